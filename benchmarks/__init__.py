@@ -1,1 +1,1 @@
-"""Measured figures beside the bars they must reach: ``make bench``, or ``python -m benchmarks identify``."""
+"""Measured figures and the bars that they must reach: ``make bench``, or ``python -m benchmarks identify``."""

@@ -1,4 +1,4 @@
-"""One measured figure beside its bar."""
+"""A measured figure with its bar, and a stopwatch."""
 
 import resource
 import time
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Bar:
-    """``figure`` was measured, ``limit`` is the bar; ``sense`` is "<=" or ">=", or "" where only printed."""
+    """Measured ``figure`` and its ``limit``, the bar. ``sense`` is "<=" or ">=", or "" if it is only printed."""
 
     name: str
     figure: float

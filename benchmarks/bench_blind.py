@@ -14,7 +14,7 @@ from turnout_blind.strata import case_id, plan_cases
 
 
 def bars():
-    """Size of a full set, CPU seconds per case, then what the revealed set shows."""
+    """Size of a full set, CPU time per case, and the figures of the revealed set."""
     effects = load_effects()
     plans = plan_cases(1, effects)
     strata = Counter(p.stratum for p in plans)

@@ -26,7 +26,7 @@ IN_BAND = (20.0, 800.0)
 
 @dataclass
 class Trial:
-    """Errors (n_test, p) of ln f and relative zeta in turn, and what else happened in the tests of one location."""
+    """Errors (n_test, p) of ln f and relative zeta in turn, and other results of the tests at one location."""
 
     errors: list = field(default_factory=list)
     bounds: list = field(default_factory=list)
@@ -45,7 +45,7 @@ class Trial:
 
 
 def trial(location, n_test, seed, with_bound=False, **conditions) -> Trial:
-    """``n_test`` synthetic tests of ten blows at a location, identified; frequencies are not told."""
+    """Identify ``n_test`` synthetic tests of ten impacts at a location, without prior frequencies."""
     model = published_model(location)
     truth = np.stack([np.log(model.frequency), model.damping], axis=1)
     result = Trial()
@@ -99,7 +99,7 @@ def accuracy():
 
 
 def unmodelled():
-    """B2: two unmodelled modes and drift, frequencies not told."""
+    """B2: two unmodelled modes and drift, without prior frequencies."""
     for snr, limits in ((40.0, (0.5, 2.5)), (26.0, (1.2, 7.0))):
         conditions = {"snr_db": snr, "nuisance": UNMODELLED, "drift": 0.05}
         trials = [trial(name, 100, 2, with_bound=True, **conditions) for name in LOCATIONS]
@@ -137,7 +137,7 @@ def _coverage_bars(name, result, spread, snr):
 
 
 def paper():
-    """B4: the paper's tables against each other, and the bias beside its method."""
+    """B4: consistency of the paper's tables, and the bias of its method."""
     pairs = {pair.key: pair for pair in TABLE_1 + TABLE_2}
     error = []
     for row in TABLE_3:
@@ -161,7 +161,7 @@ def paper():
 
 
 def _fastest(action, repeats=15):
-    """Least CPU time of several runs [ms]: what the computation costs on an undisturbed core."""
+    """Least CPU time of several runs [ms]: the cost on an undisturbed core."""
     action()
     taken = []
     for _ in range(repeats):
@@ -172,7 +172,7 @@ def _fastest(action, repeats=15):
 
 
 def speed():
-    """B5."""
+    """B5: CPU time and memory of ERA and of the identification."""
     record = hammer_test("CP A7", 1, 6, duration=0.5).decays(8000)[0]
     yield Bar("B5 ERA n = 4000, order 4", _fastest(lambda: era(record, 4, 4000, 20e3)), 10.0, "ms CPU")
     peaks = {}
@@ -214,7 +214,7 @@ def turnout():
 
 
 def _seconds_of(places, force):
-    """Least CPU time from the recordings of all places to their modes [s]."""
+    """Least CPU time from the recordings of all locations to their modes [s]."""
 
     def whole():
         for recordings in places:
@@ -247,7 +247,7 @@ def power():
 
 
 def silence():
-    """Records without any vibration must give no mode."""
+    """Records without vibration must give no mode."""
     rng = np.random.default_rng(10)
     found = sum(len(identify(list(rng.standard_normal((10, 600))), 20e3, SETTINGS).modes) for _ in range(200))
     yield Bar("modes found in tests of white noise", found, 0, n="n=200")
@@ -257,6 +257,6 @@ def silence():
 
 
 def bars():
-    """All bars of this part."""
+    """All bars of the identification."""
     for group in (paper, speed, turnout, silence, accuracy, unmodelled, power, coverage):
         yield from group()

@@ -1,7 +1,7 @@
-"""Bars of the diagnosis: the recorded oscillator, what campaigns can tell, single cases of a track, cost.
+"""Benchmarks of the diagnosis: a recorded oscillator, information in planned campaigns, cases of a track, cost.
 
-The whole development set takes hours of one core; by default three of its cases run. TURNOUT_MISMATCH_CASES names
-others, TURNOUT_MISMATCH_CASES=all runs every one; "whole turnout" is one of eight hammer points and twenty trains.
+The whole development set takes hours of one core. By default three of its cases run. TURNOUT_MISMATCH_CASES names
+others, and "all" runs every one. "whole turnout" is one of eight hammer points and twenty trains.
 """
 
 import os
@@ -52,7 +52,7 @@ EFFECTS = {
     "high_pass": (physics.HighPass("S4", 18.0), {"sensor": "S4"}),
     "clock_drift": (physics.ClockDrift("S1", 2e-3), {"sensor": "S1"}),
 }
-# Closed by the heavy train alone: one that no train closes cannot be told from no ballast at all.
+# A gap that only the heavy train closes. One that no train closes cannot be distinguished from missing ballast.
 SECOND = {"hanging_sleeper": (physics.HangingSleeper(43, 8e-4), {"place": 25.8})}
 DEVELOPMENT = [(f"control {k}", None, {}) for k in range(12)]
 DEVELOPMENT += [(name, *entry) for more in (EFFECTS, SECOND) for name, entry in more.items()]
@@ -69,7 +69,7 @@ def bars():
 
 
 def silverbox():
-    """The recorded oscillator, told nothing, and with the right law taken away."""
+    """The recorded oscillator, with all laws as candidates and without the right one."""
     shared = Path(os.environ.get("TURNOUT_SHARED_DATA", Path(__file__).parents[2] / "shared" / "data"))
     path = shared / "nonlinear_silverbox" / "SNLS80mV.csv"
     if not path.is_file():
@@ -94,17 +94,17 @@ def silverbox():
 
 
 def reserved_of(case):
-    """Observations that only the verification reads."""
+    """Observations reserved for the verification."""
     return case.reserved
 
 
 def predicted(case, found):
-    """Their predictions by the fitted model."""
+    """Predictions of the reserved observations by the fitted model."""
     return predict_reserved(case, found.fit, case.reserved)
 
 
 def planned():
-    """Nats lost when an effect is explained by nuisances alone."""
+    """Evidence lost if an effect is explained by nuisance parameters alone [nats]."""
 
     def seen(plan, family):
         matrix = distinguishability(PlannedCase(plan, families=(family,)))
@@ -119,7 +119,7 @@ def planned():
 
 
 def development():
-    """Cases made with our own simulator: necessary, not sufficient."""
+    """Cases simulated by the same code as in the diagnosis: a necessary test, not a sufficient one."""
     wanted = os.environ.get("TURNOUT_MISMATCH_CASES", ",".join(DEFAULT)).split(",")
     chosen = [(k, *c) for k, c in enumerate(DEVELOPMENT) if wanted == ["all"] or c[0] in wanted]
     if not chosen:
@@ -148,11 +148,11 @@ def development():
 
 
 def whole_turnout():
-    """One turnout as a maintainer measures it; asked for by name, it takes minutes."""
+    """One turnout as a maintainer measures it. It takes minutes and runs only on request."""
     if WHOLE not in os.environ.get("TURNOUT_MISMATCH_CASES", ""):
         return
     campaign = measured_campaign(turnout_plan(), (physics.HangingSleeper(52, 8e-4),), 700)
-    chosen = select_passages(campaign.passages)  # as turnout diagnose does
+    chosen = select_passages(campaign.passages)  # as `turnout diagnose` does
     campaign = replace(campaign, passages=tuple(chosen), reserved=reserved_names(chosen, campaign.hammer))
     started = time.monotonic()
     with stopwatch() as watch:
@@ -170,7 +170,7 @@ def _said(done, total, what):
 
 
 def located(found, where):
-    """Place within one bay, sensor and train as they are."""
+    """Whether the position is right within one bay, and sensor and train are right."""
     said = found.fit.candidates[0].where
     for key, value in where.items():
         if key == "place" and abs(said.get("place", np.inf) - value) > 0.6:
@@ -181,8 +181,10 @@ def located(found, where):
 
 
 def inside(found, term):
-    """The first parameter within 1.96 standard errors; of two waves a quarter apart, whose shares turn with the place
-    they are counted from, their amplitude."""
+    """Whether the first parameter is within 1.96 standard errors.
+
+    For a sine and a cosine their amplitude is compared, since their shares depend on the origin of the position.
+    """
     candidate, n = found.fit.candidates[0], len(found.fit.values)
     names = [p.name for p in candidate.parameters]
     if {"sine", "cosine"} <= set(names):

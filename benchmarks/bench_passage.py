@@ -1,4 +1,4 @@
-"""Bars of the passage part: the paper's models, simulated trains, real axle times, clusters, cost."""
+"""Benchmarks of the passage analysis: the paper's models, simulated trains, real axle times, clusters, cost."""
 
 import json
 from collections.abc import Iterator
@@ -48,7 +48,7 @@ def bars() -> Iterator[Bar]:
 
 
 def known_patterns():
-    """The axle patterns that are shipped."""
+    """The axle patterns in config/vehicles."""
     return read_patterns(YAML(typ="safe").load(ROOT / "config" / "vehicles" / "axle_patterns.yaml"))
 
 
@@ -98,7 +98,7 @@ def scores_and_times() -> Iterator[Bar]:
 
 
 def _ceilings(passage):
-    """Fit and forecast that the true response itself reaches on the noisy data. [%]"""
+    """Fit and forecast that the true response reaches on the noisy data [%]."""
     through = band_pass(80, 800, 4, RATE)
     data, clean = apply_filter(passage.samples, through), apply_filter(passage.clean, through)
     found = []
@@ -131,7 +131,7 @@ def noise_passages() -> Iterator[Bar]:
 
 
 def real_axle_times() -> Iterator[Bar]:
-    """Fifteen trains at two places near Bern."""
+    """Fifteen trains at two sections near Bern."""
     path = ROOT.parent / "shared" / "data" / "track_sbb_niederwangen" / "results.json"
     if not path.exists():
         return
@@ -162,7 +162,7 @@ def _count_of_bursts(train, rng):
 
 
 def axle_geometry() -> Iterator[Bar]:
-    """Thirty train types, each with and without its own template."""
+    """Thirty train types, each with and without its template."""
     from importlib.util import module_from_spec, spec_from_file_location
 
     folder = ROOT.parent / "shared" / "data" / "train_axle_geometry" / "data"
@@ -245,7 +245,7 @@ def simulated_fleet(runs=None, strangers=None) -> Iterator[Bar]:
 
 
 def _loads(cases) -> Iterator[Bar]:
-    """Load of every other train after calibration on the rest."""
+    """Axle load of each train after calibration on the others."""
     amplitude = [
         {
             c.name: train_amplitude(quasi_static(recording.signal(c.name), RATE, passage, c.position))
@@ -281,12 +281,15 @@ def _loads(cases) -> Iterator[Bar]:
     else:
         yield Bar("simulated: loads given", 0, None, "", "", n, "none: every standard error is above the limit")
     if off.size:
-        note = f"median standard error {100 * np.median(sure):.1f} %, {np.mean(off < 2 * sure):.0%} within two of them"
+        note = (
+            f"median standard error {100 * np.median(sure):.1f} %, "
+            f"{np.mean(off < 2 * sure):.0%} within two of them"
+        )
         yield Bar("simulated: median error of all loads, given or not", 100 * np.median(off), None, "%", "", "", note)
 
 
 def cluster_bars() -> Iterator[Bar]:
-    """Clusters of a traffic whose kinds are known; one more night; effects on a score with known causes."""
+    """Clusters of traffic with known types, clusters after one more night, and effects on a score with known causes."""
     from importlib.util import module_from_spec, spec_from_file_location
 
     spec = spec_from_file_location("traffic", ROOT / "tests" / "unit" / "passage" / "test_passage_clusters.py")
@@ -388,7 +391,7 @@ print(peak() - before, time.process_time() - began, *axles)
 
 
 def _logger_file(rng) -> Iterator[Bar]:
-    """Files of 200 s and 600 s, whole numbers of 2 bytes, read, cut and analysed in a process of their own."""
+    """Files of 200 s and 600 s of 2-byte integers, read, cut and analysed in a separate process."""
     import subprocess
     import sys
     import tempfile

@@ -1,7 +1,7 @@
-"""The same hammer tests through this program and through well-known packages: accuracy and time.
+"""Compare this program with well-known packages on the same hammer tests: accuracy and time.
 
-Packages of the extra ``peers``; one that is not installed is named with the reason and left out. Settings are the
-best we found for each. Packages that do not select modes by themselves are told which pole is nearest to the truth.
+The packages are those of the extra ``peers``; one that is not installed is left out with the reason. Settings are the
+best ones known to us. For packages that do not select modes, the pole nearest to the truth is taken.
 """
 
 import contextlib
@@ -28,7 +28,7 @@ CASES = {
 
 
 def ours(test):
-    """Joint identification, modes selected by itself, errors included."""
+    """Joint identification with automatic selection of modes and error bars."""
     model = identify(test.decays(), test.rate, SETTINGS)
     return np.array([m.frequency for m in model.modes]), np.array([m.damping for m in model.modes])
 
@@ -68,7 +68,7 @@ def pymor_era(test):
 
 
 def sdypy_lscf(test):
-    """LSCF of order 30 on H1, told the true frequencies."""
+    """LSCF of order 30 on H1, given the true frequencies."""
     from sdypy import EMA
 
     force, response = np.fft.rfft(test.force), np.fft.rfft(test.acceleration)
@@ -82,7 +82,7 @@ def sdypy_lscf(test):
 
 
 def pyoma2_ssi(test):
-    """Covariance-driven SSI of the mean decay by its functions, order 10; the class masks a single channel."""
+    """Covariance-driven SSI of the mean decay, order 10, by functions, since the class fails for one channel."""
     from pyoma2.functions import ssi
 
     mean = np.mean(test.decays(), axis=0)[None]
@@ -122,7 +122,7 @@ def _quietly(action, *arguments):
 
 
 def _errors(answer, test, mode):
-    """Relative errors of the nearest mode against the mean of the blows, nan if none lies within 20 %."""
+    """Relative errors of the nearest mode against the mean over the impacts, nan if none lies within 20 %."""
     frequency, damping = answer
     true_f, true_zeta = test.frequency[:, mode].mean(), test.damping[:, mode].mean()
     if not len(frequency):
@@ -142,7 +142,7 @@ def _table(action, conditions):
             start = time.process_time()
             try:
                 answer = _quietly(action, test)
-            except Exception:  # a peer that fails on a record has not found its modes
+            except Exception:  # a package that fails on a record has found no modes
                 answer = np.empty(0), np.empty(0)
             taken.append(time.process_time() - start)
             ballast.append(_errors(answer, test, 0))

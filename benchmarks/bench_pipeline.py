@@ -1,4 +1,4 @@
-"""The whole hammer chain against the floor: CPU time from raw files to registry over that of only reading them."""
+"""CPU time of the hammer pipeline, from raw files to registry, over that of only reading the files."""
 
 import shutil
 import tempfile

@@ -1,7 +1,7 @@
-"""Readers: CPU time of ``read`` over CPU time of the bare library call on the same file, MB/s, and B11.
+"""CPU time of ``read`` over that of the bare library call on the same file, MB/s, and bar B11.
 
-A hammer file of 10 records, 2 channels, 1 s at 51,200 Hz in double precision: 16.4 MB of samples. Text formats get a
-tenth of it. ``read`` also hashes the file, converts units, checks every sample and every count.
+The file has 10 records, 2 channels, 1 s at 51,200 Hz in double precision: 16.4 MB of samples. Text formats get a
+tenth of it. ``read`` also hashes the file, converts units, and checks every sample and every count.
 """
 
 import tempfile
@@ -25,7 +25,7 @@ from turnout.records import Channel, RawChannel, RawDescription, Recording
 
 RATE = 51200.0
 TEXT = ("uff58", "csv", "lvm")
-BARRED = ("uff58b", "hdf5", "tdms")  # pipeline over floor below 5 needs reading well below it
+BARRED = ("uff58b", "hdf5", "tdms")  # a pipeline within 5 times the bare reading needs a fast reader
 REPEATS = 5
 
 
@@ -114,7 +114,7 @@ def bars():
 
 
 def _vendors():
-    """B11: every set of pyuff's problem files, as pyuff reads it where pyuff gives all of it."""
+    """B11: every data set of the problem files of pyuff, compared with what pyuff reads."""
     from turnout.readers.uff_datasets import read_datasets
 
     folder = Path(__file__).resolve().parents[2] / "shared" / "data" / "uff58_reader_samples"

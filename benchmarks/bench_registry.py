@@ -51,7 +51,7 @@ def _register_in_own_process(work, registry):
 
 
 def registering(folder):
-    """R2, and what a result with all its impacts and curves costs."""
+    """R2, and the cost of a result with all its impacts and curves."""
     n = int(28000 * SHARE)
     hammer_batches(folder / "work", n)
     best = min(_register_in_own_process(folder / "work", folder / f"registry{k}") for k in range(3))
@@ -71,7 +71,7 @@ def registering(folder):
 
 
 def rerun(folder):
-    """R5: nothing twice; two at once give the union."""
+    """R5: a second run adds nothing, and two concurrent runs give the union."""
     hammer_batches(folder / "one", 800)
     hammer_batches(folder / "other", 1600)
     batches = sorted((folder / "one").glob("*.parquet"))
@@ -100,7 +100,7 @@ def _ask(registry, sql):
 
 
 def empty(folder):
-    """R8 here, R7 by the tests that name each case."""
+    """R8 here; R7 by the tests of each case."""
     register([], folder / "registry", read=iter)
     failed = sum(_fails(folder / "registry", call) for call in views())
     yield Bar("R8 views and macros that fail on an empty registry", failed, 0, "", n=f"of {len(views())}")
@@ -132,7 +132,7 @@ def _fails(registry, call):
 
 
 def versions(folder):
-    """R6: the registry of this DuckDB, opened and asked by an older one in an environment of its own."""
+    """R6: a registry of this DuckDB, opened and queried by an older version in a separate environment."""
     hammer_batches(folder / "work", 80)
     register(sorted((folder / "work").glob("*.parquet")), folder / "registry", read=read_results)
     python = folder / "venv" / "bin" / "python"
@@ -162,7 +162,7 @@ def versions(folder):
 
 
 def racing(folder):
-    """R4: 15 s of writing and compaction; the glob must fail where the list does not."""
+    """R4: 15 s of writing and compaction. Reading by a glob must fail, reading by the published list must not."""
     listed, globbed = race(folder / "list"), race(folder / "glob", through_glob=True)
     yield Bar(
         "R4 wrong counts and errors, published list", listed.wrong + listed.errors, 0, "", n=f"{listed.reads} reads"

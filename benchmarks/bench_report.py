@@ -1,4 +1,4 @@
-"""Pages of a network: 3,500 turnouts of eight sections, twelve campaigns each."""
+"""CPU time and size of the pages of a network: 3,500 turnouts of eight sections, twelve campaigns each."""
 
 import shutil
 import tempfile
@@ -53,7 +53,7 @@ def bars():
 
 
 def _network(folder):
-    """In-memory database with the registry's views as tables, one turnout repeated."""
+    """In-memory database with the views of the registry as tables, in which one turnout is repeated."""
     bench_pipeline._write(folder / "raw", "hdf5")
     configuration = load_configuration("config")
     turnout = with_raw(configuration.turnout("tommerup_s1"), folder / "raw")
@@ -73,7 +73,7 @@ def _network(folder):
 
 
 def _repeat(connection, name, times):
-    """SQL that makes table ``name``: the one turnout's rows under every turnout's id, ``times`` campaigns back."""
+    """SQL that makes table ``name``: the rows of one turnout under the id of every turnout, for ``times`` campaigns."""
     columns = [d[0] for d in connection.execute(f"select * from r.{name} limit 0").description]
     other = {
         "turnout_id": "printf('t%05d', k)",

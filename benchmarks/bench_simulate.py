@@ -1,7 +1,6 @@
-"""The simulation beside its bars: cost, growth, accuracy against closed forms and against other programs' curves.
+"""Benchmarks of the simulation: cost, growth of cost, accuracy against closed forms and curves of other programs.
 
-Figures quoted for other programs are those of the project's notes, measured there on a two-core server, and are
-named "quoted"; nothing of them is run here.
+Figures named "quoted" are those of the project's notes, measured on a two-core server. Other programs are not run here.
 """
 
 import subprocess
@@ -42,7 +41,7 @@ def bars():
 
 
 def best_of(n, work):
-    """Least CPU seconds of ``n`` repetitions: the machine is shared, only the least is the program's."""
+    """Least CPU seconds of ``n`` repetitions: on a shared machine the least is that of the program."""
     least = np.inf
     for _ in range(n):
         with stopwatch() as watch:
@@ -83,7 +82,7 @@ def cost():
 
 
 def growth():
-    """Cost over length, time step and wheels, as the ratio to what proportional growth would give."""
+    """Cost against length, time step and number of wheels, compared with proportional growth."""
     seconds = {}
     for length in (48.0, 96.0, 192.0, 384.0):
         prepared = prepare(uniform_track(length), 1e-4)
@@ -124,7 +123,7 @@ def trains():
 
 
 def accuracy():
-    """Closed forms, and our own error by halving."""
+    """Accuracy against closed forms, and the discretization error by halving step and mesh."""
     rail = Rail(210e9 * 3.055e-5, 60.21, 0.4 * 81e9 * 76.7e-4, 7850 * 3.055e-5, damping=2.0)
     frequency = np.arange(20.0, 901.0, 2.0)
     for elements in (4, 8, 16):
@@ -166,7 +165,7 @@ def accuracy():
 
 
 def other_programs():
-    """Curves of other people's models, where they lie beside the checkout; and quoted costs."""
+    """Curves of other models, if they lie beside the checkout, and quoted costs."""
     if CURVES.is_dir():
         yield from rolland()
         yield from nordborg()
@@ -185,8 +184,8 @@ def other_programs():
 def rolland():
     """Mobility of the two discretely supported tracks of rolland's tests.
 
-    Their columns are numbers, not readings: what differs is the rail's mass, 60.21 kg/m or density times area,
-    60.34 kg/m, which shifts the resonances by 0.1 % and the slopes behind them by 0.1 dB.
+    Their columns are computed, not digitised. The difference is the mass of the rail: 60.21 kg/m, or density times
+    area, 60.34 kg/m. It shifts the resonances by 0.1 % and the slopes behind them by 0.1 dB.
     """
     table = np.genfromtxt(CURVES / "rolland_data_analytical_methods.csv", delimiter=",", names=True)
     rail = Rail(210e9 * 3038.3e-8, 60.21, 0.4 * 81e9 * 76.7e-4, 7850 * 3038.3e-8)
@@ -203,7 +202,7 @@ def rolland():
 
 
 def nordborg():
-    """Nordborg's receptance as digitised by others: load moving at 60 m/s, read to about 1 dB."""
+    """Nordborg's receptance, digitised by others to about 1 dB: a load moving at 60 m/s."""
     text = (CURVES / "nordborg_data.csv").read_text().replace(",", ".").splitlines()
     frequency, level = np.array([[float(v) for v in line.split(";")] for line in text]).T
     rail = Rail(2.1e11 * 22.5e-6, 60.0, 1.0, beam="euler")

@@ -1,7 +1,7 @@
 """False alarms, delays, ranking, dates and cost of the trend charts on simulated fleets of known truth.
 
-The simulator (trend_fleet.py) knows nothing of the charts. Nothing was tuned on the seeds scored here: the guard
-comes from another simulation and other seeds (docs/decisions/guard_factor.md), thresholds from Siegmund's formula.
+The simulator (trend_fleet.py) is independent of the charts. Nothing was tuned on the seeds used here. The guard comes
+from another simulation with other seeds (docs/decisions/guard_factor.md), the thresholds from Siegmund's formula.
 """
 
 import json
@@ -27,7 +27,7 @@ FLEET = 56_000
 
 
 def bars():
-    """All bars of the trend, in the order of the table they come from."""
+    """All bars of the trend, in the order of their table."""
     yield from false_alarms()
     yield from rare_campaigns()
     yield from delays()
@@ -45,12 +45,12 @@ def bars():
 
 
 def raised(opened):
-    """(n_chart, n_campaign) bool: the campaign opens an alarm."""
+    """(n_chart, n_campaign) bool: whether the campaign opens an alarm."""
     return np.diff(opened.astype(np.int8), axis=1, prepend=0) > 0
 
 
 def false_alarms(parts=14, turnouts=500, years=3):
-    """T1: sound charts, everything estimated from the first year; all alarms of both directions count."""
+    """T1: charts without change, all parameters estimated from the first year. Alarms of both directions count."""
     for phi in (0.0, 0.2, 0.4):
         found = dict.fromkeys(("down", "up", "whole"), 0)
         for part in range(parts):
@@ -68,7 +68,7 @@ def false_alarms(parts=14, turnouts=500, years=3):
 
 
 def rare_campaigns(turnouts=750, years=5):
-    """False alarms of those promised where a campaign comes every other week, or every fourth."""
+    """False alarms over the expected number, if a campaign comes every second or fourth week."""
     promised = 1.0 / SETTINGS.run_length_loss + 1.0 / SETTINGS.run_length_gain
     for every in (2, 4):
         for phi in (0.0, 0.2, 0.4):
@@ -112,7 +112,7 @@ PAPER = {"OT": (154.6, 11.7), "SP": (167.2, 7.0), "CLP": (105.9, 20.0), "CP A7":
 
 
 def detectable():
-    """T3: with the paper's printed spreads as one sigma of a campaign, who says that it cannot see 3 % of stiffness?"""
+    """T3: sections that report that they cannot detect 3 % of stiffness, with the paper's spreads as sigma."""
     blind, numbers = 0, []
     for i, (name, (frequency, spread)) in enumerate(PAPER.items()):
         fleet = Fleet(turnouts=60, sections=1, weeks=2 * YEAR, phi=0.2, campaign=0.0, sigma=100 * spread / frequency,
@@ -127,7 +127,7 @@ def detectable():
 
 
 def ranking(turnouts=1750):
-    """T4: 2 % of 14,000 charts decline for a year; whose first fifty are right?"""
+    """T4: 2 % of 14,000 charts decline for a year. Precision of the first fifty of two rankings."""
     rng = np.random.default_rng(44)
     fleet = Fleet(turnouts=turnouts, weeks=2 * YEAR, phi=0.2)
     which = np.zeros(fleet.charts, dtype=bool)
@@ -165,7 +165,7 @@ def after_reset(turnouts=2000):
 
 
 def dates(draws=2000):
-    """T6: intervals of the time to the limit on lines, and whether a curve that settles is promised a date."""
+    """T6: intervals of the time to the limit for linear trends, and dates wrongly given for a curve that settles."""
     rng = np.random.default_rng(61)
     for years in (1, 2, 3):
         inside, verdicts, noise = 0, [], ar_noise(rng, draws, YEAR * years, 0.2, 0.6)
@@ -191,7 +191,7 @@ def dates(draws=2000):
 
 
 def ar_noise(rng, n, length, phi, sigma):
-    """(n, length) noise with memory. [%]"""
+    """(n, length) autocorrelated noise [%]."""
     noise = rng.standard_normal((n, length))
     for i in range(1, length):
         noise[:, i] = phi * noise[:, i - 1] + np.sqrt(1 - phi**2) * noise[:, i]
@@ -199,7 +199,7 @@ def ar_noise(rng, n, length, phi, sigma):
 
 
 def season_only(turnouts=300):
-    """T7: work in October that changes nothing; how often is it called a change?"""
+    """T7: share of works in October without effect that are reported as a change."""
     from tests.oracles.trend_views import connect_views
 
     from turnout.trend import baseline_rows, chart_rows
@@ -224,7 +224,7 @@ def season_only(turnouts=300):
 
 
 def oracle():
-    """T8: sums by a plain loop, residuals by pandas, slopes by statsmodels; never by the code that made the charts."""
+    """T8: sums by a plain loop, residuals by pandas, slopes by statsmodels, independent of the code of the charts."""
     from tests.oracles.trend_views import connect_views
 
     from benchmarks.trend_oracle import cusum_by_loop, residuals_by_pandas, slopes_by_statsmodels
@@ -260,7 +260,7 @@ def version():
 
 
 def drift_discoveries(turnouts=875):
-    """Share of false names among the drifts reported at a rate of 10 %."""
+    """Share of false ones among the drifts reported at a false discovery rate of 10 %."""
     from turnout.trend import candidates, describe_flagged
 
     rng = np.random.default_rng(91)
@@ -277,7 +277,10 @@ def drift_discoveries(turnouts=875):
 
 
 def real_track():
-    """The real record: error of a campaign left out, with and without temperature; docs/niederwangen_decay_rate.md."""
+    """Real data: prediction error of a campaign left out, with and without temperature.
+
+    See docs/niederwangen_decay_rate.md.
+    """
     from benchmarks.niederwangen import analyse, verdict_words
     from turnout.trend.drift import adjusted_p_values
 
@@ -306,7 +309,7 @@ def real_track():
 
 
 def demonstration():
-    """The demonstration fleet, where it has been run: the true drift against everything else on the list."""
+    """The demonstration fleet, if it has been run: rank of the true drift on the work list."""
     from turnout.demo.scenario import FLEET as scenarios
     from turnout.registry.database import open_registry
 
@@ -346,7 +349,7 @@ def demonstration():
 
 
 def nightly(turnouts=3500, weeks=520):
-    """The whole fleet: one more week, then all charts and the worklist."""
+    """The whole fleet: add one week, then update all charts and the work list."""
     from benchmarks.trend_registry import registry_of_modes
 
     with tempfile.TemporaryDirectory() as folder:

@@ -1,7 +1,7 @@
-"""W1-W4: what the workflow itself costs over a network, and what survives damage and kills.
+"""W1-W4: cost of the workflow itself on a network, and its behaviour after damage and kills.
 
-The raw files are tiny and the chain only reads them, so that orchestration is what is measured.
-TURNOUT_BENCH_SHARE (default 1) scales the number of turnouts of W1 and W2 for a quick look.
+The raw files are tiny and only read, so that the orchestration is measured. TURNOUT_BENCH_SHARE (default 1) scales the
+number of turnouts of W1 and W2 for a quick look.
 """
 
 import os
@@ -26,7 +26,7 @@ N_KILL, N_DAMAGE_TURNOUT = 20, 125
 
 
 def bars():
-    """Each figure is of a cold process of its own."""
+    """All bars; each figure is that of a new, cold process."""
     folder = Path(tempfile.mkdtemp(prefix="turnout-bench-"))
     try:
         yield from network(folder / "network")
@@ -79,7 +79,7 @@ def network(folder):
 
 
 def make_network(folder):
-    """Many turnouts fast: the bytes of a file are made once per section and test, its name tells them apart."""
+    """Write many turnouts quickly: all files share the same bytes, followed by their name."""
     toy.make(folder, n_turnout=1, n_section=N_SECTION)
     shutil.rmtree(folder / "raw")
     ids = [f"T{i:05d}" for i in range(N_TURNOUT)]
@@ -98,7 +98,7 @@ def make_network(folder):
 
 
 def measured(folder):
-    """Run the workflow; what it said, CPU and wall seconds, peak memory of its largest process [MB]."""
+    """Run the workflow: (its output, CPU and wall seconds, peak memory of its largest process [MB])."""
     with stopwatch() as watch, open(folder / "said", "w") as out:
         run = subprocess.Popen(
             toy.command(shards=SHARDS, chain="toy_fleet:nothing"), cwd=folder, env=toy.environment(), stdout=out,
@@ -112,7 +112,7 @@ def measured(folder):
 
 
 def count(said, word):
-    """Sum over the shards of one number of their summary lines."""
+    """Sum over the shards of one number in their summary lines."""
     return sum(int(n) for n in re.findall(rf"^hammer \d+of\d+:.*?(\d+) {word}", said, re.M))
 
 
@@ -121,7 +121,7 @@ def jobs(said):
 
 
 def damage_and_kills(folder):
-    """W3: one per cent damaged in ten ways; killed twenty times; the registry as if nothing had happened."""
+    """W3: one per cent of the files damaged in ten ways, and twenty kills. The registry must be unaffected."""
     fleet = toy.make(folder / "fleet", n_turnout=N_DAMAGE_TURNOUT, n_section=8)
     files = sorted((fleet / "raw").glob("*/hammer/*/*.npz"))
     kinds = toy.damages(fleet)
@@ -157,7 +157,7 @@ def quarantined(folder):
 
 
 def killed(folder, seconds):
-    """Start the unattended run, kill it and all its jobs; True where it had not ended before."""
+    """Start the unattended run and kill it with all its jobs; True if it had not ended before."""
     profile = str(toy.REPOSITORY / "profiles/default")
     command = [
         sys.executable,

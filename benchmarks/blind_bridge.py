@@ -36,7 +36,7 @@ LESSER = {
 
 
 def campaigns_of(folder, case):
-    """Campaigns of the engine, one per group of neighbouring sections, over all visits of a case."""
+    """Campaigns for the engine, one per group of neighbouring sections, over all visits of a case."""
     folder = Path(folder)
     raw = folder / "raw"
     turnout = with_raw(load_configuration(folder / "config").turnout(case), raw)
@@ -46,7 +46,7 @@ def campaigns_of(folder, case):
 
 
 def case_of(campaign, settings=None, lesser=None):
-    """``TrackCase`` of a campaign, made poorer as ``lesser`` says."""
+    """(``TrackCase``, settings) of a campaign, reduced as ``lesser`` says."""
     settings = settings or MismatchSettings()
     if lesser == "no_materiality":
         settings = replace(settings, materiality=0.005, pair_tolerance=0.005)
@@ -61,7 +61,7 @@ def case_of(campaign, settings=None, lesser=None):
 
 
 def rows(folder, case, lesser=None):
-    """Finding rows of all groups, one per effect found, or one "none"."""
+    """Finding rows of all groups, one per effect, or one "none"."""
     found = []
     for campaign in campaigns_of(folder, case):
         made, settings = case_of(campaign, lesser=lesser)
@@ -81,7 +81,7 @@ def _by_diagnosis(case, settings, lesser):
 
 
 def _by_score_test(case, settings):
-    """The family that leads the queue, if its linear gain is beyond the threshold."""
+    """Row of the first candidate of the shortlist, if the residual exceeds the control level."""
     base = fit_jointly(case, iterations=settings.base_iterations)
     plan = shortlist(case, base, settings)
     if not plan or max(base.level.values()) <= settings.control_level:

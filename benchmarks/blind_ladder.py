@@ -19,12 +19,12 @@ HIDDEN = {"hammer_pct": 6.0, "passage_pct": 46.0}
 
 
 def index_of(seen):
-    """Largest share over what hides it."""
+    """Largest ratio of a share to what hides it."""
     return max(seen[kind] / HIDDEN[kind] for kind in HIDDEN)
 
 
 def measured(effect, rung, seed):
-    """Shares [%] that the effect makes up at a site drawn by ``seed``."""
+    """Shares [%] that the effect makes up at a site drawn with ``seed``."""
     rng = np.random.default_rng([seed, 5])
     site = draw_site(rng, **effect.site)
     world = site.world.copy()

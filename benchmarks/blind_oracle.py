@@ -30,8 +30,8 @@ from turnout_blind.score.names import SAME, right_names
 from turnout_blind.score.report import provenance
 from turnout_blind.seal import digest_of_folder
 
-STEPS = 15
-STARTS = 2  # beside the truth itself: scans of phase and frequency have dozens
+STEPS = 15  # iterations of each fit
+STARTS = 2  # starts beside the truth itself; scans of phase and frequency have dozens
 
 
 def oracle(folder, case, truth):
@@ -54,8 +54,10 @@ def oracle(folder, case, truth):
 
 
 def _with(case, fit, effect):
-    """The best fit with this effect in it, where it is, from the truth itself and from the likeliest starts; what
-    nuisances may have bent to take the effect's place starts at its prior as well."""
+    """Best fit with this effect at its true position, from the truth and from the likeliest starts.
+
+    Nuisance parameters that can mask the effect start also at their prior.
+    """
     found = {}
     unbent = fit.values | {n.name: n.mean for n in case.nuisances if n.owner is None and n.can_mask}
     for candidate in _candidates(case, effect):
@@ -68,24 +70,24 @@ def _with(case, fit, effect):
                     found[key] = fit_jointly(
                         case, (*fit.candidates, candidate), [*fit.psi, *start], values, iterations=STEPS
                     )
-            except TurnoutError:  # it cannot be simulated from here
+            except TurnoutError:  # it cannot be simulated from this start
                 continue
     return min(found.values(), key=lambda f: f.cost, default=None)
 
 
 def _likeliest(case, fit, candidate):
-    """The ``STARTS`` of its starts that cost least before anything is fitted."""
+    """The ``N_STARTS`` starts of a candidate with the least cost before any fit."""
     cost = {}
     for start in candidate.starts:
         try:
             cost[start] = cost_at(case, (*fit.candidates, candidate), [*fit.psi, *start], fit.values)
-        except TurnoutError:  # it cannot be simulated there
+        except TurnoutError:  # it cannot be simulated from this start
             continue
     return sorted(cost, key=cost.get)[:STARTS]
 
 
 def _candidates(case, effect):
-    """Candidates of a right name at the true place, sensor, train and axle."""
+    """Candidates with a right name at the true position, sensor, train and axle."""
     where = effect["where"]
     for candidate in case.candidates:
         mine = candidate.where
@@ -96,7 +98,7 @@ def _candidates(case, effect):
 
 
 def _told(candidate, effect):
-    """Parameters as they really are where the two codes mean the same, the first start elsewhere."""
+    """True parameters where generator and tool share them, and the first start for the others."""
     known = {theirs: effect["parameters"][own] for own, theirs in SAME.get(effect["kind"], {}).items()}
     return [
         min(max(known.get(p.name, s), p.bounds[0]), p.bounds[1])
@@ -125,12 +127,13 @@ def _job(job):
 
 
 def asked(out, truths, clear, workers):
-    """Ask the clear singles that have no answer yet, or failed, and write each answer as it comes."""
+    """Compute the clear singles that have no answer yet or failed, and write each answer as it comes."""
     path, origin = out / "oracle.json", provenance(json.loads((out / "diagnosis.json").read_text()))
     mine = digest_of_folder(Path(turnout.__file__).parent)
     if mine != origin["tool_sha256"]:
         sys.exit(
-            f"{out}/diagnosis.json: judged by tool {origin['tool_sha256'][:16]}, this is {mine[:16]}. Run that one."
+            f"{out}/diagnosis.json: judged by tool {origin['tool_sha256'][:16]}, "
+            f"this is {mine[:16]}. Run that one."
         )
     held = json.loads(path.read_text()) if path.exists() else {}
     fits = held["fits"] if {k: held.get(k) for k in origin} == origin else {}

@@ -1,4 +1,4 @@
-"""Blows with and without faults, digitised as a 12-bit logger would: the material of the receptance benchmarks."""
+"""Simulated impacts with and without faults, digitised by a 12-bit logger, for the receptance benchmarks."""
 
 import numpy as np
 from scipy.signal import fftconvolve
@@ -10,7 +10,7 @@ RATE = 20_000.0
 N_SAMPLE = 4_000
 TRIGGER = 100
 CHANNELS = (Channel("hammer", "force"), Channel("rail", "acceleration", mounting="rail head at sleeper"))
-# Poles of A7 in the paper: 99.4 Hz, 0.291 and 616.5 Hz, 0.0656.
+# Response with the poles of A7 in the paper: 99.4 Hz, 0.291 and 616.5 Hz, 0.0656.
 TIME = np.arange(N_SAMPLE) / RATE
 RESPONSE = sum(
     w * np.exp(-z * 2 * np.pi * f * TIME) * np.sin(2 * np.pi * f * TIME + 0.4)
@@ -19,9 +19,9 @@ RESPONSE = sum(
 
 
 def digitise(x, rng, top_over_range, noise, bits=12):
-    """Quantise with a range that the largest sample fills to ``top_over_range``, clipping it if above 1.
+    """Quantise ``x``; its largest sample is ``top_over_range`` times the range and is clipped if that exceeds 1.
 
-    ``noise`` is white, its standard deviation over the largest sample.
+    ``noise`` is the standard deviation of white noise over the largest sample.
     """
     top = np.max(np.abs(x))
     limit = top / top_over_range
@@ -30,12 +30,12 @@ def digitise(x, rng, top_over_range, noise, bits=12):
 
 
 def untouched(x):
-    """No fault of the electronics."""
+    """No fault of the electronics: the signal itself."""
     return x
 
 
 def blow(rng, family, contact, second=None, distort=untouched, noise=(1e-3, 1e-2), filling=None, peak=None):
-    """(2, N_SAMPLE) force [N] and acceleration [m/s²] of one blow; ``second`` is (share, delay [s])."""
+    """(2, N_SAMPLE) force [N] and acceleration [m/s²] of one impact. ``second``: (share, delay [s]) of a double hit."""
     peak = 8_000.0 * rng.normal(1.0, 0.1) if peak is None else peak
     start = (TRIGGER + rng.uniform()) / RATE
     force = peak * force_pulse(family, TIME - start, contact)
@@ -52,7 +52,7 @@ def blow(rng, family, contact, second=None, distort=untouched, noise=(1e-3, 1e-2
 
 
 def test_of(rng, faulty, n_blow=10, tips=(1e-4, 3e-3), noise=(1e-3, 1e-2)):
-    """Recordings of one test with one tip; ``faulty`` (None or a function of rng and contact) shapes the last blow."""
+    """Recordings of one test with one tip. ``fault`` (None or a function of rng and contact) shapes the last impact."""
     family = list(FAMILIES)[rng.integers(len(FAMILIES))]
     contact = np.exp(rng.uniform(*np.log(tips)))
     blows = [blow(rng, family, contact * rng.normal(1.0, 0.05), noise=noise) for _ in range(n_blow)]
@@ -62,27 +62,27 @@ def test_of(rng, faulty, n_blow=10, tips=(1e-4, 3e-3), noise=(1e-3, 1e-2)):
 
 
 def second_hit(rng, contact):
-    """5 to 30 % of the first, 4 to 50 ms later."""
+    """A second impact of 5 to 30 % of the first, 4 to 50 ms later."""
     return {"second": (rng.uniform(0.05, 0.30), rng.uniform(4e-3, 50e-3))}
 
 
-RANGE = 11_000.0  # above all sound blows, so that a blow that ends there is the strongest of its test
+RANGE = 11_000.0  # limit of the converter [N], above all sound impacts: a clipped one is the strongest of its test
 
 
 def hard_clip(rng, contact):
-    """50 to 90 % of the peak fit into the converter's range: one code repeated."""
+    """Clipping by the converter: its range ends at 50 to 90 % of the peak, and one code is repeated."""
     share = rng.uniform(0.5, 0.9)
     return {"peak": RANGE / share, "filling": 1.0 / share}
 
 
 def analog_clip(rng, contact):
-    """The same by the electronics ahead of a noisy converter: no two samples need be equal."""
+    """Clipping by the electronics ahead of a noisy converter: clipped samples need not be equal."""
     noise = np.exp(rng.uniform(*np.log((1e-3, 1e-2))))
     return {"peak": RANGE / rng.uniform(0.5, 0.9), "distort": lambda f: np.minimum(f, RANGE), "noise": (noise, 1e-2)}
 
 
 def soft_clip(rng, contact):
-    """Saturation c tanh(F / c) that takes a quarter to a half off the peak."""
+    """Saturation c tanh(F / c) that reduces the peak by a quarter to a half."""
     drive = rng.uniform(1.0, 2.0)
     c = RANGE / np.tanh(drive)
     return {"peak": drive * c, "distort": lambda f: c * np.tanh(f / c)}

@@ -1,8 +1,8 @@
-"""Track decay rates of Bern-Niederwangen: which sections changed between which campaigns, and how sure is that.
+"""Track decay rates of Bern-Niederwangen: which sections changed between which campaigns, with what probability.
 
     python -m benchmarks.niederwangen FOLDER     writes docs/niederwangen_decay_rate.md and its figure
 
-FOLDER holds track_decay_rate.csv. Whatever stands in the page is computed here; its prose is fixed.
+FOLDER holds track_decay_rate.csv. All numbers of the page are computed here; its text is fixed.
 """
 
 import sys
@@ -37,7 +37,7 @@ def read(folder):
     for direction in DIRECTIONS:
         part = rows[rows["direction"] == direction]
         wide = part.pivot_table(index=["section", "campaign", "rail"], columns="frequency_hz", values="log")
-        # Three rails were not measured: the usual difference of the rails is taken out before they are averaged.
+        # Three rails were not measured: the mean difference of the rails is removed before they are averaged.
         both = wide.xs("left", level="rail") - wide.xs("right", level="rail")
         sign = np.where(wide.index.get_level_values("rail") == "left", 0.5, -0.5)
         cells = (wide - sign[:, None] * both.mean().to_numpy()).groupby(level=["section", "campaign"]).mean()
@@ -49,12 +49,12 @@ def read(folder):
 
 
 def analyse(folder, n_permutation=4000):
-    """Everything that the page says, as a dictionary of numbers and tables."""
+    """All results of the page, as a dictionary of numbers and tables."""
     blocks, sections, campaigns, bands, rows = read(folder)
     together = list(blocks.values())
     found = verdicts(together, n_permutation)
     alone = {name: verdicts([block], n_permutation) for name, block in blocks.items()}
-    # Steps of every section at one place, so that every section gets a p value, also those without a split.
+    # Sections without a split get the common one, so that every section has a p value.
     common = max(set(v.split for v in found if v.split) or {1}, key=[v.split for v in found].count)
     at = [v.split or common for v in found]
     table = []
@@ -247,7 +247,7 @@ campaigns cannot carry; that is why a slope that is significant in the fit ({sig
 
 
 def open_case(a, s):
-    """What speaks for and against a change of a section that is not settled, in numbers."""
+    """Evidence for and against a change of an undecided section, in numbers."""
     section = a["sections"][s]
     part = a["table"].query("section == @section and direction == 'lateral' and 500 <= band <= 3150")
     return (

@@ -1,4 +1,4 @@
-"""Simulated passages over the turnout of the demonstration, with what a measuring system would not know."""
+"""Simulated passages over the turnout of the demonstration, with the truth about each train."""
 
 from dataclasses import dataclass, replace
 
@@ -10,9 +10,9 @@ from turnout.simulate import Sensor, car, load_track, load_vehicle, prepare_pass
 from turnout.simulate.train import couple
 
 RATE = 20000.0
-# Places [m] of twelve sensors of the train's track; two of the other one feel it faintly.
+# Positions of twelve sensors on the track of the train [m].
 MAIN = (-20.0, -12.0, -6.0, 3.6, 8.4, 13.8, 19.2, 24.6, 26.4, 31.2, 36.0, 40.2)
-CROSSTALK = 0.05
+CROSSTALK = 0.05  # share of the vibration that sensors on the other track see
 
 
 @dataclass
@@ -29,7 +29,7 @@ class Run:
 
 
 def vehicles(load):
-    """Type -> vehicle: four types of the templates."""
+    """{type: vehicle} of four types with a template."""
     return {
         "IC3": load_vehicle("ic3", load),
         "IC3 double": load_vehicle("ic3", load, units=2),
@@ -39,7 +39,7 @@ def vehicles(load):
 
 
 def strangers():
-    """Trains that no template describes."""
+    """Trains without a template."""
     short = car("stranger", half_base=1.05, half_pivot=6.4, length=17.6, overhang=1.35)
     long = car("stranger", half_base=1.40, half_pivot=9.9, length=27.1, overhang=2.25)
     mixed = [short, long, short]
@@ -47,7 +47,7 @@ def strangers():
 
 
 def simulate(vehicle, name, speed_kmh, direction, route, prepared, track, seed=1):
-    """Run one train at 0 noise."""
+    """Simulate one train without noise."""
     sensors = [Sensor(f"m{i}", x) for i, x in enumerate(MAIN)]
     recording = simulate_passage(
         track,
@@ -69,7 +69,7 @@ def simulate(vehicle, name, speed_kmh, direction, route, prepared, track, seed=1
 
 
 def fleet(speeds, loads=(0.0, 1.0)):
-    """Runs of the four types: ``speeds`` maps a type to speeds [km/h]; direction and route take turns."""
+    """Runs of the four types; ``speeds`` maps a type to speeds [km/h]. Direction and route alternate."""
     track = load_track("tommerup", seed=1)
     prepared = prepare_passage(track, rate=RATE)
     k = 0
@@ -82,7 +82,7 @@ def fleet(speeds, loads=(0.0, 1.0)):
 
 
 def stranger_runs(speeds=(60.0, 110.0)):
-    """Runs of the trains without template."""
+    """Runs of the trains without a template."""
     track = load_track("tommerup", seed=1)
     prepared = prepare_passage(track, rate=RATE)
     for vehicle in strangers():
@@ -93,7 +93,7 @@ def stranger_runs(speeds=(60.0, 110.0)):
 def heard(run: Run, rows, noise, rng, beside=True):
     """(Recording, sensors): the sensors ``rows`` with white noise [m/s²], and two sensors of the other track.
 
-    A sensor before the toe feels every train; one behind it only those of its own track, the others faintly.
+    A sensor before the toe records every train. One behind it records the trains of its track, and others faintly.
     """
     samples = run.samples[list(rows)].astype(float)
     names = [f"m{i}" for i in rows]

@@ -1,6 +1,6 @@
-"""The paper's own score on simulated trains, and what its trends are there.
+"""The score of the paper on simulated trains, and its trends with load and speed.
 
-The paper re-estimates the initial state at an interval that it does not give, and scores on the same data.
+The paper re-estimates the initial state at an interval that it does not state, and scores on the same data.
 """
 
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ INTERVALS = (0.02, 0.005, 0.002, 0.001)
 
 
 def reestimated_fit(data, model, interval: float) -> float:
-    """Fit [%] of ``data`` (n,) at ``RATE`` with the model's state estimated anew every ``interval`` [s]."""
+    """Fit [%] of ``data`` (n,) at ``RATE`` with the state of the model re-estimated every ``interval`` [s]."""
     n = round(interval * RATE)
     rows, row = [], np.asarray(model.c, dtype=float)
     for _ in range(n):
@@ -31,7 +31,7 @@ def reestimated_fit(data, model, interval: float) -> float:
 
 
 def paper_trends(runs, settings, noise=0.2) -> Iterator[Bar]:
-    """At the paper's A7, every train of the main track: the fit by interval, and what load and speed do to ours."""
+    """Fit by interval at A7 of the paper, for all trains of the main track, and effects of load and speed on ours."""
     rng, model = np.random.default_rng(9), paper_model(LOCATION)
     random = random_models(30, model.order, settings.band_low, settings.band_high, RATE, settings.null_seed)
     through = band_pass(settings.band_low, settings.band_high, settings.filter_order, RATE)
@@ -63,7 +63,7 @@ def paper_trends(runs, settings, noise=0.2) -> Iterator[Bar]:
 
 
 def _passing(run, duration):
-    """When each axle passes the sensor [s]: the first reaches the first of all sensors 1.2 s after the start."""
+    """Times at which the axles pass the sensor [s]. The first axle reaches the first sensor 1.2 s after the start."""
     from benchmarks.passage_fleet import MAIN
 
     way = PLACE - min(MAIN) if run.direction == "facing" else max(MAIN) - PLACE

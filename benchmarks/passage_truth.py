@@ -1,6 +1,6 @@
-"""Passages whose truth is known: the paper's models struck by wheels, and bursts of noise that follow wheels.
+"""Passages with known truth: wheel impacts on the models of the paper, and noise bursts that follow the wheels.
 
-Computed in closed form from poles and residues, not with the code that is tested.
+They are computed in closed form from poles and residues, not with the code under test.
 """
 
 from dataclasses import dataclass
@@ -30,14 +30,14 @@ PATTERNS = read_patterns(KNOWN)
 
 
 def paper_model(location) -> ModalModel:
-    """The paper's model of a location, as identification would hand it on."""
+    """The paper's model of a location, as the identification would give it."""
     printed = published_model(location)
     return ModalModel(printed.a, printed.b, printed.c, printed.rate, ())
 
 
 @dataclass
 class Struck:
-    """``samples`` (n,) with ``times`` of the impacts [samples] and ``amplitudes``; ``clean`` without its ``noise``."""
+    """``samples`` (n,) with ``times`` [samples] and ``amplitudes`` of the impacts; ``clean`` is without ``noise``."""
 
     samples: np.ndarray
     times: np.ndarray
@@ -47,7 +47,7 @@ class Struck:
 
 
 def decay(location, past) -> np.ndarray:
-    """Response at times ``past`` after an impact [s]: Re sum R exp(s t), nothing before it."""
+    """Response at times ``elapsed`` after an impact [s]: Re sum R exp(s t), zero before it."""
     model = published_model(location)
     pole = continuous_pole(model.frequency, model.damping)
     after = np.clip(past, 0.0, None)[..., None]
@@ -65,7 +65,7 @@ def impacts(location, n, times, amplitudes) -> np.ndarray:
 
 
 def struck(rng, location="CP A7", offsets=IC3, speed=44.4, snr_db=40.0, start=0.6, tail=0.5) -> Struck:
-    """One sensor: impulses of a train on a model of the paper, white noise ``snr_db`` below the peak."""
+    """Record of one sensor: impacts of a train on a model of the paper, white noise ``snr_db`` below the peak."""
     times = (start + np.asarray(offsets) / speed) * RATE + rng.uniform(0.0, 1.0, len(offsets))
     amplitudes = 1.0 + 0.2 * rng.standard_normal(len(offsets))
     clean = impacts(location, int(times[-1] + tail * RATE), times, amplitudes)
@@ -84,7 +84,7 @@ def passing(offsets, positions, speed, acceleration, direction, lead):
 def struck_train(
     rng, locations, positions, offsets=IC3, speed=44.4, acceleration=0.0, direction=1, snr_db=40.0, lead=1.0
 ):
-    """Recording of several sensors, each with its location's model, and the (n_sensor, n_axle) true times [s]."""
+    """(recording of several sensors, each with the model of its location, true times (n_sensor, n_axle) [s])."""
     times = passing(offsets, positions, speed, acceleration, direction, lead)
     n = int((times.max() + 1.0) * RATE)
     rows = []
@@ -95,7 +95,7 @@ def struck_train(
 
 
 def rolling(rng, offsets=IC3, speed=40.0, positions=(0.0, 4.0), direction=1, noise=0.02, acceleration=0.0, lead=1.0):
-    """Recording of noise bursts that follow each wheel along the rail, power e-folding in 0.4 m: no model in it."""
+    """Recording of noise bursts that follow the wheels along the rail. Power decays by 1/e in 0.4 m; no modal model."""
     times = passing(offsets, positions, speed, acceleration, direction, lead)
     n = int((times.max() + 1.0) * RATE)
     time = np.arange(n) / RATE

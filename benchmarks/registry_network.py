@@ -1,6 +1,6 @@
-"""A network's registry for the benchmarks: 3,500 turnouts x 8 sections x 2 resonances, weekly for ten years.
+"""Registry of a network for the benchmarks: 3,500 turnouts x 8 sections x 2 resonances, weekly for ten years.
 
-Nine finished years lie compacted, the tenth as one batch a week: the everyday state of a registry.
+Nine complete years are compacted and the tenth has one batch a week, as in daily use.
 """
 
 from pathlib import Path
@@ -13,7 +13,7 @@ from turnout.registry.staging import connect
 from turnout.registry.supersede import count_superseded, latest_supersession
 
 WEEKS, WEEKS_A_YEAR, FIRST = 520, 52, "2016-01-04 10:00:00"
-# Two uniform numbers from a hash, one normal number from them: the same rows on every machine.
+# Uniform numbers from a hash and normal numbers from two of them: the same rows on every machine.
 MACROS = """
 create macro uniform(a, b) as (hash(a, b) % 1000000007 + 0.5) / 1000000007.0;
 create macro normal(a, b) as sqrt(-2 * ln(uniform(a, b))) * cos(2 * pi() * uniform(b, a || 'x'));
@@ -56,7 +56,7 @@ SMALL = {
 
 
 def make_network(root: Path, turnouts: int = 3500) -> Generation:
-    """Write the registry through the registry's own writer; about 0.75 GB for the whole network."""
+    """Write the registry with its own writer; about 0.75 GB for the whole network."""
     con = connect(temp_directory=str(root / ".spill"))
     con.execute(MACROS)
     files = []
@@ -90,7 +90,7 @@ def _modes(turnouts, from_week, to_week, run):
 
 
 def _typed(table: str, sql: str) -> str:
-    """The rows as the register would leave them: typed, rounded, absent columns NULL."""
+    """SQL of the rows as the registration writes them: typed, rounded, absent columns NULL."""
     given = connect()
     given.execute(MACROS)
     present = [r[0] for r in given.execute(f"describe {sql}").fetchall()]

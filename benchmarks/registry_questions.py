@@ -1,4 +1,4 @@
-"""The questions whose time is measured, as a user would ask them."""
+"""SQL queries whose time is measured, as a user would write them."""
 
 NETWORK = {
     "one section, all its campaigns": "from section_trend('t0100/S3', 'ballast')",
@@ -29,7 +29,7 @@ NETWORK = {
         select a.section_id, a.band, median((b.f - a.f) / (b.t - a.t)) as slope
         from m a join m b on a.section_id = b.section_id and a.band = b.band and a.t < b.t group by all""",
 }
-# The sum is a loop, S = max(0, S + z), over the list of each chart: half the time of two windows over all rows.
+# The sum S = max(0, S + z) is a loop over the list of each chart; it takes half the time of two window functions.
 CUSUM = """
 with m as (select section_id, band, measured_at_utc, frequency_hz from modes_current
     where measured_at_utc > newest_measurement() - to_days(1461)),

@@ -1,4 +1,4 @@
-"""A writer that appends and compacts, and a reader that counts: who reads the list must never be wrong."""
+"""A writer that appends and compacts, and a concurrent reader: by the published list it must never count wrongly."""
 
 import subprocess
 import sys
@@ -26,7 +26,7 @@ select md5('{k}-' || i) as model_id, 'ballast' as band, 't' as turnout_id, 't/' 
 
 @dataclass
 class Outcome:
-    """What the reader saw while the writer made ``commits`` commits."""
+    """Reads, wrong counts and errors of the reader while the writer made ``commits`` commits."""
 
     reads: int = 0
     wrong: int = 0
@@ -35,7 +35,7 @@ class Outcome:
 
 
 def append(root: Path, k: int) -> None:
-    """One batch of ``ROWS`` rows, by the steps of a registration."""
+    """Append one batch of ``ROWS`` rows, by the steps of a registration."""
     with registry_lock(root):
         now, con = load(root), connect()
         now.number += 1
@@ -49,7 +49,7 @@ def append(root: Path, k: int) -> None:
 
 
 def write(root: Path, stop: Path) -> int:
-    """Append until ``stop`` exists, compact after every fifth batch; how many commits."""
+    """Append until ``stop`` exists and compact after every fifth batch; returns the number of commits."""
     k, commits = 1, 0
     while not stop.exists():
         append(root, k)
@@ -62,7 +62,7 @@ def write(root: Path, stop: Path) -> int:
 
 
 def race(root: Path, seconds: float = 15.0, reads: int = 300, through_glob: bool = False) -> Outcome:
-    """Count in this process while another one writes, for ``seconds`` and until there were ``reads``, 90 s at most."""
+    """Count rows while another process writes, for ``seconds`` and until ``reads`` are reached, 90 s at most."""
     root.mkdir(parents=True)
     append(root, 0)
     stop = root.with_suffix(".stop")

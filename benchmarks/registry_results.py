@@ -1,4 +1,4 @@
-"""Work batches for the benchmarks: results of hammer campaigns and of passages, as the shards would leave them."""
+"""Work batches for the benchmarks: results of hammer campaigns and passages, as the shards write them."""
 
 import random
 from datetime import datetime, timedelta

@@ -1,6 +1,6 @@
-"""Do the intervals of date and size of a change hold the truth? Fleets through the whole chart, season included.
+"""Coverage of the intervals for date and size of a change, on simulated fleets with season and temperature.
 
-Part of ``python -m benchmarks trend``: one bar per kind, size, spacing and memory, and their means.
+Part of ``python -m benchmarks trend``: one bar per shape, size, spacing and autocorrelation, and their means.
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ from turnout.trend.panel import days, timestamps
 
 SETTINGS = TrendSettings()
 KINDS = {"step": step, "drift": drift}
-# Kind, percent (a year), weeks before the end, weeks from campaign to campaign, memory, missing share.
+# Shape, percent (a year), weeks before the end, weeks between campaigns, autocorrelation, missing share.
 CASES = [
     ("drift", -10.0, 33, 5, 0.0, 0.0), ("drift", -6.0, 43, 5, 0.3, 0.0), ("drift", -3.0, 58, 5, 0.0, 0.1),
     ("drift", -3.0, 58, 5, 0.4, 0.0), ("drift", -2.0, 60, 1, 0.4, 0.15), ("step", -2.0, 33, 5, 0.0, 0.0),
@@ -22,7 +22,7 @@ CASES = [
 
 
 def bars(turnouts=250):
-    """Coverage of the 95 % intervals among the charts in alarm; none but those report a change."""
+    """Coverage of the 95 % intervals among the charts in alarm, the only ones that report a change."""
     held = {"onset": [], "size": []}
     for number, case in enumerate(CASES):
         found = covered(*case, turnouts, 400 + number)
@@ -44,7 +44,7 @@ def bars(turnouts=250):
 
 
 def covered(kind, percent, before, every, phi, missing, turnouts, seed):
-    """Share of intervals that hold the truth among the alarmed charts of one case, and their widths."""
+    """Share of intervals that cover the truth among the charts in alarm of one case, and their widths."""
     fleet = Fleet(turnouts=turnouts, weeks=120, phi=phi, every=every, missing=missing)
     which = np.zeros((turnouts, fleet.sections), dtype=bool)
     which[:, 0] = True

@@ -1,7 +1,7 @@
-"""What the demonstration fleet shows of its one true drift, and how soon anyone could have known: a paragraph.
+"""Write a paragraph on the true drift of the demonstration fleet: what the charts report, and how early they can.
 
 ``python -m benchmarks.trend_demonstration . docs/trends.md`` writes it between the marks in the page. The first
-folder is that in which ``turnout demo`` was run: results/registry is read, and truth/, which no job reads.
+folder is that in which ``turnout demo`` was run. results/registry and truth/ are read; no job reads truth/.
 """
 
 import json
@@ -43,9 +43,9 @@ def drifts(truth: Path):
 
 
 def chances(times, change, spread, phi, guard, allowance, threshold, n=20_000, seed=1):
-    """Share of simulated charts that are in alarm by each campaign since the onset, and the true frequency [%].
+    """(share of simulated charts in alarm by each campaign since the onset, true change of frequency [%]).
 
-    The chart's own spread, memory, guard and threshold; frequency goes as the root of the stiffness.
+    Spread, autocorrelation, guard and threshold are those of the chart. Frequency follows the root of the stiffness.
     """
     share = TrendSettings().single_share
     truth = np.array([100.0 * (np.sqrt(change.factor(t.date())) - 1.0) for t in times])
@@ -62,7 +62,7 @@ def chances(times, change, spread, phi, guard, allowance, threshold, n=20_000, s
 
 
 def paragraph(folder) -> str:
-    """The paragraph of the page, every figure from the registry or computed from its chart."""
+    """The paragraph of the page, with figures from the registry or computed from its chart."""
     parts = []
     with open_registry(Path(folder) / "results" / "registry") as con:
         for section, band, change in drifts(Path(folder) / "truth"):

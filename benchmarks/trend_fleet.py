@@ -1,10 +1,10 @@
-"""A fleet of resonance histories with known truth: season, weather, memory, campaign effect, drift, steps.
+"""Simulate a fleet of resonance histories with known truth: season, weather, AR(1) noise, campaign effect, changes.
 
-It knows nothing of the charts. Assumed, not known (the field has no such record): a railpad resonance scatters
-by 0.6 % per campaign, its temperature coefficient is -0.15 +- 0.05 %/degC (pad stiffness falls by up to half
-over the range of service temperatures, Othman et al. 2022; Oregui et al. 2016), the rail follows the year with
-+-15 degC and the weather with 6 degC, its temperature is noted to +-1 degC, a campaign shifts all sections of a
-turnout alike by 0.6 %, and what is left has an AR(1) memory from week to week.
+It is independent of the charts. These values are assumptions, since no such record is published. A railpad resonance
+scatters by 0.6 % per campaign. Its temperature coefficient is -0.15 +- 0.05 %/degC (pad stiffness falls by up to half
+over the range of service temperatures, Othman et al. 2022; Oregui et al. 2016). Rail temperature follows the year with
++-15 degC and the weather with 6 degC; it is noted to +-1 degC. A campaign shifts all sections of a turnout by a common
+0.6 %. The remaining noise is AR(1) from week to week.
 """
 
 from dataclasses import dataclass
@@ -44,7 +44,7 @@ class Fleet:
 def histories(fleet, seed, change=None):
     """Frequencies (turnouts, sections, campaigns) [Hz], noted temperatures and weeks of the campaigns.
 
-    ``change`` is an array [%] that broadcasts to the frequencies' shape: the truth.
+    ``change`` is an array [%] that broadcasts to the shape of the frequencies: the truth.
     """
     rng = np.random.default_rng(seed)
     week = np.arange(0, fleet.weeks, fleet.every)
@@ -69,7 +69,7 @@ def histories(fleet, seed, change=None):
 
 
 def modes(fleet, seed, change=None) -> pd.DataFrame:
-    """The same as rows of the table ``modes``."""
+    """Histories as rows of the table ``modes``."""
     frequency, noted, week = histories(fleet, seed, change)
     t, s, c = (i.ravel() for i in np.indices(frequency.shape, dtype=np.int32))
     turnout = np.array([f"{fleet.prefix}{i:05d}" for i in range(fleet.turnouts)])

@@ -1,4 +1,4 @@
-"""One nightly update in a process of its own: CPU seconds and peak memory as JSON."""
+"""Run one nightly update in its own process and print CPU seconds and peak memory as JSON."""
 
 import json
 import resource
@@ -7,7 +7,7 @@ import time
 
 
 def main(registry, state) -> None:
-    """Update the registry, then ask for the worklist; both are on the clock, the imports too."""
+    """Update the registry, then query the work list. Both are timed, with the imports."""
     from pathlib import Path
 
     from turnout.config.settings.trend import TrendSettings

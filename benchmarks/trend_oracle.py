@@ -1,4 +1,4 @@
-"""The slow way: plain loops, pandas and statsmodels, for what the views of the registry say."""
+"""Independent, slow computation of what the views of the registry give: plain loops, pandas and statsmodels."""
 
 import numpy as np
 import pandas as pd
@@ -8,7 +8,7 @@ KEYS = ["turnout_id", "section_id", "band", "source"]
 
 
 def cusum_by_loop(charts, baselines) -> pd.Series:
-    """The sum for a loss of stiffness of every campaign, one after the other, as Page wrote it."""
+    """CUSUM for a loss of stiffness at every campaign, computed in a loop as in Page's definition."""
     joined = charts.merge(baselines[[*KEYS, "epoch", "allowance", "threshold_down"]], on=[*KEYS, "epoch"])
     sums = {}
     for chart, cells in joined.sort_values("measured_at_utc").groupby([*KEYS, "epoch"]):
@@ -23,10 +23,10 @@ def cusum_by_loop(charts, baselines) -> pd.Series:
 
 
 def residuals_by_pandas(modes, charts, baselines) -> pd.Series:
-    """Frequency less level, temperature and the median of the other settled sections, one campaign at a time.
+    """Frequency minus level, temperature effect and the median of the other complete sections, campaign by campaign.
 
-    Level, slope and siblings are learned here anew from ``modes``: of ``baselines`` only f0, the reference temperature
-    and the flag of the siblings are taken, of ``charts`` which campaigns the baseline holds.
+    Level, slope and siblings are estimated again from ``modes``. Of ``baselines`` only the flags of siblings and
+    completeness are used, of ``charts`` the states of the campaigns.
     """
     cells = charts[charts["section_id"] != "*"].merge(modes, on=[*KEYS, "measured_at_utc"], suffixes=("", "_mode"))
     cells = cells.merge(baselines[[*KEYS, "epoch", "with_siblings", "complete"]], on=[*KEYS, "epoch"])
@@ -37,7 +37,7 @@ def residuals_by_pandas(modes, charts, baselines) -> pd.Series:
         percent = 100.0 * (chart["frequency_hz"] / f0 - 1.0)
         design = sm.add_constant(chart["rail_temperature_c_mode"] - chart.loc[base, "rail_temperature_c_mode"].mean())
         scatter = np.sqrt(sm.OLS(percent[base], design[base]).fit().scale)
-        # the slope is 0 ± 0.5 %/°C beforehand: one more observation
+        # prior of the slope, 0 ± 0.5 %/°C, as one more observation
         known = np.vstack([design[base], [0.0, scatter / 0.5]])
         left = percent - design @ sm.OLS(np.append(percent[base], 0.0), known).fit().params
         centred.append(chart.assign(centred=left))

@@ -1,6 +1,6 @@
-"""The example outputs of docs/recipes.md: each is that of the query above it, on the demonstration registry.
+"""Write the example outputs of docs/recipes.md: each is that of the query above it, on the demonstration registry.
 
-``python -m benchmarks.trend_recipes . docs/recipes.md`` writes them between the marks of the page; the first folder is
+``python -m benchmarks.trend_recipes . docs/recipes.md`` writes them between the marks of the page. The first folder is
 that in which ``turnout demo`` was run.
 """
 

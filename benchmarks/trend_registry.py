@@ -1,4 +1,4 @@
-"""A registry of simulated modes, for the time and memory of the trends; made in parts that fit into memory."""
+"""Registry of simulated modes, for time and memory of the trends. It is made in parts that fit into memory."""
 
 import duckdb
 import numpy as np
@@ -20,7 +20,7 @@ PER_PART = 350
 def registry_of_modes(root, turnouts, weeks, holdback=1):
     """Fill ``root`` with two bands of 8 sections per turnout, all but the last ``holdback`` weeks.
 
-    One section of turnout 3 drifts from week 80 on. Returns a function that adds what was held back.
+    One section of turnout 3 drifts from week 80 on. Returns a function that adds the held-back weeks.
     """
     con = connect(temp_directory=str(root / ".spill"))
     con.execute("set preserve_insertion_order = false")
@@ -60,7 +60,7 @@ def registry_of_modes(root, turnouts, weeks, holdback=1):
 
 
 def small_registry(root, rows, number=1):
-    """A registry in ``root`` that holds ``rows`` of modes only, by the writer of the registry."""
+    """Write a registry in ``root`` that holds ``rows`` of modes only, with the writer of the registry."""
     rows = rows.assign(
         model_id=[f"m{i}" for i in range(len(rows))], damping_ratio=0.05, n_impacts=10, run_id="r", method="joint"
     )

@@ -1,4 +1,4 @@
-"""W4 with the real hammer chain: a small fleet of full recordings, whatever the shards and cores."""
+"""W4 with the real hammer stage: a small fleet of full recordings gives the same rows for any shards and cores."""
 
 import shutil
 from datetime import date
@@ -18,7 +18,7 @@ COMBINATIONS = ((1, 1), (1, 2), (7, 1), (7, 2), (64, 1), (64, 2))
 
 
 def same_rows_of_the_hammer_chain(folder, toy):
-    """Registries of one fleet by (shards, cores); ``toy`` is the module that runs the workflow."""
+    """Compare registries of one fleet by (shards, cores); ``toy`` is the module that runs the workflow."""
     n_file = make_fleet(folder)
     found, spent = {}, []
     for shards, cores in COMBINATIONS:
@@ -35,7 +35,7 @@ def same_rows_of_the_hammer_chain(folder, toy):
 
 
 def make_fleet(folder):
-    """Configuration and raw files: ten impacts per file; one file is cut off. Returns the number of files."""
+    """Write configuration and raw files: ten impacts per file, one file cut off. Returns the number of files."""
     shutil.copytree(REPOSITORY / "config", folder / "config", ignore=shutil.ignore_patterns("events.csv", "overrides"))
     ids = [f"t{k}" for k in range(TURNOUTS)]
     lines = ["turnout\tlayout\tline", *(f"{t}\ttommerup\tline {k % 2}" for k, t in enumerate(ids))]

@@ -1,4 +1,4 @@
-"""Track decay rates of one section in several campaigns as a case for the diagnosis: its model, its rival terms."""
+"""Track decay rates of one section in several campaigns as a case for the diagnosis: model and candidate changes."""
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -11,10 +11,10 @@ from turnout.physics import Parameter
 
 DIRECTIONS = {"vertical": VERTICAL, "lateral": LATERAL}
 REFERENCE = 10.0  # rail temperature at which the pads' values hold [°C]
-SMOOTH = 0.5  # octaves over which the error of one campaign at one section hangs together
-OPEN = ((1600.0, 0.5), (np.inf, 1.0))  # sd of the model's own error, ln, up to a frequency: a beam knows no torsion
+SMOOTH = 0.5  # correlation length of the error of one campaign at one section [octaves]
+OPEN = ((1600.0, 0.5), (np.inf, 1.0))  # (up to [Hz], sd of the model error [ln]): the beam model has no torsion
 SOURCE = "Thompson 2009, Railway Noise and Vibration, chapters 3 and 7"
-# Name -> (ordinary value, sd of its logarithm, meaning); concrete sleepers, hard pads, 60E1.
+# Name -> (usual value, sd of its logarithm, meaning); concrete sleepers, hard pads, 60E1.
 TRACK = {
     "vertical_pad": (8e8, 0.5, "vertical stiffness of a pad [N/m]"),
     "lateral_pad": (6e7, 0.5, "lateral stiffness of a fastening [N/m]"),
@@ -33,14 +33,14 @@ WARMTH = {
 
 @dataclass(frozen=True)
 class Change:
-    """What is different from a campaign on. ``what`` is a key of ``CHANGES``, ``amounts`` its parameters."""
+    """A change from a campaign on. ``family`` is a key of ``CHANGES``, ``amounts`` are its parameters."""
 
     what: str
     since: str
     amounts: tuple
 
     def sentence(self):
-        """What was left out, in words."""
+        """The change in words."""
         told = zip(CHANGES[self.what][1], self.amounts)
         numbers = ", ".join(f"{p.meaning} {v:.3g} {p.unit}".rstrip(" -") for p, v in told)
         return f"{CHANGES[self.what][0]} since {self.since}: {numbers}"
@@ -61,7 +61,7 @@ def _tuned(name):
 
 
 ONE = (MASS, _tuned("tuned"), LOSS, SOFTENS)
-# Family -> (words, parameters, starts)
+# Family -> (description, parameters, starts)
 CHANGES = {
     "vertical_pad": ("other vertical stiffness of the pads", (FACTOR,), ((0.7,), (-0.7,))),
     "lateral_pad": ("other lateral stiffness of the fastenings", (FACTOR,), ((0.7,), (-0.7,))),
@@ -86,7 +86,7 @@ CHANGES = {
 
 
 def candidates(dates):
-    """Every change at every date it could have come in."""
+    """Candidates: every change at every possible date."""
     found = []
     for family, (_, parameters, starts) in CHANGES.items():
         for since in dates:
@@ -100,13 +100,13 @@ def candidates(dates):
 
 
 def track_of(values, direction, temperature):
-    """``Support`` of the track as nuisances have it, at a rail temperature [°C]."""
+    """``Support`` of the track from nuisance parameters, at a rail temperature [°C]."""
     t = {name: value * np.exp(values[name]) for name, (value, *_) in TRACK.items()}
     warmer = temperature - REFERENCE
     return Support(
         t[f"{direction}_pad"] * np.exp(-values["softening"] * warmer),
-        t["pad_loss"] * np.exp(-values["calming"] * warmer), t["mass"], t[f"{direction}_ballast"], t["ballast_loss"],
-        t["rail_loss"],
+        t["pad_loss"] * np.exp(-values["calming"] * warmer), t["mass"], t[f"{direction}_ballast"],
+        t["ballast_loss"], t["rail_loss"],
     )  # fmt: skip
 
 
@@ -142,9 +142,12 @@ def _logarithm(direction, support):
 
 @dataclass(frozen=True)
 class Measured:
-    """Decay rates of one section: ``log`` {(direction, campaign): (n_band,)}, ``spread`` {direction: (n_band,)} of a
-    measurement from rail to rail, ``repeat`` {direction: (n_band,)} of a section's mean that bands share,
-    ``temperature`` {(direction, campaign): °C}, ``campaigns`` in order of time."""
+    """Measured decay rates of one section, with their errors.
+
+    ``log`` is {(direction, campaign): (n_band,)}. ``spread`` {direction: (n_band,)} is the sd from rail to rail.
+    ``repeat`` {direction: (n_band,)} is the sd of the mean of a section that neighbouring bands share. ``temperature``
+    is {(direction, campaign): °C}; ``campaigns`` are in order of time.
+    """
 
     section: str
     log: dict
@@ -155,9 +158,11 @@ class Measured:
 
 
 def whitening(spread, repeat):
-    r"""(n_band, n_band) :math:`C^{-1/2}` of the errors of one campaign at one section: ``spread`` band by band, and
-    ``repeat`` that neighbouring bands share over half an octave,
-    :math:`C_{ij} = s_i^2 \delta_{ij} + r_i r_j \exp(-\Delta_{ij}^2 / 2 \ell^2)`."""
+    r"""(n_band, n_band) :math:`C^{-1/2}` of the errors of one campaign at one section.
+
+    :math:`C_{ij} = s_i^2 \delta_{ij} + r_i r_j \exp(-\Delta_{ij}^2 / 2 \ell^2)`: ``spread`` is independent from band to
+    band, ``repeat`` is shared by neighbouring bands over half an octave.
+    """
     octave = np.log2(BANDS)
     shared = np.exp(-0.5 * ((octave[:, None] - octave) / SMOOTH) ** 2)
     power, turn = np.linalg.eigh(np.diag(spread**2) + np.outer(repeat, repeat) * shared)
@@ -165,9 +170,9 @@ def whitening(spread, repeat):
 
 
 class DecayCase(Case):
-    """Logarithms of decay rates, whitened; the model's own error of each band is free, but the same in all campaigns.
+    """Whitened logarithms of decay rates. The model error of each band is a nuisance parameter, equal in all campaigns.
 
-    ``reserved`` is a campaign that only the verification reads; ``priors`` {name: (mean, sd)} from ``calibrate``.
+    ``reserved`` is a campaign for the verification only; ``priors`` {name: (mean, sd)} come from ``calibrate``.
     """
 
     expensive = True
@@ -192,11 +197,11 @@ class DecayCase(Case):
         )  # fmt: skip
 
     def predict(self, values, terms, observations):
-        """Whitened logarithm of the decay rate of each band, with the changes that are there by then."""
+        """Whitened logarithm of the decay rate of each band, with the changes up to the campaign."""
         return [self.white[o.data_type] @ self.logarithm(values, terms, o) for o in observations]
 
     def logarithm(self, values, terms, o):
-        """(n_band,) logarithm of the decay rate that the model has under the conditions of an observation."""
+        """(n_band,) logarithm of the decay rate of the model under the conditions of an observation."""
         temperature = o.covariates["rail_temperature"]
         support, gain = track_of(values, o.data_type, temperature), 0.0
         for change in terms:
@@ -207,7 +212,7 @@ class DecayCase(Case):
         return _logarithm(o.data_type, support) + offset + gain
 
     def nuisance_jacobian(self, values, terms, observations, base):
-        """The bands' own errors exactly, the rest by differences."""
+        """Derivatives: exact for the errors of the bands, by finite differences for the other parameters."""
         whole, found = self.nuisances, [np.zeros((o.data.size, len(self.nuisances))) for o in observations]
         for k, nuisance in enumerate(whole):
             if nuisance.name in TRACK or nuisance.name in WARMTH:

@@ -1,7 +1,7 @@
-"""Track decay rate of an endless track, vertical or lateral: the library's closed form for many frequencies at once.
+"""Track decay rate of an infinite track, vertical or lateral: closed form for many frequencies at once.
 
-A test holds it against the library's meshed track (`turnout.simulate.decay_rate`). Lateral motion is the same beam with
-the rail's lateral bending and the fastening's lateral spring: no torsion, no bending of the web.
+A test compares it with the meshed track of the library (`turnout.simulate.decay_rate`). Lateral motion is that of the
+same beam with the lateral stiffness of rail and fastening, without torsion and bending of the web.
 """
 
 from dataclasses import dataclass
@@ -62,7 +62,7 @@ def decay_rate(beam, support, bands=BANDS, lines=LINES):
 
 
 def responses(beam, support, frequency):
-    """(n_line, n_place) receptance of the endless track at the grid's places under a force between supports."""
+    """(n_line, n_position) receptance of the infinite track at the positions of the grid; force between supports."""
     omega = 2.0 * np.pi * np.asarray(frequency)
     quarter = expm(_bending(omega, beam, support) * (0.25 * SPACING))
     half = quarter @ quarter

@@ -1,5 +1,7 @@
-"""A matrix of measured frequency responses against a modal model as a case for the diagnosis: too few modes, or modes
-tied to a beam that is too simple."""
+"""Measured frequency responses and a modal model as a case for the diagnosis.
+
+The model has too few modes, or modes tied to a beam model that is too simple.
+"""
 
 from dataclasses import dataclass, field
 
@@ -9,23 +11,23 @@ from turnout.mismatch import Candidate, Case, Nuisance, Observation
 from turnout.physics import Parameter
 
 SOURCE = "Ewins 2000, Modal Testing, chapters 2 and 4"
-STEP = 0.7  # largest, in prior standard deviations: longer ones jump from one sharp resonance to the next
-TOLERANCE = 0.05  # share of a response, over a tenth of an octave, that is nobody's business
-INDEPENDENT = 0.25  # neighbouring lines of one blow err together
-SOFT = 25.0  # about where a body hangs on its suspension [Hz]
+STEP = 0.7  # largest step [prior sd]: a longer one jumps from one sharp resonance to the next
+TOLERANCE = 0.05  # tolerated error as a share of the response, averaged over a tenth of an octave
+INDEPENDENT = 0.25  # effective share of independent lines: errors of neighbouring lines are correlated
+SOFT = 25.0  # approximate resonance of the rigid body on its suspension [Hz]
 LAMBDA = np.array([4.73004, 7.85320, 10.99561, 14.13717, 17.27876, 20.42035, 23.56194])  # free-free beam
 
 
 @dataclass(frozen=True)
 class Effect:
-    """What is left out: ``kind`` of ``KINDS``, ``where`` it is, ``values`` of its parameters by name."""
+    """An effect that the model lacks: a key of ``EFFECT_TEXTS``, ``where`` it is, and parameter ``values`` by name."""
 
     kind: str
     where: str
     values: dict = field(hash=False)
 
     def sentence(self):
-        """In words."""
+        """The effect in words."""
         numbers = ", ".join(f"{k} {v:.4g}" for k, v in self.values.items() if not k.startswith("shape"))
         return f"{KINDS[self.kind]} {self.where}: {numbers}".replace(" :", ":")
 
@@ -49,12 +51,13 @@ def _number(name, unit, low, high, prior, neutral=0.0, meaning=""):
 
 
 class FrfCase(Case):
-    """Accelerance (n_blow, n_sensor, n_line) [m/s²/N]. ``blown`` says at which place each blow was, places 0 to n - 1
-    being those of the sensors; by default blow k was at sensor k.
+    """Accelerance (n_impact, n_sensor, n_line) [m/s²/N].
 
-    ``peaks`` [Hz]: resonances of the base model, one unit mass each, read off the responses; ``rigid`` of them more, 2
-    at most, are the body on its soft suspension. With ``beam`` the peaks are those of a free Euler-Bernoulli beam whose
-    first is free. ``reserved`` blows are read by the verification alone.
+    ``impact_places`` holds the index of the place of each impact; places 0 to n - 1 are those of the sensors. By
+    default impact k is at sensor k. ``peaks`` [Hz] are resonances of the base model, with unit modal mass, estimated
+    from the responses. ``rigid`` (2 at most) further ones are the rigid body on its soft suspension. With ``beam`` the
+    peaks are tied to a free Euler-Bernoulli beam, of which only the first frequency is fitted. ``reserved`` impacts are
+    used by the verification only.
     """
 
     expensive = True
@@ -83,8 +86,8 @@ class FrfCase(Case):
         labels = {"sensor": np.repeat([f"A{s + 1}" for s in range(self.n_sensor)], n).astype(object)}
         labels |= {"frequency": np.tile([f"{c:.0f} Hz" for c in centre], self.n_sensor).astype(object)}
         labels |= {"condition": np.full(self.n_sensor * n, f"blow {k + 1}", dtype=object)}
-        return Observation(f"blow {k + 1}", f"blow {k + 1}", split(rows), sigma, INDEPENDENT, "response", {}, cells,
-                           labels)  # fmt: skip
+        return Observation(f"blow {k + 1}", f"blow {k + 1}", split(rows), sigma, INDEPENDENT, "response",
+                           {}, cells, labels)  # fmt: skip
 
     def _nuisances(self, peaks):
         for r, peak in enumerate(peaks):
@@ -116,7 +119,7 @@ class FrfCase(Case):
         return float(frequency[top]), zeta, self._shape(np.imag(h[:, :, top]), 0) * np.sqrt(2.0 * zeta)
 
     def _shape(self, matrix, rank):
-        """(n_place,) whose products are the ``rank``-th part of a real (n_blow, n_sensor) matrix."""
+        """(n_place,) shape whose products give the ``rank``-th term of a real (n_impact, n_sensor) matrix."""
         left, size, right = np.linalg.svd(matrix)
         blown, heard = left[:, rank] * np.sqrt(size[rank]), right[rank] * np.sqrt(size[rank])
         both = self.blown < self.n_sensor
@@ -129,13 +132,13 @@ class FrfCase(Case):
         return total / np.maximum(count, 1.0)
 
     def stiff_shape(self, rank):
-        """(n_place,) of the body's motion between its suspension and its first resonance."""
+        """(n_place,) shape of the rigid body, between its suspension and the first resonance."""
         frequency, h = self.whole
         near = (frequency > 2.0 * SOFT) & (frequency < 3.0 * SOFT)
         return self._shape(np.mean(h[:, :, near].real, axis=2), rank)
 
     def is_cheap(self, observation):
-        """All are: their derivatives are made anew at every step."""
+        """True for all observations: their derivatives are computed again at every step."""
         return True
 
     def _candidates(self):
@@ -179,7 +182,7 @@ class FrfCase(Case):
                          "frequency", scanned, exact=True)  # fmt: skip
 
     def frequencies(self, values, terms):
-        """(n_mode,) [Hz]."""
+        """(n_mode,) natural frequencies [Hz]."""
         if not self.beam:
             return np.exp([values[f"log_frequency_{r}"] for r in range(self.n_mode)])
         lam = LAMBDA[: self.n_mode]
@@ -197,7 +200,7 @@ class FrfCase(Case):
         return np.exp(values["log_frequency_0"]) * np.sqrt(square / square[0])
 
     def predict(self, values, terms, observations):
-        """Accelerance of each blow, Re and Im behind one another."""
+        """Accelerance of each impact, real parts followed by imaginary parts."""
         modes = [
             (f, np.exp(values[f"log_damping_{r}"]), [values[f"shape_{r}_{s}"] for s in range(self.n_place)])
             for r, f in enumerate(self.frequencies(values, terms))
@@ -241,7 +244,7 @@ class FrfCase(Case):
 def free_shape(lam, x):
     """Free-free beam's mode shapes at ``x`` (0 end, 0.5 middle) of its length, unit mean square, (n_mode,)."""
     sigma = (np.cosh(lam) - np.cos(lam)) / (np.sinh(lam) - np.sin(lam))
-    # e^(lam x) parts put together: cosh - sigma sinh is a difference of large numbers
+    # exponentials are combined, since cosh - sigma sinh is a difference of large numbers
     grown = 0.5 * (1.0 - sigma) * np.exp(lam * x) + 0.5 * (1.0 + sigma) * np.exp(-lam * x)
     return grown + np.cos(lam * x) - sigma * np.sin(lam * x)
 
@@ -254,5 +257,5 @@ def _one(kind, where, parameters, starts, case):
 
 
 def split(rows):
-    """Re and Im of (n_sensor, n_line) behind one another."""
+    """Real parts followed by imaginary parts of (n_sensor, n_line), flat."""
     return np.concatenate([rows.real.ravel(), rows.imag.ravel()])

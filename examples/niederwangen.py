@@ -1,8 +1,8 @@
-"""Bern-Niederwangen with the diagnosis: what changed at which section, and what was added or taken away.
+"""Diagnosis of the track decay rates of Bern-Niederwangen: what changed at which section.
 
 python -m examples.niederwangen [FOLDER]     writes docs/niederwangen_mismatch.md and its picture; minutes
 
-FOLDER holds track_decay_rate.csv. Every number in the page comes from the run; its prose is fixed.
+FOLDER holds track_decay_rate.csv. Every number in the page comes from the run; its text is fixed.
 """
 
 import sys
@@ -17,13 +17,16 @@ from turnout.mismatch import diagnose
 from turnout.mismatch.engine.cross_validation import held_out_score
 from turnout.mismatch.engine.map_fit import fit_jointly
 
-FLOOR = 0.1  # least spread of a logarithm that anybody should believe
-LEFT_OUT = ("2015-09", "2013-07")  # each in its turn; before 2013-01 there is only what the model is calibrated on
+FLOOR = 0.1  # smallest plausible sd of the logarithm of a decay rate
+LEFT_OUT = ("2015-09", "2013-07")  # campaigns left out in turn; the first campaign calibrates the model
 
 
 def read(folder):
-    """``Measured`` of every section: means over both rails; the spread is that of one rail, and how well a section's
-    mean repeats is taken from the five sections of the first campaign, before anything can have changed."""
+    """``MeasuredRates`` of every section: means over both rails.
+
+    The spread is that of one rail. The repeatability of a section mean is the spread over the five sections in the
+    first campaign, before any change.
+    """
     rows = pd.read_csv(folder / "track_decay_rate.csv", parse_dates=["date"])
     rows["campaign"] = rows["date"].dt.strftime("%Y-%m")
     rows["log"] = np.log(rows["decay_rate_db_per_m"])
@@ -80,14 +83,14 @@ DAMPS = {
     "vertical_absorber",
     "broad_absorber",
     "rail_loss",
-}  # all of them take energy out of the rail
+}  # all of them dissipate energy of the rail
 
 
 def conclusion(runs):
-    """(what, names): "not changed", "changed" or "left open", and the names that either run leaves.
+    """("not changed", "changed" or "left open", names given in either run).
 
-    A section has changed if both runs say so and both predict the campaign that they never saw better for it; it has
-    not if both say "none"; anything else stays open.
+    A section has changed if both runs name something and both predict their reserved campaign better with it. It has
+    not changed if both say "none". Otherwise it stays open.
     """
     verdicts = [d.verdict for _, d in runs.values()]
     names = tuple(dict.fromkeys(n for v in verdicts for n in v.names))
@@ -111,8 +114,10 @@ def dates(case, diagnosis):
 
 
 def bands_changed(measured, priors):
-    """{direction: (log factor (n_campaign, n_band), its sd (n_band,))} of the campaigns after the first over the
-    calibrated model at their temperature; the sd holds what one rail and one campaign may err."""
+    """{direction: (log factor (n_campaign, n_band), its sd (n_band,))}: later campaigns over the calibrated model.
+
+    The model is taken at the temperature of the campaign. The sd combines the errors of one rail and of one campaign.
+    """
     case = DecayCase(measured, priors=priors)
     values = {name: mean for name, (mean, _) in priors.items()}
     found = {}

@@ -1,4 +1,4 @@
-"""The page about Bern-Niederwangen: its tables, its picture and its fixed prose."""
+"""The page about Bern-Niederwangen: its tables, its picture and its fixed text."""
 
 import numpy as np
 from examples.decay_case import CHANGES, DIRECTIONS, Change
@@ -8,7 +8,7 @@ from examples.recorded import plotting, save, table
 
 
 def what_in_words(names):
-    """What the names have in common, and whether one is left."""
+    """What the names have in common, and whether a single one remains."""
     one = {name: CHANGES[name][0] for name in names}
     if not names:
         return "nothing"
@@ -19,7 +19,7 @@ def what_in_words(names):
 
 
 def band_words(changes):
-    """Bands whose mean factor over all later campaigns is beyond three standard deviations."""
+    """Bands whose mean factor over all later campaigns exceeds three standard deviations."""
     said = []
     for direction, (factor, sd) in changes.items():
         mean = factor.mean(axis=0)
@@ -30,7 +30,7 @@ def band_words(changes):
 
 
 def section_rows(measured, found):
-    """A row per section: conclusion, date, what, bands, and the fits on campaigns left out."""
+    """A row per section: conclusion, date, change, bands, and the fits on campaigns left out."""
     for m in measured:
         priors, runs, by_date = found[m.section]
         said, names = conclusion(runs)
@@ -79,7 +79,7 @@ def numbers(change, errors):
 
 
 def date_rows(measured, found):
-    """A row per section that did not stay: gain of the leading change at each date."""
+    """A row per section with a change: gain of the leading change at each date."""
     for m in measured:
         _, runs, gains = found[m.section]
         for campaign, (_, d) in runs.items():
@@ -89,7 +89,7 @@ def date_rows(measured, found):
 
 
 def draw(measured, found, path):
-    """Recorded over calibrated, per band and campaign, and what the leading change makes of it."""
+    """Draw recorded over calibrated decay rates per band and campaign, with the leading change."""
     plt = plotting()
     figure, axes = plt.subplots(len(measured), 2, figsize=(9, 11), sharex=True, sharey=True, layout="constrained")
     x = np.arange(BANDS.size)
@@ -117,7 +117,7 @@ def draw(measured, found, path):
 
 
 def _draw_term(axis, x, case, diagnosis, direction):
-    """Draw the leading change's own factor at the temperature of the left-out campaign; returns its name."""
+    """Draw the factor of the leading change at the temperature of the left-out campaign; returns its name."""
     score, o = diagnosis.verdict.scores[0], next(r for r in case.reserved if r.kind == direction)
     change = Change(score.family, score.candidate.where["since"], tuple(score.fit.psi[-_n(score) :]))
     with_it, without = (case.logarithm(score.fit.values, terms, o) for terms in ((change,), ()))

@@ -1,4 +1,4 @@
-"""A lumped oscillator with a law in its feedback: the smallest system that the engine diagnoses."""
+"""A single-degree-of-freedom oscillator with a nonlinear law in its feedback: the smallest system to diagnose."""
 
 from dataclasses import dataclass
 
@@ -9,8 +9,8 @@ from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
 from turnout.physics.term import Parameter
 
-# Law of displacement y and velocity v, each with y and v over their scales, so that a parameter of 1 is as strong
-# as the linear spring.
+# Laws of displacement y and velocity v, both over their scales: with a parameter of 1 a law is as strong as the linear
+# spring.
 (CUBIC, QUINTIC, QUADRATIC, ABSOLUTE, SOFTENING, PLAY, FRICTION, DRAG, CUBIC_DAMPING, STATE_DAMPING, NONE) = range(11)
 LAWS = {
     "cubic_spring": (CUBIC, "spring force grows with the cube of the displacement", (-3.0, 3.0)),
@@ -29,19 +29,19 @@ SOURCE = "Kerschen et al. 2006, Past, present and future of nonlinear system ide
 
 @dataclass(frozen=True)
 class LawTerm:
-    """Feedback force of one kind; ``amount`` is its share of the linear spring at the scale of the motion."""
+    """Feedback force of one law; ``amount`` is its share of the linear spring force at the scale of the motion."""
 
     name: str
     kind: int
     amount: float
 
     def sentence(self):
-        """What was left out, in words."""
+        """The law in words."""
         return f"{LAWS[self.name][1]} (amount {self.amount:.3g})"
 
 
 def law_candidates(without=()):
-    """All laws but those ``without``."""
+    """Candidates of all laws but those in ``without``."""
     found = []
     for name, (kind, meaning, bounds) in LAWS.items():
         if name not in without:
@@ -81,7 +81,7 @@ def _law(kind, y, v):
 
 @njit(cache=True)
 def _march(force, dt, omega, zeta, gain, kinds, amounts, scale):
-    """Displacement by the classical Runge-Kutta scheme; ``force`` holds three values a step (start, middle, end)."""
+    """Displacement by the classical Runge-Kutta scheme; ``force`` has three values a step (start, middle, end)."""
     out = np.zeros(force.shape[0] + 1)
     y, v = 0.0, 0.0
     for n in range(force.shape[0]):
@@ -111,17 +111,17 @@ class OscillatorCase(Case):
     Parameters
     ----------
     records : sequence of (name, condition, input, output)
-        One row each, rising in time, from rest; the first ``skipped`` samples are marched but not judged.
+        One record each, in order of time, from rest. The first ``skipped`` samples are simulated but not compared.
     reserved : sequence of the same
-        Read by nothing but the verification.
+        Used by the verification only.
     rate : float
         Samples per second [Hz].
     frequency, damping, gain : (mean, sd)
         Priors of the linear system; gain is of input to ω² y.
     tolerance : float
-        Materiality floor as a share of each record's rms.
+        Tolerated error as a share of the rms of each record.
     offset : float
-        Prior standard deviation of the sensor's offset; 0 leaves this nuisance out.
+        Prior standard deviation of the offset of the sensor; 0 removes this nuisance parameter.
     """
 
     def __init__(self, records, reserved, rate, frequency, damping, gain, tolerance=0.01, offset=0.02, skipped=400,
@@ -156,7 +156,7 @@ class OscillatorCase(Case):
         return found
 
     def latent_covariates(self, fit):
-        """Missing feedback from the recorded motion: what the model's equation lacks, over ω²."""
+        """Missing feedback from the recorded motion: the residual of the equation of motion over ω²."""
         omega, damping = 2.0 * np.pi * fit.values["frequency"], fit.values["damping"]
         parts = []
         for o in self.observations:
@@ -192,7 +192,7 @@ def _derivatives(y, rate):
 
 
 def _band_limited(x, rate, cutoff):
-    """Below ``cutoff``: differentiated noise above carries no force."""
+    """``x`` below ``cutoff`` [Hz]: above it there is only differentiated noise."""
     spectrum = np.fft.rfft(x)
     frequency = np.fft.rfftfreq(x.size, 1.0 / rate)
     return np.fft.irfft(spectrum / (1.0 + (frequency / cutoff) ** 8), x.size)

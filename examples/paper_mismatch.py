@@ -1,9 +1,9 @@
-"""The mismatch of Barkhordari et al. at A4 made anew: calibrated on unloaded track, too strong under a train.
+"""The mismatch of Barkhordari et al. at A4, reproduced: calibrated on unloaded track, too strong under a train.
 
 python -m examples.paper_mismatch     writes docs/paper_mismatch.md and its picture; some minutes
 
-The recordings are simulated: the truth is known, and the diagnosis is not told. Every number in the page comes from
-the run; its prose is fixed.
+The recordings are simulated. The truth is known, but not to the diagnosis. Every number in the page comes from the
+run; its text is fixed.
 """
 
 import numpy as np
@@ -22,24 +22,24 @@ from turnout.stages.mismatch_text import SENTENCES
 SPEED = 160.0 / 3.6
 SENSORS = (Sensor("A1", 0.6, "rail web"), Sensor("A4", 9.0, "rail web"))
 BLOWS = ((0.6, 15.0), (9.0, 15.0))
-SLOPE = 1e4  # pads of 205 to 307 MN/m gain 240 MN/m under this car: what was concealed
-TOP = 140.0  # Hz; where the filter of passages, 1 up to 112 Hz, ends
+SLOPE = 1e4  # [N/m per N], the concealed effect: pads of 205 to 307 MN/m gain 240 MN/m under this car
+TOP = 140.0  # [Hz], where the filter of passages ends; it is 1 up to 112 Hz
 BANDS = ((5.0, 40.0), (40.0, TOP))
-SEED = 12  # of scatter and roughness: with it the pattern is that of the publication
+SEED = 12  # of scatter and roughness: gives the pattern of the publication
 
 
 def plan(trains):
-    """Two sensors, blows beside both, and these trains."""
+    """Plan with two sensors, hammer points beside both, and these trains."""
     return Plan(load_track("tommerup"), SENSORS, BLOWS, trains, tuple(t for t in ("heavy 2",) if len(trains) > 4))
 
 
 def as_in_the_paper():
-    """One car with two bogies at 160 km/h."""
+    """Plan of the paper: one car with two bogies at 160 km/h."""
     return plan((Train(car("car"), "car", SPEED),))
 
 
 def with_more_trains():
-    """A light and a heavy car as well, each at two speeds."""
+    """Plan with a light and a heavy car as well, each at two speeds."""
     light = car("light", body_mass=8000.0, half_pivot=5.0)
     heavy = car("heavy", body_mass=34000.0, body_inertia=1.6e6, half_pivot=6.0, half_base=0.95)
     more = tuple(Train(v, v.name, s) for v in (light, heavy) for s in (28.0, 40.0))
@@ -47,7 +47,7 @@ def with_more_trains():
 
 
 def study(planned):
-    """(case, fit to blows alone, its passages, diagnosis) of a plan under the concealed effect."""
+    """(case, predicted passages of the fit to hammer tests alone, diagnosis) of a plan with the concealed effect."""
     campaign = measured_campaign(planned, (physics.PadPreload(SLOPE),), SEED)
     case = TrackCase(campaign)
     blows = [o for o in case.observations if o.data_type == "hammer"]
@@ -57,14 +57,14 @@ def study(planned):
 
 
 def densities(case, values):
-    """sensor -> (frequency, PSD) of the first passage's ``values`` (n_sensor * n,)."""
+    """{sensor: (frequency, PSD)} of the ``values`` (n_sensor * n,) of the first passage."""
     made = next(iter(case.aligned_passages.values()))
     rows, rate = np.reshape(values, (len(made.sensors), -1)), 1.0 / float(np.mean(np.diff(made.time)))
     return {s.name: welch(row, rate, nperseg=min(row.size, 256)) for s, row in zip(made.sensors, rows)}
 
 
 def models(case, unloaded, found):
-    """name -> values of the first passage: recorded, and by each model."""
+    """{name: values of the first passage}: recorded, and by each model."""
     k = next(i for i, o in enumerate(case.observations) if o.data_type == "passage")
     shown = {
         "recorded": case.observations[k].data,
@@ -77,7 +77,7 @@ def models(case, unloaded, found):
 
 
 def excess(case, shown):
-    """(model, sensor) -> dB by which each band of the model is too strong."""
+    """{(model, sensor): excess of the model over the recording in each band [dB]}."""
     recorded, found = densities(case, shown["recorded"]), {}
     for name, values in list(shown.items())[1:]:
         for sensor, (f, density) in densities(case, values).items():
@@ -88,7 +88,7 @@ def excess(case, shown):
 
 
 def draw(case, shown, path):
-    """PSD at both sensors, recorded and simulated."""
+    """Draw the PSD at both sensors, recorded and simulated."""
     plt = plotting()
     figure, axes = plt.subplots(1, 2, figsize=(9, 3.4), sharey=True, layout="constrained")
     for axis, sensor in zip(axes, ("A1", "A4")):
@@ -109,7 +109,7 @@ def excess_rows(levels):
 
 
 def answer_row(name, case, found):
-    """What the diagnosis says of one campaign."""
+    """Row of the table with the answer for one campaign."""
     v = found.verdict
     said = v.answer.replace("_", " ") + (f" {v.grade}" if v.grade else "")
     n = sum(o.data_type == "passage" for o in (*case.observations, *case.reserved))
@@ -118,7 +118,7 @@ def answer_row(name, case, found):
 
 
 def _unseen(check):
-    """Fit on the train that nothing was fitted to, by each model."""
+    """Fit of each model on the reserved train."""
     named = {"with the named effect": check.after, "with the rival": check.rival}
     said = {"before": check.before, **named, "decoy": check.decoy}
     shown = ", ".join(f"{name} {value:.0f} %" for name, value in said.items() if value is not None)
@@ -126,7 +126,7 @@ def _unseen(check):
 
 
 def ranking(found):
-    """The leaders as a table, with the first parameter of each."""
+    """Table of the leading candidates, with the first parameter of each."""
     rows, head = list(_ranking_rows(found)), ["effect", "nats gained", "first parameter ± half its 95 % interval"]
     return table(head, rows) if rows else "None: no effect gained evidence."
 
@@ -195,7 +195,7 @@ What was concealed: {concealed}. {outcome}
 
 
 def outcome(found):
-    """Whether the truth was said, in words."""
+    """Whether the truth was named, in words."""
     v = found.verdict
     if v.answer == "named":
         wrong = f"**The tool named {v.names[0]}: that is wrong.**"
@@ -208,7 +208,7 @@ def outcome(found):
 
 
 def _sized(score):
-    """Whether the size of a right name holds the truth."""
+    """Whether the interval of the size covers the truth, in words."""
     (slope, *_), (se, *_) = score.estimates
     low, high = slope - 1.96 * se, slope + 1.96 * se
     told = f"{slope:.0f} ({low:.0f} to {high:.0f}, 95 %) N/m per N where {SLOPE:.0f} were concealed"
@@ -218,7 +218,7 @@ def _sized(score):
 
 
 def main():
-    """Both campaigns, the picture and the page."""
+    """Diagnose both campaigns, and write the picture and the page."""
     case, unloaded, found = study(as_in_the_paper())
     shown = models(case, unloaded, found)
     draw(case, shown, DOCS / "paper_mismatch.svg")

@@ -1,8 +1,8 @@
-"""Real hammer tests against a model that is too simple on purpose: is what was left out found, or said to be unknown?
+"""Diagnose real hammer tests with models that are deliberately too simple: is the missing effect named or "unknown"?
 
 python -m examples.real_frfs [FOLDER]     writes docs/real_frfs.md and its picture; 20 CPU s
 
-FOLDER holds frf_beam_sdypy/ and hammer_pyfrf/. Every number in the page comes from the run; its prose is fixed.
+FOLDER holds frf_beam_sdypy/ and hammer_pyfrf/. Every number in the page comes from the run; its text is fixed.
 """
 
 import sys
@@ -19,21 +19,21 @@ from turnout.mismatch import diagnose
 from turnout.mismatch.engine.reserved_data import predict_reserved
 from turnout.readers import read
 
-SETTINGS = MismatchSettings(base_iterations=40, iterations=40)  # sharp resonances: the way is long
+SETTINGS = MismatchSettings(base_iterations=40, iterations=40)  # sharp resonances need many iterations
 MODES = (177.0, 477.0, 933.0, 1535.0, 2287.0)  # of the first beam, printed by its makers to 0.1 Hz
 PRINTED = (177.0, 477.4, 933.1, 1535.5, 2286.9, 3162.4, 4181.2)  # all that its makers print [Hz]
-PEAKS = (99.0, 164.0, 242.0, 368.0, 447.0, 558.0, 731.0, 872.0, 1362.0)  # of the second, read off its third blow
+PEAKS = (99.0, 164.0, 242.0, 368.0, 447.0, 558.0, 731.0, 872.0, 1362.0)  # of the second, from its third impact
 PUBLISHED = {477: (477.4, 0.20)}  # [Hz], [%]
 
 
 def beam(folder):
-    """(frequency (n_line,), accelerance (6 blows, 7 sensors, n_line)) of the first beam."""
+    """(frequency (n_line,), accelerance (6 impacts, 7 sensors, n_line)) of the first beam."""
     f, h = np.load(Path(folder) / "frf_beam_sdypy" / "acc_data.npy", allow_pickle=True)
     return np.real(f).astype(float), np.asarray(h).astype(complex)
 
 
 def five_blows(folder):
-    """(frequency, accelerance (5 blows, 1 sensor, n_line)) of the second beam, one line a hertz."""
+    """(frequency, accelerance (5 impacts, 1 sensor, n_line)) of the second beam, one line per hertz."""
     description = load_configuration(REPOSITORY / "examples" / "recordings_of_others").turnout("pyfrf_beam").hammer
     root = (Path(folder) / "hammer_pyfrf").resolve()
     made = read(root / "impact2_response0.lvm", root, description.descriptions["BEAM"]).recordings
@@ -44,12 +44,12 @@ def five_blows(folder):
 
 
 def without(modes, gone):
-    """``modes`` but for one."""
+    """``modes`` without one."""
     return tuple(m for m in modes if m != gone)
 
 
 def cases(folder):
-    """{title: (case, what was left out on purpose)}."""
+    """{title: (case, what was left out deliberately)}."""
     f, h = beam(folder)
     one = {"frequency": f, "h": h, "band": (100.0, 1200.0), "reserved": (5,), "step": 4}
     g, blows = five_blows(folder)
@@ -100,8 +100,11 @@ def _readable(said, diagnosis):
 
 
 def where(diagnosis):
-    """Frame by whose levels the base model's residual differs most, and its largest; * beyond what the others differ
-    by among themselves: one resonance is left out in several neighbouring bands, of which none need be odd."""
+    """The frame between whose levels the residual of the base model differs most, with its largest level.
+
+    * marks a level that differs more than the others do among themselves. A missing resonance shows in several
+    neighbouring bands, of which none need be marked.
+    """
     f = max(diagnosis.frames, key=lambda f: f.share)
     return f"{f.frame} {f.level} ({f.effect:+.0f} dB){'*' if f.q < 0.05 else ''}"
 
@@ -116,7 +119,7 @@ def mode_found(diagnosis):
 
 
 def stretched(diagnosis):
-    """Mean factor on all frequencies over the blows that were used; a reserved one is at its prior."""
+    """Mean factor on all frequencies over the impacts used; that of a reserved one stays at its prior."""
     own = [v for name, v in diagnosis.fit.values.items() if name.startswith("stretch@") and v != 0.0]
     return 1.0 + float(np.mean(own))
 
@@ -124,7 +127,7 @@ def stretched(diagnosis):
 def beam_printed():
     r"""(slenderness, half its 95 % interval, share by which the first resonance lies above that law) of the first beam.
 
-    By the frequencies that its makers print, the second to the seventh, far beyond the band of A4.
+    From the printed frequencies, the second to the seventh, far beyond the band of A4.
 
     .. math:: (\lambda_n^2 / f_n)^2 = (1 + S \lambda_n^2) / c^2, a straight line in \lambda_n^2
     """
@@ -137,7 +140,7 @@ def beam_printed():
 
 
 def draw(found, path):
-    """The reserved blow of three cases: recorded, by the simple model, with what was named."""
+    """Draw the reserved impact of some cases: recorded, by the simple model, and with the named effect."""
     plt = plotting()
     shown = ("A1", "A3", "A5", "B1")
     figure, axes = plt.subplots(len(shown), 1, figsize=(8.5, 8.0), layout="constrained")
@@ -155,7 +158,7 @@ def draw(found, path):
 
 
 def size(case, halves):
-    """(n_line,) root mean square over the sensors of Re and Im behind one another."""
+    """(n_line,) root mean square over the sensors, from real parts followed by imaginary parts."""
     real, imaginary = halves.reshape(2, case.n_sensor, -1)
     return np.sqrt(np.mean(real**2 + imaginary**2, axis=0))
 
@@ -199,7 +202,7 @@ differs from the others by more than they do among themselves (Grubbs, 5 % over 
 
 
 def nothing_known(d):
-    """What was said where nothing was left out that we know of, and whether the blow never used bears it out."""
+    """The answer where no omission is known, and whether the reserved impact confirms it."""
     check, reason = d.verification, d.verdict.reason.replace("_", " ")
     if d.verdict.answer == "none":
         return "none**: nothing is missing, it says."
@@ -216,16 +219,19 @@ def nothing_known(d):
 
 
 def plain_beam(d):
-    """What was said of a beam without shear and rotatory inertia, beside what its printed frequencies say."""
+    """The answer for a beam without shear and rotatory inertia, compared with its printed frequencies."""
     if d.verdict.names[:1] != ("shear_and_rotation",):
         return f"said to be unknown**: {d.verdict.reason.replace('_', ' ')}."
     (size, *_), (error, *_) = d.verdict.scores[0].estimates
     printed, half, above = beam_printed()
     mine, theirs = f"{1e4 * size:.3f} ± {1.96e4 * error:.3f}", f"{1e4 * printed:.2f} ± {1e4 * half:.2f}"
     return (
-        f"found**, with grade {d.verdict.grade}: shear and rotatory inertia, slenderness ({mine}) 1e-4 (95 %) from\n"
-        f"  100 to 1900 Hz. The second to the seventh frequency that the makers print, up to {PRINTED[-1]:.0f} Hz,\n"
-        f"  ask for ({theirs}) 1e-4. The first lies {above:.1%} above that law, which is the structure that stays:\n"
+        f"found**, with grade {d.verdict.grade}: shear and rotatory inertia, slenderness ({mine}) 1e-4 (95 %) "
+        "from\n"
+        f"  100 to 1900 Hz. The second to the seventh frequency that the makers print, "
+        f"up to {PRINTED[-1]:.0f} Hz,\n"
+        f"  ask for ({theirs}) 1e-4. The first lies {above:.1%} above that law, which is the structure "
+        "that stays:\n"
         "  what holds the beam and what its seven accelerometers weigh is not told."
     )
 

@@ -1,4 +1,4 @@
-"""Where recordings made by others lie, and how a page about them is written."""
+"""Folders of recordings made by others, and helpers to write pages about them."""
 
 import sys
 from pathlib import Path
@@ -9,8 +9,10 @@ SHARED = REPOSITORY.parent / "shared" / "data"
 
 
 def folder_of(name, arguments):
-    """Folder of the recordings: the first of ``arguments``, else ``name`` in the folder shared beside the checkout;
-    where it does not exist the program ends with the reason."""
+    """Folder of the recordings: the first of ``arguments``, else ``name`` in the shared folder beside the checkout.
+
+    If it does not exist, the program ends with the reason.
+    """
     folder = Path(arguments[0]) if arguments else SHARED / name
     if not folder.is_dir():
         sys.exit(f"skipped: {folder} does not exist. Give the folder of the recordings as the first argument.")
@@ -18,7 +20,7 @@ def folder_of(name, arguments):
 
 
 def plotting():
-    """pyplot that draws SVG, the same bytes every time."""
+    """pyplot with SVG output that is the same in every run."""
     import matplotlib
 
     matplotlib.use("svg")
@@ -29,12 +31,12 @@ def plotting():
 
 
 def save(figure, path):
-    """Write an SVG without a date."""
+    """Write an SVG file without a date."""
     figure.savefig(path, metadata={"Date": None})
     plotting().close(figure)
 
 
 def table(head, rows):
-    """A Markdown table: ``head`` and ``rows`` of words."""
+    """A Markdown table from ``head`` and ``rows``."""
     lines = ["| " + " | ".join(head) + " |", "|---" * len(head) + "|"]
     return "\n".join([*lines, *("| " + " | ".join(str(cell) for cell in row) + " |" for row in rows)])

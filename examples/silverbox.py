@@ -1,8 +1,8 @@
-"""The Silverbox: a recorded oscillator with a cubic spring that nobody tells the diagnosis of.
+"""Diagnose the Silverbox: a recorded oscillator with a cubic spring that is unknown to the base model.
 
 python -m examples.silverbox [FOLDER]     writes docs/silverbox.md and its pictures; 10 CPU s
 
-FOLDER holds SNLS80mV.csv. Every number in the page comes from the run; its prose is fixed.
+FOLDER holds SNLS80mV.csv. Every number in the page comes from the run; its text is fixed.
 """
 
 import sys
@@ -22,7 +22,10 @@ PRIORS = {"frequency": (60.0, 30.0), "damping": (0.1, 0.1), "gain": (1.0, 1.0)}
 
 
 def recordings(folder):
-    """((name, condition, input, output) to be fitted, the same reserved): five multisines; one more, and the arrow."""
+    """(recordings to fit, reserved recordings), each (name, condition, input, output).
+
+    Five multisines are fitted; another one and the arrow are reserved.
+    """
     u, y = np.genfromtxt(folder / "SNLS80mV.csv", delimiter=",", skip_header=1)[:, :2].T
     parts = [slice(START + k * LENGTH, START + (k + 1) * LENGTH) for k in range(10)]
     sines = [(f"multisine {k}", f"multisine {k}", u[p], y[p]) for k, p in enumerate(parts)]
@@ -30,7 +33,7 @@ def recordings(folder):
 
 
 def case_of(folder, without=()):
-    """The case: priors of a linear oscillator, an unknown offset of the sensor, the library less ``without``."""
+    """The case: priors of a linear oscillator, an unknown sensor offset, and all laws but those in ``without``."""
     return OscillatorCase(*recordings(folder), RATE, **PRIORS, without=without)
 
 
@@ -42,7 +45,7 @@ def held_out(case, fit):
 
 
 def analyse(folder):
-    """Both runs: {"told nothing", "law removed"} -> (case, diagnosis)."""
+    """(case, diagnosis) of both runs: "told nothing" has all laws, "law removed" lacks the right one."""
     cases = {"told nothing": case_of(folder), "law removed": case_of(folder, ("cubic_spring",))}
     return {name: (case, diagnose(case)) for name, case in cases.items()}
 
@@ -60,13 +63,13 @@ def law_rows(case, diagnosis):
 
 
 def missing_force(case, fit):
-    """Free law of the force that ``fit`` lacks."""
+    """Nonparametric law of the force that ``fit`` lacks."""
     seen = case.latent_covariates(fit)
     return latent_law(seen["force"], {k: seen[k] for k in ("displacement", "velocity", "time")}, seen["unit"])
 
 
 def draw_latent(found, path):
-    """Missing force against displacement: without the right law, and after it was found."""
+    """Draw the missing force against displacement: without the right law, and after it was named."""
     plt = plotting()
     figure, axes = plt.subplots(1, 2, figsize=(8.5, 3.6), sharey=True, layout="constrained")
     case, told = found["told nothing"]
@@ -85,11 +88,11 @@ def draw_latent(found, path):
 
 
 def draw_arrow(case, diagnosis, path):
-    """The reserved arrow: its recording and what two models miss of it."""
+    """Draw the reserved arrow: its recording and the residuals of two models."""
     plt = plotting()
     arrow = case.reserved[1]
     figure, axis = plt.subplots(figsize=(8.5, 3.2), layout="constrained")
-    edges = np.arange(0, arrow.data.size, 200)  # envelopes: 40000 samples are no picture
+    edges = np.arange(0, arrow.data.size, 200)  # envelopes, since 40000 samples are too many to draw
     time = edges / RATE
     rows = {"recording": arrow.data}
     for name, fit in (("missed by the linear base", diagnosis.base), ("missed with the cubic spring", diagnosis.fit)):

@@ -1,4 +1,4 @@
-"""The paper's tables as data, its slips, its models, and hammer tests computed from them."""
+"""The tables of the paper as data, their misprints, the models, and hammer tests computed from them."""
 
 from benchmarks.published.models import PublishedModel, published_model
 from benchmarks.published.synthetic import UNMODELLED, HammerTest, Nuisance, hammer_test

@@ -1,7 +1,7 @@
-"""What in the paper's tables cannot be right as printed, by test and row, with the reason.
+"""Misprints in the tables of the paper, by test and row, with the reason.
 
-Every entry follows from arithmetic on the paper's own numbers. A test of a table marks exactly these rows
-as strict expected failures, so that neither a new slip nor a repaired one passes unseen.
+Every entry follows from arithmetic on the numbers of the paper. The tests of the tables mark exactly these rows as
+strict expected failures, so that a new misprint or a repaired one is noticed.
 """
 
 FREQUENCY = {("CP A9", "high"): "prints 547.6198 Hz; every matrix that prints as Table 2 gives 546.95 to 547.32 Hz"}

@@ -1,4 +1,4 @@
-"""State-space models of the paper's eight locations, repaired where a sign or a row cannot be right."""
+"""State-space models of the eight locations of the paper, corrected where a sign or a row cannot be right."""
 
 from dataclasses import dataclass
 
@@ -37,16 +37,16 @@ def state_matrix(pair) -> np.ndarray:
 
 
 def output_row(pair, repaired=True) -> np.ndarray:
-    """(2,) output row of a printed row, with the sign or row repaired where it cannot be right."""
+    """(2,) output vector of a printed row, corrected where its sign or values cannot be right."""
     printed = (pair.c1, pair.c2)
     return np.array(REPAIRED_OUTPUT.get(pair.key, printed) if repaired else printed)
 
 
 def published_model(location: str) -> PublishedModel:
-    """Model of a location of the paper, order 4, or 2 at CP A8 where the gate left one band.
+    """Model of a location of the paper: order 4, or 2 at CP A8 where the gate left one band.
 
-    The paper prints no input vector; its pairs are balanced, hence b = diag(1, -1) c^T. KeyError lists the
-    locations there are.
+    The paper prints no input vector. Its pairs are balanced, hence b = diag(1, -1) c^T. KeyError lists the existing
+    locations.
 
     >>> model = published_model("CP A7")
     >>> print(model.bands, [f"{f:.1f} Hz" for f in model.frequency])

@@ -1,4 +1,4 @@
-"""Impulse response of a section from the paper's models, with its stiffness changed by given factors."""
+"""Impulse response of a section from the models of the paper, with its stiffness changed by given factors."""
 
 import numpy as np
 
@@ -14,17 +14,17 @@ LOCATION = {
     "ASM": "AS main",
     "ASD": "AS diverging",
 }
-# The paper normalises its data; this makes 8 kN give some 500 m/s², as a sledge hammer on a rail head does.
+# [m/s² per N s]. The paper normalises its data; with this value 8 kN give some 500 m/s², as a sledge hammer does.
 ACCELERATION_PER_IMPULSE = 40.0
-SPREAD = 0.006
+SPREAD = 0.006  # relative sd of frequency and damping from impact to impact
 N_SAMPLE = 2_400
 
 
 def paper_response(section, ballast, railpad):
-    """Function of a random generator giving (N_SAMPLE,) acceleration per unit impulse [m/s² per N s].
+    """Function of a random generator that gives (N_SAMPLE,) acceleration per unit impulse [m/s² per N s].
 
-    A resonance goes with the square root of its stiffness; every blow meets frequencies and damping that
-    differ by 0.6 %.
+    A resonance frequency follows the square root of its stiffness. Frequencies and damping scatter by 0.6 % from impact
+    to impact.
     """
     model = published_model(LOCATION[section])
     factor = {"ballast": np.sqrt(ballast), "railpad": np.sqrt(railpad)}

@@ -1,4 +1,4 @@
-"""Hammer tests computed from the paper's models: the truth behind tests, benchmarks and the demonstration fleet."""
+"""Hammer tests computed from the models of the paper, for tests and benchmarks with known truth."""
 
 from dataclasses import dataclass, field
 
@@ -11,7 +11,7 @@ from turnout.modal.state_space import continuous_pole
 
 @dataclass(frozen=True)
 class Nuisance:
-    """A mode that the published models do not have; ``share`` is its initial amplitude over the largest mode's."""
+    """A mode that the published models lack; ``share`` is its initial amplitude over that of the largest mode."""
 
     frequency: float
     damping: float
@@ -25,11 +25,11 @@ UNMODELLED = (Nuisance(1050.0, 0.03, 0.50), Nuisance(330.0, 0.05, 0.12))
 
 @dataclass(frozen=True)
 class HammerTest:
-    """Synthetic blows at one place: ``force`` [N] and ``acceleration`` [m/s²] are (n_impact, n_sample).
+    """Synthetic impacts at one location: ``force`` [N] and ``acceleration`` [m/s²] are (n_impact, n_sample).
 
-    ``decay_start`` (n_impact,) is the first sample of the free decay. ``frequency`` [Hz], ``damping``
-    (n_impact, n_mode) are the true modes of each blow and ``bands`` their names; unmodelled modes follow.
-    ``noise`` [m/s²] is the standard deviation of the white noise of each blow, (n_impact,).
+    ``decay_start`` (n_impact,) is the first sample of the free decay. ``frequency`` [Hz] and ``damping``, both
+    (n_impact, n_mode), are the true modes of each impact and ``bands`` their names; unmodelled modes come last.
+    ``noise`` [m/s²] is the standard deviation of the white noise of each impact, (n_impact,).
     """
 
     force: np.ndarray
@@ -43,7 +43,7 @@ class HammerTest:
     peak: np.ndarray = field(repr=False)
 
     def decays(self, n: int = 600) -> list[np.ndarray]:
-        """Free decays of ``n`` samples, one (n,) array per blow. [m/s²]"""
+        """Free decays of ``n`` samples, one (n,) array per impact [m/s²]."""
         return [y[k : k + n] for y, k in zip(self.acceleration, self.decay_start, strict=True)]
 
 
@@ -63,20 +63,20 @@ def hammer_test(
     duration: float = 0.04,
     pre_trigger: float = 2e-3,
 ) -> HammerTest:
-    r"""Blows of a soft-tipped hammer on one of the paper's locations.
+    r"""Simulate impacts of a soft-tipped hammer at one location of the paper.
 
     Parameters
     ----------
     location : str or PublishedModel
         A name of ``tables.LOCATIONS``.
     n_impact : int
-        Blows; contact varies by 8 %, peak force by 10 %, the start falls anywhere between two samples.
+        Number of impacts. Contact time varies by 8 %, peak force by 10 %; the start lies anywhere between two samples.
     seed : int or Generator
-        The only source of chance.
+        The only source of randomness.
     snr_db : float
-        Peak acceleration of a blow over the standard deviation of its white noise. [dB]
+        Peak acceleration of an impact over the standard deviation of its white noise [dB].
     spread : float
-        Relative standard deviation between blows of every frequency and damping, independently.
+        Relative standard deviation of every frequency and damping from impact to impact, independent.
     shift : (n_mode,) floats
         Factors on the true frequencies, for drift over campaigns.
     nuisance : tuple of Nuisance
@@ -87,7 +87,7 @@ def hammer_test(
         Mean contact time [s], mean peak force [N], and acceleration [m/s²] per unit of the paper's normalised
         output, which has none.
     duration, pre_trigger : float
-        Length after and before the blow. [s]
+        Length after and before the impact [s].
 
     Returns
     -------
@@ -108,7 +108,7 @@ def hammer_test(
     n = before + round(duration * model.rate)
     time = (np.arange(n) - before - rng.random(n_impact)[:, None]) / model.rate
     force = height[:, None] * haversine_pulse(time, length[:, None])
-    # y_k = Re sum R z^k answers one unit of impulse in one sample, hence the factor of the rate.
+    # y_k = Re sum R z^k is the response to one unit of impulse in one sample, hence the factor of the rate.
     pole = continuous_pole(frequency, damping)
     clean = gain * model.rate * height[:, None] * pulse_response(time, pole, residue, length)
     top = np.max(np.abs(clean), axis=1)
@@ -125,7 +125,7 @@ def hammer_test(
 
 
 def _modes(model, n_impact, spread, shift, nuisance, rng):
-    """(frequency, damping, residue) of every blow, (n_impact, n_mode) each: the model's modes, then the unmodelled."""
+    """(frequency, damping, residue) of every impact, (n_impact, n_mode) each; unmodelled modes come last."""
     n_mode = len(model.frequency)
     chance = 1.0 + spread * rng.standard_normal((2, n_impact, n_mode))
     frequency = model.frequency * np.asarray(shift, float)[:n_mode] * chance[0]

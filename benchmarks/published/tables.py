@@ -1,7 +1,7 @@
-"""Tables 1 to 4 of the paper as printed; values and printed uncertainties, digit for digit.
+"""Tables 1 to 4 of the paper as printed: values and printed uncertainties, digit for digit.
 
 P. Barkhordari, R. Galeazzi, A. de Miguel Tejada, I. F. Santos, Identification of Behavioural Models for
-Railway Turnouts Monitoring. Sampling rate 20 kHz. What is wrong with single entries is in ``slips``.
+Railway Turnouts Monitoring. Sampling rate 20 kHz. Wrong entries are listed in ``misprints``.
 """
 
 from dataclasses import dataclass

@@ -20,8 +20,8 @@ WALL, CPU = 1800.0, 900.0  # budget of a case: wall clock and CPU time [s]
 
 
 def diagnose_set(
-    out, truth, command=COMMAND, only=None, timeout=WALL, workers=1, say=print, cpu=CPU, again=False, progress=None,
-    label=None,
+    out, truth, command=COMMAND, only=None, timeout=WALL, workers=1, say=print, cpu=CPU,
+    again=False, progress=None, label=None,
 ):  # fmt: skip
     """Write ``out``/findings/<case>.json and ``out``/diagnosis.json; returns the content of diagnosis.json.
 

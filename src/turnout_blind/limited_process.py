@@ -41,7 +41,7 @@ def limited(command, cpu):
 def run(command, folder, logs, wall, cpu):
     """``ProcessResult`` of ``command`` (list) in ``folder``; its output goes to files in ``logs``.
 
-    It is killed with all its children after ``wall`` [s] of wall clock, and by the system after ``cpu`` [s] of CPU time.
+    It is killed with all its children after ``wall`` [s] of wall clock, and by the system after ``cpu`` [s].
     CPU time is that of the process and of the children it has waited for.
     """
     logs = Path(logs)

@@ -117,7 +117,7 @@ def _path(wheels, i, x):
 
 @numba.njit(cache=True)
 def hertz(stiffness, local, approach, guess):
-    """Contact force [N] of F = k max(0, approach - local F)^1.5 by Newton's method from ``guess``; 0 without contact."""
+    """Contact force [N] of F = k max(0, approach - local F)^1.5 by Newton's method from ``guess``; 0 if apart."""
     if approach <= 0.0:
         return 0.0
     force = guess

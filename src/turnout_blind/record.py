@@ -97,8 +97,8 @@ def passage_motion(site, world, k, rng):
         return site.roughness["rail"](x) + site.roughness[plan.train, i + 1](x, plan.phase)
 
     a, _, _ = roll(
-        world, train, plan.speed, places, PASSAGE_LENGTH, lead_of(world, places, plan.speed), plan.temperature, rough,
-        plan.phase, grown=float(k),
+        world, train, plan.speed, places, PASSAGE_LENGTH, lead_of(world, places, plan.speed),
+        plan.temperature, rough, plan.phase, grown=float(k),
     )  # fmt: skip
     for source in world.passage_noise:
         a = a + source(np.arange(a.shape[1]) / RATE, places, k, rng)

@@ -18,7 +18,7 @@ def level(wavelength, at_10_cm):
 
 
 def patch_share(wavelength):
-    """Share of the variance that moves a wheel: exp(-(2 pi a / wavelength)^2), an approximation of Remington's filter."""
+    """Share of the variance that moves a wheel: exp(-(2 pi a / wavelength)^2), approximating Remington's filter."""
     return np.exp(-((2.0 * np.pi * PATCH / np.asarray(wavelength)) ** 2))
 
 

@@ -29,8 +29,8 @@ def strike(world, places, at, times, velocities, duration, temperature=None, mas
     cars, wheels = no_train()
     sensors = read(world.grid, places)
     out, hammer, _, state = march(
-        round(duration / dt), dt, world.grid.start, world.beam(), world.supports(temperature), world.hung(), cars,
-        wheels, REST, blow, *sensors, 1,
+        round(duration / dt), dt, world.grid.start, world.beam(), world.supports(temperature),
+        world.hung(), cars, wheels, REST, blow, *sensors, 1,
     )  # fmt: skip
     return hammer, accelerations(out, dt), state
 
@@ -62,7 +62,7 @@ def roll(world, train, speed, places, duration, lead, temperature=None, roughnes
     way = Roll(min(places) - speed * lead, speed, low, low + RAMP, high - RAMP, high)
     sensors = read(world.grid, places)
     out, _, force, state = march(
-        round(duration / dt), dt, world.grid.start, world.beam(), world.supports(temperature, grown), world.hung(),
-        cars_of(train), wheels, way, STILL, *sensors, 60,
+        round(duration / dt), dt, world.grid.start, world.beam(), world.supports(temperature, grown),
+        world.hung(), cars_of(train), wheels, way, STILL, *sensors, 60,
     )  # fmt: skip
     return accelerations(out, dt), force.T, state

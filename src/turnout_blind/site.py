@@ -89,8 +89,9 @@ def draw_site(rng, same_temperature=None, one_speed=None, panel=PLAIN):
     force = Chain("force", 22.2e3, float(1.0 + 0.01 * rng.normal()), 0.0, noise=2.0, drift=0.5, coupling=0.05)
     site = Site(
         zones, nominal, sensors, tuple(x for k, x in enumerate(sensors) if k != left_out), trains,
-        {name: _driven(train, rng) for name, train in trains.items()}, _passages(rng, temperatures, one_speed),
-        temperatures, _world(rng, zones, nominal), chains, force, tip=1.1e9 * float(np.exp(0.1 * rng.normal())),
+        {name: _driven(train, rng) for name, train in trains.items()},
+        _passages(rng, temperatures, one_speed), temperatures, _world(rng, zones, nominal), chains, force,
+        tip=1.1e9 * float(np.exp(0.1 * rng.normal())),
     )  # fmt: skip
     site.world.sensor_shift = {c.name: float(0.015 * rng.normal()) for c in chains}
     site.roughness = _roughness(rng, site.true_trains)

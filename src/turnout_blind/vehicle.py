@@ -65,8 +65,9 @@ def cars_of(train):
 
     return Cars(
         of(lambda c: 0.5 * c.body), of(lambda c: 0.5 * c.body_inertia), of(lambda c: 0.5 * c.bogie),
-        of(lambda c: 0.5 * c.bogie_inertia), of(lambda c: 0.5 * c.primary), of(lambda c: 0.5 * c.primary_damping),
-        of(lambda c: 0.5 * c.secondary), of(lambda c: 0.5 * c.secondary_damping), of(lambda c: 0.5 * c.base),
+        of(lambda c: 0.5 * c.bogie_inertia), of(lambda c: 0.5 * c.primary),
+        of(lambda c: 0.5 * c.primary_damping), of(lambda c: 0.5 * c.secondary),
+        of(lambda c: 0.5 * c.secondary_damping), of(lambda c: 0.5 * c.base),
         of(lambda c: 0.5 * c.pivots),
     )  # fmt: skip
 

@@ -1,1 +1,1 @@
-"""From truths and finding rows to figures with intervals; reads nothing else of the tool."""
+"""Score a set: from truths and finding rows to figures with intervals. Nothing else of the tool is read."""

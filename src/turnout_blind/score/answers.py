@@ -1,4 +1,4 @@
-"""Finding rows as answers: the same words whatever wrote them."""
+"""Convert finding rows into answers of one form, whichever program wrote the rows."""
 
 import json
 import re
@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 @dataclass(frozen=True)
 class Answer:
-    """One row of findings. ``names`` are one for "named", two for "a_or_b"; ``parameters`` {name: (value, se)}."""
+    """One row of findings: one of ``names`` for "named", two for "a_or_b"; ``parameters`` {name: (value, se)}."""
 
     verdict: str
     names: tuple = ()
@@ -24,7 +24,7 @@ class Answer:
 
     @property
     def silent(self):
-        """Whether it says that nothing is wrong."""
+        """Whether the answer is that nothing is wrong."""
         return self.verdict == "none"
 
 
@@ -41,8 +41,10 @@ def answers_of(rows):
 
 
 def _answers(row):
-    """The answer of a row, and one for each further term that it says was found with it: of ``term_json``, or where
-    that is not there, of the names that its parameters bear."""
+    """The answer of a row, and one for each further term in it.
+
+    Further terms are read from ``term_json``. Without that column they are the terms named by the parameters.
+    """
     found = json.loads(row.get("term_json") or "[]")
     first = _answer(row)
     yield replace(first, parameters=_values(found[0])) if found and row["verdict"] == "named" else first
@@ -55,7 +57,7 @@ def _answers(row):
 
 
 def _further(term):
-    """The answer that a further term is, or one of two, where and how large.
+    """The answer of a further term: its name or two, its position and its parameters.
 
     >>> dip = {"term": "surface_dip", "or": "wheel_flat", "fixed": {"place": 21.0},
     ...        "parameters": {"shift": {"value": 0.4}}}
@@ -97,13 +99,13 @@ def _answer(row):
 
 
 def _in_train(text):
-    """(train, axle) of "loaded, axle 3", either None where it is not said."""
+    """(train, axle) of "loaded, axle 3"; either is None if it is missing."""
     train, _, axle = (text or "").partition(", axle ")
     return train or None, int(axle) if axle.isdecimal() else None
 
 
 def _parameters(text, term=None):
-    """(where, {name: (value, se)}) of the column, of one term where the entries say whose they are."""
+    """(where, {name: (value, se)}) of the column, for one term if the entries name their term."""
     where, entries = _entries(text)
     mine = [r for r in entries if r.get("term") in (None, term)]
     return where, {r["name"]: (r.get("value"), r.get("se", r.get("standard_error"))) for r in mine}

@@ -1,4 +1,4 @@
-"""Cases told: what was concealed, what could be heard of it, what was said, and what it was worth."""
+"""Report single cases: what was concealed, how it shows in the signals, the answer, and the fits."""
 
 from pathlib import Path
 
@@ -21,11 +21,11 @@ UNITS = dict.fromkeys(METRES.split(), "m") | {
     "phase": "rad",
 }  # fmt: skip
 FITS = {"before": "no name", "decoy": "a decoy", "rival": "second best name", "after": "the name"}
-ALIKE = 0.05  # half of all lines of two spectra differ by less: a picture of them shows one curve
+ALIKE = 0.05  # median difference of two spectra (logarithm) below which their curves coincide in a picture
 
 
 def choose(judged):
-    """Ids of three cases: the least plain single named rightly, two effects, and the plainest failure."""
+    """Ids of three cases: the least visible single effect named rightly, two effects, and the most visible failure."""
     right = [j for j in judged if j.stratum == "single" and j.clear and outcome(j) == "right"]
     double = [j for j in judged if j.stratum == "double"]
     failed = [j for j in judged if j.kinds and j.clear and outcome(j) in ("wrong", "none", "unknown")]
@@ -37,9 +37,9 @@ def choose(judged):
 
 
 def tell(out, page, cases=None, more=None, oracle=None, effects=()):
-    """Markdown of stories; a picture per case goes beside the ``page``. ``cases``: ids, else three are chosen.
+    """Markdown reports of ``cases`` (ids; None chooses three). A picture of each case is written beside the ``page``.
 
-    The recordings without the effect are made by the generator from the seed that the truth holds.
+    The generator makes the recordings without the effect from the seed in the truth.
     """
     truths, rows, _ = revealed(out)
     judged = {case: judge(truths[case], answers_of(rows[case]), more) for case in truths}
@@ -62,7 +62,7 @@ def _title(truth):
 
 
 def words(truth, rows):
-    """Concealed and said, in sentences."""
+    """What was concealed and what was answered, in sentences."""
     concealed = "; ".join(
         f"{e['kind'].replace('_', ' ')} ({_numbers({**e['where'], **e['parameters']})})" for e in truth["effects"]
     )
@@ -97,7 +97,7 @@ def _number(value, unit):
 
 
 def draw(truth, rows, oracle, path, effects):
-    """With and without the effect, blow and train; the track with what was there and what was said; the fits."""
+    """Draw one case: impact and train with and without the effect, the track with truth and answers, and the fits."""
     plt = pyplot()
     concealed = tuple((e["kind"], e["rung"]) for e in truth["effects"])
     plan = CasePlan(truth["stratum"], concealed, tuple(truth["seed"]), truth.get("panel", PLAIN))
@@ -114,7 +114,7 @@ def draw(truth, rows, oracle, path, effects):
 
 
 def _compared(axis, before, after, top, window):
-    """Spectra without and with the effect up to ``top``; where these are alike, as with a delay, 30 ms of signals."""
+    """Plot spectra without and with the effect up to ``top`` [Hz]; if they coincide, as for a delay, 30 ms of time."""
     (f, was), (_, became) = (spectrum(signal[None], RATE, window) for signal in (before, after))
     inside = (f > 5.0) & (f < top)
     if np.median(np.abs(np.log(became[0][inside] / was[0][inside]))) > ALIKE:
@@ -131,7 +131,7 @@ def _compared(axis, before, after, top, window):
 
 
 def _blow(site, world):
-    """(title, without, with, top [Hz], window) of a blow at the place whose sensors show the effect most."""
+    """(title, without, with, top [Hz], window) of an impact at the position where the effect shows most."""
 
     def sides(place):
         for w in (site.world, world):
@@ -144,7 +144,7 @@ def _blow(site, world):
 
 
 def _train(site, world):
-    """(title, without, with, top [Hz], window) of the passage whose sensors show the effect most."""
+    """(title, without, with, top [Hz], window) of the passage in which the effect shows most."""
 
     def sides(k):
         for w in (site.world, world):
@@ -156,12 +156,12 @@ def _train(site, world):
 
 
 def _plainest(shown):
-    """The (what, without, with) that differs most."""
+    """The (key, without, with) that differs most."""
     return max(shown, key=lambda s: changes(*s[1:]).max())
 
 
 def _shown(site, world, motion, kind):
-    """Through the sensors' faults, as the recorder of a "hammer" test or a "passage" has it."""
+    """Signals of the sensors under ``motion`` with their faults, in a "hammer" test or a "passage"."""
     rows = []
     for x, chain in zip(motion, site.chains):
         for fault in world.channels.get(chain.name, ()):
@@ -171,7 +171,7 @@ def _shown(site, world, motion, kind):
 
 
 def _map(axis, truth, rows, site):
-    """Sensors, blows, what was there (filled) and what was said (open) along the rail."""
+    """Plot along the rail: sensors, hammer positions, concealed effects (filled) and answers (open)."""
     axis.set_xlim(min(site.sensors) - 2.5, max(site.sensors) + 2.5)
     axis.plot(site.sensors, np.zeros(len(site.sensors)), "^", color="0.4", label="sensor")
     axis.plot(site.blows, np.zeros(len(site.blows)), "v", color="0.7", label="blow")
@@ -191,7 +191,7 @@ def _map(axis, truth, rows, site):
 
 
 def _mark(axis, x, y, words, train, axle, **style):
-    """What has a place there; what has none, with its wheel or train, at the left."""
+    """Mark an effect at its position ``x``; one without a position stands at the left with its wheel or train."""
     if x is not None:
         axis.plot(x, y, "o", **style)
         _note(axis, x, y, words)
@@ -201,7 +201,7 @@ def _mark(axis, x, y, words, train, axle, **style):
 
 
 def _note(axis, x, y, words):
-    """Beside the point, towards the middle of the axis."""
+    """Write the text beside the point, towards the middle of the axis."""
     low, high = axis.get_xlim()
     side = "right" if x > 0.5 * (low + high) else "left"
     axis.annotate(words.replace("_", " "), (x, y), xytext=(-5 if side == "right" else 5, 5),
@@ -209,7 +209,7 @@ def _note(axis, x, y, words):
 
 
 def _bars(axis, rows, oracle):
-    """Held-out fits."""
+    """Plot the fits of the held-out recordings."""
     row = (rows or [{}])[0]
     found = {words: row.get(f"fit_{name}_pct") for name, words in FITS.items()} | {"told the truth": oracle}
     found = {name: value for name, value in found.items() if value is not None}

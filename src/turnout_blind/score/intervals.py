@@ -1,12 +1,12 @@
-"""Exact intervals of shares."""
+"""Exact confidence intervals of shares."""
 
 from scipy.stats import beta
 
 
 def clopper_pearson(k, n, confidence=0.95):
-    """(low, high) of a share of which ``k`` of ``n`` were seen; (0, 1) for n = 0.
+    """(low, high) of a share if ``k`` of ``n`` were observed; (0, 1) for n = 0.
 
-    No alarm in 60 leaves up to 6.0 % two-sided; one in 30 is 0.1 to 17.2 %:
+    No alarm in 60 gives an upper limit of 6.0 % (two-sided). One in 30 gives 0.1 to 17.2 %:
 
     >>> [round(100 * x, 1) for x in (*clopper_pearson(0, 60), *clopper_pearson(1, 30))]
     [0.0, 6.0, 0.1, 17.2]

@@ -1,4 +1,4 @@
-"""One case held against its truth."""
+"""Compare the answers of one case with its truth."""
 
 from dataclasses import dataclass, field
 
@@ -6,16 +6,19 @@ import numpy as np
 
 from turnout_blind.score.names import right_locks, right_names, same_parameters
 
-BAY = 0.6  # a place is right within one bay [m]
-LEVEL = 46.0  # what controls leave unexplained of a passage never used [% of its norm]; roughness, mostly
-NEUTRAL = {"factor": 1.0, "gain": 1.0}  # no effect; 0 elsewhere
-CLEAR = 3.0  # points of held-out fit that an effect must cost to be counted as there to be found
+BAY = 0.6  # largest error of a right position: one sleeper bay [m]
+LEVEL = 46.0  # residual of controls in a held-out passage, mostly roughness [% of its norm]
+NEUTRAL = {"factor": 1.0, "gain": 1.0}  # parameter values without effect; 0 for all others
+CLEAR = 3.0  # loss of held-out fit above which an effect is clear [points]
 
 
 @dataclass(frozen=True)
 class Judged:
-    """``hits`` per effect: "named", "a_or_b" or ""; ``placed`` per effect: where it was said right; ``wrong`` answers
-    with a name and no right one; the rest as the bars ask."""
+    """Result of one case. ``matches`` per effect: "named", "a_or_b" or "".
+
+    ``is_located`` per effect: whether its position, axle and sensor are right. ``wrong_names`` are names of answers
+    without a right one.
+    """
 
     case: str
     stratum: str
@@ -38,14 +41,14 @@ class Judged:
 
     @property
     def clear(self):
-        """Whether the effect costs enough fit to be found."""
+        """Whether the effect costs enough fit to be detectable."""
         return self.gain > CLEAR
 
 
 def gain_of(visible):
-    """Visibility of an effect that makes up a share ``visible`` of the response [%], in points of fit.
+    """Visibility in points of fit of an effect that makes up a share ``visible`` of the response [%].
 
-    It adds in squares to what controls leave: sqrt(46^2 + v^2) - 46. 3 points are lost at v = 16.9 %.
+    Its square adds to that of the control residual: sqrt(46^2 + v^2) - 46. 3 points are lost at v = 16.9 %.
 
     >>> round(gain_of({"hammer_pct": 1.0, "passage_pct": 16.9}), 2)
     3.01
@@ -55,7 +58,7 @@ def gain_of(visible):
 
 
 def judge(truth, answers, more=None):
-    """``Judged`` of a case from its truth and ``answers`` (None where the tool gave none)."""
+    """``CaseResult`` of a case from its truth and ``answers`` (None if the tool gave none)."""
     effects = truth["effects"]
     kinds = tuple(e["kind"] for e in effects)
     loud = [a for a in answers or () if not a.silent]
@@ -68,15 +71,17 @@ def judge(truth, answers, more=None):
     ahead = loud[0] if loud else (answers or [None])[0]
     return Judged(
         truth["case"], truth["stratum"], kinds, tuple(e["rung"] for e in effects), gain_of(truth["visible"]),
-        bool(answers), bool(loud), hits, tuple(all(_where(e, n, loud).values()) for e, n in zip(effects, right)), first,
-        wrong, _said(answers, loud), _located(effects, right, loud),
+        bool(answers), bool(loud), hits,
+        tuple(all(_where(e, n, loud).values()) for e, n in zip(effects, right)),
+        first, wrong, _said(answers, loud),
+        _located(effects, right, loud),
         tuple(_compared(effects, right, loud)), probability, sound,
         (None, None) if ahead is None else (ahead.before, ahead.after), ahead and ahead.gain_error,
     )  # fmt: skip
 
 
 def _wrong(right, loud):
-    """Names of the answers that fit no effect, or only one that has its name already."""
+    """Names of the answers that match no effect, or only one that is named already."""
     free, wrong = list(right), []
     for answer in (a for a in loud if a.names):
         fits = next((names for names in free if set(answer.names) & set(names)), None)
@@ -103,8 +108,10 @@ def _said(answers, loud):
 
 
 def _probability(truth, answers, loud, known, wrong):
-    """Stated probability of the answer, and whether all of it was right; "none" is where nothing clear was there,
-    "unknown" where the effects are not ``known`` to a library."""
+    """(stated probability of the answer, whether the answer is right).
+
+    "none" is right without a clear effect, "unknown" if the library does not hold the effects (``is_known`` False).
+    """
     if not answers:
         return None, None
     ahead = loud[0] if loud else answers[0]
@@ -119,12 +126,12 @@ def _probability(truth, answers, loud, known, wrong):
 
 
 def _best(names, loud):
-    """The answer that speaks of an effect: one that names it, else the first."""
+    """The answer that refers to an effect: one that names it, else the first."""
     return next((a for a in loud if set(a.names) & set(names)), loud[0] if loud else None)
 
 
 def _located(effects, right, loud):
-    """{"lock", "place", "axle", "sensor"}: True or False for each that the one effect has."""
+    """{"lock", "place", "axle", "sensor"}: True or False for each that a single effect has."""
     if len(effects) != 1:
         return {}
     effect, answer = effects[0], _best(right[0], loud)
@@ -147,8 +154,10 @@ def _where(effect, names, loud):
 
 
 def _compared(effects, right, loud):
-    """(error over the size of the effect, whether the 95 % interval covers, or None without a standard error) per
-    parameter named."""
+    """(relative error, whether the 95 % interval covers the truth) of each parameter of a named effect.
+
+    The error is relative to the size of the effect. Without a standard error the second is None.
+    """
     for effect, names in zip(effects, right):
         answer = next((a for a in loud if a.verdict == "named" and set(a.names) & set(names)), None)
         for own, theirs in same_parameters(effect).items():

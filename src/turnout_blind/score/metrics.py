@@ -1,4 +1,4 @@
-"""The figures that the proof has to show, each with its n, its interval and its bar."""
+"""Compute the figures of the proof, each with its number of cases, interval and target (bar)."""
 
 from collections import Counter
 from dataclasses import dataclass, replace
@@ -8,13 +8,13 @@ import numpy as np
 from turnout_blind.score.intervals import clopper_pearson
 from turnout_blind.score.matching import CLEAR
 
-POINT = 1.0  # of held-out fit
-FEWEST = 5  # cases of a group of probabilities that is held against its bar
+POINT = 1.0  # loss of held-out fit that counts if the row gives no standard error [points]
+FEWEST = 5  # smallest group of stated probabilities that is compared with its bar [cases]
 
 
 @dataclass(frozen=True)
 class Share:
-    """``k`` of ``n``; ``bar`` [%] with ``sense`` ">=" or "<=", None where only printed."""
+    """``k`` of ``n`` cases; ``bar`` [%] with ``sense`` ">=" or "<=", None if the figure is only printed."""
 
     name: str
     k: int
@@ -24,12 +24,12 @@ class Share:
 
     @property
     def share(self):
-        """Percent, nan for n = 0."""
+        """Share in percent, nan for n = 0."""
         return 100.0 * self.k / self.n if self.n else float("nan")
 
     @property
     def interval(self):
-        """Two-sided 95 % of Clopper and Pearson [%]."""
+        """Two-sided 95 % interval of Clopper and Pearson [%]."""
         return tuple(100.0 * x for x in clopper_pearson(self.k, self.n))
 
     @property
@@ -42,7 +42,7 @@ class Share:
 
 @dataclass(frozen=True)
 class Value:
-    """A figure that is no share: ``value`` from ``n``; nan where nothing was measured."""
+    """A figure other than a share: ``value`` from ``n`` cases, nan if nothing was measured."""
 
     name: str
     value: float
@@ -60,7 +60,7 @@ class Value:
 
 
 def figures(judged, oracle=None):
-    """All figures of ``judged`` cases; ``oracle`` as ``oracle_of`` reads it, {} where not known."""
+    """All figures of the ``results`` of cases; ``oracle`` is that of ``read_oracle``, {} if there is none."""
     of = {
         s: [j for j in judged if j.stratum == s] for s in ("control", "single", "double", "outside", "unidentifiable")
     }
@@ -106,13 +106,13 @@ def _where_and_what(cases, which):
 
 
 def _gained(j, oracle):
-    """Points of held-out fit that the true effect gains in the tool's own hands, nan where nobody asked."""
+    """Points of held-out fit that the true effect gains in the same engine, nan if it was not computed."""
     before, after = oracle.get(j.case, (float("nan"), float("nan")))
     return after - before
 
 
 def as_it_should(j):
-    """Whether what cannot be identified was answered so: nothing, or "a or b" with the truth among them."""
+    """Whether an unidentifiable effect got the right kind of answer: none, or "a or b" with the truth among them."""
     return j.answered and not j.wrong and (not j.alarm or j.hits[0] == "a_or_b")
 
 
@@ -133,8 +133,11 @@ def _parameters(judged):
 
 
 def _held_out(judged, gained, oracle):
-    """What names gain on recordings left out. Silence closes no gap. A named model without a fit of its own counts as
-    fallen; where a row has no standard error of the gain, a point stands for it."""
+    """Figures of the fit gained by names on held-out recordings.
+
+    No answer closes no gap. A named model without a fit counts as worse. Without a standard error of the gain, one
+    point is used.
+    """
     closed = {j.case: _closed(j, *oracle[j.case]) for j in gained}
     named = [closed[j.case] for j in gained if j.fits[1] is not None]
     yield Value(
@@ -169,7 +172,7 @@ def _median(values):
 
 
 def reliability(judged):
-    """(mean stated probability, share right, n) of five groups, equal in number but for ties, which stay together."""
+    """(mean stated probability, share right, n) of five groups of equal size, except that ties stay together."""
     stated = sorted((j.probability, j.probably_right) for j in judged if j.probability is not None)
     if not stated:
         return []
@@ -183,7 +186,7 @@ def reliability(judged):
 
 
 def confusion(judged):
-    """{row: Counter of what was said first}; a double counts under both its kinds, joined."""
+    """{row: Counter of first answers}; a double counts under both its kinds, joined."""
     table = {}
     for j in judged:
         table.setdefault(" + ".join(sorted(j.kinds)) or "control", Counter())[j.said] += 1
@@ -191,7 +194,7 @@ def confusion(judged):
 
 
 def severity(judged):
-    """{kind: [(rung, visibility [points], what was said)]} of singles, by rung."""
+    """{kind: [(rung, visibility [points], first answer, whether it is right)]} of single effects, by rung."""
     table = {}
     for j in judged:
         if j.stratum in ("single", "outside"):

@@ -1,7 +1,6 @@
-"""What the tool may call each concealed effect: the only place where the two vocabularies meet."""
+"""Right names of each concealed effect: the only module in which the vocabularies of generator and tool meet."""
 
-# Kind -> names that are right. None of the tool's names is right for a kind outside its library, except where a
-# library has grown to hold it.
+# Kind -> right names. A kind outside the library of the tool has none, unless the library has since been extended.
 RIGHT = {
     "void": ("hanging_sleeper",),
     "ballast": ("local_ballast",),
@@ -31,8 +30,8 @@ RIGHT = {
     "common_gain": ("sensor_gain",),
 }
 
-# Kind -> what it may be said to be locked to. A lag is the sensor's or its clock's; what acts with amplitude at one
-# place is locked to either. A polygon goes with its wheel, too heavy wheelsets with their train, and with nothing else.
+# Kind -> right locks. A delay belongs to the sensor or its clock. An effect of amplitude at one position is locked to
+# either. A polygon is locked to its wheel only, too heavy wheelsets to their train only.
 LOCKS = {
     "pad_fractional": ("condition", "frequency"),
     "rail_shear": ("condition", "frequency"),
@@ -48,9 +47,9 @@ LOCKS = {
     "common_gain": ("condition", "sensor", "train"),
 }
 
-# Kind -> {parameter: the tool's parameter of the same meaning}. A flat's length is in both that of the chord with a
-# depth of l^2 / 16 R, however far its edges are worn; a limit is the mean of both sides. Not compared: a power law has
-# no single branch, a polygon's cosine and sine hang on where the angle is counted from, a mount yields beside another.
+# Kind -> {parameter: parameter of the tool with the same meaning}. The length of a flat is in both the chord with a
+# depth of l^2 / 16 R, however worn its edges are. A limit is the mean of both sides. Not compared: a power law has no
+# single branch, cosine and sine of a polygon depend on the origin of the angle, a mount is in series with another.
 SAME = {
     "void": {"gap": "gap"},
     "ballast": {"factor": "factor"},
@@ -68,14 +67,14 @@ SAME = {
 
 
 def right_names(kind, more=None):
-    """Names that are right for ``kind``; ``more`` {kind: [names]} for effects of one's own."""
+    """Right names of an effect type; ``extra_names`` {kind: [names]} are those of added effects."""
     return tuple(RIGHT.get(kind, ())) + tuple((more or {}).get(kind, ()))
 
 
 def same_parameters(effect):
-    """{parameter: the tool's of the same meaning} of one concealed effect (its entry in the truth).
+    """{parameter: parameter of the tool with the same meaning} of one concealed effect (its entry in the truth).
 
-    A sleeper that still bears on a part of its bed has no gap of its own: only one that hangs whole has.
+    A sleeper that is partly supported has no comparable gap: only one that hangs completely has.
     """
     if effect["parameters"].get("seated", 0.0) > 0.0:
         return {}
@@ -83,5 +82,5 @@ def same_parameters(effect):
 
 
 def right_locks(kind, locked_to):
-    """What ``kind`` may be said to be locked to."""
+    """Right locks of an effect type."""
     return LOCKS.get(kind, (locked_to,))

@@ -1,4 +1,4 @@
-"""The measured part of a page, between two marks: written from a scored set, its prose around it left alone."""
+"""Write the measured part of a page, between two marks, from a scored set. The other text stays unchanged."""
 
 from pathlib import Path
 
@@ -12,9 +12,9 @@ KEY = '*Red: a wrong name was among those given, also beside a right one. ½: th
 
 
 def write_page(path, out, more=None, effects=(), cases=None):
-    """Put report, pictures and stories of the set ``out`` between the marks of the page at ``path``.
+    """Write report, pictures and case reports of the set ``out`` between the marks of the page at ``path``.
 
-    Pictures go beside the page and bear its name. Errors: BlindError where the page lacks the marks.
+    Pictures are written beside the page under its name. Errors: BlindError if the page lacks the marks.
     """
     path = Path(path)
     text = path.read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Pictures of a scored set: what was said along every ladder, and how far stated probabilities can be believed."""
+"""Pictures of a scored set: the answers along every ladder, and the reliability of stated probabilities."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ LETTERS = {"right": "✓", "among two": "½", "none": "–", "unknown": "?", "wr
 
 
 def pyplot():
-    """pyplot that draws SVG, the same bytes every time."""
+    """pyplot with SVG output that is the same in every run."""
     import matplotlib
 
     matplotlib.use("svg")
@@ -21,14 +21,14 @@ def pyplot():
 
 
 def save(figure, path):
-    """Write an SVG without a date."""
+    """Write an SVG file without a date."""
     figure.savefig(path, metadata={"Date": None})
     pyplot().close(figure)
     return path
 
 
 def outcome(judged):
-    """One word of ``COLOURS`` for a case; a wrong name outweighs a right one beside it."""
+    """Outcome of a case, a key of ``COLOURS``. A wrong name outweighs a right one beside it."""
     if judged.wrong:
         return "wrong"
     if all(h == "named" for h in judged.hits) and judged.hits:
@@ -39,7 +39,7 @@ def outcome(judged):
 
 
 def draw_severity(judged, path):
-    """A cell per kind and rung, from hidden to obvious, with what was said; framed: visible by more than 3 points."""
+    """Draw a cell per kind and rung, from hidden to obvious, with the outcome; framed: visibility above 3 points."""
     plt = pyplot()
     mine = [j for j in judged if j.stratum in ("single", "outside", "unidentifiable")]
     kinds = sorted({(("single", "outside", "unidentifiable").index(j.stratum), j.kinds[0]) for j in mine})
@@ -61,7 +61,7 @@ def draw_severity(judged, path):
 
 
 def _side_by_side(judged):
-    """Cases of one kind and rung beside one another: the second half a cell to the right, and so on."""
+    """(offset, case): cases of one kind and rung side by side, each a quarter of a cell further right."""
     seen = {}
     for j in judged:
         key = j.kinds[0], j.rungs[0]
@@ -70,7 +70,7 @@ def _side_by_side(judged):
 
 
 def draw_reliability(judged, path):
-    """Share right against stated probability, by fifths of the cases, with 95 % intervals."""
+    """Draw the share right against the stated probability, by fifths of the cases, with 95 % intervals."""
     plt = pyplot()
     figure, axis = plt.subplots(figsize=(4.2, 3.8), layout="constrained")
     axis.plot([0, 1], [0, 1], color="0.6", lw=1)
@@ -88,9 +88,9 @@ def draw_reliability(judged, path):
 
 
 def spectrum(rows, rate, window="hann"):
-    """(frequency [Hz], density) of the rows (n_sensor, n), windowed pieces of 0.25 s overlapping by half.
+    """(frequency [Hz], density) of the rows (n_sensor, n), from windowed segments of 0.25 s that overlap by half.
 
-    A blow at the start of a piece wants the window "boxcar": others take it away.
+    For an impact at the start of a segment use the window "boxcar": others suppress it.
     """
     from scipy import signal
 
@@ -98,10 +98,10 @@ def spectrum(rows, rate, window="hann"):
 
 
 def changes(before, after):
-    """(n_sensor,) change of each row, relative to itself."""
+    """(n_sensor,) relative change of each row."""
     return np.linalg.norm(after - before, axis=1) / np.linalg.norm(before, axis=1)
 
 
 def furthest(before, after):
-    """Index of the row that changes most, relative to itself."""
+    """Index of the row with the largest relative change."""
     return int(np.argmax(changes(before, after)))

@@ -1,4 +1,4 @@
-"""The report of a revealed set, as Markdown."""
+"""Write the report of a revealed set as Markdown."""
 
 import json
 from pathlib import Path
@@ -16,20 +16,20 @@ KEY = (
 
 
 def judged_set(out, more=None, label=None):
-    """(judged cases, diagnosis) of a revealed set, or of an ablation of the tool on it; cases not run are left out."""
+    """(results of cases, diagnosis) of a revealed set or of an ablation on it; cases not run are left out."""
     truths, rows, held = revealed(out, label)
     return [judge(truths[case], answers_of(rows[case]), more) for case in sorted(truths) if case in held["cases"]], held
 
 
 def provenance(held):
-    """Hashes of the tool and of the set that a diagnosis, and an oracle beside it, are of."""
+    """Hashes of the tool and of the set, from a diagnosis or an oracle file."""
     return {name: held[name] for name in ("tool_sha256", "commit_sha256")}
 
 
 def oracle_of(out):
-    """{case: held-out fit (without, with) the true effect [%]} from ``out``/oracle.json, {} where there is none.
+    """{case: held-out fit (without, with) the true effect [%]} from ``out``/oracle.json, {} if there is none.
 
-    Errors: BlindError where another tool, or of another set, has been asked.
+    Errors: BlindError if it was computed with another tool or for another set.
     """
     path = Path(out) / "oracle.json"
     if not path.exists():
@@ -41,7 +41,7 @@ def oracle_of(out):
 
 
 def oracle_words(out):
-    """How many were asked, and what had no answer; nothing where nobody asked."""
+    """Number of cases asked of the oracle, and those without an answer; [] if there is no oracle file."""
     path = Path(out) / "oracle.json"
     if not path.exists():
         return []
@@ -52,19 +52,20 @@ def oracle_words(out):
     waiting = len(told["asked"]) - len(asked)
     return [
         f"Oracle: {len(asked)} of {len(told['asked'])} clear singles asked, in the order of their ids"
-        f"{f' ({waiting} not yet)' if waiting else ''}, {len(left)} without an answer{f' ({why})' if why else ''}."
+        f"{f' ({waiting} not yet)' if waiting else ''}, "
+        f"{len(left)} without an answer{f' ({why})' if why else ''}."
     ]
 
 
 def labels_of(out):
-    """Ablations of the tool on this set."""
+    """Labels of the ablations of this set."""
     return sorted(p.parent.name for p in (Path(out) / "ablations").glob("*/diagnosis.json"))
 
 
 def report_of(out, more=None):
-    """Markdown: figures beside their bars, confusion, severity, reliability, failures, ablations, cost.
+    """Markdown: figures with their bars, confusion, severity, reliability, failures, ablations, cost.
 
-    ``more`` {kind: [right names]}. Fits with the true effect are read from ``out``/oracle.json.
+    ``extra_names`` {kind: [right names]}. Fits with the true effect are read from ``out``/oracle.json.
     """
     judged, held = judged_set(out, more)
     parts = [
@@ -86,18 +87,21 @@ def report_of(out, more=None):
 
 
 def cost(judged, held, total):
-    """One paragraph: how many cases of ``total``, under which seals, at which cost."""
+    """One paragraph: number of cases of ``total``, hashes, and CPU time."""
     cpu = sorted(run["cpu_s"] for run in held["cases"].values()) or [float("nan")]
     commit, tool = held["commit_sha256"][:16], held["tool_sha256"][:16]
     return (
-        f"{len(judged)} of {total} sealed cases; commit {commit}, tool {tool}, truth hidden by {held['isolation']}; "
+        f"{len(judged)} of {total} sealed cases; commit {commit}, tool {tool}, "
+        f"truth hidden by {held['isolation']}; "
         f"CPU per case: median {cpu[len(cpu) // 2]:.0f} s, most {cpu[-1]:.0f} s."
     )
 
 
 def failure_table(judged):
-    """A row per case that went wrong: alarms on controls, wrong names, clear effects missed, no answer; what cannot be
-    identified and got any name but a half of "a or b"."""
+    """A row per failed case: alarm on a control, wrong name, clear effect missed, or no answer.
+
+    An unidentifiable effect fails with any answer but none or "a or b" with the truth among them.
+    """
     lines = [
         "| case | concealed | visibility [points] | said first | wrong names | probability |",
         "|---|---|---|---|---|---|",
@@ -106,7 +110,10 @@ def failure_table(judged):
         if _failed(j):
             what = " + ".join(f"{k} {r}" for k, r in zip(j.kinds, j.rungs)) or "nothing"
             sure = "" if j.probability is None else f"{j.probability:.2f}"
-            lines.append(f"| {j.case} | {what} | {j.gain:.1f} | {j.said} | {', '.join(j.wrong)} | {sure} |")
+            lines.append(
+                f"| {j.case} | {what} | {j.gain:.1f} | {j.said} | "
+                f"{', '.join(j.wrong)} | {sure} |"
+            )
     return "\n".join(lines) if len(lines) > 2 else "None."
 
 
@@ -120,7 +127,7 @@ def _failed(j):
 
 
 def ablation_table(out, judged, more=None):
-    """A row per figure that names and alarms hang on, a column per ablation; every column over its own cases."""
+    """A row per key figure and a column per ablation, each over its own cases."""
     columns = {"the tool": judged} | {label: judged_set(out, more, label)[0] for label in labels_of(out)}
     found = {name: {f.name: f for f in figures(cases)} for name, cases in columns.items()}
     lines = ["| figure | " + " | ".join(f"{n} (n = {len(c)})" for n, c in columns.items()) + " |"]
@@ -148,7 +155,7 @@ def figure_table(found):
 
 
 def confusion_table(table):
-    """Rows of what was concealed, columns of what was said."""
+    """Rows of concealed effects, columns of first answers."""
     columns = sorted({said for row in table.values() for said in row}, key=lambda s: (s not in ("none", "unknown"), s))
     lines = ["| concealed | " + " | ".join(columns) + " |", "|---" * (len(columns) + 1) + "|"]
     for kind in sorted(table, key=lambda k: (k != "control", k)):
