@@ -18,16 +18,16 @@ def main() -> int:
     parser.add_argument("part", nargs="*", metavar="part", help="any of: " + ", ".join(available))
     parser.add_argument("--strict", action="store_true", help="exit code 1 where a bar is missed; 0 without it")
     args = parser.parse_args()
-    parts = args.part or available
-    if unknown := set(parts) - set(available):
+    names = args.part or available
+    if unknown := set(names) - set(available):
         parser.error(f"no benchmark {', '.join(sorted(unknown))}; there are {', '.join(available)}")
     print(f"Python {platform.python_version()}, {os.cpu_count()} cores, one BLAS thread. CPU s = user + system.")
     missed = 0
-    for part in parts:
-        print(f"\n{part}\n{'-' * len(part)}", flush=True)
-        for bar in import_module(f"benchmarks.bench_{part}").bars():
+    for name in names:
+        print(f"\n{name}\n{'-' * len(name)}", flush=True)
+        for bar in import_module(f"benchmarks.bench_{name}").bars():
             print(bar, flush=True)
-            missed += bar.met is False
+            missed += bar.is_met is False
     print(f"\n{missed} bar(s) missed." if missed else "\nNo bar missed.")
     return 1 if args.strict and missed else 0
 

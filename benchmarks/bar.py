@@ -19,13 +19,13 @@ class Bar:
     note: str = ""
 
     @property
-    def met(self) -> bool | None:
+    def is_met(self) -> bool | None:
         if self.limit is None or not self.sense:
             return None
         return self.figure <= self.limit if self.sense == "<=" else self.figure >= self.limit
 
     def __str__(self) -> str:
-        verdict = {True: "met", False: "MISSED", None: ""}[self.met]
+        verdict = {True: "met", False: "MISSED", None: ""}[self.is_met]
         bar = "" if self.limit is None else f"{self.sense} {self.limit:g}"
         return f"{self.name:<64} {self.figure:>11.4g} {bar:>12} {self.unit:<10} {verdict:<7}{self.n} {self.note}"
 

@@ -21,7 +21,7 @@ from turnout.modal.least_squares import drift_columns
 from turnout.records import Channel, Recording
 
 SETTINGS = IdentifySettings(null_draws=10)
-IN_BAND = (20.0, 800.0)
+COUNTED_BAND = (20.0, 800.0)
 
 
 @dataclass
@@ -37,7 +37,7 @@ class Trial:
     def rms(self):
         return np.sqrt(np.mean(np.square(self.errors), axis=0))
 
-    def bound(self):
+    def rms_bound(self):
         return np.sqrt(np.mean(np.square(self.bounds), axis=0))
 
     def bias(self):
@@ -54,12 +54,12 @@ def trial(location, n_test, seed, with_bound=False, **conditions) -> Trial:
         decays = test.decays()
         answer = identify(decays, test.rate, SETTINGS)
         modes = [answer.mode(band) for band in model.bands]
-        near = [m is not None and abs(np.log(m.frequency) - truth[i, 0]) < 0.2 for i, m in enumerate(modes)]
-        result.detected.append(near)
-        seen = [f for f in answer.diagnostics.get("modes_in_fit", ()) if IN_BAND[0] <= f <= IN_BAND[1]]
-        true = np.mean(test.frequency, axis=0)
-        result.false_modes.append(sum(np.min(np.abs(f / true - 1.0)) > 0.1 for f in seen))
-        if not all(near):
+        identified = [m is not None and abs(np.log(m.frequency) - truth[i, 0]) < 0.2 for i, m in enumerate(modes)]
+        result.detected.append(identified)
+        frequencies = [f for f in answer.diagnostics.get("modes_in_fit", ()) if COUNTED_BAND[0] <= f <= COUNTED_BAND[1]]
+        true_frequency = np.mean(test.frequency, axis=0)
+        result.false_modes.append(sum(np.min(np.abs(f / true_frequency - 1.0)) > 0.1 for f in frequencies))
+        if not all(identified):
             continue
         result.errors.append(
             [e for i, m in enumerate(modes) for e in (np.log(m.frequency) - truth[i, 0], m.damping / truth[i, 1] - 1)]
@@ -87,32 +87,32 @@ def accuracy():
     """B1: rms over bound at every location and mode."""
     for snr, limit in ((40.0, 1.3), (20.0, 1.5)):
         trials = {name: trial(name, 200, 1, with_bound=True, snr_db=snr) for name in LOCATIONS}
-        ratio = {name: t.rms() / t.bound() for name, t in trials.items()}
+        ratio = {name: t.rms() / t.rms_bound() for name, t in trials.items()}
         worst = max(ratio, key=lambda name: ratio[name].max())
         note = f"worst at {worst}; median {np.median(np.concatenate(list(ratio.values()))):.2f}"
         yield Bar(f"B1 rms / CRB, {snr:.0f} dB", ratio[worst].max(), limit, n="n=200 x 8", note=note)
         biased = max(trials, key=lambda name: trials[name].bias().max())
         bias = trials[biased].bias().max()
         yield Bar(f"B1 |bias| / rms, {snr:.0f} dB", bias, 0.3, n="n=200 x 8", note=f"worst at {biased}")
-        found = min(float(np.mean(t.detected, axis=0).min()) for t in trials.values())
-        yield Bar(f"B1 found, {snr:.0f} dB", found, 1.0, sense=">=", n="n=200 x 8")
+        detected = min(float(np.mean(t.detected, axis=0).min()) for t in trials.values())
+        yield Bar(f"B1 found, {snr:.0f} dB", detected, 1.0, sense=">=", n="n=200 x 8")
 
 
-def unmodelled():
+def unmodelled_modes():
     """B2: two unmodelled modes and drift, without prior frequencies."""
     for snr, limits in ((40.0, (0.5, 2.5)), (26.0, (1.2, 7.0))):
         conditions = {"snr_db": snr, "nuisance": UNMODELLED, "drift": 0.05}
         trials = [trial(name, 100, 2, with_bound=True, **conditions) for name in LOCATIONS]
         rms = 100.0 * np.array([t.rms()[:2] for t in trials])
-        bound = 100.0 * np.array([t.bound()[:2] for t in trials])
-        for i, what in enumerate(("f", "zeta")):
+        bound = 100.0 * np.array([t.rms_bound()[:2] for t in trials])
+        for i, quantity in enumerate(("f", "zeta")):
             worst = int(np.argmax(rms[:, i]))
             note = f"worst {LOCATIONS[worst]} {rms[worst, i]:.2f} % where the CRB is {bound[worst, i]:.2f} %"
             figure = np.sqrt(np.mean(rms[:, i] ** 2))
-            yield Bar(f"B2 ballast {what} rms, {snr:.0f} dB", figure, limits[i], "%", n="n=100 x 8", note=note)
+            yield Bar(f"B2 ballast {quantity} rms, {snr:.0f} dB", figure, limits[i], "%", n="n=100 x 8", note=note)
         yield Bar(f"B2 rms / CRB with all modes unknown, largest, {snr:.0f} dB", (rms / bound).max(), 1.3)
-        found = min(float(np.mean(t.detected, axis=0).min()) for t in trials)
-        yield Bar(f"B2 found, worst location and mode, {snr:.0f} dB", found, 0.95, sense=">=", n="n=100 x 8")
+        detected = min(float(np.mean(t.detected, axis=0).min()) for t in trials)
+        yield Bar(f"B2 found, worst location and mode, {snr:.0f} dB", detected, 0.95, sense=">=", n="n=100 x 8")
         false = max(float(np.mean(t.false_modes)) for t in trials)
         yield Bar(f"B2 false modes per test in 20-800 Hz, {snr:.0f} dB", false, 0.3, n="n=100 x 8")
 
@@ -145,30 +145,32 @@ def paper():
         frequency, _ = modal_parameters(z[np.argmax(z.imag)], 20e3)
         error.append(100.0 * abs(frequency / row.frequency - 1.0))
     yield Bar("B4 Table 3 frequencies from Tables 1 and 2, largest error", max(error), 0.15, "%", n=f"n={len(error)}")
-    left, without = [], 0
+    remaining_bias, n_without = [], 0
     for name in LOCATIONS:
         test = hammer_test(name, 10, 5)
         leads = [y[:k] for y, k in zip(test.acceleration, test.decay_start, strict=True)]
         model = identify(test.decays(), test.rate, SETTINGS, method="paper", leads=leads)
-        without += "bias_words" not in model.diagnostics
+        n_without += "bias_words" not in model.diagnostics
         true = published_model(name)
         for mode in model.modes:
             f = true.frequency[true.bands.index(mode.band)]
             bias = model.diagnostics["simulated_bias"][mode.band]["frequency_percent"]
-            left.append(abs(100.0 * (mode.frequency / f - 1.0) - bias))
-    yield Bar("B4 results of method paper without their bias", without, 0, n="n=8")
-    yield Bar("B4 true bias less printed bias, largest, f", max(left), None, "%", "", n=f"n={len(left)}")
+            remaining_bias.append(abs(100.0 * (mode.frequency / f - 1.0) - bias))
+    yield Bar("B4 results of method paper without their bias", n_without, 0, n="n=8")
+    yield Bar(
+        "B4 true bias less printed bias, largest, f", max(remaining_bias), None, "%", "", n=f"n={len(remaining_bias)}"
+    )
 
 
 def _fastest(action, repeats=15):
     """Least CPU time of several runs [ms]: the cost on an undisturbed core."""
     action()
-    taken = []
+    times = []
     for _ in range(repeats):
         start = time.process_time()
         action()
-        taken.append(time.process_time() - start)
-    return 1e3 * min(taken)
+        times.append(time.process_time() - start)
+    return 1e3 * min(times)
 
 
 def speed():
@@ -186,77 +188,84 @@ def speed():
     for n in (10, 30):
         test = hammer_test("CP A7", n, 7)
         decays = test.decays()
-        taken = _fastest(lambda d=decays: identify(d, 20e3, IdentifySettings())) / n
-        yield Bar(f"B5 identify with error bars, {n} impacts, per impact", taken, 3.0, "ms CPU")
+        cost = _fastest(lambda d=decays: identify(d, 20e3, IdentifySettings())) / n
+        yield Bar(f"B5 identify with error bars, {n} impacts, per impact", cost, 3.0, "ms CPU")
     tests = [hammer_test(name, 30, 8).decays() for name in LOCATIONS]
-    taken = _fastest(lambda: [identify(d, 20e3, IdentifySettings()) for d in tests], 3) / 1e3
-    yield Bar("B5 identify 8 x 30 impacts, without reading and FRF", taken, 2.0, "s CPU")
+    cost = _fastest(lambda: [identify(d, 20e3, IdentifySettings()) for d in tests], 3) / 1e3
+    yield Bar("B5 identify 8 x 30 impacts, without reading and FRF", cost, 2.0, "s CPU")
 
 
-def turnout():
+def whole_turnout():
     """B5: one turnout of 8 x 30 impacts, from samples to modes: impacts and their quality, FRF, limits, gate, modes."""
     channels = (Channel("hammer", "force"), Channel("rail", "acceleration"))
-    places = []
+    recordings_by_location = []
     for name in LOCATIONS:
         test = hammer_test(name, 30, 8, duration=0.1, pre_trigger=0.02)
         pairs = enumerate(zip(test.force, test.acceleration, strict=True))
-        places.append([Recording(np.array(pair), test.rate, channels, record=i) for i, pair in pairs])
-    taken = _seconds_of(places, "hammer")
-    yield Bar("B5 8 x 30 impacts with quality, FRF, limits, gate and modes", taken, 2.0, "s CPU")
+        recordings_by_location.append([Recording(np.array(pair), test.rate, channels, record=i) for i, pair in pairs])
+    cost = _seconds_of(recordings_by_location, "hammer")
+    yield Bar("B5 8 x 30 impacts with quality, FRF, limits, gate and modes", cost, 2.0, "s CPU")
     day = date(2024, 5, 13)
     simulated = []
     for section in SECTIONS:
         response, rng = simulated_response(section, 1.0, 1.0), np.random.default_rng([8, SECTIONS.index(section)])
         tests = [demonstration_test(response, None, day, test, rng)[0] for test in (1, 2, 3)]
         simulated.append([recording for test in tests for recording in test])
-    taken = _seconds_of(simulated, "force")
-    yield Bar("B5 the same on simulated track, many modes", taken, 2.0, "s CPU")
+    cost = _seconds_of(simulated, "force")
+    yield Bar("B5 the same on simulated track, many modes", cost, 2.0, "s CPU")
 
 
-def _seconds_of(places, force):
+def _seconds_of(recordings_by_location, force):
     """Least CPU time from the recordings of all locations to their modes [s]."""
 
-    def whole():
-        for recordings in places:
+    def analyse():
+        for recordings in recordings_by_location:
             impacts = find_impacts(recordings, force, "rail", ReceptanceSettings())
-            used = [impact for impact in impacts if impact.accepted]
-            receptance = receptance_of(used, ReceptanceSettings())
-            identify([impact.decay for impact in used], 20e3, IdentifySettings(), receptance)
+            accepted = [impact for impact in impacts if impact.accepted]
+            receptance = receptance_of(accepted, ReceptanceSettings())
+            identify([impact.decay for impact in accepted], 20e3, IdentifySettings(), receptance)
 
-    return _fastest(whole, 3) / 1e3
+    return _fastest(analyse, 3) / 1e3
 
 
 def power():
     """B10: shifts between two tests of ten impacts, p < 0.01."""
     cases = (("ballast", (0.95, 1.0), 0.029, 0.8), ("railpad", (1.0, 0.99), 0.005, 0.9))
     for band, shift, spread, limit in cases:
-        found, false, fits = [], [], []
+        detected, false_alarms, fits = [], [], []
         for k in range(200):
-            first, again, moved = (
+            first, repeated, shifted = (
                 identify(hammer_test("CP A7", 10, [9, k, i], spread=spread, shift=s).decays(), 20e3, SETTINGS)
                 for i, s in enumerate(((1.0, 1.0), (1.0, 1.0), shift))
             )
-            found.append(compare_tests(first, moved, band).detected)
-            false.append(compare_tests(first, again, band).detected)
-            fits.append(first.fit - moved.fit)
+            detected.append(compare_tests(first, shifted, band).detected)
+            false_alarms.append(compare_tests(first, repeated, band).detected)
+            fits.append(first.fit - shifted.fit)
         change = 100.0 * (1.0 - min(shift))
         name = f"B10 {change:.0f} % {band} shift found, spread {100 * spread:.1f} %"
-        yield Bar(name, float(np.mean(found)), limit, sense=">=", n="n=200", note=f"false alarms {np.mean(false):.3f}")
+        yield Bar(
+            name,
+            float(np.mean(detected)),
+            limit,
+            sense=">=",
+            n="n=200",
+            note=f"false alarms {np.mean(false_alarms):.3f}",
+        )
         words = f"mean change of fit {np.mean(fits):+.2f} points: a fit does not tell"
         yield Bar("B10 spread of the change of fit", float(np.std(fits)), None, "points", "", note=words)
 
 
-def silence():
+def no_vibration():
     """Records without vibration must give no mode."""
     rng = np.random.default_rng(10)
-    found = sum(len(identify(list(rng.standard_normal((10, 600))), 20e3, SETTINGS).modes) for _ in range(200))
-    yield Bar("modes found in tests of white noise", found, 0, n="n=200")
+    n_modes = sum(len(identify(list(rng.standard_normal((10, 600))), 20e3, SETTINGS).modes) for _ in range(200))
+    yield Bar("modes found in tests of white noise", n_modes, 0, n="n=200")
     walks = (np.cumsum(rng.standard_normal((10, 600)), axis=1) for _ in range(200))
-    found = sum(len(identify(list(walk), 20e3, SETTINGS).modes) for walk in walks)
-    yield Bar("modes found in tests of random walks", found, 0, n="n=200")
+    n_modes = sum(len(identify(list(walk), 20e3, SETTINGS).modes) for walk in walks)
+    yield Bar("modes found in tests of random walks", n_modes, 0, n="n=200")
 
 
 def bars():
     """All bars of the identification."""
-    for group in (paper, speed, turnout, silence, accuracy, unmodelled, power, coverage):
+    for group in (paper, speed, whole_turnout, no_vibration, accuracy, unmodelled_modes, power, coverage):
         yield from group()

@@ -53,17 +53,17 @@ EFFECTS = {
     "clock_drift": (physics.ClockDrift("S1", 2e-3), {"sensor": "S1"}),
 }
 # A gap that only the heavy train closes. One that no train closes cannot be distinguished from missing ballast.
-SECOND = {"hanging_sleeper": (physics.HangingSleeper(43, 8e-4), {"place": 25.8})}
+SECOND_EFFECTS = {"hanging_sleeper": (physics.HangingSleeper(43, 8e-4), {"place": 25.8})}
 DEVELOPMENT = [(f"control {k}", None, {}) for k in range(12)]
-DEVELOPMENT += [(name, *entry) for more in (EFFECTS, SECOND) for name, entry in more.items()]
+DEVELOPMENT += [(name, *entry) for more in (EFFECTS, SECOND_EFFECTS) for name, entry in more.items()]
 WHOLE = "whole turnout"
-DEFAULT = ("control 0", "pad_temperature", "hanging_sleeper")
+DEFAULT_CASES = ("control 0", "pad_temperature", "hanging_sleeper")
 
 
 def bars():
     """Yield every bar."""
     yield from silverbox()
-    yield from planned()
+    yield from campaign_planning()
     yield from development()
     yield from whole_turnout()
 
@@ -75,22 +75,24 @@ def silverbox():
     if not path.is_file():
         return
     u, y = np.genfromtxt(path, delimiter=",", skip_header=1)[:, :2].T
-    parts = [slice(40650 + k * 8692, 40650 + (k + 1) * 8692) for k in range(10)]
-    sines = [(f"multisine {k}", f"multisine {k}", u[p], y[p]) for k, p in enumerate(parts)]
+    segments = [slice(40650 + k * 8692, 40650 + (k + 1) * 8692) for k in range(10)]
+    sines = [(f"multisine {k}", f"multisine {k}", u[p], y[p]) for k, p in enumerate(segments)]
     reserved = [sines[8], sines[9], ("arrow", "arrow", u[:40000], y[:40000])]
 
     def case(**options):
         return OscillatorCase(sines[:8], reserved, 1e7 / 2**14, (60.0, 30.0), (0.1, 0.1), (1.0, 1.0), **options)
 
-    told_nothing = case()
+    full_case = case()
     with stopwatch() as watch:
-        found = diagnose(told_nothing)
-    fits = [fit_percent([o], [p]) for o, p in zip(reserved_of(told_nothing), predicted(told_nothing, found))]
-    yield Bar("Silverbox: cubic law chosen of ten (1 yes)", float(found.names == ("cubic_spring",)), 1.0, sense=">=")
+        diagnosis = diagnose(full_case)
+    fits = [fit_percent([o], [p]) for o, p in zip(reserved_of(full_case), reserved_predictions(full_case, diagnosis))]
+    yield Bar(
+        "Silverbox: cubic law chosen of ten (1 yes)", float(diagnosis.names == ("cubic_spring",)), 1.0, sense=">="
+    )
     yield Bar("Silverbox: multisines never used", min(fits[:2]), 98.0, "%", ">=", "n=2")
     yield Bar("Silverbox: arrow, beyond the range", fits[2], 96.0, "%", ">=", "n=1", f"{watch.cpu:.1f} CPU s")
-    without = diagnose(case(without=("cubic_spring",))).verdict.answer
-    yield Bar("Silverbox without the cubic law: unknown (1 yes)", float(without == "unknown"), 1.0, sense=">=")
+    answer_without = diagnose(case(without=("cubic_spring",))).verdict.answer
+    yield Bar("Silverbox without the cubic law: unknown (1 yes)", float(answer_without == "unknown"), 1.0, sense=">=")
 
 
 def reserved_of(case):
@@ -98,45 +100,45 @@ def reserved_of(case):
     return case.reserved
 
 
-def predicted(case, found):
+def reserved_predictions(case, diagnosis):
     """Predictions of the reserved observations by the fitted model."""
-    return predict_reserved(case, found.fit, case.reserved)
+    return predict_reserved(case, diagnosis.fit, case.reserved)
 
 
-def planned():
+def campaign_planning():
     """Evidence lost if an effect is explained by nuisance parameters alone [nats]."""
 
-    def seen(plan, family):
+    def nats_lost(plan, family):
         matrix = distinguishability(PlannedCase(plan, families=(family,)))
         return float(matrix.detectability[0])
 
     one, two = small_plan((30.0,), passages=False), small_plan((5.0, 30.0), passages=False)
     rolling = replace(small_plan((15.0,), speeds=(40.0,)), hammer_points=())
-    yield Bar("pad temperature from one temperature", seen(one, "pad_temperature"), 5.0, "nats")
-    yield Bar("pad temperature from two", seen(two, "pad_temperature"), 1000.0, "nats", ">=")
-    yield Bar("frequency-dependent pads from passages alone", seen(rolling, "zener_pad"), 5.0, "nats")
-    yield Bar("the same from blows", seen(one, "zener_pad"), 1000.0, "nats", ">=")
+    yield Bar("pad temperature from one temperature", nats_lost(one, "pad_temperature"), 5.0, "nats")
+    yield Bar("pad temperature from two", nats_lost(two, "pad_temperature"), 1000.0, "nats", ">=")
+    yield Bar("frequency-dependent pads from passages alone", nats_lost(rolling, "zener_pad"), 5.0, "nats")
+    yield Bar("the same from blows", nats_lost(one, "zener_pad"), 1000.0, "nats", ">=")
 
 
 def development():
     """Cases simulated by the same code as in the diagnosis: a necessary test, not a sufficient one."""
-    wanted = os.environ.get("TURNOUT_MISMATCH_CASES", ",".join(DEFAULT)).split(",")
+    wanted = os.environ.get("TURNOUT_MISMATCH_CASES", ",".join(DEFAULT_CASES)).split(",")
     chosen = [(k, *c) for k, c in enumerate(DEVELOPMENT) if wanted == ["all"] or c[0] in wanted]
     if not chosen:
         return
-    right, alarms, controls, covered, cost = 0, 0, 0, 0, []
+    right, alarms, controls, covered, costs = 0, 0, 0, 0, []
     for k, name, term, where in chosen:
         campaign = measured_campaign(small_plan(), (term,) if term else (), 500 + k)
         with stopwatch() as watch:
-            found = diagnose(TrackCase(campaign))
-        cost.append(watch.cpu)
+            diagnosis = diagnose(TrackCase(campaign))
+        costs.append(watch.cpu)
         if term is None:
             controls += 1
-            alarms += found.verdict.answer != "none"
+            alarms += diagnosis.verdict.answer != "none"
             continue
-        named = found.names[:1] == (name,)
-        right += named and located(found, where)
-        covered += named and inside(found, term)
+        is_named = diagnosis.names[:1] == (name,)
+        right += is_named and is_located(diagnosis, where)
+        covered += is_named and is_covered(diagnosis, term)
     n = len(chosen) - controls
     yield Bar("development: false alarms", float(alarms), 0.0, sense="<=", n=f"n={controls}")
     if n:
@@ -144,7 +146,7 @@ def development():
         yield Bar(
             "development: inside the 95 % interval, of those named", 100.0 * covered / max(right, 1), 90.0, "%", ">="
         )
-    yield Bar("development: cost of a small case, worst", max(cost), 60.0, "CPU s", n=f"n={len(cost)}")
+    yield Bar("development: cost of a small case, worst", max(costs), 60.0, "CPU s", n=f"n={len(costs)}")
 
 
 def whole_turnout():
@@ -156,41 +158,41 @@ def whole_turnout():
     campaign = replace(campaign, passages=tuple(chosen), reserved=reserved_names(chosen, campaign.hammer))
     started = time.monotonic()
     with stopwatch() as watch:
-        found = diagnose(TrackCase(campaign), progress=_said)
-    told = f"{found.verdict.answer} {', '.join(found.names)}; {watch.cpu:.0f} CPU s"
-    right = found.names[:1] == ("hanging_sleeper",) and located(found, {"place": 31.2})
-    yield Bar("whole turnout: hanging sleeper named and placed (1 yes)", float(right), 1.0, sense=">=", n=told)
+        diagnosis = diagnose(TrackCase(campaign), progress=_print_progress)
+    note = f"{diagnosis.verdict.answer} {', '.join(diagnosis.names)}; {watch.cpu:.0f} CPU s"
+    right = diagnosis.names[:1] == ("hanging_sleeper",) and is_located(diagnosis, {"place": 31.2})
+    yield Bar("whole turnout: hanging sleeper named and placed (1 yes)", float(right), 1.0, sense=">=", n=note)
     yield Bar("whole turnout: time", (time.monotonic() - started) / 60.0, 15.0, "min")
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     yield Bar("whole turnout: memory", memory, 4.0, "GiB")
 
 
-def _said(done, total, what):
-    print(f"  fit {done} of {total}: {what}", file=sys.stderr, flush=True)
+def _print_progress(n_done, total, what):
+    print(f"  fit {n_done} of {total}: {what}", file=sys.stderr, flush=True)
 
 
-def located(found, where):
+def is_located(diagnosis, where):
     """Whether the position is right within one bay, and sensor and train are right."""
-    said = found.fit.candidates[0].where
+    stated = diagnosis.fit.candidates[0].where
     for key, value in where.items():
-        if key == "place" and abs(said.get("place", np.inf) - value) > 0.6:
+        if key == "place" and abs(stated.get("place", np.inf) - value) > 0.6:
             return False
-        if key != "place" and said.get(key) != value:
+        if key != "place" and stated.get(key) != value:
             return False
     return True
 
 
-def inside(found, term):
+def is_covered(diagnosis, term):
     """Whether the first parameter is within 1.96 standard errors.
 
     For a sine and a cosine their amplitude is compared, since their shares depend on the origin of the position.
     """
-    candidate, n = found.fit.candidates[0], len(found.fit.values)
+    candidate, n = diagnosis.fit.candidates[0], len(diagnosis.fit.values)
     names = [p.name for p in candidate.parameters]
     if {"sine", "cosine"} <= set(names):
         waves = [names.index("sine"), names.index("cosine")]
-        size, covariance = found.fit.psi[waves], found.fit.covariance[n:, n:][np.ix_(waves, waves)]
+        size, covariance = diagnosis.fit.psi[waves], diagnosis.fit.covariance[n:, n:][np.ix_(waves, waves)]
         amplitude = np.hypot(*size)
         se = np.hypot(np.sqrt(size @ covariance @ size) / amplitude, candidate.model_error_share * amplitude)
         return abs(amplitude - np.hypot(term.sine, term.cosine)) <= 1.96 * se
-    return abs(found.fit.psi[0] - getattr(term, names[0])) <= 1.96 * found.fit.psi_se[0]
+    return abs(diagnosis.fit.psi[0] - getattr(term, names[0])) <= 1.96 * diagnosis.fit.psi_se[0]

@@ -13,7 +13,7 @@ from sklearn.metrics import adjusted_rand_score
 from benchmarks import passage_fleet, passage_truth
 from benchmarks.bar import Bar, stopwatch
 from benchmarks.passage_paper import paper_trends
-from benchmarks.passage_truth import IC3, RATE, paper_model, struck, struck_train
+from benchmarks.passage_truth import IC3, RATE, impact_record, impact_train, paper_model
 from turnout.config.settings.passage import PassageSettings
 from turnout.passage.analysis import analyse
 from turnout.passage.axle_load import axle_load, calibrate, quasi_static, train_amplitude
@@ -33,8 +33,8 @@ ROOT = Path(__file__).resolve().parents[1]
 SETTINGS = PassageSettings()
 LOCATIONS = ("OT", "SP", "CLP", "CP A7", "CP A8", "CP A9", "AS main", "AS diverging")
 SPEEDS = {"IC3": (40, 100, 180), "IC3 double": (60, 160), "intercity": (50, 120, 160), "freight": (45, 80, 110)}
-NOISES = (0.05, 0.2, 1.0)  # m/s²: a quiet sensor, 0.02 g as data sheets have it, and five times that
-SUBSETS = ((7,), (4, 5), (2, 5, 9), tuple(range(12)))
+NOISE_LEVELS = (0.05, 0.2, 1.0)  # m/s²: a quiet sensor, 0.02 g as data sheets have it, and five times that
+SENSOR_SUBSETS = ((7,), (4, 5), (2, 5, 9), tuple(range(12)))
 
 
 def bars() -> Iterator[Bar]:
@@ -47,7 +47,7 @@ def bars() -> Iterator[Bar]:
     yield from cost()
 
 
-def known_patterns():
+def shipped_patterns():
     """The axle patterns in config/vehicles."""
     return read_patterns(YAML(typ="safe").load(ROOT / "config" / "vehicles" / "axle_patterns.yaml"))
 
@@ -58,55 +58,57 @@ def scores_and_times() -> Iterator[Bar]:
     fits = {}
     for location in LOCATIONS:
         for _ in range(5):
-            p = struck(rng, location, start=1.2)
+            p = impact_record(rng, location, start=1.2)
             detected = p.times / RATE + rng.normal(0.004, 0.001, p.times.size)
             fit = fit_channel(p.samples, RATE, detected, 44.4, paper_model(location), SETTINGS, with_null=False)
-            fits.setdefault(location, []).append((fit.scores.fit, fit.scores.forecast, *_ceilings(p)))
+            fits.setdefault(location, []).append((fit.scores.fit, fit.scores.forecast, *_attainable_scores(p)))
     median = {k: np.median(v, axis=0) for k, v in fits.items()}
     for k, name in enumerate(("in-sample fit", "forecast")):
         worst = min(median, key=lambda location: median[location][k])
         yield Bar(f"B8 {name} of the true model, 40 dB, A7", median["CP A7"][k], 95.0, "%", ">=", "n=5")
         note = f"{worst}; the noise allows {median[worst][2 + k]:.1f}"
         yield Bar(f"B8 {name}, 40 dB, worst of 8 places", median[worst][k], None, "%", "", "n=5", note)
-        short = max(m[2 + k] - m[k] for m in median.values())
-        yield Bar(f"B8 {name}, 40 dB, furthest below what the noise allows", short, 2.0, "points", "<=", "8 places")
+        shortfall = max(m[2 + k] - m[k] for m in median.values())
+        yield Bar(f"B8 {name}, 40 dB, furthest below what the noise allows", shortfall, 2.0, "points", "<=", "8 places")
     basis = wheel_basis(paper_model("CP A7"), None, RATE)
     for snr in (40.0, 26.0):
-        off, bound, silent, flagged = [], [], 0, 0
+        errors, bound, n_unflagged, n_flagged = [], [], 0, 0
         for _ in range(60):
-            p = struck(rng, snr_db=snr)
+            p = impact_record(rng, snr_db=snr)
             expected = p.times + rng.normal(0.0, 10.0, p.times.size)
-            found = impact_times(p.samples, expected, basis, 60.0, p.noise, 20.0)
-            wrong = np.ceil(found.times) != np.ceil(p.times)
-            silent += int(np.sum(wrong & ~found.ambiguous))
-            flagged += int(found.ambiguous.sum())
-            off += list((found.times - p.times)[~found.ambiguous])
+            timing = impact_times(p.samples, expected, basis, 60.0, p.noise, 20.0)
+            is_wrong = np.ceil(timing.times) != np.ceil(p.times)
+            n_unflagged += int(np.sum(is_wrong & ~timing.ambiguous))
+            n_flagged += int(timing.ambiguous.sum())
+            errors += list((timing.times - p.times)[~timing.ambiguous])
             _, phi = onsets(p.times)
             for g, f in zip(p.amplitudes, phi):
                 rows = np.stack([basis.coefficients(f) @ basis.columns, g * (basis.slopes(f) @ basis.columns)])
                 bound.append(p.noise * np.sqrt(np.linalg.inv(rows @ rows.T)[1, 1]))
-        ratio = np.sqrt(np.mean(np.square(off)) / np.mean(np.square(bound)))
+        ratio = np.sqrt(np.mean(np.square(errors)) / np.mean(np.square(bound)))
         yield Bar(f"B8 impact time rms over the Cramér-Rao bound, {snr:g} dB", ratio, 1.5, "", "<=", "n=480 wheels")
-        yield Bar(f"B8 wrong intervals without a flag, {snr:g} dB", silent, 0, "", "<=", "n=480", f"{flagged} flagged")
+        yield Bar(
+            f"B8 wrong intervals without a flag, {snr:g} dB", n_unflagged, 0, "", "<=", "n=480", f"{n_flagged} flagged"
+        )
     p_values = []
     for _ in range(60):
-        p = struck(rng)
+        p = impact_record(rng)
         p_values += list(direction_test(p.samples, p.times, basis, p.noise).p_value)
     share = float(np.mean(np.array(p_values) < 0.01))
     limit = float(stats.binom.ppf(0.999, 480, 0.01) / 480)
     yield Bar("chi-squared test along b rejects sound wheels at level 0.01", share, limit, "", "<=", "n=480")
 
 
-def _ceilings(passage):
+def _attainable_scores(passage):
     """Fit and forecast that the true response reaches on the noisy data [%]."""
     through = band_pass(80, 800, 4, RATE)
     data, clean = apply_filter(passage.samples, through), apply_filter(passage.clean, through)
-    found = []
+    scores = []
     for first, last in ((0.0, SETTINGS.score_window), (SETTINGS.forecast_train, 0.020)):
         rows = [np.arange(int(t + first * RATE), int(t + last * RATE)) for t in passage.times]
         rows = np.concatenate(rows)
-        found.append(fit_percent(data[rows], clean[rows]))
-    return found
+        scores.append(fit_percent(data[rows], clean[rows]))
+    return scores
 
 
 def noise_passages() -> Iterator[Bar]:
@@ -114,19 +116,19 @@ def noise_passages() -> Iterator[Bar]:
     rng = np.random.default_rng(2)
     through = band_pass(80, 800, 4, RATE)
     basis, random = wheel_basis(paper_model("CP A7"), through, RATE), null_bases(4, through, RATE, SETTINGS)
-    own, best, left, null_left = [], [], [], []
+    forecasts, null_best, leave_one_out, null_left = [], [], [], []
     for _ in range(40):
         times = (0.3 + IC3 / 44.4) * RATE
         data = apply_filter(rng.standard_normal(int(times[-1] + 5000)), through)
-        found, null = score(data, times, basis, SETTINGS), null_scores(data, times, random, SETTINGS)
-        own.append(found.forecast)
-        left.append(found.leave_one_out)
-        best.append(max(s.forecast for s in null))
+        result, null = score(data, times, basis, SETTINGS), null_scores(data, times, random, SETTINGS)
+        forecasts.append(result.forecast)
+        leave_one_out.append(result.leave_one_out)
+        null_best.append(max(s.forecast for s in null))
         null_left += [s.leave_one_out for s in null]
-    yield Bar("B9 noise: median forecast with the section's model", np.median(own), 0.0, "%", "<=", "n=40")
-    yield Bar("B9 noise: largest forecast with the section's model", max(own), 3.0, "%", "<=", "n=40")
-    yield Bar("B9 noise: largest forecast with the best of 30 random models", max(best), 7.0, "%", "<=", "n=40")
-    above = float(np.mean(np.array(left) > np.quantile(null_left, 0.95)))
+    yield Bar("B9 noise: median forecast with the section's model", np.median(forecasts), 0.0, "%", "<=", "n=40")
+    yield Bar("B9 noise: largest forecast with the section's model", max(forecasts), 3.0, "%", "<=", "n=40")
+    yield Bar("B9 noise: largest forecast with the best of 30 random models", max(null_best), 7.0, "%", "<=", "n=40")
+    above = float(np.mean(np.array(leave_one_out) > np.quantile(null_left, 0.95)))
     yield Bar("B9 noise: leave-one-out above the 95 % quantile of its null", above, 0.15, "", "<=", "n=40")
 
 
@@ -135,30 +137,30 @@ def real_axle_times() -> Iterator[Bar]:
     path = ROOT.parent / "shared" / "data" / "track_sbb_niederwangen" / "results.json"
     if not path.exists():
         return
-    trains, patterns, rng = json.loads(path.read_text()), known_patterns(), np.random.default_rng(3)
-    named = counted = 0
+    trains, patterns, rng = json.loads(path.read_text()), shipped_patterns(), np.random.default_rng(3)
+    n_named = n_counted = 0
     worst = 0.0
     for k in range(15):
         train = trains[str(k)]
-        for place in ("Q1", "Q4"):
-            times = np.array(train[place]["tPeaks"])
-            found = find_type(times, patterns, SETTINGS)
-            named += found.type == train["Zugstyp"]
-            middle = found.speed + found.acceleration * (times[-1] - times[0]) / 2
-            worst = max(worst, abs(3.6 * middle - train[place]["vAv"]))
-            counted += _count_of_bursts(train[place], rng) == train["axleN"]
-    yield Bar("real: type IC or Regio from the axle times", named, 30, "of 30", ">=")
+        for location in ("Q1", "Q4"):
+            times = np.array(train[location]["tPeaks"])
+            match = find_type(times, patterns, SETTINGS)
+            n_named += match.type == train["Zugstyp"]
+            mean_speed = match.speed + match.acceleration * (times[-1] - times[0]) / 2
+            worst = max(worst, abs(3.6 * mean_speed - train[location]["vAv"]))
+            n_counted += _count_bursts(train[location], rng) == train["axleN"]
+    yield Bar("real: type IC or Regio from the axle times", n_named, 30, "of 30", ">=")
     yield Bar("real: largest difference of mean speed", worst, 0.7, "km/h", "<=", "n=30")
-    yield Bar("real: axles counted in bursts at the measured times, one sensor", counted, 30, "of 30", ">=")
+    yield Bar("real: axles counted in bursts at the measured times, one sensor", n_counted, 30, "of 30", ">=")
 
 
-def _count_of_bursts(train, rng):
+def _count_bursts(train, rng):
     times = np.array(train["tPeaks"]) - train["tPeaks"][0] + 1.0
     time = np.arange(int((times[-1] + 1.0) * RATE)) / RATE
     power = sum(np.exp(-np.abs(time - t) * (train["vAv"] / 3.6) / 0.4) for t in times)
     samples = np.sqrt(power) * rng.standard_normal(time.size) + 0.02 * rng.standard_normal(time.size)
     recording = passage_truth.recording_of(samples[None], [0.0])
-    return analyse(recording, passage_truth.sensors_for(recording), known_patterns(), SETTINGS).n_axle
+    return analyse(recording, passage_truth.sensors_for(recording), shipped_patterns(), SETTINGS).n_axle
 
 
 def axle_geometry() -> Iterator[Bar]:
@@ -173,42 +175,42 @@ def axle_geometry() -> Iterator[Bar]:
     spec.loader.exec_module(tools)
     cars = {p.stem: tools.read_vehicle(p) for p in sorted((folder / "cars").glob("*.txt"))}
     types = [tools.read_train(p, cars) for p in sorted((folder / "trains").glob("*.txt"))]
-    rng, named, unknown, total = np.random.default_rng(4), 0, 0, 0
+    rng, n_named, n_unknown, total = np.random.default_rng(4), 0, 0, 0
     for pattern in types:
-        others = tools.both_ways([p for p in types if p is not pattern])
+        without_own = tools.both_ways([p for p in types if p is not pattern])
         for _ in range(10):
             times = tools.passing_times(pattern, rng)
             total += 1
-            named += find_type(times, tools.both_ways(types), SETTINGS, position_se=0.03).type == pattern.type
-            unknown += find_type(times, others, SETTINGS, position_se=0.03).type == "unknown"
-    yield Bar("30 types: named, speed unknown, axles 3 cm off", 100 * named / total, 99.0, "%", ">=", f"n={total}")
-    yield Bar("30 types: unknown without the own template", 100 * unknown / total, 95.0, "%", ">=", f"n={total}")
+            n_named += find_type(times, tools.both_ways(types), SETTINGS, position_se=0.03).type == pattern.type
+            n_unknown += find_type(times, without_own, SETTINGS, position_se=0.03).type == "unknown"
+    yield Bar("30 types: named, speed unknown, axles 3 cm off", 100 * n_named / total, 99.0, "%", ">=", f"n={total}")
+    yield Bar("30 types: unknown without the own template", 100 * n_unknown / total, 95.0, "%", ">=", f"n={total}")
 
 
-def simulated_fleet(runs=None, strangers=None) -> Iterator[Bar]:
+def simulated_fleet(runs=None, unlisted=None) -> Iterator[Bar]:
     """Four types, 40 to 180 km/h, empty and loaded, three noise levels, 1 to 12 sensors."""
-    rng, patterns = np.random.default_rng(5), known_patterns()
+    rng, patterns = np.random.default_rng(5), shipped_patterns()
     runs = list(runs if runs is not None else passage_fleet.fleet(SPEEDS))
     yield from paper_trends(runs, SETTINGS)
-    cases = [(r, rows, noise) for r in runs for noise in NOISES for rows in SUBSETS]
+    cases = [(r, rows, noise) for r in runs for noise in NOISE_LEVELS for rows in SENSOR_SUBSETS]
     tally = {"axles": 0, "speed": 0, "place": 0, "type": 0, "given": 0, "named_wrong": 0, "sure_wrong": 0}
     loads, n_several = {}, 0
     for run, rows, noise in cases:
-        recording, sensors = passage_fleet.heard(run, rows, noise, rng)
+        recording, sensors = passage_fleet.sensor_recording(run, rows, noise, rng)
         passage = analyse(recording, sensors, patterns, SETTINGS)
-        several = len(rows) > 1
-        n_several += several
-        right = passage.n_axle == len(run.offsets)
-        tally["axles"] += right
+        is_several = len(rows) > 1
+        n_several += is_several
+        is_right = passage.n_axle == len(run.offsets)
+        tally["axles"] += is_right
         name = run.type.removesuffix(" double")
         if passage.n_axle:
             tally["type"] += passage.type.type == name
             tally["named_wrong"] += passage.type.type not in (name, "unknown")
-            tally["sure_wrong"] += not right and "axles_uncertain" not in {f.reason for f in passage.findings}
+            tally["sure_wrong"] += not is_right and "axles_uncertain" not in {f.reason for f in passage.findings}
             tally["given"] += passage.speed.source != "bogie"
             tally["speed"] += abs(passage.speed.speed / run.speed - 1) <= 0.003 and passage.speed.source != "bogie"
-            tally["place"] += several and passage.direction == run.direction and passage.track == run.route
-        if rows == SUBSETS[-1] and right and noise == NOISES[1]:
+            tally["place"] += is_several and passage.direction == run.direction and passage.track == run.route
+        if rows == SENSOR_SUBSETS[-1] and is_right and noise == NOISE_LEVELS[1]:
             loads.setdefault((run.type, run.axle_load, run.speed), (recording, passage, run))
     n = len(cases)
     yield Bar("simulated: axles exact", 100 * tally["axles"] / n, 99.5, "%", ">=", f"n={n}")
@@ -232,19 +234,21 @@ def simulated_fleet(runs=None, strangers=None) -> Iterator[Bar]:
     yield Bar(
         "simulated: type", 100 * tally["type"] / n, 99.0, "%", ">=", f"n={n}", f"{tally['named_wrong']} named wrongly"
     )
-    unknown = total = 0
-    for run in strangers if strangers is not None else passage_fleet.stranger_runs():
-        for noise in NOISES:
-            for rows in SUBSETS:
-                recording, sensors = passage_fleet.heard(run, rows, noise, rng)
+    n_unknown = total = 0
+    for run in unlisted if unlisted is not None else passage_fleet.unlisted_runs():
+        for noise in NOISE_LEVELS:
+            for rows in SENSOR_SUBSETS:
+                recording, sensors = passage_fleet.sensor_recording(run, rows, noise, rng)
                 passage = analyse(recording, sensors, patterns, SETTINGS)
                 total += 1
-                unknown += passage.type is None or passage.type.type == "unknown"
-    yield Bar("simulated: trains without template called unknown", 100 * unknown / total, 95.0, "%", ">=", f"n={total}")
-    yield from _loads(list(loads.values()))
+                n_unknown += passage.type is None or passage.type.type == "unknown"
+    yield Bar(
+        "simulated: trains without template called unknown", 100 * n_unknown / total, 95.0, "%", ">=", f"n={total}"
+    )
+    yield from _load_bars(list(loads.values()))
 
 
-def _loads(cases) -> Iterator[Bar]:
+def _load_bars(cases) -> Iterator[Bar]:
     """Axle load of each train after calibration on the others."""
     amplitude = [
         {
@@ -254,38 +258,40 @@ def _loads(cases) -> Iterator[Bar]:
         }
         for recording, passage, _ in cases
     ]
-    off, sure = [], []
+    errors, relative_errors = [], []
     for k, (recording, passage, run) in enumerate(cases):
         calibrations = {}
         for name in amplitude[k]:
-            others = [i for i in range(len(cases)) if i != k and name in amplitude[i]]
-            made = calibrate(
-                [amplitude[i][name][0] for i in others],
-                [cases[i][2].axle_load for i in others],
-                [cases[i][1].motion.speed for i in others],
+            reference_cases = [i for i in range(len(cases)) if i != k and name in amplitude[i]]
+            calibration = calibrate(
+                [amplitude[i][name][0] for i in reference_cases],
+                [cases[i][2].axle_load for i in reference_cases],
+                [cases[i][1].motion.speed for i in reference_cases],
                 SETTINGS.load_trains_minimum,
-                [amplitude[i][name][1] for i in others],
+                [amplitude[i][name][1] for i in reference_cases],
             )
-            if made is not None:
-                calibrations[name] = made
-        found = axle_load(recording, passage, calibrations, replace(SETTINGS, load_relative_error_maximum=0.5))
-        if found is not None:
-            off.append(found.mean / run.axle_load - 1)
-            sure.append(found.se / found.mean)
-    off, sure = np.abs(off), np.array(sure)
-    given = sure <= SETTINGS.load_relative_error_maximum
-    n = f"n={given.sum()} of {len(cases)}"
-    if given.any():
-        within = 100 * float(np.mean(off[given] <= 0.05))
+            if calibration is not None:
+                calibrations[name] = calibration
+        load = axle_load(recording, passage, calibrations, replace(SETTINGS, load_relative_error_maximum=0.5))
+        if load is not None:
+            errors.append(load.mean / run.axle_load - 1)
+            relative_errors.append(load.se / load.mean)
+    errors, relative_errors = np.abs(errors), np.array(relative_errors)
+    is_given = relative_errors <= SETTINGS.load_relative_error_maximum
+    n = f"n={is_given.sum()} of {len(cases)}"
+    if is_given.any():
+        within = 100 * float(np.mean(errors[is_given] <= 0.05))
         yield Bar("simulated: load within 5 % where given", within, 95.0, "%", ">=", n)
     else:
         yield Bar("simulated: loads given", 0, None, "", "", n, "none: every standard error is above the limit")
-    if off.size:
+    if errors.size:
         note = (
-            f"median standard error {100 * np.median(sure):.1f} %, "
-            f"{np.mean(off < 2 * sure):.0%} within two of them"
+            f"median standard error {100 * np.median(relative_errors):.1f} %, "
+            f"{np.mean(errors < 2 * relative_errors):.0%} within two of them"
         )
-        yield Bar("simulated: median error of all loads, given or not", 100 * np.median(off), None, "%", "", "", note)
+        yield Bar(
+            "simulated: median error of all loads, given or not", 100 * np.median(errors), None, "%", "", "", note
+        )
 
 
 def cluster_bars() -> Iterator[Bar]:
@@ -325,29 +331,31 @@ def cluster_bars() -> Iterator[Bar]:
 def cost() -> Iterator[Bar]:
     """One passage of 10 s, 12 sensors, 8 axles; ten minutes of a logger."""
     rng = np.random.default_rng(7)
-    places = [3.0 * k for k in range(12)]
+    positions = [3.0 * k for k in range(12)]
     locations = [LOCATIONS[k % 8] if k % 8 != 4 else "OT" for k in range(12)]
-    recording, _ = struck_train(rng, locations, places, speed=30.0, lead=6.2)
-    recording = passage_truth.recording_of(recording.samples[:, : int(10 * RATE)], places)
-    sensors, patterns = passage_truth.sensors_for(recording), known_patterns()
+    recording, _ = impact_train(rng, locations, positions, speed=30.0, lead=6.2)
+    recording = passage_truth.recording_of(recording.samples[:, : int(10 * RATE)], positions)
+    sensors, patterns = passage_truth.sensors_for(recording), shipped_patterns()
     models = {s.name: paper_model(location) for s, location in zip(sensors, locations)}
-    others = {location: paper_model(location) for location in LOCATIONS[1:]}
+    other_models = {location: paper_model(location) for location in LOCATIONS[1:]}
     for nulls, limit in ((False, 0.3), (True, 1.5)):
-        best = np.inf
+        least_cpu = np.inf
         for _ in range(3):
             with stopwatch() as watch:
                 passage = analyse(recording, sensors, patterns, SETTINGS)
                 for name, times in passage.at_sensor.items():
-                    own, speed = recording.signal(name), passage.motion.speed
-                    fit_channel(own, RATE, times, speed, models[name], SETTINGS, others if nulls else None, nulls)
-            best = min(best, watch.cpu)
+                    samples, speed = recording.signal(name), passage.motion.speed
+                    fit_channel(
+                        samples, RATE, times, speed, models[name], SETTINGS, other_models if nulls else None, nulls
+                    )
+            least_cpu = min(least_cpu, watch.cpu)
         words = "all scores, null bands, 7 other models" if nulls else "all scores, no null bands"
         note = f"{passage.n_axle} axles, {len(passage.at_sensor)} sensors"
-        yield Bar(f"cost: 12 sensors, 8 axles, 10 s, {words}", best, limit, "CPU s", "<=", "best of 3", note)
-    yield from _logger(rng)
+        yield Bar(f"cost: 12 sensors, 8 axles, 10 s, {words}", least_cpu, limit, "CPU s", "<=", "best of 3", note)
+    yield from _logger_bars(rng)
 
 
-def _logger(rng) -> Iterator[Bar]:
+def _logger_bars(rng) -> Iterator[Bar]:
     import tracemalloc
 
     def blocks():
@@ -355,18 +363,18 @@ def _logger(rng) -> Iterator[Bar]:
             yield (0.02 * rng.standard_normal((12, int(5 * RATE)))).astype(np.float32)
 
     with stopwatch() as watch:
-        found = len(list(cut_passages(blocks(), RATE, SETTINGS)))
+        n_passages = len(list(cut_passages(blocks(), RATE, SETTINGS)))
     tracemalloc.start()
     list(cut_passages(blocks(), RATE, SETTINGS))
     peak = tracemalloc.get_traced_memory()[1] / 2**20
     tracemalloc.stop()
     whole = 12 * 600 * RATE * 8 / 2**20
-    note = f"{found} passages; the file as float64 is {whole:.0f} MiB; CPU with making the data {watch.cpu:.0f} s"
+    note = f"{n_passages} passages; the file as float64 is {whole:.0f} MiB; CPU with making the data {watch.cpu:.0f} s"
     yield Bar("cost: 10 min x 12 channels x 20 kHz, peak memory of the cut", peak, 200.0, "MiB", "<=", "", note)
-    yield from _logger_file(rng)
+    yield from _logger_file_bars(rng)
 
 
-CHILD = """
+CHILD_CODE = """
 import sys, time
 from pathlib import Path
 from turnout.passage.analysis import analyse
@@ -383,14 +391,14 @@ import h5py, turnout.readers.hdf5
 before, began = peak(), time.process_time()
 result = read(sys.argv[2], sys.argv[1], described, SETTINGS.longest)
 axles = []
-for record in (*result.recordings, *result.long):
+for record in (*result.recordings, *result.long_recordings):
     for part, _, _ in trains_in(record, SETTINGS):
         axles.append(analyse(part, passage_truth.sensors_for(part), passage_truth.PATTERNS, SETTINGS).n_axle)
 print(peak() - before, time.process_time() - began, *axles)
 """
 
 
-def _logger_file(rng) -> Iterator[Bar]:
+def _logger_file_bars(rng) -> Iterator[Bar]:
     """Files of 200 s and 600 s of 2-byte integers, read, cut and analysed in a separate process."""
     import subprocess
     import sys
@@ -398,8 +406,8 @@ def _logger_file(rng) -> Iterator[Bar]:
 
     import h5py
 
-    places = [3.0 * k for k in range(12)]
-    train = 1e3 * passage_truth.rolling(rng, IC3, 33.0, places, noise=0.0).samples
+    positions = [3.0 * k for k in range(12)]
+    train = 1e3 * passage_truth.rolling_noise(rng, IC3, 33.0, positions, noise=0.0).samples
     peaks = []
     for seconds, starts in ((200, (60,)), (600, (60, 287, 452))):
         with tempfile.TemporaryDirectory() as folder:
@@ -410,11 +418,11 @@ def _logger_file(rng) -> Iterator[Bar]:
                     for start in starts:
                         samples[int(start * RATE) :][: row.size] += row
                     file.create_dataset(f"c{i}", data=np.round(samples).astype(np.int16), chunks=(2**16,))
-            command = [sys.executable, "-c", CHILD, folder, "logger.h5"]
-            said = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
-        peaks.append(float(said[0]))
+            command = [sys.executable, "-c", CHILD_CODE, folder, "logger.h5"]
+            output = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
+        peaks.append(float(output[0]))
         whole = 12 * seconds * RATE * 8 / 2**20
-        note = f"axles {' '.join(said[2:])}; {float(said[1]):.0f} CPU s; whole as float64 {whole:.0f}"
+        note = f"axles {' '.join(output[2:])}; {float(output[1]):.0f} CPU s; whole as float64 {whole:.0f}"
         yield Bar(
             f"cost: logger file of {seconds} s, resident memory of reading to axles",
             peaks[-1],

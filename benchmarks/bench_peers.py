@@ -19,7 +19,7 @@ from turnout.config.settings.identify import IdentifySettings
 from turnout.modal import identify, modal_parameters
 
 SETTINGS = IdentifySettings()
-TESTS = 3
+N_TESTS = 3
 CASES = {
     "40 dB": {},
     "40 dB, 3 % between blows": {"spread": 0.03},
@@ -135,20 +135,20 @@ def _errors(answer, test, mode):
 
 def _table(action, conditions):
     """Errors (n, 2) of the ballast mode, of the railpad mode, and CPU times of a peer over all locations."""
-    ballast, railpad, taken = [], [], []
-    for place, location in enumerate(LOCATIONS):
-        for k in range(TESTS):
-            test = hammer_test(location, 10, [20, place, k], duration=0.1, **conditions)
+    ballast, railpad, cpu_times = [], [], []
+    for index, location in enumerate(LOCATIONS):
+        for k in range(N_TESTS):
+            test = hammer_test(location, 10, [20, index, k], duration=0.1, **conditions)
             start = time.process_time()
             try:
                 answer = _quietly(action, test)
             except Exception:  # a package that fails on a record has found no modes
                 answer = np.empty(0), np.empty(0)
-            taken.append(time.process_time() - start)
+            cpu_times.append(time.process_time() - start)
             ballast.append(_errors(answer, test, 0))
             if "railpad" in test.bands:
                 railpad.append(_errors(answer, test, 1))
-    return np.array(ballast), np.array(railpad), np.array(taken)
+    return np.array(ballast), np.array(railpad), np.array(cpu_times)
 
 
 def bars():
@@ -162,19 +162,22 @@ def bars():
                 except ImportError as error:
                     yield Bar(f"{case}: {name}", float("nan"), None, "", "", note=f"left out: {error}")
                     continue
-            ballast, railpad, taken = _table(action, conditions)
-            found = float(np.isfinite(ballast[:, 0]).mean())
+            ballast, railpad, cpu_times = _table(action, conditions)
+            share_found = float(np.isfinite(ballast[:, 0]).mean())
             rms = [
-                100.0 * np.sqrt(np.nanmean(np.square(e), axis=0)) if found else [np.nan] * 2 for e in (ballast, railpad)
+                100.0 * np.sqrt(np.nanmean(np.square(e), axis=0)) if share_found else [np.nan] * 2
+                for e in (ballast, railpad)
             ]
-            figures[name] = (rms[0][0], found)
+            figures[name] = (rms[0][0], share_found)
             note = (
-                f"found {found:.2f}; zeta {rms[0][1]:.2g} %; railpad f {rms[1][0]:.2g}, zeta {rms[1][1]:.2g} %;"
-                f" {1e3 * np.median(taken):.0f} ms CPU a test"
+                f"found {share_found:.2f}; zeta {rms[0][1]:.2g} %; railpad f {rms[1][0]:.2g}, zeta {rms[1][1]:.2g} %;"
+                f" {1e3 * np.median(cpu_times):.0f} ms CPU a test"
             )
             yield Bar(f"{case}: {name}, ballast f rms", rms[0][0], None, "%", "", f"n={len(ballast)}", note)
-        others = [f for name, (f, found) in figures.items() if not name.startswith("turnout") and found == 1.0]
-        if others:
+        peers = [
+            f for name, (f, share_found) in figures.items() if not name.startswith("turnout") and share_found == 1.0
+        ]
+        if peers:
             # An rms of 24 tests is known to 14 %.
             note = "bar: one standard deviation of the ratio of two rms values of 24 tests"
-            yield Bar(f"{case}: ours over the best that finds all", figures["turnout"][0] / min(others), 1.2, note=note)
+            yield Bar(f"{case}: ours over the best that finds all", figures["turnout"][0] / min(peers), 1.2, note=note)

@@ -22,7 +22,7 @@ from turnout.workflow.scan import scan, unit_id
 
 DAY = date(2024, 5, 13)
 FORMATS = ("uff58b", "hdf5", "tdms", "mat", "csv")
-AIMED = ("uff58b", "hdf5", "tdms")
+LIMITED_FORMATS = ("uff58b", "hdf5", "tdms")
 
 
 def bars():
@@ -30,35 +30,35 @@ def bars():
     for file_format in FORMATS:
         folder = Path(tempfile.mkdtemp())
         try:
-            yield from _of_format(file_format, folder)
+            yield from _format_bars(file_format, folder)
         finally:
             shutil.rmtree(folder)
 
 
-def _of_format(file_format, folder):
+def _format_bars(file_format, folder):
     raw = folder / "raw"
-    _write(raw, file_format)
+    _write_raw_files(raw, file_format)
     turnout = with_raw(load_configuration("config").turnout("tommerup_s1"), raw)
     units = scan(turnout, raw).units
-    floor, whole = [], []
+    reading_times, processing_times = [], []
     for attempt in range(4):
         with stopwatch() as reading:
             for unit in units:
                 for path, _, _ in unit.files:
                     read(path, raw, turnout.hammer.descriptions[unit.section])
-        with stopwatch() as chain:
-            results = [_result(unit, turnout, raw) for unit in units]
+        with stopwatch() as processing:
+            results = [_hammer_result(unit, turnout, raw) for unit in units]
         with stopwatch() as registering:
             batch = write_batch(folder / f"work{attempt}", results)
             register([batch], folder / f"registry{attempt}", read=read_results)
         if attempt:
-            floor.append(reading.cpu)
-            whole.append(chain.cpu + registering.cpu)
-    limit, sense = (5.0, "<=") if file_format in AIMED else (None, "")
-    note = f"{min(whole):.2f} s over {min(floor):.3f} s"
+            reading_times.append(reading.cpu)
+            processing_times.append(processing.cpu + registering.cpu)
+    limit, sense = (5.0, "<=") if file_format in LIMITED_FORMATS else (None, "")
+    note = f"{min(processing_times):.2f} s over {min(reading_times):.3f} s"
     yield Bar(
         f"raw {file_format} to registry over only reading",
-        min(whole) / min(floor),
+        min(processing_times) / min(reading_times),
         limit,
         "x",
         sense,
@@ -66,10 +66,10 @@ def _of_format(file_format, folder):
         note,
     )
     if file_format == "hdf5":
-        yield Bar("one turnout, 8 x 30 impacts, files to rows", min(whole), 2.0, "CPU s", "<=", "min of 3")
+        yield Bar("one turnout, 8 x 30 impacts, files to rows", min(processing_times), 2.0, "CPU s", "<=", "min of 3")
 
 
-def _write(raw, file_format):
+def _write_raw_files(raw, file_format):
     folder = raw / "tommerup_s1" / "hammer" / DAY.isoformat()
     folder.mkdir(parents=True)
     for section in SECTIONS:
@@ -83,6 +83,6 @@ def _write(raw, file_format):
     (raw / "tommerup_s1" / "campaigns.csv").write_text(notes)
 
 
-def _result(unit, turnout, raw):
+def _hammer_result(unit, turnout, raw):
     tables = hammer_unit(unit, turnout, raw, algo="bench")
     return UnitResult(unit_id(unit), unit.turnout, unit.kind, "key", "bench", "ok", tables)

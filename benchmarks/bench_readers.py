@@ -24,8 +24,8 @@ from turnout.readers.writing import write
 from turnout.records import Channel, RawChannel, RawDescription, Recording
 
 RATE = 51200.0
-TEXT = ("uff58", "csv", "lvm")
-BARRED = ("uff58b", "hdf5", "tdms")  # a pipeline within 5 times the bare reading needs a fast reader
+TEXT_FORMATS = ("uff58", "csv", "lvm")
+LIMITED_FORMATS = ("uff58b", "hdf5", "tdms")  # a pipeline within 5 times the bare reading needs a fast reader
 REPEATS = 5
 
 
@@ -63,7 +63,7 @@ def _tdms(path):
     return [channel[:] for group in tdms.groups() for channel in group.channels()]
 
 
-BARE = {
+BARE_READERS = {
     "uff58": lambda path: pyuff.UFF(str(path)).read_sets(),
     "uff58b": lambda path: pyuff.UFF(str(path)).read_sets(),
     "tdms": _tdms,
@@ -79,7 +79,7 @@ BARE = {
 }
 
 
-def _best(call, *arguments):
+def _fastest(call, *arguments):
     """CPU seconds of the fastest of some rounds of calls, after one call to warm up."""
     with stopwatch() as watch:
         call(*arguments)
@@ -97,17 +97,17 @@ def bars():
     """Speed per format, then the vendor files of B11."""
     description = _description()
     with tempfile.TemporaryDirectory() as folder:
-        for format, bare in BARE.items():
+        for format, bare in BARE_READERS.items():
             n_record = 1 if format == "wav" else 10
-            n_sample = int((0.1 if format in TEXT else 10 / n_record) * RATE)
+            n_sample = int((0.1 if format in TEXT_FORMATS else 10 / n_record) * RATE)
             path = write(_recordings(n_record, n_sample), Path(folder) / f"a.{format}", format, description)
-            promised = replace(description, format=format, n_records=n_record, n_samples=n_sample)
-            result = read(path.name, folder, promised)
+            full_description = replace(description, format=format, n_records=n_record, n_samples=n_sample)
+            result = read(path.name, folder, full_description)
             assert not result.errors and len(result.recordings) == n_record
-            ours, floor = _best(read, path.name, folder, promised), _best(bare, path)
+            ours, floor = _fastest(read, path.name, folder, full_description), _fastest(bare, path)
             megabytes = path.stat().st_size / 1e6
             note = f"{megabytes / ours:.0f} MB/s; library {megabytes / floor:.0f} MB/s"
-            limit = 5.0 if format in BARRED else None
+            limit = 5.0 if format in LIMITED_FORMATS else None
             yield Bar(f"read over bare library, {format}", ours / floor, limit, "times", n=f"n={REPEATS}", note=note)
             path.unlink()
     yield from _vendors()

@@ -18,39 +18,39 @@ N_TEST = 400
 
 def bars():
     """Definitions: second hits of 5-30 % after 4-50 ms, tips of 0.1-3 ms in four pulse families, 12-bit loggers."""
-    yield from hit_quality()
+    yield from impact_quality()
     yield from windows_and_gate()
     yield from speed()
 
 
 @cache
-def rates(fault, tips=(1e-4, 3e-3), noise=(1e-3, 1e-2), reason=None):
+def detection_rates(fault, tips=(1e-4, 3e-3), noise=(1e-3, 1e-2), reason=None):
     """(share of faulty impacts detected, share of sound impacts with any finding, numbers of both)."""
     rng = np.random.default_rng(17)
-    named = faulty = alarms = sound = 0
+    n_named = n_faulty = n_alarms = n_sound = 0
     for _ in range(N_TEST):
         impacts = find_impacts(blows.test_of(rng, fault, tips=tips, noise=noise), "hammer", "rail")
-        good = impacts if fault is None else impacts[:-1]
-        alarms += sum(bool(i.rejections or i.notes) for i in good)
-        sound += len(good)
+        sound_impacts = impacts if fault is None else impacts[:-1]
+        n_alarms += sum(bool(i.rejections or i.notes) for i in sound_impacts)
+        n_sound += len(sound_impacts)
         if fault is not None:
-            faulty += 1
-            named += reason in {r.reason for r in (*impacts[-1].rejections, *impacts[-1].notes)}
-    return named / max(faulty, 1), alarms / sound, faulty, sound
+            n_faulty += 1
+            n_named += reason in {r.reason for r in (*impacts[-1].rejections, *impacts[-1].notes)}
+    return n_named / max(n_faulty, 1), n_alarms / n_sound, n_faulty, n_sound
 
 
-def hit_quality():
-    found, alarms, n, m = rates(blows.second_hit, reason="double_hit")
-    yield Bar("B6 second hits found", found, 0.99, sense=">=", n=f"n {n}")
+def impact_quality():
+    detected, alarms, n, m = detection_rates(blows.second_impact, reason="double_hit")
+    yield Bar("B6 second hits found", detected, 0.99, sense=">=", n=f"n {n}")
     yield Bar("B6 findings on sound blows of the same tests", alarms, 0.01, n=f"n {m}")
     for name in ("hard_clip", "analog_clip", "soft_clip"):
         fault = getattr(blows, name)
-        found, alarms, n, m = rates(fault, reason="overload")
-        yield Bar(f"B6 {name.replace('_', ' ')} found, tips 0.1-3 ms", found, 0.95, sense=">=", n=f"n {n}")
-        short, _, n, _ = rates(fault, (1e-4, 3e-4), reason="overload")
+        detected, alarms, n, m = detection_rates(fault, reason="overload")
+        yield Bar(f"B6 {name.replace('_', ' ')} found, tips 0.1-3 ms", detected, 0.95, sense=">=", n=f"n {n}")
+        short, _, n, _ = detection_rates(fault, (1e-4, 3e-4), reason="overload")
         yield Bar("   of these tips 0.1-0.3 ms, 2 to 6 samples", short, sense="", n=f"n {n}")
         yield Bar("   findings on sound blows of the same tests", alarms, 0.01, n=f"n {m}")
-    _, alarms, _, m = rates(None, noise=(0.0, 0.0))
+    _, alarms, _, m = detection_rates(None, noise=(0.0, 0.0))
     yield Bar("B6 findings on quiet 12-bit channels without noise", alarms, 0.01, n=f"n {m}")
     rng, clipped = np.random.default_rng(3), []
     for _ in range(100):
@@ -63,7 +63,7 @@ def hit_quality():
     yield Bar("   hard clip of the response at 50-90 % found", float(np.mean(clipped)), sense="", n="n 100")
 
 
-def windowed(settings, noise=0.0):
+def windowed_receptance(settings, noise=0.0):
     """(receptance, pole, residue) of a 150 Hz mode with 0.3 % damping in 0.2 s: 59 % of it remains at the end."""
     pole, residue = -0.003 * 2 * np.pi * 150 + 2j * np.pi * 150, 0.7 - 0.4j
     t = np.arange(4000) / blows.RATE
@@ -77,28 +77,28 @@ def windowed(settings, noise=0.0):
     return receptance_of(find_impacts(recordings, "hammer", "rail", settings), settings), pole, residue
 
 
-def fitted(result, decay):
+def fit_mode(result, decay):
     """Pole and residue of one mode, by linear least squares on the lines around it."""
-    near = (result.frequency > 100) & (result.frequency < 200)
-    f = result.frequency[near]
-    h = result.h1[near] * (2j * np.pi * f + decay) ** 2
+    is_near = (result.frequency > 100) & (result.frequency < 200)
+    f = result.frequency[is_near]
+    h = result.h1[is_near] * (2j * np.pi * f + decay) ** 2
     q = np.exp(-2j * np.pi * f / blows.RATE)
     rows = np.stack([np.ones_like(q), q, -q * h, -(q**2) * h], axis=1)
-    both = np.concatenate([rows.real, rows.imag]), np.concatenate([h.real, h.imag])
-    b0, b1, a1, a2 = np.linalg.lstsq(*both, rcond=None)[0]
+    system = np.concatenate([rows.real, rows.imag]), np.concatenate([h.real, h.imag])
+    b0, b1, a1, a2 = np.linalg.lstsq(*system, rcond=None)[0]
     z = next(r for r in np.roots([1.0, a1, a2]) if r.imag > 0)
     return np.log(z) * blows.RATE, 2.0 * (b0 * z + b1) / (z - np.conj(z))
 
 
 def windows_and_gate():
     decay = 60.0
-    result, pole, residue = windowed(ReceptanceSettings(exponential_window=decay))
-    seen, amplitude = fitted(result, decay)
-    s = correct_poles(seen, decay)
+    result, pole, residue = windowed_receptance(ReceptanceSettings(exponential_window=decay))
+    estimated_pole, amplitude = fit_mode(result, decay)
+    s = correct_poles(estimated_pole, decay)
     zeta, truth = -s.real / abs(s), -pole.real / abs(pole)
     yield Bar("B7 exponential window: error of damping", 100 * abs(zeta / truth - 1), 0.1, "%")
     yield Bar("B7 exponential window: error of amplitude", 100 * abs(amplitude / residue - 1), 0.1, "%")
-    raw = -seen.real / abs(seen)
+    raw = -estimated_pole.real / abs(estimated_pole)
     yield Bar("   the same damping left uncorrected", 100 * abs(raw / truth - 1), unit="%", sense="")
     yield Bar("B7 lowest line (0 Hz masked)", result.frequency[0], 5.0, "Hz", ">=", note="one line spacing")
     rng = np.random.default_rng(4)
@@ -131,10 +131,10 @@ def coverage(n=10, draws=40_000):
 
 def speed():
     rng = np.random.default_rng(6)
-    sections = [blows.test_of(rng, None, n_blow=30, tips=(1e-3, 2e-3)) for _ in range(8)]
+    sections = [blows.test_of(rng, None, n_impact=30, tips=(1e-3, 2e-3)) for _ in range(8)]
     with stopwatch() as finding:
-        found = [find_impacts(recordings, "hammer", "rail") for recordings in sections]
+        tests = [find_impacts(recordings, "hammer", "rail") for recordings in sections]
     yield Bar("B5 part: 8 x 30 impacts of 4,000 samples found and judged", finding.cpu, 1.0, "CPU s")
     with stopwatch() as averaging:
-        lines = sum(receptance_of(impacts).frequency.size for impacts in found)
+        lines = sum(receptance_of(impacts).frequency.size for impacts in tests)
     yield Bar("B5 part: receptance with all limits", averaging.cpu, 0.3, "CPU s", n=f"{lines} lines")

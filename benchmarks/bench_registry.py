@@ -22,8 +22,8 @@ from turnout.registry.job import register
 from turnout.workflow.batches import read_results
 
 SHARE = float(os.environ.get("TURNOUT_BENCH_SHARE", "1"))
-QUICK = ("one section, all its campaigns", "network ranked by 90-day slope")
-OLDER = "1.5.5"
+QUICK_QUESTIONS = ("one section, all its campaigns", "network ranked by 90-day slope")
+OLDER_DUCKDB = "1.5.5"
 REGISTER = (
     "import sys, glob, time, resource; from turnout.registry.job import register;"
     "from turnout.workflow.batches import read_results; b = sorted(glob.glob(sys.argv[1] + '/*.parquet'));"
@@ -35,9 +35,9 @@ REGISTER = (
 def bars():
     folder = Path(tempfile.mkdtemp(prefix="turnout-bench-"))
     try:
-        for part in (registering, rerun, empty, versions, racing, passages, network):
-            yield from part(folder / part.__name__)
-            shutil.rmtree(folder / part.__name__, ignore_errors=True)
+        for group in (registering, rerun, empty_registry, versions, racing, passages, network):
+            yield from group(folder / group.__name__)
+            shutil.rmtree(folder / group.__name__, ignore_errors=True)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
@@ -54,8 +54,8 @@ def registering(folder):
     """R2, and the cost of a result with all its impacts and curves."""
     n = int(28000 * SHARE)
     hammer_batches(folder / "work", n)
-    best = min(_register_in_own_process(folder / "work", folder / f"registry{k}") for k in range(3))
-    yield Bar(f"R2 register {n} results", best[0], 5, "CPU s", n=f"{best[2]} units, {best[3]} refused")
+    fastest = min(_register_in_own_process(folder / "work", folder / f"registry{k}") for k in range(3))
+    yield Bar(f"R2 register {n} results", fastest[0], 5, "CPU s", n=f"{fastest[2]} units, {fastest[3]} refused")
     per_table = {}
     for path in (folder / "registry0").rglob("batch-*.parquet"):
         table = path.relative_to(folder / "registry0").parts[0]
@@ -79,18 +79,18 @@ def rerun(folder):
     again = register(batches, folder / "registry", read=read_results)
     yield Bar("R5 rows added by a second run", sum(again.rows.values()), 0, "rows", n=f"{first.n_units} units")
     command = [sys.executable, "-c", REGISTER]
-    both = [
+    processes = [
         subprocess.Popen([*command, str(folder / name), str(folder / "both")], stdout=subprocess.DEVNULL)
         for name in ("one", "other")
     ]
-    codes = [p.wait() for p in both]
+    codes = [p.wait() for p in processes]
     register(sorted((folder / "other").glob("*.parquet")), folder / "calm", read=read_results)
     register(batches, folder / "calm", read=read_results)
-    ask = "select section_id, band, frequency_hz from modes_current order by all"
-    found = [_ask(folder / name, ask) for name in ("both", "calm")]
-    differ = len(set(found[0]) ^ set(found[1]))
+    query = "select section_id, band, frequency_hz from modes_current order by all"
+    answers = [_ask(folder / name, query) for name in ("both", "calm")]
+    differ = len(set(answers[0]) ^ set(answers[1]))
     yield Bar(
-        "R5 rows that two concurrent runs lack of their union", differ + sum(codes), 0, "rows", n=f"{len(found[1])}"
+        "R5 rows that two concurrent runs lack of their union", differ + sum(codes), 0, "rows", n=f"{len(answers[1])}"
     )
 
 
@@ -99,14 +99,14 @@ def _ask(registry, sql):
         return connection.execute(sql).fetchall()
 
 
-def empty(folder):
+def empty_registry(folder):
     """R8 here; R7 by the tests of each case."""
     register([], folder / "registry", read=iter)
     failed = sum(_fails(folder / "registry", call) for call in views())
     yield Bar("R8 views and macros that fail on an empty registry", failed, 0, "", n=f"of {len(views())}")
     tests = Path(__file__).resolve().parents[1] / "tests" / "unit" / "registry" / "test_registry_refusals.py"
-    done = subprocess.run([sys.executable, "-m", "pytest", "-q", "-x", str(tests)], capture_output=True, text=True)
-    yield Bar("R7 refusals that fail", done.returncode, 0, "", n=done.stdout.strip().splitlines()[-1])
+    result = subprocess.run([sys.executable, "-m", "pytest", "-q", "-x", str(tests)], capture_output=True, text=True)
+    yield Bar("R7 refusals that fail", result.returncode, 0, "", n=result.stdout.strip().splitlines()[-1])
 
 
 ARGUMENTS = {
@@ -138,7 +138,7 @@ def versions(folder):
     python = folder / "venv" / "bin" / "python"
     try:
         subprocess.run([sys.executable, "-m", "venv", str(folder / "venv")], check=True, capture_output=True)
-        pip = [str(python), "-m", "pip", "install", "--quiet", f"duckdb=={OLDER}"]
+        pip = [str(python), "-m", "pip", "install", "--quiet", f"duckdb=={OLDER_DUCKDB}"]
         subprocess.run(pip, check=True, capture_output=True, timeout=300)
     except (subprocess.SubprocessError, OSError):
         yield Bar("R6 not run: no older DuckDB to be had", 0, None)
@@ -154,9 +154,9 @@ def versions(folder):
     )
     queries = [_sql(call) for call in views()]
     file = folder / "registry" / "registry.duckdb"
-    done = subprocess.run([str(python), "-c", code, str(file), *queries], capture_output=True, text=True)
-    print(done.stderr, end="")
-    failed, rows, version = done.stdout.split() if done.returncode == 0 else (str(len(queries)), "0", OLDER)
+    result = subprocess.run([str(python), "-c", code, str(file), *queries], capture_output=True, text=True)
+    print(result.stderr, end="")
+    failed, rows, version = result.stdout.split() if result.returncode == 0 else (str(len(queries)), "0", OLDER_DUCKDB)
     yield Bar("R6 views and macros that fail in an older DuckDB", int(failed), 0, "", n=f"of {len(queries)}, {version}")
     yield Bar("R6 modes it reads", int(rows), 160, "rows", ">=")
 
@@ -188,7 +188,7 @@ def passages(folder):
     yield Bar("R1 bytes per passage fit", size / rows, 10, "B", n=f"{rows} rows")
     with open_registry(folder / "registry") as connection:
         for name, sql in PASSAGES.items():
-            yield Bar(name, _best(connection, sql), 1.2, "CPU s")
+            yield Bar(name, _fastest(connection, sql), 1.2, "CPU s")
 
 
 def network(folder):
@@ -201,8 +201,8 @@ def network(folder):
     yield Bar("R1 bytes per mode", size / rows, 26, "B", n=note)
     with open_registry(folder) as connection:
         for name, sql in NETWORK.items():
-            yield Bar(f"R3 {name}", _best(connection, sql), 0.15 if name in QUICK else 1.2, "CPU s")
-        yield Bar("R3 CUSUM of all charts, 4 years", _best(connection, CUSUM), 6, "CPU s")
+            yield Bar(f"R3 {name}", _fastest(connection, sql), 0.15 if name in QUICK_QUESTIONS else 1.2, "CPU s")
+        yield Bar("R3 CUSUM of all charts, 4 years", _fastest(connection, CUSUM), 6, "CPU s")
 
 
 def _size(registry, table):
@@ -212,7 +212,7 @@ def _size(registry, table):
     return sum(f.bytes for f in files), sum(f.rows for f in files)
 
 
-def _best(connection, sql, times=3):
+def _fastest(connection, sql, times=3):
     """CPU seconds of the fastest of ``times`` runs, result fetched."""
     seconds = []
     for _ in range(times):

@@ -17,10 +17,10 @@ from turnout.workflow.configuration_rows import configuration_rows
 from turnout.workflow.scan import scan
 
 N_TURNOUT, N_CAMPAIGN, N_WRITTEN = 3_500, 12, 200
-ONCE = ("receptances_current", "results_current")
-PLAIN = ("turnouts", "sections", "events", "quarantine_open")
-DATED = ("modes_current", "models_current", "impacts_current", *ONCE)
-EMPTY = ("passages_current", "passage_scores", "findings_newest", "fit_adjusted", "fit_effects")
+SINGLE_TABLES = ("receptances_current", "results_current")
+TURNOUT_TABLES = ("turnouts", "sections", "events", "quarantine_open")
+CAMPAIGN_TABLES = ("modes_current", "models_current", "impacts_current", *SINGLE_TABLES)
+EMPTY_TABLES = ("passages_current", "passage_scores", "findings_newest", "fit_adjusted", "fit_effects")
 
 
 def bars():
@@ -54,20 +54,20 @@ def bars():
 
 def _network(folder):
     """In-memory database with the views of the registry as tables, in which one turnout is repeated."""
-    bench_pipeline._write(folder / "raw", "hdf5")
+    bench_pipeline._write_raw_files(folder / "raw", "hdf5")
     configuration = load_configuration("config")
     turnout = with_raw(configuration.turnout("tommerup_s1"), folder / "raw")
-    results = [bench_pipeline._result(u, turnout, folder / "raw") for u in scan(turnout, folder / "raw").units]
+    results = [bench_pipeline._hammer_result(u, turnout, folder / "raw") for u in scan(turnout, folder / "raw").units]
     batch = write_batch(folder / "work", results)
     tables = configuration_rows(configuration, folder / "raw", [])
     register([batch], folder / "registry", read=read_results, tables=tables)
     open_registry(folder / "registry").close()
     connection = duckdb.connect()
     connection.execute(f"attach '{folder}/registry/registry.duckdb' as r (read_only)")
-    for name in EMPTY:
+    for name in EMPTY_TABLES:
         connection.execute(f"create table {name} as select * from r.{name} limit 0")
-    for name in (*PLAIN, *DATED):
-        times = N_CAMPAIGN if name in DATED and name not in ONCE else 1
+    for name in (*TURNOUT_TABLES, *CAMPAIGN_TABLES):
+        times = N_CAMPAIGN if name in CAMPAIGN_TABLES and name not in SINGLE_TABLES else 1
         connection.execute(_repeat(connection, name, times))
     return connection
 
@@ -75,14 +75,14 @@ def _network(folder):
 def _repeat(connection, name, times):
     """SQL that makes table ``name``: the rows of one turnout under the id of every turnout, for ``times`` campaigns."""
     columns = [d[0] for d in connection.execute(f"select * from r.{name} limit 0").description]
-    other = {
+    replacements = {
         "turnout_id": "printf('t%05d', k)",
         "section_id": "replace(section_id, turnout_id, printf('t%05d', k))",
         "model_id": "printf('%s-%d-%d', model_id, k, j)",
         "campaign_id": "printf('t%05d/%03d', k, 100 - j)",
         "measured_at_utc": "measured_at_utc - to_days(cast(30 * j as integer))",
     }
-    chosen = ", ".join(f"{other[c]} as {c}" if c in other else c for c in columns)
+    chosen = ", ".join(f"{replacements[c]} as {c}" if c in replacements else c for c in columns)
     return (
         f"create table {name} as select {chosen} from r.{name}, range({N_TURNOUT}) a(k), range({times}) b(j) "
         "where turnout_id = 'tommerup_s1'"

@@ -35,8 +35,8 @@ print(time.process_time())
 
 def bars():
     """Every bar of the simulation."""
-    for part in (cost, growth, trains, accuracy, other_programs):
-        for bar in part():
+    for group in (cost, growth, trains, accuracy, other_programs):
+        for bar in group():
             yield replace(bar, figure=float(bar.figure))
 
 
@@ -50,9 +50,9 @@ def best_of(n, work):
     return least
 
 
-def reference_run(prepared, duration=1.0, start=40.0, places=(48.0, ("sleeper", 80))):
+def reference_run(prepared, duration=1.0, start=40.0, positions=(48.0, ("sleeper", 80))):
     """One simulated second: 96 m, 160 bays, four elements each, a car of four wheels."""
-    return run(prepared, duration, [Probe(p) for p in places], car(), Drive(start, 30.0, entry=0.0), forces=False)
+    return run(prepared, duration, [Probe(p) for p in positions], car(), Drive(start, 30.0, entry=0.0), forces=False)
 
 
 def cost():
@@ -86,11 +86,11 @@ def growth():
     seconds = {}
     for length in (48.0, 96.0, 192.0, 384.0):
         prepared = prepare(uniform_track(length), 1e-4)
-        places = (length / 2, ("sleeper", 20))
-        seconds[length] = best_of(3, lambda p=prepared, at=places: reference_run(p, 0.2, 40.0, at))
+        positions = (length / 2, ("sleeper", 20))
+        seconds[length] = best_of(3, lambda p=prepared, at=positions: reference_run(p, 0.2, 40.0, at))
         yield Bar(f"length {length:.0f} m, 0.2 s", seconds[length], None, "CPU s", n="best of 3")
-        kept = sum(a.nbytes for a in prepared.arrays if isinstance(a, np.ndarray)) / length
-        yield Bar(f"length {length:.0f} m, memory per metre", kept / 1e3, None, "kB/m", note="constant: O(n)")
+        memory = sum(a.nbytes for a in prepared.arrays if isinstance(a, np.ndarray)) / length
+        yield Bar(f"length {length:.0f} m, memory per metre", memory / 1e3, None, "kB/m", note="constant: O(n)")
     yield Bar("length 384 m over 96 m, 4 is linear", seconds[384.0] / seconds[96.0], 4.6, "")
     step = {}
     for dt in (1e-4, 2.5e-5):
@@ -130,8 +130,8 @@ def accuracy():
         track = uniform_track(96.0, rail=rail, elements_per_bay=elements)
         worst = np.zeros(2)
         for offset in (0.0, 0.15, 0.3):
-            found = receptance(assemble(track), frequency, 48.0 + offset, 48.0 + offset)
-            error = np.abs(np.abs(found / floquet_receptance(frequency, track, offset)) - 1.0)
+            computed = receptance(assemble(track), frequency, 48.0 + offset, 48.0 + offset)
+            error = np.abs(np.abs(computed / floquet_receptance(frequency, track, offset)) - 1.0)
             worst = np.maximum(worst, [error[frequency <= 500.0].max(), error.max()])
         yield Bar(f"Floquet, {elements} elements per bay, to 500 Hz", 100 * worst[0], 0.5, "%")
         yield Bar(f"Floquet, {elements} elements per bay, to 900 Hz", 100 * worst[1], 2.0, "%")
@@ -148,12 +148,12 @@ def accuracy():
     vehicle = car(half_pivot=2.6)
     plain = run(prepared, 0.02, [Probe(12.0)], vehicle, drive, marcher=march_numpy)
     compiled = run(prepared, 0.02, [Probe(12.0)], vehicle, drive)
-    apart = np.max(np.abs(compiled.signals - plain.signals)) / np.max(np.abs(compiled.signals))
-    yield Bar("compiled march against plain numpy, relative", apart, 1e-9, "")
+    difference = np.max(np.abs(compiled.signals - plain.signals)) / np.max(np.abs(compiled.signals))
+    yield Bar("compiled march against plain numpy, relative", difference, 1e-9, "")
     turnout = load_track("tommerup")
-    places = (("A4", 9.0), ("A7", 24.6), ("A11", 36.0))
+    positions = (("A4", 9.0), ("A7", 24.6), ("A11", 36.0))
     case = PassageCase(
-        turnout, car(half_pivot=4.0), SPEED, tuple(Sensor(n, x) for n, x in places), {"lead": 0.3, "tail": 0.2}
+        turnout, car(half_pivot=4.0), SPEED, tuple(Sensor(n, x) for n, x in positions), {"lead": 0.3, "tail": 0.2}
     )
     report = numerical_error(case)
     for k, (low, high) in enumerate(report.bands):
@@ -170,8 +170,8 @@ def other_programs():
         yield from rolland()
         yield from nordborg()
     quoted = (("ROSE", 9.4, "wall"), ("railFE, one wheel, 49 m", 238.0, ""), ("UVEC, vehicle only, at least", 2.0, ""))
-    for name, seconds, kind in quoted:
-        yield Bar(f"quoted: {name}, 1 simulated second", seconds, None, "s", note=f"not run here, {kind} of the notes")
+    for name, seconds, clock in quoted:
+        yield Bar(f"quoted: {name}, 1 simulated second", seconds, None, "s", note=f"not run here, {clock} of the notes")
     yield Bar(
         "quoted: ROSE force lines at 73.8 and 148.8 Hz, ratio",
         802.0 / 118.0,
@@ -210,8 +210,8 @@ def nordborg():
         96.0, rail=rail, pad_stiffness=300e6, pad_damping=18e3, ballast_stiffness=150e6, ballast_damping=48e3
     )
     inside = (frequency > 20.0) & (frequency < 900.0)
-    found = 20.0 * np.log10(np.abs(receptance(assemble(track), frequency[inside], 48.3, 48.3)))
-    error = found - level[inside]
+    computed = 20.0 * np.log10(np.abs(receptance(assemble(track), frequency[inside], 48.3, 48.3)))
+    error = computed - level[inside]
     note = f"median {np.median(error):+.2f} dB"
     yield Bar(
         "Nordborg, 20-900 Hz, standing load, 90 % of points within",

@@ -44,27 +44,27 @@ def bars():
     yield from nightly()
 
 
-def raised(opened):
+def opens_alarm(opened):
     """(n_chart, n_campaign) bool: whether the campaign opens an alarm."""
     return np.diff(opened.astype(np.int8), axis=1, prepend=0) > 0
 
 
-def false_alarms(parts=14, turnouts=500, years=3):
+def false_alarms(n_part=14, turnouts=500, years=3):
     """T1: charts without change, all parameters estimated from the first year. Alarms of both directions count."""
     for phi in (0.0, 0.2, 0.4):
-        found = dict.fromkeys(("down", "up", "whole"), 0)
-        for part in range(parts):
+        counts = dict.fromkeys(("down", "up", "whole"), 0)
+        for index in range(n_part):
             fleet = Fleet(turnouts=turnouts, weeks=YEAR * (1 + years), phi=phi)
-            charts = evaluate(modes(fleet, 100 * part + int(10 * phi)), None, SETTINGS)
+            charts = evaluate(modes(fleet, 100 * index + int(10 * phi)), None, SETTINGS)
             n = fleet.charts
-            found["down"] += raised(charts.down_open[:n]).sum()
-            found["up"] += raised(charts.up_open[:n]).sum()
-            found["whole"] += raised(charts.down_open[n:]).sum() + raised(charts.up_open[n:]).sum()
-        weeks = YEAR * years * parts * turnouts * 8 / FLEET
-        total = sum(found.values()) / weeks
-        words = ", ".join(f"{k} {v / weeks:.1f}" for k, v in found.items())
+            counts["down"] += opens_alarm(charts.down_open[:n]).sum()
+            counts["up"] += opens_alarm(charts.up_open[:n]).sum()
+            counts["whole"] += opens_alarm(charts.down_open[n:]).sum() + opens_alarm(charts.up_open[n:]).sum()
+        weeks = YEAR * years * n_part * turnouts * 8 / FLEET
+        total = sum(counts.values()) / weeks
+        words = ", ".join(f"{k} {v / weeks:.1f}" for k, v in counts.items())
         yield Bar(f"T1 false alarms a week in {FLEET} charts, phi {phi}", total, 10.0, "", "<=",
-                  f"n = {parts * turnouts * 8} charts x {years} a", words)  # fmt: skip
+                  f"n = {n_part * turnouts * 8} charts x {years} a", words)  # fmt: skip
 
 
 def rare_campaigns(turnouts=750, years=5):
@@ -75,9 +75,9 @@ def rare_campaigns(turnouts=750, years=5):
             fleet = Fleet(turnouts=turnouts, weeks=56 + YEAR * years, phi=phi ** (1 / every), every=every)
             charts = evaluate(modes(fleet, 60 + every), None, SETTINGS)
             n = fleet.charts
-            judged = np.isfinite(charts.z[:n]) & ~charts.learning[:n] & charts.prepared.baseline.complete[:n, None]
-            alarms = raised(charts.down_open[:n]).sum() + raised(charts.up_open[:n]).sum()
-            share = alarms / (judged.sum() * promised)
+            is_judged = np.isfinite(charts.z[:n]) & ~charts.learning[:n] & charts.prepared.baseline.complete[:n, None]
+            alarms = opens_alarm(charts.down_open[:n]).sum() + opens_alarm(charts.up_open[:n]).sum()
+            share = alarms / (is_judged.sum() * promised)
             yield Bar(f"T1 false alarms of those promised, one campaign in {every} weeks, phi {phi}",
                       share, None, "", "<=", f"n = {n} charts, {alarms} alarms")  # fmt: skip
 
@@ -96,8 +96,8 @@ def delays(turnouts=2000):
         weeks = {}
         for name, change in (("step", step(fleet, which, -1.5, YEAR)), ("drift", drift(fleet, which, -1.5, YEAR))):
             charts = evaluate(modes(fleet, 7, change), None, SETTINGS)
-            opened = raised(charts.down_open[: fleet.charts].reshape(turnouts, 8, -1)[:, 0])
-            weeks[name] = np.where(opened.any(axis=1), opened.argmax(axis=1) - YEAR + 1, 10_000)
+            openings = opens_alarm(charts.down_open[: fleet.charts].reshape(turnouts, 8, -1)[:, 0])
+            weeks[name] = np.where(openings.any(axis=1), openings.argmax(axis=1) - YEAR + 1, 10_000)
         about = f"campaign effect {campaign} %, phi {phi}"
         values = (np.median(weeks["step"]), np.mean(weeks["step"] <= 26), np.median(weeks["drift"]))
         senses, units = ("<=", ">=", "<="), ("weeks", "", "weeks")
@@ -113,16 +113,16 @@ PAPER = {"OT": (154.6, 11.7), "SP": (167.2, 7.0), "CLP": (105.9, 20.0), "CP A7":
 
 def detectable():
     """T3: sections that report that they cannot detect 3 % of stiffness, with the paper's spreads as sigma."""
-    blind, numbers = 0, []
+    n_blind, numbers = 0, []
     for i, (name, (frequency, spread)) in enumerate(PAPER.items()):
         fleet = Fleet(turnouts=60, sections=1, weeks=2 * YEAR, phi=0.2, campaign=0.0, sigma=100 * spread / frequency,
                       frequency=frequency, band="ballast", coefficient_spread=0.0, prefix=f"N{i}")  # fmt: skip
         status = chart_status(evaluate(modes(fleet, 30 + i), None, SETTINGS), SETTINGS)
         status = status[status["section_id"] != "*"]
-        silent = (status["detectable_pct"] > SETTINGS.target_percent).mean()
-        blind += silent > 0.95 if name != "CP A8" else 0
+        silent_share = (status["detectable_pct"] > SETTINGS.target_percent).mean()
+        n_blind += silent_share > 0.95 if name != "CP A8" else 0
         numbers.append(f"{name} {status['detectable_pct'].median():.1f} %")
-    yield Bar("T3 ballast sections of the paper but A8 that say they cannot see", blind, 7, "of 7", ">=",
+    yield Bar("T3 ballast sections of the paper but A8 that say they cannot see", n_blind, 7, "of 7", ">=",
               "n = 60 each", "median change seen: " + ", ".join(numbers))  # fmt: skip
 
 
@@ -158,7 +158,7 @@ def after_reset(turnouts=2000):
     charts = evaluate(modes(fleet, 51), work, SETTINGS)
     n = fleet.charts
     active = np.isfinite(charts.z[:n]) & ~charts.learning[:n] & (charts.prepared.epoch[:n] == 1)
-    rate = (raised(charts.down_open[:n]) & active).sum() / active.sum()
+    rate = (opens_alarm(charts.down_open[:n]) & active).sum() / active.sum()
     rate *= SETTINGS.run_length_loss
     yield Bar(f"T5 false alarms after a reset, m = {SETTINGS.learning_large}, of those asked for", rate, 1.5, "", "<=",
               f"n = {n} charts, {active.sum() // n} campaigns")  # fmt: skip
@@ -183,9 +183,9 @@ def dates(draws=2000):
     for years in (2, 3):
         time = np.arange(YEAR * years) * 7.0
         noise = ar_noise(rng, 500, time.size, 0.2, 0.6)
-        found = [forecast(time, v, 0.2, SETTINGS) for v in noise - 3.0 * (1 - np.exp(-time / 365.25 / 0.5))]
-        dated = np.mean([np.isfinite(f.not_before) for f in found])
-        latest = np.mean([np.isfinite(f.not_after) for f in found])
+        forecasts = [forecast(time, v, 0.2, SETTINGS) for v in noise - 3.0 * (1 - np.exp(-time / 365.25 / 0.5))]
+        dated = np.mean([np.isfinite(f.not_before) for f in forecasts])
+        latest = np.mean([np.isfinite(f.not_after) for f in forecasts])
         yield Bar(f"T6 settling curve (3 %, half a year) that gets a date, {years} a", float(dated), 0.05, "", "<=",
                   "n = 500", f"with a latest date {latest:.3f}")  # fmt: skip
 
@@ -213,14 +213,14 @@ def season_only(turnouts=300):
         charts = evaluate(rows, work, SETTINGS)
         frames = {"charts": chart_rows(charts), "baselines": baseline_rows(charts, SETTINGS), "events": work}
         with connect_views(frames, rows["measured_at_utc"].max()) as con:
-            found = con.execute("select changed, change_pct from change_since_event('tamping', 120)").df()
+            events = con.execute("select changed, change_pct from change_since_event('tamping', 120)").df()
         raw = rows[(rows["measured_at_utc"] - pd.Timestamp("2017-10-10")).abs() < pd.Timedelta("120D")]
         later = raw["measured_at_utc"] >= "2017-10-10"
         side = raw.groupby(["section_id", later], observed=True)["frequency_hz"].mean().unstack()
         yield Bar(f"T7 work that changed nothing called a change, {'reset' if resets else 'no reset'}",
-                  float(found["changed"].mean()), 0.05, "", "<=", f"n = {len(found)}",
+                  float(events["changed"].mean()), 0.05, "", "<=", f"n = {len(events)}",
                   f"raw would say {100 * (side[True] / side[False] - 1).mean():+.1f} %, residuals say "
-                  f"{found['change_pct'].mean():+.2f} %")  # fmt: skip
+                  f"{events['change_pct'].mean():+.2f} %")  # fmt: skip
 
 
 def oracle():
@@ -246,11 +246,11 @@ def oracle():
     )  # fmt: skip
     with connect_views(frames, rows["measured_at_utc"].max(), rounded=False) as con:
         for name, question, column, oracle in oracles:
-            found = con.execute(f"select * from {question}").df().set_index(oracle.index.names)[column]
-            both = pd.concat([found.rename("sql"), oracle.rename("oracle")], axis=1, join="inner").dropna()
-            worst = float((both["sql"] - both["oracle"]).abs().max())
+            sql_values = con.execute(f"select * from {question}").df().set_index(oracle.index.names)[column]
+            joined = pd.concat([sql_values.rename("sql"), oracle.rename("oracle")], axis=1, join="inner").dropna()
+            worst = float((joined["sql"] - joined["oracle"]).abs().max())
             yield Bar(f"T8 SQL against an independent computation, {name}", worst, 1e-8, "", "<=",
-                      f"n = {len(both)} rows", f"DuckDB {version()}")  # fmt: skip
+                      f"n = {len(joined)} rows", f"DuckDB {version()}")  # fmt: skip
 
 
 def version():
@@ -296,15 +296,21 @@ def real_track():
             f"not measured: no {folder.name} beside this repository",
         )
         return
-    found = analyse(folder, n_permutation=1000)
-    for direction, (with_t, without) in found["loco"].items():
+    analysis = analyse(folder, n_permutation=1000)
+    for direction, (with_t, without) in analysis["loco"].items():
         for name, error in (("with", with_t), ("without", without)):
             yield Bar(f"decay rate, {direction}, campaign left out, {name} temperature, median band",
                       100 * float(np.median(error)), None, "%", "", f"n = {error.size} bands")  # fmt: skip
-    q = adjusted_p_values(np.array([v.p_value for v in found["found"]]))
-    words = ", ".join(f"{s} {verdict_words(v, x)}" for s, v, x in zip(found["sections"], found["found"], q))
+    q = adjusted_p_values(np.array([v.p_value for v in analysis["found"]]))
+    words = ", ".join(f"{s} {verdict_words(v, x)}" for s, v, x in zip(analysis["sections"], analysis["found"], q))
     yield Bar(
-        "decay rate, sections that changed", sum(v.split is not None for v in found["found"]), None, "", "", "", words
+        "decay rate, sections that changed",
+        sum(v.split is not None for v in analysis["found"]),
+        None,
+        "",
+        "",
+        "",
+        words,
     )
 
 
@@ -322,17 +328,17 @@ def demonstration():
     with open_registry(registry) as con:
         rows = con.execute("select rank, turnout_id, section_id, band, state from worklist order by rank").fetchall()
         for (turnout, section, band), since in drifts.items():
-            place = [
+            worklist_rows = [
                 r
                 for r in rows
                 if (r[1], r[2], r[3]) == (turnout, section, band) and r[4] in ("inspect this week", "plan")
             ]
-            rank = place[0][0] if place else 999
+            rank = worklist_rows[0][0] if worklist_rows else 999
             above = sum(r[0] < rank and r[1:4] not in drifts for r in rows)
             yield Bar(
                 f"demonstration: sound charts above the drift of {section} {band}", above, 0, "", "<=", f"rank {rank}"
             )
-            seen = con.execute(
+            alarm = con.execute(
                 "select count(distinct c.measured_at_utc), min(a.raised_at_utc) from alarms a join charts c using "
                 "(turnout_id, section_id, band, source) where a.section_id = ? and a.band = ? and a.direction = 'down' "
                 "and a.raised_at_utc >= ? and c.measured_at_utc >= ? and c.measured_at_utc <= a.raised_at_utc",
@@ -343,8 +349,8 @@ def demonstration():
                 "join baselines b using (turnout_id, section_id, band, source) where s.section_id = ? and s.band = ?",
                 [section, band],
             ).fetchall()[0]
-            yield Bar(f"demonstration: campaigns from its start to the alarm, {section}", seen[0], None, "", "", "",
-                      f"raised {seen[1]}; spread {spread[1] or 0:.2f} %, {spread[2]} campaigns a year, sees "
+            yield Bar(f"demonstration: campaigns from its start to the alarm, {section}", alarm[0], None, "", "", "",
+                      f"raised {alarm[1]}; spread {spread[1] or 0:.2f} %, {spread[2]} campaigns a year, sees "
                       f"{spread[0] or 0:.1f} % within a year")  # fmt: skip
 
 

@@ -15,7 +15,7 @@ import time
 from pathlib import Path
 
 from benchmarks.bar import Bar, stopwatch
-from benchmarks.workflow_hammer import same_rows_of_the_hammer_chain
+from benchmarks.workflow_hammer import hammer_same_rows
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "workflow"))
 import toy_fleet as toy
@@ -32,7 +32,7 @@ def bars():
         yield from network(folder / "network")
         yield from damage_and_kills(folder)
         yield from same_rows(folder)
-        yield from same_rows_of_the_hammer_chain(folder / "hammer", toy)
+        yield from hammer_same_rows(folder / "hammer", toy)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
@@ -41,14 +41,16 @@ def network(folder):
     """W1 and W2 on a network of 3,500 turnouts x 8 sections, five files each."""
     make_network(folder)
     n_file = sum(len(files) for _, _, files in os.walk(folder / "raw")) - N_TURNOUT
-    said, watch, _ = measured(folder)
+    output, watch, _ = run_workflow(folder)
     n = f"{N_TURNOUT} turnouts, {n_file} files, {SHARDS} shards"
-    processed = count(said, "processed")
+    processed = count(output, "processed")
     yield Bar("W2 first run of all: units processed", processed, N_TURNOUT * N_SECTION, "units", ">=", n)
     note = "starts, imports, scan, hashing all files, register; the chain does nothing"
-    yield Bar("W2 first run of all: orchestration", watch.cpu, 420.0, "CPU s", "<=", f"{jobs(said)} hammer jobs", note)
-    said, watch, peak = measured(folder)
-    assert "Nothing to be done" in said, said
+    yield Bar(
+        "W2 first run of all: orchestration", watch.cpu, 420.0, "CPU s", "<=", f"{count_jobs(output)} hammer jobs", note
+    )
+    output, watch, peak = run_workflow(folder)
+    assert "Nothing to be done" in output, output
     note = f"{watch.cpu:.2f} CPU s; load of the machine {os.getloadavg()[0]:.1f}"
     yield Bar("W1 nothing new: wall", watch.wall, 5.0, "s", "<=", n, note)
     yield Bar("W1 nothing new: memory of the process", peak, 300.0, "MB", "<=", n)
@@ -57,25 +59,25 @@ def network(folder):
     turnout = "T00042" if N_TURNOUT > 42 else "T00001"
     day = folder / "raw" / turnout / "hammer" / "2024-01-01"
     (day / "A3_9.npz").write_bytes(toy.raw_bytes(1, folder))
-    said, watch, _ = measured(folder)
-    yield Bar("W2 one new file: units processed", count(said, "processed"), 1, "units", "<=")
-    yield Bar("W2 one new file: hammer jobs", jobs(said), 1, "jobs", "<=")
+    output, watch, _ = run_workflow(folder)
+    yield Bar("W2 one new file: units processed", count(output, "processed"), 1, "units", "<=")
+    yield Bar("W2 one new file: hammer jobs", count_jobs(output), 1, "jobs", "<=")
     yield Bar("W2 one new file: wall", watch.wall, 15.0, "s", "<=", "", f"{watch.cpu:.2f} CPU s")
 
     toy.add_raw(folder, "T99999", N_SECTION)
     with open(folder / "config/turnouts.tsv", "a") as table:
         table.write("T99999\ttoy\tline 1\n")
-    said, watch, _ = measured(folder)
-    yield Bar("W2 one new turnout row: units processed", count(said, "processed"), N_SECTION, "units", "<=")
+    output, watch, _ = run_workflow(folder)
+    yield Bar("W2 one new turnout row: units processed", count(output, "processed"), N_SECTION, "units", "<=")
     yield Bar("W2 one new turnout row: wall", watch.wall, 15.0, "s", "<=", "", f"{watch.cpu:.2f} CPU s")
 
-    some = [f"T{i:05d}" for i in range(0, N_TURNOUT, max(1, N_TURNOUT // 200))][:200]
-    for name in some:
+    changed = [f"T{i:05d}" for i in range(0, N_TURNOUT, max(1, N_TURNOUT // 200))][:200]
+    for name in changed:
         toy.add_raw(folder, name, N_SECTION, n_campaign=1, first=1)
-    said, watch, _ = measured(folder)
-    off = abs(count(said, "processed") - N_SECTION * len(some))
-    yield Bar(f"W2 {len(some)} turnouts with a new campaign: units off", off, 0, "units", "<=")
-    yield Bar("W2 orchestration of these", watch.cpu, 420.0, "CPU s", "<=", f"{jobs(said)} hammer jobs")
+    output, watch, _ = run_workflow(folder)
+    off = abs(count(output, "processed") - N_SECTION * len(changed))
+    yield Bar(f"W2 {len(changed)} turnouts with a new campaign: units off", off, 0, "units", "<=")
+    yield Bar("W2 orchestration of these", watch.cpu, 420.0, "CPU s", "<=", f"{count_jobs(output)} hammer jobs")
 
 
 def make_network(folder):
@@ -97,7 +99,7 @@ def make_network(folder):
                 (day / f"{section}_{test}.npz").write_bytes(content + f"{turnout}{section}{test}".encode())
 
 
-def measured(folder):
+def run_workflow(folder):
     """Run the workflow: (its output, CPU and wall seconds, peak memory of its largest process [MB])."""
     with stopwatch() as watch, open(folder / "said", "w") as out:
         run = subprocess.Popen(
@@ -106,57 +108,57 @@ def measured(folder):
         )  # fmt: skip
         _, status, usage = os.wait4(run.pid, 0)
         run.returncode = os.waitstatus_to_exitcode(status)
-    said = (folder / "said").read_text()
-    assert run.returncode == 0, said[-3000:]
-    return said, watch, usage.ru_maxrss / 1024
+    output = (folder / "said").read_text()
+    assert run.returncode == 0, output[-3000:]
+    return output, watch, usage.ru_maxrss / 1024
 
 
-def count(said, word):
+def count(output, word):
     """Sum over the shards of one number in their summary lines."""
-    return sum(int(n) for n in re.findall(rf"^hammer \d+of\d+:.*?(\d+) {word}", said, re.M))
+    return sum(int(n) for n in re.findall(rf"^hammer \d+of\d+:.*?(\d+) {word}", output, re.M))
 
 
-def jobs(said):
-    return len(re.findall(r"^(?:local)?rule hammer:", said, re.M))
+def count_jobs(output):
+    return len(re.findall(r"^(?:local)?rule hammer:", output, re.M))
 
 
 def damage_and_kills(folder):
     """W3: one per cent of the files damaged in ten ways, and twenty kills. The registry must be unaffected."""
     fleet = toy.make(folder / "fleet", n_turnout=N_DAMAGE_TURNOUT, n_section=8)
     files = sorted((fleet / "raw").glob("*/hammer/*/*.npz"))
-    kinds = toy.damages(fleet)
-    broken = dict(zip(files[17 :: len(files) // len(kinds)], kinds))
-    expected = {(str(f.relative_to(fleet / "raw")), kinds[k][1]) for f, k in broken.items()}
-    for path, kind in broken.items():
-        path.write_bytes(kinds[kind][0])
+    damage_types = toy.damages(fleet)
+    broken = dict(zip(files[17 :: len(files) // len(damage_types)], damage_types))
+    expected = {(str(f.relative_to(fleet / "raw")), damage_types[k][1]) for f, k in broken.items()}
+    for path, damage_type in broken.items():
+        path.write_bytes(damage_types[damage_type][0])
     toy.run(fleet, shards=4)
     undisturbed = toy.data_files(fleet)
-    found = quarantined(fleet)
-    n = f"{len(files)} files, {len(broken)} damaged in {len(kinds)} ways"
-    yield Bar("W3 damaged files without their reason in quarantine", len(expected - found), 0, "files", "<=", n)
-    yield Bar("W3 sound files in quarantine", len(found - expected), 0, "files", "<=", n)
-    lost = len(files) - len(toy.rows(fleet)["recordings"]) - sum(not kinds[k][2] for k in broken.values())
+    in_quarantine = quarantine_rows(fleet)
+    n = f"{len(files)} files, {len(broken)} damaged in {len(damage_types)} ways"
+    yield Bar("W3 damaged files without their reason in quarantine", len(expected - in_quarantine), 0, "files", "<=", n)
+    yield Bar("W3 sound files in quarantine", len(in_quarantine - expected), 0, "files", "<=", n)
+    lost = len(files) - len(toy.rows(fleet)["recordings"]) - sum(not damage_types[k][2] for k in broken.values())
     yield Bar("W3 sound recordings that are not in the registry", abs(lost), 0, "files", "<=", n)
 
     toy.forget(fleet)
     (fleet / "config/config.yaml").write_text("fleet: {checkpoint_units: 10}\n")
     moments, n_dead = random.Random(20171001), 0
     for _ in range(N_KILL):
-        n_dead += killed(fleet, moments.uniform(0.5, 6.0))
+        n_dead += kill_run(fleet, moments.uniform(0.5, 6.0))
     toy.run(fleet, "--rerun-incomplete", shards=4)
     differs = int(toy.data_files(fleet) != undisturbed)
     note = f"{n_dead} of {N_KILL} kills met a run that was not finished"
     yield Bar("W3 registry differs after 20 kills -9 and a last run", differs, 0, "", "<=", n, note)
 
 
-def quarantined(folder):
+def quarantine_rows(folder):
     import duckdb
 
     with duckdb.connect(str(folder / "results/registry/registry.duckdb"), read_only=True) as con:
         return set(con.sql("select distinct path, reason_code from quarantine").fetchall())
 
 
-def killed(folder, seconds):
+def kill_run(folder, seconds):
     """Start the unattended run and kill it with all its jobs; True if it had not ended before."""
     profile = str(toy.REPOSITORY / "profiles/default")
     command = [
@@ -181,10 +183,10 @@ def same_rows(folder):
     """W4: shards and cores change no byte of the registry's data files."""
     fleet = folder / "fleet"
     (fleet / "config/config.yaml").write_text("")
-    found = {}
+    registries = {}
     for shards, cores in ((1, 1), (1, 2), (7, 2), (64, 2)):
         toy.forget(fleet)
         toy.run(fleet, shards=shards, cores=cores)
-        found[shards, cores] = tuple(toy.data_files(fleet))
-    n = "shards x cores " + ", ".join(f"{s}x{c}" for s, c in found)
-    yield Bar("W4 different registries", len(set(found.values())), 1, "", "<=", n)
+        registries[shards, cores] = tuple(toy.data_files(fleet))
+    n = "shards x cores " + ", ".join(f"{s}x{c}" for s, c in registries)
+    yield Bar("W4 different registries", len(set(registries.values())), 1, "", "<=", n)

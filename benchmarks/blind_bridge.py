@@ -25,7 +25,7 @@ from turnout.stages.mismatch_inputs import gather_inputs, track_of
 from turnout.stages.mismatch_rows import location_fields
 from turnout.workflow.scan import scan
 
-LESSER = {
+LESSER_TOOLS = {
     "in_sample": "names by the fit to what was fitted, not by conditions left out",
     "score_test": "names by the score test on the fitted base model, nothing refitted",
     "single_start": "every term is refitted from its first start alone",
@@ -41,8 +41,8 @@ def campaigns_of(folder, case):
     raw = folder / "raw"
     turnout = with_raw(load_configuration(folder / "config").turnout(case), raw)
     track, _ = track_of(turnout)
-    found = gather_inputs(scan(turnout, raw).units, turnout, raw, track, {})
-    return [group.campaign for group in groups(turnout, track, found)]
+    gathered = gather_inputs(scan(turnout, raw).units, turnout, raw, track, {})
+    return [group.campaign for group in groups(turnout, track, gathered)]
 
 
 def case_of(campaign, settings=None, lesser=None):
@@ -60,24 +60,28 @@ def case_of(campaign, settings=None, lesser=None):
     return case, settings
 
 
-def rows(folder, case, lesser=None):
+def finding_rows(folder, case, lesser=None):
     """Finding rows of all groups, one per effect, or one "none"."""
-    found = []
+    result = []
     for campaign in campaigns_of(folder, case):
-        made, settings = case_of(campaign, lesser=lesser)
-        found += _by_score_test(made, settings) if lesser == "score_test" else _by_diagnosis(made, settings, lesser)
-    return found
+        track_case, settings = case_of(campaign, lesser=lesser)
+        result += (
+            _by_score_test(track_case, settings)
+            if lesser == "score_test"
+            else _by_diagnosis(track_case, settings, lesser)
+        )
+    return result
 
 
 def _by_diagnosis(case, settings, lesser):
     diagnosis = diagnose(case, settings)
     if lesser != "in_sample" or not diagnosis.verdict.scores:
         return rows_of(diagnosis)
-    best = min(diagnosis.verdict.scores, key=lambda s: s.fit.cost)
-    gained = 0.5 * (diagnosis.base.cost - best.fit.cost) - len(best.candidate.parameters)
-    if gained <= settings.threshold:
+    best_score = min(diagnosis.verdict.scores, key=lambda s: s.fit.cost)
+    gain = 0.5 * (diagnosis.base.cost - best_score.fit.cost) - len(best_score.candidate.parameters)
+    if gain <= settings.threshold:
         return [_row("none", None, None, diagnosis.verification)]
-    return [_row("named", best.candidate, best.fit, diagnosis.verification)]
+    return [_row("named", best_score.candidate, best_score.fit, diagnosis.verification)]
 
 
 def _by_score_test(case, settings):
@@ -91,31 +95,33 @@ def _by_score_test(case, settings):
 
 def rows_of(diagnosis):
     """Finding rows of a diagnosis."""
-    found = []
+    result = []
     for verdict in diagnosis.verdicts:
-        best = verdict.scores[0].candidate if verdict.scores and verdict.names else None
-        row = _row(verdict.answer, best, diagnosis.fit, diagnosis.verification, diagnosis.where)
+        candidate = verdict.scores[0].candidate if verdict.scores and verdict.names else None
+        row = _row(verdict.answer, candidate, diagnosis.fit, diagnosis.verification, diagnosis.where)
         frame = diagnosis.frames[0].frame if diagnosis.frames else None
-        found.append(
+        result.append(
             row
             | {
                 "grade": verdict.grade or None, "rival_term": verdict.names[1] if len(verdict.names) > 1 else None,
                 "locked_to": row["locked_to"] or frame, "probability": verdict.probability, "sentence": verdict.reason,
             }
         )  # fmt: skip
-    return found
+    return result
 
 
-def _row(verdict, candidate, fit, seen, found=None):
-    where = dict(candidate.where) if candidate else location_fields(found) if verdict == "unknown" else {}
-    mine = fit.part(candidate) if candidate and fit else None
-    values = zip(candidate.parameters, fit.psi[mine], fit.psi_se[mine]) if mine else ()
+def _row(verdict, candidate, fit, verification, location=None):
+    where = dict(candidate.where) if candidate else location_fields(location) if verdict == "unknown" else {}
+    parameters = fit.part(candidate) if candidate and fit else None
+    values = zip(candidate.parameters, fit.psi[parameters], fit.psi_se[parameters]) if parameters else ()
     numbers = {p.name: {"value": float(v), "se": float(s), "unit": p.unit} for p, v, s in values}
-    fits = {f"fit_{name}_pct": _number(getattr(seen, name, None)) for name in ("before", "after", "rival", "decoy")}
+    fits = {
+        f"fit_{name}_pct": _number(getattr(verification, name, None)) for name in ("before", "after", "rival", "decoy")
+    }
     return {
         "verdict": verdict, "term": candidate.family if candidate else None,
         "locked_to": candidate.frame if candidate else where.get("frame"), "position_m": where.get("place"),
-        "channel": where.get("sensor"), **fits, "n_held_out": getattr(seen, "n", 0),
+        "channel": where.get("sensor"), **fits, "n_held_out": getattr(verification, "n", 0),
         "parameters_json": json.dumps({**numbers, "where": {k: _plain(v) for k, v in where.items()}}),
     }  # fmt: skip
 
@@ -134,11 +140,11 @@ def main():
     parser.add_argument("folder")
     parser.add_argument("case")
     parser.add_argument("out")
-    parser.add_argument("--lesser", choices=sorted(LESSER), help="a poorer tool, for the ablations")
+    parser.add_argument("--lesser", choices=sorted(LESSER_TOOLS), help="a poorer tool, for the ablations")
     args = parser.parse_args()
-    found = rows(args.folder, args.case, args.lesser)
-    Path(args.out).write_text(json.dumps(found, indent=1) + "\n")
-    print(", ".join(f"{r['verdict']} {r['term'] or ''}".strip() for r in found))
+    result = finding_rows(args.folder, args.case, args.lesser)
+    Path(args.out).write_text(json.dumps(result, indent=1) + "\n")
+    print(", ".join(f"{r['verdict']} {r['term'] or ''}".strip() for r in result))
 
 
 if __name__ == "__main__":

@@ -13,24 +13,24 @@ import numpy as np
 
 from turnout_blind.effect import load_effects
 from turnout_blind.site import draw_site
-from turnout_blind.visibility import visible
+from turnout_blind.visibility import effect_visibility
 
-HIDDEN = {"hammer_pct": 6.0, "passage_pct": 46.0}
+HIDDEN_SHARE = {"hammer_pct": 6.0, "passage_pct": 46.0}
 
 
-def index_of(seen):
+def index_of(visibility):
     """Largest ratio of a share to what hides it."""
-    return max(seen[kind] / HIDDEN[kind] for kind in HIDDEN)
+    return max(visibility[quantity] / HIDDEN_SHARE[quantity] for quantity in HIDDEN_SHARE)
 
 
-def measured(effect, rung, seed):
+def measure_visibility(effect, rung, seed):
     """Shares [%] that the effect makes up at a site drawn with ``seed``."""
     rng = np.random.default_rng([seed, 5])
     site = draw_site(rng, **effect.site)
     world = site.world.copy()
-    drawn = effect.concealed(rng, site, rung)
+    drawn = effect.draw_concealed(rng, site, rung)
     effect.act(world, site, drawn.where, drawn.parameters)
-    return visible(site, world, [seed, rung])
+    return effect_visibility(site, world, [seed, rung])
 
 
 def main():
@@ -40,15 +40,15 @@ def main():
     parser.add_argument("--sites", type=int, default=1)
     parser.add_argument("--kinds", nargs="+")
     args = parser.parse_args()
-    for kind, effect in sorted(load_effects().items()):
-        if args.kinds and kind not in args.kinds:
+    for effect_type, effect in sorted(load_effects().items()):
+        if args.kinds and effect_type not in args.kinds:
             continue
         last = len(effect.ladder) - 1
         for rung in sorted({min(r, last) for r in args.rungs} if args.rungs else range(last + 1)):
-            seen = [measured(effect, rung, seed) for seed in range(args.sites)]
-            hammer, passage = (np.mean([s[k] for s in seen]) for k in HIDDEN)
-            index = np.mean([index_of(s) for s in seen])
-            print(f"{kind:18s} {rung}  {hammer:7.1f} {passage:7.1f}  {index:6.2f}", flush=True)
+            visibilities = [measure_visibility(effect, rung, seed) for seed in range(args.sites)]
+            hammer, passage = (np.mean([s[k] for s in visibilities]) for k in HIDDEN_SHARE)
+            index = np.mean([index_of(s) for s in visibilities])
+            print(f"{effect_type:18s} {rung}  {hammer:7.1f} {passage:7.1f}  {index:6.2f}", flush=True)
 
 
 if __name__ == "__main__":

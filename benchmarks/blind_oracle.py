@@ -25,54 +25,60 @@ from turnout.errors import TurnoutError
 from turnout.mismatch.engine.map_fit import cost_at, fit_jointly
 from turnout.mismatch.engine.reserved_data import fit_percent, predict_reserved
 from turnout.mismatch.turnout.case import TrackCase
-from turnout_blind.score.matching import BAY, CLEAR, gain_of
-from turnout_blind.score.names import SAME, right_names
+from turnout_blind.score.matching import MAX_POSITION_ERROR, MIN_CLEAR_GAIN, gain_of
+from turnout_blind.score.names import SAME_PARAMETERS, right_names
 from turnout_blind.score.report import provenance
 from turnout_blind.seal import digest_of_folder
 
-STEPS = 15  # iterations of each fit
-STARTS = 2  # starts beside the truth itself; scans of phase and frequency have dozens
+MAX_ITERATIONS = 15  # iterations of each fit
+N_STARTS = 2  # starts beside the truth itself; scans of phase and frequency have dozens
 
 
 def oracle(folder, case, truth):
     """{"before", "oracle", "cpu_s"} of one case: [%] and seconds."""
-    began = time.process_time()
+    start = time.process_time()
     (campaign,) = campaigns_of(folder, case)
-    made = TrackCase(campaign)
-    if not made.reserved:
+    track_case = TrackCase(campaign)
+    if not track_case.reserved:
         raise TurnoutError("none of the recordings left out can be used, so no fit can be told")
-    base = fit = fit_jointly(made, iterations=STEPS)
+    base = fit = fit_jointly(track_case, iterations=MAX_ITERATIONS)
     for effect in truth["effects"]:
-        fit = _with(made, fit, effect) or fit
-    before, after = (fit_percent(made.reserved, predict_reserved(made, f, made.reserved)) for f in (base, fit))
-    held = {c.family for c in fit.candidates}
-    whole = all(held & set(right_names(e["kind"])) for e in truth["effects"])
+        fit = _fit_with(track_case, fit, effect) or fit
+    before, after = (
+        fit_percent(track_case.reserved, predict_reserved(track_case, f, track_case.reserved)) for f in (base, fit)
+    )
+    families = {c.family for c in fit.candidates}
+    is_complete = all(families & set(right_names(e["kind"])) for e in truth["effects"])
     return {
-        "before": before, "oracle": after if whole and truth["effects"] else None,
-        "cpu_s": round(time.process_time() - began, 1),
+        "before": before, "oracle": after if is_complete and truth["effects"] else None,
+        "cpu_s": round(time.process_time() - start, 1),
     }  # fmt: skip
 
 
-def _with(case, fit, effect):
+def _fit_with(case, fit, effect):
     """Best fit with this effect at its true position, from the truth and from the likeliest starts.
 
     Nuisance parameters that can mask the effect start also at their prior.
     """
-    found = {}
+    fits = {}
     unbent = fit.values | {n.name: n.mean for n in case.nuisances if n.owner is None and n.can_mask}
     for candidate in _candidates(case, effect):
-        told = _told(candidate, effect)
-        starts = [(told, fit.values), (told, unbent), *((s, fit.values) for s in _likeliest(case, fit, candidate))]
+        true_start = _true_start(candidate, effect)
+        starts = [
+            (true_start, fit.values),
+            (true_start, unbent),
+            *((s, fit.values) for s in _likeliest(case, fit, candidate)),
+        ]
         for start, values in starts:
             key = repr(candidate.term(start)), values is unbent
             try:
-                if key not in found:
-                    found[key] = fit_jointly(
-                        case, (*fit.candidates, candidate), [*fit.psi, *start], values, iterations=STEPS
+                if key not in fits:
+                    fits[key] = fit_jointly(
+                        case, (*fit.candidates, candidate), [*fit.psi, *start], values, iterations=MAX_ITERATIONS
                     )
             except TurnoutError:  # it cannot be simulated from this start
                 continue
-    return min(found.values(), key=lambda f: f.cost, default=None)
+    return min(fits.values(), key=lambda f: f.cost, default=None)
 
 
 def _likeliest(case, fit, candidate):
@@ -83,25 +89,35 @@ def _likeliest(case, fit, candidate):
             cost[start] = cost_at(case, (*fit.candidates, candidate), [*fit.psi, *start], fit.values)
         except TurnoutError:  # it cannot be simulated from this start
             continue
-    return sorted(cost, key=cost.get)[:STARTS]
+    return sorted(cost, key=cost.get)[:N_STARTS]
 
 
 def _candidates(case, effect):
     """Candidates with a right name at the true position, sensor, train and axle."""
     where = effect["where"]
     for candidate in case.candidates:
-        mine = candidate.where
-        near = "place" not in mine or "position" not in where or abs(mine["place"] - where["position"]) <= 0.5 * BAY
-        same = all(mine.get(k) == where[k] for k in ("sensor", "train", "axle") if k in where and k in mine)
-        if candidate.family in right_names(effect["kind"]) and near and same:
+        candidate_where = candidate.where
+        is_near = (
+            "place" not in candidate_where
+            or "position" not in where
+            or abs(candidate_where["place"] - where["position"]) <= 0.5 * MAX_POSITION_ERROR
+        )
+        is_same = all(
+            candidate_where.get(k) == where[k]
+            for k in ("sensor", "train", "axle")
+            if k in where and k in candidate_where
+        )
+        if candidate.family in right_names(effect["kind"]) and is_near and is_same:
             yield candidate
 
 
-def _told(candidate, effect):
+def _true_start(candidate, effect):
     """True parameters where generator and tool share them, and the first start for the others."""
-    known = {theirs: effect["parameters"][own] for own, theirs in SAME.get(effect["kind"], {}).items()}
+    true_values = {
+        tool_name: effect["parameters"][name] for name, tool_name in SAME_PARAMETERS.get(effect["kind"], {}).items()
+    }
     return [
-        min(max(known.get(p.name, s), p.bounds[0]), p.bounds[1])
+        min(max(true_values.get(p.name, s), p.bounds[0]), p.bounds[1])
         for p, s in zip(candidate.parameters, candidate.starts[0])
     ]
 
@@ -112,7 +128,7 @@ def clear_singles(truths):
         case
         for case, truth in sorted(truths.items())
         if truth["stratum"] == "single"
-        and gain_of(truth["visible"]) > CLEAR
+        and gain_of(truth["visible"]) > MIN_CLEAR_GAIN
         and right_names(truth["effects"][0]["kind"])
         and "axle" not in truth["effects"][0].get("where", {})
     ]
@@ -126,17 +142,17 @@ def _job(job):
         return case, {"error": f"{type(error).__name__}: {error}"[:300]}
 
 
-def asked(out, truths, clear, workers):
+def ask_oracle(out, truths, clear, workers):
     """Compute the clear singles that have no answer yet or failed, and write each answer as it comes."""
     path, origin = out / "oracle.json", provenance(json.loads((out / "diagnosis.json").read_text()))
-    mine = digest_of_folder(Path(turnout.__file__).parent)
-    if mine != origin["tool_sha256"]:
+    tool_sha256 = digest_of_folder(Path(turnout.__file__).parent)
+    if tool_sha256 != origin["tool_sha256"]:
         sys.exit(
             f"{out}/diagnosis.json: judged by tool {origin['tool_sha256'][:16]}, "
-            f"this is {mine[:16]}. Run that one."
+            f"this is {tool_sha256[:16]}. Run that one."
         )
-    held = json.loads(path.read_text()) if path.exists() else {}
-    fits = held["fits"] if {k: held.get(k) for k in origin} == origin else {}
+    former = json.loads(path.read_text()) if path.exists() else {}
+    fits = former["fits"] if {k: former.get(k) for k in origin} == origin else {}
     chosen = clear_singles(truths)[:clear]
     for case, result in answers(out, [c for c in chosen if fits.get(c, {}).get("oracle") is None], truths, workers):
         fits[case] = result
@@ -147,8 +163,8 @@ def answers(out, cases, truths, workers):
     """(case, result) as they come."""
     with ProcessPoolExecutor(workers) as pool:
         jobs = [pool.submit(_job, (out / "cases" / case, case, truths[case])) for case in cases]
-        for done in tqdm(as_completed(jobs), "oracle", len(jobs), unit="case", disable=not sys.stderr.isatty()):
-            yield done.result()
+        for future in tqdm(as_completed(jobs), "oracle", len(jobs), unit="case", disable=not sys.stderr.isatty()):
+            yield future.result()
 
 
 def main():
@@ -165,7 +181,7 @@ def main():
         for case, result in answers(out, args.cases, truths, args.workers):
             print(case, result, flush=True)
     else:
-        asked(out, truths, args.clear, args.workers)
+        ask_oracle(out, truths, args.clear, args.workers)
 
 
 if __name__ == "__main__":

@@ -29,12 +29,12 @@ def digitise(x, rng, top_over_range, noise, bits=12):
     return np.clip(np.round((x + noise * top * rng.standard_normal(x.size)) / step) * step, -limit, limit - step)
 
 
-def untouched(x):
+def identity(x):
     """No fault of the electronics: the signal itself."""
     return x
 
 
-def blow(rng, family, contact, second=None, distort=untouched, noise=(1e-3, 1e-2), filling=None, peak=None):
+def simulate_impact(rng, family, contact, second=None, distort=identity, noise=(1e-3, 1e-2), filling=None, peak=None):
     """(2, N_SAMPLE) force [N] and acceleration [m/s²] of one impact. ``second``: (share, delay [s]) of a double hit."""
     peak = 8_000.0 * rng.normal(1.0, 0.1) if peak is None else peak
     start = (TRIGGER + rng.uniform()) / RATE
@@ -51,38 +51,44 @@ def blow(rng, family, contact, second=None, distort=untouched, noise=(1e-3, 1e-2
     ])  # fmt: skip
 
 
-def test_of(rng, faulty, n_blow=10, tips=(1e-4, 3e-3), noise=(1e-3, 1e-2)):
+def test_of(rng, fault, n_impact=10, tips=(1e-4, 3e-3), noise=(1e-3, 1e-2)):
     """Recordings of one test with one tip. ``fault`` (None or a function of rng and contact) shapes the last impact."""
     family = list(FAMILIES)[rng.integers(len(FAMILIES))]
     contact = np.exp(rng.uniform(*np.log(tips)))
-    blows = [blow(rng, family, contact * rng.normal(1.0, 0.05), noise=noise) for _ in range(n_blow)]
-    if faulty is not None:
-        blows[-1] = blow(rng, family, contact, **({"noise": noise} | faulty(rng, contact)))
-    return [Recording(samples, RATE, CHANNELS, record=k) for k, samples in enumerate(blows)]
+    impacts = [simulate_impact(rng, family, contact * rng.normal(1.0, 0.05), noise=noise) for _ in range(n_impact)]
+    if fault is not None:
+        impacts[-1] = simulate_impact(rng, family, contact, **({"noise": noise} | fault(rng, contact)))
+    return [Recording(samples, RATE, CHANNELS, record=k) for k, samples in enumerate(impacts)]
 
 
-def second_hit(rng, contact):
+def second_impact(rng, contact):
     """A second impact of 5 to 30 % of the first, 4 to 50 ms later."""
     return {"second": (rng.uniform(0.05, 0.30), rng.uniform(4e-3, 50e-3))}
 
 
-RANGE = 11_000.0  # limit of the converter [N], above all sound impacts: a clipped one is the strongest of its test
+CONVERTER_RANGE = (
+    11_000.0  # limit of the converter [N], above all sound impacts: a clipped one is the strongest of its test
+)
 
 
 def hard_clip(rng, contact):
     """Clipping by the converter: its range ends at 50 to 90 % of the peak, and one code is repeated."""
     share = rng.uniform(0.5, 0.9)
-    return {"peak": RANGE / share, "filling": 1.0 / share}
+    return {"peak": CONVERTER_RANGE / share, "filling": 1.0 / share}
 
 
 def analog_clip(rng, contact):
     """Clipping by the electronics ahead of a noisy converter: clipped samples need not be equal."""
     noise = np.exp(rng.uniform(*np.log((1e-3, 1e-2))))
-    return {"peak": RANGE / rng.uniform(0.5, 0.9), "distort": lambda f: np.minimum(f, RANGE), "noise": (noise, 1e-2)}
+    return {
+        "peak": CONVERTER_RANGE / rng.uniform(0.5, 0.9),
+        "distort": lambda f: np.minimum(f, CONVERTER_RANGE),
+        "noise": (noise, 1e-2),
+    }
 
 
 def soft_clip(rng, contact):
     """Saturation c tanh(F / c) that reduces the peak by a quarter to a half."""
     drive = rng.uniform(1.0, 2.0)
-    c = RANGE / np.tanh(drive)
+    c = CONVERTER_RANGE / np.tanh(drive)
     return {"peak": drive * c, "distort": lambda f: c * np.tanh(f / c)}

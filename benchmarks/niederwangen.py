@@ -35,13 +35,13 @@ def read(folder):
     rows["log"] = np.log(rows["decay_rate_db_per_m"])
     blocks = {}
     for direction in DIRECTIONS:
-        part = rows[rows["direction"] == direction]
-        wide = part.pivot_table(index=["section", "campaign", "rail"], columns="frequency_hz", values="log")
+        selected = rows[rows["direction"] == direction]
+        wide = selected.pivot_table(index=["section", "campaign", "rail"], columns="frequency_hz", values="log")
         # Three rails were not measured: the mean difference of the rails is removed before they are averaged.
-        both = wide.xs("left", level="rail") - wide.xs("right", level="rail")
+        difference = wide.xs("left", level="rail") - wide.xs("right", level="rail")
         sign = np.where(wide.index.get_level_values("rail") == "left", 0.5, -0.5)
-        cells = (wide - sign[:, None] * both.mean().to_numpy()).groupby(level=["section", "campaign"]).mean()
-        temperature = part.groupby(["section", "campaign"])["rail_temp_c"].mean()
+        cells = (wide - sign[:, None] * difference.mean().to_numpy()).groupby(level=["section", "campaign"]).mean()
+        temperature = selected.groupby(["section", "campaign"])["rail_temp_c"].mean()
         sections, campaigns = cells.index.levels
         shape = (len(sections), len(campaigns))
         blocks[direction] = Block(cells.to_numpy().T.reshape(-1, *shape), temperature.to_numpy().reshape(shape))
@@ -52,33 +52,33 @@ def analyse(folder, n_permutation=4000):
     """All results of the page, as a dictionary of numbers and tables."""
     blocks, sections, campaigns, bands, rows = read(folder)
     together = list(blocks.values())
-    found = verdicts(together, n_permutation)
-    alone = {name: verdicts([block], n_permutation) for name, block in blocks.items()}
+    joint = verdicts(together, n_permutation)
+    by_direction = {name: verdicts([block], n_permutation) for name, block in blocks.items()}
     # Sections without a split get the common one, so that every section has a p value.
-    common = max(set(v.split for v in found if v.split) or {1}, key=[v.split for v in found].count)
-    at = [v.split or common for v in found]
+    common = max(set(v.split for v in joint if v.split) or {1}, key=[v.split for v in joint].count)
+    splits = [v.split or common for v in joint]
     table = []
     for name, block in blocks.items():
-        step, error, p_value, _, _ = steps(block, at)
+        step, error, p_value, _, _ = steps(block, splits)
         freedom = block.temperature.size - 2 * len(sections) - 1
         for i, band in enumerate(bands):
             for s, section in enumerate(sections):
-                table.append([name, band, section, at[s], step[i, s], error[i, s], p_value[i, s], freedom])
+                table.append([name, band, section, splits[s], step[i, s], error[i, s], p_value[i, s], freedom])
     table = pd.DataFrame(table, columns=["direction", "band", "section", "split", "log", "error", "p", "freedom"])
     table["q"] = adjusted_p_values(table["p"].to_numpy())
-    best = find_splits(together)
-    loco = {name: (left_out_error(b, best), left_out_error(b, best, "")) for name, b in blocks.items()}
-    slopes = {name: steps(b, best)[3:] for name, b in blocks.items()}
+    best_splits = find_splits(together)
+    loco = {name: (left_out_error(b, best_splits), left_out_error(b, best_splits, "")) for name, b in blocks.items()}
+    slopes = {name: steps(b, best_splits)[3:] for name, b in blocks.items()}
     rivals = {
         "nothing changed": (0,) * len(sections),
-        "the likeliest splits": best,
+        "the likeliest splits": best_splits,
     }
     shared = {name: deviance(together, k, "campaign") for name, k in rivals.items()}
     for s, section in enumerate(sections):
-        only = tuple(common if i == s else 0 for i in range(len(sections)))
-        shared[f"{section} alone, in {campaigns[common]}"] = deviance(together, only, "campaign")
-    return dict(blocks=blocks, sections=sections, campaigns=campaigns, bands=bands, rows=rows, found=found,
-                alone=alone, table=table, loco=loco, slopes=slopes, best=best, common=common,
+        one_section = tuple(common if i == s else 0 for i in range(len(sections)))
+        shared[f"{section} alone, in {campaigns[common]}"] = deviance(together, one_section, "campaign")
+    return dict(blocks=blocks, sections=sections, campaigns=campaigns, bands=bands, rows=rows, found=joint,
+                alone=by_direction, table=table, loco=loco, slopes=slopes, best=best_splits, common=common,
                 shared=shared)  # fmt: skip
 
 
@@ -102,13 +102,15 @@ def section_rows(a):
     """One line per section of the table of verdicts."""
     q = adjusted_p_values(np.array([v.p_value for v in a["found"]]))
     for s, (section, v) in enumerate(zip(a["sections"], a["found"])):
-        part = a["table"].query("section == @section and q <= 0.05")
-        named = []
+        significant = a["table"].query("section == @section and q <= 0.05")
+        texts = []
         for direction in DIRECTIONS:
-            these = part[part["direction"] == direction]
-            if len(these):
-                factors = ", ".join(f"{b} (×{np.exp(x):.1f})" for b, x in zip(these["band"], these["log"]))
-                named.append(f"{direction} {factors}")
+            in_direction = significant[significant["direction"] == direction]
+            if len(in_direction):
+                factors = ", ".join(
+                    f"{b} (×{np.exp(x):.1f})" for b, x in zip(in_direction["band"], in_direction["log"])
+                )
+                texts.append(f"{direction} {factors}")
         middle = a["table"].query("section == @section and direction == 'lateral' and 500 <= band <= 3150")["log"]
         middle = np.exp(middle)
         likely = int(np.argmax(v.probability[1:])) + 1
@@ -120,7 +122,7 @@ def section_rows(a):
             f"| {section} | **{words}** | {date} | "
             f"{1 - v.probability[0]:.3f} ({v.probability[v.split or likely]:.3f}) | {v.p_value:.4f} ({q[s]:.3f}) | "
             f"{1 - vertical.probability[0]:.2f} / {1 - lateral.probability[0]:.2f} | "
-            f"×{middle.median():.2f} ({middle.min():.2f} to {middle.max():.2f}) | {'; '.join(named) or 'none'} |"
+            f"×{middle.median():.2f} ({middle.min():.2f} to {middle.max():.2f}) | {'; '.join(texts) or 'none'} |"
         )
 
 
@@ -131,9 +133,9 @@ def band_rows(a):
         with_t, without = a["loco"][direction]
         for i, band in enumerate(a["bands"]):
             cells = []
-            part = a["table"].query("direction == @direction and band == @band").set_index("section")
+            factors = a["table"].query("direction == @direction and band == @band").set_index("section")
             for section in a["sections"]:
-                row = part.loc[section]
+                row = factors.loc[section]
                 half = stats.t.isf(0.025, row["freedom"]) * row["error"]
                 star = "\\*" if row["q"] <= 0.05 else ""
                 cells.append(
@@ -165,11 +167,11 @@ def figure(a, path):
     fig, axes = plt.subplots(2, 1, figsize=(9, 7), sharex=True, layout="constrained")
     for axis, direction in zip(axes, DIRECTIONS):
         for s, section in enumerate(a["sections"]):
-            part = a["table"].query("direction == @direction and section == @section")
-            half = stats.t.isf(0.025, part["freedom"]) * part["error"]
-            x = np.arange(len(part)) + 0.15 * (s - 2)
-            low, high = np.exp(part["log"] - half), np.exp(part["log"] + half)
-            middle = np.exp(part["log"])
+            rows = a["table"].query("direction == @direction and section == @section")
+            half = stats.t.isf(0.025, rows["freedom"]) * rows["error"]
+            x = np.arange(len(rows)) + 0.15 * (s - 2)
+            low, high = np.exp(rows["log"] - half), np.exp(rows["log"] + half)
+            middle = np.exp(rows["log"])
             axis.errorbar(x, middle, [middle - low, high - middle], fmt="os^Dv"[s], ms=4, lw=1, label=section)
         axis.axhline(1.0, color="black", lw=0.8)
         axis.set_yscale("log")
@@ -249,11 +251,11 @@ campaigns cannot carry; that is why a slope that is significant in the fit ({sig
 def open_case(a, s):
     """Evidence for and against a change of an undecided section, in numbers."""
     section = a["sections"][s]
-    part = a["table"].query("section == @section and direction == 'lateral' and 500 <= band <= 3150")
+    rows = a["table"].query("section == @section and direction == 'lateral' and 500 <= band <= 3150")
     return (
-        f"- **{section}, cannot tell:** lateral, 500 to 3150 Hz, {int((part['log'] > 0).sum())} of {len(part)} bands "
-        f"lie above 1 (median ×{np.exp(part['log'].median()):.2f}), {int((part['p'] <= 0.05).sum())} of them with p "
-        f"at most 0.05 before correction and {int((part['q'] <= 0.05).sum())} after. The bands err together, so their "
+        f"- **{section}, cannot tell:** lateral, 500 to 3150 Hz, {int((rows['log'] > 0).sum())} of {len(rows)} bands "
+        f"lie above 1 (median ×{np.exp(rows['log'].median()):.2f}), {int((rows['p'] <= 0.05).sum())} of them with p "
+        f"at most 0.05 before correction and {int((rows['q'] <= 0.05).sum())} after. The bands err together, so their "
         "number proves "
         "little. One more campaign before or a quieter one after would settle it."
     )

@@ -11,7 +11,7 @@ from turnout.simulate.train import couple
 
 RATE = 20000.0
 # Positions of twelve sensors on the track of the train [m].
-MAIN = (-20.0, -12.0, -6.0, 3.6, 8.4, 13.8, 19.2, 24.6, 26.4, 31.2, 36.0, 40.2)
+SENSOR_POSITIONS = (-20.0, -12.0, -6.0, 3.6, 8.4, 13.8, 19.2, 24.6, 26.4, 31.2, 36.0, 40.2)
 CROSSTALK = 0.05  # share of the vibration that sensors on the other track see
 
 
@@ -38,7 +38,7 @@ def vehicles(load):
     }
 
 
-def strangers():
+def unlisted_trains():
     """Trains without a template."""
     short = car("stranger", half_base=1.05, half_pivot=6.4, length=17.6, overhang=1.35)
     long = car("stranger", half_base=1.40, half_pivot=9.9, length=27.1, overhang=2.25)
@@ -48,7 +48,7 @@ def strangers():
 
 def simulate(vehicle, name, speed_kmh, direction, route, prepared, track, seed=1):
     """Simulate one train without noise."""
-    sensors = [Sensor(f"m{i}", x) for i, x in enumerate(MAIN)]
+    sensors = [Sensor(f"m{i}", x) for i, x in enumerate(SENSOR_POSITIONS)]
     recording = simulate_passage(
         track,
         vehicle,
@@ -81,35 +81,39 @@ def fleet(speeds, loads=(0.0, 1.0)):
                 yield simulate(vehicle, name, speed, direction, route, prepared, track)
 
 
-def stranger_runs(speeds=(60.0, 110.0)):
+def unlisted_runs(speeds=(60.0, 110.0)):
     """Runs of the trains without a template."""
     track = load_track("tommerup", seed=1)
     prepared = prepare_passage(track, rate=RATE)
-    for vehicle in strangers():
+    for vehicle in unlisted_trains():
         for speed in speeds:
             yield simulate(vehicle, "unknown", speed, "facing", "main", prepared, track)
 
 
-def heard(run: Run, rows, noise, rng, beside=True):
+def sensor_recording(run: Run, rows, noise, rng, with_other_track=True):
     """(Recording, sensors): the sensors ``rows`` with white noise [m/s²], and two sensors of the other track.
 
     A sensor before the toe records every train. One behind it records the trains of its track, and others faintly.
     """
     samples = run.samples[list(rows)].astype(float)
     names = [f"m{i}" for i in rows]
-    places = [MAIN[i] for i in rows]
-    here, other = run.route, "diverging" if run.route == "main" else "main"
-    tracks = ["both" if x < 4.0 else here for x in places]
-    if beside:
-        faint = CROSSTALK * run.samples[[9, 10]].astype(float)
-        samples, names, places = np.vstack([samples, faint]), [*names, "o1", "o2"], [*places, MAIN[9], MAIN[10]]
-        tracks = [*tracks, other, other]
+    positions = [SENSOR_POSITIONS[i] for i in rows]
+    own_track, other_track = run.route, "diverging" if run.route == "main" else "main"
+    tracks = ["both" if x < 4.0 else own_track for x in positions]
+    if with_other_track:
+        crosstalk = CROSSTALK * run.samples[[9, 10]].astype(float)
+        samples, names, positions = (
+            np.vstack([samples, crosstalk]),
+            [*names, "o1", "o2"],
+            [*positions, SENSOR_POSITIONS[9], SENSOR_POSITIONS[10]],
+        )
+        tracks = [*tracks, other_track, other_track]
     samples = samples + noise * rng.standard_normal(samples.shape)
-    channels = tuple(Channel(n, "acceleration", x) for n, x in zip(names, places))
-    sensors = [PassageSensor(n, n, x, t) for n, x, t in zip(names, places, tracks)]
+    channels = tuple(Channel(n, "acceleration", x) for n, x in zip(names, positions))
+    sensors = [PassageSensor(n, n, x, t) for n, x, t in zip(names, positions, tracks)]
     return Recording(samples, RATE, channels, "passage"), sensors
 
 
-def scaled(run: Run, factor) -> Run:
+def scale_run(run: Run, factor) -> Run:
     """The same run with all accelerations multiplied."""
     return replace(run, samples=run.samples * factor)

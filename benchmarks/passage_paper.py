@@ -14,7 +14,7 @@ from turnout.passage.model_tests import random_models
 from turnout.passage.score_regression import effects
 from turnout.passage.wheel_basis import apply_filter, band_pass
 
-SENSOR, PLACE, LOCATION = 7, 24.6, "CP A7"
+SENSOR, POSITION, LOCATION = 7, 24.6, "CP A7"
 INTERVALS = (0.02, 0.005, 0.002, 0.001)
 
 
@@ -26,8 +26,8 @@ def reestimated_fit(data, model, interval: float) -> float:
         rows.append(row)
         row = row @ model.a
     windows = data[: len(data) // n * n].reshape(-1, n).T
-    rest = windows - rows @ np.linalg.lstsq(np.array(rows), windows, rcond=None)[0]
-    return float(100.0 * (1.0 - np.linalg.norm(rest) / np.linalg.norm(windows - windows.mean())))
+    residual = windows - rows @ np.linalg.lstsq(np.array(rows), windows, rcond=None)[0]
+    return float(100.0 * (1.0 - np.linalg.norm(residual) / np.linalg.norm(windows - windows.mean())))
 
 
 def paper_trends(runs, settings, noise=0.2) -> Iterator[Bar]:
@@ -38,7 +38,7 @@ def paper_trends(runs, settings, noise=0.2) -> Iterator[Bar]:
     by_interval, rows = {t: [] for t in INTERVALS}, []
     for run in (r for r in runs if r.route == "main"):
         samples = run.samples[SENSOR] + noise * rng.standard_normal(run.samples.shape[1])
-        times = _passing(run, len(samples) / RATE)
+        times = _passing_times(run, len(samples) / RATE)
         data = apply_filter(samples, through)[int(times[0] * RATE) : int((times[-1] + 0.05) * RATE)]
         for t in INTERVALS:
             null = [reestimated_fit(data, m, t) for m in random]
@@ -49,23 +49,23 @@ def paper_trends(runs, settings, noise=0.2) -> Iterator[Bar]:
         rows[-1] |= {"fit_pct": fit.scores.fit, "null": fit.null.fit, "reestimated": by_interval[0.002][-1][0]}
     n = f"n={len(rows)}"
     for t, scores in by_interval.items():
-        own, median, high = np.mean(scores, axis=0)
+        mean_fit, median, high = np.mean(scores, axis=0)
         note = f"random models: median {median:.0f}, 95 % {high:.0f}"
-        yield Bar(f"paper's fit, state estimated anew every {1e3 * t:g} ms, A7", own, None, "%", "", n, note)
+        yield Bar(f"paper's fit, state estimated anew every {1e3 * t:g} ms, A7", mean_fit, None, "%", "", n, note)
     note = f"random models reach {np.mean([r['null'] for r in rows]):.1f} (95 %)"
     yield Bar("joint fit, one amplitude per wheel, A7", np.mean([r["fit_pct"] for r in rows]), None, "%", "", n, note)
     for score, words in (("fit_pct", "joint fit"), ("reestimated", "paper's fit at 2 ms")):
         for e in effects(rows, score):
             if e.factor != "train type":
-                kind = "others held fixed" if e.adjusted else "as compared"
-                note = f"95 %: {e.low:+.2f} to {e.high:+.2f}, {kind}"
+                comparison = "others held fixed" if e.adjusted else "as compared"
+                note = f"95 %: {e.low:+.2f} to {e.high:+.2f}, {comparison}"
                 yield Bar(f"{words} with {e.factor}, per {e.per}", e.change, None, "points", "", n, note)
 
 
-def _passing(run, duration):
+def _passing_times(run, duration):
     """Times at which the axles pass the sensor [s]. The first axle reaches the first sensor 1.2 s after the start."""
-    from benchmarks.passage_fleet import MAIN
+    from benchmarks.passage_fleet import SENSOR_POSITIONS
 
-    way = PLACE - min(MAIN) if run.direction == "facing" else max(MAIN) - PLACE
-    times = 1.2 + (way + run.offsets - run.offsets[0]) / run.speed
+    distance = POSITION - min(SENSOR_POSITIONS) if run.direction == "facing" else max(SENSOR_POSITIONS) - POSITION
+    times = 1.2 + (distance + run.offsets - run.offsets[0]) / run.speed
     return times[times < duration - 0.2]

@@ -15,7 +15,7 @@ from turnout.records import Channel, ModalModel, Recording
 
 RATE = 20000.0
 IC3 = np.array([0.0, 2.7, 16.35, 19.05, 34.05, 36.75, 50.4, 53.1])
-KNOWN = {
+PATTERN_FILE = {
     "vehicles": {
         "unit": {"length": 58.8, "axles": [2.85, 5.55, 19.2, 21.9, 36.9, 39.6, 53.25, 55.95]},
         "coach": {"length": 26.4, "pivots": 19.0, "wheelbase": 2.5},
@@ -26,7 +26,7 @@ KNOWN = {
         "intercity": {"units": ["loco", {"any": ["coach"], "count": [1, 12]}]},
     },
 }
-PATTERNS = read_patterns(KNOWN)
+PATTERNS = read_patterns(PATTERN_FILE)
 
 
 def paper_model(location) -> ModalModel:
@@ -36,7 +36,7 @@ def paper_model(location) -> ModalModel:
 
 
 @dataclass
-class Struck:
+class ImpactRecord:
     """``samples`` (n,) with ``times`` [samples] and ``amplitudes`` of the impacts; ``clean`` is without ``noise``."""
 
     samples: np.ndarray
@@ -46,12 +46,12 @@ class Struck:
     clean: np.ndarray
 
 
-def decay(location, past) -> np.ndarray:
+def decay(location, elapsed) -> np.ndarray:
     """Response at times ``elapsed`` after an impact [s]: Re sum R exp(s t), zero before it."""
     model = published_model(location)
     pole = continuous_pole(model.frequency, model.damping)
-    after = np.clip(past, 0.0, None)[..., None]
-    return np.where(past >= 0, np.real(np.sum(model.residue * np.exp(pole * after), axis=-1)), 0.0)
+    positive = np.clip(elapsed, 0.0, None)[..., None]
+    return np.where(elapsed >= 0, np.real(np.sum(model.residue * np.exp(pole * positive), axis=-1)), 0.0)
 
 
 def impacts(location, n, times, amplitudes) -> np.ndarray:
@@ -64,28 +64,28 @@ def impacts(location, n, times, amplitudes) -> np.ndarray:
     return out
 
 
-def struck(rng, location="CP A7", offsets=IC3, speed=44.4, snr_db=40.0, start=0.6, tail=0.5) -> Struck:
+def impact_record(rng, location="CP A7", offsets=IC3, speed=44.4, snr_db=40.0, start=0.6, tail=0.5) -> ImpactRecord:
     """Record of one sensor: impacts of a train on a model of the paper, white noise ``snr_db`` below the peak."""
     times = (start + np.asarray(offsets) / speed) * RATE + rng.uniform(0.0, 1.0, len(offsets))
     amplitudes = 1.0 + 0.2 * rng.standard_normal(len(offsets))
     clean = impacts(location, int(times[-1] + tail * RATE), times, amplitudes)
     noise = np.abs(clean).max() * 10 ** (-snr_db / 20)
-    return Struck(clean + noise * rng.standard_normal(clean.size), times, amplitudes, noise, clean)
+    return ImpactRecord(clean + noise * rng.standard_normal(clean.size), times, amplitudes, noise, clean)
 
 
-def passing(offsets, positions, speed, acceleration, direction, lead):
+def passing_times(offsets, positions, speed, acceleration, direction, lead):
     """(n_sensor, n_axle) times [s]; the first axle reaches the first sensor ``lead`` after the start."""
     along = direction * np.asarray(positions, float)
-    way = np.asarray(offsets, float) + (along - along.min())[:, None]
-    root = np.sqrt(speed**2 + 2 * acceleration * way)
-    return lead + 2 * way / (speed + root)
+    distance = np.asarray(offsets, float) + (along - along.min())[:, None]
+    root = np.sqrt(speed**2 + 2 * acceleration * distance)
+    return lead + 2 * distance / (speed + root)
 
 
-def struck_train(
+def impact_train(
     rng, locations, positions, offsets=IC3, speed=44.4, acceleration=0.0, direction=1, snr_db=40.0, lead=1.0
 ):
     """(recording of several sensors, each with the model of its location, true times (n_sensor, n_axle) [s])."""
-    times = passing(offsets, positions, speed, acceleration, direction, lead)
+    times = passing_times(offsets, positions, speed, acceleration, direction, lead)
     n = int((times.max() + 1.0) * RATE)
     rows = []
     for location, row in zip(locations, times):
@@ -94,9 +94,11 @@ def struck_train(
     return recording_of(np.array(rows), positions), times
 
 
-def rolling(rng, offsets=IC3, speed=40.0, positions=(0.0, 4.0), direction=1, noise=0.02, acceleration=0.0, lead=1.0):
+def rolling_noise(
+    rng, offsets=IC3, speed=40.0, positions=(0.0, 4.0), direction=1, noise=0.02, acceleration=0.0, lead=1.0
+):
     """Recording of noise bursts that follow the wheels along the rail. Power decays by 1/e in 0.4 m; no modal model."""
-    times = passing(offsets, positions, speed, acceleration, direction, lead)
+    times = passing_times(offsets, positions, speed, acceleration, direction, lead)
     n = int((times.max() + 1.0) * RATE)
     time = np.arange(n) / RATE
     rows = []

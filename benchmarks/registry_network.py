@@ -70,7 +70,9 @@ def make_network(root: Path, turnouts: int = 3500) -> Generation:
         )
     for table, sql in SMALL.items():
         files.append(
-            write_sorted(con, root, table, None, _typed(table, sql.format(turnouts=turnouts, first=FIRST)), "all")
+            write_sorted(
+                con, root, table, None, _typed_select(table, sql.format(turnouts=turnouts, first=FIRST)), "all"
+            )
         )
     con.execute(
         "create view said as " + read_live(con, root, "supersedes", [f for f in files if f.table == "supersedes"])
@@ -86,18 +88,18 @@ def make_network(root: Path, turnouts: int = 3500) -> Generation:
 
 def _modes(turnouts, from_week, to_week, run):
     sql = MODES.format(turnouts=turnouts, first=FIRST, from_week=from_week, to_week=to_week, run=run)
-    return _typed("modes", sql)
+    return _typed_select("modes", sql)
 
 
-def _typed(table: str, sql: str) -> str:
+def _typed_select(table: str, sql: str) -> str:
     """SQL of the rows as the registration writes them: typed, rounded, absent columns NULL."""
-    given = connect()
-    given.execute(MACROS)
-    present = [r[0] for r in given.execute(f"describe {sql}").fetchall()]
+    connection = connect()
+    connection.execute(MACROS)
+    present = [r[0] for r in connection.execute(f"describe {sql}").fetchall()]
     columns = [c for c in tables()[table]]
     assert set(present) <= set(names(table))
-    parts = [
+    expressions = [
         f'{c.rounded}::{c.type} as "{c.name}"' if c.name in present else f'null::{c.type} as "{c.name}"'
         for c in columns
     ]
-    return f"select {', '.join(parts)} from ({sql})"
+    return f"select {', '.join(expressions)} from ({sql})"

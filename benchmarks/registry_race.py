@@ -70,8 +70,8 @@ def race(root: Path, seconds: float = 15.0, reads: int = 300, through_glob: bool
     code = f"from pathlib import Path; from benchmarks.registry_race import write; {call}"
     folder = Path(__file__).resolve().parents[1]
     writer = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, cwd=folder)
-    outcome, begun = Outcome(), time.monotonic()
-    while (spent := time.monotonic() - begun) < seconds or (outcome.reads < reads and spent < 90):
+    outcome, start = Outcome(), time.monotonic()
+    while (spent := time.monotonic() - start) < seconds or (outcome.reads < reads and spent < 90):
         outcome.reads += 1
         try:
             rows, batches = _count(root, through_glob)

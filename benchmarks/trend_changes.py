@@ -23,17 +23,17 @@ CASES = [
 
 def bars(turnouts=250):
     """Coverage of the 95 % intervals among the charts in alarm, the only ones that report a change."""
-    held = {"onset": [], "size": []}
+    shares = {"onset": [], "size": []}
     for number, case in enumerate(CASES):
-        found = covered(*case, turnouts, 400 + number)
-        kind, size, before, every, phi, missing = case
-        about = f"{kind} {size:g} %{'/a' if kind == 'drift' else ''}, {before} weeks ago, a campaign every {every}, "
+        coverage = interval_coverage(*case, turnouts, 400 + number)
+        shape, size, before, every, phi, missing = case
+        about = f"{shape} {size:g} %{'/a' if shape == 'drift' else ''}, {before} weeks ago, a campaign every {every}, "
         about += f"phi {phi}, {missing:.0%} missing"
-        for name in held:
-            held[name].append(found[name])
-            yield Bar(f"95 % interval of the {name}, {about}", found[name], None, "", "", f"n = {found['n']}",
-                      f"median width {found[f'{name} width']}, kind right {found['kind']:.2f}")  # fmt: skip
-    for name, values in held.items():
+        for name in shares:
+            shares[name].append(coverage[name])
+            yield Bar(f"95 % interval of the {name}, {about}", coverage[name], None, "", "", f"n = {coverage['n']}",
+                      f"median width {coverage[f'{name} width']}, kind right {coverage['kind']:.2f}")  # fmt: skip
+    for name, values in shares.items():
         mean = float(np.mean(values))
         yield Bar(
             f"95 % interval of the {name}, mean of the cases, at least", mean, 0.93, "", ">=", f"{len(CASES)} cases"
@@ -43,25 +43,25 @@ def bars(turnouts=250):
         )
 
 
-def covered(kind, percent, before, every, phi, missing, turnouts, seed):
+def interval_coverage(shape, percent, before, every, phi, missing, turnouts, seed):
     """Share of intervals that cover the truth among the charts in alarm of one case, and their widths."""
     fleet = Fleet(turnouts=turnouts, weeks=120, phi=phi, every=every, missing=missing)
     which = np.zeros((turnouts, fleet.sections), dtype=bool)
     which[:, 0] = True
     start = fleet.weeks - before - 0.5  # between two campaigns
-    change = KINDS[kind](fleet, which, percent, start)
+    change = KINDS[shape](fleet, which, percent, start)
     charts = evaluate(modes(fleet, seed, change), None, SETTINGS)
     status = chart_status(charts, SETTINGS)
-    told = describe_flagged(status, candidates(charts, status, SETTINGS), SETTINGS)
-    told = told[told["section_id"].str.endswith("/S0").to_numpy() & (told["state"] == "alarm").to_numpy()]
+    alarms = describe_flagged(status, candidates(charts, status, SETTINGS), SETTINGS)
+    alarms = alarms[alarms["section_id"].str.endswith("/S0").to_numpy() & (alarms["state"] == "alarm").to_numpy()]
     since = timestamps(days([START]) + 7.0 * start)[0]
-    last = ((told["last_measured_at_utc"] - START) / np.timedelta64(7, "D")).to_numpy()
-    truth = percent * (last - start) / 52.18 if kind == "drift" else np.full(len(told), percent)
-    onset = (told["since_earliest_utc"] <= since) & (since <= told["since_latest_utc"])
-    size = (told["change_low_pct"] <= truth) & (truth <= told["change_high_pct"])
-    width = (told["since_latest_utc"] - told["since_earliest_utc"]).median() / np.timedelta64(1, "D")
+    last = ((alarms["last_measured_at_utc"] - START) / np.timedelta64(7, "D")).to_numpy()
+    truth = percent * (last - start) / 52.18 if shape == "drift" else np.full(len(alarms), percent)
+    onset = (alarms["since_earliest_utc"] <= since) & (since <= alarms["since_latest_utc"])
+    size = (alarms["change_low_pct"] <= truth) & (truth <= alarms["change_high_pct"])
+    width = (alarms["since_latest_utc"] - alarms["since_earliest_utc"]).median() / np.timedelta64(1, "D")
     return {
-        "n": len(told), "onset": float(onset.mean()), "size": float(size.mean()), "onset width": f"{width:.0f} d",
-        "size width": f"{(told['change_high_pct'] - told['change_low_pct']).median():.2f} %",
-        "kind": float((told["change_kind"] == kind).mean()),
+        "n": len(alarms), "onset": float(onset.mean()), "size": float(size.mean()), "onset width": f"{width:.0f} d",
+        "size width": f"{(alarms['change_high_pct'] - alarms['change_low_pct']).median():.2f} %",
+        "kind": float((alarms["change_kind"] == shape).mean()),
     }  # fmt: skip

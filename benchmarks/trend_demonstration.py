@@ -32,14 +32,14 @@ order by c.measured_at_utc
 """
 
 
-def drifts(truth: Path):
+def true_drifts(truth: Path):
     """(section id, band, change) of every true drift that no event explains."""
     for path in sorted(Path(truth).glob("*.json")):
-        told = json.loads(path.read_text(encoding="utf-8"))
-        for said in told.get("changes", []) if isinstance(told, dict) else []:
-            if said["per_year"] and not said["event"]:
-                change = Change(**said | {"since": date.fromisoformat(said["since"]), "until": None})
-                yield f"{told['turnout']}/{change.section}", change.component, change
+        content = json.loads(path.read_text(encoding="utf-8"))
+        for entry in content.get("changes", []) if isinstance(content, dict) else []:
+            if entry["per_year"] and not entry["event"]:
+                change = Change(**entry | {"since": date.fromisoformat(entry["since"]), "until": None})
+                yield f"{content['turnout']}/{change.section}", change.component, change
 
 
 def chances(times, change, spread, phi, guard, allowance, threshold, n=20_000, seed=1):
@@ -63,62 +63,62 @@ def chances(times, change, spread, phi, guard, allowance, threshold, n=20_000, s
 
 def paragraph(folder) -> str:
     """The paragraph of the page, with figures from the registry or computed from its chart."""
-    parts = []
+    sentences = []
     with open_registry(Path(folder) / "results" / "registry") as con:
-        for section, band, change in drifts(Path(folder) / "truth"):
+        for section, band, change in true_drifts(Path(folder) / "truth"):
             since = datetime.combine(change.since, datetime.min.time())
             rows = con.execute(QUESTION, [since - timedelta(days=1), section, band]).fetchall()
             if rows:
-                parts.append(_words(section, band, change, since, rows))
-    return "\n".join(parts)
+                sentences.append(_sentences(section, band, change, since, rows))
+    return "\n".join(sentences)
 
 
-def _words(section, band, change, since, rows) -> str:
+def _sentences(section, band, change, since, rows) -> str:
     times = [row[0] for row in rows]
     spread, phi, guard, allowance, threshold, state = rows[-1][2:8]
-    first, early, late, kind, size, low, high, raised, place, n_inspect = rows[-1][8:]
+    first, early, late, shape, size, low, high, raised, rank, n_inspect = rows[-1][8:]
     after = [t for t in times if t >= since]
-    known, truth = chances(after, change, spread, phi, guard, allowance, threshold)
-    half, most = (int(np.argmax(known >= p)) + 1 if known.max() >= p else None for p in (0.5, 0.95))
+    alarm_share, truth = chances(after, change, spread, phi, guard, allowance, threshold)
+    half, most = (int(np.argmax(alarm_share >= p)) + 1 if alarm_share.max() >= p else None for p in (0.5, 0.95))
     spacing = float(np.median(np.diff(times)) / timedelta(days=1))
-    said = [
+    sentences = [
         f"On the demonstration fleet ({len(times)} campaigns of this chart, {spacing:.0f} days apart; raw files "
         f"through the whole pipeline) the stiffness of the {band} at `{section}` falls by "
         f"{-100 * change.per_year:.0f} % a year from {change.since}; its frequency has lost {-truth[-1]:.1f} % by the "
         f"newest campaign, {times[-1]:%Y-%m-%d}.",
-        f"It is number {place} of the list, and {n_inspect} place{' is' if n_inspect == 1 else 's are'} to inspect."
-        if place
+        f"It is number {rank} of the list, and {n_inspect} place{' is' if n_inspect == 1 else 's are'} to inspect."
+        if rank
         else f"It is not on the list (state {state}).",
     ]
     if raised:
         count = sum(since <= t <= raised for t in times)
-        said.append(f"The alarm came with campaign number {count} after the onset, on {raised:%Y-%m-%d}.")
+        sentences.append(f"The alarm came with campaign number {count} after the onset, on {raised:%Y-%m-%d}.")
     soon = f"half of such charts are in alarm by campaign {half}" if half else "fewer than half are in alarm today"
     sure = f"95 % by campaign {most}" if most else "95 % not yet"
-    said.append(
+    sentences.append(
         f"With this chart's spread of {spread:.2f} % a campaign ({phi:.2f} memory) {soon} after the onset and {sure}; "
         f"one campaign alone may never raise one: nobody could have known before the second."
     )
     if first:
-        held = early <= since <= late
+        date_ok = early <= since <= late
         inside = low <= truth[-1] <= high
-        said.append(
-            f"The change is called a {kind} since {first:%Y-%m-%d}, 95 % between {early:%Y-%m-%d} and {late:%Y-%m-%d} "
-            f"({'which holds' if held else 'which misses'} the true day), and its size {size:+.1f} % ({low:+.1f} to "
+        sentences.append(
+            f"The change is called a {shape} since {first:%Y-%m-%d}, 95 % between {early:%Y-%m-%d} and {late:%Y-%m-%d} "
+            f"({'which holds' if date_ok else 'which misses'} the true day), and its size {size:+.1f} % ({low:+.1f} to "
             f"{high:+.1f}), which {'holds' if inside else 'misses'} the true one."
         )
-    return " ".join(said)
+    return " ".join(sentences)
 
 
 def write(page: Path, text: str) -> None:
     """Put the paragraph between the marks of the page."""
-    before, rest = page.read_text(encoding="utf-8").split(MARKS[0])
-    after = rest.split(MARKS[1])[1]
+    before, tail = page.read_text(encoding="utf-8").split(MARKS[0])
+    after = tail.split(MARKS[1])[1]
     page.write_text(f"{before}{MARKS[0]}\n{text}\n{MARKS[1]}{after}", encoding="utf-8")
 
 
 if __name__ == "__main__":
-    found = paragraph(sys.argv[1])
-    print(found)
+    output = paragraph(sys.argv[1])
+    print(output)
     if len(sys.argv) > 2:
-        write(Path(sys.argv[2]), found)
+        write(Path(sys.argv[2]), output)

@@ -52,7 +52,7 @@ def histories(fleet, seed, change=None):
     phase = rng.uniform(-2.0, 2.0, (fleet.turnouts, 1))
     rail = 12.0 + fleet.season * np.sin(2 * np.pi * (week + phase - 17) / 52.18)
     rail = rail + fleet.weather * rng.standard_normal((fleet.turnouts, week.size))
-    noted = rail + fleet.thermometer * rng.standard_normal(rail.shape)
+    temperature = rail + fleet.thermometer * rng.standard_normal(rail.shape)
     phi = fleet.phi**fleet.every
     noise = rng.standard_normal(shape)
     for i in range(1, week.size):
@@ -62,15 +62,15 @@ def histories(fleet, seed, change=None):
     percent += fleet.campaign * rng.standard_normal(rail.shape)[:, None]
     if change is not None:
         percent = percent + change
-    own = fleet.frequency * (1.0 + 0.1 * rng.uniform(-1, 1, shape[:2]))[..., None]
-    frequency = own * (1.0 + percent / 100.0)
+    base_frequency = fleet.frequency * (1.0 + 0.1 * rng.uniform(-1, 1, shape[:2]))[..., None]
+    frequency = base_frequency * (1.0 + percent / 100.0)
     frequency[rng.random(shape) < fleet.missing] = np.nan
-    return frequency, noted, week
+    return frequency, temperature, week
 
 
 def modes(fleet, seed, change=None) -> pd.DataFrame:
     """Histories as rows of the table ``modes``."""
-    frequency, noted, week = histories(fleet, seed, change)
+    frequency, temperature, week = histories(fleet, seed, change)
     t, s, c = (i.ravel() for i in np.indices(frequency.shape, dtype=np.int32))
     turnout = np.array([f"{fleet.prefix}{i:05d}" for i in range(fleet.turnouts)])
     section = np.array([f"{name}/S{j}" for name in turnout for j in range(fleet.sections)])
@@ -83,7 +83,7 @@ def modes(fleet, seed, change=None) -> pd.DataFrame:
             "measured_at_utc": (START + (week * 7).astype("timedelta64[D]")).astype("datetime64[us]")[c],
             "frequency_hz": frequency.ravel(),
             "frequency_se_hz": np.full(t.size, 0.1),
-            "rail_temperature_c": noted[t, c],
+            "rail_temperature_c": temperature[t, c],
         }
     )
     return rows[rows["frequency_hz"].notna()] if fleet.missing else rows

@@ -14,15 +14,15 @@ def main(registry, state) -> None:
     from turnout.registry.database import open_registry
     from turnout.trend.update import update
 
-    known = json.loads(Path(state).read_text()) if Path(state).exists() else None
-    done = update(registry, TrendSettings(), known)
+    digests = json.loads(Path(state).read_text()) if Path(state).exists() else None
+    result = update(registry, TrendSettings(), digests)
     updated = time.process_time()
     with open_registry(registry) as con:
         n = len(con.execute("select * from worklist").fetchall())
-    Path(state).write_text(json.dumps(done.digests))
+    Path(state).write_text(json.dumps(result.digests))
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e9
     print(json.dumps({"cpu": time.process_time(), "worklist": time.process_time() - updated, "peak": peak,
-                      "rows": done.rows, "written": done.written, "n": n}))  # fmt: skip
+                      "rows": result.rows, "written": result.written, "n": n}))  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -38,17 +38,17 @@ def residuals_by_pandas(modes, charts, baselines) -> pd.Series:
         design = sm.add_constant(chart["rail_temperature_c_mode"] - chart.loc[base, "rail_temperature_c_mode"].mean())
         scatter = np.sqrt(sm.OLS(percent[base], design[base]).fit().scale)
         # prior of the slope, 0 ± 0.5 %/°C, as one more observation
-        known = np.vstack([design[base], [0.0, scatter / 0.5]])
-        left = percent - design @ sm.OLS(np.append(percent[base], 0.0), known).fit().params
-        centred.append(chart.assign(centred=left))
+        design_with_prior = np.vstack([design[base], [0.0, scatter / 0.5]])
+        residual = percent - design @ sm.OLS(np.append(percent[base], 0.0), design_with_prior).fit().params
+        centred.append(chart.assign(centred=residual))
     cells = pd.concat(centred)
     median = []
     for _, campaign in cells.groupby(["turnout_id", "band", "source", "measured_at_utc"]):
         settled = campaign["complete"] & (campaign["state"] != "learning") & campaign["is_sibling"]
         for i in range(len(campaign)):
-            others = np.delete(campaign["centred"].to_numpy(), i)[np.delete(settled.to_numpy(), i)]
-            use = campaign["with_siblings"].iloc[i] and len(others) >= 3
-            median.append((campaign.index[i], np.median(others) if use else np.nan))
+            siblings = np.delete(campaign["centred"].to_numpy(), i)[np.delete(settled.to_numpy(), i)]
+            use = campaign["with_siblings"].iloc[i] and len(siblings) >= 3
+            median.append((campaign.index[i], np.median(siblings) if use else np.nan))
     cells = cells.reset_index(drop=True) if cells.index.has_duplicates else cells
     cells["median"] = pd.Series(dict(median))
     against = cells["centred"] - cells["median"]
@@ -61,10 +61,10 @@ def slopes_by_statsmodels(modes, days) -> pd.Series:
     """Slope [%/a] of each chart on time and temperature together over the last days."""
     newest = modes["measured_at_utc"].max()
     recent = modes[modes["measured_at_utc"] > newest - pd.Timedelta(days=days)]
-    found = {}
+    slopes = {}
     for chart, rows in recent.groupby(KEYS, observed=True):
         years = (rows["measured_at_utc"] - newest) / pd.Timedelta(days=365.25)
         columns = np.column_stack([np.ones(len(rows)), years, rows["rail_temperature_c"]])
         fit = sm.OLS(rows["frequency_hz"].to_numpy(), columns).fit()
-        found[chart] = 100.0 * fit.params[1] / rows["frequency_hz"].mean()
-    return pd.Series(list(found.values()), pd.MultiIndex.from_tuples(found, names=KEYS))
+        slopes[chart] = 100.0 * fit.params[1] / rows["frequency_hz"].mean()
+    return pd.Series(list(slopes.values()), pd.MultiIndex.from_tuples(slopes, names=KEYS))

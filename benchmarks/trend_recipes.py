@@ -29,16 +29,16 @@ QUERIES = {
 
 def examples(registry) -> str:
     """Every query with its output."""
-    parts = []
+    texts = []
     with open_registry(registry) as con:
         for title, sql in QUERIES.items():
-            parts.append(f"{title}:\n\n```sql\n{sql}\n```\n```\n{format_table(con.sql(sql))}\n```\n")
-    return "\n".join(parts)
+            texts.append(f"{title}:\n\n```sql\n{sql}\n```\n```\n{format_table(con.sql(sql))}\n```\n")
+    return "\n".join(texts)
 
 
 if __name__ == "__main__":
     page = Path(sys.argv[2])
-    before, rest = page.read_text(encoding="utf-8").split(MARKS[0])
-    after = rest.split(MARKS[1])[1]
-    found = examples(Path(sys.argv[1]) / "results" / "registry")
-    page.write_text(f"{before}{MARKS[0]}\n{found}{MARKS[1]}{after}", encoding="utf-8")
+    before, tail = page.read_text(encoding="utf-8").split(MARKS[0])
+    after = tail.split(MARKS[1])[1]
+    output = examples(Path(sys.argv[1]) / "results" / "registry")
+    page.write_text(f"{before}{MARKS[0]}\n{output}{MARKS[1]}{after}", encoding="utf-8")

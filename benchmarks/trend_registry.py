@@ -71,8 +71,8 @@ def small_registry(root, rows, number=1):
         years = sorted(rows["measured_at_utc"].dt.year.unique())
         select = "select * from all_rows where year(measured_at_utc) = {}"
         files = [write_sorted(con, root, "modes", int(y), select.format(y), f"batch-{number}") for y in years]
-    kept = [f for f in load(root).files if f.table != "modes"]
-    generation = Generation(number=number, files=sorted([*kept, *files], key=lambda f: f.path))
+    other_files = [f for f in load(root).files if f.table != "modes"]
+    generation = Generation(number=number, files=sorted([*other_files, *files], key=lambda f: f.path))
     commit(root, generation)
     build_database(root, generation)
 

@@ -17,21 +17,23 @@ TURNOUTS, SECTIONS = 5, ("SP", "A7", "A8")
 COMBINATIONS = ((1, 1), (1, 2), (7, 1), (7, 2), (64, 1), (64, 2))
 
 
-def same_rows_of_the_hammer_chain(folder, toy):
+def hammer_same_rows(folder, toy):
     """Compare registries of one fleet by (shards, cores); ``toy`` is the module that runs the workflow."""
     n_file = make_fleet(folder)
-    found, spent = {}, []
+    registries, cpu_texts = {}, []
     for shards, cores in COMBINATIONS:
         toy.forget(folder)
         with stopwatch() as watch:
             toy.run(folder, shards=shards, cores=cores, chain="")
-        found[shards, cores] = tuple(toy.data_files(folder))
-        spent.append(f"{shards}x{cores} {watch.cpu:.0f} s")
+        registries[shards, cores] = tuple(toy.data_files(folder))
+        cpu_texts.append(f"{shards}x{cores} {watch.cpu:.0f} s")
     rows = toy.rows(folder)
     n = f"{n_file} files, {len(rows['impacts'])} impacts, {len(rows['modes'])} modes; shards x cores, CPU: "
     off = abs(len(rows["models"]) - (n_file - 1))
     yield Bar("W4 hammer chain: models too many or too few", off, 0, "", "<=", f"{n_file} files, one of them cut off")
-    yield Bar("W4 hammer chain: different registries", len(set(found.values())), 1, "", "<=", n + ", ".join(spent))
+    yield Bar(
+        "W4 hammer chain: different registries", len(set(registries.values())), 1, "", "<=", n + ", ".join(cpu_texts)
+    )
 
 
 def make_fleet(folder):
@@ -46,11 +48,11 @@ def make_fleet(folder):
         notes = ["campaign,started_at_utc,rail_temperature_c"]
         for day in DAYS:
             notes.append(f"{day},{day}T09:00:00,12.0")
-            place = folder / "raw" / turnout / "hammer" / day.isoformat()
-            place.mkdir(parents=True)
+            campaign_folder = folder / "raw" / turnout / "hammer" / day.isoformat()
+            campaign_folder.mkdir(parents=True)
             for section in SECTIONS:
                 recordings, _ = hammer_test(paper_response(section, 1.0, 1.0), 12.0, day, 1, rng)
-                paths.append(place / f"{section}_1.npz")
+                paths.append(campaign_folder / f"{section}_1.npz")
                 write(recordings, paths[-1], "npz")
         (folder / "raw" / turnout / "campaigns.csv").write_text("\n".join(notes) + "\n")
     paths[-1].write_bytes(paths[-1].read_bytes()[:5000])

@@ -10,12 +10,15 @@ from turnout.mismatch import Candidate, Case, Nuisance, Observation
 from turnout.physics import Parameter
 
 DIRECTIONS = {"vertical": VERTICAL, "lateral": LATERAL}
-REFERENCE = 10.0  # rail temperature at which the pads' values hold [°C]
-SMOOTH = 0.5  # correlation length of the error of one campaign at one section [octaves]
-OPEN = ((1600.0, 0.5), (np.inf, 1.0))  # (up to [Hz], sd of the model error [ln]): the beam model has no torsion
+REFERENCE_TEMPERATURE = 10.0  # rail temperature at which the pads' values hold [°C]
+SMOOTHING_OCTAVES = 0.5  # correlation length of the error of one campaign at one section [octaves]
+MODEL_ERROR_SD = (
+    (1600.0, 0.5),
+    (np.inf, 1.0),
+)  # (up to [Hz], sd of the model error [ln]): the beam model has no torsion
 SOURCE = "Thompson 2009, Railway Noise and Vibration, chapters 3 and 7"
 # Name -> (usual value, sd of its logarithm, meaning); concrete sleepers, hard pads, 60E1.
-TRACK = {
+TRACK_PRIORS = {
     "vertical_pad": (8e8, 0.5, "vertical stiffness of a pad [N/m]"),
     "lateral_pad": (6e7, 0.5, "lateral stiffness of a fastening [N/m]"),
     "pad_loss": (0.2, 0.4, "loss factor of pads"),
@@ -25,7 +28,7 @@ TRACK = {
     "ballast_loss": (1.0, 0.4, "loss factor of ballast"),
     "rail_loss": (0.002, 1.0, "loss factor of the rail"),
 }
-WARMTH = {
+TEMPERATURE_PRIORS = {
     "softening": (0.0, 0.005, "relative loss of pad stiffness per kelvin"),
     "calming": (0.0, 0.02, "relative loss of the pads' loss factor per kelvin"),
 }
@@ -35,32 +38,32 @@ WARMTH = {
 class Change:
     """A change from a campaign on. ``family`` is a key of ``CHANGES``, ``amounts`` are its parameters."""
 
-    what: str
+    family: str
     since: str
     amounts: tuple
 
     def sentence(self):
         """The change in words."""
-        told = zip(CHANGES[self.what][1], self.amounts)
-        numbers = ", ".join(f"{p.meaning} {v:.3g} {p.unit}".rstrip(" -") for p, v in told)
-        return f"{CHANGES[self.what][0]} since {self.since}: {numbers}"
+        pairs = zip(CHANGES[self.family][1], self.amounts)
+        amounts = ", ".join(f"{p.meaning} {v:.3g} {p.unit}".rstrip(" -") for p, v in pairs)
+        return f"{CHANGES[self.family][0]} since {self.since}: {amounts}"
 
 
-def _number(name, unit, low, high, meaning, prior=None, neutral=0.0):
+def _parameter(name, unit, low, high, meaning, prior=None, neutral=0.0):
     return Parameter(name, unit, neutral, (low, high), meaning, SOURCE, prior)
 
 
-FACTOR = _number("log_factor", "-", -2.5, 2.5, "natural logarithm of the factor", (0.0, 0.7))
-MASS = _number("mass", "kg/m", 0.0, 60.0, "mass", (15.0, 15.0))
-LOSS = _number("loss", "-", 0.05, 2.0, "loss factor", (0.5, 0.5), neutral=0.5)
-SOFTENS = _number("softening", "1/K", -0.06, 0.06, "loss of its stiffness per kelvin", (0.0, 0.02))
+FACTOR = _parameter("log_factor", "-", -2.5, 2.5, "natural logarithm of the factor", (0.0, 0.7))
+MASS = _parameter("mass", "kg/m", 0.0, 60.0, "mass", (15.0, 15.0))
+LOSS = _parameter("loss", "-", 0.05, 2.0, "loss factor", (0.5, 0.5), neutral=0.5)
+SOFTENING = _parameter("softening", "1/K", -0.06, 0.06, "loss of its stiffness per kelvin", (0.0, 0.02))
 
 
-def _tuned(name):
-    return _number(name, "ln(Hz)", np.log(200.0), np.log(6000.0), "ln frequency", (7.0, 0.8), neutral=7.0)
+def _tuned_frequency(name):
+    return _parameter(name, "ln(Hz)", np.log(200.0), np.log(6000.0), "ln frequency", (7.0, 0.8), neutral=7.0)
 
 
-ONE = (MASS, _tuned("tuned"), LOSS, SOFTENS)
+ABSORBER_PARAMETERS = (MASS, _tuned_frequency("tuned"), LOSS, SOFTENING)
 # Family -> (description, parameters, starts)
 CHANGES = {
     "vertical_pad": ("other vertical stiffness of the pads", (FACTOR,), ((0.7,), (-0.7,))),
@@ -69,17 +72,17 @@ CHANGES = {
     "pad_loss": ("other damping of the pads", (FACTOR,), ((0.7,), (-0.7,))),
     "ballast": ("other stiffness of the ballast", (FACTOR,), ((0.7,), (-0.7,))),
     "sleeper_mass": ("other sleepers, heavier or lighter", (FACTOR,), ((0.3,), (-0.3,))),
-    "rail_loss": ("a damping layer on the rail", (_number("loss", "-", 0.0, 0.5, "loss factor", (0.03, 0.05)),),
+    "rail_loss": ("a damping layer on the rail", (_parameter("loss", "-", 0.0, 0.5, "loss factor", (0.03, 0.05)),),
                   ((0.01,), (0.1,))),
-    "lateral_absorber": ("tuned masses along the rail that act laterally", ONE,
+    "lateral_absorber": ("tuned masses along the rail that act laterally", ABSORBER_PARAMETERS,
                          tuple((10.0, np.log(f), 0.5, 0.0) for f in (600.0, 1250.0, 2500.0))),
-    "vertical_absorber": ("tuned masses along the rail that act vertically", ONE,
+    "vertical_absorber": ("tuned masses along the rail that act vertically", ABSORBER_PARAMETERS,
                           tuple((10.0, np.log(f), 0.5, 0.0) for f in (600.0, 1250.0, 2500.0))),
     "absorber": ("tuned masses along the rail that act both ways",
-                 (MASS, _tuned("vertical"), _tuned("lateral"), LOSS, SOFTENS),
+                 (MASS, _tuned_frequency("vertical"), _tuned_frequency("lateral"), LOSS, SOFTENING),
                  tuple((10.0, np.log(v), np.log(f), 0.5, 0.0)
                        for v, f in ((1250.0, 1250.0), (2500.0, 1250.0), (3500.0, 1250.0), (600.0, 600.0)))),
-    "broad_absorber": ("masses along the rail tuned an octave apart, in equal parts, both ways", ONE,
+    "broad_absorber": ("masses along the rail tuned an octave apart, in equal parts, both ways", ABSORBER_PARAMETERS,
                        tuple((15.0, np.log(f), 0.5, 0.0) for f in (800.0, 1250.0, 2000.0))),
     "measured_gain": ("all decay rates measured otherwise", (FACTOR,), ((0.5,), (-0.5,))),
 }  # fmt: skip
@@ -87,61 +90,61 @@ CHANGES = {
 
 def candidates(dates):
     """Candidates: every change at every possible date."""
-    found = []
+    result = []
     for family, (_, parameters, starts) in CHANGES.items():
         for since in dates:
-            found.append(
+            result.append(
                 Candidate(
                     family, parameters, lambda psi, w=family, s=since: Change(w, s, tuple(psi.values())), starts,
                     {"since": since}, "condition", len(dates),
                 )
             )  # fmt: skip
-    return tuple(found)
+    return tuple(result)
 
 
 def track_of(values, direction, temperature):
     """``Support`` of the track from nuisance parameters, at a rail temperature [°C]."""
-    t = {name: value * np.exp(values[name]) for name, (value, *_) in TRACK.items()}
-    warmer = temperature - REFERENCE
+    t = {name: value * np.exp(values[name]) for name, (value, *_) in TRACK_PRIORS.items()}
+    temperature_rise = temperature - REFERENCE_TEMPERATURE
     return Support(
-        t[f"{direction}_pad"] * np.exp(-values["softening"] * warmer),
-        t["pad_loss"] * np.exp(-values["calming"] * warmer), t["mass"], t[f"{direction}_ballast"],
+        t[f"{direction}_pad"] * np.exp(-values["softening"] * temperature_rise),
+        t["pad_loss"] * np.exp(-values["calming"] * temperature_rise), t["mass"], t[f"{direction}_ballast"],
         t["ballast_loss"], t["rail_loss"],
     )  # fmt: skip
 
 
-def changed(support, change, direction, temperature):
+def apply_change(support, change, direction, temperature):
     """The track with one change in it."""
-    a, what = change.amounts, change.what
-    factor = float(np.exp(a[0])) if CHANGES[what][1][0] is FACTOR else 1.0
-    if what in ("pads", f"{direction}_pad"):
+    a, family = change.amounts, change.family
+    factor = float(np.exp(a[0])) if CHANGES[family][1][0] is FACTOR else 1.0
+    if family in ("pads", f"{direction}_pad"):
         return replace(support, pad=support.pad * factor)
-    if what == "pad_loss":
+    if family == "pad_loss":
         return replace(support, pad_loss=support.pad_loss * factor)
-    if what == "ballast":
+    if family == "ballast":
         return replace(support, ballast=support.ballast * factor)
-    if what == "sleeper_mass":
+    if family == "sleeper_mass":
         return replace(support, mass=support.mass * factor)
-    if what == "rail_loss":
+    if family == "rail_loss":
         return replace(support, rail_loss=support.rail_loss + a[0])
-    if what == "broad_absorber":
-        centre = np.exp(a[1] - 0.5 * a[3] * (temperature - REFERENCE))
-        parts = tuple((a[0] / 3.0, float(centre * octave), a[2]) for octave in (0.5, 1.0, 2.0))
-        return replace(support, absorbers=(*support.absorbers, *parts))
-    if what in ("absorber", f"{direction}_absorber"):
-        tuned = a[1] if what != "absorber" or direction == "vertical" else a[2]
-        frequency = float(np.exp(tuned - 0.5 * a[-1] * (temperature - REFERENCE)))
+    if family == "broad_absorber":
+        centre = np.exp(a[1] - 0.5 * a[3] * (temperature - REFERENCE_TEMPERATURE))
+        absorbers = tuple((a[0] / 3.0, float(centre * octave), a[2]) for octave in (0.5, 1.0, 2.0))
+        return replace(support, absorbers=(*support.absorbers, *absorbers))
+    if family in ("absorber", f"{direction}_absorber"):
+        tuned = a[1] if family != "absorber" or direction == "vertical" else a[2]
+        frequency = float(np.exp(tuned - 0.5 * a[-1] * (temperature - REFERENCE_TEMPERATURE)))
         return replace(support, absorbers=(*support.absorbers, (a[0], frequency, a[-2])))
     return support
 
 
 @lru_cache(maxsize=4096)
-def _logarithm(direction, support):
+def _log_decay_rate(direction, support):
     return np.log(decay_rate(DIRECTIONS[direction], support))
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredRates:
     """Measured decay rates of one section, with their errors.
 
     ``log`` is {(direction, campaign): (n_band,)}. ``spread`` {direction: (n_band,)} is the sd from rail to rail.
@@ -164,9 +167,9 @@ def whitening(spread, repeat):
     band, ``repeat`` is shared by neighbouring bands over half an octave.
     """
     octave = np.log2(BANDS)
-    shared = np.exp(-0.5 * ((octave[:, None] - octave) / SMOOTH) ** 2)
-    power, turn = np.linalg.eigh(np.diag(spread**2) + np.outer(repeat, repeat) * shared)
-    return (turn / np.sqrt(power)) @ turn.T
+    shared = np.exp(-0.5 * ((octave[:, None] - octave) / SMOOTHING_OCTAVES) ** 2)
+    power, vectors = np.linalg.eigh(np.diag(spread**2) + np.outer(repeat, repeat) * shared)
+    return (vectors / np.sqrt(power)) @ vectors.T
 
 
 class DecayCase(Case):
@@ -178,11 +181,11 @@ class DecayCase(Case):
     expensive = True
 
     def __init__(self, measured, reserved=None, priors=None, only=None):
-        self.measured, kept = measured, only or measured.campaigns
+        self.measured, campaigns = measured, only or measured.campaigns
         self.white = {d: whitening(measured.spread[d], measured.repeat[d]) for d in DIRECTIONS}
-        made = {c: [self._observation(d, c) for d in DIRECTIONS] for c in kept}
-        self.observations = tuple(o for c in kept if c != reserved for o in made[c])
-        self.reserved = tuple(made[reserved]) if reserved else ()
+        by_campaign = {c: [self._observation(d, c) for d in DIRECTIONS] for c in campaigns}
+        self.observations = tuple(o for c in campaigns if c != reserved for o in by_campaign[c])
+        self.reserved = tuple(by_campaign[reserved]) if reserved else ()
         self.nuisances = tuple(_nuisances(priors or {}))
         self.candidates = candidates([c for c in measured.campaigns[1:] if c != reserved])
 
@@ -206,35 +209,35 @@ class DecayCase(Case):
         support, gain = track_of(values, o.data_type, temperature), 0.0
         for change in terms:
             if o.condition >= change.since:
-                support = changed(support, change, o.data_type, temperature)
-                gain += change.amounts[0] if change.what == "measured_gain" else 0.0
+                support = apply_change(support, change, o.data_type, temperature)
+                gain += change.amounts[0] if change.family == "measured_gain" else 0.0
         offset = np.array([values[f"{o.data_type}_{b:.0f}"] for b in BANDS])
-        return _logarithm(o.data_type, support) + offset + gain
+        return _log_decay_rate(o.data_type, support) + offset + gain
 
     def nuisance_jacobian(self, values, terms, observations, base):
         """Derivatives: exact for the errors of the bands, by finite differences for the other parameters."""
-        whole, found = self.nuisances, [np.zeros((o.data.size, len(self.nuisances))) for o in observations]
-        for k, nuisance in enumerate(whole):
-            if nuisance.name in TRACK or nuisance.name in WARMTH:
+        nuisances, jacobians = self.nuisances, [np.zeros((o.data.size, len(self.nuisances))) for o in observations]
+        for k, nuisance in enumerate(nuisances):
+            if nuisance.name in TRACK_PRIORS or nuisance.name in TEMPERATURE_PRIORS:
                 step = 0.1 * nuisance.sd
-                moved = self.predict({**values, nuisance.name: values[nuisance.name] + step}, terms, observations)
-                for new, old, jacobian in zip(moved, base, found):
+                perturbed = self.predict({**values, nuisance.name: values[nuisance.name] + step}, terms, observations)
+                for new, old, jacobian in zip(perturbed, base, jacobians):
                     jacobian[:, k] = (new - old) / step
             else:
                 direction, band = nuisance.name.split("_")
-                for o, jacobian in zip(observations, found):
+                for o, jacobian in zip(observations, jacobians):
                     if o.data_type == direction:
                         jacobian[:, k] = self.white[direction][:, BANDS == float(band)][:, 0]
-        return found
+        return jacobians
 
 
 def _nuisances(priors):
-    for name, (_, sd, meaning) in (TRACK | WARMTH).items():
+    for name, (_, sd, meaning) in (TRACK_PRIORS | TEMPERATURE_PRIORS).items():
         mean, sd = priors.get(name, (0.0, sd))
-        yield Nuisance(name, "ln" if name in TRACK else "1/K", mean, sd, meaning=meaning)
+        yield Nuisance(name, "ln" if name in TRACK_PRIORS else "1/K", mean, sd, meaning=meaning)
     for direction in DIRECTIONS:
         for band in BANDS:
-            sd = next(s for top, s in OPEN if band <= top)
+            sd = next(s for top, s in MODEL_ERROR_SD if band <= top)
             name = f"{direction}_{band:.0f}"
             mean, sd = priors.get(name, (0.0, sd))
             yield Nuisance(name, "ln", mean, sd, meaning="error of the model in this band", can_mask=False)

@@ -75,15 +75,15 @@ def responses(beam, support, frequency):
     here = half @ vector
     ends = np.concatenate([here[:, :, :2], -here[:, :, 2:]], axis=2)
     amount = np.linalg.solve(ends, np.tile([[0.0], [0.0], [0.0], [-1.0]], (omega.size, 1, 1)))[:, :2, 0]
-    parts, step = [vector[:, 0, :2]], vector[:, :, :2]
+    quarter_shapes, step = [vector[:, 0, :2]], vector[:, :, :2]
     for _ in range(3):
         step = quarter @ step
-        parts.append(step[:, 0, :])
-    found = np.empty((omega.size, DISTANCES.size), dtype=complex)
+        quarter_shapes.append(step[:, 0, :])
+    receptance = np.empty((omega.size, DISTANCES.size), dtype=complex)
     for k, x in enumerate(DISTANCES):
-        bays, rest = divmod(round(4.0 * x) + 2, 4)  # quarters of a bay behind the support before the force
-        found[:, k] = np.sum(parts[rest] * amount * multiplier[:, :2] ** bays, axis=1)
-    return found
+        bays, quarters = divmod(round(4.0 * x) + 2, 4)  # quarters of a bay behind the support before the force
+        receptance[:, k] = np.sum(quarter_shapes[quarters] * amount * multiplier[:, :2] ** bays, axis=1)
+    return receptance
 
 
 def seat(omega, support):
@@ -104,7 +104,7 @@ def _bending(omega, beam, support):
     system[:, 2, 3] = -1.0
     push = -(omega**2) * beam.mass + 0j
     for mass, tuned, loss in support.absorbers:
-        own = (2.0 * np.pi * tuned) ** 2 * (1.0 + 1j * loss)
-        push = push - mass * omega**2 * own / (own - omega**2)
+        stiffness = (2.0 * np.pi * tuned) ** 2 * (1.0 + 1j * loss)
+        push = push - mass * omega**2 * stiffness / (stiffness - omega**2)
     system[:, 3, 0] = push
     return system

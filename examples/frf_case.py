@@ -11,10 +11,10 @@ from turnout.mismatch import Candidate, Case, Nuisance, Observation
 from turnout.physics import Parameter
 
 SOURCE = "Ewins 2000, Modal Testing, chapters 2 and 4"
-STEP = 0.7  # largest step [prior sd]: a longer one jumps from one sharp resonance to the next
+MAX_STEP = 0.7  # largest step [prior sd]: a longer one jumps from one sharp resonance to the next
 TOLERANCE = 0.05  # tolerated error as a share of the response, averaged over a tenth of an octave
-INDEPENDENT = 0.25  # effective share of independent lines: errors of neighbouring lines are correlated
-SOFT = 25.0  # approximate resonance of the rigid body on its suspension [Hz]
+INDEPENDENT_SHARE = 0.25  # effective share of independent lines: errors of neighbouring lines are correlated
+SUSPENSION_FREQUENCY = 25.0  # approximate resonance of the rigid body on its suspension [Hz]
 LAMBDA = np.array([4.73004, 7.85320, 10.99561, 14.13717, 17.27876, 20.42035, 23.56194])  # free-free beam
 
 
@@ -22,17 +22,17 @@ LAMBDA = np.array([4.73004, 7.85320, 10.99561, 14.13717, 17.27876, 20.42035, 23.
 class Effect:
     """An effect that the model lacks: a key of ``EFFECT_TEXTS``, ``where`` it is, and parameter ``values`` by name."""
 
-    kind: str
+    effect_type: str
     where: str
     values: dict = field(hash=False)
 
     def sentence(self):
         """The effect in words."""
         numbers = ", ".join(f"{k} {v:.4g}" for k, v in self.values.items() if not k.startswith("shape"))
-        return f"{KINDS[self.kind]} {self.where}: {numbers}".replace(" :", ":")
+        return f"{EFFECT_TEXTS[self.effect_type]} {self.where}: {numbers}".replace(" :", ":")
 
 
-KINDS = {
+EFFECT_TEXTS = {
     "mode": "a resonance that the model lacks, near",
     "sensor_gain": "another sensitivity of sensor",
     "blow_gain": "another sensitivity of the hammer in",
@@ -46,7 +46,7 @@ KINDS = {
 }
 
 
-def _number(name, unit, low, high, prior, neutral=0.0, meaning=""):
+def _parameter(name, unit, low, high, prior, neutral=0.0, meaning=""):
     return Parameter(name, unit, neutral, (low, high), meaning or name.replace("_", " "), SOURCE, prior)
 
 
@@ -62,15 +62,17 @@ class FrfCase(Case):
 
     expensive = True
 
-    def __init__(self, frequency, h, band, peaks, reserved=(), rigid=0, beam=False, without=(), step=3, blown=None):
+    def __init__(
+        self, frequency, h, band, peaks, reserved=(), rigid=0, beam=False, without=(), step=3, impact_places=None
+    ):
         inside = np.flatnonzero((frequency >= band[0]) & (frequency <= band[1]))[::step]
         self.frequency, self.h, self.beam = frequency[inside], h[:, :, inside], beam
-        self.whole, self.n_sensor, self.n_mode, self.rigid = (frequency, h), h.shape[1], len(peaks), rigid
-        self.blown = np.arange(h.shape[0]) if blown is None else np.asarray(blown)
-        self.n_place = max(h.shape[1], int(self.blown.max()) + 1)
-        made = [self._observation(k) for k in range(h.shape[0])]
-        self.observations = tuple(o for k, o in enumerate(made) if k not in reserved)
-        self.reserved = tuple(made[k] for k in reserved)
+        self.all_lines, self.n_sensor, self.n_mode, self.rigid = (frequency, h), h.shape[1], len(peaks), rigid
+        self.impact_places = np.arange(h.shape[0]) if impact_places is None else np.asarray(impact_places)
+        self.n_place = max(h.shape[1], int(self.impact_places.max()) + 1)
+        observations = [self._observation(k) for k in range(h.shape[0])]
+        self.observations = tuple(o for k, o in enumerate(observations) if k not in reserved)
+        self.reserved = tuple(observations[k] for k in reserved)
         self.nuisances = tuple(self._nuisances(peaks))
         self.candidates = tuple(c for c in self._candidates() if c.family not in without)
 
@@ -86,31 +88,33 @@ class FrfCase(Case):
         labels = {"sensor": np.repeat([f"A{s + 1}" for s in range(self.n_sensor)], n).astype(object)}
         labels |= {"frequency": np.tile([f"{c:.0f} Hz" for c in centre], self.n_sensor).astype(object)}
         labels |= {"condition": np.full(self.n_sensor * n, f"blow {k + 1}", dtype=object)}
-        return Observation(f"blow {k + 1}", f"blow {k + 1}", split(rows), sigma, INDEPENDENT, "response",
+        return Observation(f"blow {k + 1}", f"blow {k + 1}", split_complex(rows), sigma, INDEPENDENT_SHARE, "response",
                            {}, cells, labels)  # fmt: skip
 
     def _nuisances(self, peaks):
         for r, peak in enumerate(peaks):
             f, zeta, shape = self.read_off(peak)
             if r == 0 or not self.beam:
-                yield Nuisance(f"log_frequency_{r}", "ln(Hz)", float(np.log(f)), 0.01, max_step_sd=STEP)
-            yield Nuisance(f"log_damping_{r}", "ln", float(np.log(zeta)), 0.5, max_step_sd=STEP)
+                yield Nuisance(f"log_frequency_{r}", "ln(Hz)", float(np.log(f)), 0.01, max_step_sd=MAX_STEP)
+            yield Nuisance(f"log_damping_{r}", "ln", float(np.log(zeta)), 0.5, max_step_sd=MAX_STEP)
             widest = float(np.max(np.abs(shape)))
             for s, value in enumerate(shape):
                 yield Nuisance(f"shape_{r}_{s}", "kg^-1/2", float(value), 0.3 * widest, max_step_sd=2.0, can_mask=False)
         for r in range(self.rigid):
-            yield Nuisance(f"log_frequency_rigid{r}", "ln(Hz)", float(np.log(SOFT)), 0.4, max_step_sd=STEP)
+            yield Nuisance(
+                f"log_frequency_rigid{r}", "ln(Hz)", float(np.log(SUSPENSION_FREQUENCY)), 0.4, max_step_sd=MAX_STEP
+            )
             shape = self.stiff_shape(r)
             widest = float(np.max(np.abs(shape)))
             for s, value in enumerate(shape):
                 yield Nuisance(f"shape_rigid{r}_{s}", "kg^-1/2", value, 0.5 * widest, max_step_sd=2.0, can_mask=False)
         for o in (*self.observations, *self.reserved):
-            yield Nuisance(f"hammer@{o.name}", "-", 0.0, 0.05, o.name, (-0.2, 0.2), max_step_sd=STEP)
-            yield Nuisance(f"stretch@{o.name}", "-", 0.0, 5e-4, o.name, max_step_sd=STEP)
+            yield Nuisance(f"hammer@{o.name}", "-", 0.0, 0.05, o.name, (-0.2, 0.2), max_step_sd=MAX_STEP)
+            yield Nuisance(f"stretch@{o.name}", "-", 0.0, 5e-4, o.name, max_step_sd=MAX_STEP)
 
     def read_off(self, about, share=1.0 / 6.0):
         """(frequency, damping ratio, shape (n_place,)) of the highest line within ``share`` octaves of ``about``."""
-        frequency, h = self.whole
+        frequency, h = self.all_lines
         near = np.flatnonzero(np.abs(np.log2(frequency / about)) < share)
         size = np.sum(np.abs(h[:, :, near]) ** 2, axis=(0, 1))
         top = near[int(np.argmax(size))]
@@ -120,21 +124,24 @@ class FrfCase(Case):
 
     def _shape(self, matrix, rank):
         """(n_place,) shape whose products give the ``rank``-th term of a real (n_impact, n_sensor) matrix."""
-        left, size, right = np.linalg.svd(matrix)
-        blown, heard = left[:, rank] * np.sqrt(size[rank]), right[rank] * np.sqrt(size[rank])
-        both = self.blown < self.n_sensor
-        sign = -1.0 if blown[both] @ heard[self.blown[both]] < 0.0 else 1.0
+        left_vectors, size, right_vectors = np.linalg.svd(matrix)
+        impact_shape, sensor_shape = (
+            left_vectors[:, rank] * np.sqrt(size[rank]),
+            right_vectors[rank] * np.sqrt(size[rank]),
+        )
+        is_shared = self.impact_places < self.n_sensor
+        sign = -1.0 if impact_shape[is_shared] @ sensor_shape[self.impact_places[is_shared]] < 0.0 else 1.0
         total, count = np.zeros(self.n_place), np.zeros(self.n_place)
-        total[: self.n_sensor] += heard
+        total[: self.n_sensor] += sensor_shape
         count[: self.n_sensor] += 1.0
-        np.add.at(total, self.blown, sign * blown)
-        np.add.at(count, self.blown, 1.0)
+        np.add.at(total, self.impact_places, sign * impact_shape)
+        np.add.at(count, self.impact_places, 1.0)
         return total / np.maximum(count, 1.0)
 
     def stiff_shape(self, rank):
         """(n_place,) shape of the rigid body, between its suspension and the first resonance."""
-        frequency, h = self.whole
-        near = (frequency > 2.0 * SOFT) & (frequency < 3.0 * SOFT)
+        frequency, h = self.all_lines
+        near = (frequency > 2.0 * SUSPENSION_FREQUENCY) & (frequency < 3.0 * SUSPENSION_FREQUENCY)
         return self._shape(np.mean(h[:, :, near].real, axis=2), rank)
 
     def is_cheap(self, observation):
@@ -142,43 +149,65 @@ class FrfCase(Case):
         return True
 
     def _candidates(self):
-        whole = self.whole[0]
-        low, high = max(0.25 * self.frequency[0], whole[0]), min(4.0 * self.frequency[-1], whole[-1])
-        places = [low * 2.0 ** (k / 2.0) for k in range(int(2.0 * np.log2(high / low)) + 1)]
-        seen = {}
-        for about in places:
+        all_frequencies = self.all_lines[0]
+        low, high = (
+            max(0.25 * self.frequency[0], all_frequencies[0]),
+            min(4.0 * self.frequency[-1], all_frequencies[-1]),
+        )
+        frequencies = [low * 2.0 ** (k / 2.0) for k in range(int(2.0 * np.log2(high / low)) + 1)]
+        peaks = {}
+        for about in frequencies:
             f, zeta, shape = self.read_off(about, 0.25)
-            seen.setdefault(round(f), (f, zeta, shape))
-        for f, zeta, shape in seen.values():
-            yield self._mode(f, zeta, shape, len(seen))
+            peaks.setdefault(round(f), (f, zeta, shape))
+        for f, zeta, shape in peaks.values():
+            yield self._mode(f, zeta, shape, len(peaks))
         for s in range(self.n_sensor):
             name = f"A{s + 1}"
-            yield _one("sensor_gain", name, [_number("gain", "-", -0.6, 1.0, (0.0, 0.3))], ((0.2,), (-0.2,)), self)
-            yield _one("sensor_delay", name, [_number("delay", "s", -1e-3, 1e-3, (0.0, 2e-4))], ((5e-5,),), self)
-            period = _number("period", "s", 0.0, 2e-3, (2e-4, 3e-4))
-            yield _one("mount_resonance", name, [period], ((2e-4,), (5e-4,)), self)
+            yield _single_candidate(
+                "sensor_gain", name, [_parameter("gain", "-", -0.6, 1.0, (0.0, 0.3))], ((0.2,), (-0.2,)), self
+            )
+            yield _single_candidate(
+                "sensor_delay", name, [_parameter("delay", "s", -1e-3, 1e-3, (0.0, 2e-4))], ((5e-5,),), self
+            )
+            period = _parameter("period", "s", 0.0, 2e-3, (2e-4, 3e-4))
+            yield _single_candidate("mount_resonance", name, [period], ((2e-4,), (5e-4,)), self)
         for o in self.observations:
-            gain = _number("gain", "-", -0.95, 3.0, (0.0, 0.5))
+            gain = _parameter("gain", "-", -0.95, 3.0, (0.0, 0.5))
             where, n = {"blow": o.name}, len(self.observations)
             yield Candidate("blow_gain", (gain,), lambda p, w=o.name: Effect("blow_gain", w, dict(p)),
                             ((-0.5,), (0.5,)), where, "condition", n)  # fmt: skip
-        yield _one("structural_damping", "", [_number("share", "-", 0.0, 1.0, (0.5, 0.5))], ((0.5,),), self)
+        yield _single_candidate(
+            "structural_damping", "", [_parameter("share", "-", 0.0, 1.0, (0.5, 0.5))], ((0.5,),), self
+        )
         if self.beam:
-            slender = [_number("slenderness", "-", 0.0, 2e-3, (3e-4, 5e-4))]
-            yield _one("shear_and_rotation", "", slender, ((2e-5,), (1e-4,), (3e-4,)), self)
-            mass = [_number("share", "-", 0.0, 0.5, (0.05, 0.1)), _number("place", "-", 0.0, 0.5, (0.25, 0.2), 0.25)]
-            yield _one("point_mass", "", mass, ((0.05, 0.03), (0.05, 0.22), (0.05, 0.36), (0.05, 0.5)), self)
-            yield _one("tension", "", [_number("tension", "-", -5.0, 5.0, (0.0, 2.0))], ((1.0,), (-1.0,)), self)
-            yield _one("suspension", "", [_number("stiffness", "-", 0.0, 0.3, (0.03, 0.05))], ((0.03,),), self)
+            slender = [_parameter("slenderness", "-", 0.0, 2e-3, (3e-4, 5e-4))]
+            yield _single_candidate("shear_and_rotation", "", slender, ((2e-5,), (1e-4,), (3e-4,)), self)
+            mass = [
+                _parameter("share", "-", 0.0, 0.5, (0.05, 0.1)),
+                _parameter("place", "-", 0.0, 0.5, (0.25, 0.2), 0.25),
+            ]
+            yield _single_candidate(
+                "point_mass", "", mass, ((0.05, 0.03), (0.05, 0.22), (0.05, 0.36), (0.05, 0.5)), self
+            )
+            yield _single_candidate(
+                "tension", "", [_parameter("tension", "-", -5.0, 5.0, (0.0, 2.0))], ((1.0,), (-1.0,)), self
+            )
+            yield _single_candidate(
+                "suspension", "", [_parameter("stiffness", "-", 0.0, 0.3, (0.03, 0.05))], ((0.03,),), self
+            )
 
     def _mode(self, f, zeta, shape, scanned):
-        own = [_number("log_frequency", "ln(Hz)", np.log(f) - 0.3, np.log(f) + 0.3, (np.log(f), 0.1), np.log(f))]
-        own.append(_number("log_damping", "ln", -8.0, -1.5, (-5.5, 1.0), np.log(zeta)))
+        parameters = [
+            _parameter("log_frequency", "ln(Hz)", np.log(f) - 0.3, np.log(f) + 0.3, (np.log(f), 0.1), np.log(f))
+        ]
+        parameters.append(_parameter("log_damping", "ln", -8.0, -1.5, (-5.5, 1.0), np.log(zeta)))
         widest = 3.0 * float(np.max(np.abs(shape))) + 0.1
-        own += [_number(f"shape_{s}", "kg^-1/2", -widest, widest, (0.0, widest / 3.0)) for s in range(self.n_place)]
+        parameters += [
+            _parameter(f"shape_{s}", "kg^-1/2", -widest, widest, (0.0, widest / 3.0)) for s in range(self.n_place)
+        ]
         start = (float(np.log(f)), float(np.clip(np.log(zeta), -7.9, -1.6)), *map(float, shape))
         where = f"{f:.0f} Hz"
-        return Candidate("mode", tuple(own), lambda p: Effect("mode", where, dict(p)), (start,), {"near": where},
+        return Candidate("mode", tuple(parameters), lambda p: Effect("mode", where, dict(p)), (start,), {"near": where},
                          "frequency", scanned, exact=True)  # fmt: skip
 
     def frequencies(self, values, terms):
@@ -189,13 +218,13 @@ class FrfCase(Case):
         square = lam**4
         for t in terms:
             v = t.values
-            if t.kind == "shear_and_rotation":
+            if t.effect_type == "shear_and_rotation":
                 square = square / (1.0 + v["slenderness"] * lam**2)
-            elif t.kind == "point_mass":
+            elif t.effect_type == "point_mass":
                 square = square / (1.0 + v["share"] * free_shape(lam, v["place"]) ** 2)
-            elif t.kind == "tension":
+            elif t.effect_type == "tension":
                 square = square * (1.0 + v["tension"] / lam**2)
-            elif t.kind == "suspension":
+            elif t.effect_type == "suspension":
                 square = square + v["stiffness"] * LAMBDA[0] ** 4
         return np.exp(values["log_frequency_0"]) * np.sqrt(square / square[0])
 
@@ -209,31 +238,31 @@ class FrfCase(Case):
             shape = [values[f"shape_rigid{r}_{s}"] for s in range(self.n_place)]
             modes.append((np.exp(values[f"log_frequency_rigid{r}"]), 0.05, shape))
         for t in terms:
-            if t.kind == "mode":
+            if t.effect_type == "mode":
                 v, shape = t.values, [t.values[f"shape_{s}"] for s in range(self.n_place)]
                 modes.append((np.exp(v["log_frequency"]), np.exp(v["log_damping"]), shape))
-        loss = sum(t.values["share"] for t in terms if t.kind == "structural_damping")
-        found = []
+        loss = sum(t.values["share"] for t in terms if t.effect_type == "structural_damping")
+        predictions = []
         for o in observations:
             k, stretch = int(o.name.split()[1]) - 1, 1.0 + values[f"stretch@{o.name}"]
             rows = np.zeros((self.n_sensor, self.frequency.size), dtype=complex)
             for f, zeta, shape in modes:
                 x = self.frequency / (f * stretch)
                 line = -(x**2) / (1.0 - x**2 + 2j * zeta * ((1.0 - loss) * x + loss))
-                rows += np.outer(np.asarray(shape[: self.n_sensor]) * shape[self.blown[k]], line)
+                rows += np.outer(np.asarray(shape[: self.n_sensor]) * shape[self.impact_places[k]], line)
             gain = 1.0 + values[f"hammer@{o.name}"]
-            gain += sum(t.values["gain"] for t in terms if t.kind == "blow_gain" and t.where == o.name)
-            found.append(split(gain * self._heard(rows, terms)))
-        return found
+            gain += sum(t.values["gain"] for t in terms if t.effect_type == "blow_gain" and t.where == o.name)
+            predictions.append(split_complex(gain * self._through_sensors(rows, terms)))
+        return predictions
 
-    def _heard(self, rows, terms):
+    def _through_sensors(self, rows, terms):
         rows, f = rows.copy(), self.frequency
         for t in terms:
-            if t.kind.startswith("sensor_") or t.kind == "mount_resonance":
+            if t.effect_type.startswith("sensor_") or t.effect_type == "mount_resonance":
                 s, v = int(t.where[1:]) - 1, t.values
-                if t.kind == "sensor_gain":
+                if t.effect_type == "sensor_gain":
                     rows[s] *= 1.0 + v["gain"]
-                elif t.kind == "sensor_delay":
+                elif t.effect_type == "sensor_delay":
                     rows[s] *= np.exp(-2j * np.pi * f * v["delay"])
                 else:
                     x = f * v["period"]
@@ -249,13 +278,15 @@ def free_shape(lam, x):
     return grown + np.cos(lam * x) - sigma * np.sin(lam * x)
 
 
-def _one(kind, where, parameters, starts, case):
+def _single_candidate(effect_type, where, parameters, starts, case):
     scanned = case.n_sensor if where else 1
-    place = {"sensor": where} if where else {}
+    labels = {"sensor": where} if where else {}
     frame = "sensor" if where else "frequency"
-    return Candidate(kind, tuple(parameters), lambda p: Effect(kind, where, dict(p)), starts, place, frame, scanned)
+    return Candidate(
+        effect_type, tuple(parameters), lambda p: Effect(effect_type, where, dict(p)), starts, labels, frame, scanned
+    )
 
 
-def split(rows):
+def split_complex(rows):
     """Real parts followed by imaginary parts of (n_sensor, n_line), flat."""
     return np.concatenate([rows.real.ravel(), rows.imag.ravel()])

@@ -9,7 +9,7 @@ import sys
 
 import numpy as np
 import pandas as pd
-from examples.decay_case import DIRECTIONS, DecayCase, Measured
+from examples.decay_case import DIRECTIONS, DecayCase, MeasuredRates
 from examples.decay_model import BANDS
 from examples.recorded import DOCS, folder_of
 
@@ -17,8 +17,8 @@ from turnout.mismatch import diagnose
 from turnout.mismatch.engine.cross_validation import held_out_score
 from turnout.mismatch.engine.map_fit import fit_jointly
 
-FLOOR = 0.1  # smallest plausible sd of the logarithm of a decay rate
-LEFT_OUT = ("2015-09", "2013-07")  # campaigns left out in turn; the first campaign calibrates the model
+MIN_SPREAD = 0.1  # smallest plausible sd of the logarithm of a decay rate
+LEFT_OUT_CAMPAIGNS = ("2015-09", "2013-07")  # campaigns left out in turn; the first campaign calibrates the model
 
 
 def read(folder):
@@ -32,23 +32,23 @@ def read(folder):
     rows["log"] = np.log(rows["decay_rate_db_per_m"])
     campaigns = tuple(sorted(rows["campaign"].unique()))
     spread, repeat, log, temperature = {}, {}, {}, {}
-    for direction, part in rows.groupby("direction"):
-        wide = part.pivot_table(index=["section", "campaign", "rail"], columns="frequency_hz", values="log")
+    for direction, selected in rows.groupby("direction"):
+        wide = selected.pivot_table(index=["section", "campaign", "rail"], columns="frequency_hz", values="log")
         rails = wide.xs("left", level="rail") - wide.xs("right", level="rail")
-        spread[direction] = np.maximum(FLOOR, rails.std().to_numpy() / np.sqrt(2.0))
+        spread[direction] = np.maximum(MIN_SPREAD, rails.std().to_numpy() / np.sqrt(2.0))
         first = wide.xs(campaigns[0], level="campaign").groupby("section").mean().std().to_numpy() ** 2
         repeat[direction] = np.sqrt(np.convolve(np.pad(first, 2, mode="edge"), np.ones(5) / 5.0, "valid"))
-        for (section, campaign), cell in part.groupby(["section", "campaign"]):
+        for (section, campaign), cell in selected.groupby(["section", "campaign"]):
             log[section, direction, campaign] = cell.groupby("frequency_hz")["log"].mean().loc[BANDS].to_numpy()
             temperature[section, direction, campaign] = float(cell["rail_temp_c"].mean())
     return [
-        Measured(s, _of(s, log), spread, repeat, _of(s, temperature), campaigns)
+        MeasuredRates(s, _of_section(s, log), spread, repeat, _of_section(s, temperature), campaigns)
         for s in sorted(rows["section"].unique())
     ]
 
 
-def _of(section, held):
-    return {key[1:]: value for key, value in held.items() if key[0] == section}
+def _of_section(section, values):
+    return {key[1:]: value for key, value in values.items() if key[0] == section}
 
 
 def calibrate(measured):
@@ -59,25 +59,25 @@ def calibrate(measured):
     return {n.name: (fit.values[n.name], float(s)) for n, s in zip(case.nuisances, sd)}
 
 
-def analyse(folder, sections=None, tell=print):
+def analyse(folder, sections=None, report=print):
     """{section: (calibrated priors, {left-out campaign: (case, diagnosis)}, {left-out campaign: gains by date})}."""
-    found = {}
+    results = {}
     for measured in read(folder):
         if sections and measured.section not in sections:
             continue
         priors = calibrate(measured)
         runs = {}
-        for campaign in LEFT_OUT:
+        for campaign in LEFT_OUT_CAMPAIGNS:
             case = DecayCase(measured, campaign, priors)
             runs[campaign] = case, diagnose(case)
             d = runs[campaign][1]
-            tell(f"{measured.section} without {campaign}: {d.verdict.answer} {d.verdict.names} {d.verification}")
+            report(f"{measured.section} without {campaign}: {d.verdict.answer} {d.verdict.names} {d.verification}")
         gains = {c: dates(*run) if run[1].verdict.answer != "none" else {} for c, run in runs.items()}
-        found[measured.section] = priors, runs, gains
-    return found
+        results[measured.section] = priors, runs, gains
+    return results
 
 
-DAMPS = {
+DAMPING_EFFECTS = {
     "absorber",
     "lateral_absorber",
     "vertical_absorber",
@@ -105,12 +105,12 @@ def conclusion(runs):
 
 def dates(case, diagnosis):
     """{campaign: gain over the base model by held-out density [nats]} of the leading change at each date."""
-    best = diagnosis.verdict.scores[0]
-    base, found = sum(held_out_score(case, diagnosis.base).values()), {}
-    for candidate in (c for c in case.candidates if c.family == best.family):
-        fit = fit_jointly(case, (candidate,), best.fit.psi[-len(candidate.parameters) :], iterations=15)
-        found[candidate.where["since"]] = sum(held_out_score(case, fit).values()) - base
-    return found
+    best_score = diagnosis.verdict.scores[0]
+    base, gains = sum(held_out_score(case, diagnosis.base).values()), {}
+    for candidate in (c for c in case.candidates if c.family == best_score.family):
+        fit = fit_jointly(case, (candidate,), best_score.fit.psi[-len(candidate.parameters) :], iterations=15)
+        gains[candidate.where["since"]] = sum(held_out_score(case, fit).values()) - base
+    return gains
 
 
 def bands_changed(measured, priors):
@@ -120,13 +120,13 @@ def bands_changed(measured, priors):
     """
     case = DecayCase(measured, priors=priors)
     values = {name: mean for name, (mean, _) in priors.items()}
-    found = {}
+    factors = {}
     for direction in DIRECTIONS:
-        mine = [o for o in case.observations if o.data_type == direction and o.condition != measured.campaigns[0]]
-        factor = np.array([measured.log[direction, o.condition] - case.logarithm(values, (), o) for o in mine])
+        later = [o for o in case.observations if o.data_type == direction and o.condition != measured.campaigns[0]]
+        factor = np.array([measured.log[direction, o.condition] - case.logarithm(values, (), o) for o in later])
         error = np.sqrt(measured.spread[direction] ** 2 + measured.repeat[direction] ** 2)
-        found[direction] = factor, error * np.sqrt(1.0 + 1.0 / len(mine))
-    return found
+        factors[direction] = factor, error * np.sqrt(1.0 + 1.0 / len(later))
+    return factors
 
 
 def main(arguments):
@@ -134,10 +134,10 @@ def main(arguments):
     from examples.niederwangen_page import draw, page, section_rows
 
     folder = folder_of("track_sbb_niederwangen", arguments)
-    measured, found = read(folder), analyse(folder)
-    draw(measured, found, DOCS / "niederwangen_mismatch.svg")
-    (DOCS / "niederwangen_mismatch.md").write_text(page(measured, found), encoding="utf-8")
-    for row in section_rows(measured, found):
+    measured, results = read(folder), analyse(folder)
+    draw(measured, results, DOCS / "niederwangen_mismatch.svg")
+    (DOCS / "niederwangen_mismatch.md").write_text(page(measured, results), encoding="utf-8")
+    for row in section_rows(measured, results):
         print(" | ".join(row))
 
 

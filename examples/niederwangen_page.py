@@ -3,42 +3,44 @@
 import numpy as np
 from examples.decay_case import CHANGES, DIRECTIONS, Change
 from examples.decay_model import BANDS
-from examples.niederwangen import DAMPS, LEFT_OUT, bands_changed, conclusion
+from examples.niederwangen import DAMPING_EFFECTS, LEFT_OUT_CAMPAIGNS, bands_changed, conclusion
 from examples.recorded import plotting, save, table
 
 
 def what_in_words(names):
     """What the names have in common, and whether a single one remains."""
-    one = {name: CHANGES[name][0] for name in names}
+    texts = {name: CHANGES[name][0] for name in names}
     if not names:
         return "nothing"
-    if set(names) <= DAMPS:
-        told = " or ".join(one.values())
-        return f"**added: something that damps the rail** ({told}{'' if len(names) == 1 else '; not told apart'})"
-    return "open: " + " or ".join(one.values())
+    if set(names) <= DAMPING_EFFECTS:
+        alternatives = " or ".join(texts.values())
+        return (
+            f"**added: something that damps the rail** ({alternatives}{'' if len(names) == 1 else '; not told apart'})"
+        )
+    return "open: " + " or ".join(texts.values())
 
 
 def band_words(changes):
     """Bands whose mean factor over all later campaigns exceeds three standard deviations."""
-    said = []
+    texts = []
     for direction, (factor, sd) in changes.items():
         mean = factor.mean(axis=0)
         bands = [f"{b:.0f} (×{np.exp(m):.1f})" for b, m, s in zip(BANDS, mean, sd) if abs(m) > 3.0 * s]
         if bands:
-            said.append(f"{direction} {', '.join(bands)}")
-    return "; ".join(said) or "none"
+            texts.append(f"{direction} {', '.join(bands)}")
+    return "; ".join(texts) or "none"
 
 
-def section_rows(measured, found):
+def section_rows(measured, results):
     """A row per section: conclusion, date, change, bands, and the fits on campaigns left out."""
     for m in measured:
-        priors, runs, by_date = found[m.section]
-        said, names = conclusion(runs)
-        gains = by_date[LEFT_OUT[0]]
+        priors, runs, by_date = results[m.section]
+        answer, names = conclusion(runs)
+        gains = by_date[LEFT_OUT_CAMPAIGNS[0]]
         when = max(gains, key=gains.get) if gains else None
         date = f"after {m.campaigns[m.campaigns.index(when) - 1]}, by {when}" if when else "–"
-        told = what_in_words(names) if said == "changed" else "–" if said == "not changed" else "**left open**"
-        yield [m.section, f"**{said}**", date, told, band_words(bands_changed(m, priors)), *_fits(runs)]
+        change = what_in_words(names) if answer == "changed" else "–" if answer == "not changed" else "**left open**"
+        yield [m.section, f"**{answer}**", date, change, band_words(bands_changed(m, priors)), *_fits(runs)]
 
 
 def _fits(runs):
@@ -49,15 +51,15 @@ def _fits(runs):
         yield f"{v.before:.0f} → {after} (rival {rival})"
 
 
-def term_rows(measured, found):
+def term_rows(measured, results):
     """A row per section, run and model: gain, level, parameters."""
     for m in measured:
-        for campaign, (_, d) in found[m.section][1].items():
+        for campaign, (_, d) in results[m.section][1].items():
             for score in d.verdict.scores[:4]:
-                told = Change(score.family, score.candidate.where["since"], tuple(score.fit.psi[-_n(score) :]))
+                change = Change(score.family, score.candidate.where["since"], tuple(score.fit.psi[-_n(score) :]))
                 yield [
                     m.section, campaign, score.family.replace("_", " "), f"{score.gain:.0f}", f"{score.explained:.0%}",
-                    numbers(told, score.fit.psi_se[-_n(score) :]),
+                    numbers(change, score.fit.psi_se[-_n(score) :]),
                 ]  # fmt: skip
 
 
@@ -67,46 +69,46 @@ def _n(score):
 
 def numbers(change, errors):
     """Parameters of a change with 95 % intervals, frequencies in Hz."""
-    said = [f"by {change.since}"]
-    for p, value, se in zip(CHANGES[change.what][1], change.amounts, errors):
+    texts = [f"by {change.since}"]
+    for p, value, se in zip(CHANGES[change.family][1], change.amounts, errors):
         if p.unit == "ln(Hz)":
-            said.append(f"{p.name} {np.exp(value):.0f} Hz (×/÷ {np.exp(1.96 * se):.2f})")
+            texts.append(f"{p.name} {np.exp(value):.0f} Hz (×/÷ {np.exp(1.96 * se):.2f})")
         elif p.name == "log_factor":
-            said.append(f"factor {np.exp(value):.2f} (×/÷ {np.exp(1.96 * se):.2f})")
+            texts.append(f"factor {np.exp(value):.2f} (×/÷ {np.exp(1.96 * se):.2f})")
         else:
-            said.append(f"{p.name} {value:.3g} ± {1.96 * se:.2g} {p.unit}".removesuffix(" -"))
-    return ", ".join(said)
+            texts.append(f"{p.name} {value:.3g} ± {1.96 * se:.2g} {p.unit}".removesuffix(" -"))
+    return ", ".join(texts)
 
 
-def date_rows(measured, found):
+def date_rows(measured, results):
     """A row per section with a change: gain of the leading change at each date."""
     for m in measured:
-        _, runs, gains = found[m.section]
+        _, runs, gains = results[m.section]
         for campaign, (_, d) in runs.items():
             if gains[campaign]:
-                told = ", ".join(f"by {c}: {g:.0f}" for c, g in gains[campaign].items())
-                yield [m.section, campaign, d.verdict.scores[0].family.replace("_", " "), told]
+                text = ", ".join(f"by {c}: {g:.0f}" for c, g in gains[campaign].items())
+                yield [m.section, campaign, d.verdict.scores[0].family.replace("_", " "), text]
 
 
-def draw(measured, found, path):
+def draw(measured, results, path):
     """Draw recorded over calibrated decay rates per band and campaign, with the leading change."""
     plt = plotting()
     figure, axes = plt.subplots(len(measured), 2, figsize=(9, 11), sharex=True, sharey=True, layout="constrained")
     x = np.arange(BANDS.size)
     for row, m in zip(axes, measured):
-        priors, runs, _ = found[m.section]
-        case, d = runs[LEFT_OUT[0]]
+        priors, runs, _ = results[m.section]
+        case, d = runs[LEFT_OUT_CAMPAIGNS[0]]
         changes = bands_changed(m, priors)
         for axis, direction in zip(row, DIRECTIONS):
             factor, sd = changes[direction]
             axis.fill_between(x, np.exp(-2.0 * sd), np.exp(2.0 * sd), color="0.85", lw=0, label="±2 sd")
             for values, campaign, mark in zip(factor, m.campaigns[1:], "ovs"):
                 axis.plot(x, np.exp(values), mark, ms=3, label=campaign)
-            said = conclusion(runs)[0]
-            if said == "changed":
-                said += f", {_draw_term(axis, x, case, d, direction)}"
+            answer = conclusion(runs)[0]
+            if answer == "changed":
+                answer += f", {_draw_term(axis, x, case, d, direction)}"
             axis.set_yscale("log")
-            axis.set_title(f"{m.section} {direction}: {said}", fontsize=9)
+            axis.set_title(f"{m.section} {direction}: {answer}", fontsize=9)
         row[0].set_ylabel("recorded / calibrated")
     for axis in axes[-1]:
         axis.set_xticks(x[::2], [f"{b:.0f}" for b in BANDS[::2]], rotation=60)
@@ -188,18 +190,18 @@ says more of the date than the evidence above and is larger; both runs.
 """
 
 
-def page(measured, found):
+def page(measured, results):
     """The page as text."""
     head = ["section", "", "when", "what", "bands (factor)", "fit, 2015-09 left out", "fit, 2013-07 left out"]
-    warm = [found[m.section][1][LEFT_OUT[0]][1].fit.values for m in measured]
+    warm = [results[m.section][1][LEFT_OUT_CAMPAIGNS[0]][1].fit.values for m in measured]
     soft, calm = ([100.0 * v[n] for v in warm] for n in ("softening", "calming"))
     spread = {d: float(np.median(measured[0].spread[d])) for d in DIRECTIONS}
     repeat = {d: float(np.median(measured[0].repeat[d])) for d in DIRECTIONS}
     return PAGE.format(
         n_changes=len(CHANGES),
-        answers=table(head, section_rows(measured, found)),
-        terms=table(["section", "left out", "change", "gain", "explained", "numbers"], term_rows(measured, found)),
-        dates=table(["section", "left out", "change", "gain by date"], date_rows(measured, found)),
+        answers=table(head, section_rows(measured, results)),
+        terms=table(["section", "left out", "change", "gain", "explained", "numbers"], term_rows(measured, results)),
+        dates=table(["section", "left out", "change", "gain by date"], date_rows(measured, results)),
         warmth=f"Pads are found to soften by {min(soft):.1f} to {max(soft):.1f} % and their loss factor to change by "
         f"{-max(calm):+.1f} to {-min(calm):+.1f} % per kelvin, section by section.",
         spread_v=spread["vertical"], spread_l=spread["lateral"], repeat_v=repeat["vertical"],

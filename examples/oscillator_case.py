@@ -32,7 +32,7 @@ class LawTerm:
     """Feedback force of one law; ``amount`` is its share of the linear spring force at the scale of the motion."""
 
     name: str
-    kind: int
+    law_index: int
     amount: float
 
     def sentence(self):
@@ -42,58 +42,60 @@ class LawTerm:
 
 def law_candidates(without=()):
     """Candidates of all laws but those in ``without``."""
-    found = []
-    for name, (kind, meaning, bounds) in LAWS.items():
+    result = []
+    for name, (law_index, meaning, bounds) in LAWS.items():
         if name not in without:
             parameter = Parameter("amount", "-", 0.0, bounds, meaning, SOURCE)
             starts = ((0.05,), (0.5 if bounds[0] < 0.0 else 0.2,))
-            found.append(
-                Candidate(name, (parameter,), lambda psi, n=name, k=kind: LawTerm(n, k, psi["amount"]), starts,
+            result.append(
+                Candidate(name, (parameter,), lambda psi, n=name, k=law_index: LawTerm(n, k, psi["amount"]), starts,
                           frame="amplitude", component="oscillator")
             )  # fmt: skip
-    return tuple(found)
+    return tuple(result)
 
 
 @njit(cache=True)
-def _law(kind, y, v):
-    if kind == CUBIC:
+def _law_force(law_index, y, v):
+    if law_index == CUBIC:
         return y * y * y
-    if kind == QUINTIC:
+    if law_index == QUINTIC:
         return y**5
-    if kind == QUADRATIC:
+    if law_index == QUADRATIC:
         return y * y
-    if kind == ABSOLUTE:
+    if law_index == ABSOLUTE:
         return abs(y) * y
-    if kind == SOFTENING:
+    if law_index == SOFTENING:
         return np.tanh(3.0 * y)
-    if kind == PLAY:
+    if law_index == PLAY:
         return -min(max(y, -0.1), 0.1)
-    if kind == FRICTION:
+    if law_index == FRICTION:
         return 0.1 * np.tanh(v / 0.02)
-    if kind == DRAG:
+    if law_index == DRAG:
         return 0.1 * abs(v) * v
-    if kind == CUBIC_DAMPING:
+    if law_index == CUBIC_DAMPING:
         return 0.1 * v * v * v
-    if kind == STATE_DAMPING:
+    if law_index == STATE_DAMPING:
         return 0.1 * y * y * v
     return 0.0
 
 
 @njit(cache=True)
-def _march(force, dt, omega, zeta, gain, kinds, amounts, scale):
+def _simulate(force, dt, omega, zeta, gain, law_indices, amounts, scale):
     """Displacement by the classical Runge-Kutta scheme; ``force`` has three values a step (start, middle, end)."""
     out = np.zeros(force.shape[0] + 1)
     y, v = 0.0, 0.0
     for n in range(force.shape[0]):
         ky, kv = np.zeros(4), np.zeros(4)
         for stage in range(4):
-            way = 0.0 if stage == 0 else 0.5 if stage < 3 else 1.0
-            ys = y + (way * dt * ky[stage - 1] if stage else 0.0)
-            vs = v + (way * dt * kv[stage - 1] if stage else 0.0)
+            fraction = 0.0 if stage == 0 else 0.5 if stage < 3 else 1.0
+            ys = y + (fraction * dt * ky[stage - 1] if stage else 0.0)
+            vs = v + (fraction * dt * kv[stage - 1] if stage else 0.0)
             f = force[n, 0 if stage == 0 else 1 if stage < 3 else 2]
             acceleration = gain * f - 2.0 * zeta * omega * vs - omega * omega * ys
-            for k in range(kinds.size):
-                acceleration -= omega * omega * scale * amounts[k] * _law(kinds[k], ys / scale, vs / (omega * scale))
+            for k in range(law_indices.size):
+                acceleration -= (
+                    omega * omega * scale * amounts[k] * _law_force(law_indices[k], ys / scale, vs / (omega * scale))
+                )
             ky[stage], kv[stage] = vs, acceleration
         y += dt / 6.0 * (ky[0] + 2.0 * ky[1] + 2.0 * ky[2] + ky[3])
         v += dt / 6.0 * (kv[0] + 2.0 * kv[1] + 2.0 * kv[2] + kv[3])
@@ -128,13 +130,13 @@ class OscillatorCase(Case):
                  without=(), effective=0.2):  # fmt: skip
         self.rate, self.skipped, self.effective = rate, skipped, effective
         self.scale = 3.0 * float(np.sqrt(np.mean(np.concatenate([y for *_, y in records]) ** 2)))
-        self.inputs = {name: (_thirds(u), y) for name, _, u, y in (*records, *reserved)}
+        self.inputs = {name: (_step_inputs(u), y) for name, _, u, y in (*records, *reserved)}
         self.observations = tuple(self._observation(*r, tolerance) for r in records)
         self.reserved = tuple(self._observation(*r, tolerance) for r in reserved)
-        parts = [("frequency", "Hz", frequency, (0.0, np.inf)), ("damping", "-", damping, (0.0, 1.0))]
-        parts += [("gain", "-", gain, (-np.inf, np.inf))]
-        parts += [("offset", "V", (0.0, offset), (-np.inf, np.inf))] if offset else []
-        self.nuisances = tuple(Nuisance(n, u, *prior, bounds=b) for n, u, prior, b in parts)
+        prior_table = [("frequency", "Hz", frequency, (0.0, np.inf)), ("damping", "-", damping, (0.0, 1.0))]
+        prior_table += [("gain", "-", gain, (-np.inf, np.inf))]
+        prior_table += [("offset", "V", (0.0, offset), (-np.inf, np.inf))] if offset else []
+        self.nuisances = tuple(Nuisance(n, u, *prior, bounds=b) for n, u, prior, b in prior_table)
         self.candidates = law_candidates(without)
 
     def _observation(self, name, condition, u, y, tolerance):
@@ -145,20 +147,20 @@ class OscillatorCase(Case):
     def predict(self, values, terms, observations):
         """Displacement of every record."""
         omega = 2.0 * np.pi * values["frequency"]
-        kinds = np.array([t.kind for t in terms], dtype=np.int64)
+        law_indices = np.array([t.law_index for t in terms], dtype=np.int64)
         amounts = np.array([t.amount for t in terms], dtype=float)
         gain = values["gain"] * omega**2
-        found = []
+        predictions = []
         for o in observations:
             force, _ = self.inputs[o.name]
-            y = _march(force, 1.0 / self.rate, omega, values["damping"], gain, kinds, amounts, self.scale)
-            found.append(y[self.skipped : self.skipped + o.data.size] + values.get("offset", 0.0))
-        return found
+            y = _simulate(force, 1.0 / self.rate, omega, values["damping"], gain, law_indices, amounts, self.scale)
+            predictions.append(y[self.skipped : self.skipped + o.data.size] + values.get("offset", 0.0))
+        return predictions
 
     def latent_covariates(self, fit):
         """Missing feedback from the recorded motion: the residual of the equation of motion over ω²."""
         omega, damping = 2.0 * np.pi * fit.values["frequency"], fit.values["damping"]
-        parts = []
+        segments = []
         for o in self.observations:
             force, y = self.inputs[o.name]
             y = y - fit.values.get("offset", 0.0)
@@ -166,15 +168,17 @@ class OscillatorCase(Case):
             missing = fit.values["gain"] * force[:, 0] - a[:-1] / omega**2 - 2.0 * damping * v[:-1] / omega - y[:-1]
             for term in fit.terms:
                 u, w = y[:-1] / self.scale, v[:-1] / (omega * self.scale)
-                missing = missing - term.amount * self.scale * np.array([_law(term.kind, p, q) for p, q in zip(u, w)])
+                missing = missing - term.amount * self.scale * np.array(
+                    [_law_force(term.law_index, p, q) for p, q in zip(u, w)]
+                )
             inner = slice(self.skipped, -50)
-            parts.append((missing[inner], y[:-1][inner], v[:-1][inner], np.arange(missing.size)[inner] / self.rate))
-        force, y, v, t = (np.concatenate(p) for p in zip(*parts))
+            segments.append((missing[inner], y[:-1][inner], v[:-1][inner], np.arange(missing.size)[inner] / self.rate))
+        force, y, v, t = (np.concatenate(p) for p in zip(*segments))
         return {"force": _band_limited(force, self.rate, 3.2 * fit.values["frequency"]), "unit": "V",
                 "displacement": y, "velocity": v, "time": t}  # fmt: skip
 
 
-def _thirds(u):
+def _step_inputs(u):
     """Input at start, middle and end of each step, band-limited between samples, (n - 1, 3)."""
     n = u.size
     spectrum = np.fft.rfft(np.concatenate([u, u[::-1]]))
@@ -185,9 +189,9 @@ def _thirds(u):
 def _derivatives(y, rate):
     """Velocity and acceleration of a record by Fourier transform of it and its mirror image."""
     n = y.size
-    both = np.concatenate([y, y[::-1]])
+    mirrored = np.concatenate([y, y[::-1]])
     omega = 2j * np.pi * np.fft.rfftfreq(2 * n, 1.0 / rate)
-    spectrum = np.fft.rfft(both)
+    spectrum = np.fft.rfft(mirrored)
     return np.fft.irfft(omega * spectrum, 2 * n)[:n], np.fft.irfft(omega**2 * spectrum, 2 * n)[:n]
 
 

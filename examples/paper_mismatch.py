@@ -21,24 +21,26 @@ from turnout.stages.mismatch_text import SENTENCES
 
 SPEED = 160.0 / 3.6
 SENSORS = (Sensor("A1", 0.6, "rail web"), Sensor("A4", 9.0, "rail web"))
-BLOWS = ((0.6, 15.0), (9.0, 15.0))
-SLOPE = 1e4  # [N/m per N], the concealed effect: pads of 205 to 307 MN/m gain 240 MN/m under this car
-TOP = 140.0  # [Hz], where the filter of passages ends; it is 1 up to 112 Hz
-BANDS = ((5.0, 40.0), (40.0, TOP))
+HAMMER_POINTS = ((0.6, 15.0), (9.0, 15.0))
+PRELOAD_SLOPE = 1e4  # [N/m per N], the concealed effect: pads of 205 to 307 MN/m gain 240 MN/m under this car
+MAX_FREQUENCY = 140.0  # [Hz], where the filter of passages ends; it is 1 up to 112 Hz
+BANDS = ((5.0, 40.0), (40.0, MAX_FREQUENCY))
 SEED = 12  # of scatter and roughness: gives the pattern of the publication
 
 
 def plan(trains):
     """Plan with two sensors, hammer points beside both, and these trains."""
-    return Plan(load_track("tommerup"), SENSORS, BLOWS, trains, tuple(t for t in ("heavy 2",) if len(trains) > 4))
+    return Plan(
+        load_track("tommerup"), SENSORS, HAMMER_POINTS, trains, tuple(t for t in ("heavy 2",) if len(trains) > 4)
+    )
 
 
-def as_in_the_paper():
+def paper_plan():
     """Plan of the paper: one car with two bogies at 160 km/h."""
     return plan((Train(car("car"), "car", SPEED),))
 
 
-def with_more_trains():
+def plan_with_more_trains():
     """Plan with a light and a heavy car as well, each at two speeds."""
     light = car("light", body_mass=8000.0, half_pivot=5.0)
     heavy = car("heavy", body_mass=34000.0, body_inertia=1.6e6, half_pivot=6.0, half_base=0.95)
@@ -48,53 +50,53 @@ def with_more_trains():
 
 def study(planned):
     """(case, predicted passages of the fit to hammer tests alone, diagnosis) of a plan with the concealed effect."""
-    campaign = measured_campaign(planned, (physics.PadPreload(SLOPE),), SEED)
+    campaign = measured_campaign(planned, (physics.PadPreload(PRELOAD_SLOPE),), SEED)
     case = TrackCase(campaign)
-    blows = [o for o in case.observations if o.data_type == "hammer"]
-    unloaded = fit_jointly(case, observations=blows, iterations=15)
+    hammer_observations = [o for o in case.observations if o.data_type == "hammer"]
+    unloaded = fit_jointly(case, observations=hammer_observations, iterations=15)
     passages = [o for o in case.observations if o.data_type == "passage"]
     return case, case.predict(unloaded.values, (), passages), diagnose(case)
 
 
 def densities(case, values):
     """{sensor: (frequency, PSD)} of the ``values`` (n_sensor * n,) of the first passage."""
-    made = next(iter(case.aligned_passages.values()))
-    rows, rate = np.reshape(values, (len(made.sensors), -1)), 1.0 / float(np.mean(np.diff(made.time)))
-    return {s.name: welch(row, rate, nperseg=min(row.size, 256)) for s, row in zip(made.sensors, rows)}
+    aligned = next(iter(case.aligned_passages.values()))
+    rows, rate = np.reshape(values, (len(aligned.sensors), -1)), 1.0 / float(np.mean(np.diff(aligned.time)))
+    return {s.name: welch(row, rate, nperseg=min(row.size, 256)) for s, row in zip(aligned.sensors, rows)}
 
 
-def models(case, unloaded, found):
+def models(case, unloaded, diagnosis):
     """{name: values of the first passage}: recorded, and by each model."""
     k = next(i for i, o in enumerate(case.observations) if o.data_type == "passage")
-    shown = {
+    curves = {
         "recorded": case.observations[k].data,
         "calibrated on blows alone": unloaded[0],
-        "all fitted together": found.base.predictions[k],
+        "all fitted together": diagnosis.base.predictions[k],
     }
-    if found.verdict.scores:
-        shown["with the leading effect"] = found.verdict.scores[0].fit.predictions[k]
-    return shown
+    if diagnosis.verdict.scores:
+        curves["with the leading effect"] = diagnosis.verdict.scores[0].fit.predictions[k]
+    return curves
 
 
-def excess(case, shown):
+def excess(case, curves):
     """{(model, sensor): excess of the model over the recording in each band [dB]}."""
-    recorded, found = densities(case, shown["recorded"]), {}
-    for name, values in list(shown.items())[1:]:
+    recorded, levels = densities(case, curves["recorded"]), {}
+    for name, values in list(curves.items())[1:]:
         for sensor, (f, density) in densities(case, values).items():
             inside = [(f >= low) & (f < high) for low, high in BANDS]
             power = [(density[i].sum(), recorded[sensor][1][i].sum()) for i in inside]
-            found[name, sensor] = [10.0 * np.log10(a / b) for a, b in power]
-    return found
+            levels[name, sensor] = [10.0 * np.log10(a / b) for a, b in power]
+    return levels
 
 
-def draw(case, shown, path):
+def draw(case, curves, path):
     """Draw the PSD at both sensors, recorded and simulated."""
     plt = plotting()
     figure, axes = plt.subplots(1, 2, figsize=(9, 3.4), sharey=True, layout="constrained")
     for axis, sensor in zip(axes, ("A1", "A4")):
-        for (name, values), style in zip(shown.items(), ("k-", "C1--", "C2:", "C0-")):
+        for (name, values), style in zip(curves.items(), ("k-", "C1--", "C2:", "C0-")):
             f, density = densities(case, values)[sensor]
-            inside = (f >= 5.0) & (f <= TOP)
+            inside = (f >= 5.0) & (f <= MAX_FREQUENCY)
             axis.semilogy(f[inside], density[inside], style, lw=1.2, label=name)
         axis.set(title=sensor, xlabel="frequency [Hz]")
     axes[0].set_ylabel("PSD [(m/s²)²/Hz]")
@@ -108,31 +110,39 @@ def excess_rows(levels):
         yield [name, sensor, f"{low:+.1f} dB", f"{high:+.1f} dB"]
 
 
-def answer_row(name, case, found):
+def answer_row(name, case, diagnosis):
     """Row of the table with the answer for one campaign."""
-    v = found.verdict
-    said = v.answer.replace("_", " ") + (f" {v.grade}" if v.grade else "")
+    v = diagnosis.verdict
+    answer = v.answer.replace("_", " ") + (f" {v.grade}" if v.grade else "")
     n = sum(o.data_type == "passage" for o in (*case.observations, *case.reserved))
     names = ", ".join(v.names).replace("_", " ") or "–"
-    return [name, n, f"**{said}**", names, f"{v.probability:.2f}", v.reason or "–", _unseen(found.verification)]
+    return [
+        name,
+        n,
+        f"**{answer}**",
+        names,
+        f"{v.probability:.2f}",
+        v.reason or "–",
+        _reserved_fit_text(diagnosis.verification),
+    ]
 
 
-def _unseen(check):
+def _reserved_fit_text(check):
     """Fit of each model on the reserved train."""
-    named = {"with the named effect": check.after, "with the rival": check.rival}
-    said = {"before": check.before, **named, "decoy": check.decoy}
-    shown = ", ".join(f"{name} {value:.0f} %" for name, value in said.items() if value is not None)
-    return shown if check.n else "no train to spare"
+    named_fits = {"with the named effect": check.after, "with the rival": check.rival}
+    fits = {"before": check.before, **named_fits, "decoy": check.decoy}
+    text = ", ".join(f"{name} {value:.0f} %" for name, value in fits.items() if value is not None)
+    return text if check.n else "no train to spare"
 
 
-def ranking(found):
+def ranking(diagnosis):
     """Table of the leading candidates, with the first parameter of each."""
-    rows, head = list(_ranking_rows(found)), ["effect", "nats gained", "first parameter ± half its 95 % interval"]
+    rows, head = list(_ranking_rows(diagnosis)), ["effect", "nats gained", "first parameter ± half its 95 % interval"]
     return table(head, rows) if rows else "None: no effect gained evidence."
 
 
-def _ranking_rows(found):
-    for score in found.verdict.scores[:4]:
+def _ranking_rows(diagnosis):
+    for score in diagnosis.verdict.scores[:4]:
         p = score.candidate.parameters[0]
         k = -len(score.candidate.parameters)
         value, se = score.fit.psi[k], score.fit.psi_se[k]
@@ -194,50 +204,50 @@ What was concealed: {concealed}. {outcome}
 """
 
 
-def outcome(found):
+def outcome(diagnosis):
     """Whether the truth was named, in words."""
-    v = found.verdict
+    v = diagnosis.verdict
     if v.answer == "named":
         wrong = f"**The tool named {v.names[0]}: that is wrong.**"
-        return _sized(v.scores[0]) if v.names[0] == "pad_preload" else wrong
+        return _size_text(v.scores[0]) if v.names[0] == "pad_preload" else wrong
     if v.answer == "a_or_b" and "pad_preload" in v.names:
         return "The tool named it as one of two."
     leads = v.scores and v.scores[0].family == "pad_preload"
-    said = "The tool missed it: nothing above its thresholds" if v.answer == "none" else "The tool gave it no name"
-    return said + (", though the right name leads the ranking." if leads else ", and the right name does not lead.")
+    text = "The tool missed it: nothing above its thresholds" if v.answer == "none" else "The tool gave it no name"
+    return text + (", though the right name leads the ranking." if leads else ", and the right name does not lead.")
 
 
-def _sized(score):
+def _size_text(score):
     """Whether the interval of the size covers the truth, in words."""
     (slope, *_), (se, *_) = score.estimates
     low, high = slope - 1.96 * se, slope + 1.96 * se
-    told = f"{slope:.0f} ({low:.0f} to {high:.0f}, 95 %) N/m per N where {SLOPE:.0f} were concealed"
-    if low <= SLOPE <= high:
-        return f"The tool named it, and its size: {told}."
-    return f"The tool named it, **but not its size**: {told}."
+    text = f"{slope:.0f} ({low:.0f} to {high:.0f}, 95 %) N/m per N where {PRELOAD_SLOPE:.0f} were concealed"
+    if low <= PRELOAD_SLOPE <= high:
+        return f"The tool named it, and its size: {text}."
+    return f"The tool named it, **but not its size**: {text}."
 
 
 def main():
     """Diagnose both campaigns, and write the picture and the page."""
-    case, unloaded, found = study(as_in_the_paper())
-    shown = models(case, unloaded, found)
-    draw(case, shown, DOCS / "paper_mismatch.svg")
-    more_case, _, more = study(with_more_trains())
+    case, unloaded, diagnosis = study(paper_plan())
+    curves = models(case, unloaded, diagnosis)
+    draw(case, curves, DOCS / "paper_mismatch.svg")
+    more_case, _, more = study(plan_with_more_trains())
     answers = table(
         ("campaign", "passages", "answer", "names", "probability", "because", "fit on a train never used"),
-        [answer_row("as in the publication", case, found), answer_row("with more trains", more_case, more)],
+        [answer_row("as in the publication", case, diagnosis), answer_row("with more trains", more_case, more)],
     )
     text = PAGE.format(
-        slope=SLOPE,
-        excess=table(("simulation", "sensor", "5-40 Hz", "40-140 Hz"), excess_rows(excess(case, shown))),
+        slope=PRELOAD_SLOPE,
+        excess=table(("simulation", "sensor", "5-40 Hz", "40-140 Hz"), excess_rows(excess(case, curves))),
         answers=answers,
-        sentence_one=sentence(found),
+        sentence_one=sentence(diagnosis),
         sentence_more=sentence(more),
         next_more=(recommendation(more) + "." if recommendation(more) else ""),
-        ranking_one=ranking(found),
+        ranking_one=ranking(diagnosis),
         ranking_more=ranking(more),
         concealed=SENTENCES["pad_preload"].lower(),
-        outcome=f"One train: {outcome(found)} Five trains: {outcome(more)}",
+        outcome=f"One train: {outcome(diagnosis)} Five trains: {outcome(more)}",
     )
     (DOCS / "paper_mismatch.md").write_text(text, encoding="utf-8")
     print(answers)

@@ -21,7 +21,7 @@ from turnout.readers import read
 
 SETTINGS = MismatchSettings(base_iterations=40, iterations=40)  # sharp resonances need many iterations
 MODES = (177.0, 477.0, 933.0, 1535.0, 2287.0)  # of the first beam, printed by its makers to 0.1 Hz
-PRINTED = (177.0, 477.4, 933.1, 1535.5, 2286.9, 3162.4, 4181.2)  # all that its makers print [Hz]
+PRINTED_FREQUENCIES = (177.0, 477.4, 933.1, 1535.5, 2286.9, 3162.4, 4181.2)  # all that its makers print [Hz]
 PEAKS = (99.0, 164.0, 242.0, 368.0, 447.0, 558.0, 731.0, 872.0, 1362.0)  # of the second, from its third impact
 PUBLISHED = {477: (477.4, 0.20)}  # [Hz], [%]
 
@@ -32,28 +32,28 @@ def beam(folder):
     return np.real(f).astype(float), np.asarray(h).astype(complex)
 
 
-def five_blows(folder):
+def beam_of_five_impacts(folder):
     """(frequency, accelerance (5 impacts, 1 sensor, n_line)) of the second beam, one line per hertz."""
     description = load_configuration(REPOSITORY / "examples" / "recordings_of_others").turnout("pyfrf_beam").hammer
     root = (Path(folder) / "hammer_pyfrf").resolve()
-    made = read(root / "impact2_response0.lvm", root, description.descriptions["BEAM"]).recordings
-    force, answer = (np.fft.rfft([r.signal(n) for r in made]) for n in ("force", "acceleration"))
-    frequency = np.fft.rfftfreq(made[0].n_sample, 1.0 / made[0].rate)
-    keep = slice(1, 8000)
-    return frequency[keep], (answer[:, keep] / force[:, keep])[:, None, :]
+    recordings = read(root / "impact2_response0.lvm", root, description.descriptions["BEAM"]).recordings
+    force, response = (np.fft.rfft([r.signal(n) for r in recordings]) for n in ("force", "acceleration"))
+    frequency = np.fft.rfftfreq(recordings[0].n_sample, 1.0 / recordings[0].rate)
+    used = slice(1, 8000)
+    return frequency[used], (response[:, used] / force[:, used])[:, None, :]
 
 
-def without(modes, gone):
+def without(modes, removed):
     """``modes`` without one."""
-    return tuple(m for m in modes if m != gone)
+    return tuple(m for m in modes if m != removed)
 
 
 def cases(folder):
     """{title: (case, what was left out deliberately)}."""
     f, h = beam(folder)
     one = {"frequency": f, "h": h, "band": (100.0, 1200.0), "reserved": (5,), "step": 4}
-    g, blows = five_blows(folder)
-    two = {"frequency": g, "h": blows, "band": (80.0, 1000.0), "step": 1}
+    g, h2 = beam_of_five_impacts(folder)
+    two = {"frequency": g, "h": h2, "band": (80.0, 1000.0), "step": 1}
     more = (64.0, *PEAKS)
     return {
         "A1": (FrfCase(peaks=without(MODES, 477.0), rigid=2, **one), "the second resonance"),
@@ -63,40 +63,40 @@ def cases(folder):
         "A4": (FrfCase(peaks=MODES, rigid=2, beam=True, **{**one, "band": (100.0, 1900.0), "step": 6}),
                "resonances tied to those of a free Euler-Bernoulli beam"),
         "A5": (FrfCase(peaks=MODES, rigid=2, **one), "nothing that we know of"),
-        "B1": (FrfCase(peaks=PEAKS, reserved=(4,), blown=[1] * 5, **two),
+        "B1": (FrfCase(peaks=PEAKS, reserved=(4,), impact_places=[1] * 5, **two),
                "nothing on purpose; the makers overloaded blow 1"),
-        "B2": (FrfCase(peaks=without(more, 447.0), reserved=(3,), blown=[1] * 4, **{**two, "h": blows[1:]}),
+        "B2": (FrfCase(peaks=without(more, 447.0), reserved=(3,), impact_places=[1] * 4, **{**two, "h": h2[1:]}),
                "a resonance; blow 1 left away, what B1 found besides put in"),
     }  # fmt: skip
 
 
 def analyse(folder):
     """{title: (case, left out, diagnosis)}."""
-    return {title: (case, told, diagnose(case, SETTINGS)) for title, (case, told) in cases(folder).items()}
+    return {title: (case, left_out, diagnose(case, SETTINGS)) for title, (case, left_out) in cases(folder).items()}
 
 
-def rows(found):
+def rows(results):
     """A row per case."""
-    for title, (_, told, d) in found.items():
+    for title, (_, left_out, d) in results.items():
         v, check = d.verdict, d.verification
         names = ", ".join(n.replace("_", " ") for n in v.names)
         after = "–" if check.after is None else f"{check.after:.1f}"
         rival = "–" if check.rival is None else f"{check.rival:.1f}"
-        said = "; ".join(t.sentence() for t in d.fit.terms) or v.reason.replace("_", " ")
-        yield [title, told, f"**{v.answer.replace('_', ' ')}** {names}".strip(), _readable(said, d), where(d),
+        text = "; ".join(t.sentence() for t in d.fit.terms) or v.reason.replace("_", " ")
+        yield [title, left_out, f"**{v.answer.replace('_', ' ')}** {names}".strip(), _readable(text, d), where(d),
                f"{check.before:.1f} → {after}", rival]  # fmt: skip
 
 
-def _readable(said, diagnosis):
+def _readable(text, diagnosis):
     """Sentences with logarithms turned into hertz and percent."""
     for term in diagnosis.fit.terms:
         v = term.values
         if "log_frequency" in v:
             old = f"log_frequency {v['log_frequency']:.4g}, log_damping {v['log_damping']:.4g}"
-            frequency = np.exp(v["log_frequency"]) * stretched(diagnosis)
+            frequency = np.exp(v["log_frequency"]) * mean_stretch(diagnosis)
             new = f"{frequency:.1f} Hz, damping {100.0 * np.exp(v['log_damping']):.2f} %"
-            said = said.replace(old, new)
-    return said
+            text = text.replace(old, new)
+    return text
 
 
 def where(diagnosis):
@@ -109,19 +109,19 @@ def where(diagnosis):
     return f"{f.frame} {f.level} ({f.effect:+.0f} dB){'*' if f.q < 0.05 else ''}"
 
 
-def mode_found(diagnosis):
+def identified_mode(diagnosis):
     """(frequency [Hz], damping ratio [%]) of the resonance named, its frequency the mean over the blows used.
 
     A common stretch of all blows and the frequencies of all resonances only show as a product.
     """
-    v = next(t.values for t in diagnosis.fit.terms if t.kind == "mode")
-    return float(np.exp(v["log_frequency"])) * stretched(diagnosis), 100.0 * float(np.exp(v["log_damping"]))
+    v = next(t.values for t in diagnosis.fit.terms if t.effect_type == "mode")
+    return float(np.exp(v["log_frequency"])) * mean_stretch(diagnosis), 100.0 * float(np.exp(v["log_damping"]))
 
 
-def stretched(diagnosis):
+def mean_stretch(diagnosis):
     """Mean factor on all frequencies over the impacts used; that of a reserved one stays at its prior."""
-    own = [v for name, v in diagnosis.fit.values.items() if name.startswith("stretch@") and v != 0.0]
-    return 1.0 + float(np.mean(own))
+    stretches = [v for name, v in diagnosis.fit.values.items() if name.startswith("stretch@") and v != 0.0]
+    return 1.0 + float(np.mean(stretches))
 
 
 def beam_printed():
@@ -131,7 +131,7 @@ def beam_printed():
 
     .. math:: (\lambda_n^2 / f_n)^2 = (1 + S \lambda_n^2) / c^2, a straight line in \lambda_n^2
     """
-    square, f = LAMBDA**2, np.array(PRINTED)
+    square, f = LAMBDA**2, np.array(PRINTED_FREQUENCIES)
     line = stats.linregress(square[1:], (square[1:] / f[1:]) ** 2)
     first = (square[0] / f[0]) ** 2
     above = np.sqrt((line.intercept + line.slope * square[0]) / first) - 1.0
@@ -139,18 +139,18 @@ def beam_printed():
     return line.slope / line.intercept, half / line.intercept, above
 
 
-def draw(found, path):
+def draw(results, path):
     """Draw the reserved impact of some cases: recorded, by the simple model, and with the named effect."""
     plt = plotting()
-    shown = ("A1", "A3", "A5", "B1")
-    figure, axes = plt.subplots(len(shown), 1, figsize=(8.5, 8.0), layout="constrained")
-    for axis, title in zip(axes, shown):
-        case, told, d = found[title]
+    titles = ("A1", "A3", "A5", "B1")
+    figure, axes = plt.subplots(len(titles), 1, figsize=(8.5, 8.0), layout="constrained")
+    for axis, title in zip(axes, titles):
+        case, left_out, d = results[title]
         before, after = (size(case, predict_reserved(case, fit, case.reserved)[0]) for fit in (d.base, d.fit))
         axis.semilogy(case.frequency, size(case, case.reserved[0].data), color="black", lw=1.2, label="recorded")
         axis.semilogy(case.frequency, before, color="C1", lw=1, label="too simple model")
         axis.semilogy(case.frequency, after, color="C0", lw=1, ls="--", label="with what was named")
-        axis.set_title(f"{title}, {case.reserved[0].name}, never used. Left out: {told}", fontsize=9)
+        axis.set_title(f"{title}, {case.reserved[0].name}, never used. Left out: {left_out}", fontsize=9)
         axis.set_ylabel("rms of the sensors [m/s²/N]")
     axes[0].legend(ncols=3)
     axes[-1].set_xlabel("frequency [Hz]")
@@ -197,11 +197,11 @@ resonance found outside the band of the fit stands for all that lies beyond, and
 """
 
 
-STARRED = """ * Its mean
+STAR_NOTE = """ * Its mean
 differs from the others by more than they do among themselves (Grubbs, 5 % over all frames)."""
 
 
-def nothing_known(d):
+def control_text(d):
     """The answer where no omission is known, and whether the reserved impact confirms it."""
     check, reason = d.verification, d.verdict.reason.replace("_", " ")
     if d.verdict.answer == "none":
@@ -210,50 +210,52 @@ def nothing_known(d):
         return (
             f"said to be unknown**: {reason}. The fit of the blow never used is {check.before:.1f} %, best of series A."
         )
-    told = "a false name, not withdrawn" if check.is_worse else "named, and we cannot check it"
+    text = "a false name, not withdrawn" if check.is_worse else "named, and we cannot check it"
     return (
-        f"{told}.** Nothing was left out that we know of; the fit of the blow never used goes from {check.before:.1f}\n"
+        f"{text}.** Nothing was left out that we know of; the fit of the blow never used goes from {check.before:.1f}\n"
         f"  to {check.after:.1f} % (standard error of the difference {check.error:.1f}). Resonances above the band\n"
-        f"  there are: the makers print some up to {PRINTED[-1]:.0f} Hz."
+        f"  there are: the makers print some up to {PRINTED_FREQUENCIES[-1]:.0f} Hz."
     )
 
 
-def plain_beam(d):
+def beam_text(d):
     """The answer for a beam without shear and rotatory inertia, compared with its printed frequencies."""
     if d.verdict.names[:1] != ("shear_and_rotation",):
         return f"said to be unknown**: {d.verdict.reason.replace('_', ' ')}."
     (size, *_), (error, *_) = d.verdict.scores[0].estimates
     printed, half, above = beam_printed()
-    mine, theirs = f"{1e4 * size:.3f} ± {1.96e4 * error:.3f}", f"{1e4 * printed:.2f} ± {1e4 * half:.2f}"
+    fitted_text, printed_text = f"{1e4 * size:.3f} ± {1.96e4 * error:.3f}", f"{1e4 * printed:.2f} ± {1e4 * half:.2f}"
     return (
-        f"found**, with grade {d.verdict.grade}: shear and rotatory inertia, slenderness ({mine}) 1e-4 (95 %) "
+        f"found**, with grade {d.verdict.grade}: shear and rotatory inertia, slenderness ({fitted_text}) 1e-4 (95 %) "
         "from\n"
         f"  100 to 1900 Hz. The second to the seventh frequency that the makers print, "
-        f"up to {PRINTED[-1]:.0f} Hz,\n"
-        f"  ask for ({theirs}) 1e-4. The first lies {above:.1%} above that law, which is the structure "
+        f"up to {PRINTED_FREQUENCIES[-1]:.0f} Hz,\n"
+        f"  ask for ({printed_text}) 1e-4. The first lies {above:.1%} above that law, which is the structure "
         "that stays:\n"
         "  what holds the beam and what its seven accelerometers weigh is not told."
     )
 
 
-def page(found):
+def page(results):
     """The page as text."""
-    f, zeta = mode_found(found["A1"][2])
-    b2 = found["B2"][2]
-    blow = next(t for t in found["B1"][2].fit.terms if t.kind == "blow_gain")
-    struck = 1.0 + blow.values["gain"] + found["B1"][2].fit.values["hammer@blow 1"]
+    f, zeta = identified_mode(results["A1"][2])
+    b2 = results["B2"][2]
+    gain_effect = next(t for t in results["B1"][2].fit.terms if t.effect_type == "blow_gain")
+    impact_gain = 1.0 + gain_effect.values["gain"] + results["B1"][2].fit.values["hammer@blow 1"]
     head = ["", "left out", "answer", "in words", "residual is largest at", "fit", "rival"]
-    told = "found." if "mode" in b2.verdict.names else "said to be unknown, and placed; "
+    b2_text = "found." if "mode" in b2.verdict.names else "said to be unknown, and placed; "
     if "mode" in b2.verdict.names:
-        told += f" At {mode_found(b2)[0]:.1f} Hz; left out was the one at 447 Hz."
+        b2_text += f" At {identified_mode(b2)[0]:.1f} Hz; left out was the one at 447 Hz."
     else:
-        told += f"the resonance near {b2.verdict.scores[0].candidate.where.get('near', '?')} leads and leaves too much."
-    cells = table(head, rows(found))
+        b2_text += (
+            f"the resonance near {b2.verdict.scores[0].candidate.where.get('near', '?')} leads and leaves too much."
+        )
+    cells = table(head, rows(results))
     return PAGE.format(
-        cases=cells, starred=STARRED if " dB)*" in cells else "", f=f, zeta=zeta,
+        cases=cells, starred=STAR_NOTE if " dB)*" in cells else "", f=f, zeta=zeta,
         published=PUBLISHED[477][0], printed=PUBLISHED[477][1],
-        low=mode_found(found["A3"][2])[0], a2=where(found["A2"][2]),
-        a4=plain_beam(found["A4"][2]), a5=nothing_known(found["A5"][2]), gain=struck, b2=told,
+        low=identified_mode(results["A3"][2])[0], a2=where(results["A2"][2]),
+        a4=beam_text(results["A4"][2]), a5=control_text(results["A5"][2]), gain=impact_gain, b2=b2_text,
     )  # fmt: skip
 
 
@@ -262,9 +264,9 @@ def main(arguments):
     folder = Path(arguments[0]) if arguments else SHARED
     if not (folder / "frf_beam_sdypy").is_dir():
         sys.exit(f"skipped: {folder}/frf_beam_sdypy does not exist. Give the folder of the recordings.")
-    found = analyse(folder)
-    draw(found, DOCS / "real_frfs.svg")
-    text = page(found)
+    results = analyse(folder)
+    draw(results, DOCS / "real_frfs.svg")
+    text = page(results)
     (DOCS / "real_frfs.md").write_text(text, encoding="utf-8")
     print(text)
 

@@ -27,8 +27,8 @@ def recordings(folder):
     Five multisines are fitted; another one and the arrow are reserved.
     """
     u, y = np.genfromtxt(folder / "SNLS80mV.csv", delimiter=",", skip_header=1)[:, :2].T
-    parts = [slice(START + k * LENGTH, START + (k + 1) * LENGTH) for k in range(10)]
-    sines = [(f"multisine {k}", f"multisine {k}", u[p], y[p]) for k, p in enumerate(parts)]
+    segments = [slice(START + k * LENGTH, START + (k + 1) * LENGTH) for k in range(10)]
+    sines = [(f"multisine {k}", f"multisine {k}", u[p], y[p]) for k, p in enumerate(segments)]
     return [sines[k] for k in FITTED], [sines[HELD_OUT], ("arrow", "arrow", u[:ARROW], y[:ARROW])]
 
 
@@ -53,29 +53,32 @@ def analyse(folder):
 def law_rows(case, diagnosis):
     """A row per model: the linear base, then the laws by held-out gain."""
 
-    def shown(fit):
+    def fit_texts(fit):
         return [f"{percent:.1f} % ({missed:.2f} mV)" for percent, missed in held_out(case, fit)]
 
-    yield ["linear base", "0", "", *shown(diagnosis.base)]
+    yield ["linear base", "0", "", *fit_texts(diagnosis.base)]
     for score in diagnosis.scores or diagnosis.verdict.scores:
         amount = f"{score.fit.psi[0]:.3f} ± {1.96 * score.fit.psi_se[0]:.3f}"
-        yield [score.family.replace("_", " "), f"{score.gain:.0f}", amount, *shown(score.fit)]
+        yield [score.family.replace("_", " "), f"{score.gain:.0f}", amount, *fit_texts(score.fit)]
 
 
 def missing_force(case, fit):
     """Nonparametric law of the force that ``fit`` lacks."""
-    seen = case.latent_covariates(fit)
-    return latent_law(seen["force"], {k: seen[k] for k in ("displacement", "velocity", "time")}, seen["unit"])
+    latent = case.latent_covariates(fit)
+    return latent_law(latent["force"], {k: latent[k] for k in ("displacement", "velocity", "time")}, latent["unit"])
 
 
-def draw_latent(found, path):
+def draw_latent(results, path):
     """Draw the missing force against displacement: without the right law, and after it was named."""
     plt = plotting()
     figure, axes = plt.subplots(1, 2, figsize=(8.5, 3.6), sharey=True, layout="constrained")
-    case, told = found["told nothing"]
-    other, removed = found["law removed"]
-    shown = (("law removed: unknown", other, removed.base), ("told nothing: with the cubic spring", case, told.fit))
-    for axis, (title, of, fit) in zip(axes, shown):
+    case, full = results["told nothing"]
+    reduced_case, reduced = results["law removed"]
+    panels = (
+        ("law removed: unknown", reduced_case, reduced.base),
+        ("told nothing: with the cubic spring", case, full.fit),
+    )
+    for axis, (title, of, fit) in zip(axes, panels):
         centre, force, error = missing_force(of, fit).curves["displacement"]
         axis.errorbar(1e3 * centre, 1e3 * force, 1.96e3 * error, fmt="o", ms=3, lw=1)
         fine, cubic = np.linspace(centre[0], centre[-1], 101), np.polyfit(centre, force, 3)
@@ -162,33 +165,33 @@ forgotten, it hides under every law and one-sided springs gain (`tests/published
 """
 
 
-def page(found):
+def page(results):
     """The page as text."""
-    case, told = found["told nothing"]
-    other, removed = found["law removed"]
-    (sine, _), (arrow, _) = held_out(case, told.fit)
-    best = removed.verdict.scores[0]
-    fits = held_out(other, best.fit)
-    check, r2 = told.verification, missing_force(other, removed.base).r2
+    case, full = results["told nothing"]
+    reduced_case, reduced = results["law removed"]
+    (sine, _), (arrow, _) = held_out(case, full.fit)
+    best_score = reduced.verdict.scores[0]
+    fits = held_out(reduced_case, best_score.fit)
+    check, r2 = full.verification, missing_force(reduced_case, reduced.base).r2
     return PAGE.format(
-        n_laws=len(LAWS), answer=told.verdict.answer, names=", ".join(told.names).replace("_", " "),
-        grade=told.verdict.grade, probability=told.verdict.probability, before=check.before, after=check.after,
-        sentence=" ".join(f"What the model left out: {t.sentence()}." for t in told.fit.terms),
-        rival=check.rival, decoy=check.decoy, cubic="yes" if told.names == ("cubic_spring",) else "no", sine=sine,
-        arrow=arrow, answer_2=removed.verdict.answer, reason_2=removed.verdict.reason.replace("_", " "),
-        best_2=best.family.replace("_", " "),
+        n_laws=len(LAWS), answer=full.verdict.answer, names=", ".join(full.names).replace("_", " "),
+        grade=full.verdict.grade, probability=full.verdict.probability, before=check.before, after=check.after,
+        sentence=" ".join(f"What the model left out: {t.sentence()}." for t in full.fit.terms),
+        rival=check.rival, decoy=check.decoy, cubic="yes" if full.names == ("cubic_spring",) else "no", sine=sine,
+        arrow=arrow, answer_2=reduced.verdict.answer, reason_2=reduced.verdict.reason.replace("_", " "),
+        best_2=best_score.family.replace("_", " "),
         best_fit=f"{fits[0][0]:.1f} % of the multisine and {fits[1][0]:.1f} % of the arrow",
         r2_y=r2["displacement"], r2_v=max(0.0, r2["velocity"]), r2_t=max(0.0, r2["time"]),
-        laws=table(["model", "gain [nats]", "amount", "multisine never used", "arrow"], law_rows(case, told)),
+        laws=table(["model", "gain [nats]", "amount", "multisine never used", "arrow"], law_rows(case, full)),
     )  # fmt: skip
 
 
 def main(arguments):
     """Write the page and its pictures."""
-    found = analyse(folder_of("nonlinear_silverbox", arguments))
-    draw_latent(found, DOCS / "silverbox_latent.svg")
-    draw_arrow(*found["told nothing"], DOCS / "silverbox_arrow.svg")
-    text = page(found)
+    results = analyse(folder_of("nonlinear_silverbox", arguments))
+    draw_latent(results, DOCS / "silverbox_latent.svg")
+    draw_arrow(*results["told nothing"], DOCS / "silverbox_arrow.svg")
+    text = page(results)
     (DOCS / "silverbox.md").write_text(text, encoding="utf-8")
     print(text)
 

@@ -58,13 +58,13 @@ def published_model(location: str) -> PublishedModel:
     n = 2 * len(keys)
     a, b, c, pole, residue = np.zeros((n, n)), np.zeros(n), np.zeros(n), [], []
     for i, key in enumerate(keys):
-        part = slice(2 * i, 2 * i + 2)
-        a[part, part], c[part] = state_matrix(PAIRS[key]), output_row(PAIRS[key])
-        b[part] = c[part] * (1.0, -1.0)
-        values, vectors = np.linalg.eig(a[part, part])
+        block = slice(2 * i, 2 * i + 2)
+        a[block, block], c[block] = state_matrix(PAIRS[key]), output_row(PAIRS[key])
+        b[block] = c[block] * (1.0, -1.0)
+        values, vectors = np.linalg.eig(a[block, block])
         upper = int(np.argmax(values.imag))
         pole.append(values[upper])
-        residue.append(2.0 * (c[part] @ vectors[:, upper]) * (np.linalg.inv(vectors)[upper] @ b[part]))
+        residue.append(2.0 * (c[block] @ vectors[:, upper]) * (np.linalg.inv(vectors)[upper] @ b[block]))
     frequency, damping = modal_parameters(np.array(pole), RATE)
     bands = tuple(BANDS[band] for _, band in keys)
     return PublishedModel(location, a, b, c, bands, frequency, damping, np.array(residue))

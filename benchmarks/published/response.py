@@ -34,9 +34,9 @@ def paper_response(section, ballast, railpad):
     gain = ACCELERATION_PER_IMPULSE / np.max(np.abs(model.residue))
 
     def response(rng):
-        chance = 1.0 + SPREAD * rng.standard_normal(len(pole))
+        scatter = 1.0 + SPREAD * rng.standard_normal(len(pole))
         damping = 1.0 + SPREAD * rng.standard_normal(len(pole))
-        s = (pole.real * damping + 1j * pole.imag) * scale * chance
+        s = (pole.real * damping + 1j * pole.imag) * scale * scatter
         return gain * np.real(model.residue[:, None] * np.exp(s[:, None] * time)).sum(axis=0)
 
     return response

@@ -127,9 +127,9 @@ def hammer_test(
 def _modes(model, n_impact, spread, shift, nuisance, rng):
     """(frequency, damping, residue) of every impact, (n_impact, n_mode) each; unmodelled modes come last."""
     n_mode = len(model.frequency)
-    chance = 1.0 + spread * rng.standard_normal((2, n_impact, n_mode))
-    frequency = model.frequency * np.asarray(shift, float)[:n_mode] * chance[0]
-    damping = np.clip(model.damping * chance[1], 1e-4, 0.95)
+    scatter = 1.0 + spread * rng.standard_normal((2, n_impact, n_mode))
+    frequency = model.frequency * np.asarray(shift, float)[:n_mode] * scatter[0]
+    damping = np.clip(model.damping * scatter[1], 1e-4, 0.95)
     residue = np.broadcast_to(model.residue, (n_impact, n_mode))
     largest = np.max(np.abs(model.residue))
     for extra in nuisance:

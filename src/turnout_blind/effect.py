@@ -16,7 +16,7 @@ STRATA = ("single", "outside", "unidentifiable")
 
 
 @dataclass(frozen=True)
-class Drawn:
+class ConcealedEffect:
     """One concealed effect in SI units: where it is and its ``parameters``.
 
     ``where`` holds those of "position", "sleeper", "sensor", "train" and "axle" that apply.
@@ -50,10 +50,10 @@ class Effect:
         if self.locked_to not in LOCKS or self.stratum not in STRATA:
             raise ValueError(f"effect {self.kind!r}: locked to {self.locked_to!r} or stratum {self.stratum!r} unknown")
 
-    def concealed(self, rng, site, rung):
+    def draw_concealed(self, rng, site, rung):
         """A ``ConcealedEffect`` at ``rung`` of the ladder, counted from 0."""
         where, parameters = self.draw(rng, site, self.ladder[rung])
-        return Drawn(self.kind, self.locked_to, where, parameters, rung)
+        return ConcealedEffect(self.kind, self.locked_to, where, parameters, rung)
 
 
 def load_effects(*folders):
@@ -63,7 +63,7 @@ def load_effects(*folders):
     >>> sorted(load_effects())[:3]
     ['ballast', 'bilinear_clip', 'bottomless_void']
     """
-    found = {}
+    effects = {}
     for folder in (Path(__file__).with_name("effects"), *map(Path, folders)):
         for path in sorted(folder.glob("*.py")):
             if path.name.startswith("_"):
@@ -74,29 +74,29 @@ def load_effects(*folders):
             effect = getattr(module, "EFFECT", None)
             if not isinstance(effect, Effect):
                 raise ValueError(f"{path}: defines no EFFECT of class turnout_blind.effect.Effect")
-            found[effect.kind] = effect
-    return found
+            effects[effect.kind] = effect
+    return effects
 
 
-def sign(rng):
+def draw_sign(rng):
     """+1 or -1 with equal probability."""
     return 1.0 if rng.random() < 0.5 else -1.0
 
 
-def sleeper_near(rng, site):
+def draw_sleeper(rng, site):
     """{"sleeper": index, "position": [m]} of a sleeper between the sensors, drawn uniformly."""
     low, high = min(site.sensors) - 0.35, max(site.sensors) + 0.35
-    inside = np.flatnonzero((site.world.place > low) & (site.world.place < high))
+    inside = np.flatnonzero((site.world.position > low) & (site.world.position < high))
     j = int(rng.choice(inside))
-    return {"sleeper": j, "position": float(site.world.place[j])}
+    return {"sleeper": j, "position": float(site.world.position[j])}
 
 
-def any_sensor(rng, site):
+def draw_sensor(rng, site):
     """{"sensor": name}, drawn uniformly."""
     return {"sensor": str(rng.choice(site.names()))}
 
 
-def any_axle(rng, site):
+def draw_axle(rng, site):
     """{"train", "axle"}, the train drawn uniformly and then one of its axles, counted from 1."""
     train = str(rng.choice(sorted(site.trains)))
     return {"train": train, "axle": int(rng.integers(1, site.trains[train].axles().size + 1))}

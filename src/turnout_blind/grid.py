@@ -37,8 +37,8 @@ class Grid:
 
     def rates(self, shift=0.0):
         """(n,) damping rate at the nodes, or ``shift`` steps beside them [1/s]. It grows cubically into the sponge."""
-        place = self.step * (np.arange(self.n) + shift)
-        edge = np.minimum(place, (self.n - 1) * self.step - place)
+        distance = self.step * (np.arange(self.n) + shift)
+        edge = np.minimum(distance, (self.n - 1) * self.step - distance)
         depth = np.clip(1.0 - edge / self.sponge, 0.0, 1.0) if self.sponge else np.zeros(self.n)
         return self.sponge_rate * depth**3
 
@@ -55,16 +55,16 @@ def stable_step(grid, rail):
     return 2.0 / np.sqrt(4.0 * fastest / grid.step**2 + rail.shear / rail.rotary)
 
 
-def spread(grid, places):
+def spread(grid, positions):
     """(first node, (n, 4) weights) of the cubic B-spline at each of ``positions`` [m]: a load 4 steps wide.
 
     >>> first, weights = spread(Grid(start=0.0, n=101), [5.05])
     >>> int(first[0]), round(float(weights[0].sum()), 12), round(float(weights[0] @ np.arange(4)), 12)
     (49, 1.0, 1.5)
     """
-    place = (np.atleast_1d(np.asarray(places, dtype=float)) - grid.start) / grid.step
-    node = np.floor(place).astype(np.int64)
-    s = place - node
+    coordinate = (np.atleast_1d(np.asarray(positions, dtype=float)) - grid.start) / grid.step
+    node = np.floor(coordinate).astype(np.int64)
+    s = coordinate - node
     weights = np.stack(
         [
             (1.0 - s) ** 3,
@@ -77,11 +77,11 @@ def spread(grid, places):
     return node - 1, weights / 6.0
 
 
-def read(grid, places):
+def interpolation_weights(grid, positions):
     """(first node, (n, 4) weights) of the cubic through the four nodes about each of ``positions`` [m]."""
-    place = (np.atleast_1d(np.asarray(places, dtype=float)) - grid.start) / grid.step
-    node = np.floor(place).astype(np.int64)
-    s = place - node
+    coordinate = (np.atleast_1d(np.asarray(positions, dtype=float)) - grid.start) / grid.step
+    node = np.floor(coordinate).astype(np.int64)
+    s = coordinate - node
     weights = np.stack(
         [
             -s * (s - 1.0) * (s - 2.0) / 6.0,

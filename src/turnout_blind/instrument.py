@@ -9,7 +9,7 @@ BITS = 16
 
 
 @dataclass(frozen=True)
-class Chain:
+class MeasurementChain:
     """One channel. ``gain`` is relative; ``mount`` [Hz] is the mounting resonance and ``quality`` its quality factor.
 
     ``coupling`` [Hz] is the corner of the amplifier. ``noise`` (rms), ``drift`` (random walk after one second) and
@@ -31,14 +31,14 @@ class Chain:
         return 2.0 * self.full_scale / 2**BITS
 
 
-def mounting(samples, rate, frequency, quality):
+def mounting_response(samples, rate, frequency, quality):
     """Output of a seismic sensor with that resonance: a second-order low-pass with gain 1 at low frequency."""
     omega = 2.0 * np.pi * frequency
     b, a = signal.bilinear([omega**2], [1.0, omega / quality, omega**2], rate)
     return signal.lfilter(b, a, samples)
 
 
-def amplified(chain, samples, rate, faults=()):
+def amplify(chain, samples, rate, faults=()):
     """Output of the amplifier for the true ``samples`` at ``rate`` [Hz].
 
     The mounting comes before the ``faults``, so that a saturated channel never exceeds its limit. ``faults`` are
@@ -46,18 +46,18 @@ def amplified(chain, samples, rate, faults=()):
     """
     x = np.asarray(samples, dtype=float)
     if chain.mount:
-        x = mounting(x, rate, chain.mount, chain.quality)
+        x = mounting_response(x, rate, chain.mount, chain.quality)
     for fault in faults:
         x = fault(x, rate)
     return x
 
 
-def digitised(chain, samples, rate, down, rng, faults=()):
+def digitise(chain, samples, rate, decimation, rng, faults=()):
     """(n // decimation,) recorded values of the true ``samples`` at ``rate`` [Hz], with ``faults``."""
-    x = amplified(chain, samples, rate, faults)
+    x = amplify(chain, samples, rate, faults)
     if chain.coupling:
         x = signal.sosfilt(signal.butter(1, chain.coupling, "high", fs=rate, output="sos"), x)
-    x = signal.sosfilt(signal.butter(6, 0.4 * rate / down, fs=rate, output="sos"), x)[::down]
-    walk = np.cumsum(rng.normal(size=x.size)) * chain.drift / np.sqrt(rate / down)
-    x = chain.gain * x + walk + chain.noise * rng.normal(size=x.size)
+    x = signal.sosfilt(signal.butter(6, 0.4 * rate / decimation, fs=rate, output="sos"), x)[::decimation]
+    drift = np.cumsum(rng.normal(size=x.size)) * chain.drift / np.sqrt(rate / decimation)
+    x = chain.gain * x + drift + chain.noise * rng.normal(size=x.size)
     return chain.step * np.clip(np.round(x / chain.step), -(2 ** (BITS - 1)), 2 ** (BITS - 1) - 1)

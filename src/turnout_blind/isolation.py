@@ -21,59 +21,65 @@ def hidden_command(command, folders):
     return ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c", inner]
 
 
-def method():
+def isolation_method():
     """ "unshare" where namespaces are allowed, else "modes" for an ordinary user, else "" (nothing can hide)."""
     if shutil.which("unshare"):
-        tried = subprocess.run(hidden_command(["true"], ["/mnt"]), capture_output=True)
-        if tried.returncode == 0:
+        result = subprocess.run(hidden_command(["true"], ["/mnt"]), capture_output=True)
+        if result.returncode == 0:
             return "unshare"
     return "" if os.geteuid() == 0 else "modes"
 
 
-class Hidden:
+class HiddenFolders:
     """``with HiddenFolders(truth, more_folders) as hidden: hidden.run(command)``: ``command`` cannot read ``truth``.
 
     ``more_folders`` (the code of the generator) are hidden as well where the method allows it. On entry a canary file
     is written into ``truth``, and reading it is tried inside. BlindError if that succeeds, or if no method works.
     """
 
-    def __init__(self, truth, more=()):
-        self.truth, self.more, self.how = Path(truth).resolve(), tuple(Path(f).resolve() for f in more), method()
+    def __init__(self, truth, more_folders=()):
+        self.truth, self.more_folders, self.method = (
+            Path(truth).resolve(),
+            tuple(Path(f).resolve() for f in more_folders),
+            isolation_method(),
+        )
 
     def __enter__(self):
-        if not self.how:
-            found = "neither namespaces nor file modes can hide it from this user"
-            raise BlindError(self.truth, "isolation", found, "Run as an ordinary user, or where unshare is allowed")
+        if not self.method:
+            problem = "neither namespaces nor file modes can hide it from this user"
+            raise BlindError(self.truth, "isolation", problem, "Run as an ordinary user, or where unshare is allowed")
         canary = self.truth / CANARY
         canary.write_text("who can read this knows the truth\n")
         self._modes = self.truth.stat().st_mode
-        if self.how == "modes":
+        if self.method == "modes":
             self.truth.chmod(0)
-        tried = [self._try(["cat", str(canary)])]
-        tried.append(self._try(["sh", "-c", f"umount {shlex.quote(str(self.truth))}; cat {shlex.quote(str(canary))}"]))
-        tried.append(self._try(["ls", str(self.truth)]))
-        self.canary = {"read": tried[0], "unmounted_and_read": tried[1], "listed": tried[2]}
-        if any(tried):
+        leaks = [self._shows_output(["cat", str(canary)])]
+        leaks.append(
+            self._shows_output(["sh", "-c", f"umount {shlex.quote(str(self.truth))}; cat {shlex.quote(str(canary))}"])
+        )
+        leaks.append(self._shows_output(["ls", str(self.truth)]))
+        self.canary = {"read": leaks[0], "unmounted_and_read": leaks[1], "listed": leaks[2]}
+        if any(leaks):
             self.__exit__(None, None, None)
             raise BlindError(
-                canary, "isolation", f"can be read from inside ({self.how})", "Nothing is blind here: stop"
+                canary, "isolation", f"can be read from inside ({self.method})", "Nothing is blind here: stop"
             )
         return self
 
     def __exit__(self, *_):
-        if self.how == "modes":
+        if self.method == "modes":
             self.truth.chmod(self._modes & 0o7777)
         (self.truth / CANARY).unlink(missing_ok=True)
 
-    def _try(self, command):
+    def _shows_output(self, command):
         """True if the command, run inside, printed anything."""
-        done = self.run(command, capture_output=True, text=True)
-        return bool(done.stdout.strip())
+        result = self.run(command, capture_output=True, text=True)
+        return bool(result.stdout.strip())
 
-    def inside(self, command):
+    def isolated_command(self, command):
         """``command`` (list), wrapped so that it runs inside."""
-        return hidden_command(command, [self.truth, *self.more]) if self.how == "unshare" else list(command)
+        return hidden_command(command, [self.truth, *self.more_folders]) if self.method == "unshare" else list(command)
 
     def run(self, command, **options):
         """subprocess.run of ``command`` (list) inside."""
-        return subprocess.run(self.inside(command), **options)
+        return subprocess.run(self.isolated_command(command), **options)

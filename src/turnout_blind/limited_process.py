@@ -8,12 +8,12 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-LOOK = 0.2  # interval at which a running process is polled [s]
-TOLD = 300  # length to which the last line of output is cut [characters]
+POLL_INTERVAL = 0.2  # interval at which a running process is polled [s]
+MAX_LINE_LENGTH = 300  # length to which the last line of output is cut [characters]
 
 
 @dataclass(frozen=True)
-class Ran:
+class ProcessResult:
     """Exit ``code`` (negative: a signal), output ``out`` and ``err``, ``cpu`` and ``wall`` [s].
 
     ``stop_reason`` says why the process was stopped, "" if it was not.
@@ -24,15 +24,15 @@ class Ran:
     err: str
     cpu: float
     wall: float
-    spent: str = ""
+    stop_reason: str = ""
 
     @property
-    def last_words(self):
+    def last_line(self):
         """Last line of output, or why the process was stopped."""
-        return self.spent or next(reversed((self.out + self.err).strip().splitlines()), "")[:TOLD]
+        return self.stop_reason or next(reversed((self.out + self.err).strip().splitlines()), "")[:MAX_LINE_LENGTH]
 
 
-def limited(command, cpu):
+def with_cpu_limit(command, cpu):
     """``command`` (list) with a limit of ``cpu`` [s], after which the system ends it by a signal."""
     soft = int(cpu)
     return ["sh", "-c", f"ulimit -S -t {soft}; ulimit -H -t {soft + 5}; exec {shlex.join(map(str, command))}"]
@@ -46,36 +46,36 @@ def run(command, folder, logs, wall, cpu):
     """
     logs = Path(logs)
     logs.mkdir(parents=True, exist_ok=True)
-    began = time.monotonic()
+    start = time.monotonic()
     with open(logs / "out.txt", "wb") as out, open(logs / "err.txt", "wb") as err:
         process = subprocess.Popen(command, stdout=out, stderr=err, cwd=folder, start_new_session=True)
         try:
-            status, usage, late = _until(process.pid, began + wall)
+            status, usage, timed_out = _wait_until(process.pid, start + wall)
         except BaseException:  # interrupted: leave no process running
             _kill(process.pid)
             os.wait4(process.pid, 0)
             raise
     process.returncode = code = os.waitstatus_to_exitcode(status)
-    used = usage.ru_utime + usage.ru_stime
-    spent = f"no answer within {wall:.0f} s of the clock" if late else ""
+    cpu_time = usage.ru_utime + usage.ru_stime
+    stop_reason = f"no answer within {wall:.0f} s of the clock" if timed_out else ""
     # the system counts in ticks and may stop a process before its exact CPU time reaches the limit
-    if not spent and (code == -signal.SIGXCPU or (code == -signal.SIGKILL and used >= 0.8 * cpu)):
-        spent = f"no answer within {cpu:.0f} s of the processor"
-    words = [(logs / name).read_text(encoding="utf-8", errors="replace") for name in ("out.txt", "err.txt")]
-    return Ran(code, *words, used, time.monotonic() - began, spent)
+    if not stop_reason and (code == -signal.SIGXCPU or (code == -signal.SIGKILL and cpu_time >= 0.8 * cpu)):
+        stop_reason = f"no answer within {cpu:.0f} s of the processor"
+    texts = [(logs / name).read_text(encoding="utf-8", errors="replace") for name in ("out.txt", "err.txt")]
+    return ProcessResult(code, *texts, cpu_time, time.monotonic() - start, stop_reason)
 
 
-def _until(pid, deadline):
+def _wait_until(pid, deadline):
     """(status, usage, whether it was killed at the deadline)."""
     while True:
-        found, status, usage = os.wait4(pid, os.WNOHANG)
-        if found:
+        finished_pid, status, usage = os.wait4(pid, os.WNOHANG)
+        if finished_pid:
             return status, usage, False
         if time.monotonic() > deadline:
             _kill(pid)
             _, status, usage = os.wait4(pid, 0)
             return status, usage, True
-        time.sleep(LOOK)
+        time.sleep(POLL_INTERVAL)
 
 
 def _kill(pid):

@@ -11,7 +11,7 @@ from pathlib import Path
 import turnout
 from turnout_blind.campaign import make_case
 from turnout_blind.effect import load_effects
-from turnout_blind.seal import SET, BlindError, commit, digest, digest_of_folder, seed_for, write_truth
+from turnout_blind.seal import SET_FILE, BlindError, digest, digest_of_folder, seed_for, write_commit, write_truth
 from turnout_blind.site import PLAIN
 from turnout_blind.strata import case_id, plan_cases
 
@@ -52,45 +52,47 @@ def make_set(
         raise BlindError(out, "cases", "a set is there already", "Choose another folder, or remove it")
     examines = digest_of_folder(Path(turnout.__file__).parent) if seed == "tool" else None
     if unknown := sorted(set(only or ()) - set(load_effects(*folders))):
-        there = ", ".join(sorted(load_effects(*folders)))
-        raise BlindError("--only", unknown[0], "no such kind", f"There are {there}")
-    about = _begun(truth, seed_for(examines) if examines else seed, full, folders, only, limit, panel)
-    seed = about["seed"]
+        available = ", ".join(sorted(load_effects(*folders)))
+        raise BlindError("--only", unknown[0], "no such kind", f"There are {available}")
+    set_info = _open_set(truth, seed_for(examines) if examines else seed, full, folders, only, limit, panel)
+    seed = set_info["seed"]
     plans = plan_cases(seed, load_effects(*folders), full, only, panel)[:limit]
     folders = tuple(map(str, folders))
     jobs = [(out / "cases", truth, case_id(seed, k), plan, folders, seed) for k, plan in enumerate(plans)]
-    waiting = [job for job in jobs if not _made(job)]
+    pending = [job for job in jobs if not _is_made(job)]
     with ProcessPoolExecutor(workers) as pool:
-        running = [pool.submit(_make, job) for job in waiting]
-        for made in (progress or (lambda done, total: done))(as_completed(running), len(running)):
-            made.result()
+        futures = [pool.submit(_make, job) for job in pending]
+        for future in (progress or (lambda finished, total: finished))(as_completed(futures), len(futures)):
+            future.result()
     shutil.rmtree(out / "unfinished", ignore_errors=True)
-    truths = {"set": digest((truth / SET).read_bytes())}
+    truths = {"set": digest((truth / SET_FILE).read_bytes())}
     truths |= {job[2]: digest((truth / f"{job[2]}.json").read_bytes()) for job in jobs}
-    return commit(out, truths, examines)
+    return write_commit(out, truths, examines)
 
 
-def _begun(truth, seed, full, folders, only, limit, panel):
+def _open_set(truth, seed, full, folders, only, limit, panel):
     """Content of set.json: seed and options of an interrupted set, or written now."""
-    wanted = {"full": full, "effects": sorted(map(str, folders)), "only": sorted(only or ()), "limit": limit}
-    wanted |= {
+    settings = {"full": full, "effects": sorted(map(str, folders)), "only": sorted(only or ()), "limit": limit}
+    settings |= {
         "panel": panel,
         "generator_sha256": digest_of_folder(Path(__file__).parent, "*.py"),
         "made_on": platform.machine(),
     }
-    path = truth / SET
+    path = truth / SET_FILE
     if not path.exists():
         seed = secrets.randbits(63) if seed is None else int(seed)
-        write_truth(truth, "set", {"seed": seed, **wanted}, seed)
+        write_truth(truth, "set", {"seed": seed, **settings}, seed)
         return json.loads(path.read_bytes())
-    held = json.loads(path.read_bytes())
-    other = [k for k, v in wanted.items() if held.get(k) != v] + (["seed"] if seed not in (None, held["seed"]) else [])
-    if other:
-        raise BlindError(path, other[0], "begun otherwise", "Go on as it was begun, or remove both folders")
-    return held
+    set_info = json.loads(path.read_bytes())
+    changed = [k for k, v in settings.items() if set_info.get(k) != v] + (
+        ["seed"] if seed not in (None, set_info["seed"]) else []
+    )
+    if changed:
+        raise BlindError(path, changed[0], "begun otherwise", "Go on as it was begun, or remove both folders")
+    return set_info
 
 
-def _made(job):
+def _is_made(job):
     cases, truth, case, *_ = job
     return (cases / case).is_dir() and (truth / f"{case}.json").exists()
 
@@ -98,11 +100,11 @@ def _made(job):
 def _make(job):
     """Make a case in a temporary folder, write its truth, then move it: an incomplete case is never taken for one."""
     cases, truth, case, plan, folders, seed = job
-    aside = cases.parent / "unfinished"
-    shutil.rmtree(aside / case, ignore_errors=True)
-    made = make_case(aside, case, plan, load_effects(*folders))
-    write_truth(truth, case, made, seed)
+    temporary = cases.parent / "unfinished"
+    shutil.rmtree(temporary / case, ignore_errors=True)
+    case_truth = make_case(temporary, case, plan, load_effects(*folders))
+    write_truth(truth, case, case_truth, seed)
     cases.mkdir(parents=True, exist_ok=True)
     shutil.rmtree(cases / case, ignore_errors=True)
-    os.replace(aside / case, cases / case)
+    os.replace(temporary / case, cases / case)
     return case

@@ -9,16 +9,16 @@ import numba
 import numpy as np
 from numba.extending import overload
 
-STEP = 1.0 / 60000.0
+TIME_STEP = 1.0 / 60000.0
 
 
-def _of(value, i):
+def _value_at(value, i):
     """``value`` at the ``i``-th node. For a uniform rail ``value`` is a constant."""
     return value[i] if isinstance(value, np.ndarray) else value
 
 
-@overload(_of)
-def _compiled_of(value, i):
+@overload(_value_at)
+def _compile_value_at(value, i):
     if isinstance(value, numba.types.Array):
         return lambda value, i: value[i]
     return lambda value, i: value
@@ -31,40 +31,42 @@ def _rail_step(beam, dt, v, turn, q, moment, w, f):
     for i in range(1, n - 1):
         d = 0.5 * dt * beam.rate[i]
         push = (q[i] - q[i - 1] + f[i]) / h
-        v[i] = (v[i] * (1.0 - d) + dt / _of(beam.mass, i) * push) / (1.0 + d)
+        v[i] = (v[i] * (1.0 - d) + dt / _value_at(beam.mass, i) * push) / (1.0 + d)
     for i in range(n - 1):
         d = 0.5 * dt * beam.rate_between[i]
         push = (moment[i + 1] - moment[i]) / h + q[i]
-        turn[i] = (turn[i] * (1.0 - d) + dt / _of(beam.rotary, i) * push) / (1.0 + d)
+        turn[i] = (turn[i] * (1.0 - d) + dt / _value_at(beam.rotary, i) * push) / (1.0 + d)
     for i in range(n - 1):
-        q[i] += dt * _of(beam.shear, i) * ((v[i + 1] - v[i]) / h - turn[i])
+        q[i] += dt * _value_at(beam.shear, i) * ((v[i + 1] - v[i]) / h - turn[i])
     for i in range(1, n - 1):
-        moment[i] += dt * _of(beam.bending, i) / h * (turn[i] - turn[i - 1])
+        moment[i] += dt * _value_at(beam.bending, i) / h * (turn[i] - turn[i - 1])
         w[i] += dt * v[i]
 
 
 @numba.njit(cache=True)
-def _at(x, first, weights):
+def _interpolate(x, first, weights):
     return x[first] * weights[0] + x[first + 1] * weights[1] + x[first + 2] * weights[2] + x[first + 3] * weights[3]
 
 
 @numba.njit(cache=True)
-def _push(f, first, weights, force):
+def _add_force(f, first, weights, force):
     for k in range(4):
         f[first + k] += weights[k] * force
 
 
 @numba.njit(cache=True)
-def _ballast(s, j, y, rate, t):
+def _ballast_force(s, j, y, rate, t):
     k = s.ballast[j] * (1.0 + s.drift[j] * t)
     if s.gap[j] < 0.0:
         return k * y * (1.0 + s.hardening[j] * abs(y)) + s.ballast_damping[j] * rate
-    held = s.seated[j] * (k * y + s.ballast_damping[j] * rate)
+    seated_force = s.seated[j] * (k * y + s.ballast_damping[j] * rate)
     d = y - s.gap[j]
     if d <= 0.0:
-        return held
-    shut = 1.0 - np.exp(-d / s.close[j])
-    return held + (1.0 - s.seated[j]) * max(0.0, k * (d - s.close[j] * shut) + s.ballast_damping[j] * rate * shut)
+        return seated_force
+    closure = 1.0 - np.exp(-d / s.close[j])
+    return seated_force + (1.0 - s.seated[j]) * max(
+        0.0, k * (d - s.close[j] * closure) + s.ballast_damping[j] * rate * closure
+    )
 
 
 @numba.njit(cache=True)
@@ -72,15 +74,15 @@ def _support_step(s, dt, t, w, v, f, y, rate, branch, last, decay, grow, force):
     n, nb = y.size, decay.size
     force[:] = 0.0
     for j in range(n):
-        r = _at(w, s.first[j], s.weights[j]) - y[j]
+        r = _interpolate(w, s.first[j], s.weights[j]) - y[j]
         pad = s.pad[j] * (r if r >= 0.0 else r * s.lift[j])
-        pad += s.pad_damping[j] * (_at(v, s.first[j], s.weights[j]) - rate[j])
+        pad += s.pad_damping[j] * (_interpolate(v, s.first[j], s.weights[j]) - rate[j])
         for b in range(nb):
             branch[b, j] = branch[b, j] * decay[b] + s.branch_share[b] * s.pad[j] * (r - last[j]) * grow[b]
             pad += branch[b, j]
         last[j] = r
-        _push(f, s.first[j], s.weights[j], -pad)
-        force[j] += pad - _ballast(s, j, y[j], rate[j], t)
+        _add_force(f, s.first[j], s.weights[j], -pad)
+        force[j] += pad - _ballast_force(s, j, y[j], rate[j], t)
         if j + 1 < n:
             link = s.shear[j] * (y[j + 1] - y[j]) + s.shear_damping[j] * (rate[j + 1] - rate[j])
             force[j] += link
@@ -91,32 +93,32 @@ def _support_step(s, dt, t, w, v, f, y, rate, branch, last, decay, grow, force):
 
 
 @numba.njit(cache=True)
-def _rider_step(r, dt, w, v, f, y, rate):
+def _attached_mass_step(r, dt, w, v, f, y, rate):
     for j in range(y.size):
-        d = _at(w, r.first[j], r.weights[j]) - y[j]
-        force = r.stiffness[j] * d + r.damping[j] * (_at(v, r.first[j], r.weights[j]) - rate[j])
+        d = _interpolate(w, r.first[j], r.weights[j]) - y[j]
+        force = r.stiffness[j] * d + r.damping[j] * (_interpolate(v, r.first[j], r.weights[j]) - rate[j])
         if d > r.play[j]:
             force += r.stop[j] * (d - r.play[j])
         elif d < -r.play[j]:
             force += r.stop[j] * (d + r.play[j])
-        _push(f, r.first[j], r.weights[j], -force)
+        _add_force(f, r.first[j], r.weights[j], -force)
         rate[j] += dt * force / r.mass[j]
         y[j] += dt * rate[j]
 
 
 @numba.njit(cache=True)
-def _path(wheels, i, x):
-    place = (x - wheels.path_start) / wheels.path_step
-    k = int(np.floor(place))
+def _path_height(wheels, i, x):
+    coordinate = (x - wheels.path_start) / wheels.path_step
+    k = int(np.floor(coordinate))
     if k < 1 or k > wheels.path.shape[1] - 3:
         return 0.0
-    s = place - k
+    s = coordinate - k
     a, b, c, d = wheels.path[i, k - 1], wheels.path[i, k], wheels.path[i, k + 1], wheels.path[i, k + 2]
     return b + 0.5 * s * (c - a + s * (2.0 * a - 5.0 * b + 4.0 * c - d + s * (3.0 * (b - c) + d - a)))
 
 
 @numba.njit(cache=True)
-def hertz(stiffness, local, approach, guess):
+def hertz_force(stiffness, local, approach, guess):
     """Contact force [N] of F = k max(0, approach - local F)^1.5 by Newton's method from ``guess``; 0 if apart."""
     if approach <= 0.0:
         return 0.0
@@ -135,36 +137,36 @@ def hertz(stiffness, local, approach, guess):
 
 
 @numba.njit(cache=True)
-def _hold(roll, x):
-    if x <= roll.hold or x >= roll.left:
+def _contact_share(motion, x):
+    if x <= motion.engage_start or x >= motion.release_end:
         return 0.0
     s = 1.0
-    if x < roll.held:
-        s = (x - roll.hold) / (roll.held - roll.hold)
-    elif x > roll.leave:
-        s = (roll.left - x) / (roll.left - roll.leave)
+    if x < motion.engage_end:
+        s = (x - motion.engage_start) / (motion.engage_end - motion.engage_start)
+    elif x > motion.release_start:
+        s = (motion.release_end - x) / (motion.release_end - motion.release_start)
     return s * s * (3.0 - 2.0 * s)
 
 
 @numba.njit(cache=True)
-def _wheel_forces(wheels, roll, grid_start, h, n, t, w, f, z, contact, stencil):
+def _wheel_forces(wheels, motion, grid_start, h, n, t, w, f, z, contact, stencil):
     for i in range(z.size):
-        x = roll.start + roll.speed * t - wheels.behind[i]
-        share = _hold(roll, x)
-        rest = (wheels.load[i] / wheels.stiffness[i]) ** (2.0 / 3.0) + wheels.local * wheels.load[i]
+        x = motion.start + motion.speed * t - wheels.distance_behind[i]
+        share = _contact_share(motion, x)
+        static_approach = (wheels.load[i] / wheels.stiffness[i]) ** (2.0 / 3.0) + wheels.local * wheels.load[i]
         if share == 0.0:
-            contact[i] = hertz(wheels.stiffness[i], wheels.local, z[i] + rest, contact[i])
+            contact[i] = hertz_force(wheels.stiffness[i], wheels.local, z[i] + static_approach, contact[i])
             continue
-        place = (x - grid_start) / h
-        k = int(np.floor(place))
-        s = place - k
+        coordinate = (x - grid_start) / h
+        k = int(np.floor(coordinate))
+        s = coordinate - k
         stencil[0] = (1.0 - s) ** 3 / 6.0
         stencil[1] = (3.0 * s**3 - 6.0 * s**2 + 4.0) / 6.0
         stencil[2] = (-3.0 * s**3 + 3.0 * s**2 + 3.0 * s + 1.0) / 6.0
         stencil[3] = s**3 / 6.0
-        below = _at(w, k - 1, stencil) + _path(wheels, i, x)
-        contact[i] = hertz(wheels.stiffness[i], wheels.local, z[i] - share * below + rest, contact[i])
-        _push(f, k - 1, stencil, share * contact[i])
+        height = _interpolate(w, k - 1, stencil) + _path_height(wheels, i, x)
+        contact[i] = hertz_force(wheels.stiffness[i], wheels.local, z[i] - share * height + static_approach, contact[i])
+        _add_force(f, k - 1, stencil, share * contact[i])
 
 
 @numba.njit(cache=True)
@@ -200,7 +202,7 @@ def _car_step(cars, wheels, dt, z, zv, b, bv, contact):
 
 
 @numba.njit(cache=True)
-def march(n_step, dt, grid_start, beam, supports, riders, cars, wheels, roll, blow, first, weights, every):
+def march(n_step, dt, grid_start, beam, supports, attached_masses, cars, wheels, motion, hammer, first, weights, every):
     """(velocities (n_step, n_sensor) [m/s], hammer force, wheel forces, last state).
 
     Velocities are those half a step after each whole step. Wheel forces are stored every ``every`` steps. The state is
@@ -213,34 +215,34 @@ def march(n_step, dt, grid_start, beam, supports, riders, cars, wheels, roll, bl
     decay = np.exp(-supports.branch_rate * dt)
     grow = (1.0 - decay) / (supports.branch_rate * dt)
     branch, last, force = np.zeros((decay.size, y.size)), np.zeros(y.size), np.zeros(y.size)
-    ry, rrate = np.zeros(riders.mass.size), np.zeros(riders.mass.size)
+    ry, rrate = np.zeros(attached_masses.mass.size), np.zeros(attached_masses.mass.size)
     z, zv, contact = np.zeros(wheels.mass.size), np.zeros(wheels.mass.size), wheels.load.copy()
     b, bv = np.zeros(6 * cars.body.size), np.zeros(6 * cars.body.size)
-    stencil, hit, head, head_speed = np.zeros(4), 0, 0.0, 0.0
-    out, hammer = np.zeros((n_step, first.size)), np.zeros(n_step)
-    kept = np.zeros((n_step // every + 1, z.size))
+    stencil, n_impacts, head_position, head_speed = np.zeros(4), 0, 0.0, 0.0
+    out, hammer_force = np.zeros((n_step, first.size)), np.zeros(n_step)
+    wheel_forces = np.zeros((n_step // every + 1, z.size))
     for step in range(n_step):
         t = step * dt
         f[:] = 0.0
         _support_step(supports, dt, t, w, v, f, y, rate, branch, last, decay, grow, force)
-        _rider_step(riders, dt, w, v, f, ry, rrate)
+        _attached_mass_step(attached_masses, dt, w, v, f, ry, rrate)
         if z.size:
-            _wheel_forces(wheels, roll, grid_start, beam.step, n, t, w, f, z, contact, stencil)
+            _wheel_forces(wheels, motion, grid_start, beam.step, n, t, w, f, z, contact, stencil)
             _car_step(cars, wheels, dt, z, zv, b, bv, contact)
             if step % every == 0:
-                kept[step // every] = contact
-        if blow.mass > 0.0:
-            if hit < blow.times.size and t >= blow.times[hit]:
-                head, head_speed = _at(w, blow.first, blow.weights), blow.velocities[hit]
-                hit += 1
-            d = head - _at(w, blow.first, blow.weights)
+                wheel_forces[step // every] = contact
+        if hammer.mass > 0.0:
+            if n_impacts < hammer.times.size and t >= hammer.times[n_impacts]:
+                head_position, head_speed = _interpolate(w, hammer.first, hammer.weights), hammer.velocities[n_impacts]
+                n_impacts += 1
+            d = head_position - _interpolate(w, hammer.first, hammer.weights)
             if d > 0.0:
-                closing = head_speed - _at(v, blow.first, blow.weights)
-                hammer[step] = max(0.0, blow.tip * d**1.5 * (1.0 + blow.loss * closing))
-                _push(f, blow.first, blow.weights, hammer[step])
-            head_speed -= dt * hammer[step] / blow.mass
-            head += dt * head_speed
+                closing = head_speed - _interpolate(v, hammer.first, hammer.weights)
+                hammer_force[step] = max(0.0, hammer.tip * d**1.5 * (1.0 + hammer.loss * closing))
+                _add_force(f, hammer.first, hammer.weights, hammer_force[step])
+            head_speed -= dt * hammer_force[step] / hammer.mass
+            head_position += dt * head_speed
         _rail_step(beam, dt, v, turn, q, moment, w, f)
         for k in range(first.size):
-            out[step, k] = _at(v, first[k], weights[k])
-    return out, hammer, kept, (w, v, turn, q, moment, y, rate)
+            out[step, k] = _interpolate(v, first[k], weights[k])
+    return out, hammer_force, wheel_forces, (w, v, turn, q, moment, y, rate)

@@ -50,7 +50,7 @@ class Supports(NamedTuple):
     branch_rate: np.ndarray
 
 
-class Riders(NamedTuple):
+class AttachedMasses(NamedTuple):
     """Masses attached to the rail by a spring, with stops of stiffness ``stop`` at ``play`` [m] on both sides."""
 
     first: np.ndarray
@@ -86,7 +86,7 @@ class Wheels(NamedTuple):
 
     mass: np.ndarray
     load: np.ndarray
-    behind: np.ndarray
+    distance_behind: np.ndarray
     stiffness: np.ndarray
     local: float
     path: np.ndarray
@@ -94,7 +94,7 @@ class Wheels(NamedTuple):
     path_step: float
 
 
-class Roll(NamedTuple):
+class WheelMotion(NamedTuple):
     """Position of the first wheel at time 0 [m] and speed [m/s].
 
     A wheel engages the rail gradually from ``engage_start`` to ``engage_end`` and releases it from ``release_start`` to
@@ -103,13 +103,13 @@ class Roll(NamedTuple):
 
     start: float
     speed: float
-    hold: float
-    held: float
-    leave: float
-    left: float
+    engage_start: float
+    engage_end: float
+    release_start: float
+    release_end: float
 
 
-class Blow(NamedTuple):
+class Hammer(NamedTuple):
     """Hammer with ``velocities`` and ``times`` of its impacts and tip force k d^1.5 (1 + loss d'). ``mass`` 0: none."""
 
     first: int

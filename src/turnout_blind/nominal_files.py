@@ -27,10 +27,10 @@ def write_configuration(folder, turnout, site):
 def layout(site):
     """Sections at the sensors, channels of hammer tests and passages."""
     lines = ["description: four sensors on the rail of one track", "sections:"]
-    for i, place in enumerate(site.sensors, 1):
-        lines += [f"  S{i}:", "    panel: CLP", "    track: main", f"    position: {place:.2f}", "    hammer:"]
+    for i, position in enumerate(site.sensors, 1):
+        lines += [f"  S{i}:", "    panel: CLP", "    track: main", f"    position: {position:.2f}", "    hammer:"]
         lines += [f"      response: A{i}", "      channels:"]
-        lines += [f"        A{k}: {{offset: {x - place:.2f}}}" for k, x in enumerate(site.sensors, 1)]
+        lines += [f"        A{k}: {{offset: {x - position:.2f}}}" for k, x in enumerate(site.sensors, 1)]
     lines += ["hammer:", '  files: "hammer/{campaign}/{section}_{test}.{ext}"', "  format: npz", "  rate: 20000"]
     lines += ["  records: 6", "  samples: 5000", "  time_zone: UTC", "  force: force", "  response: A1", "  channels:"]
     lines += [
@@ -43,16 +43,16 @@ def layout(site):
     return "\n".join(lines) + "\n"
 
 
-def _channel(chain, name, more):
+def _channel(chain, name, suffix):
     return (
         f"    {name}: {{source: {name}, quantity: acceleration, unit: m/s², mounting: rail web, "
-        f"limit: {chain.full_scale:g}, resolution: {chain.step:.6g}{more}}}"
+        f"limit: {chain.full_scale:g}, resolution: {chain.step:.6g}{suffix}}}"
     )
 
 
 def _value(value, unit, prior=None):
-    more = "" if prior is None else f", prior: {prior}"
-    return f'{{value: {value:.6g}, unit: "{unit}", source: register{more}}}'
+    prior_text = "" if prior is None else f", prior: {prior}"
+    return f'{{value: {value:.6g}, unit: "{unit}", source: register{prior_text}}}'
 
 
 def track(site):
@@ -86,9 +86,9 @@ def _casting(crossing):
 
 def _nose(c):
     """The nose of the crossing, with priors as wide as an estimate deserves."""
-    place, share = _value(c.nose, "m", round(0.05 / c.nose, 4)), _value(c.share, "-", 0.2)
+    position, share = _value(c.nose, "m", round(0.05 / c.nose, 4)), _value(c.share, "-", 0.2)
     depth, length = _value(1e3 * c.depth, "mm", 0.4), _value(c.length, "m", 0.2)
-    return f"{{kind: kink, place: {place}, depth: {depth}, length: {length}, share: {share}}}"
+    return f"{{kind: kink, place: {position}, depth: {depth}, length: {length}, share: {share}}}"
 
 
 def _support(v):
@@ -134,9 +134,9 @@ def patterns(trains):
     """Axle patterns of the trains."""
     lines = ["vehicles:"]
     for name, train in trains.items():
-        places = ", ".join(f"{x:.3f}" for x in train.axles())
+        positions = ", ".join(f"{x:.3f}" for x in train.axles())
         length = sum(c.length for c in train.cars)
-        lines.append(f'  {name}_unit: {{length: {length:.2f}, axles: [{places}], source: "{SOURCE}"}}')
+        lines.append(f'  {name}_unit: {{length: {length:.2f}, axles: [{positions}], source: "{SOURCE}"}}')
     lines.append("trains:")
     for name in trains:
         lines += [f"  {name}:", f"    units: [{name}_unit]"]

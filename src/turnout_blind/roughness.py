@@ -2,10 +2,10 @@
 
 import numpy as np
 
-SHORTEST, LONGEST = 0.02, 3.0  # wavelengths [m]
-TREAD = 8192  # points round a wheel, a third of a millimetre apart
-PATCH = 0.006  # half length of the contact patch [m], which filters short waves
-SLOPE = 18.0  # level per decade of wavelength [dB], as in measured spectra of ground rail in service
+MIN_WAVELENGTH, MAX_WAVELENGTH = 0.02, 3.0  # wavelengths [m]
+N_TREAD_POINTS = 8192  # points round a wheel, a third of a millimetre apart
+CONTACT_HALF_LENGTH = 0.006  # half length of the contact patch [m], which filters short waves
+LEVEL_SLOPE = 18.0  # level per decade of wavelength [dB], as in measured spectra of ground rail in service
 
 
 def level(wavelength, at_10_cm):
@@ -14,12 +14,12 @@ def level(wavelength, at_10_cm):
     >>> level(0.1, 2.0), level(1.0, 2.0)
     (2.0, 20.0)
     """
-    return float(at_10_cm + SLOPE * np.log10(wavelength / 0.1))
+    return float(at_10_cm + LEVEL_SLOPE * np.log10(wavelength / 0.1))
 
 
 def patch_share(wavelength):
     """Share of the variance that moves a wheel: exp(-(2 pi a / wavelength)^2), approximating Remington's filter."""
-    return np.exp(-((2.0 * np.pi * PATCH / np.asarray(wavelength)) ** 2))
+    return np.exp(-((2.0 * np.pi * CONTACT_HALF_LENGTH / np.asarray(wavelength)) ** 2))
 
 
 def rail_roughness(rng, at_10_cm, waves=420):
@@ -27,20 +27,20 @@ def rail_roughness(rng, at_10_cm, waves=420):
 
     Wavelengths are uniform in the logarithm. The cosines of each third octave share the variance of its level.
     """
-    edges = np.geomspace(SHORTEST, LONGEST, waves + 1)
+    edges = np.geomspace(MIN_WAVELENGTH, MAX_WAVELENGTH, waves + 1)
     length = np.exp(rng.uniform(np.log(edges[:-1]), np.log(edges[1:])))
     share = np.log2(edges[1:] / edges[:-1]) * 3.0
-    variance = 1e-12 * 10.0 ** ((at_10_cm + SLOPE * np.log10(length / 0.1)) / 10.0) * share * patch_share(length)
+    variance = 1e-12 * 10.0 ** ((at_10_cm + LEVEL_SLOPE * np.log10(length / 0.1)) / 10.0) * share * patch_share(length)
     phase = rng.uniform(0.0, 2.0 * np.pi, waves)
-    amplitude, number = np.sqrt(2.0 * variance), 2.0 * np.pi / length
+    amplitude, wavenumber = np.sqrt(2.0 * variance), 2.0 * np.pi / length
 
-    seen = {}
+    cache = {}
 
     def dips(x):
         key = (x[0], x[-1], x.size)
-        if key not in seen:
-            seen[key] = np.sum(amplitude[:, None] * np.cos(np.outer(number, x) + phase[:, None]), axis=0)
-        return seen[key]
+        if key not in cache:
+            cache[key] = np.sum(amplitude[:, None] * np.cos(np.outer(wavenumber, x) + phase[:, None]), axis=0)
+        return cache[key]
 
     return dips
 
@@ -53,15 +53,15 @@ def wheel_roughness(rng, at_10_cm, radius, orders=130):
     order = np.arange(1, orders + 1)
     length = 2.0 * np.pi * radius / order
     width = np.log2((order + 0.5) / (order - 0.5)) * 3.0
-    variance = 1e-12 * 10.0 ** ((at_10_cm + SLOPE * np.log10(length / 0.1)) / 10.0) * width * patch_share(length)
+    variance = 1e-12 * 10.0 ** ((at_10_cm + LEVEL_SLOPE * np.log10(length / 0.1)) / 10.0) * width * patch_share(length)
     amplitude = np.sqrt(2.0 * variance) * rng.rayleigh(0.8, orders)
     amplitude[:3] = rng.uniform(1e-5, 3e-5, 3)
-    turn = rng.uniform(0.0, 2.0 * np.pi, orders)
+    phases = rng.uniform(0.0, 2.0 * np.pi, orders)
 
-    angle = np.linspace(0.0, 2.0 * np.pi, TREAD + 1)
-    spectrum = np.zeros(TREAD // 2 + 1, dtype=complex)
-    spectrum[order] = 0.5 * TREAD * amplitude * np.exp(1j * turn)
-    tread = np.fft.irfft(spectrum, TREAD)
+    angle = np.linspace(0.0, 2.0 * np.pi, N_TREAD_POINTS + 1)
+    spectrum = np.zeros(N_TREAD_POINTS // 2 + 1, dtype=complex)
+    spectrum[order] = 0.5 * N_TREAD_POINTS * amplitude * np.exp(1j * phases)
+    tread = np.fft.irfft(spectrum, N_TREAD_POINTS)
     tread = np.append(tread, tread[0])
 
     def dips(x, phase):

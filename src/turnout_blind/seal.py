@@ -6,14 +6,14 @@ from pathlib import Path
 
 from turnout.errors import TurnoutError
 
-COMMIT, SET, FORMAT = "commit.json", "set.json", 1
+COMMIT_FILE, SET_FILE, FORMAT_VERSION = "commit.json", "set.json", 1
 
 
 class BlindError(TurnoutError):
     """A blind set does not match its seals, or cannot be kept blind."""
 
-    def __init__(self, path, where, found, remedy):
-        super().__init__(f"{path}, {where}: {found}. {remedy}.")
+    def __init__(self, path, where, problem, remedy):
+        super().__init__(f"{path}, {where}: {problem}. {remedy}.")
 
 
 def digest(data):
@@ -27,11 +27,11 @@ def digest(data):
 
 def digest_of_folder(folder, pattern="*"):
     """SHA-256 over names and contents of all matching files below ``folder``, sorted by name, without caches."""
-    whole = hashlib.sha256()
+    hasher = hashlib.sha256()
     for path in sorted(Path(folder).rglob(pattern)):
         if path.is_file() and "__pycache__" not in path.parts:
-            whole.update(f"{path.relative_to(folder).as_posix()}\0{digest(path.read_bytes())}\n".encode())
-    return whole.hexdigest()
+            hasher.update(f"{path.relative_to(folder).as_posix()}\0{digest(path.read_bytes())}\n".encode())
+    return hasher.hexdigest()
 
 
 def seed_for(tool_sha256):
@@ -51,14 +51,14 @@ def write_truth(folder, name, content, seed):
     return digest(data)
 
 
-def files_of(case):
+def file_digests(case):
     """{path below the case: SHA-256} of all files of a case."""
     return {
         p.relative_to(case).as_posix(): digest(p.read_bytes()) for p in sorted(Path(case).rglob("*")) if p.is_file()
     }
 
 
-def commit(out, truths, examines=None):
+def write_commit(out, truths, examines=None):
     """Write commit.json; returns its SHA-256.
 
     ``truths`` is {case: SHA-256 of its truth, "set": SHA-256 of set.json}. ``examines`` is the hash of the tool that
@@ -66,22 +66,24 @@ def commit(out, truths, examines=None):
     """
     out = Path(out)
     package = Path(__file__).parent
-    cases = {c: {"truth_sha256": truths[c], "files": files_of(out / "cases" / c)} for c in sorted(truths) if c != "set"}
+    cases = {
+        c: {"truth_sha256": truths[c], "files": file_digests(out / "cases" / c)} for c in sorted(truths) if c != "set"
+    }
     content = {
-        "format": FORMAT,
+        "format": FORMAT_VERSION,
         "set_sha256": truths["set"],
         "generator_sha256": digest_of_folder(package, "*.py"),
         "examines": examines,
         "cases": cases,
     }
     data = json.dumps(content, indent=1, sort_keys=True).encode() + b"\n"
-    (out / COMMIT).write_bytes(data)
+    (out / COMMIT_FILE).write_bytes(data)
     return digest(data)
 
 
 def read_commit(out):
     """commit.json as a dictionary."""
-    path = Path(out) / COMMIT
+    path = Path(out) / COMMIT_FILE
     if not path.exists():
         raise BlindError(path, "line 1", "no such file", "Make a set first: turnout blind make --out FOLDER")
     return json.loads(path.read_bytes())
@@ -89,25 +91,25 @@ def read_commit(out):
 
 def verify(out, truth):
     """Truths by case; BlindError at the first truth or recording that does not match its seal."""
-    out, truth, sealed = Path(out), Path(truth), read_commit(out)
-    _fits(truth / SET, sealed["set_sha256"])
-    found = {}
-    for case, seals in sealed["cases"].items():
-        _fits(truth / f"{case}.json", seals["truth_sha256"])
-        there = files_of(out / "cases" / case)
-        if set(there) != set(seals["files"]):
-            odd = sorted(set(there) ^ set(seals["files"]))[0]
+    out, truth, commit = Path(out), Path(truth), read_commit(out)
+    _check_seal(truth / SET_FILE, commit["set_sha256"])
+    truths = {}
+    for case, seals in commit["cases"].items():
+        _check_seal(truth / f"{case}.json", seals["truth_sha256"])
+        digests = file_digests(out / "cases" / case)
+        if set(digests) != set(seals["files"]):
+            difference = sorted(set(digests) ^ set(seals["files"]))[0]
             raise BlindError(
-                out / "cases" / case, odd, "a file that was added or taken away", "Take the sealed set again"
+                out / "cases" / case, difference, "a file that was added or taken away", "Take the sealed set again"
             )
-        for name, sha in there.items():
+        for name, sha in digests.items():
             if sha != seals["files"][name]:
                 raise BlindError(out / "cases" / case, name, "not the sealed content", "Take the sealed set again")
-        found[case] = json.loads((truth / f"{case}.json").read_bytes())
-    return found
+        truths[case] = json.loads((truth / f"{case}.json").read_bytes())
+    return truths
 
 
-def _fits(path, sha):
+def _check_seal(path, sha):
     if not path.exists():
         raise BlindError(path, "line 1", "no such truth", "Give the folder of the truth with --truth")
     if digest(path.read_bytes()) != sha:

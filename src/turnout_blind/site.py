@@ -5,29 +5,29 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from turnout_blind import vehicle
-from turnout_blind.crossing import Crossing, bearers, cast_in, draw_crossing
+from turnout_blind.crossing import Crossing, add_crossing, draw_bearer_mass_ratio, draw_crossing
 from turnout_blind.grid import Grid, Rail
-from turnout_blind.instrument import Chain
+from turnout_blind.instrument import MeasurementChain
 from turnout_blind.roughness import rail_roughness, wheel_roughness
 from turnout_blind.true_site import SPACING, World
 from turnout_blind.vehicle import Car, Train
 
 SENSOR_SETS = ((2.4, 4.5, 6.6, 8.7), (2.4, 4.2, 6.3, 9.0), (1.8, 3.9, 6.0, 8.1), (2.1, 4.2, 6.6, 9.0))
-RANGES = {
+NOMINAL_RANGES = {
     "pad": (1.6e8, 4.8e8),
     "pad_damping": (1.2e4, 3.5e4),
     "mass": (135.0, 175.0),
     "ballast": (6e7, 1.6e8),
     "ballast_damping": (4e4, 9e4),
 }
-SCATTER = {"pad": 0.08, "pad_damping": 0.15, "mass": 0.02, "ballast": 0.10, "ballast_damping": 0.15}
+SUPPORT_SCATTER = {"pad": 0.08, "pad_damping": 0.15, "mass": 0.02, "ballast": 0.10, "ballast_damping": 0.15}
 RAIL_DAMPING = 4000.0  # [N s/m²], loss factor 0.010 at 1040 Hz; Thompson 2009, Railway Noise and Vibration: 0.02
 PLAIN, CROSSING = PANELS = ("plain", "crossing")
-COMMON = {"pad": 0.08, "pad_damping": 0.2, "mass": 0.02, "ballast": 0.08, "ballast_damping": 0.2}
+COMMON_ERROR = {"pad": 0.08, "pad_damping": 0.2, "mass": 0.02, "ballast": 0.08, "ballast_damping": 0.2}
 
 
 @dataclass(frozen=True)
-class Planned:
+class PlannedPassage:
     """One passage: ``train`` name, ``speed`` [m/s], ``phase`` [rad] of its wheels, true rail ``temperature`` [°C]."""
 
     train: str
@@ -48,14 +48,14 @@ class Site:
     zones: tuple
     nominal: tuple
     sensors: tuple
-    blows: tuple
+    hammer_positions: tuple
     trains: dict
     true_trains: dict
     passages: list
     temperatures: tuple
     world: World
     chains: tuple
-    force: Chain
+    force: MeasurementChain
     roughness: dict = field(default_factory=dict)
     tip: float = 1.1e9
     crossing: Crossing | None = None
@@ -74,57 +74,59 @@ def draw_site(rng, same_temperature=None, one_speed=None, panel=PLAIN):
     one_speed = bool(rng.random() < 0.1) if one_speed is None else one_speed
     boundary = float(rng.choice([3.9, 4.5, 5.7, 6.9]))
     zones = ((-45.0, boundary), (boundary, 57.0))
-    nominal = _nominal(rng)
+    nominal = _draw_nominal(rng)
     sensors = SENSOR_SETS[rng.integers(len(SENSOR_SETS))]
-    left_out = int(rng.integers(1, 3))
-    trains = _trains()
-    temperatures = _temperatures(rng, same_temperature)
+    unused_sensor = int(rng.integers(1, 3))
+    trains = _nominal_trains()
+    temperatures = _draw_temperatures(rng, same_temperature)
     chains = tuple(
-        Chain(
+        MeasurementChain(
             f"A{i + 1}", 1000.0, float(1.0 + 0.01 * rng.normal()), float(rng.uniform(2500, 4500)),
             float(rng.uniform(10, 25)), noise=float(rng.uniform(0.02, 0.06)),
         )
         for i in range(len(sensors))
     )  # fmt: skip
-    force = Chain("force", 22.2e3, float(1.0 + 0.01 * rng.normal()), 0.0, noise=2.0, drift=0.5, coupling=0.05)
+    force = MeasurementChain(
+        "force", 22.2e3, float(1.0 + 0.01 * rng.normal()), 0.0, noise=2.0, drift=0.5, coupling=0.05
+    )
     site = Site(
-        zones, nominal, sensors, tuple(x for k, x in enumerate(sensors) if k != left_out), trains,
-        {name: _driven(train, rng) for name, train in trains.items()},
-        _passages(rng, temperatures, one_speed), temperatures, _world(rng, zones, nominal), chains, force,
+        zones, nominal, sensors, tuple(x for k, x in enumerate(sensors) if k != unused_sensor), trains,
+        {name: _draw_true_train(train, rng) for name, train in trains.items()},
+        _draw_passages(rng, temperatures, one_speed), temperatures, _draw_world(rng, zones, nominal), chains, force,
         tip=1.1e9 * float(np.exp(0.1 * rng.normal())),
     )  # fmt: skip
     site.world.sensor_shift = {c.name: float(0.015 * rng.normal()) for c in chains}
-    site.roughness = _roughness(rng, site.true_trains)
+    site.roughness = _draw_roughness(rng, site.true_trains)
     return with_crossing(rng, site) if panel == CROSSING else site
 
 
 def with_crossing(rng, site):
     """The site with bearers from the zone boundary on, and a crossing behind it."""
     (west, east), boundary = site.nominal, site.zones[1][0]
-    factor, true = bearers(rng)
-    site.nominal = west, {**east, "mass": round(factor * east["mass"])}
-    site.world.mass[site.world.place > boundary - 0.3] *= true
-    there, site.crossing = draw_crossing(rng, boundary)
-    cast_in(rng, site.world, there, site.trains)
+    nominal_factor, true_factor = draw_bearer_mass_ratio(rng)
+    site.nominal = west, {**east, "mass": round(nominal_factor * east["mass"])}
+    site.world.mass[site.world.position > boundary - 0.3] *= true_factor
+    true_crossing, site.crossing = draw_crossing(rng, boundary)
+    add_crossing(rng, site.world, true_crossing, site.trains)
     site.chains = tuple(replace(c, full_scale=5.0 * c.full_scale) for c in site.chains)  # impacts at the nose are hard
     return site
 
 
-def _nominal(rng):
-    first = {name: float(rng.uniform(*span)) for name, span in RANGES.items()}
+def _draw_nominal(rng):
+    first = {name: float(rng.uniform(*span)) for name, span in NOMINAL_RANGES.items()}
     second = {name: value * float(np.exp(rng.uniform(-0.35, 0.35))) for name, value in first.items()}
     second["mass"] = first["mass"]
     digits = {"pad": -6, "ballast": -6, "pad_damping": -2, "ballast_damping": -2, "mass": 0}
     return tuple({k: round(v, digits[k]) for k, v in zone.items()} for zone in (first, second))
 
 
-def _temperatures(rng, same):
+def _draw_temperatures(rng, same):
     same = bool(rng.random() < 0.25) if same is None else same
     cold, warm = float(rng.uniform(-4.0, 9.0)), float(rng.uniform(20.0, 33.0))
     return (warm, warm + float(rng.uniform(-1.0, 1.0))) if same else (cold, warm)
 
 
-def _trains():
+def _nominal_trains():
     return {
         "railcar": Train("railcar", (vehicle.RAILCAR, vehicle.RAILCAR), 0.43, 9.3e10),
         "locomotive": Train("locomotive", (vehicle.LOCOMOTIVE,), 0.61, 1.0e11),
@@ -132,58 +134,58 @@ def _trains():
     }
 
 
-def _driven(train, rng):
+def _draw_true_train(train, rng):
     """The true train: masses, springs, dampers, wheels and axle positions with their deviations from the file."""
 
     def car(c):
         spread = {"body": 0.03, "bogie": 0.03, "wheelset": 0.02, "primary": 0.1, "secondary": 0.1}
         spread |= {"primary_damping": 0.2, "secondary_damping": 0.2, "body_inertia": 0.05, "bogie_inertia": 0.05}
-        held = {k: getattr(c, k) * float(np.exp(s * rng.normal())) for k, s in spread.items()}
-        held |= {"base": c.base + 0.003 * float(rng.normal()), "pivots": c.pivots + 0.008 * float(rng.normal())}
-        return Car(**{**c.__dict__, **held})
+        values = {k: getattr(c, k) * float(np.exp(s * rng.normal())) for k, s in spread.items()}
+        values |= {"base": c.base + 0.003 * float(rng.normal()), "pivots": c.pivots + 0.008 * float(rng.normal())}
+        return Car(**{**c.__dict__, **values})
 
     radius = train.radius - float(rng.uniform(0.0, 0.02))
     return Train(train.name, tuple(car(c) for c in train.cars), radius, train.contact * float(rng.uniform(0.9, 1.1)))
 
 
-def _passages(rng, temperatures, one_speed):
+def _draw_passages(rng, temperatures, one_speed):
     plan = [("railcar", 25.0), ("railcar", 33.0), ("railcar", 42.0), ("locomotive", 28.0), ("locomotive", 38.0)]
     plan += [("loaded", 20.0), ("loaded", 25.0), ("loaded", 29.0)]
     order = rng.permutation(len(plan))
-    one = float(rng.uniform(24.0, 29.0))
-    found = []
+    common_speed = float(rng.uniform(24.0, 29.0))
+    passages = []
     for k in order:
         name, speed = plan[k]
-        speed = (one if one_speed else speed) * float(np.exp((0.002 if one_speed else 0.05) * rng.normal()))
-        warm = temperatures[1] + float(rng.uniform(-3.0, 3.0))
-        found.append(Planned(name, speed, float(rng.uniform(0.0, 2.0 * np.pi)), warm))
-    return found
+        speed = (common_speed if one_speed else speed) * float(np.exp((0.002 if one_speed else 0.05) * rng.normal()))
+        temperature = temperatures[1] + float(rng.uniform(-3.0, 3.0))
+        passages.append(PlannedPassage(name, speed, float(rng.uniform(0.0, 2.0 * np.pi)), temperature))
+    return passages
 
 
-def _world(rng, zones, nominal):
+def _draw_world(rng, zones, nominal):
     grid = Grid()
-    count = int((grid.end - grid.start - 1.0) / SPACING)
-    ideal = grid.start + SPACING * np.arange(1, count + 1)
-    place = ideal + 0.008 * rng.normal(size=count)
+    n_support = int((grid.end - grid.start - 1.0) / SPACING)
+    ideal = grid.start + SPACING * np.arange(1, n_support + 1)
+    position = ideal + 0.008 * rng.normal(size=n_support)
     values = {}
-    common = {name: float(np.exp(s * rng.normal())) for name, s in COMMON.items()}
-    for name, s in SCATTER.items():
+    common = {name: float(np.exp(s * rng.normal())) for name, s in COMMON_ERROR.items()}
+    for name, s in SUPPORT_SCATTER.items():
         base = np.where(ideal < zones[0][1], nominal[0][name], nominal[1][name])
-        values[name] = base * common[name] * np.exp(s * rng.normal(size=count))
-    lossy = RAIL_DAMPING * float(np.exp(0.25 * rng.normal()))
-    rail = Rail(6.378e6 * (1 + 0.01 * rng.normal()), 2.435e8 * (1 + 0.02 * rng.normal()), damping=lossy)
-    stiff = float(np.mean(values["ballast"]))
-    world = World(grid, rail, place, **values, shear=0.04 * stiff, shear_damping=2e3)
+        values[name] = base * common[name] * np.exp(s * rng.normal(size=n_support))
+    damping = RAIL_DAMPING * float(np.exp(0.25 * rng.normal()))
+    rail = Rail(6.378e6 * (1 + 0.01 * rng.normal()), 2.435e8 * (1 + 0.02 * rng.normal()), damping=damping)
+    mean_ballast = float(np.mean(values["ballast"]))
+    world = World(grid, rail, position, **values, shear=0.04 * mean_ballast, shear_damping=2e3)
     slope = float(rng.uniform(0.0, 6e-4))
     world.softening = lambda kelvin: 1.0 - slope * kelvin
     return world
 
 
-def _roughness(rng, trains):
+def _draw_roughness(rng, trains):
     """Functions that give dips: "rail" of position; (train, axle) of position and phase."""
-    found = {"rail": rail_roughness(rng, float(rng.uniform(-3.0, 4.0)))}
+    roughness = {"rail": rail_roughness(rng, float(rng.uniform(-3.0, 4.0)))}
     for train in trains.values():
         level = float(rng.uniform(-8.0, -1.0))
         for axle in range(1, train.axles().size + 1):
-            found[train.name, axle] = wheel_roughness(rng, level, train.radius)
-    return found
+            roughness[train.name, axle] = wheel_roughness(rng, level, train.radius)
+    return roughness

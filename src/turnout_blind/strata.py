@@ -7,12 +7,12 @@ import numpy as np
 
 from turnout_blind.site import PLAIN
 
-FULL = {"control": 60, "single": 1, "double": 20, "outside": 20, "unidentifiable": 16}
-FAST = {"control": 10, "single": 17, "double": 3, "outside": 5, "unidentifiable": 5}
+FULL_COUNTS = {"control": 60, "single": 1, "double": 20, "outside": 20, "unidentifiable": 16}
+FAST_COUNTS = {"control": 10, "single": 17, "double": 3, "outside": 5, "unidentifiable": 5}
 # A double has two of these effects that do not mask one another, from the upper half of their ladders.
-PAIRS = ("void", "ballast", "pad", "pad_temperature", "rail_shear", "dip", "flat", "unsprung_mass", "gain",
+PAIR_EFFECTS = ("void", "ballast", "pad", "pad_temperature", "rail_shear", "dip", "flat", "unsprung_mass", "gain",
          "time_offset", "mount_resonance", "position")  # fmt: skip
-MASKING = ({"void", "ballast"}, {"time_offset", "position"}, {"time_offset", "mount_resonance"})
+MASKING_PAIRS = ({"void", "ballast"}, {"time_offset", "position"}, {"time_offset", "mount_resonance"})
 
 
 @dataclass(frozen=True)
@@ -37,34 +37,36 @@ def plan_cases(seed, effects, full=True, only=None, panel=PLAIN):
     (40, 10)
     """
     rng = np.random.default_rng([seed, 11])
-    kinds = {
+    effect_types = {
         s: [k for k, e in sorted(effects.items()) if e.stratum == s] for s in ("single", "outside", "unidentifiable")
     }
-    counts = FULL if full else FAST
-    made = [("control", ())] * counts["control"]
+    counts = FULL_COUNTS if full else FAST_COUNTS
+    cases = [("control", ())] * counts["control"]
     if full:
-        made += [("single", ((k, r),)) for k in kinds["single"] for r in range(len(effects[k].ladder))]
+        cases += [("single", ((k, r),)) for k in effect_types["single"] for r in range(len(effects[k].ladder))]
     else:
-        one = [(k, int(rng.integers(2, len(effects[k].ladder)))) for k in kinds["single"]]
-        made += [("single", (e,)) for e in one]
+        singles = [(k, int(rng.integers(2, len(effects[k].ladder)))) for k in effect_types["single"]]
+        cases += [("single", (e,)) for e in singles]
     for stratum in ("outside", "unidentifiable"):
         for i in range(counts[stratum]):
-            kind = kinds[stratum][i % len(kinds[stratum])]
-            n = len(effects[kind].ladder)
-            made.append((stratum, ((kind, (i // len(kinds[stratum]) if full else int(rng.integers(n))) % n),)))
-    made += [("double", _pair(rng, effects)) for _ in range(counts["double"])]
+            effect_type = effect_types[stratum][i % len(effect_types[stratum])]
+            n = len(effects[effect_type].ladder)
+            cases.append(
+                (stratum, ((effect_type, (i // len(effect_types[stratum]) if full else int(rng.integers(n))) % n),))
+            )
+    cases += [("double", _draw_pair(rng, effects)) for _ in range(counts["double"])]
     if only is not None:
-        made = [m for m in made if all(k in only for k, _ in m[1])]
-    order = rng.permutation(len(made))
-    return [CasePlan(*made[i], seed=(seed, 23, k), panel=panel) for k, i in enumerate(order)]
+        cases = [m for m in cases if all(k in only for k, _ in m[1])]
+    order = rng.permutation(len(cases))
+    return [CasePlan(*cases[i], seed=(seed, 23, k), panel=panel) for k, i in enumerate(order)]
 
 
-def _pair(rng, effects):
-    there = [k for k in PAIRS if k in effects]
+def _draw_pair(rng, effects):
+    available = [k for k in PAIR_EFFECTS if k in effects]
     while True:
-        two = rng.choice(there, 2, replace=False).tolist()
-        if set(two) not in MASKING:
-            return tuple((k, int(rng.integers(len(effects[k].ladder) // 2 + 1, len(effects[k].ladder)))) for k in two)
+        pair = rng.choice(available, 2, replace=False).tolist()
+        if set(pair) not in MASKING_PAIRS:
+            return tuple((k, int(rng.integers(len(effects[k].ladder) // 2 + 1, len(effects[k].ladder)))) for k in pair)
 
 
 def case_id(seed, k):

@@ -5,13 +5,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from turnout_blind.grid import Grid, Rail, spread
-from turnout_blind.march_inputs import Beam, Riders, Supports
+from turnout_blind.march_inputs import AttachedMasses, Beam, Supports
 
 SPACING = 0.6
 PER_SUPPORT = ("place", "pad", "pad_damping", "mass", "ballast", "ballast_damping")
 
 
-def _none():
+def _empty_array():
     return np.zeros(0)
 
 
@@ -30,25 +30,25 @@ class World:
 
     grid: Grid
     rail: Rail
-    place: np.ndarray
+    position: np.ndarray
     pad: np.ndarray
     pad_damping: np.ndarray
     mass: np.ndarray
     ballast: np.ndarray
     ballast_damping: np.ndarray
-    lift: np.ndarray = field(default_factory=_none)
-    gap: np.ndarray = field(default_factory=_none)
-    seated: np.ndarray = field(default_factory=_none)
-    close: np.ndarray = field(default_factory=_none)
-    hardening: np.ndarray = field(default_factory=_none)
-    drift: np.ndarray = field(default_factory=_none)
+    lift: np.ndarray = field(default_factory=_empty_array)
+    gap: np.ndarray = field(default_factory=_empty_array)
+    seated: np.ndarray = field(default_factory=_empty_array)
+    close: np.ndarray = field(default_factory=_empty_array)
+    hardening: np.ndarray = field(default_factory=_empty_array)
+    drift: np.ndarray = field(default_factory=_empty_array)
     shear: float = 0.0
     shear_damping: float = 0.0
-    branch_share: np.ndarray = field(default_factory=_none)
-    branch_rate: np.ndarray = field(default_factory=_none)
+    branch_share: np.ndarray = field(default_factory=_empty_array)
+    branch_rate: np.ndarray = field(default_factory=_empty_array)
     reference: float = 15.0
     softening: object = None
-    riders: list = field(default_factory=list)
+    attached_masses: list = field(default_factory=list)
     profile: tuple | None = None
     surface: list = field(default_factory=list)
     treads: dict = field(default_factory=dict)
@@ -59,7 +59,7 @@ class World:
     passage_noise: list = field(default_factory=list)
 
     def __post_init__(self):
-        n = self.place.size
+        n = self.position.size
         neutral = {"lift": 1.0, "gap": -1.0, "seated": 0.0, "close": 1e-4, "hardening": 0.0, "drift": 0.0}
         for name, value in neutral.items():
             if getattr(self, name).size != n:
@@ -67,19 +67,19 @@ class World:
 
     def copy(self):
         """A copy whose arrays and lists can be changed without changing this world."""
-        held = {}
+        values = {}
         for name, value in self.__dict__.items():
             if isinstance(value, np.ndarray):
-                held[name] = value.copy()
+                values[name] = value.copy()
             elif isinstance(value, list):
-                held[name] = list(value)
+                values[name] = list(value)
             elif isinstance(value, dict):
-                held[name] = {k: list(v) if isinstance(v, list) else v for k, v in value.items()}
-        return replace(self, **held)
+                values[name] = {k: list(v) if isinstance(v, list) else v for k, v in value.items()}
+        return replace(self, **values)
 
-    def nearest(self, place):
+    def nearest(self, position):
         """Index of the support nearest to ``position`` [m]."""
-        return int(np.argmin(np.abs(self.place - place)))
+        return int(np.argmin(np.abs(self.position - position)))
 
     def beam(self):
         """Inputs of the march: the rail."""
@@ -94,28 +94,28 @@ class World:
             rates[0] + loss / mass, rates[1],
         )  # fmt: skip
 
-    def supports(self, temperature=None, grown=0.0):
+    def supports(self, temperature=None, n_passages=0.0):
         """Inputs of the march: pads, sleepers and ballast at a rail ``temperature`` [°C] after ``n_passages``."""
-        first, weights = spread(self.grid, self.place)
-        soft = 1.0
+        first, weights = spread(self.grid, self.position)
+        pad_factor = 1.0
         if self.softening is not None and temperature is not None:
-            soft = self.softening(temperature - self.reference)
+            pad_factor = self.softening(temperature - self.reference)
         gap, ballast = self.gap.copy(), self.ballast.copy()
-        for j, (gap_more, factor) in self.wear_per_passage.items():
-            gap[j] += gap_more * grown if gap[j] >= 0.0 else 0.0
-            ballast[j] *= factor**grown
-        n = self.place.size
+        for j, (gap_growth, factor) in self.wear_per_passage.items():
+            gap[j] += gap_growth * n_passages if gap[j] >= 0.0 else 0.0
+            ballast[j] *= factor**n_passages
+        n = self.position.size
         return Supports(
-            first, weights, self.pad * soft, self.pad_damping, self.lift, self.mass, ballast,
+            first, weights, self.pad * pad_factor, self.pad_damping, self.lift, self.mass, ballast,
             self.ballast_damping, gap, self.seated, self.close, self.hardening, self.drift,
             np.full(n, self.shear), np.full(n, self.shear_damping), self.branch_share, self.branch_rate,
         )  # fmt: skip
 
-    def hung(self):
+    def attached_mass_inputs(self):
         """Inputs of the march: masses attached to the rail."""
-        table = np.array(self.riders, dtype=float).reshape(-1, 6)
+        table = np.array(self.attached_masses, dtype=float).reshape(-1, 6)
         first, weights = spread(self.grid, table[:, 0])
-        return Riders(first, weights.reshape(-1, 4), *(np.ascontiguousarray(c) for c in table.T[1:]))
+        return AttachedMasses(first, weights.reshape(-1, 4), *(np.ascontiguousarray(c) for c in table.T[1:]))
 
 
 def uniform_world(
@@ -133,6 +133,6 @@ def uniform_world(
     rail = rail or Rail()
     grid = Grid(-0.5 * length, round(length / step) + 1, step, sponge)
     half = int(0.5 * length / SPACING) - 1
-    place = SPACING * np.arange(-half, half + 1)
+    position = SPACING * np.arange(-half, half + 1)
     values = (pad, pad_damping, mass, ballast, ballast_damping)
-    return World(grid, rail, place, *(np.full(place.size, float(v)) for v in values))
+    return World(grid, rail, position, *(np.full(position.size, float(v)) for v in values))

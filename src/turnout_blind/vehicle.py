@@ -43,13 +43,13 @@ class Train:
 
     def axles(self):
         """Distances of the axles from the front end [m]."""
-        found, front = [], 0.0
+        positions, front = [], 0.0
         for car in self.cars:
             for pivot in (-0.5, 0.5):
                 centre = front + 0.5 * car.length + pivot * car.pivots
-                found += [centre - 0.5 * car.base, centre + 0.5 * car.base]
+                positions += [centre - 0.5 * car.base, centre + 0.5 * car.base]
             front += car.length
-        return np.array(found)
+        return np.array(positions)
 
     @property
     def axle_load(self):
@@ -60,15 +60,15 @@ class Train:
 def cars_of(train):
     """Inputs of the march: half of every car."""
 
-    def of(make):
-        return np.array([float(make(c)) for c in train.cars])
+    def per_car(quantity):
+        return np.array([float(quantity(c)) for c in train.cars])
 
     return Cars(
-        of(lambda c: 0.5 * c.body), of(lambda c: 0.5 * c.body_inertia), of(lambda c: 0.5 * c.bogie),
-        of(lambda c: 0.5 * c.bogie_inertia), of(lambda c: 0.5 * c.primary),
-        of(lambda c: 0.5 * c.primary_damping), of(lambda c: 0.5 * c.secondary),
-        of(lambda c: 0.5 * c.secondary_damping), of(lambda c: 0.5 * c.base),
-        of(lambda c: 0.5 * c.pivots),
+        per_car(lambda c: 0.5 * c.body), per_car(lambda c: 0.5 * c.body_inertia), per_car(lambda c: 0.5 * c.bogie),
+        per_car(lambda c: 0.5 * c.bogie_inertia), per_car(lambda c: 0.5 * c.primary),
+        per_car(lambda c: 0.5 * c.primary_damping), per_car(lambda c: 0.5 * c.secondary),
+        per_car(lambda c: 0.5 * c.secondary_damping), per_car(lambda c: 0.5 * c.base),
+        per_car(lambda c: 0.5 * c.pivots),
     )  # fmt: skip
 
 

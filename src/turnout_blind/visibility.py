@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from turnout_blind.instrument import amplified
-from turnout_blind.march import STEP
-from turnout_blind.record import PASSAGE_DOWN, RATE, passage_motion, sensor_places
-from turnout_blind.run import strike
+from turnout_blind.instrument import amplify
+from turnout_blind.march import TIME_STEP
+from turnout_blind.record import PASSAGE_DECIMATION, RATE, passage_motion, sensor_positions
+from turnout_blind.run import simulate_impacts
 
 HAMMER_BAND, PASSAGE_BAND = (30.0, 800.0), (5.0, 800.0)  # [Hz]
 
 
-def visible(site, world, seed):
+def effect_visibility(site, world, seed):
     r"""{"hammer_pct", "passage_pct"}: share of the response that an effect makes up, largest over the sensors.
 
     .. math:: 100\, \|y - y_0\| / \|y\|
@@ -19,44 +19,46 @@ def visible(site, world, seed):
     cannot lose more than this if the effect is left out, even without a refit. Used are one impact per position and the
     first passage of each train.
     """
-    pairs = [_blow(site, w, seed) for w in (site.world, world)]
-    hammer = _difference(*pairs, HAMMER_BAND, 3)
-    rolled, first = [], {}
+    hammer_pair = [_impact_signals(site, w, seed) for w in (site.world, world)]
+    hammer = _relative_difference(*hammer_pair, HAMMER_BAND, 3)
+    passage_pairs, first_passage = [], {}
     for k, plan in enumerate(site.passages):
-        first.setdefault(plan.train, k)
-    for k in first.values():
-        rolled.append([_pass(site, w, k, seed) for w in (site.world, world)])
-    passage = max(_difference(a, b, PASSAGE_BAND, PASSAGE_DOWN) for a, b in rolled)
+        first_passage.setdefault(plan.train, k)
+    for k in first_passage.values():
+        passage_pairs.append([_passage_signals(site, w, k, seed) for w in (site.world, world)])
+    passage = max(_relative_difference(a, b, PASSAGE_BAND, PASSAGE_DECIMATION) for a, b in passage_pairs)
     return {"hammer_pct": round(hammer, 2), "passage_pct": round(passage, 2)}
 
 
-def _shown(site, world, a, kind, seed):
+def _sensor_signals(site, world, a, recording_type, seed):
     """Signals of the sensors under the motion ``a``, with faults and without noise."""
     rows = []
     for i, chain in enumerate(site.chains):
-        faults = [fault(kind, np.random.default_rng(seed)) for fault in world.channels.get(chain.name, ())]
-        rows.append(amplified(chain, a[i], RATE, faults))
+        faults = [fault(recording_type, np.random.default_rng(seed)) for fault in world.channels.get(chain.name, ())]
+        rows.append(amplify(chain, a[i], RATE, faults))
     return np.array(rows)
 
 
-def _blow(site, world, seed):
+def _impact_signals(site, world, seed):
     """Responses to one impact at each position, at the temperature of the second campaign, concatenated."""
     rows = []
-    for point in site.blows:
+    for position in site.hammer_positions:
         warm = site.temperatures[1]
-        _, a, _ = strike(world, sensor_places(site, world), point, [0.005], [0.95], 0.12, warm, tip=site.tip)
-        rows.append(_shown(site, world, a, "hammer", seed))
+        _, a, _ = simulate_impacts(
+            world, sensor_positions(site, world), position, [0.005], [0.95], 0.12, warm, tip=site.tip
+        )
+        rows.append(_sensor_signals(site, world, a, "hammer", seed))
     return np.concatenate(rows, axis=1)
 
 
-def _pass(site, world, k, seed):
-    return _shown(site, world, passage_motion(site, world, k, np.random.default_rng(seed)), "passage", seed)
+def _passage_signals(site, world, k, seed):
+    return _sensor_signals(site, world, passage_motion(site, world, k, np.random.default_rng(seed)), "passage", seed)
 
 
-def _difference(before, after, band, down):
-    f = np.fft.rfftfreq(before.shape[1], STEP)
+def _relative_difference(before, after, band, decimation):
+    f = np.fft.rfftfreq(before.shape[1], TIME_STEP)
     inside = (f >= band[0]) & (f <= band[1])
     a, b = (np.fft.rfft(x)[:, inside] for x in (before, after))
-    missed, whole = np.linalg.norm(b - a, axis=1), np.linalg.norm(b, axis=1)
-    heard = whole > 0.0  # an unplugged channel shows nothing of the effect
-    return float(np.max(100.0 * missed[heard] / whole[heard], initial=0.0))
+    difference, total = np.linalg.norm(b - a, axis=1), np.linalg.norm(b, axis=1)
+    has_signal = total > 0.0  # an unplugged channel shows nothing of the effect
+    return float(np.max(100.0 * difference[has_signal] / total[has_signal], initial=0.0))

@@ -5,9 +5,9 @@ import pytest
 from tests.blind.test_blind_physics import BENDING_ONLY, on_supports, winkler
 
 from turnout_blind.grid import Rail
-from turnout_blind.march import STEP
-from turnout_blind.record import HAMMER_LENGTH, PRETRIGGER, sensor_places
-from turnout_blind.run import strike
+from turnout_blind.march import TIME_STEP
+from turnout_blind.record import HAMMER_DURATION, PRETRIGGER, sensor_positions
+from turnout_blind.run import simulate_impacts
 from turnout_blind.site import RAIL_DAMPING, draw_site
 from turnout_blind.true_site import uniform_world
 
@@ -19,9 +19,9 @@ def fading(x, omega, k, c, rail):
     return np.exp(-b * x) * (np.cos(b * x) + np.sin(b * x)) / (8.0 * rail.bending * b**3)
 
 
-def lines(world, places, hit, frequency, duration, temperature=None, dt=STEP):
+def lines(world, places, hit, frequency, duration, temperature=None, dt=TIME_STEP):
     """(n_frequency, n_place) receptance of one blow at single lines."""
-    force, a, _ = strike(world, places, hit, [PRETRIGGER], [1.0], duration, temperature, dt=dt)
+    force, a, _ = simulate_impacts(world, places, hit, [PRETRIGGER], [1.0], duration, temperature, dt=dt)
     kernel = np.exp(-2j * np.pi * np.asarray(frequency)[:, None] * np.arange(force.size) * dt)
     return (kernel @ a.T) / (kernel @ force)[:, None] / -((2.0 * np.pi * np.asarray(frequency)) ** 2)[:, None]
 
@@ -29,7 +29,7 @@ def lines(world, places, hit, frequency, duration, temperature=None, dt=STEP):
 def test_a_beam_on_a_foundation_fades_with_distance():
     """Below the cut-on at 205 Hz to a thousandth at 4.5 m, above it by waves; 5 % and a 2000th of the blow's place."""
     k, c, frequency, x = 1e8, 1.5e4, np.array([35.0, 60.0, 120.0, 300.0, 450.0]), np.array([0.0, 1.5, 3.0, 4.5, 6.0])
-    found = lines(winkler(k, BENDING_ONLY, c), x, 0.0, frequency, 0.25, dt=STEP / 2)
+    found = lines(winkler(k, BENDING_ONLY, c), x, 0.0, frequency, 0.25, dt=TIME_STEP / 2)
     for f, row in zip(frequency, found):
         exact = fading(x, 2.0 * np.pi * f, k, c, BENDING_ONLY)
         assert np.all(np.abs(np.abs(row) - np.abs(exact)) < 0.05 * np.abs(exact) + 5e-4 * abs(exact[0])), f
@@ -40,7 +40,7 @@ def test_a_track_on_sleepers_fades_with_distance(frequency, share):
     """To 6.3 m against the exact series with point supports; the pads here are 0.2 m wide, which shows near 200 Hz."""
     world = uniform_world(pad_damping=2.5e4, rail=Rail(damping=RAIL_DAMPING))
     places = 0.3 + np.array([0.0, 2.1, 4.2, 6.3])
-    found = lines(world, places, 0.3, frequency, HAMMER_LENGTH)
+    found = lines(world, places, 0.3, frequency, HAMMER_DURATION)
     for f, row in zip(frequency, found):
         exact = on_supports(world, places, [0.3], 2.0 * np.pi * f)[:, 0]
         assert np.abs(row) == pytest.approx(np.abs(exact), rel=share), f
@@ -54,6 +54,6 @@ def test_a_record_is_long_enough_for_its_rail(seed):
     large.
     """
     site = draw_site(np.random.default_rng(seed))
-    places, frequency = sensor_places(site, site.world), np.array([36.0, 50.0, 80.0])
-    short, long = (lines(site.world, places, site.blows[0], frequency, t, 15.0) for t in (HAMMER_LENGTH, 1.0))
+    places, frequency = sensor_positions(site, site.world), np.array([36.0, 50.0, 80.0])
+    short, long = (lines(site.world, places, site.hammer_positions[0], frequency, t, 15.0) for t in (HAMMER_DURATION, 1.0))
     assert np.abs(short) == pytest.approx(np.abs(long), rel=0.05)

@@ -8,7 +8,7 @@ from turnout.stages.mismatch_inputs import track_of
 from turnout_blind.crossing import Crossing
 from turnout_blind.effect import load_effects
 from turnout_blind.nominal_files import write_configuration
-from turnout_blind.run import roll
+from turnout_blind.run import simulate_passage
 from turnout_blind.score import case_reports
 from turnout_blind.site import draw_site
 from turnout_blind.strata import plan_cases
@@ -43,7 +43,7 @@ def site():
 def test_wheels_meet_the_nose_each_a_little_otherwise_and_come_to_rest(site):
     """The first wheel's force rises at the nose by far more than elsewhere, and comes back to its weight."""
     train, nose = site.true_trains["railcar"], site.world.surface[0]
-    _, force, _ = roll(site.world, train, 30.0, [2.0], 1.2, 0.6)
+    _, force, _ = simulate_passage(site.world, train, 30.0, [2.0], 1.2, 0.6)
     load = 0.5 * train.axle_load
     at = 2.0 + 30.0 * (np.arange(force.shape[1]) * 1e-3 - 0.6)
     x = np.linspace(0.0, 12.0, 2401)
@@ -90,4 +90,4 @@ def test_the_story_of_a_case_at_a_crossing_is_drawn_there(monkeypatch, tmp_path)
     monkeypatch.setattr(case_reports, "stage", staged)
     truth = {"stratum": "control", "effects": [], "seed": [1], "panel": "crossing"}
     with pytest.raises(Staged, match="crossing"):
-        case_reports.draw(truth, [], None, tmp_path / "story.svg", {})
+        case_reports.draw_case(truth, [], None, tmp_path / "story.svg", {})

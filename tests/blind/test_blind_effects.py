@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from turnout_blind.effect import LOCKS, load_effects
-from turnout_blind.instrument import Chain, amplified, digitised, mounting
+from turnout_blind.instrument import MeasurementChain, amplify, digitise, mounting_response
 from turnout_blind.roughness import level, patch_share, rail_roughness, wheel_roughness
-from turnout_blind.score.names import RIGHT, SAME
+from turnout_blind.score.names import RIGHT_NAMES, SAME_PARAMETERS
 from turnout_blind.site import draw_site
 from turnout_blind.strata import case_id, plan_cases
-from turnout_blind.visibility import _difference
+from turnout_blind.visibility import _relative_difference
 
 EFFECTS = load_effects()
 MAY = {"turnout", "turnout.errors", "turnout.records", "turnout.readers", "turnout.readers.writing"}
@@ -52,7 +52,7 @@ def test_an_effect_changes_its_copy_of_the_world_and_nothing_else(kind):
     for rung in range(len(effect.ladder)):
         site = draw_site(np.random.default_rng(rung), **effect.site)
         before, world = contents(site.world), site.world.copy()
-        drawn = effect.concealed(np.random.default_rng(rung), site, rung)
+        drawn = effect.draw_concealed(np.random.default_rng(rung), site, rung)
         effect.act(world, site, drawn.where, drawn.parameters)
         assert contents(site.world) == before
         assert contents(world) != before
@@ -66,10 +66,10 @@ def test_an_effect_changes_its_copy_of_the_world_and_nothing_else(kind):
 
 
 def test_every_kind_has_its_line_in_the_map_of_names():
-    assert set(EFFECTS) == set(RIGHT)
-    for kind, same in SAME.items():
+    assert set(EFFECTS) == set(RIGHT_NAMES)
+    for kind, same in SAME_PARAMETERS.items():
         site = draw_site(np.random.default_rng(1), **EFFECTS[kind].site)
-        assert set(same) <= set(EFFECTS[kind].concealed(np.random.default_rng(2), site, 3).parameters), kind
+        assert set(same) <= set(EFFECTS[kind].draw_concealed(np.random.default_rng(2), site, 3).parameters), kind
 
 
 def test_a_full_set_has_what_the_proof_asks_for():
@@ -117,7 +117,7 @@ def test_a_polygon_passes_at_a_frequency_of_the_track():
     for seed in range(20):
         rng = np.random.default_rng(seed)
         site = draw_site(rng)
-        drawn = EFFECTS["out_of_round"].concealed(rng, site, 6)
+        drawn = EFFECTS["out_of_round"].draw_concealed(rng, site, 6)
         train = site.trains[drawn.where["train"]]
         turns = np.mean([p.speed for p in site.passages if p.train == train.name]) / (2.0 * np.pi * train.radius)
         assert 60.0 - 0.51 * turns < drawn.parameters["order"] * turns < 110.0 + 0.51 * turns
@@ -128,7 +128,7 @@ def test_a_clipped_channel_shows_its_limit_as_the_mean_of_both_sides():
     """Of what is far beyond; nothing within 0.73 of it is touched; the limit counts in peaks that the channel meets."""
     site = draw_site(np.random.default_rng(4))
     world = site.world.copy()
-    drawn = EFFECTS["clipping"].concealed(np.random.default_rng(4), site, 2)
+    drawn = EFFECTS["clipping"].draw_concealed(np.random.default_rng(4), site, 2)
     EFFECTS["clipping"].act(world, site, drawn.where, drawn.parameters)
     (fault,) = world.channels[drawn.where["sensor"]]
     shown, limit = fault("hammer", None), drawn.parameters["limit"]
@@ -147,7 +147,7 @@ def test_a_saturating_amplifier_shows_no_more_than_its_limit_though_the_mounting
     faults = [fault("hammer", None) for fault in world.channels["A2"]]
     click = np.zeros(6000)
     click[1000:1010] = 400.0
-    free, shown = (np.abs(amplified(Chain("A2", 1000.0), click, 60000.0, f)).max() for f in ((), faults))
+    free, shown = (np.abs(amplify(MeasurementChain("A2", 1000.0), click, 60000.0, f)).max() for f in ((), faults))
     assert free > 3.0 * shown
     assert shown == pytest.approx(54.0)
 
@@ -176,14 +176,14 @@ def test_wheel_roughness_repeats_every_turn():
 def test_mounting_is_flat_below_and_peaks_by_its_quality():
     t = np.arange(60000) / 60000.0
     for frequency, gain in ((50.0, 1.0), (400.0, 8.0)):
-        shown = mounting(np.sin(2.0 * np.pi * frequency * t), 60000.0, 400.0, 8.0)
+        shown = mounting_response(np.sin(2.0 * np.pi * frequency * t), 60000.0, 400.0, 8.0)
         assert np.abs(shown[40000:]).max() == pytest.approx(gain, rel=0.03)
 
 
 def test_sixteen_bits_and_their_range():
-    chain = Chain("A1", 100.0, mount=0.0, coupling=0.0, noise=0.0, drift=0.0)
+    chain = MeasurementChain("A1", 100.0, mount=0.0, coupling=0.0, noise=0.0, drift=0.0)
     t = np.arange(60000) / 60000.0
-    shown = digitised(chain, 150.0 * np.sin(2.0 * np.pi * 5.0 * t), 60000.0, 12, np.random.default_rng(0))
+    shown = digitise(chain, 150.0 * np.sin(2.0 * np.pi * 5.0 * t), 60000.0, 12, np.random.default_rng(0))
     steps = shown / chain.step
     assert shown.size == 5000
     assert np.allclose(steps, np.round(steps), atol=1e-8)
@@ -195,5 +195,5 @@ def test_a_channel_that_shows_nothing_shows_nothing_of_the_effect():
     t = np.arange(6000) / 60000.0
     before = np.array([np.sin(600.0 * t), np.sin(600.0 * t)])
     after = np.array([1.1 * np.sin(600.0 * t), 0.0 * t])
-    assert _difference(before, after, (30.0, 800.0), 3) == pytest.approx(100.0 / 11.0, rel=1e-6)
-    assert _difference(before, 0.0 * after, (30.0, 800.0), 3) == 0.0
+    assert _relative_difference(before, after, (30.0, 800.0), 3) == pytest.approx(100.0 / 11.0, rel=1e-6)
+    assert _relative_difference(before, 0.0 * after, (30.0, 800.0), 3) == 0.0

@@ -7,9 +7,9 @@ from zipfile import ZipFile
 
 import numpy as np
 import pytest
-from benchmarks.blind_bridge import rows
+from benchmarks.blind_bridge import finding_rows
 
-from turnout_blind.archive import kept, plan_of, verify_kept, verify_recordings
+from turnout_blind.archive import plan_of, read_archive, verify_archive, verify_recordings
 from turnout_blind.campaign import make_case
 from turnout_blind.effect import load_effects
 from turnout_blind.score.answers import answers_of
@@ -26,11 +26,11 @@ def held(repository):
     if not folder.is_dir():
         pytest.skip("no kept set: turnout blind make --fast --seed 20261121, then turnout blind keep")
     assert (folder / "set.json.gz").stat().st_size < SMALL
-    return kept(folder)
+    return read_archive(folder)
 
 
 def test_all_forty_seals_hold_and_all_effects_follow_from_the_seed(held):
-    truths = verify_kept(held)
+    truths = verify_archive(held)
     strata = [t["stratum"] for t in truths.values()]
     assert len(truths) == 40
     assert {s: strata.count(s) for s in set(strata)} == {
@@ -41,12 +41,12 @@ def test_all_forty_seals_hold_and_all_effects_follow_from_the_seed(held):
 
 def test_rungs_of_the_ladders_show_more_and_more(held):
     """Of the singles kept: what the generator says is to be seen grows with the rung, over all kinds together."""
-    single = [t for t in verify_kept(held).values() if t["stratum"] == "single"]
+    single = [t for t in verify_archive(held).values() if t["stratum"] == "single"]
     rungs = [t["effects"][0]["rung"] for t in single]
     seen = [max(t["visible"].values()) for t in single]
     ranks = [np.argsort(np.argsort(v)) for v in (rungs, seen)]
     assert np.corrcoef(*ranks)[0, 1] > 0.3
-    assert all(max(t["visible"].values()) == 0.0 for t in verify_kept(held).values() if not t["effects"])
+    assert all(max(t["visible"].values()) == 0.0 for t in verify_archive(held).values() if not t["effects"])
 
 
 def archives_as_sealed():
@@ -83,7 +83,7 @@ def test_a_case_made_again_is_the_one_that_was_sealed(held, again):
 def test_the_tool_names_nothing_in_the_blows_of_a_control(again):
     """Hammer tests alone, which take it seconds; the whole campaign is for a release."""
     case, folder, _ = again
-    answers = answers_of(rows(folder / case, case, "hammer_only"))
+    answers = answers_of(finding_rows(folder / case, case, "hammer_only"))
     assert answers and not [a.names for a in answers if a.verdict == "named"]
 
 
@@ -91,7 +91,7 @@ def test_kept_answers_are_scored_with_their_truths(held):
     """Where the tool has spoken: every figure can be had from the kept set alone, and no row is lost."""
     if held["diagnosis"] is None:
         pytest.skip("no tool has spoken about the kept set yet: turnout blind diagnose, reveal, keep")
-    truths = verify_kept(held)
+    truths = verify_archive(held)
     judged = [judge(truths[c], answers_of(held["rows"][c])) for c in truths if c in held["diagnosis"]["cases"]]
     found = {f.name: f for f in figures(judged)}
     assert sum(isinstance(f, Share) for f in found.values()) >= 15

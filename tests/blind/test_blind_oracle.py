@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from benchmarks.blind_bridge import rows_of
-from benchmarks.blind_oracle import _candidates, _told, clear_singles
+from benchmarks.blind_oracle import _candidates, _true_start, clear_singles
 
 from turnout.mismatch import Candidate
 from turnout.physics import Parameter
@@ -39,9 +39,9 @@ def test_an_oracle_gets_the_right_name_at_the_true_place_and_nothing_else():
 
 
 def test_an_oracle_starts_from_the_truth_within_the_bounds():
-    assert _told(PADS[5], EFFECT) == [0.33]
-    assert _told(PADS[5], {**EFFECT, "parameters": {"factor": 0.01}}) == [0.05]
-    assert _told(PADS[5], {**EFFECT, "kind": "void", "parameters": {"gap": 1e-3}}) == [0.4]
+    assert _true_start(PADS[5], EFFECT) == [0.33]
+    assert _true_start(PADS[5], {**EFFECT, "parameters": {"factor": 0.01}}) == [0.05]
+    assert _true_start(PADS[5], {**EFFECT, "kind": "void", "parameters": {"gap": 1e-3}}) == [0.4]
 
 
 def test_a_sample_of_clear_singles_is_drawn_by_id_alone():
@@ -74,6 +74,6 @@ def test_rows_of_the_bridge_are_read_by_the_scorer():
         "visible": {"hammer_pct": 40.0, "passage_pct": 5.0},
     }
     judged = judge(truth, answers_of(rows))
-    assert judged.hits == ("named",) and judged.located == {"lock": True, "place": True}
+    assert judged.matches == ("named",) and judged.located == {"lock": True, "place": True}
     assert judged.fits == (40.0, 48.0)
     assert judged.parameters == ((pytest.approx(0.02 / 0.67), True),)

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from turnout_blind.grid import Rail, lost_compliance, read
-from turnout_blind.march import STEP, _ballast, hertz
-from turnout_blind.run import roll, strike
+from turnout_blind.grid import Rail, interpolation_weights, lost_compliance
+from turnout_blind.march import TIME_STEP, _ballast_force, hertz_force
+from turnout_blind.run import simulate_impacts, simulate_passage
 from turnout_blind.true_site import SPACING, uniform_world
 from turnout_blind.vehicle import GRAVITY, Car, Train
 
@@ -31,14 +31,14 @@ def on_supports(world, x, xi, omega=0.0, branch=0.0):
     pad = world.pad * (1.0 + branch) + 1j * omega * world.pad_damping
     below = world.ballast + 1j * omega * world.ballast_damping - omega**2 * world.mass
     springs = np.diag(1.0 / pad + 1.0 / below)
-    among = series(world, world.place, world.place, omega)
-    reaction = np.linalg.solve(among + springs, series(world, world.place, xi, omega))
-    return series(world, x, xi, omega) - series(world, x, world.place, omega) @ reaction
+    among = series(world, world.position, world.position, omega)
+    reaction = np.linalg.solve(among + springs, series(world, world.position, xi, omega))
+    return series(world, x, xi, omega) - series(world, x, world.position, omega) @ reaction
 
 
-def receptance(world, places, hit, duration=0.2, dt=STEP):
+def receptance(world, places, hit, duration=0.2, dt=TIME_STEP):
     """(frequency, receptance) that a blow on the marched track gives."""
-    force, a, _ = strike(world, places, hit, [0.002], [1.2], duration, dt=dt)
+    force, a, _ = simulate_impacts(world, places, hit, [0.002], [1.2], duration, dt=dt)
     n = 1 << int(np.ceil(np.log2(force.size)) + 1)
     f = np.fft.rfftfreq(n, dt)[1:]
     return f, np.fft.rfft(a, n)[:, 1:] / np.fft.rfft(force, n)[1:] / -((2.0 * np.pi * f) ** 2)
@@ -55,7 +55,7 @@ def winkler(per_metre, rail, damping=0.0, length=60.0):
     place = 0.1 * np.arange(-half, half + 1)
     ones = np.ones(place.size)
     return replace(
-        world, place=place, pad=0.1 * per_metre * ones, pad_damping=0.1 * damping * ones, mass=1e12 * ones,
+        world, position=place, pad=0.1 * per_metre * ones, pad_damping=0.1 * damping * ones, mass=1e12 * ones,
         ballast=0.0 * ones, ballast_damping=0.0 * ones, lift=ones, gap=-ones, seated=0.0 * ones, close=1e-4 * ones,
         hardening=0.0 * ones, drift=0.0 * ones,
     )  # fmt: skip
@@ -73,8 +73,8 @@ def test_static_deflection_under_four_wheels(front):
     places = front - (train.axles() - train.axles()[0])
     load = np.full(4, 0.5 * train.axle_load)
     exact = (on_supports(world, places, places) @ load).real
-    _, force, state = roll(world, train, 1e-9, [front], 1.4, 0.0)
-    first, weights = read(world.grid, places)
+    _, force, state = simulate_passage(world, train, 1e-9, [front], 1.4, 0.0)
+    first, weights = interpolation_weights(world.grid, places)
     found = np.array([state[0][i : i + 4] @ w for i, w in zip(first, weights)])
     assert force[:, 1390] == pytest.approx(load, rel=1e-3)  # at rest again
     assert found == pytest.approx(exact, rel=0.02)
@@ -85,7 +85,7 @@ def test_bending_beam_on_an_elastic_foundation(frequency):
     """1/(8 EI b^3), b^4 = (k + i w c - m w^2)/4EI: below and above the cut-on at 205 Hz; 2 % for shear and mesh."""
     k, c = 1e8, 1.5e4
     world = winkler(k, BENDING_ONLY, c)
-    f, h = receptance(world, [0.0], 0.0, 0.12, STEP / 2)
+    f, h = receptance(world, [0.0], 0.0, 0.12, TIME_STEP / 2)
     h, f0 = at(f, h, frequency)
     omega = 2.0 * np.pi * f0
     b = ((k + 1j * omega * c - 60.21 * omega**2) / (4.0 * 6.42e6)) ** 0.25
@@ -103,7 +103,7 @@ def test_two_rails_that_meet_on_an_elastic_foundation(frequency):
     world = winkler(k, BENDING_ONLY, c)
     side = np.sign(np.round(world.grid.start + world.grid.step * np.arange(world.grid.n), 6))
     world.profile = tuple(1.0 + 0.5 * (1.0 + side) * (f - 1.0) for f in (factor, heavier))
-    f, h = receptance(world, [0.0], 0.0, 0.12, STEP / 2)
+    f, h = receptance(world, [0.0], 0.0, 0.12, TIME_STEP / 2)
     h, f0 = at(f, h, frequency)
     omega = 2.0 * np.pi * f0
     ends = []
@@ -135,7 +135,7 @@ def test_moving_load_on_an_elastic_foundation():
     world = winkler(k, BENDING_ONLY, c, 80.0)
     train = Train("far apart", (replace(CAR, base=6.0, pivots=14.0),))
     load = 0.5 * train.axle_load
-    _, force, state = roll(world, train, v, [20.0], 0.2, 0.18, dt=STEP / 2)
+    _, force, state = simulate_passage(world, train, v, [20.0], 0.2, 0.18, dt=TIME_STEP / 2)
     assert force[0, -30] == pytest.approx(load, rel=0.02)
     # The rail lies spread under the wheel: 1 % of the peak.
     assert state[0].max() == pytest.approx(steady_peak(force[0, -30], v, k, c, BENDING_ONLY), rel=0.015)
@@ -157,7 +157,7 @@ def test_receptance_of_a_track_on_sleepers(hit):
 def test_the_mesh_error_falls_with_the_mesh():
     """A spline half as wide comes at least half nearer to the point supports."""
     error = []
-    for step, dt in ((0.1, STEP), (0.05, STEP / 2)):
+    for step, dt in ((0.1, TIME_STEP), (0.05, TIME_STEP / 2)):
         world = uniform_world(36.0, step, pad_damping=3e4, ballast_damping=8e4, sponge=0.0)
         f, h = receptance(world, [0.0], 0.0, 0.1, dt)
         worst = 0.0
@@ -229,7 +229,7 @@ def test_a_rider_holds_the_rail_still_at_its_own_frequency():
     world = uniform_world(sponge=0.0)
     free = on_supports(world, [0.0], [0.0], 2.0 * np.pi * 150.0)[0, 0]
     k = 60.0 * (2.0 * np.pi * 150.0) ** 2
-    world.riders.append((0.0, 60.0, k, 0.01 * np.sqrt(k * 60.0), 1.0, 0.0))
+    world.attached_masses.append((0.0, 60.0, k, 0.01 * np.sqrt(k * 60.0), 1.0, 0.0))
     f, h = receptance(world, [0.0], 0.0, 0.4)
     found, _ = at(f, h, 150.0)
     assert abs(found[0]) < 0.1 * abs(free)
@@ -240,8 +240,9 @@ def test_energy_is_kept_without_damping():
     rail = replace(Rail(), damping=0.0)
     world = uniform_world(36.0, pad_damping=0.0, ballast_damping=0.0, rail=rail, sponge=0.0)
     for duration in (0.02, 0.12):
-        force, _, (w, v, turn, q, moment, y, rate) = strike(world, [0.0], 0.0, [0.002], [1.2], duration, loss=0.0)
-        left = 1.2 - force.sum() * STEP / 5.5
+        force, _, state = simulate_impacts(world, [0.0], 0.0, [0.002], [1.2], duration, loss=0.0)
+        w, v, turn, q, moment, y, rate = state
+        left = 1.2 - force.sum() * TIME_STEP / 5.5
         given = 0.5 * 5.5 * (1.2**2 - left**2)
         h = world.grid.step
         elastic = 0.5 * h * (np.sum(q**2) / rail.shear + np.sum(moment**2) / rail.bending)
@@ -257,25 +258,25 @@ def test_energy_is_kept_without_damping():
 def test_hertz_approach_and_stiffness():
     """93 GN/m^1.5: 66, 87, 114 µm and 1.13, 1.30, 1.49 GN/m under 50, 75, 112.5 kN; the force is never a pull."""
     for load, approach, stiffness in ((50e3, 66e-6, 1.13e9), (75e3, 87e-6, 1.30e9), (112.5e3, 114e-6, 1.49e9)):
-        assert hertz(93e9, 0.0, (load / 93e9) ** (2 / 3), 1e4) == pytest.approx(load, rel=1e-6)
+        assert hertz_force(93e9, 0.0, (load / 93e9) ** (2 / 3), 1e4) == pytest.approx(load, rel=1e-6)
         assert (load / 93e9) ** (2 / 3) == pytest.approx(approach, rel=0.01)
-        slope = (hertz(93e9, 0.0, approach + 1e-9, load) - hertz(93e9, 0.0, approach - 1e-9, load)) / 2e-9
+        slope = (hertz_force(93e9, 0.0, approach + 1e-9, load) - hertz_force(93e9, 0.0, approach - 1e-9, load)) / 2e-9
         assert slope == pytest.approx(stiffness, rel=0.01)
     local = lost_compliance(uniform_world(12.0).grid, Rail())
-    force = hertz(93e9, local, 1e-4, 1e5)
+    force = hertz_force(93e9, local, 1e-4, 1e5)
     assert force == pytest.approx(93e9 * (1e-4 - local * force) ** 1.5, rel=1e-9)
-    assert hertz(93e9, local, -1e-5, 1e4) == 0.0
+    assert hertz_force(93e9, local, -1e-5, 1e4) == 0.0
 
 
 def test_hammer_on_a_rigid_rail_is_a_hertz_impact():
     """Hertz 1881: longest approach (5 m v²/4k)^(2/5), contact 2.9432 times that over v."""
     heavy = replace(Rail(), mass=1e9, rotary=1e9, bending=1.0, shear=1.0)
     world = uniform_world(12.0, rail=heavy)
-    force, _, _ = strike(world, [0.0], 0.0, [0.001], [1.1], 0.01, mass=5.5, tip=1.2e9, loss=0.0)
+    force, _, _ = simulate_impacts(world, [0.0], 0.0, [0.001], [1.1], 0.01, mass=5.5, tip=1.2e9, loss=0.0)
     deepest = (5.0 * 5.5 * 1.1**2 / (4.0 * 1.2e9)) ** 0.4
     assert force.max() == pytest.approx(1.2e9 * deepest**1.5, rel=0.01)
-    assert np.count_nonzero(force) * STEP == pytest.approx(2.9432 * deepest / 1.1, abs=2 * STEP)
-    assert force.sum() * STEP == pytest.approx(2.0 * 5.5 * 1.1, rel=0.01)
+    assert np.count_nonzero(force) * TIME_STEP == pytest.approx(2.9432 * deepest / 1.1, abs=2 * TIME_STEP)
+    assert force.sum() * TIME_STEP == pytest.approx(2.0 * 5.5 * 1.1, rel=0.01)
 
 
 def test_a_deep_dip_throws_the_wheel_off_the_rail():
@@ -283,7 +284,7 @@ def test_a_deep_dip_throws_the_wheel_off_the_rail():
     world = uniform_world()
     world.surface.append(lambda x: 5e-3 * np.clip(1.0 - np.abs(x) / 0.3, 0.0, None))
     train = Train("car", (CAR,))
-    _, force, _ = roll(world, train, 40.0, [0.0], 1.2, 0.6)
+    _, force, _ = simulate_passage(world, train, 40.0, [0.0], 1.2, 0.6)
     assert force.min() == 0.0
     assert np.any((force == 0.0).any(axis=1))
     weight = GRAVITY * (0.25 * CAR.body + 0.5 * CAR.bogie + CAR.wheelset) * 0.5
@@ -296,20 +297,20 @@ def test_softly_closing_gap():
     world.gap[3], world.close[3] = 1e-3, 2e-4
     s = world.supports()
     k = world.ballast[3]
-    assert _ballast(s, 3, 0.9e-3, 0.0, 0.0) == 0.0
-    assert _ballast(s, 3, 1.1e-3, 0.0, 0.0) < 0.35 * k * 1e-4
-    assert _ballast(s, 3, 4e-3, 0.0, 0.0) == pytest.approx(k * (3e-3 - 2e-4), rel=1e-6)
-    assert _ballast(s, 4, -1e-3, 0.0, 0.0) == pytest.approx(-k * 1e-3)  # an ordinary sleeper is held both ways
+    assert _ballast_force(s, 3, 0.9e-3, 0.0, 0.0) == 0.0
+    assert _ballast_force(s, 3, 1.1e-3, 0.0, 0.0) < 0.35 * k * 1e-4
+    assert _ballast_force(s, 3, 4e-3, 0.0, 0.0) == pytest.approx(k * (3e-3 - 2e-4), rel=1e-6)
+    assert _ballast_force(s, 4, -1e-3, 0.0, 0.0) == pytest.approx(-k * 1e-3)  # an ordinary sleeper is held both ways
     world.seated[3] = 0.4
     s = world.supports()
-    assert _ballast(s, 3, 0.9e-3, 0.0, 0.0) == pytest.approx(0.4 * k * 0.9e-3)
-    assert _ballast(s, 3, 4e-3, 0.0, 0.0) == pytest.approx(k * (0.4 * 4e-3 + 0.6 * (3e-3 - 2e-4)), rel=1e-6)
+    assert _ballast_force(s, 3, 0.9e-3, 0.0, 0.0) == pytest.approx(0.4 * k * 0.9e-3)
+    assert _ballast_force(s, 3, 4e-3, 0.0, 0.0) == pytest.approx(k * (0.4 * 4e-3 + 0.6 * (3e-3 - 2e-4)), rel=1e-6)
 
 
 def test_sleepers_pass_at_speed_over_spacing():
     """A smooth rail shakes the wheel at v/L and its multiples, and hardly anywhere else."""
     world = uniform_world(96.0)
-    _, force, _ = roll(world, Train("car", (CAR,)), 40.0, [10.0], 1.9, 1.3)
+    _, force, _ = simulate_passage(world, Train("car", (CAR,)), 40.0, [10.0], 1.9, 1.3)
     steady = force[0, 700:1900] - force[0, 700:1900].mean()
     spectrum = np.abs(np.fft.rfft(steady * np.hanning(steady.size)))
     f = np.fft.rfftfreq(steady.size, 1e-3)

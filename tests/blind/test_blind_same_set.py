@@ -54,8 +54,8 @@ def test_a_set_for_one_tool_lets_no_other_in(light, tmp_path, monkeypatch, tool,
     command = '{python} -c "print(\'[{{\\"verdict\\": \\"none\\"}}]\')"'
     if refused:
         with pytest.raises(BlindError, match="examines: made for another tool"):
-            diagnose_set(tmp_path / "set", tmp_path / "truth", command, say=lambda text: None)
+            diagnose_set(tmp_path / "set", tmp_path / "truth", command, report=lambda text: None)
         assert not (tmp_path / "set" / "findings").exists()
     else:
-        held = diagnose_set(tmp_path / "set", tmp_path / "truth", command, say=lambda text: None)
+        held = diagnose_set(tmp_path / "set", tmp_path / "truth", command, report=lambda text: None)
         assert [run["status"] for run in held["cases"].values()] == ["answered"]

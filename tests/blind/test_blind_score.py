@@ -10,8 +10,8 @@ from turnout_blind.score.answers import answers_of
 from turnout_blind.score.intervals import clopper_pearson
 from turnout_blind.score.matching import gain_of, judge
 from turnout_blind.score.metrics import confusion, figures, reliability
-from turnout_blind.score.names import LOCKS, RIGHT, SAME, right_names
-from turnout_blind.score.report import failure_table, oracle_of, oracle_words
+from turnout_blind.score.names import RIGHT_LOCKS, RIGHT_NAMES, SAME_PARAMETERS, right_names
+from turnout_blind.score.report import failure_table, oracle_text, read_oracle
 from turnout_blind.seal import BlindError
 
 SINGLES = ("void", "dip", "flat", "gain", "pad_temperature")
@@ -49,7 +49,7 @@ def row(effect, name, probability=0.95, **more):
     where, values = effect["where"], effect["parameters"]
     parameters = [
         {"name": own, "value": values[o], "se": 0.05 * abs(values[o])}
-        for o, own in SAME.get(effect["kind"], {}).items()
+        for o, own in SAME_PARAMETERS.get(effect["kind"], {}).items()
     ]
     return {
         "verdict": "named", "term": name, "rival_term": None, "locked_to": effect["locked_to"],
@@ -67,7 +67,7 @@ def perfect(t):
         return [row(e, None, verdict="unknown")]
     if t["stratum"] == "unidentifiable":
         return [row(t["effects"][0], "local_ballast", verdict="a_or_b", rival_term="hanging_sleeper")]
-    return [row(e, RIGHT[e["kind"]][0]) for e in t["effects"]]
+    return [row(e, RIGHT_NAMES[e["kind"]][0]) for e in t["effects"]]
 
 
 def table(tool, **more):
@@ -77,12 +77,12 @@ def table(tool, **more):
 
 def test_a_perfect_tool_meets_every_bar():
     judged, found = table(perfect, oracle={j["case"]: (20.0, 52.0) for j in truths()})
-    assert [f.name for f in found.values() if f.met is False] == []
+    assert [f.name for f in found.values() if f.is_met is False] == []
     assert found["what: top-1 (clear singles)"].share == 100.0
     assert found["where: axle right (clear singles)"].n == 10
     assert found["parameters: median error"].value == 0.0
     assert found["held-out fit: gap to the oracle closed, median"].value == pytest.approx(100.0 * 30 / 32)
-    assert found["probability: worst fifth, stated from seen"].met
+    assert found["probability: worst fifth, stated from seen"].is_met
     assert all(set(counts) <= {"none", "unknown", "a_or_b", "hanging_sleeper", "surface_dip", "wheel_flat",
                                "sensor_gain", "pad_temperature"} for counts in confusion(judged).values())  # fmt: skip
 
@@ -107,7 +107,7 @@ def test_a_silent_tool_raises_no_alarm_and_finds_nothing():
         assert found[name].k == 0
         assert found[name].n > 0
     assert found["parameters: median error"].n == 0
-    assert found["parameters: median error"].met is None  # nothing measured is not a bar met
+    assert found["parameters: median error"].is_met is None  # nothing measured is not a bar met
     # 0.9 said of "none" in 166 cases, right in 60 controls and 16 that nobody can tell: 76/166.
     assert found["probability: worst fifth, stated from seen"].value == pytest.approx(abs(0.9 - 76 / 166))
 
@@ -121,7 +121,7 @@ def test_a_tool_that_never_answers_is_not_a_silent_one():
 
 def test_a_random_tool_is_right_at_chance():
     rng = np.random.default_rng(5)
-    names = [RIGHT[k][0] for k in SINGLES]
+    names = [RIGHT_NAMES[k][0] for k in SINGLES]
 
     def tool(t):
         e = (t["effects"] or [{"where": {}, "parameters": {}, "kind": "", "locked_to": "place"}])[0]
@@ -138,7 +138,7 @@ def test_a_random_tool_is_right_at_chance():
 def test_a_confidently_wrong_tool_fails_where_it_should():
     _, found = table(lambda t: [row(e, "rail_shear", 0.99) for e in t["effects"]] or [{"verdict": "none"}])
     assert found["what: a wrong name (clear singles)"].share == 100.0
-    assert found["not identifiable: a wrong name"].met is False
+    assert found["not identifiable: a wrong name"].is_met is False
     assert found["two effects: one right and none wrong"].k == 0
     assert found["probability: worst fifth, stated from seen"].value > 0.9
 
@@ -164,8 +164,8 @@ def test_one_right_name_and_one_wrong_in_a_double_is_not_well():
     t = truth("d", "double", "void", "gain")
     right, wrong = row(t["effects"][0], "hanging_sleeper"), row(t["effects"][1], "time_offset")
     judged = judge(t, answers_of([right, wrong]))
-    assert judged.hits == ("named", "")
-    assert judged.wrong == ("time_offset",)
+    assert judged.matches == ("named", "")
+    assert judged.wrong_names == ("time_offset",)
     found = {f.name: f for f in figures([judged])}
     assert found["two effects: one right and none wrong"].k == 0
     assert found["two effects: both right"].k == 0
@@ -195,7 +195,7 @@ def test_the_gap_of_a_sleeper_that_hangs_in_part_is_not_compared():
     named = row(t["effects"][0], "hanging_sleeper")
     t["effects"][0]["parameters"] = {"gap": 1e-3, "seated": 0.35}
     judged = judge(t, answers_of([named]))
-    assert judged.hits == ("named",)
+    assert judged.matches == ("named",)
     assert judged.parameters == ()
 
 
@@ -209,7 +209,7 @@ def test_effects_too_small_to_cost_fit_are_not_held_against_the_tool():
 def test_a_name_of_ones_own_can_be_added():
     assert right_names("squeal") == ()
     assert right_names("squeal", {"squeal": ["hum"]}) == ("hum",)
-    assert set(LOCKS) <= set(RIGHT)
+    assert set(RIGHT_LOCKS) <= set(RIGHT_NAMES)
 
 
 def test_reliability_holds_probability_one():
@@ -224,8 +224,8 @@ def test_a_second_term_among_the_parameters_is_an_answer_of_its_own():
     ]
     rows = [{"verdict": "named", "term": "hanging_sleeper", "parameters_json": json.dumps(entries)}]
     judged = judge(truth("d", "double", "void", "gain"), answers_of(rows))
-    assert judged.hits == ("named", "named")
-    assert judged.wrong == ()
+    assert judged.matches == ("named", "named")
+    assert judged.wrong_names == ()
     assert judged.parameters == ((0.0, True), (pytest.approx(0.01 / 0.3), True))
 
 
@@ -253,8 +253,8 @@ def test_an_empty_list_of_rows_is_no_answer():
 def test_two_names_of_which_none_is_right_are_a_wrong_name():
     t = truth("s", "single", "void")
     said = row(t["effects"][0], "rail_shear", verdict="a_or_b", rival_term="time_offset")
-    assert judge(t, answers_of([said])).wrong == ("rail_shear",)
-    assert judge(t, answers_of([said | {"rival_term": "hanging_sleeper"}])).wrong == ()
+    assert judge(t, answers_of([said])).wrong_names == ("rail_shear",)
+    assert judge(t, answers_of([said | {"rival_term": "hanging_sleeper"}])).wrong_names == ()
 
 
 def both(gap_at, sensor):
@@ -269,7 +269,7 @@ def both(gap_at, sensor):
 @pytest.mark.parametrize(("gap_at", "sensor", "right"), [(4.2, "A2", True), (8.2, "A2", False), (4.2, "A3", False)])
 def test_both_of_two_effects_are_right_where_their_places_are(gap_at, sensor, right):
     judged = judge(truth("d", "double", "void", "gain"), answers_of(both(gap_at, sensor)))
-    assert judged.hits == ("named", "named")
+    assert judged.matches == ("named", "named")
     found = {f.name: f for f in figures([judged])}
     assert bool(found["two effects: both right"].k) is right
     assert found["two effects: one right and none wrong"].k == 1
@@ -280,7 +280,7 @@ def test_a_name_said_twice_of_one_effect_is_wrong_once_and_does_not_lend_its_siz
     other = {"term": "sensor_gain", "fixed": {"channel_name": "A3"}, "parameters": {"gain": {"value": 0.8, "se": 0.01}}}
     rows = [{"verdict": "named", "term": "sensor_gain", "channel": "A2", "term_json": json.dumps([gain, other])}]
     judged = judge(truth("s", "single", "gain"), answers_of(rows))
-    assert judged.wrong == ("sensor_gain",)
+    assert judged.wrong_names == ("sensor_gain",)
     assert judged.parameters == ((0.0, True),)
 
 
@@ -289,10 +289,11 @@ def test_silence_closes_no_gap_and_small_oracles_ask_for_none():
     oracle = {f"s{i}": (20.0, 24.0 if i < 10 else 22.0) for i in range(50)}
     name = "held-out fit: gap to the oracle closed, median"
     _, silent = table(lambda t: [{"verdict": "none", "fit_before_pct": 20.0}], oracle=oracle)
-    assert (silent[name].n, silent[name].value, silent[name].met) == (10, 0.0, False)
+    assert (silent[name].n, silent[name].value, silent[name].is_met) == (10, 0.0, False)
 
     def halfway(t):
-        return [row(e, RIGHT[e["kind"]][0], fit_after_pct=22.0) for e in t["effects"][:1] if RIGHT[e["kind"]]]
+        effects = [e for e in t["effects"][:1] if RIGHT_NAMES[e["kind"]]]
+        return [row(e, RIGHT_NAMES[e["kind"]][0], fit_after_pct=22.0) for e in effects]
 
     half = table(halfway, oracle=oracle)[1]
     assert half[name].value == pytest.approx(50.0)
@@ -336,15 +337,15 @@ def test_an_oracle_by_another_tool_is_refused(tmp_path):
     told = held | {"asked": ["s0", "s1"], "fits": {"s0": {"before": 20.0, "oracle": 30.0}, "s1": {"error": "no"}}}
     (tmp_path / "diagnosis.json").write_text(json.dumps(held))
     (tmp_path / "oracle.json").write_text(json.dumps(told))
-    assert oracle_of(tmp_path) == {"s0": (20.0, 30.0)}
-    assert oracle_words(tmp_path) == [
+    assert read_oracle(tmp_path) == {"s0": (20.0, 30.0)}
+    assert oracle_text(tmp_path) == [
         "Oracle: 2 of 2 clear singles asked, in the order of their ids, 1 without an answer (s1: no)."
     ]
     (tmp_path / "oracle.json").write_text(json.dumps(told | {"asked": ["s0", "s1", "s2"]}))
-    assert "2 of 3 clear singles asked, in the order of their ids (1 not yet), 1 without" in oracle_words(tmp_path)[0]
+    assert "2 of 3 clear singles asked, in the order of their ids (1 not yet), 1 without" in oracle_text(tmp_path)[0]
     (tmp_path / "oracle.json").write_text(json.dumps(told | {"tool_sha256": "c" * 64}))
     with pytest.raises(BlindError, match="Ask the oracle with that tool"):
-        oracle_of(tmp_path)
+        read_oracle(tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -355,4 +356,4 @@ def test_the_axle_of_a_second_effect_is_counted_from_one(wheel, train, right):
     flat = {"term": "wheel_flat", "fixed": {"wheel": wheel, "train": train}, "parameters": {}}
     gap = {"term": "hanging_sleeper", "fixed": {"sleeper": 4.2}, "parameters": {}}
     rows = [{"verdict": "named", "term": "hanging_sleeper", "position_m": 4.2, "term_json": json.dumps([gap, flat])}]
-    assert judge(truth("d", "double", "void", "flat"), answers_of(rows)).placed == (True, right)
+    assert judge(truth("d", "double", "void", "flat"), answers_of(rows)).is_located == (True, right)

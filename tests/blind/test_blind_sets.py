@@ -10,17 +10,17 @@ import pytest
 
 from turnout.config.load import load_configuration, with_raw
 from turnout.readers import read
-from turnout_blind.archive import keep, kept, verify_kept, verify_recordings
+from turnout_blind.archive import read_archive, verify_archive, verify_recordings, write_archive
 from turnout_blind.diagnose import diagnose_set
 from turnout_blind.effect import load_effects
-from turnout_blind.isolation import Hidden, method
+from turnout_blind.isolation import HiddenFolders, isolation_method
 from turnout_blind.make import make_set
 from turnout_blind.record import hammer_test
 from turnout_blind.reveal import reveal
-from turnout_blind.score.case_reports import _map
+from turnout_blind.score.case_reports import _plot_track
 from turnout_blind.score.page import BEGIN, END, write_page
 from turnout_blind.score.plots import pyplot
-from turnout_blind.score.report import report_of
+from turnout_blind.score.report import report_text
 from turnout_blind.seal import BlindError, digest, verify
 from turnout_blind.site import draw_site
 
@@ -92,7 +92,7 @@ def test_the_same_seed_gives_the_same_samples():
     for _ in range(2):
         rng = np.random.default_rng([3, 1])
         site = draw_site(rng)
-        tests.append(hammer_test(site, site.world, 0, site.blows[0], rng, {}))
+        tests.append(hammer_test(site, site.world, 0, site.hammer_positions[0], rng, {}))
     assert all(np.array_equal(a.samples, b.samples) for a, b in zip(*tests))
 
 
@@ -150,73 +150,73 @@ json.dump([{"verdict": "none", "probability": 0.5, "sentence": " ".join(seen)}],
 """
 
 
-@pytest.mark.skipif(not method(), reason="nothing here can hide a folder from this user")
+@pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
 def test_the_tool_sees_neither_truth_nor_generator(copy, tmp_path):
     out, truth = copy
     spy = tmp_path / "spy.py"
     spy.write_text(SPY)
     command = f"{{python}} {spy} {{case}} {{folder}} {{out}} {truth}"
-    held = diagnose_set(out, truth, command, say=lambda line: None)
+    held = diagnose_set(out, truth, command, report=lambda line: None)
     assert not any(held["canary"].values())
     for path in (out / "findings").glob("*.json"):
         said = json.loads(path.read_text())[0]["sentence"]
         assert said == "" if held["isolation"] == "unshare" else "opened" not in said
     assert (truth / "set.json").exists()  # outside it is there as before
     assert len(reveal(out, truth)) == 2
-    report = report_of(out)
+    report = report_text(out)
     assert "| controls: false alarms | 0.0 % (0) | 0.0 to 97.5 % | 1 | <= 3.33 % | met |" in report
     spoilt = next((out / "findings").glob("*.json"))
     spoilt.write_text('[{"verdict": "named"}]')
     with pytest.raises(BlindError, match="not the rows that the tool wrote"):
-        report_of(out)
+        report_text(out)
 
 
-@pytest.mark.skipif(not method(), reason="nothing here can hide a folder from this user")
+@pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
 def test_a_tool_that_fails_is_counted_and_not_hidden(copy):
     out, truth = copy
-    held = diagnose_set(out, truth, "{python} -c 'raise SystemExit(3)'", say=lambda line: None)
+    held = diagnose_set(out, truth, "{python} -c 'raise SystemExit(3)'", report=lambda line: None)
     assert {run["status"] for run in held["cases"].values()} == {"failed"}
     reveal(out, truth)
-    assert "| cases without an answer | 100.0 % (2)" in report_of(out)
+    assert "| cases without an answer | 100.0 % (2)" in report_text(out)
 
 
-@pytest.mark.skipif(not method(), reason="nothing here can hide a folder from this user")
+@pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
 def test_rows_are_taken_from_what_the_tool_prints(copy, tmp_path):
     """It prints notes, then its row, in the folder of the case; anything else is a failure with its words kept."""
     out, truth = copy
     one, other = (c.name for c in cases(out))
     tool, row = tmp_path / "tool.py", 'print(5)\nprint("{\\n\\"verdict\\": \\"none\\"}")\nprint("page: x.html")'
     tool.write_text("import os; print(os.listdir())")
-    held = diagnose_set(out, truth, f"{{python}} {tool}", [one], say=lambda line: None)
+    held = diagnose_set(out, truth, f"{{python}} {tool}", [one], report=lambda line: None)
     assert held["cases"][one]["status"] == "failed"  # a list of Python's is no JSON
     assert held["cases"][one]["said"].startswith("printed no rows; [")
     tool.write_text(row)
-    held = diagnose_set(out, truth, f"{{python}} {tool}", [other], say=lambda line: None)
+    held = diagnose_set(out, truth, f"{{python}} {tool}", [other], report=lambda line: None)
     assert held["cases"][other]["status"] == "answered"
     assert json.loads((out / "findings" / f"{other}.json").read_text()) == [{"verdict": "none"}]
-    held = diagnose_set(out, truth, f"{{python}} {tool}", say=lambda line: None, again=True)
+    held = diagnose_set(out, truth, f"{{python}} {tool}", report=lambda line: None, again=True)
     assert {run["status"] for run in held["cases"].values()} == {"answered"}
 
 
-@pytest.mark.skipif(not method(), reason="nothing here can hide a folder from this user")
+@pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
 def test_a_set_is_judged_by_one_command_with_rows_and_before_it_is_open(copy):
     """An empty list says nothing; another command, or a judgement of an open set, is refused."""
     out, truth = copy
     one, other = (c.name for c in cases(out))
-    held = diagnose_set(out, truth, "{python} -c 'print([])'", [one], say=lambda line: None)
+    held = diagnose_set(out, truth, "{python} -c 'print([])'", [one], report=lambda line: None)
     assert held["cases"][one]["status"] == "failed"
     with pytest.raises(BlindError, match="another command"):
-        diagnose_set(out, truth, "{python} -c 'print(1)'", [other], say=lambda line: None)
+        diagnose_set(out, truth, "{python} -c 'print(1)'", [other], report=lambda line: None)
     reveal(out, truth)
     with pytest.raises(BlindError, match="this set is open"):
-        diagnose_set(out, truth, "{python} -c 'print([])'", [other], say=lambda line: None)
+        diagnose_set(out, truth, "{python} -c 'print([])'", [other], report=lambda line: None)
     spy = f"{{python}} -c 'import os; print(os.listdir(\"{out}/revealed\"))'"
-    held = diagnose_set(out, truth, spy, [one], say=lambda line: None, label="spy")
+    held = diagnose_set(out, truth, spy, [one], report=lambda line: None, label="spy")
     if held["isolation"] == "unshare":
         assert held["cases"][one]["said"] == "[]"
 
 
-@pytest.mark.skipif(not method(), reason="nothing here can hide a folder from this user")
+@pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
 @pytest.mark.parametrize(
     ("code", "budget", "said"),
     [
@@ -226,19 +226,19 @@ def test_a_set_is_judged_by_one_command_with_rows_and_before_it_is_open(copy):
 )
 def test_a_case_that_exceeds_its_budget_is_silence(copy, code, budget, said):
     out, truth = copy
-    held = diagnose_set(out, truth, f"{{python}} -c '{code}'", say=lambda line: None, workers=2, **budget)
+    held = diagnose_set(out, truth, f"{{python}} -c '{code}'", report=lambda line: None, workers=2, **budget)
     assert {(run["status"], run["said"]) for run in held["cases"].values()} == {("over budget", said)}
     reveal(out, truth)
-    assert "| controls: false alarms | 0.0 % (0)" in report_of(out)
+    assert "| controls: false alarms | 0.0 % (0)" in report_text(out)
 
 
-@pytest.mark.skipif(not method(), reason="nothing here can hide a folder from this user")
+@pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
 def test_what_the_tool_writes_beside_its_files_breaks_no_seal(copy):
     out, truth = copy
     code = (
         'import os, json; os.makedirs("results/pages"); open("raw/x", "w"); print(json.dumps([dict(verdict="none")]))'
     )
-    held = diagnose_set(out, truth, f"{{python}} -c '{code}'", say=lambda line: None)
+    held = diagnose_set(out, truth, f"{{python}} -c '{code}'", report=lambda line: None)
     assert {run["status"] for run in held["cases"].values()} == {"answered"}
     assert len(verify(out, truth)) == 2
     assert not list((out / "copies").iterdir())
@@ -269,15 +269,15 @@ def test_an_interrupted_set_goes_on(made, tmp_path, monkeypatch):
     assert kept.is_dir()
 
 
-@pytest.mark.skipif(not method(), reason="nothing here can hide a folder from this user")
+@pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
 def test_a_tool_that_changes_on_the_way_proves_nothing(copy, monkeypatch):
     states = iter(["one", "another"])
     monkeypatch.setattr("turnout_blind.diagnose.digest_of_folder", lambda folder: next(states))
     with pytest.raises(BlindError, match="changed while it diagnosed"):
-        diagnose_set(*copy, "{python} -c 'raise SystemExit(3)'", say=lambda line: None)
+        diagnose_set(*copy, "{python} -c 'raise SystemExit(3)'", report=lambda line: None)
     monkeypatch.setattr("turnout_blind.diagnose.digest_of_folder", lambda folder: "a third")
     with pytest.raises(BlindError, match="changed since the first case"):
-        diagnose_set(*copy, "{python} -c 'raise SystemExit(3)'", say=lambda line: None)
+        diagnose_set(*copy, "{python} -c 'raise SystemExit(3)'", report=lambda line: None)
 
 
 def test_nothing_is_revealed_before_the_tool_has_spoken(copy):
@@ -290,13 +290,13 @@ def test_the_truth_may_not_lie_where_the_tool_looks(tmp_path):
         make_set(tmp_path / "a", tmp_path / "a" / "truth", 1)
 
 
-@pytest.mark.skipif(not method(), reason="nothing here can hide a folder from this user")
+@pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
 def test_the_canary_is_found_where_nothing_is_hidden(tmp_path, monkeypatch):
     """With the hiding switched off, the check itself must cry out."""
     monkeypatch.setattr("turnout_blind.isolation.hidden_command", lambda command, folders: command)
     (tmp_path / "truth").mkdir()
-    hidden = Hidden(tmp_path / "truth")
-    hidden.how = "unshare"
+    hidden = HiddenFolders(tmp_path / "truth")
+    hidden.method = "unshare"
     with pytest.raises(BlindError, match="can be read from inside"):
         hidden.__enter__()
     assert not (tmp_path / "truth" / "canary.txt").exists()
@@ -316,12 +316,12 @@ def scored(copy, tmp_path):
     for label, row in ((None, answer()), ("mute", {"verdict": "none"})):
         tool = tmp_path / f"{label}.py"
         tool.write_text(f"import json, sys\njson.dump([{row!r}], open(sys.argv[1], 'w'))\n")
-        diagnose_set(out, truth, f"{{python}} {tool} {{out}}", say=lambda line: None, label=label)
+        diagnose_set(out, truth, f"{{python}} {tool} {{out}}", report=lambda line: None, label=label)
     reveal(out, truth)
     return out
 
 
-@pytest.mark.skipif(not method(), reason="nothing here can hide a folder from this user")
+@pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
 def test_a_page_shows_figures_pictures_stories_failures_and_ablations(scored, tmp_path):
     page = tmp_path / "page.md"
     page.write_text(f"# Before\n\n{BEGIN}\nold\n{END}\n\nAfter\n")
@@ -340,18 +340,18 @@ def test_a_page_shows_figures_pictures_stories_failures_and_ablations(scored, tm
         write_page(page, scored)
 
 
-@pytest.mark.skipif(not method(), reason="nothing here can hide a folder from this user")
+@pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
 def test_a_kept_set_is_small_and_says_all(scored, tmp_path):
-    path = keep(scored, tmp_path / "kept")
+    path = write_archive(scored, tmp_path / "kept")
     assert path.stat().st_size < 20e3
-    held = kept(tmp_path / "kept")
-    assert set(verify_kept(held)) == set(held["rows"]) == {c.name for c in cases(scored)}
+    held = read_archive(tmp_path / "kept")
+    assert set(verify_archive(held)) == set(held["rows"]) == {c.name for c in cases(scored)}
     for case in held["truths"]:
         verify_recordings(held, case, scored / "cases")
         spoilt = json.loads(held["truths"][case])
         spoilt["stratum"] = "double"
         with pytest.raises(BlindError, match="not what was sealed"):
-            verify_kept({**held, "truths": {**held["truths"], case: json.dumps(spoilt)}})
+            verify_archive({**held, "truths": {**held["truths"], case: json.dumps(spoilt)}})
 
 
 def test_a_kind_that_is_not_there_is_refused_before_anything_is_made(tmp_path):
@@ -369,7 +369,8 @@ def test_what_was_said_of_a_wheel_or_a_second_place_is_on_the_map():
         {"term": "surface_dip", "fixed": {"place": 5.0}, "parameters": {"shift": {"value": 0.4}}},
     ]
     row = {"verdict": "named", "term": "time_offset", "channel": "A1", "term_json": json.dumps(terms)}
-    _map(axis, truth, [row], SimpleNamespace(sensors=(2.0, 8.0), blows=(2.0,), names=lambda: ("A1", "A2")))
+    site = SimpleNamespace(sensors=(2.0, 8.0), hammer_positions=(2.0,), names=lambda: ("A1", "A2"))
+    _plot_track(axis, truth, [row], site)
     words = [text.get_text() for text in axis.texts]
     assert "flat: axle 2 of railcar" in words and "surface dip" in words and "time offset" in words
     assert 5.4 in [float(line.get_xdata()[0]) for line in axis.lines]

@@ -9,7 +9,14 @@ from turnout_blind.effect import load_effects
 from turnout_blind.record import passage_motion
 from turnout_blind.site import draw_site
 from turnout_blind.vehicle import Train
-from turnout_blind.visibility import HAMMER_BAND, PASSAGE_BAND, PASSAGE_DOWN, _blow, _difference, _shown
+from turnout_blind.visibility import (
+    HAMMER_BAND,
+    PASSAGE_BAND,
+    PASSAGE_DECIMATION,
+    _impact_signals,
+    _relative_difference,
+    _sensor_signals,
+)
 
 EFFECTS = load_effects()
 HIDDEN = 5.0  # % of the response, below the 6 % that two owners' models differ by
@@ -21,7 +28,7 @@ def concealed(kind, rung=-1, seed=3):
     rng = np.random.default_rng([seed, 9])
     site = draw_site(rng, **effect.site)
     world = site.world.copy()
-    drawn = effect.concealed(rng, site, rung % len(effect.ladder))
+    drawn = effect.draw_concealed(rng, site, rung % len(effect.ladder))
     effect.act(world, site, drawn.where, drawn.parameters)
     return site, world, drawn
 
@@ -29,15 +36,15 @@ def concealed(kind, rung=-1, seed=3):
 def roll_apart(site, world, other_site, other_world, k=0):
     """Share [%] of a passage's response by which two worlds differ."""
     shown = [
-        _shown(s, w, passage_motion(s, w, k, np.random.default_rng(k)), "passage", [1])
+        _sensor_signals(s, w, passage_motion(s, w, k, np.random.default_rng(k)), "passage", [1])
         for s, w in ((other_site, other_world), (site, world))
     ]
-    return _difference(*shown, PASSAGE_BAND, PASSAGE_DOWN)
+    return _relative_difference(*shown, PASSAGE_BAND, PASSAGE_DECIMATION)
 
 
 def strike_apart(site, world, other):
     """The same of a blow at each place."""
-    return _difference(_blow(site, other, [1]), _blow(site, world, [1]), HAMMER_BAND, 3)
+    return _relative_difference(_impact_signals(site, other, [1]), _impact_signals(site, world, [1]), HAMMER_BAND, 3)
 
 
 def test_no_kind_is_called_so_without_a_test_here():

@@ -22,6 +22,8 @@ HERE = Path(__file__).resolve().parent
 INPUTS = Path(os.environ.get("TURNOUT_GOLDEN_INPUTS", "/work/golden/inputs"))
 DAY = "2026-08-01"
 MAIN = "import sys; from turnout.cli import main; sys.exit(main())"
+# Bars and lines of progress: which of them come depends on the clock.
+PROGRESS = r"[^\r\n]*(?:\d+%\||, \d+ simulations|groups done, )[^\r\n]*[\r\n]+"
 COMMANDS = (
     "add", "calibrate", "check", "config", "demo", "diagnose", "distinguish", "hammer", "nightly", "passage", "plan",
     "query", "export", "events", "acknowledge", "blind", "worklist", "real", "registry", "report", "simulate", "trains",
@@ -64,7 +66,7 @@ class Recording:
         code, out, err = self.run(["-c", MAIN, *words], folder)
         with open(self.out / "cpu.txt", "a") as file:
             file.write(f"{_cpu() - before:6.1f} s {name}\n")
-        err = re.sub(r"[^\r\n]*\d+%\|[^\r\n]*[\r\n]+", "", err)  # bars of progress tell the time
+        err = re.sub(PROGRESS, "", err)
         self.keep(name, f"$ turnout {shlex.join(words)}\n{out}--- stderr\n{err}--- exit code {code}\n")
         return out
 

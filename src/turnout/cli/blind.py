@@ -130,10 +130,10 @@ def _score(args):
     import json
     from pathlib import Path
 
-    from turnout_blind.score.report import report_of
+    from turnout_blind.score.report import report_text
 
     names = json.loads(Path(args.names).read_text()) if args.names else None
-    text = report_of(args.out, names)
+    text = report_text(args.out, names)
     if args.page:
         from turnout_blind.score.page import write_page
 
@@ -144,7 +144,7 @@ def _score(args):
 
 
 def _keep(args):
-    from turnout_blind.archive import keep
+    from turnout_blind.archive import write_archive
 
-    path = keep(args.out, args.folder, _truth(args))
+    path = write_archive(args.out, args.folder, _truth(args))
     print(f"{path}: {path.stat().st_size / 1e3:.0f} kB")

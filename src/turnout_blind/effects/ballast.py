@@ -1,12 +1,12 @@
 """Ballast softer or stiffer under one sleeper, and a third as much (in logarithms) under one neighbour."""
 
-from turnout_blind.effect import Effect, sign, sleeper_near
+from turnout_blind.effect import Effect, draw_sign, draw_sleeper
 
 
 def draw(rng, site, ratio):
     """Factor on stiffness. For stiffer ballast the logarithm of the factor is 0.6 times that for softer."""
     factor = ratio if rng.random() < 0.65 else ratio**-0.6
-    return sleeper_near(rng, site), {"factor": float(factor), "side": sign(rng)}
+    return draw_sleeper(rng, site), {"factor": float(factor), "side": draw_sign(rng)}
 
 
 def act(world, site, where, p):

@@ -2,14 +2,16 @@
 
 from turnout_blind.effect import Effect
 
-AWAY = 13.0  # distance of the sleeper from the nearest sensor [m]
+DISTANCE_FROM_SENSORS = 13.0  # distance of the sleeper from the nearest sensor [m]
 
 
 def draw(rng, site, factor):
     """Factor on the stiffness of a pad before the first sensor or behind the last."""
     before = rng.random() < 0.5
-    j = site.world.nearest(min(site.sensors) - AWAY if before else max(site.sensors) + AWAY)
-    return {"sleeper": j, "position": float(site.world.place[j])}, {"factor": float(factor)}
+    j = site.world.nearest(
+        min(site.sensors) - DISTANCE_FROM_SENSORS if before else max(site.sensors) + DISTANCE_FROM_SENSORS
+    )
+    return {"sleeper": j, "position": float(site.world.position[j])}, {"factor": float(factor)}
 
 
 def act(world, site, where, p):

@@ -1,11 +1,11 @@
 """Fastenings that barely hold the rail down: the pads of three sleepers act in compression and hardly in uplift."""
 
-from turnout_blind.effect import Effect, sleeper_near
+from turnout_blind.effect import Effect, draw_sleeper
 
 
 def draw(rng, site, lift):
     """Stiffness in uplift over that in compression."""
-    return sleeper_near(rng, site), {"lift": float(lift)}
+    return draw_sleeper(rng, site), {"lift": float(lift)}
 
 
 def act(world, site, where, p):

@@ -1,11 +1,11 @@
 """A sleeper with a gap that no train closes: missing ballast would give the same recordings."""
 
-from turnout_blind.effect import Effect, sleeper_near
+from turnout_blind.effect import Effect, draw_sleeper
 
 
 def draw(rng, site, gap):
     """A gap larger than every deflection."""
-    return sleeper_near(rng, site), {"gap": float(gap)}
+    return draw_sleeper(rng, site), {"gap": float(gap)}
 
 
 def act(world, site, where, p):

@@ -2,40 +2,43 @@
 
 import numpy as np
 
-from turnout_blind.effect import Effect, any_sensor
-from turnout_blind.record import passage_motion, sensor_places
-from turnout_blind.run import strike
+from turnout_blind.effect import Effect, draw_sensor
+from turnout_blind.record import passage_motion, sensor_positions
+from turnout_blind.run import simulate_impacts
 
 
-def peak(site, sensor):
+def peak_acceleration(site, sensor):
     """Largest acceleration of the rail at a sensor [m/s²], of impacts at all hammer positions and the fastest passage.
 
     The impacts have the usual velocity.
     """
-    i, places = site.names().index(sensor), sensor_places(site, site.world)
-    blows = [strike(site.world, places, x, [0.0], [0.95], 0.03, tip=site.tip)[1][i] for x in site.blows]
+    i, positions = site.names().index(sensor), sensor_positions(site, site.world)
+    impacts = [
+        simulate_impacts(site.world, positions, x, [0.0], [0.95], 0.03, tip=site.tip)[1][i]
+        for x in site.hammer_positions
+    ]
     fastest = max(range(len(site.passages)), key=lambda k: site.passages[k].speed)
-    rolled = passage_motion(site, site.world, fastest, None)[i]
-    return float(max(np.abs(x).max() for x in (*blows, rolled)))
+    passage = passage_motion(site, site.world, fastest, None)[i]
+    return float(max(np.abs(x).max() for x in (*impacts, passage)))
 
 
 def draw(rng, site, share):
     """Limit as the mean of both sides. Four digits, since the peak has the round-off of the libraries."""
-    where = any_sensor(rng, site)
-    return where, {"limit": float(f"{share * peak(site, where['sensor']):.4g}"), "share": float(share)}
+    where = draw_sensor(rng, site)
+    return where, {"limit": float(f"{share * peak_acceleration(site, where['sensor']):.4g}"), "share": float(share)}
 
 
 def act(world, site, where, p):
     """Add a limit 8 % higher upward and 8 % lower downward. The channel is linear up to 80 % of its limit."""
 
-    def fault(kind, rng):
-        def bent(x, rate):
+    def fault(recording_type, rng):
+        def clip(x, rate):
             limit = np.where(x > 0.0, 1.08 * p["limit"], 0.92 * p["limit"])
-            size, knee = np.abs(x), 0.8 * limit
-            over = np.maximum(size - knee, 0.0)
-            return np.sign(x) * (np.minimum(size, knee) + 0.2 * limit * np.tanh(over / (0.2 * limit)))
+            magnitude, knee = np.abs(x), 0.8 * limit
+            excess = np.maximum(magnitude - knee, 0.0)
+            return np.sign(x) * (np.minimum(magnitude, knee) + 0.2 * limit * np.tanh(excess / (0.2 * limit)))
 
-        return bent
+        return clip
 
     world.channels.setdefault(where["sensor"], []).append(fault)
 

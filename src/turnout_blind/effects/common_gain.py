@@ -11,8 +11,8 @@ def draw(rng, site, change):
 def act(world, site, where, p):
     """Multiply all channels in passages only: hammer tests have another logger."""
 
-    def fault(kind, rng):
-        return lambda x, rate: p["gain"] * x if kind == "passage" else x
+    def fault(recording_type, rng):
+        return lambda x, rate: p["gain"] * x if recording_type == "passage" else x
 
     for name in site.names():
         world.channels.setdefault(name, []).append(fault)

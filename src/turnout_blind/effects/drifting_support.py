@@ -1,11 +1,11 @@
 """Wet ballast that loses stiffness during a passage and recovers partly before the next."""
 
-from turnout_blind.effect import Effect, sleeper_near
+from turnout_blind.effect import Effect, draw_sleeper
 
 
 def draw(rng, site, loss):
     """Share of stiffness lost per second of a record, and factor from passage to passage."""
-    return sleeper_near(rng, site), {"loss": float(loss), "factor": float(rng.uniform(0.85, 0.95))}
+    return draw_sleeper(rng, site), {"loss": float(loss), "factor": float(rng.uniform(0.85, 0.95))}
 
 
 def act(world, site, where, p):

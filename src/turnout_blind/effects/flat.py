@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from turnout_blind.effect import Effect, any_axle
+from turnout_blind.effect import Effect, draw_axle
 
 
 def draw(rng, site, length):
     """Chord of the fresh flat and its angle on the tread."""
-    return any_axle(rng, site), {"length": float(length), "angle": float(rng.uniform(0.0, 2.0 * np.pi))}
+    return draw_axle(rng, site), {"length": float(length), "angle": float(rng.uniform(0.0, 2.0 * np.pi))}
 
 
 def act(world, site, where, p):
@@ -15,9 +15,9 @@ def act(world, site, where, p):
 
     def tread(x, phase, radius):
         depth, half = p["length"] ** 2 / (16.0 * radius), 0.75 * p["length"]
-        turned = np.mod(np.asarray(x) / radius + phase + p["angle"] + np.pi, 2.0 * np.pi) - np.pi
-        way = np.clip(turned * radius / half, -1.0, 1.0)
-        return 0.5 * depth * (1.0 + np.cos(np.pi * way))
+        angle = np.mod(np.asarray(x) / radius + phase + p["angle"] + np.pi, 2.0 * np.pi) - np.pi
+        distance = np.clip(angle * radius / half, -1.0, 1.0)
+        return 0.5 * depth * (1.0 + np.cos(np.pi * distance))
 
     world.treads.setdefault((where["train"], where["axle"]), []).append(tread)
 

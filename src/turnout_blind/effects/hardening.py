@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from turnout_blind.effect import Effect, sleeper_near
+from turnout_blind.effect import Effect, draw_sleeper
 
 
 def draw(rng, site, rate):
     """Relative increase of secant stiffness per metre of compression."""
-    return sleeper_near(rng, site), {"rate": float(rate)}
+    return draw_sleeper(rng, site), {"rate": float(rate)}
 
 
 def act(world, site, where, p):

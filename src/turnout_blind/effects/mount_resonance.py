@@ -5,20 +5,20 @@ It comes in series with the mount of every sensor (2.5 to 4.5 kHz). At 5 kHz bot
 
 import numpy as np
 
-from turnout_blind.effect import Effect, any_sensor
-from turnout_blind.instrument import mounting
+from turnout_blind.effect import Effect, draw_sensor
+from turnout_blind.instrument import mounting_response
 
 
 def draw(rng, site, frequency):
     """Frequency and quality factor of the mount."""
-    return any_sensor(rng, site), {"frequency": float(frequency), "quality": float(rng.uniform(4.0, 14.0))}
+    return draw_sensor(rng, site), {"frequency": float(frequency), "quality": float(rng.uniform(4.0, 14.0))}
 
 
 def act(world, site, where, p):
     """Filter the channel, in hammer tests and passages."""
 
-    def fault(kind, rng):
-        return lambda x, rate: mounting(x, rate, p["frequency"], p["quality"])
+    def fault(recording_type, rng):
+        return lambda x, rate: mounting_response(x, rate, p["frequency"], p["quality"])
 
     world.channels.setdefault(where["sensor"], []).append(fault)
 

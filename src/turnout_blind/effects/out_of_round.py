@@ -6,16 +6,16 @@ Polygons grow at a fixed passing frequency, where vehicle and track resonate. Se
 
 import numpy as np
 
-from turnout_blind.effect import Effect, any_axle
+from turnout_blind.effect import Effect, draw_axle
 
-GROWS_AT = (60.0, 110.0)  # passing frequency at the mean speed of the train [Hz]
+POLYGON_FREQUENCIES = (60.0, 110.0)  # passing frequency at the mean speed of the train [Hz]
 
 
 def draw(rng, site, amplitude):
     """Amplitude, order, angle."""
-    where = any_axle(rng, site)
+    where = draw_axle(rng, site)
     speed = np.mean([p.speed for p in site.passages if p.train == where["train"]])
-    order = round(2.0 * np.pi * site.trains[where["train"]].radius * float(rng.uniform(*GROWS_AT)) / speed)
+    order = round(2.0 * np.pi * site.trains[where["train"]].radius * float(rng.uniform(*POLYGON_FREQUENCIES)) / speed)
     return where, {"amplitude": float(amplitude), "order": int(order), "angle": float(rng.uniform(0, 6.28))}
 
 

@@ -1,11 +1,11 @@
 """A worn, missing or wrongly replaced pad at one sleeper: its stiffness changes."""
 
-from turnout_blind.effect import Effect, sleeper_near
+from turnout_blind.effect import Effect, draw_sleeper
 
 
 def draw(rng, site, ratio):
     """Factor on stiffness, below or above 1."""
-    return sleeper_near(rng, site), {"factor": float(ratio if rng.random() < 0.6 else 1.0 / ratio)}
+    return draw_sleeper(rng, site), {"factor": float(ratio if rng.random() < 0.6 else 1.0 / ratio)}
 
 
 def act(world, site, where, p):

@@ -4,7 +4,7 @@ import numpy as np
 
 from turnout_blind.effect import Effect
 
-RATES = 2.0 * np.pi * np.array([25.0, 100.0, 400.0, 1600.0])
+BRANCH_RATES = 2.0 * np.pi * np.array([25.0, 100.0, 400.0, 1600.0])
 
 
 def draw(rng, site, order):
@@ -14,9 +14,9 @@ def draw(rng, site, order):
 
 def act(world, site, where, p):
     """Give branch b the increase of the power law over its factor of four in frequency, and halve the dashpots."""
-    knees = 4.0 ** (p["order"] * np.arange(1, RATES.size + 1))
-    world.branch_share = np.diff(np.concatenate([[1.0], knees]))
-    world.branch_rate = RATES.copy()
+    stiffness_ratios = 4.0 ** (p["order"] * np.arange(1, BRANCH_RATES.size + 1))
+    world.branch_share = np.diff(np.concatenate([[1.0], stiffness_ratios]))
+    world.branch_rate = BRANCH_RATES.copy()
     world.pad_damping = world.pad_damping * 0.5
 
 

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from turnout_blind.effect import Effect, any_sensor, sign
+from turnout_blind.effect import Effect, draw_sensor, draw_sign
 
 
 def draw(rng, site, shift):
     """Shift along the rail [m]."""
-    return any_sensor(rng, site), {"shift": float(shift) * sign(rng)}
+    return draw_sensor(rng, site), {"shift": float(shift) * draw_sign(rng)}
 
 
 def act(world, site, where, p):

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from turnout_blind.effect import Effect, any_sensor, sign
+from turnout_blind.effect import Effect, draw_sensor, draw_sign
 
 
-def shifted(x, rate, delay):
+def delay_signal(x, rate, delay):
     """``x`` (n,) delayed by ``delay`` [s], by linear interpolation. At 60 kHz the error is 1e-3 at 1 kHz."""
     time = np.arange(x.size) / rate
     return np.interp(time - delay, time, x, left=0.0, right=0.0)
@@ -13,15 +13,15 @@ def shifted(x, rate, delay):
 
 def draw(rng, site, delay):
     """Delay of the channel [s]."""
-    return any_sensor(rng, site), {"delay": float(delay) * sign(rng)}
+    return draw_sensor(rng, site), {"delay": float(delay) * draw_sign(rng)}
 
 
 def act(world, site, where, p):
     """Delay the channel, in hammer tests and passages."""
 
-    def fault(kind, rng):
+    def fault(recording_type, rng):
         delay = p["delay"] * (1.0 + 0.02 * float(rng.normal()))
-        return lambda x, rate: shifted(x, rate, delay)
+        return lambda x, rate: delay_signal(x, rate, delay)
 
     world.channels.setdefault(where["sensor"], []).append(fault)
 

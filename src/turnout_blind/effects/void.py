@@ -5,14 +5,14 @@ ones (Kaewunruen and Remennikov 2008, Dynamic properties of railway track). Low 
 ballast stiffness.
 """
 
-from turnout_blind.effect import Effect, sleeper_near
+from turnout_blind.effect import Effect, draw_sleeper
 
 
 def draw(rng, site, level):
     """Gap, share of the bed that still bears, compression over which the gap closes, and growth per passage."""
     gap, seated = level
     close = float(gap * rng.uniform(0.1, 0.4))
-    return sleeper_near(rng, site), {"gap": float(gap), "seated": float(seated), "close": close, "growth": 0.02}
+    return draw_sleeper(rng, site), {"gap": float(gap), "seated": float(seated), "close": close, "growth": 0.02}
 
 
 def act(world, site, where, p):

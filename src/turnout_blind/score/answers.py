@@ -23,7 +23,7 @@ class Answer:
     parameters: dict = field(default_factory=dict)
 
     @property
-    def silent(self):
+    def says_none(self):
         """Whether the answer is that nothing is wrong."""
         return self.verdict == "none"
 
@@ -37,40 +37,40 @@ def answers_of(rows):
     >>> answer.names, answer.axle, answer.parameters
     (('wheel_flat',), 3, {'length': (0.05, 0.01)})
     """
-    return None if rows is None else [answer for row in rows for answer in _answers(row)]
+    return None if rows is None else [answer for row in rows for answer in _answers_of_row(row)]
 
 
-def _answers(row):
+def _answers_of_row(row):
     """The answer of a row, and one for each further term in it.
 
     Further terms are read from ``term_json``. Without that column they are the terms named by the parameters.
     """
-    found = json.loads(row.get("term_json") or "[]")
-    first = _answer(row)
-    yield replace(first, parameters=_values(found[0])) if found and row["verdict"] == "named" else first
-    if found:
-        yield from (_further(term) for term in found[1:])
+    json_terms = json.loads(row.get("term_json") or "[]")
+    first = _first_answer(row)
+    yield replace(first, parameters=_values(json_terms[0])) if json_terms and row["verdict"] == "named" else first
+    if json_terms:
+        yield from (_further_answer(term) for term in json_terms[1:])
     elif row["verdict"] == "named":
         terms = [entry.get("term") for entry in _entries(row.get("parameters_json"))[1]]
         for term in dict.fromkeys(t for t in terms if t and t != row.get("term")):
             yield Answer("named", (term,), parameters=_parameters(row["parameters_json"], term)[1])
 
 
-def _further(term):
+def _further_answer(term):
     """The answer of a further term: its name or two, its position and its parameters.
 
     >>> dip = {"term": "surface_dip", "or": "wheel_flat", "fixed": {"place": 21.0},
     ...        "parameters": {"shift": {"value": 0.4}}}
-    >>> answer = _further(dip)
+    >>> answer = _further_answer(dip)
     >>> answer.verdict, answer.names, answer.position
     ('a_or_b', ('surface_dip', 'wheel_flat'), 21.4)
     """
     fixed, values = term.get("fixed", {}), _values(term)
     names = tuple(n for n in (term["term"], term.get("or")) if n)
-    places = [fixed[k] for k in ("place", "position", "sleeper", "support") if k in fixed]
+    positions = [fixed[k] for k in ("place", "position", "sleeper", "support") if k in fixed]
     ends = [fixed[k] for k in ("first", "last", "start", "end") if k in fixed]
-    beyond = values.get("shift", (0.0,))[0] if "place" in fixed else 0.0
-    position = float(places[0]) + beyond if places else sum(ends) / 2.0 if len(ends) == 2 else None
+    shift = values.get("shift", (0.0,))[0] if "place" in fixed else 0.0
+    position = float(positions[0]) + shift if positions else sum(ends) / 2.0 if len(ends) == 2 else None
     axle = fixed["wheel"] + 1 if "wheel" in fixed else None
     return Answer(
         "named" if len(names) == 1 else "a_or_b", names, None, position, fixed.get("channel_name"), fixed.get("train"),
@@ -82,13 +82,13 @@ def _values(term):
     return {name: (p.get("value"), p.get("se")) for name, p in term.get("parameters", {}).items()}
 
 
-def _answer(row):
+def _first_answer(row):
     where, parameters = _parameters(row.get("parameters_json"), row.get("term"))
-    said = row.get("sentence") or ""
-    train, axle = _in_train(row.get("train"))
+    sentence = row.get("sentence") or ""
+    train, axle = _train_and_axle(row.get("train"))
     axle, train = where.get("axle", axle), where.get("train", train)
-    if axle is None and (found := re.search(r"(?:axle|wheel)\s+(\d+)(?: of (?!every)(\w+))?", said)):
-        axle, train = int(found.group(1)), train or found.group(2)
+    if axle is None and (match := re.search(r"(?:axle|wheel)\s+(\d+)(?: of (?!every)(\w+))?", sentence)):
+        axle, train = int(match.group(1)), train or match.group(2)
     names = tuple(n for n in (row.get("term"), row.get("rival_term") if row["verdict"] == "a_or_b" else None) if n)
     return Answer(
         row["verdict"], names if row["verdict"] in ("named", "a_or_b") else (), row.get("locked_to"),
@@ -98,7 +98,7 @@ def _answer(row):
     )  # fmt: skip
 
 
-def _in_train(text):
+def _train_and_axle(text):
     """(train, axle) of "loaded, axle 3"; either is None if it is missing."""
     train, _, axle = (text or "").partition(", axle ")
     return train or None, int(axle) if axle.isdecimal() else None
@@ -107,16 +107,16 @@ def _in_train(text):
 def _parameters(text, term=None):
     """(where, {name: (value, se)}) of the column, for one term if the entries name their term."""
     where, entries = _entries(text)
-    mine = [r for r in entries if r.get("term") in (None, term)]
-    return where, {r["name"]: (r.get("value"), r.get("se", r.get("standard_error"))) for r in mine}
+    term_entries = [r for r in entries if r.get("term") in (None, term)]
+    return where, {r["name"]: (r.get("value"), r.get("se", r.get("standard_error"))) for r in term_entries}
 
 
 def _entries(text):
     """(where, entries) of the column: a list of objects, or an object of objects or numbers."""
-    held = json.loads(text) if isinstance(text, str) and text else text or {}
-    where = held.pop("where", {}) if isinstance(held, dict) else {}
-    return where, held if isinstance(held, list) else [{"name": k, **_as_row(v)} for k, v in held.items()]
+    content = json.loads(text) if isinstance(text, str) and text else text or {}
+    where = content.pop("where", {}) if isinstance(content, dict) else {}
+    return where, content if isinstance(content, list) else [{"name": k, **_as_entry(v)} for k, v in content.items()]
 
 
-def _as_row(value):
+def _as_entry(value):
     return value if isinstance(value, dict) else {"value": value}

@@ -6,82 +6,84 @@ import numpy as np
 
 from turnout_blind.campaign import stage
 from turnout_blind.effect import load_effects
-from turnout_blind.march import STEP
-from turnout_blind.record import RATE, passage_motion, sensor_places
-from turnout_blind.reveal import revealed
-from turnout_blind.run import strike
+from turnout_blind.march import TIME_STEP
+from turnout_blind.record import RATE, passage_motion, sensor_positions
+from turnout_blind.reveal import read_revealed
+from turnout_blind.run import simulate_impacts
 from turnout_blind.score.answers import answers_of
 from turnout_blind.score.matching import judge
-from turnout_blind.score.plots import changes, furthest, outcome, pyplot, save, spectrum
+from turnout_blind.score.plots import most_changed, outcome, pyplot, relative_changes, save, spectrum
 from turnout_blind.strata import PLAIN, CasePlan
 
-METRES = "position depth length gap close play amplitude shift wavelength reach"
-UNITS = dict.fromkeys(METRES.split(), "m") | {
+METRE_KEYS = "position depth length gap close play amplitude shift wavelength reach"
+UNITS = dict.fromkeys(METRE_KEYS.split(), "m") | {
     "delay": "s", "frequency": "Hz", "mass": "kg", "limit": "m/s²", "coefficient": "1/K", "angle": "rad",
     "phase": "rad",
 }  # fmt: skip
-FITS = {"before": "no name", "decoy": "a decoy", "rival": "second best name", "after": "the name"}
-ALIKE = 0.05  # median difference of two spectra (logarithm) below which their curves coincide in a picture
+FIT_LABELS = {"before": "no name", "decoy": "a decoy", "rival": "second best name", "after": "the name"}
+MIN_SPECTRUM_CHANGE = (
+    0.05  # median difference of two spectra (logarithm) below which their curves coincide in a picture
+)
 
 
-def choose(judged):
+def choose_cases(results):
     """Ids of three cases: the least visible single effect named rightly, two effects, and the most visible failure."""
-    right = [j for j in judged if j.stratum == "single" and j.clear and outcome(j) == "right"]
-    double = [j for j in judged if j.stratum == "double"]
-    failed = [j for j in judged if j.kinds and j.clear and outcome(j) in ("wrong", "none", "unknown")]
-    failed = [j for j in failed if j.stratum in ("single", "double") or j.wrong]
-    found = [min(right, key=lambda j: j.gain)] if right else []
-    found += [max(double, key=lambda j: (sum(h == "named" for h in j.hits), j.gain))] if double else []
-    found += [max(failed, key=lambda j: (bool(j.wrong), j.gain))] if failed else []
-    return list(dict.fromkeys(j.case for j in found))
+    right = [j for j in results if j.stratum == "single" and j.is_clear and outcome(j) == "right"]
+    double = [j for j in results if j.stratum == "double"]
+    failed = [j for j in results if j.kinds and j.is_clear and outcome(j) in ("wrong", "none", "unknown")]
+    failed = [j for j in failed if j.stratum in ("single", "double") or j.wrong_names]
+    chosen = [min(right, key=lambda j: j.gain)] if right else []
+    chosen += [max(double, key=lambda j: (sum(h == "named" for h in j.matches), j.gain))] if double else []
+    chosen += [max(failed, key=lambda j: (bool(j.wrong_names), j.gain))] if failed else []
+    return list(dict.fromkeys(j.case for j in chosen))
 
 
-def tell(out, page, cases=None, more=None, oracle=None, effects=()):
+def case_texts(out, page, cases=None, extra_names=None, oracle=None, effects=()):
     """Markdown reports of ``cases`` (ids; None chooses three). A picture of each case is written beside the ``page``.
 
     The generator makes the recordings without the effect from the seed in the truth.
     """
-    truths, rows, _ = revealed(out)
-    judged = {case: judge(truths[case], answers_of(rows[case]), more) for case in truths}
-    parts = []
-    for case in cases or choose(list(judged.values())):
+    truths, rows, _ = read_revealed(out)
+    results = {case: judge(truths[case], answers_of(rows[case]), extra_names) for case in truths}
+    texts = []
+    for case in cases or choose_cases(list(results.values())):
         name = f"{Path(page).stem}_story_{case}.svg"
-        draw(
+        draw_case(
             truths[case],
             rows[case],
             (oracle or {}).get(case, (None, None))[1],
             Path(page).with_name(name),
             load_effects(*effects),
         )
-        parts.append(f"### {_title(truths[case])}\n\n{words(truths[case], rows[case])}\n\n![{case}]({name})")
-    return "\n\n".join(parts)
+        texts.append(f"### {_title(truths[case])}\n\n{case_text(truths[case], rows[case])}\n\n![{case}]({name})")
+    return "\n\n".join(texts)
 
 
 def _title(truth):
     return f"{truth['case']}: " + (" and ".join(e["kind"].replace("_", " ") for e in truth["effects"]) or "nothing")
 
 
-def words(truth, rows):
+def case_text(truth, rows):
     """What was concealed and what was answered, in sentences."""
     concealed = "; ".join(
         f"{e['kind'].replace('_', ' ')} ({_numbers({**e['where'], **e['parameters']})})" for e in truth["effects"]
     )
-    seen = truth["visible"]
-    said = " ".join(f"*{_said(row)}*" for row in rows) if rows else "*no answer*"
+    visibility = truth["visible"]
+    answers = " ".join(f"*{_row_text(row)}*" for row in rows) if rows else "*no answer*"
     return (
-        f"Concealed: {concealed or 'nothing'}. It makes up {seen['hammer_pct']:.0f} % of the blows' and "
-        f"{seen['passage_pct']:.0f} % of the passages' response at the sensor that shows it most. Said: {said}"
+        f"Concealed: {concealed or 'nothing'}. It makes up {visibility['hammer_pct']:.0f} % of the blows' and "
+        f"{visibility['passage_pct']:.0f} % of the passages' response at the sensor that shows it most. Said: {answers}"
     )
 
 
-def _said(row):
+def _row_text(row):
     sure = row.get("probability")
-    told = row.get("sentence") or row.get("term") or ""
-    return f"{row['verdict'].replace('_', ' ')}{'' if sure is None else f' (probability {sure:.2f})'}: {told}"
+    sentence = row.get("sentence") or row.get("term") or ""
+    return f"{row['verdict'].replace('_', ' ')}{'' if sure is None else f' (probability {sure:.2f})'}: {sentence}"
 
 
-def _numbers(held):
-    return ", ".join(f"{k} {_number(v, UNITS.get(k, ''))}" for k, v in held.items())
+def _numbers(values):
+    return ", ".join(f"{k} {_number(v, UNITS.get(k, ''))}" for k, v in values.items())
 
 
 def _number(value, unit):
@@ -96,124 +98,132 @@ def _number(value, unit):
     return f"{value:.3g} {unit}".rstrip()
 
 
-def draw(truth, rows, oracle, path, effects):
+def draw_case(truth, rows, oracle, path, effects):
     """Draw one case: impact and train with and without the effect, the track with truth and answers, and the fits."""
     plt = pyplot()
     concealed = tuple((e["kind"], e["rung"]) for e in truth["effects"])
     plan = CasePlan(truth["stratum"], concealed, tuple(truth["seed"]), truth.get("panel", PLAIN))
     _, site, world, _ = stage(plan, effects)
     figure, axes = plt.subplots(2, 2, figsize=(8.5, 5.6), layout="constrained")
-    for axis, (title, before, after, top, window) in zip(axes[0], (_blow(site, world), _train(site, world))):
-        k = furthest(before, after)
+    for axis, (title, before, after, top, window) in zip(
+        axes[0], (_impact_comparison(site, world), _passage_comparison(site, world))
+    ):
+        k = most_changed(before, after)
         axis.set_title(f"{title}, sensor {site.names()[k]}", fontsize=9)
-        _compared(axis, before[k], after[k], top, window)
+        _plot_comparison(axis, before[k], after[k], top, window)
         axis.legend(fontsize=7)
-    _map(axes[1, 0], truth, rows, site)
-    _bars(axes[1, 1], rows, oracle)
+    _plot_track(axes[1, 0], truth, rows, site)
+    _plot_fits(axes[1, 1], rows, oracle)
     return save(figure, path)
 
 
-def _compared(axis, before, after, top, window):
+def _plot_comparison(axis, before, after, top, window):
     """Plot spectra without and with the effect up to ``top`` [Hz]; if they coincide, as for a delay, 30 ms of time."""
-    (f, was), (_, became) = (spectrum(signal[None], RATE, window) for signal in (before, after))
+    (f, density_before), (_, density_after) = (spectrum(signal[None], RATE, window) for signal in (before, after))
     inside = (f > 5.0) & (f < top)
-    if np.median(np.abs(np.log(became[0][inside] / was[0][inside]))) > ALIKE:
-        shown, x, label = np.sqrt([was[0], became[0]]), f, ("frequency [Hz]", "acceleration [m/s²/√Hz]")
-        axis.set(yscale="log", xlim=(0.0, top), ylim=(0.3 * shown[1][inside].min(), None))
+    if np.median(np.abs(np.log(density_after[0][inside] / density_before[0][inside]))) > MIN_SPECTRUM_CHANGE:
+        curves, x, label = (
+            np.sqrt([density_before[0], density_after[0]]),
+            f,
+            ("frequency [Hz]", "acceleration [m/s²/√Hz]"),
+        )
+        axis.set(yscale="log", xlim=(0.0, top), ylim=(0.3 * curves[1][inside].min(), None))
     else:
         first = max(int(np.argmax(np.abs(after))) - int(0.01 * RATE), 0)
-        part = slice(first, first + int(0.03 * RATE))
-        shown, label = np.array([before[part], after[part]]), ("time [ms]", "acceleration [m/s²]")
-        x = 1e3 * np.arange(shown.shape[1]) / RATE
-    for row, name, style in zip(shown, ("without", "with"), ("-", "--")):
+        segment = slice(first, first + int(0.03 * RATE))
+        curves, label = np.array([before[segment], after[segment]]), ("time [ms]", "acceleration [m/s²]")
+        x = 1e3 * np.arange(curves.shape[1]) / RATE
+    for row, name, style in zip(curves, ("without", "with"), ("-", "--")):
         axis.plot(x, row, style, lw=1, label=f"{name} the effect")
     axis.set(xlabel=label[0], ylabel=label[1])
 
 
-def _blow(site, world):
+def _impact_comparison(site, world):
     """(title, without, with, top [Hz], window) of an impact at the position where the effect shows most."""
 
-    def sides(place):
+    def both_signals(position):
         for w in (site.world, world):
             warm = site.temperatures[1]
-            _, a, _ = strike(w, sensor_places(site, w), place, [0.005], [0.95], 0.25, warm, tip=site.tip)
-            yield _shown(site, w, a, "hammer")
+            _, a, _ = simulate_impacts(
+                w, sensor_positions(site, w), position, [0.005], [0.95], 0.25, warm, tip=site.tip
+            )
+            yield _sensor_signals(site, w, a, "hammer")
 
-    place, before, after = _plainest((x, *sides(x)) for x in site.blows)
-    return f"a blow at {place:.1f} m", before, after, 900.0, "boxcar"
+    position, before, after = _most_different((x, *both_signals(x)) for x in site.hammer_positions)
+    return f"a blow at {position:.1f} m", before, after, 900.0, "boxcar"
 
 
-def _train(site, world):
+def _passage_comparison(site, world):
     """(title, without, with, top [Hz], window) of the passage in which the effect shows most."""
 
-    def sides(k):
+    def both_signals(k):
         for w in (site.world, world):
-            yield _shown(site, w, passage_motion(site, w, k, np.random.default_rng(k)), "passage")
+            yield _sensor_signals(site, w, passage_motion(site, w, k, np.random.default_rng(k)), "passage")
 
-    k, before, after = _plainest((k, *sides(k)) for k in range(len(site.passages)))
+    k, before, after = _most_different((k, *both_signals(k)) for k in range(len(site.passages)))
     p = site.passages[k]
     return f"{p.train}, {3.6 * p.speed:.0f} km/h", before, after, 250.0, "hann"
 
 
-def _plainest(shown):
+def _most_different(comparisons):
     """The (key, without, with) that differs most."""
-    return max(shown, key=lambda s: changes(*s[1:]).max())
+    return max(comparisons, key=lambda s: relative_changes(*s[1:]).max())
 
 
-def _shown(site, world, motion, kind):
+def _sensor_signals(site, world, motion, recording_type):
     """Signals of the sensors under ``motion`` with their faults, in a "hammer" test or a "passage"."""
     rows = []
     for x, chain in zip(motion, site.chains):
         for fault in world.channels.get(chain.name, ()):
-            x = fault(kind, np.random.default_rng(0))(x, 1.0 / STEP)
+            x = fault(recording_type, np.random.default_rng(0))(x, 1.0 / TIME_STEP)
         rows.append(x)
     return np.array(rows)
 
 
-def _map(axis, truth, rows, site):
+def _plot_track(axis, truth, rows, site):
     """Plot along the rail: sensors, hammer positions, concealed effects (filled) and answers (open)."""
     axis.set_xlim(min(site.sensors) - 2.5, max(site.sensors) + 2.5)
     axis.plot(site.sensors, np.zeros(len(site.sensors)), "^", color="0.4", label="sensor")
-    axis.plot(site.blows, np.zeros(len(site.blows)), "v", color="0.7", label="blow")
+    axis.plot(site.hammer_positions, np.zeros(len(site.hammer_positions)), "v", color="0.7", label="blow")
     for name, x in zip(site.names(), site.sensors):
         axis.annotate(name, (x, 0.0), xytext=(0, -14), textcoords="offset points", ha="center", fontsize=8)
     for k, effect in enumerate(truth["effects"]):
         where = effect["where"]
         x = where.get("position", truth["sensors"].get(where.get("sensor")))
-        _mark(axis, x, 1.0 + 0.45 * k, effect["kind"], where.get("train"), where.get("axle"), color="black")
+        _plot_mark(axis, x, 1.0 + 0.45 * k, effect["kind"], where.get("train"), where.get("axle"), color="black")
     for k, a in enumerate(answers_of(rows) or ()):
         x = truth["sensors"].get(a.sensor) if a.position is None else a.position
-        _mark(axis, x, 2.0 + 0.45 * k, " or ".join(a.names) or a.verdict, a.train, a.axle, color="C3", mfc="none")
+        _plot_mark(axis, x, 2.0 + 0.45 * k, " or ".join(a.names) or a.verdict, a.train, a.axle, color="C3", mfc="none")
     axis.set_yticks([0, 1, 2], ["track", "concealed", "said"])
     axis.set_ylim(-1.1, 3.3)
     axis.set_xlabel("place [m]")
     axis.legend(loc="lower right", ncols=2, fontsize=7)
 
 
-def _mark(axis, x, y, words, train, axle, **style):
+def _plot_mark(axis, x, y, text, train, axle, **style):
     """Mark an effect at its position ``x``; one without a position stands at the left with its wheel or train."""
     if x is not None:
         axis.plot(x, y, "o", **style)
-        _note(axis, x, y, words)
+        _annotate(axis, x, y, text)
         return
     wheel = f"axle {axle} of {train}" if axle is not None else train or "no place"
-    axis.annotate(f"{words.replace('_', ' ')}: {wheel}", (0.02, y), xycoords=("axes fraction", "data"), fontsize=8)
+    axis.annotate(f"{text.replace('_', ' ')}: {wheel}", (0.02, y), xycoords=("axes fraction", "data"), fontsize=8)
 
 
-def _note(axis, x, y, words):
+def _annotate(axis, x, y, text):
     """Write the text beside the point, towards the middle of the axis."""
     low, high = axis.get_xlim()
     side = "right" if x > 0.5 * (low + high) else "left"
-    axis.annotate(words.replace("_", " "), (x, y), xytext=(-5 if side == "right" else 5, 5),
+    axis.annotate(text.replace("_", " "), (x, y), xytext=(-5 if side == "right" else 5, 5),
                   textcoords="offset points", fontsize=8, ha=side)  # fmt: skip
 
 
-def _bars(axis, rows, oracle):
+def _plot_fits(axis, rows, oracle):
     """Plot the fits of the held-out recordings."""
     row = (rows or [{}])[0]
-    found = {words: row.get(f"fit_{name}_pct") for name, words in FITS.items()} | {"told the truth": oracle}
-    found = {name: value for name, value in found.items() if value is not None}
-    axis.barh(list(found), list(found.values()), color="C0")
+    fits = {label: row.get(f"fit_{name}_pct") for name, label in FIT_LABELS.items()} | {"told the truth": oracle}
+    fits = {name: value for name, value in fits.items() if value is not None}
+    axis.barh(list(fits), list(fits.values()), color="C0")
     axis.set_xlabel("fit on recordings never used [%]")
-    if not found:
+    if not fits:
         axis.text(0.5, 0.5, "no fit was given", ha="center", transform=axis.transAxes)

@@ -6,14 +6,14 @@ import numpy as np
 
 from turnout_blind.score.names import right_locks, right_names, same_parameters
 
-BAY = 0.6  # largest error of a right position: one sleeper bay [m]
-LEVEL = 46.0  # residual of controls in a held-out passage, mostly roughness [% of its norm]
-NEUTRAL = {"factor": 1.0, "gain": 1.0}  # parameter values without effect; 0 for all others
-CLEAR = 3.0  # loss of held-out fit above which an effect is clear [points]
+MAX_POSITION_ERROR = 0.6  # largest error of a right position: one sleeper bay [m]
+CONTROL_RESIDUAL = 46.0  # residual of controls in a held-out passage, mostly roughness [% of its norm]
+NEUTRAL_VALUES = {"factor": 1.0, "gain": 1.0}  # parameter values without effect; 0 for all others
+MIN_CLEAR_GAIN = 3.0  # loss of held-out fit above which an effect is clear [points]
 
 
 @dataclass(frozen=True)
-class Judged:
+class CaseResult:
     """Result of one case. ``matches`` per effect: "named", "a_or_b" or "".
 
     ``is_located`` per effect: whether its position, axle and sensor are right. ``wrong_names`` are names of answers
@@ -27,22 +27,22 @@ class Judged:
     gain: float
     answered: bool
     alarm: bool
-    hits: tuple
-    placed: tuple
-    first: bool
-    wrong: tuple
-    said: str
+    matches: tuple
+    is_located: tuple
+    is_first_right: bool
+    wrong_names: tuple
+    first_answer: str
     located: dict = field(default_factory=dict)
     parameters: tuple = ()
     probability: float | None = None
-    probably_right: bool | None = None
+    is_answer_right: bool | None = None
     fits: tuple = (None, None)
     gain_error: float | None = None
 
     @property
-    def clear(self):
+    def is_clear(self):
         """Whether the effect costs enough fit to be detectable."""
-        return self.gain > CLEAR
+        return self.gain > MIN_CLEAR_GAIN
 
 
 def gain_of(visible):
@@ -54,116 +54,116 @@ def gain_of(visible):
     3.01
     """
     share = max(visible["hammer_pct"], visible["passage_pct"])
-    return float(np.hypot(LEVEL, share) - LEVEL)
+    return float(np.hypot(CONTROL_RESIDUAL, share) - CONTROL_RESIDUAL)
 
 
-def judge(truth, answers, more=None):
+def judge(truth, answers, extra_names=None):
     """``CaseResult`` of a case from its truth and ``answers`` (None if the tool gave none)."""
     effects = truth["effects"]
     kinds = tuple(e["kind"] for e in effects)
-    loud = [a for a in answers or () if not a.silent]
-    right = [right_names(k, more) for k in kinds]
-    hits = tuple(_hit(names, loud) for names in right)
-    allowed = {n for names in right for n in names}
-    wrong = _wrong(right, loud)
-    first = bool(loud) and loud[0].verdict == "named" and loud[0].names[0] in allowed
-    probability, sound = _probability(truth, answers, loud, bool(allowed), wrong)
-    ahead = loud[0] if loud else (answers or [None])[0]
-    return Judged(
+    alarms = [a for a in answers or () if not a.says_none]
+    right_by_effect = [right_names(k, extra_names) for k in kinds]
+    matches = tuple(_match_verdict(names, alarms) for names in right_by_effect)
+    allowed = {n for names in right_by_effect for n in names}
+    wrong_names = _wrong_names(right_by_effect, alarms)
+    is_first_right = bool(alarms) and alarms[0].verdict == "named" and alarms[0].names[0] in allowed
+    probability, is_right = _stated_probability(truth, answers, alarms, bool(allowed), wrong_names)
+    leading = alarms[0] if alarms else (answers or [None])[0]
+    return CaseResult(
         truth["case"], truth["stratum"], kinds, tuple(e["rung"] for e in effects), gain_of(truth["visible"]),
-        bool(answers), bool(loud), hits,
-        tuple(all(_where(e, n, loud).values()) for e, n in zip(effects, right)),
-        first, wrong, _said(answers, loud),
-        _located(effects, right, loud),
-        tuple(_compared(effects, right, loud)), probability, sound,
-        (None, None) if ahead is None else (ahead.before, ahead.after), ahead and ahead.gain_error,
+        bool(answers), bool(alarms), matches,
+        tuple(all(_position_checks(e, n, alarms).values()) for e, n in zip(effects, right_by_effect)),
+        is_first_right, wrong_names, _first_answer_text(answers, alarms),
+        _location_checks(effects, right_by_effect, alarms),
+        tuple(_parameter_errors(effects, right_by_effect, alarms)), probability, is_right,
+        (None, None) if leading is None else (leading.before, leading.after), leading and leading.gain_error,
     )  # fmt: skip
 
 
-def _wrong(right, loud):
+def _wrong_names(right_by_effect, alarms):
     """Names of the answers that match no effect, or only one that is named already."""
-    free, wrong = list(right), []
-    for answer in (a for a in loud if a.names):
-        fits = next((names for names in free if set(answer.names) & set(names)), None)
-        if fits is None:
-            wrong.append(answer.names[0])
+    unmatched, wrong_names = list(right_by_effect), []
+    for answer in (a for a in alarms if a.names):
+        match = next((names for names in unmatched if set(answer.names) & set(names)), None)
+        if match is None:
+            wrong_names.append(answer.names[0])
         else:
-            free.remove(fits)
-    return tuple(wrong)
+            unmatched.remove(match)
+    return tuple(wrong_names)
 
 
-def _hit(names, loud):
+def _match_verdict(names, alarms):
     for verdict in ("named", "a_or_b"):
-        if any(a.verdict == verdict and set(a.names) & set(names) for a in loud):
+        if any(a.verdict == verdict and set(a.names) & set(names) for a in alarms):
             return verdict
     return ""
 
 
-def _said(answers, loud):
+def _first_answer_text(answers, alarms):
     if not answers:
         return "no answer"
-    if not loud:
+    if not alarms:
         return "none"
-    return loud[0].names[0] if loud[0].verdict == "named" else loud[0].verdict
+    return alarms[0].names[0] if alarms[0].verdict == "named" else alarms[0].verdict
 
 
-def _probability(truth, answers, loud, known, wrong):
+def _stated_probability(truth, answers, alarms, is_known, wrong_names):
     """(stated probability of the answer, whether the answer is right).
 
     "none" is right without a clear effect, "unknown" if the library does not hold the effects (``is_known`` False).
     """
     if not answers:
         return None, None
-    ahead = loud[0] if loud else answers[0]
-    if ahead.probability is None:
+    leading = alarms[0] if alarms else answers[0]
+    if leading.probability is None:
         return None, None
-    if ahead.verdict == "none":
-        hidden = gain_of(truth["visible"]) <= CLEAR
-        return ahead.probability, truth["stratum"] in ("control", "unidentifiable") or hidden
-    if ahead.verdict == "unknown":
-        return ahead.probability, bool(truth["effects"]) and not known
-    return ahead.probability, not wrong
+    if leading.verdict == "none":
+        is_hidden = gain_of(truth["visible"]) <= MIN_CLEAR_GAIN
+        return leading.probability, truth["stratum"] in ("control", "unidentifiable") or is_hidden
+    if leading.verdict == "unknown":
+        return leading.probability, bool(truth["effects"]) and not is_known
+    return leading.probability, not wrong_names
 
 
-def _best(names, loud):
+def _answer_to(names, alarms):
     """The answer that refers to an effect: one that names it, else the first."""
-    return next((a for a in loud if set(a.names) & set(names)), loud[0] if loud else None)
+    return next((a for a in alarms if set(a.names) & set(names)), alarms[0] if alarms else None)
 
 
-def _located(effects, right, loud):
+def _location_checks(effects, right_by_effect, alarms):
     """{"lock", "place", "axle", "sensor"}: True or False for each that a single effect has."""
     if len(effects) != 1:
         return {}
-    effect, answer = effects[0], _best(right[0], loud)
+    effect, answer = effects[0], _answer_to(right_by_effect[0], alarms)
     lock = answer is not None and answer.lock in right_locks(effect["kind"], effect["locked_to"])
-    return {"lock": lock, **_where(effect, right[0], loud)}
+    return {"lock": lock, **_position_checks(effect, right_by_effect[0], alarms)}
 
 
-def _where(effect, names, loud):
+def _position_checks(effect, names, alarms):
     """{"place", "axle", "sensor"}: True or False for each that an effect of the right ``names`` has."""
-    answer, where, found = _best(names, loud), effect["where"], {}
+    answer, where, checks = _answer_to(names, alarms), effect["where"], {}
     if effect["locked_to"] in ("place", "amplitude") and "position" in where:
-        near = answer is not None and answer.position is not None
-        found["place"] = near and abs(answer.position - where["position"]) <= BAY
+        has_position = answer is not None and answer.position is not None
+        checks["place"] = has_position and abs(answer.position - where["position"]) <= MAX_POSITION_ERROR
     if "axle" in where:
-        same = answer is not None and answer.axle == where["axle"]
-        found["axle"] = same and answer.train == where["train"]
+        is_same_axle = answer is not None and answer.axle == where["axle"]
+        checks["axle"] = is_same_axle and answer.train == where["train"]
     if "sensor" in where:
-        found["sensor"] = answer is not None and answer.sensor == where["sensor"]
-    return found
+        checks["sensor"] = answer is not None and answer.sensor == where["sensor"]
+    return checks
 
 
-def _compared(effects, right, loud):
+def _parameter_errors(effects, right_by_effect, alarms):
     """(relative error, whether the 95 % interval covers the truth) of each parameter of a named effect.
 
     The error is relative to the size of the effect. Without a standard error the second is None.
     """
-    for effect, names in zip(effects, right):
-        answer = next((a for a in loud if a.verdict == "named" and set(a.names) & set(names)), None)
-        for own, theirs in same_parameters(effect).items():
-            if answer is None or answer.parameters.get(theirs, (None,))[0] is None:
+    for effect, names in zip(effects, right_by_effect):
+        answer = next((a for a in alarms if a.verdict == "named" and set(a.names) & set(names)), None)
+        for name, tool_name in same_parameters(effect).items():
+            if answer is None or answer.parameters.get(tool_name, (None,))[0] is None:
                 continue
-            value, se = answer.parameters[theirs]
-            truth = effect["parameters"][own]
+            value, se = answer.parameters[tool_name]
+            truth = effect["parameters"][name]
             covers = None if se is None else abs(value - truth) <= 1.96 * se
-            yield abs(value - truth) / abs(truth - NEUTRAL.get(own, 0.0)), covers
+            yield abs(value - truth) / abs(truth - NEUTRAL_VALUES.get(name, 0.0)), covers

@@ -1,7 +1,7 @@
 """Right names of each concealed effect: the only module in which the vocabularies of generator and tool meet."""
 
 # Kind -> right names. A kind outside the library of the tool has none, unless the library has since been extended.
-RIGHT = {
+RIGHT_NAMES = {
     "void": ("hanging_sleeper",),
     "ballast": ("local_ballast",),
     "pad": ("local_pad",),
@@ -32,7 +32,7 @@ RIGHT = {
 
 # Kind -> right locks. A delay belongs to the sensor or its clock. An effect of amplitude at one position is locked to
 # either. A polygon is locked to its wheel only, too heavy wheelsets to their train only.
-LOCKS = {
+RIGHT_LOCKS = {
     "pad_fractional": ("condition", "frequency"),
     "rail_shear": ("condition", "frequency"),
     "corrugation": ("wavelength", "place"),
@@ -50,7 +50,7 @@ LOCKS = {
 # Kind -> {parameter: parameter of the tool with the same meaning}. The length of a flat is in both the chord with a
 # depth of l^2 / 16 R, however worn its edges are. A limit is the mean of both sides. Not compared: a power law has no
 # single branch, cosine and sine of a polygon depend on the origin of the angle, a mount is in series with another.
-SAME = {
+SAME_PARAMETERS = {
     "void": {"gap": "gap"},
     "ballast": {"factor": "factor"},
     "pad": {"factor": "factor"},
@@ -66,9 +66,9 @@ SAME = {
 }
 
 
-def right_names(kind, more=None):
+def right_names(effect_type, extra_names=None):
     """Right names of an effect type; ``extra_names`` {kind: [names]} are those of added effects."""
-    return tuple(RIGHT.get(kind, ())) + tuple((more or {}).get(kind, ()))
+    return tuple(RIGHT_NAMES.get(effect_type, ())) + tuple((extra_names or {}).get(effect_type, ()))
 
 
 def same_parameters(effect):
@@ -78,9 +78,9 @@ def same_parameters(effect):
     """
     if effect["parameters"].get("seated", 0.0) > 0.0:
         return {}
-    return SAME.get(effect["kind"], {})
+    return SAME_PARAMETERS.get(effect["kind"], {})
 
 
-def right_locks(kind, locked_to):
+def right_locks(effect_type, locked_to):
     """Right locks of an effect type."""
-    return LOCKS.get(kind, (locked_to,))
+    return RIGHT_LOCKS.get(effect_type, (locked_to,))

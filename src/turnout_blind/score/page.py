@@ -2,16 +2,18 @@
 
 from pathlib import Path
 
-from turnout_blind.score.case_reports import tell
+from turnout_blind.score.case_reports import case_texts
 from turnout_blind.score.plots import draw_reliability, draw_severity
-from turnout_blind.score.report import judged_set, oracle_of, report_of
+from turnout_blind.score.report import read_oracle, report_text, score_set
 from turnout_blind.seal import BlindError
 
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
-KEY = '*Red: a wrong name was among those given, also beside a right one. ½: the right name was in an "a or b".*'
+PICTURE_KEY = (
+    '*Red: a wrong name was among those given, also beside a right one. ½: the right name was in an "a or b".*'
+)
 
 
-def write_page(path, out, more=None, effects=(), cases=None):
+def write_page(path, out, extra_names=None, effects=(), cases=None):
     """Write report, pictures and case reports of the set ``out`` between the marks of the page at ``path``.
 
     Pictures are written beside the page under its name. Errors: BlindError if the page lacks the marks.
@@ -20,17 +22,17 @@ def write_page(path, out, more=None, effects=(), cases=None):
     text = path.read_text(encoding="utf-8")
     if text.count(BEGIN) != 1 or text.count(END) != 1:
         raise BlindError(path, "marks", f"{BEGIN} and {END} are not there once each", "Put them where figures belong")
-    judged, _ = judged_set(out, more)
+    results, _ = score_set(out, extra_names)
     severity, reliability = f"{path.stem}_severity.svg", f"{path.stem}_reliability.svg"
-    draw_severity(judged, path.with_name(severity))
-    draw_reliability(judged, path.with_name(reliability))
-    told = tell(out, path, cases, more, oracle_of(out), effects)
+    draw_severity(results, path.with_name(severity))
+    draw_reliability(results, path.with_name(reliability))
+    stories = case_texts(out, path, cases, extra_names, read_oracle(out), effects)
     measured = "\n\n".join(
         [
-            report_of(out, more).strip(), f"![What was said along every ladder]({severity})", KEY,
-            f"![Stated probability and share right]({reliability})", told,
+            report_text(out, extra_names).strip(), f"![What was said along every ladder]({severity})", PICTURE_KEY,
+            f"![Stated probability and share right]({reliability})", stories,
         ]
     )  # fmt: skip
-    head, rest = text.split(BEGIN)
-    path.write_text(f"{head}{BEGIN}\n\n{measured}\n\n{END}{rest.split(END)[1]}", encoding="utf-8")
+    head, tail = text.split(BEGIN)
+    path.write_text(f"{head}{BEGIN}\n\n{measured}\n\n{END}{tail.split(END)[1]}", encoding="utf-8")
     return path

@@ -3,30 +3,34 @@
 import json
 from pathlib import Path
 
-from turnout_blind.reveal import revealed
+from turnout_blind.reveal import read_revealed
 from turnout_blind.score.answers import answers_of
 from turnout_blind.score.matching import judge
-from turnout_blind.score.metrics import Share, as_it_should, confusion, figures, reliability, severity
+from turnout_blind.score.metrics import Share, confusion, figures, is_handled_right, reliability, severity
 from turnout_blind.seal import BlindError, read_commit
 
-KEY = (
+KEY_FIGURES = (
     "controls: false alarms", "what: top-1 (clear singles)", "what: a wrong name (all singles)",
     "outside the library: named wrongly", "two effects: both right", "cases without an answer",
 )  # fmt: skip
 
 
-def judged_set(out, more=None, label=None):
+def score_set(out, extra_names=None, label=None):
     """(results of cases, diagnosis) of a revealed set or of an ablation on it; cases not run are left out."""
-    truths, rows, held = revealed(out, label)
-    return [judge(truths[case], answers_of(rows[case]), more) for case in sorted(truths) if case in held["cases"]], held
+    truths, rows, diagnosis = read_revealed(out, label)
+    return [
+        judge(truths[case], answers_of(rows[case]), extra_names)
+        for case in sorted(truths)
+        if case in diagnosis["cases"]
+    ], diagnosis
 
 
-def provenance(held):
+def provenance(record):
     """Hashes of the tool and of the set, from a diagnosis or an oracle file."""
-    return {name: held[name] for name in ("tool_sha256", "commit_sha256")}
+    return {name: record[name] for name in ("tool_sha256", "commit_sha256")}
 
 
-def oracle_of(out):
+def read_oracle(out):
     """{case: held-out fit (without, with) the true effect [%]} from ``out``/oracle.json, {} if there is none.
 
     Errors: BlindError if it was computed with another tool or for another set.
@@ -34,70 +38,70 @@ def oracle_of(out):
     path = Path(out) / "oracle.json"
     if not path.exists():
         return {}
-    told, held = json.loads(path.read_text()), json.loads((Path(out) / "diagnosis.json").read_text())
-    if provenance(held) != {name: told.get(name) for name in provenance(held)}:
+    oracle, diagnosis = json.loads(path.read_text()), json.loads((Path(out) / "diagnosis.json").read_text())
+    if provenance(diagnosis) != {name: oracle.get(name) for name in provenance(diagnosis)}:
         raise BlindError(path, "tool_sha256", "not the tool and set of diagnosis.json", "Ask the oracle with that tool")
-    return {case: (r["before"], r["oracle"]) for case, r in told["fits"].items() if r.get("oracle") is not None}
+    return {case: (r["before"], r["oracle"]) for case, r in oracle["fits"].items() if r.get("oracle") is not None}
 
 
-def oracle_words(out):
+def oracle_text(out):
     """Number of cases asked of the oracle, and those without an answer; [] if there is no oracle file."""
     path = Path(out) / "oracle.json"
     if not path.exists():
         return []
-    told, known = json.loads(path.read_text()), oracle_of(out)
-    asked = {c: told["fits"][c].get("error", "no such candidate") for c in told["asked"] if c in told["fits"]}
-    left = {c: why for c, why in asked.items() if c not in known}
-    why = "; ".join(f"{c}: {reason}" for c, reason in left.items())
-    waiting = len(told["asked"]) - len(asked)
+    oracle, answered = json.loads(path.read_text()), read_oracle(out)
+    reasons = {c: oracle["fits"][c].get("error", "no such candidate") for c in oracle["asked"] if c in oracle["fits"]}
+    unanswered = {c: why for c, why in reasons.items() if c not in answered}
+    why = "; ".join(f"{c}: {reason}" for c, reason in unanswered.items())
+    waiting = len(oracle["asked"]) - len(reasons)
     return [
-        f"Oracle: {len(asked)} of {len(told['asked'])} clear singles asked, in the order of their ids"
+        f"Oracle: {len(reasons)} of {len(oracle['asked'])} clear singles asked, in the order of their ids"
         f"{f' ({waiting} not yet)' if waiting else ''}, "
-        f"{len(left)} without an answer{f' ({why})' if why else ''}."
+        f"{len(unanswered)} without an answer{f' ({why})' if why else ''}."
     ]
 
 
-def labels_of(out):
+def ablation_labels(out):
     """Labels of the ablations of this set."""
     return sorted(p.parent.name for p in (Path(out) / "ablations").glob("*/diagnosis.json"))
 
 
-def report_of(out, more=None):
+def report_text(out, extra_names=None):
     """Markdown: figures with their bars, confusion, severity, reliability, failures, ablations, cost.
 
     ``extra_names`` {kind: [right names]}. Fits with the true effect are read from ``out``/oracle.json.
     """
-    judged, held = judged_set(out, more)
-    parts = [
-        cost(judged, held, len(read_commit(out)["cases"])),
-        *oracle_words(out),
-        figure_table(figures(judged, oracle_of(out))),
+    results, diagnosis = score_set(out, extra_names)
+    sections = [
+        cost_text(results, diagnosis, len(read_commit(out)["cases"])),
+        *oracle_text(out),
+        figure_table(figures(results, read_oracle(out))),
         "What was said first, by what was concealed:",
-        confusion_table(confusion(judged)),
+        confusion_table(confusion(results)),
         "Along the ladder (visibility in points: what was said; * = the right name among it):",
-        severity_table(severity(judged)),
+        severity_table(severity(results)),
         "Stated probability and share right, in up to five groups of the cases, equal ones together:",
-        "\n".join(f"- {p:.2f}: {share:.2f} of {n}" for p, share, n in reliability(judged)) or "- none stated",
+        "\n".join(f"- {p:.2f}: {share:.2f} of {n}" for p, share, n in reliability(results)) or "- none stated",
         "Alarms, wrong names, clear effects without their name or without a word, no answer:",
-        failure_table(judged),
+        failure_table(results),
     ]
-    if labels_of(out):
-        parts += ["Ablations, each over its own cases:", ablation_table(out, judged, more)]
-    return "\n\n".join(parts) + "\n"
+    if ablation_labels(out):
+        sections += ["Ablations, each over its own cases:", ablation_table(out, results, extra_names)]
+    return "\n\n".join(sections) + "\n"
 
 
-def cost(judged, held, total):
+def cost_text(results, diagnosis, total):
     """One paragraph: number of cases of ``total``, hashes, and CPU time."""
-    cpu = sorted(run["cpu_s"] for run in held["cases"].values()) or [float("nan")]
-    commit, tool = held["commit_sha256"][:16], held["tool_sha256"][:16]
+    cpu = sorted(run["cpu_s"] for run in diagnosis["cases"].values()) or [float("nan")]
+    commit, tool = diagnosis["commit_sha256"][:16], diagnosis["tool_sha256"][:16]
     return (
-        f"{len(judged)} of {total} sealed cases; commit {commit}, tool {tool}, "
-        f"truth hidden by {held['isolation']}; "
+        f"{len(results)} of {total} sealed cases; commit {commit}, tool {tool}, "
+        f"truth hidden by {diagnosis['isolation']}; "
         f"CPU per case: median {cpu[len(cpu) // 2]:.0f} s, most {cpu[-1]:.0f} s."
     )
 
 
-def failure_table(judged):
+def failure_table(results):
     """A row per failed case: alarm on a control, wrong name, clear effect missed, or no answer.
 
     An unidentifiable effect fails with any answer but none or "a or b" with the truth among them.
@@ -106,68 +110,72 @@ def failure_table(judged):
         "| case | concealed | visibility [points] | said first | wrong names | probability |",
         "|---|---|---|---|---|---|",
     ]
-    for j in sorted(judged, key=lambda j: (j.stratum, j.kinds, j.rungs)):
-        if _failed(j):
-            what = " + ".join(f"{k} {r}" for k, r in zip(j.kinds, j.rungs)) or "nothing"
-            sure = "" if j.probability is None else f"{j.probability:.2f}"
+    for j in sorted(results, key=lambda j: (j.stratum, j.kinds, j.rungs)):
+        if _is_failure(j):
+            concealed = " + ".join(f"{k} {r}" for k, r in zip(j.kinds, j.rungs)) or "nothing"
+            probability = "" if j.probability is None else f"{j.probability:.2f}"
             lines.append(
-                f"| {j.case} | {what} | {j.gain:.1f} | {j.said} | "
-                f"{', '.join(j.wrong)} | {sure} |"
+                f"| {j.case} | {concealed} | {j.gain:.1f} | {j.first_answer} | "
+                f"{', '.join(j.wrong_names)} | {probability} |"
             )
     return "\n".join(lines) if len(lines) > 2 else "None."
 
 
-def _failed(j):
-    missed = {
+def _is_failure(j):
+    checks = {
         "control": lambda: j.alarm,
-        "outside": lambda: j.clear and not j.alarm,
-        "unidentifiable": lambda: not as_it_should(j),
+        "outside": lambda: j.is_clear and not j.alarm,
+        "unidentifiable": lambda: not is_handled_right(j),
     }
-    return not j.answered or bool(j.wrong) or missed.get(j.stratum, lambda: j.clear and not all(j.hits))()
+    return not j.answered or bool(j.wrong_names) or checks.get(j.stratum, lambda: j.is_clear and not all(j.matches))()
 
 
-def ablation_table(out, judged, more=None):
+def ablation_table(out, results, extra_names=None):
     """A row per key figure and a column per ablation, each over its own cases."""
-    columns = {"the tool": judged} | {label: judged_set(out, more, label)[0] for label in labels_of(out)}
-    found = {name: {f.name: f for f in figures(cases)} for name, cases in columns.items()}
+    columns = {"the tool": results} | {label: score_set(out, extra_names, label)[0] for label in ablation_labels(out)}
+    by_column = {name: {f.name: f for f in figures(cases)} for name, cases in columns.items()}
     lines = ["| figure | " + " | ".join(f"{n} (n = {len(c)})" for n, c in columns.items()) + " |"]
     lines.append("|---" * (len(columns) + 1) + "|")
-    for name in KEY:
-        cells = [f"{f[name].k} of {f[name].n}" if f[name].n else "–" for f in found.values()]
+    for name in KEY_FIGURES:
+        cells = [f"{f[name].k} of {f[name].n}" if f[name].n else "–" for f in by_column.values()]
         lines.append(f"| {name} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
 
-def figure_table(found):
+def figure_table(values):
     """A row per figure: figure, 95 % interval, n, bar, met or missed."""
     lines = ["| figure | measured | 95 % | n | bar | |", "|---|---|---|---|---|---|"]
-    for f in found:
-        word = {True: "met", False: "missed", None: ""}[f.met]
+    for f in values:
+        verdict = {True: "met", False: "missed", None: ""}[f.is_met]
         bar = "" if f.bar is None else f"{f.sense} {f.bar:.3g}"
         if isinstance(f, Share):
-            shown = f"{f.share:.1f} % ({f.k})" if f.n else "not measured"
+            text = f"{f.share:.1f} % ({f.k})" if f.n else "not measured"
             low, high = f.interval
-            lines.append(f"| {f.name} | {shown} | {low:.1f} to {high:.1f} % | {f.n} | {bar and bar + ' %'} | {word} |")
+            lines.append(
+                f"| {f.name} | {text} | {low:.1f} to {high:.1f} % | {f.n} | {bar and bar + ' %'} | {verdict} |"
+            )
         else:
-            shown = f"{f.value:.3g} {f.unit}".strip() if f.n else "not measured"
-            lines.append(f"| {f.name} | {shown} | | {f.n} | {bar and bar + ' ' + f.unit} | {word} |")
+            text = f"{f.value:.3g} {f.unit}".strip() if f.n else "not measured"
+            lines.append(f"| {f.name} | {text} | | {f.n} | {bar and bar + ' ' + f.unit} | {verdict} |")
     return "\n".join(lines)
 
 
 def confusion_table(table):
     """Rows of concealed effects, columns of first answers."""
-    columns = sorted({said for row in table.values() for said in row}, key=lambda s: (s not in ("none", "unknown"), s))
+    columns = sorted(
+        {answer for row in table.values() for answer in row}, key=lambda s: (s not in ("none", "unknown"), s)
+    )
     lines = ["| concealed | " + " | ".join(columns) + " |", "|---" * (len(columns) + 1) + "|"]
-    for kind in sorted(table, key=lambda k: (k != "control", k)):
-        cells = [str(table[kind][c] or "") for c in columns]
-        lines.append(f"| {kind} | " + " | ".join(cells) + " |")
+    for effect_type in sorted(table, key=lambda k: (k != "control", k)):
+        cells = [str(table[effect_type][c] or "") for c in columns]
+        lines.append(f"| {effect_type} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
 
 def severity_table(table):
     """One line per kind, rung by rung."""
     lines = []
-    for kind, rows in table.items():
-        told = ", ".join(f"{gain:.1f}: {said}{'*' if right else ''}" for _, gain, said, right in rows)
-        lines.append(f"- {kind}: {told}")
+    for effect_type, rows in table.items():
+        entries = ", ".join(f"{gain:.1f}: {answer}{'*' if right else ''}" for _, gain, answer, right in rows)
+        lines.append(f"- {effect_type}: {entries}")
     return "\n".join(lines)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from benchmarks.passage_truth import IC3, PATTERNS, RATE, passing, rolling, sensors_for
+from benchmarks.passage_truth import IC3, PATTERNS, RATE, passing_times, rolling_noise, sensors_for
 
 from turnout.passage.analysis import analyse
 
@@ -19,7 +19,7 @@ def blows(rng, recording, place, speed, rows, strength=3.0):
     """The recording with a burst at the channels ``rows`` whenever a wheel is at ``place``: a nose, a joint."""
     samples = recording.samples.copy()
     time = np.arange(recording.n_sample) / RATE
-    for t in passing(IC3, [0.0, place], speed, 0.0, 1, 1.0)[1]:
+    for t in passing_times(IC3, [0.0, place], speed, 0.0, 1, 1.0)[1]:
         past = time - t
         decay = np.where(past >= 0, np.exp(-np.clip(past, 0, None) / 0.01), 0.0)
         samples[rows] += strength * decay * rng.standard_normal((len(rows), time.size))
@@ -28,7 +28,7 @@ def blows(rng, recording, place, speed, rows, strength=3.0):
 
 def test_a_sensor_of_the_crossing_panel_may_hear_the_nose_instead_of_the_wheel_above_it(settings):
     """1.5 m off, alike in both halves of the train: in the crossing panel no finding, elsewhere one."""
-    recording = rolling(np.random.default_rng(21), IC3, 40.0, (0.0, 4.0, 9.0, 16.5, 22.0))
+    recording = rolling_noise(np.random.default_rng(21), IC3, 40.0, (0.0, 4.0, 9.0, 16.5, 22.0))
     sensors = sensors_for(recording)
     sensors[3] = replace(sensors[3], position=15.0, panel="CP")
     passage = analyse(recording, sensors, PATTERNS, settings)
@@ -42,14 +42,14 @@ def test_a_sensor_of_the_crossing_panel_may_hear_the_nose_instead_of_the_wheel_a
 def test_a_blow_at_one_place_is_not_a_second_train(settings):
     """Two of five sensors hear every wheel a second time, when it is at the nose."""
     rng = np.random.default_rng(22)
-    recording = blows(rng, rolling(rng, IC3, 15.0, PLACES), 19.0, 15.0, [3, 4])
+    recording = blows(rng, rolling_noise(rng, IC3, 15.0, PLACES), 19.0, 15.0, [3, 4])
     passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
     assert passage.n_axle == 8 and not findings(passage, "two_trains")
 
 
 def test_a_clock_that_runs_too_fast_is_named_with_its_channel(settings):
     """A twelfth too fast, right in the middle of the train: its offset changes sign, and its mean says nothing."""
-    recording = rolling(np.random.default_rng(23), IC3, 25.0, PLACES)
+    recording = rolling_noise(np.random.default_rng(23), IC3, 25.0, PLACES)
     samples, n = recording.samples.copy(), recording.n_sample
     middle = (1.0 + (IC3.mean() + PLACES[1]) / 25.0) * RATE
     place = middle + (np.arange(n) - middle) / 1.08
@@ -64,7 +64,7 @@ def test_a_clock_that_runs_too_fast_is_named_with_its_channel(settings):
 def test_a_sensor_that_falls_off_halfway_says_until_when_it_is_sound(after, settings):
     """What it says afterwards is a constant, or the noise of an amplifier without a sensor."""
     rng = np.random.default_rng(24)
-    recording = rolling(rng, IC3, 25.0, PLACES)
+    recording = rolling_noise(rng, IC3, 25.0, PLACES)
     samples, fell = recording.samples.copy(), int(2.0 * RATE)
     rest = samples.shape[1] - fell
     samples[2, fell:] = 0.125 if after == "constant" else 0.02 * rng.standard_normal(rest)
@@ -78,7 +78,7 @@ def test_a_sensor_that_falls_off_halfway_says_until_when_it_is_sound(after, sett
 
 def test_all_channels_clipped_still_tell_that_a_train_came(settings):
     """Every sensor says nothing about the track; the axles are what the clipped parts let through."""
-    recording = rolling(np.random.default_rng(25), IC3, 40.0, PLACES)
+    recording = rolling_noise(np.random.default_rng(25), IC3, 40.0, PLACES)
     samples = np.clip(recording.samples, -0.05, 0.05)
     passage = analyse(replace(recording, samples=samples), sensors_for(recording), PATTERNS, settings)
     assert passage.status in ("partly", "quarantined", "rejected")

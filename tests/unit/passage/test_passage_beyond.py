@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from benchmarks.passage_truth import KNOWN, RATE, recording_of, rolling, sensors_for
+from benchmarks.passage_truth import PATTERN_FILE, RATE, recording_of, rolling_noise, sensors_for
 
 from turnout.passage.analysis import analyse
 from turnout.passage.axle_patterns import offsets, read_patterns
@@ -17,11 +17,11 @@ SPEED, COACHES = 33.0, {"units": [{"any": ["coach"], "count": [2, 12]}]}
 
 def with_locomotive(width, seed):
     """Five coaches whose wheels burst within 0.4 m, behind a locomotive that is heard ``width`` [m] around its own."""
-    patterns = read_patterns({**KNOWN, "trains": {**KNOWN["trains"], "coaches": COACHES}})
+    patterns = read_patterns({**PATTERN_FILE, "trains": {**PATTERN_FILE["trains"], "coaches": COACHES}})
     kinds = {v.name: v for p in patterns for g in p.groups for v in g.vehicles}
     places = offsets((kinds["loco"], *(kinds["coach"],) * 5))
     rng = np.random.default_rng(seed)
-    behind = rolling(rng, places[4:] - places[4], SPEED, (2.0,), lead=1.0 + places[4] / SPEED)
+    behind = rolling_noise(rng, places[4:] - places[4], SPEED, (2.0,), lead=1.0 + places[4] / SPEED)
     samples = behind.samples.copy()
     time = np.arange(samples.shape[1]) / RATE
     passed = (time[:, None] - 1.0) * SPEED - 2.0 - places[:4]
@@ -61,6 +61,6 @@ def test_what_is_heard_beyond_a_row_is_compared_with_the_row(speed, direction):
 def test_the_neighbouring_track_is_not_heard_beside_one_sensor_of_its_own():
     """One sensor that hears the train and two of the other track with 8 % of its amplitude: 22 dB below."""
     rng = np.random.default_rng(3)
-    samples = rolling(rng, positions=(2.0, 9.0, 14.0)).samples * np.array([[1.0], [0.08], [0.08]])
+    samples = rolling_noise(rng, positions=(2.0, 9.0, 14.0)).samples * np.array([[1.0], [0.08], [0.08]])
     samples += 1e-3 * rng.standard_normal(samples.shape)
     assert audible_sensors(sensor_envelopes(samples, RATE, (2.0, 9.0, 14.0), 0.001)).tolist() == [0]

@@ -6,7 +6,7 @@ from datetime import datetime, timedelta
 
 import numpy as np
 import pytest
-from benchmarks.passage_truth import IC3, PATTERNS, paper_model, rolling, struck_train
+from benchmarks.passage_truth import IC3, PATTERNS, impact_train, paper_model, rolling_noise
 
 from turnout.config import load_configuration, with_raw
 from turnout.passage.clusters import Cluster, Clusters
@@ -39,7 +39,7 @@ def lay_out(raw, recording, name="20240513T100000Z", trains=""):
 def on_main(seed=1, speed=44.4):
     """An IC3 on the main track as the paper's models answer; the diverging sensors hear nothing."""
     rng = np.random.default_rng(seed)
-    recording, times = struck_train(rng, LOCATIONS.values(), list(PLACES.values()), speed=speed)
+    recording, times = impact_train(rng, LOCATIONS.values(), list(PLACES.values()), speed=speed)
     samples = recording.samples.copy()
     for i, name in enumerate(PLACES):
         if name in DIVERGING:
@@ -157,7 +157,7 @@ def test_a_clipped_channel_is_quarantined_by_name_and_the_others_are_fitted(tmp_
 
 def test_a_rolling_train_is_no_impulse_and_its_scores_are_still_told(tmp_path):
     rng = np.random.default_rng(3)
-    recording = rolling(rng, IC3, 40.0, list(PLACES.values()))
+    recording = rolling_noise(rng, IC3, 40.0, list(PLACES.values()))
     channels = tuple(Channel(name, "acceleration", x) for name, x in PLACES.items())
     recording = replace(recording, channels=channels, started_at=datetime(2024, 5, 13, 10))
     unit, turnout = lay_out(tmp_path, recording)

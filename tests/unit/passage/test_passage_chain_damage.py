@@ -5,7 +5,7 @@ from datetime import datetime, timedelta
 
 import numpy as np
 import pytest
-from benchmarks.passage_truth import PATTERNS, paper_model, struck_train
+from benchmarks.passage_truth import PATTERNS, impact_train, paper_model
 
 from turnout.config import load_configuration, with_raw
 from turnout.errors import PartlyComputed
@@ -29,7 +29,7 @@ def in_repository(repository, monkeypatch):
 def on_main(snr_db=40.0):
     """An IC3 on the main track as the paper's models answer; the diverging sensors hear nothing."""
     rng = np.random.default_rng(1)
-    recording, _ = struck_train(rng, LOCATIONS.values(), list(PLACES.values()), speed=44.4, snr_db=snr_db)
+    recording, _ = impact_train(rng, LOCATIONS.values(), list(PLACES.values()), speed=44.4, snr_db=snr_db)
     samples = recording.samples.copy()
     for i, name in enumerate(PLACES):
         if name in ("A9", "ASD"):

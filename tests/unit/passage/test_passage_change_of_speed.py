@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from benchmarks.passage_truth import IC3, PATTERNS, passing, rolling, sensors_for
+from benchmarks.passage_truth import IC3, PATTERNS, passing_times, rolling_noise, sensors_for
 
 from turnout.passage.analysis import _sensor_speed, analyse
 
@@ -16,10 +16,11 @@ FREIGHT = np.concatenate([14.0 * k + np.array(WAGONS[k % 3]) for k in range(22)]
 
 def passed(settings, offsets, speed, acceleration, direction):
     """The passage, and its true speed halfway between the first and the last axle at the origin. [m/s]"""
-    recording = rolling(np.random.default_rng(3), offsets, speed, PLACES, direction, acceleration=acceleration, lead=3)
+    random = np.random.default_rng(3)
+    recording = rolling_noise(random, offsets, speed, PLACES, direction, acceleration=acceleration, lead=3)
     passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
     first = min(PLACES) if direction > 0 else max(PLACES)
-    at_origin = passing(offsets, (first, 0.0), speed, acceleration, direction, 3.0)[1]
+    at_origin = passing_times(offsets, (first, 0.0), speed, acceleration, direction, 3.0)[1]
     return passage, speed + acceleration * (0.5 * (at_origin[0] + at_origin[-1]) - 3.0)
 
 
@@ -49,7 +50,7 @@ def test_a_freight_train_without_template_too(speed, acceleration, settings):
 @pytest.mark.parametrize("acceleration", [0.1, -0.15])
 def test_exact_times_of_a_train_that_changes_its_speed_give_speed_and_acceleration(acceleration, settings):
     """138 m at 9 m/s at first, up by a fifth or down by two: neither slowness nor way is a straight line."""
-    times = passing(FREIGHT[:28], PLACES, 9.0, acceleration, 1, 3.0)
+    times = passing_times(FREIGHT[:28], PLACES, 9.0, acceleration, 1, 3.0)
     heard = SimpleNamespace(positions=np.array(PLACES))
     speed, se, found, _, at = _sensor_speed(times, heard, 1, settings.place_error, settings)
     assert speed == pytest.approx(9.0 + acceleration * (at - 3.0), rel=1e-4) and se < 2e-3 * speed

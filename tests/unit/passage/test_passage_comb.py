@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from benchmarks.passage_truth import IC3, PATTERNS, RATE, passing, recording_of, rolling, sensors_for
+from benchmarks.passage_truth import IC3, PATTERNS, RATE, passing_times, recording_of, rolling_noise, sensors_for
 
 from turnout.passage.analysis import analyse
 from turnout.passage.axle_patterns import Group, Pattern, Vehicle, offsets
@@ -101,7 +101,7 @@ def test_a_train_that_differs_from_its_template_by_its_wheelbases_is_unknown(set
     named = {"same": 0, "other": 0}
     for seed in range(6):
         for key, places in (("same", IC3), ("other", other - other[0])):
-            recording = rolling(np.random.default_rng(50 + seed), places, 40.0, (2.0,))
+            recording = rolling_noise(np.random.default_rng(50 + seed), places, 40.0, (2.0,))
             named[key] += analyse(recording, sensors_for(recording), PATTERNS, settings).type.type == "IC3"
     assert named["other"] == 0 and named["same"] >= 5
 
@@ -112,9 +112,9 @@ def test_the_stated_error_of_the_speed_covers_it(positions, settings):
     rng, inside = np.random.default_rng(77), 0
     for _ in range(24):
         speed, a = rng.uniform(24.0, 55.0), rng.choice([0.0, 0.0, 0.0, 0.15, -0.2])
-        recording = rolling(rng, IC3, speed, positions, acceleration=a)
+        recording = rolling_noise(rng, IC3, speed, positions, acceleration=a)
         passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
-        times = passing(IC3, positions, speed, a, 1, 1.0)
+        times = passing_times(IC3, positions, speed, a, 1, 1.0)
         middle = 0.5 * (times.mean(axis=0)[0] + times.mean(axis=0)[-1])
         true = speed + a * (middle - 1.0)
         inside += abs(passage.speed.at(middle) - true) < 2.0 * passage.speed.se

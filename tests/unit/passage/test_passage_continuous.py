@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from benchmarks.passage_truth import IC3, PATTERNS, RATE, rolling, sensors_for
+from benchmarks.passage_truth import IC3, PATTERNS, RATE, rolling_noise, sensors_for
 
 from turnout.passage.analysis import analyse
 from turnout.passage.segmentation import cut_passages
@@ -20,7 +20,7 @@ def record(starts, speeds, length, seed=1):
     rng = np.random.default_rng(seed)
     samples = 0.02 * rng.standard_normal((2, int(length * RATE)))
     for start, speed in zip(starts, speeds):
-        train = rolling(rng, IC3, speed, (0.0, 4.0), lead=0.0, noise=0.0).samples
+        train = rolling_noise(rng, IC3, speed, (0.0, 4.0), lead=0.0, noise=0.0).samples
         first = int(start * RATE)
         train = train[:, : samples.shape[1] - first]
         samples[:, first : first + train.shape[1]] += train

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import duckdb
 import numpy as np
 import pytest
-from benchmarks.passage_truth import IC3, PATTERNS, RATE, passing, rolling, sensors_for
+from benchmarks.passage_truth import IC3, PATTERNS, RATE, passing_times, rolling_noise, sensors_for
 
 from turnout.cli.main import main
 from turnout.config import load_configuration, with_raw
@@ -28,9 +28,9 @@ WAVENUMBER = 1.1
 def weighed(rng, load, speed, scatter=0.01):
     """Bursts that follow the wheels, and under each the v² w'' of a rail on its foundation, for ``load`` tonnes."""
     places = list(PLACES.values())
-    recording = rolling(rng, IC3, speed, places, noise=0.01)
+    recording = rolling_noise(rng, IC3, speed, places, noise=0.01)
     samples, time = 0.3 * recording.samples, np.arange(recording.n_sample) / RATE
-    for row, name, times in zip(samples, PLACES, passing(IC3, places, speed, 0.0, 1, 1.0)):
+    for row, name, times in zip(samples, PLACES, passing_times(IC3, places, speed, 0.0, 1, 1.0)):
         for t in times:
             kx = WAVENUMBER * speed * np.abs(time - t)
             shape = np.exp(-kx) * (np.cos(kx) - np.sin(kx))

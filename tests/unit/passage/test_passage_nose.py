@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from benchmarks.passage_truth import IC3, PATTERNS, RATE, passing, recording_of, rolling, sensors_for
+from benchmarks.passage_truth import IC3, PATTERNS, RATE, passing_times, recording_of, rolling_noise, sensors_for
 
 from turnout.config.settings.passage import PassageSettings
 from turnout.passage.analysis import analyse
@@ -15,9 +15,9 @@ STRANGER = np.array([0.0, 1.9, 11.2, 13.1, 19.7, 21.8, 33.0, 35.4])
 def banging(rng, offsets, speed, direction, loud=6.0):
     """Bursts that follow the wheels, and at each sensor a burst ``loud`` times as strong while a wheel is at the nose,
     ringing for 15 ms, all of it at the same moment; and (n_sensor, n_axle) when the wheels pass the sensors."""
-    recording = rolling(rng, offsets, speed, PLACES, direction)
+    recording = rolling_noise(rng, offsets, speed, PLACES, direction)
     samples, time = recording.samples.copy(), np.arange(recording.samples.shape[1]) / RATE
-    every = passing(offsets, (*PLACES, NOSE), speed, 0.0, direction, 1.0)
+    every = passing_times(offsets, (*PLACES, NOSE), speed, 0.0, direction, 1.0)
     for t in every[-1]:
         ring = np.where(time >= t, np.exp(-np.maximum(time - t, 0.0) / 0.015), 0.0)
         for i, x in enumerate(PLACES):
@@ -46,6 +46,6 @@ def test_a_train_without_template_that_bangs_is_counted_with_a_doubt():
 
 
 def test_the_same_train_without_bangs_is_not_doubted():
-    recording = rolling(np.random.default_rng(3), STRANGER, 33.0, PLACES)
+    recording = rolling_noise(np.random.default_rng(3), STRANGER, 33.0, PLACES)
     passage = analyse(recording, sensors_for(recording), PATTERNS, PassageSettings())
     assert (passage.type.type, passage.n_axle, passage.status) == (UNKNOWN, 8, "accepted")

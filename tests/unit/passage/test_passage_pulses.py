@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from benchmarks.passage_truth import PATTERNS, struck_train
+from benchmarks.passage_truth import PATTERNS, impact_train
 from scipy import signal
 
 from turnout.passage.analysis import analyse
@@ -20,7 +20,7 @@ AT = (0.31, 1.702, 2.4)  # s: before, under and behind the first bogie
 
 @pytest.fixture(scope="module")
 def train():
-    recording, _ = struck_train(np.random.default_rng(4), LOCATIONS, list(PLACES.values()), speed=44.4)
+    recording, _ = impact_train(np.random.default_rng(4), LOCATIONS, list(PLACES.values()), speed=44.4)
     return replace(recording, channels=tuple(Channel(name, "acceleration", x) for name, x in PLACES.items()))
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from benchmarks.passage_truth import IC3, RATE, paper_model, struck
+from benchmarks.passage_truth import IC3, RATE, impact_record, paper_model
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -39,7 +39,7 @@ def test_the_true_model_reaches_what_the_noise_allows(location, settings):
 
     A time on the wrong side of a sample costs a wheel its first sample, up to a point of fit with eight wheels.
     """
-    passage = struck(np.random.default_rng(11), location, start=1.7)
+    passage = impact_record(np.random.default_rng(11), location, start=1.7)
     fit = fit_channel(passage.samples, RATE, passage.times / RATE + 0.004, 44.4, paper_model(location), settings)
     assert fit.status == "accepted"
     assert fit.max_fit - 1.2 < fit.scores.fit < fit.max_fit + 0.4
@@ -49,7 +49,7 @@ def test_the_true_model_reaches_what_the_noise_allows(location, settings):
 
 
 def test_a_wrong_place_scores_less_and_the_forecast_says_it_loudest(settings):
-    passage = struck(np.random.default_rng(12), "CP A7")
+    passage = impact_record(np.random.default_rng(12), "CP A7")
     data = apply_filter(passage.samples, THROUGH)
     true, wrong = (
         score(data, passage.times, wheel_basis(paper_model(x), THROUGH, RATE), settings) for x in ("CP A7", "OT")
@@ -60,7 +60,7 @@ def test_a_wrong_place_scores_less_and_the_forecast_says_it_loudest(settings):
 def test_the_forecast_does_not_see_its_future(settings):
     """Data behind the training part of the last wheel doubled: what is foretold there stays, so half is missing."""
     rng = np.random.default_rng(13)
-    passage = struck(rng, "CP A7", offsets=IC3[:4])
+    passage = impact_record(rng, "CP A7", offsets=IC3[:4])
     data = apply_filter(passage.samples, THROUGH)
     basis = wheel_basis(paper_model("CP A7"), THROUGH, RATE)
     _, parts = forecast(data, passage.times, basis, settings)
@@ -107,7 +107,7 @@ def test_noise_is_never_accepted(settings):
 def test_the_longer_the_wheel_presses_the_less_is_along_b_and_the_less_is_explained(length, status, settings):
     """Half-sine forces: a quarter of a period of the 616 Hz mode is 0.4 ms, a quarter of one of 99 Hz 2.5 ms."""
     rng = np.random.default_rng(16)
-    passage = struck(rng, "CP A7", snr_db=120.0, start=1.2)
+    passage = impact_record(rng, "CP A7", snr_db=120.0, start=1.2)
     pulse = np.sin(np.pi * (np.arange(round(length * RATE)) + 0.5) / (length * RATE))
     samples = np.convolve(passage.clean, pulse / pulse.sum())[: passage.clean.size]
     samples = samples + 0.01 * np.abs(samples).max() * rng.standard_normal(samples.size)
@@ -125,14 +125,14 @@ def test_a_model_that_is_a_little_off_is_not_taken_for_a_load_that_is_no_impulse
     slow = np.abs(logs.imag) < np.median(np.abs(logs.imag))
     logs = np.where(slow == (mode == 0), factor * logs, logs)
     off = replace(model, a=np.real(vectors @ np.diag(np.exp(logs)) @ np.linalg.inv(vectors)))
-    passage = struck(np.random.default_rng(18), "CP A7", start=1.2)
+    passage = impact_record(np.random.default_rng(18), "CP A7", start=1.2)
     fit = fit_channel(passage.samples, RATE, passage.times / RATE, 44.4, off, settings)
     assert fit.test.failed_share > 0.5 and fit.test.along_share > 0.95
     assert fit.status == "accepted"
 
 
 def test_wheels_cut_off_by_the_end_are_left_out(settings):
-    passage = struck(np.random.default_rng(17), tail=0.01)
+    passage = impact_record(np.random.default_rng(17), tail=0.01)
     fit = fit_channel(passage.samples, RATE, passage.times / RATE, 44.4, paper_model("CP A7"), settings)
     assert fit.times.size == 7
     short = fit_channel(passage.samples, RATE, passage.times[-1:] / RATE, 44.4, paper_model("CP A7"), settings)
@@ -141,7 +141,7 @@ def test_wheels_cut_off_by_the_end_are_left_out(settings):
 
 def test_a_wheel_that_is_heard_before_the_record_begins_costs_itself_only(settings):
     """All impacts 8 ms before the detected axles, the first of which is 6 ms into the record."""
-    passage = struck(np.random.default_rng(19), "CP A7")
+    passage = impact_record(np.random.default_rng(19), "CP A7")
     heard = passage.times / RATE + 0.008
     cut = round((heard[0] - 0.006) * RATE)
     fit = fit_channel(passage.samples[cut:], RATE, heard - cut / RATE, 44.4, paper_model("CP A7"), settings)
@@ -151,7 +151,7 @@ def test_a_wheel_that_is_heard_before_the_record_begins_costs_itself_only(settin
 def test_amplitudes_scatter_as_their_standard_errors_say(settings):
     """White noise of 4 % of the peak, 60 draws of 8 wheels: the ratio is known to 3 %. The filter's band holds a
     fourteenth of the noise's power, whose density there decides: errors from its rms alone are 3.7 times too small."""
-    passage = struck(np.random.default_rng(20), "CP A7", snr_db=120.0, start=1.2)
+    passage = impact_record(np.random.default_rng(20), "CP A7", snr_db=120.0, start=1.2)
     rng, level = np.random.default_rng(21), 0.04 * np.abs(passage.clean).max()
     found, said = [], []
     for _ in range(60):

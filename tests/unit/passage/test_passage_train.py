@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from benchmarks.passage_truth import IC3, PATTERNS, RATE, rolling, sensors_for, struck_train
+from benchmarks.passage_truth import IC3, PATTERNS, RATE, impact_train, rolling_noise, sensors_for
 
 from turnout.passage.analysis import analyse
 from turnout.passage.channel_checks import inconsistent_positions
@@ -31,7 +31,7 @@ def test_rolling_train_on_three_sensors(direction, name, speed, acceleration, to
     prior of a steady speed stands.
     """
     positions = (-3.0, 1.5, 9.0)
-    recording = rolling(np.random.default_rng(1), IC3, speed, positions, direction, acceleration=acceleration)
+    recording = rolling_noise(np.random.default_rng(1), IC3, speed, positions, direction, acceleration=acceleration)
     passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
     assert passage.n_axle == 8 and passage.direction == name and passage.type.type == "IC3"
     first_at = 1.0 + (0.0 - np.min(direction * np.array(positions))) / speed
@@ -49,7 +49,7 @@ def test_struck_train_is_timed_to_microseconds_after_blind_detection(settings):
 
     from turnout.passage.channel_fit import fit_channel
 
-    recording, times = struck_train(np.random.default_rng(2), ["CP A7", "OT"], [0.0, 4.0])
+    recording, times = impact_train(np.random.default_rng(2), ["CP A7", "OT"], [0.0, 4.0])
     passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
     assert passage.type.type == "IC3" and passage.speed.speed == pytest.approx(44.4, rel=2e-3)
     fit = fit_channel(
@@ -60,7 +60,7 @@ def test_struck_train_is_timed_to_microseconds_after_blind_detection(settings):
 
 
 def test_locomotive_with_coaches_is_found_by_its_row_of_vehicles(settings):
-    recording = rolling(np.random.default_rng(3), COACHES, 33.0, (0.0, 6.0))
+    recording = rolling_noise(np.random.default_rng(3), COACHES, 33.0, (0.0, 6.0))
     passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
     assert passage.type.type == "intercity"
     assert [v.name for v in passage.type.vehicles] == ["loco", "coach", "coach", "coach"]
@@ -68,13 +68,13 @@ def test_locomotive_with_coaches_is_found_by_its_row_of_vehicles(settings):
 
 def test_the_same_train_backwards(settings):
     backwards = COACHES[-1] - COACHES[::-1]
-    recording = rolling(np.random.default_rng(4), backwards, 33.0, (0.0, 6.0))
+    recording = rolling_noise(np.random.default_rng(4), backwards, 33.0, (0.0, 6.0))
     passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
     assert [v.name for v in passage.type.vehicles] == ["coach", "coach", "coach", "loco"]
 
 
 def test_a_train_without_template_is_unknown_and_still_measured(settings):
-    recording = rolling(np.random.default_rng(5), ODD, 30.0, (0.0, 7.0, 15.0))
+    recording = rolling_noise(np.random.default_rng(5), ODD, 30.0, (0.0, 7.0, 15.0))
     passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
     assert passage.type.type == "unknown" and passage.type.probability > 0.95
     assert passage.n_axle == 8
@@ -83,7 +83,7 @@ def test_a_train_without_template_is_unknown_and_still_measured(settings):
 
 
 def test_one_sensor_knows_the_speed_from_the_template_and_no_direction(settings):
-    recording = rolling(np.random.default_rng(6), IC3, 40.0, (2.0,))
+    recording = rolling_noise(np.random.default_rng(6), IC3, 40.0, (2.0,))
     passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
     assert (passage.type.type, passage.direction, passage.speed.source) == ("IC3", "unknown", "axle spacing")
     # 8 axles over 53 m, each placed to some 10 cm by bursts of 0.4 m: 0.2 % of the speed
@@ -92,14 +92,14 @@ def test_one_sensor_knows_the_speed_from_the_template_and_no_direction(settings)
 
 
 def test_one_sensor_and_an_unknown_train_say_how_little_is_known(settings):
-    recording = rolling(np.random.default_rng(7), ODD, 30.0, (2.0,))
+    recording = rolling_noise(np.random.default_rng(7), ODD, 30.0, (2.0,))
     passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
     assert passage.type.type == "unknown" and passage.speed.source == "bogie"
     assert passage.speed.se > 0.1 * passage.speed.speed
 
 
 def test_the_track_is_that_of_the_sensors_that_hear_it(settings):
-    recording = rolling(np.random.default_rng(8), IC3, 40.0, (0.0, 5.0, 9.0, 12.0))
+    recording = rolling_noise(np.random.default_rng(8), IC3, 40.0, (0.0, 5.0, 9.0, 12.0))
     samples = recording.samples.copy()
     samples[1] = samples[3] = 0.02 * np.random.default_rng(9).standard_normal(samples.shape[1:])
     recording = replace(recording, samples=samples)
@@ -111,14 +111,14 @@ def test_the_track_is_that_of_the_sensors_that_hear_it(settings):
 
 
 def test_noise_is_no_train(settings):
-    recording = rolling(np.random.default_rng(10), IC3, 40.0, (0.0, 4.0))
+    recording = rolling_noise(np.random.default_rng(10), IC3, 40.0, (0.0, 4.0))
     noise = np.random.default_rng(11).standard_normal(recording.samples.shape)
     passage = analyse(replace(recording, samples=noise), sensors_for(recording), PATTERNS, settings)
     assert (passage.status, passage.reason, passage.n_axle) == ("rejected", "no_train", 0)
 
 
 def test_a_train_cut_off_is_named_at_either_end(settings):
-    recording = rolling(np.random.default_rng(12), IC3, 40.0, (0.0, 4.0))
+    recording = rolling_noise(np.random.default_rng(12), IC3, 40.0, (0.0, 4.0))
     for part, words in (
         (slice(int(1.5 * RATE), None), "after the start"),
         (slice(0, int(2.2 * RATE)), "before the end"),
@@ -132,8 +132,8 @@ def test_a_train_cut_off_is_named_at_either_end(settings):
 
 def test_a_second_train_the_other_way_is_found_and_flagged(settings):
     positions = (0.0, 6.0, 11.0, 19.0)
-    first = rolling(np.random.default_rng(13), IC3, 40.0, positions)
-    other = rolling(np.random.default_rng(14), COACHES, 25.0, positions, direction=-1, lead=1.4)
+    first = rolling_noise(np.random.default_rng(13), IC3, 40.0, positions)
+    other = rolling_noise(np.random.default_rng(14), COACHES, 25.0, positions, direction=-1, lead=1.4)
     n = min(first.n_sample, other.n_sample)
     both = replace(first, samples=first.samples[:, :n] + 0.5 * other.samples[:, :n])
     passage = analyse(both, sensors_for(both), PATTERNS, settings)
@@ -143,7 +143,7 @@ def test_a_second_train_the_other_way_is_found_and_flagged(settings):
 
 
 def test_clipped_dead_and_lost_channels_are_named_and_the_rest_is_used(settings):
-    recording = rolling(np.random.default_rng(15), IC3, 40.0, (0.0, 3.0, 6.0, 9.0, 12.0))
+    recording = rolling_noise(np.random.default_rng(15), IC3, 40.0, (0.0, 3.0, 6.0, 9.0, 12.0))
     samples = recording.samples.copy()
     samples[1] = np.clip(samples[1], -1.0, 1.0)
     samples[2] = 0.0
@@ -159,7 +159,7 @@ def test_clipped_dead_and_lost_channels_are_named_and_the_rest_is_used(settings)
 
 def test_swapped_channels_are_named_and_left_out(settings):
     positions = (0.0, 4.0, 9.0, 15.0, 22.0)
-    recording = rolling(np.random.default_rng(16), IC3, 40.0, positions)
+    recording = rolling_noise(np.random.default_rng(16), IC3, 40.0, positions)
     samples = recording.samples.copy()
     samples[[1, 3]] = samples[[3, 1]]
     passage = analyse(replace(recording, samples=samples), sensors_for(recording), PATTERNS, settings)
@@ -171,7 +171,7 @@ def test_swapped_channels_are_named_and_left_out(settings):
 
 def test_a_clock_off_by_a_tenth_of_a_second_is_named(settings):
     positions = (0.0, 4.0, 9.0, 15.0, 22.0)
-    recording = rolling(np.random.default_rng(17), IC3, 40.0, positions)
+    recording = rolling_noise(np.random.default_rng(17), IC3, 40.0, positions)
     samples = recording.samples.copy()
     samples[2] = np.roll(samples[2], int(0.1 * RATE))
     passage = analyse(replace(recording, samples=samples), sensors_for(recording), PATTERNS, settings)
@@ -181,7 +181,7 @@ def test_a_clock_off_by_a_tenth_of_a_second_is_named(settings):
 
 
 def test_fewer_than_four_sensors_cannot_say_which_one_is_wrong(settings):
-    recording = rolling(np.random.default_rng(18), IC3, 40.0, (0.0, 4.0, 9.0))
+    recording = rolling_noise(np.random.default_rng(18), IC3, 40.0, (0.0, 4.0, 9.0))
     findings, keep = inconsistent_positions(recording, Motion(40.0), sensors_for(recording))
     assert findings == [] and keep.all()
 
@@ -229,6 +229,6 @@ def test_motion_and_its_inverse_agree_with_the_law_of_motion():
 )
 def test_a_lone_locomotive_has_its_template_and_a_lone_coach_has_none(axles, type_, settings, repository):
     patterns = known_patterns(str(repository / "config" / "vehicles" / "axle_patterns.yaml"))
-    recording = rolling(np.random.default_rng(9), np.array(axles), 25.0, (0.0, 10.0, 30.0, 40.0))
+    recording = rolling_noise(np.random.default_rng(9), np.array(axles), 25.0, (0.0, 10.0, 30.0, 40.0))
     passage = analyse(recording, sensors_for(recording), patterns, settings)
     assert (passage.n_axle, passage.type.type) == (len(axles), type_)

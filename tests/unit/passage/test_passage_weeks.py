@@ -5,7 +5,7 @@ from datetime import datetime, timedelta
 
 import numpy as np
 import pytest
-from benchmarks.passage_truth import IC3, PATTERNS, paper_model, rolling
+from benchmarks.passage_truth import IC3, PATTERNS, paper_model, rolling_noise
 
 from turnout.config import load_configuration, with_raw
 from turnout.readers.writing import write
@@ -25,7 +25,7 @@ TRAINS = (5, 6, 5, 5, 4)  # in each week: four are too few for an amplitude
 
 def passing_train(rng, week):
     """An IC3 at 36 to 40 m/s; A7 is ``LOUDER`` times as loud from the third week on."""
-    recording = rolling(rng, IC3, rng.uniform(36.0, 40.0), list(PLACES.values()), noise=0.01)
+    recording = rolling_noise(rng, IC3, rng.uniform(36.0, 40.0), list(PLACES.values()), noise=0.01)
     samples = recording.samples.copy()
     for i, name in enumerate(PLACES):
         if name in SILENT:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from benchmarks.passage_truth import IC3, RATE, paper_model, struck
+from benchmarks.passage_truth import IC3, RATE, impact_record, paper_model
 from scipy import stats
 
 from turnout.passage.impact_timing import impact_times, search_times
@@ -104,7 +104,7 @@ def test_impact_times_reach_the_bound_and_say_their_error(snr_db, limit):
     basis = wheel_basis(paper_model("CP A7"), None, RATE)
     off, bound, reported, flagged = [], [], [], []
     for _ in range(40):
-        passage = struck(rng, snr_db=snr_db)
+        passage = impact_record(rng, snr_db=snr_db)
         expected = passage.times + rng.normal(0.0, 10.0, passage.times.size)
         found = impact_times(passage.samples, expected, basis, 60.0, passage.noise, 20.0)
         off += list(found.times - passage.times)
@@ -122,7 +122,7 @@ def test_a_wrong_interval_is_never_silent():
     basis = wheel_basis(paper_model("CP A7"), None, RATE)
     silent = wrong = total = 0
     for _ in range(60):
-        passage = struck(rng, snr_db=6.0)
+        passage = impact_record(rng, snr_db=6.0)
         expected = passage.times + rng.normal(0.0, 10.0, passage.times.size)
         found = impact_times(passage.samples, expected, basis, 60.0, passage.noise, 10.0)
         missed = np.ceil(found.times) != np.ceil(passage.times)
@@ -136,7 +136,7 @@ def test_a_wrong_interval_is_never_silent():
 def test_overlapping_wheels_are_taken_off_each_other():
     """A three-axle bogie at 250 km/h: responses of SP (27 ms) overlap; times within 5 us without noise."""
     rng = np.random.default_rng(8)
-    passage = struck(rng, "SP", [0.0, 1.5, 3.0], 69.4, snr_db=120.0)
+    passage = impact_record(rng, "SP", [0.0, 1.5, 3.0], 69.4, snr_db=120.0)
     basis = wheel_basis(paper_model("SP"), None, RATE)
     found = search_times(passage.samples, passage.times + 3.0, basis, 40.0, basis.n_sample, 8)
     assert np.abs(found - passage.times).max() < 0.1
@@ -149,7 +149,7 @@ def test_the_jump_test_keeps_its_level_and_finds_another_direction():
     p_values, other = [], []
     model = paper_model("CP A7")
     for k in range(100):
-        passage = struck(rng)
+        passage = impact_record(rng)
         p_values += list(direction_test(passage.samples, passage.times, basis, passage.noise).p_value)
         if k < 5:
             first, phi = onsets(passage.times)
