@@ -4,7 +4,8 @@ import math
 import re
 from dataclasses import dataclass
 
-STANDARD_GRAVITY = 9.80665
+from turnout.constants import KMH, STANDARD_GRAVITY
+
 IGNORED = "ignored"  # quantity of a channel that is in the file and is not read
 
 # dimension -> {spelling: (scale, offset)} with SI = scale * number + offset
@@ -30,11 +31,54 @@ UNITS = {
         "g": (STANDARD_GRAVITY, 0.0),
         "mg": (1e-3 * STANDARD_GRAVITY, 0.0),
     },
-    "velocity": {"m/s": (1.0, 0.0), "mm/s": (1e-3, 0.0), "km/h": (1 / 3.6, 0.0)},
+    "velocity": {"m/s": (1.0, 0.0), "mm/s": (1e-3, 0.0), "km/h": (1 / KMH, 0.0)},
     "displacement": {"m": (1.0, 0.0), "mm": (1e-3, 0.0), "µm": (1e-6, 0.0)},
     "strain": {"m/m": (1.0, 0.0), "µm/m": (1e-6, 0.0), "%": (1e-2, 0.0)},
     "pressure": {"Pa": (1.0, 0.0), "kPa": (1e3, 0.0)},
     "temperature": {"°C": (1.0, 0.0), "K": (1.0, -273.15), "°F": (5 / 9, -160 / 9)},
+}
+# Units of parameter files, compound ones included: spelling -> (SI unit, factor)
+PARAMETER_UNITS = {
+    "-": ("-", 1.0),
+    "%": ("-", 0.01),
+    "dB": ("dB", 1.0),
+    "m": ("m", 1.0),
+    "mm": ("m", 1e-3),
+    "µm": ("m", 1e-6),
+    "kg": ("kg", 1.0),
+    "t": ("kg", 1e3),
+    "kg/m": ("kg/m", 1.0),
+    "kg m²": ("kg m²", 1.0),
+    "t m²": ("kg m²", 1e3),
+    "kg/m³": ("kg/m³", 1.0),
+    "Pa": ("Pa", 1.0),
+    "GPa": ("Pa", 1e9),
+    "m⁴": ("m⁴", 1.0),
+    "cm⁴": ("m⁴", 1e-8),
+    "m²": ("m²", 1.0),
+    "cm²": ("m²", 1e-4),
+    "N": ("N", 1.0),
+    "kN": ("N", 1e3),
+    "N/m": ("N/m", 1.0),
+    "MN/m": ("N/m", 1e6),
+    "N s/m": ("N s/m", 1.0),
+    "kN s/m": ("N s/m", 1e3),
+    "N s/m²": ("N s/m²", 1.0),
+    "N/m^1.5": ("N/m^1.5", 1.0),
+    "GN/m^1.5": ("N/m^1.5", 1e9),
+    "s/m": ("s/m", 1.0),
+    "N/m per N": ("N/m per N", 1.0),
+    "m/s²": ("m/s²", 1.0),
+    "m/s": ("m/s", 1.0),
+    "km/h": ("m/s", 1.0 / KMH),
+    "s": ("s", 1.0),
+    "ms": ("s", 1e-3),
+    "1/s": ("1/s", 1.0),
+    "Hz": ("Hz", 1.0),
+    "rad": ("rad", 1.0),
+    "mrad": ("rad", 1e-3),
+    "1/K": ("1/K", 1.0),
+    "°C": ("°C", 1.0),
 }
 SPELLINGS = {
     "V": "Volt Volts volt volts v",

@@ -7,7 +7,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from turnout.config.parameters import UNITS
 from turnout.physics import TERMS, PhysicsTerm
 from turnout.physics.term import EFFECT_TYPES
 from turnout.simulate import Sensor, car, simulate_hammer, simulate_passage, uniform_track
@@ -16,6 +15,7 @@ from turnout.simulate.run import run
 from turnout.simulate.sensor import record_signal
 from turnout.simulate.turnout_track import TurnoutTrack
 from turnout.simulate.wheel_path import Cosine
+from turnout.units import PARAMETER_UNITS
 
 TRACK = uniform_track(24.0)
 TURNOUT = TurnoutTrack(TRACK, {"main": ((Cosine(13.0, 1e-3, 1.0),),)})
@@ -53,7 +53,7 @@ class TestTerm:
         fields = {f.name for f in dataclasses.fields(term)}
         for p in term.parameters:
             assert p.name in fields
-            assert p.unit in UNITS or p.unit in EXTRA_UNITS, p.unit
+            assert p.unit in PARAMETER_UNITS or p.unit in EXTRA_UNITS, p.unit
             assert p.bounds[0] <= p.neutral <= p.bounds[1] and p.bounds[0] < p.bounds[1]
             assert p.bounds[0] <= getattr(example, p.name) <= p.bounds[1]
             assert len(p.meaning.split()) >= 3

@@ -9,12 +9,12 @@ are printed as they stand in the track's file. Without --track it is that of the
 """
 
 HELP = "fit a simulated section to measured receptances"
-UNITS = {
-    "pad_stiffness": ("MN/m", 1e6),
-    "pad_damping": ("kN s/m", 1e3),
-    "ballast_stiffness": ("MN/m", 1e6),
-    "ballast_damping": ("kN s/m", 1e3),
-    "sleeper_mass": ("kg", 1.0),
+PRINTED_UNITS = {
+    "pad_stiffness": "MN/m",
+    "pad_damping": "kN s/m",
+    "ballast_stiffness": "MN/m",
+    "ballast_damping": "kN s/m",
+    "sleeper_mass": "kg",
 }
 
 
@@ -64,6 +64,8 @@ def run(args):
 
 def _track_entry(section, values, sd, missed) -> str:
     """The values as lines of the track file, or as comments if the fit ``missed`` the tests."""
+    from turnout.units import PARAMETER_UNITS
+
     if missed:
         head = f"# do not paste: section {section} with these values {missed}"
     elif values:
@@ -73,7 +75,8 @@ def _track_entry(section, values, sd, missed) -> str:
     mark, source = ("# ", "guess: fit that misses its test") if missed else ("", "estimate: fitted")
     lines = ["", f"  {head}"]
     for name, value in values.items():
-        unit, factor = UNITS[name]
+        unit = PRINTED_UNITS[name]
+        _, factor = PARAMETER_UNITS[unit]
         prior = f", prior: {sd[name]:.2g}" if name in sd and not missed else ""
         lines.append(f'    {mark}{name}: {{value: {value / factor:.4g}, unit: {unit}, source: "{source}"{prior}}}')
     return "\n".join(lines)

@@ -8,6 +8,8 @@ Exit code 1 where no train is found, 2 where the command cannot be followed.
 
 import argparse
 
+from turnout.constants import KMH
+
 HELP = "analyse one passage file and say what is in it"
 
 
@@ -70,7 +72,7 @@ def _train_lines(recording, passage) -> list[str]:
         return lines
     speed, type_ = passage.speed, passage.type
     lines.append(f"  axles      {passage.n_axle}, the clearest cut between them and the rest is {passage.contrast:.1f}")
-    lines.append(f"  speed      {3.6 * speed.speed:.1f} ± {3.6 * speed.se:.1f} km/h halfway, from {speed.source}")
+    lines.append(f"  speed      {KMH * speed.speed:.1f} ± {KMH * speed.se:.1f} km/h halfway, from {speed.source}")
     lines.append(f"  change     {speed.acceleration:+z.2f} ± {speed.acceleration_se:.2f} m/s²")
     if speed.disagreement is not None and abs(speed.disagreement) > 3:
         lines.append(f"  sensors and axle spacing differ by {abs(speed.disagreement):.1f} standard errors")

@@ -10,6 +10,8 @@ setting passage.assets names; the next run uses them, and computes the passages 
 import argparse
 from pathlib import Path
 
+from turnout.constants import KMH
+
 HELP = "learn axle loads and clusters from the trains so far"
 
 
@@ -60,7 +62,7 @@ def _load_lines(name, trains, calibrations, settings) -> list[str]:
     for channel, c in calibrations.items():
         lines.append(
             f"  {channel:<6} one train scatters by {100 * c.scatter:.1f} %, amplitude with speed to the power "
-            f"{c.exponent:.2f}, {3.6 * c.slowest:.0f} to {3.6 * c.fastest:.0f} km/h, n = {c.n}"
+            f"{c.exponent:.2f}, {KMH * c.slowest:.0f} to {KMH * c.fastest:.0f} km/h, n = {c.n}"
         )
     return lines
 

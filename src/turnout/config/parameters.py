@@ -1,59 +1,23 @@
 """Parameter files of the simulation: YAML files in which every number has a unit and a source."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from itertools import repeat
 from math import isfinite
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
 
-from ruamel.yaml import YAML
-from ruamel.yaml.error import MarkedYAMLError
-
-from turnout.config.document import as_config_errors, describe_place
+from turnout.config.document import Branch, Place, as_config_errors, compose, place_of_node
 from turnout.errors import ConfigError, SimulationError
+from turnout.units import PARAMETER_UNITS
 
-# Unit: (SI unit, factor)
-UNITS = {
-    "-": ("-", 1.0),
-    "%": ("-", 0.01),
-    "dB": ("dB", 1.0),
-    "m": ("m", 1.0),
-    "mm": ("m", 1e-3),
-    "µm": ("m", 1e-6),
-    "kg": ("kg", 1.0),
-    "t": ("kg", 1e3),
-    "kg/m": ("kg/m", 1.0),
-    "kg m²": ("kg m²", 1.0),
-    "t m²": ("kg m²", 1e3),
-    "kg/m³": ("kg/m³", 1.0),
-    "Pa": ("Pa", 1.0),
-    "GPa": ("Pa", 1e9),
-    "m⁴": ("m⁴", 1.0),
-    "cm⁴": ("m⁴", 1e-8),
-    "m²": ("m²", 1.0),
-    "cm²": ("m²", 1e-4),
-    "N": ("N", 1.0),
-    "kN": ("N", 1e3),
-    "N/m": ("N/m", 1.0),
-    "MN/m": ("N/m", 1e6),
-    "N s/m": ("N s/m", 1.0),
-    "kN s/m": ("N s/m", 1e3),
-    "N s/m²": ("N s/m²", 1.0),
-    "N/m^1.5": ("N/m^1.5", 1.0),
-    "GN/m^1.5": ("N/m^1.5", 1e9),
-    "s/m": ("s/m", 1.0),
-    "N/m per N": ("N/m per N", 1.0),
-    "m/s²": ("m/s²", 1.0),
-    "m/s": ("m/s", 1.0),
-    "km/h": ("m/s", 1.0 / 3.6),
-    "s": ("s", 1.0),
-    "ms": ("s", 1e-3),
-    "1/s": ("1/s", 1.0),
-    "Hz": ("Hz", 1.0),
-    "rad": ("rad", 1.0),
-    "mrad": ("rad", 1e-3),
-    "1/K": ("1/K", 1.0),
-    "°C": ("°C", 1.0),
-}
+if TYPE_CHECKING:
+    from turnout.config.document import AnyNode
+
+Key = str | int  # of a mapping, or of a list that is counted from 0
+Entry = Any  # Number, ParameterSet, Entries, or any other value of YAML: the caller asks for what it expects
 KEYS = {"value", "unit", "source", "prior", "note"}
 
 
@@ -70,47 +34,37 @@ class Number:
         return self.value
 
 
-class ParameterSet(Mapping):
-    """A mapping of a parameter file that knows its place in the file, so that errors can name it.
+class ParameterSet(Branch):
+    """A mapping of a parameter file, whose keys know their lines, so that errors can name them.
 
-    >>> node = ParameterSet({"mass": Number(1500.0, "kg", "data sheet")}, "car.yaml", "bogie")
+    ``place`` has the path of the mapping within the file as its ``entry``.
+
+    >>> node = ParameterSet(Place("car.yaml", entry="bogie"), {"mass": Number(1500.0, "kg", "data sheet")})
     >>> node.number("mass", "kg"), node.number("length", "m", default=2.5)
     (1500.0, 2.5)
     """
 
-    def __init__(self, content, path, place):
-        self.content, self.path, self.place = content, str(path), place
+    def __init__(self, place: Place, values: Mapping | None = None, key_places: Mapping | None = None):
+        super().__init__(place)
+        self.update(values or {})
+        self.key_places.update(key_places or {})
 
-    def error(self, key, problem, remedy, entry=""):
+    def error(self, key: Key | None, problem: str, remedy: str, below: Key = "") -> ConfigError:
         """A ``ConfigError`` at ``key`` of this mapping, or at the mapping itself if ``key`` is None.
 
-        Its line is that of ``entry`` below that place.
+        With ``below`` its line is that of this key, although the error names the mapping.
         """
-        suffix = f"[{key}]" if isinstance(key, int) else f".{key}"
-        place = f"{self.place}{suffix if key is not None else ''}".lstrip(".")
-        return ConfigError(self.path, describe_place(self.path, place, entry), problem, remedy)
+        place = self.place if key is None else self.place.below(key, self.place_of(key))
+        if below and (written := self.place_of(below)).path == place.path:
+            place = replace(place, line=written.line)
+        return place.error(problem, remedy)
 
-    def __getitem__(self, key):
-        if key not in self.content:
-            raise self.error(None, f"the key {key!r} is missing", f"Give {key!r} there")
-        return self.content[key]
-
-    def __iter__(self):
-        return iter(self.content)
-
-    def __contains__(self, key):
-        return key in self.content
-
-    def __len__(self):
-        return len(self.content)
-
-    def get(self, key, default=None):
-        """Value of ``key``, or ``default`` if it is absent."""
-        return self.content.get(key, default)
+    def __missing__(self, key: Key) -> NoReturn:
+        raise self.error(None, f"the key {key!r} is missing", f"Give {key!r} there")
 
     def number(self, key, unit, default=None):
         """Value of ``key`` in the SI unit ``unit``; ``default`` if it is absent and a default exists."""
-        if key not in self.content and default is not None:
+        if key not in self and default is not None:
             return default
         entry = self[key]
         if not isinstance(entry, Number):
@@ -138,16 +92,17 @@ class ParameterSet(Mapping):
 
     def optional_mapping_at(self, key):
         """The mapping at ``key``, an empty one if it is absent."""
-        return ParameterSet({}, self.path, self.place) if self.get(key) is None else self.mapping_at(key)
+        return ParameterSet(self.place) if self.get(key) is None else self.mapping_at(key)
 
     def list_at(self, key):
         """The list at ``key`` as a ParameterSet with the keys 0, 1, 2 ...; an empty one if it is absent."""
-        entries = [] if self.get(key) is None else self[key]
+        entries = Entries() if self.get(key) is None else self[key]
         if not isinstance(entries, list):
             raise self.error(
                 key, f"{_describe_value(entries)} instead of a list", "Write each entry with a dash before it"
             )
-        return ParameterSet(dict(enumerate(entries)), self.path, f"{self.place}.{key}".lstrip("."))
+        places = dict(enumerate(entries.places)) if isinstance(entries, Entries) else {}
+        return ParameterSet(self.place.below(key, self.place_of(key)), dict(enumerate(entries)), places)
 
     def mappings_at(self, key):
         """The mappings listed at ``key``."""
@@ -163,15 +118,23 @@ class ParameterSet(Mapping):
 
     def allow_only(self, *allowed):
         """Raise ConfigError for a key that is not in ``allowed``; return the mapping itself."""
-        for key in self.content:
+        for key in self:
             if key not in allowed:
                 raise self.error(None, f"unknown key {key!r}", f"Use one of {', '.join(sorted(allowed))}", key)
         return self
 
     def numbers(self):
         """(place, Number) of every number in this mapping and below."""
-        for key, value in self.content.items():
-            yield from _numbers(value, f"{self.place}.{key}" if self.place else str(key))
+        for key, value in self.items():
+            yield from _numbers(value, f"{self.place.entry}.{key}".lstrip("."))
+
+
+class Entries(list):
+    """A list of a parameter file; ``places`` are those of its entries."""
+
+    def __init__(self, values: Iterable = (), places: Iterable[Place] = ()):
+        super().__init__(values)
+        self.places = tuple(places)
 
 
 def _describe_value(value):
@@ -191,70 +154,79 @@ def _numbers(value, place):
             yield from _numbers(item, f"{place}[{k}]")
 
 
-def read_parameters(path):
+def read_parameters(path: Path | str) -> ParameterSet:
     """The parameter set in a YAML file.
 
     A number is ``{value: 120, unit: MN/m, source: ...}``. ``source`` is text or a key of the file's ``sources``
     table. A source that begins with "estimate" requires a ``prior``: the relative standard deviation of the value.
     """
-    path = Path(path)
-    try:
-        with as_config_errors(path, "the file"):
-            content = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
-    except MarkedYAMLError as error:
-        mark = error.problem_mark
-        place = f"line {mark.line + 1}, column {mark.column + 1}" if mark else "the file"
-        raise ConfigError(path, place, str(error.problem), "Correct the YAML") from None
+    place = Place(str(path), entry="")
+    with as_config_errors(path, "the file", "Correct the YAML"):
+        content, node = read_content(Path(path))
     if not isinstance(content, dict):
-        raise ConfigError(path, "the file", "is not a mapping", "Write 'key: value' lines")
+        raise place.error("is not a mapping", "Write 'key: value' lines")
     if not isinstance(sources := content.pop("sources", None) or {}, dict):
-        raise ConfigError(
-            path, describe_place(path, "sources"), "is not a mapping", "Write 'key: source' lines below it"
-        )
+        written, _ = _members(node, place.path).get("sources", (None, None))
+        raise place.below("sources", written).error("is not a mapping", "Write 'key: source' lines below it")
     with as_config_errors(path, "the file"):
-        return _parse(content, path, "", sources)
+        return _parameter_set(content, node, place, sources)
 
 
-def _parse(value, path, place, sources):
+def read_content(path: Path) -> tuple[Any, AnyNode | None]:
+    """(content as dictionaries, lists and values, root node) of a YAML file; merge keys are resolved in both."""
+    node, constructor = compose(path)
+    return None if node is None else constructor.construct_document(node), node
+
+
+def _parse(value: Any, node: AnyNode | None, place: Place, sources: dict) -> Entry:
+    """The entry at ``place``, with ParameterSet, Entries and Number in place of dictionaries, lists and numbers."""
     if isinstance(value, list):
-        return [_parse(item, path, f"{place}[{k}]", sources) for k, item in enumerate(value)]
+        nodes = node.value if node is not None and node.id == "sequence" else [None] * len(value)
+        places = [place.below(k, item and place_of_node(item, place.path)) for k, item in enumerate(nodes)]
+        return Entries(map(_parse, value, nodes, places, repeat(sources)), places)
     if not isinstance(value, dict):
         return value
-    if "value" in value:
-        return _parse_number(value, path, place, sources)
-    return ParameterSet(
-        {k: _parse(v, path, f"{place}.{k}" if place else str(k), sources) for k, v in value.items()}, path, place
-    )
+    return _number(value, place, sources) if "value" in value else _parameter_set(value, node, place, sources)
 
 
-def _parse_number(entry, path, place, sources):
+def _parameter_set(content: dict, node: AnyNode | None, place: Place, sources: dict) -> ParameterSet:
+    result, written = ParameterSet(place), _members(node, place.path)
+    for key, value in content.items():
+        key_place, member = written.get(str(key), (None, None))
+        below = place.below(str(key), key_place)
+        result.put(key, _parse(value, member, below, sources), below)
+    return result
+
+
+def _members(node: AnyNode | None, path: str) -> dict[str, tuple[Place, AnyNode]]:
+    """Key -> (where it stands, node of its value); of a key that a merge key repeats those in the mapping itself."""
+    pairs = node.value if node is not None and node.id == "mapping" else ()
+    return {str(key.value): (place_of_node(key, path), value) for key, value in pairs}
+
+
+def _number(entry: dict, place: Place, sources: dict) -> Number:
     for key in ("unit", "source"):
         if isinstance(entry.get(key), (list, dict, type(None))):
-            raise ConfigError(path, describe_place(path, place), f"a number without {key}", f"Give its {key}")
+            raise place.error(f"a number without {key}", f"Give its {key}")
     if unknown := set(entry) - KEYS:
-        raise ConfigError(
-            path, describe_place(path, place), f"unknown key {min(unknown)!r}", f"Use {', '.join(sorted(KEYS))}"
-        )
-    if entry["unit"] not in UNITS:
-        raise ConfigError(
-            path, describe_place(path, place), f"unknown unit {entry['unit']!r}", f"Use one of {', '.join(UNITS)}"
-        )
+        raise place.error(f"unknown key {min(unknown)!r}", f"Use {', '.join(sorted(KEYS))}")
+    if entry["unit"] not in PARAMETER_UNITS:
+        raise place.error(f"unknown unit {entry['unit']!r}", f"Use one of {', '.join(PARAMETER_UNITS)}")
     source = sources.get(entry["source"], entry["source"])
     prior = entry.get("prior")
-    spread = None if prior is None else _finite(prior, path, place)
+    spread = None if prior is None else _finite(prior, place)
     if (spread is None and str(source).startswith("estimate")) or (spread is not None and spread <= 0.0):
         problem = "an estimate without a prior" if spread is None else f"a prior of {prior}"
-        remedy = "Give its relative standard deviation, above 0, as prior"
-        raise ConfigError(path, describe_place(path, place), problem, remedy)
-    unit, factor = UNITS[entry["unit"]]
-    return Number(factor * _finite(entry["value"], path, place), unit, str(source), spread)
+        raise place.error(problem, "Give its relative standard deviation, above 0, as prior")
+    unit, factor = PARAMETER_UNITS[entry["unit"]]
+    return Number(factor * _finite(entry["value"], place), unit, str(source), spread)
 
 
-def _finite(value, path, place) -> float:
+def _finite(value: Any, place: Place) -> float:
     try:
         number = float(value)
     except (TypeError, ValueError):
-        raise ConfigError(path, describe_place(path, place), f"{value!r} is not a number", "Write a number") from None
+        raise place.error(f"{value!r} is not a number", "Write a number") from None
     if not isfinite(number):
-        raise ConfigError(path, describe_place(path, place), f"{value!r} is not finite", "Write a number")
+        raise place.error(f"{value!r} is not finite", "Write a number")
     return number

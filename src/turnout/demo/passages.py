@@ -9,6 +9,7 @@ from zlib import crc32
 
 import numpy as np
 
+from turnout.constants import KMH
 from turnout.demo.scenario import gap_under, rail_temperature, stiffness_factors
 from turnout.physics.hanging_sleeper import HangingSleeper
 from turnout.readers.writing import write
@@ -70,7 +71,7 @@ def make_passage(job):
     recording = simulate_passage(
         track,
         _vehicle(vehicle, round(truth["load_share"], 1)),
-        truth["speed_kmh"] / 3.6,
+        truth["speed_kmh"] / KMH,
         sensors,
         terms=_terms_of(scenario, track, truth["track"], moment.date()),
         direction=truth["direction"],

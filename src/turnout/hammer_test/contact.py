@@ -11,7 +11,7 @@ import numpy as np
 from scipy.fft import next_fast_len, rfft
 from scipy.signal import find_peaks
 
-from turnout.hammer_test.segmentation import MAD_TO_SD
+from turnout.constants import MAD_TO_SD
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,10 @@ from dataclasses import replace
 import numpy as np
 from scipy import stats
 
+from turnout.constants import KMH
 from turnout.passage.axles import AxleFinding, fit_axle_positions
 from turnout.passage.comb import CORRELATION_LENGTH, evidence, explained_share, fit_shape, profiles_at
 from turnout.passage.comb_search import (
-    KMH_PER_MS,
     SPEED_STEP,
     FittedRow,
     likeliest_rows,
@@ -233,7 +233,7 @@ def count_without_distance(envelopes, patterns, settings):
     match = match_template(envelopes, motions_at_all_speeds(envelopes.begin, settings), patterns, settings)
     if match is not None:
         return match
-    slow, fast = settings.speed_minimum / KMH_PER_MS, settings.speed_maximum / KMH_PER_MS
+    slow, fast = settings.speed_minimum / KMH, settings.speed_maximum / KMH
     candidates = []
     for speed in np.geomspace(slow, fast, 32):
         motion = Motion(float(speed), envelopes.begin)

@@ -11,6 +11,7 @@ from itertools import product
 
 import numpy as np
 
+from turnout.constants import KMH
 from turnout.passage.axle_patterns import Pattern, offsets
 from turnout.passage.comb import Comb, evidence, explained_share, profiles_at, teeth_of
 from turnout.passage.kinematics import Motion
@@ -56,7 +57,6 @@ def _mean_amplitudes(envelopes, i, motion, stretches):
     return np.diff(inside, axis=1)[:, 0] / np.maximum(np.diff(times, axis=1)[:, 0], step)
 
 
-KMH_PER_MS = 3.6
 SPEED_STEP = 0.003  # relative step between the speeds that are tried
 COARSE_ERROR = 0.5  # m, error of the first search over the length of the row
 MAX_ENVELOPE_MARGIN = 75.0  # m, most that is audible before the first and behind the last axle together
@@ -101,7 +101,7 @@ def uniform_rows(patterns) -> tuple:
 
 def motions_at_all_speeds(begin: float, settings) -> list[Motion]:
     """Motions at all speeds of trains, ``SPEED_STEP`` apart, with the first axle at 0 at the time ``begin`` [s]."""
-    slow, fast = settings.speed_minimum / KMH_PER_MS, settings.speed_maximum / KMH_PER_MS
+    slow, fast = settings.speed_minimum / KMH, settings.speed_maximum / KMH
     return [Motion(float(v), begin) for v in np.geomspace(slow, fast, int(np.log(fast / slow) / SPEED_STEP))]
 
 

@@ -10,6 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import fft, ndimage
 
+from turnout.constants import KMH
+
 
 @dataclass(frozen=True)
 class Motion:
@@ -55,9 +57,6 @@ class Motion:
         return replace(self, speed=float(self.speed_at(start)), start=start)
 
 
-KMH_PER_MS = 3.6  # km/h per m/s
-
-
 @dataclass(frozen=True)
 class Scan:
     """Correlation of all sensors after shifts by distance times slowness, over signed slowness. [s/m]
@@ -91,7 +90,7 @@ class Scan:
 
 def slowness_grid(settings, relative: float = 0.008) -> np.ndarray:
     """Signed slownesses between the slowest and the fastest train, with relative steps ``relative``. [s/m]"""
-    slow, fast = KMH_PER_MS / settings.speed_minimum, KMH_PER_MS / settings.speed_maximum
+    slow, fast = KMH / settings.speed_minimum, KMH / settings.speed_maximum
     positive = np.geomspace(fast, slow, int(np.log(slow / fast) / relative) + 2)
     return np.concatenate([-positive[::-1], positive])
 
@@ -109,7 +108,7 @@ def correlation_at(slowness, values, step: float, positions) -> np.ndarray:
     """(n,) correlation of all sensors at each slowness [s/m]; at 0 that of simultaneous records."""
     positions = np.asarray(positions, dtype=float)
     # as wide as the grid at the slow end, where a passage is long
-    width = np.clip(0.008 * np.ptp(positions) * KMH_PER_MS / 20.0, 0.02, 0.1)
+    width = np.clip(0.008 * np.ptp(positions) * KMH / 20.0, 0.02, 0.1)
     values, step = coarsen(values, step, 0.005)
     return stack_correlations(
         pair_correlations(values, step, width), step, positions, np.asarray(slowness, dtype=float)

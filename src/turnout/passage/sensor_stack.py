@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import fft, ndimage
 
+from turnout.constants import KMH, MAD_TO_SD
 from turnout.passage.axles import (
     GRID_STEP,
     AxleFinding,
@@ -92,7 +93,7 @@ def levels(samples, rate: float, step: float, bands=BANDS) -> Levels:
     values = np.log1p(powers / quiet_power).mean(axis=1)
     quiet = values < np.quantile(values, 0.2, axis=1, keepdims=True)
     centre = np.array([np.median(v[q]) for v, q in zip(values, quiet)])
-    scatter = np.array([1.4826 * np.median(np.abs(v[q] - c)) for v, q, c in zip(values, quiet, centre)])
+    scatter = np.array([MAD_TO_SD * np.median(np.abs(v[q] - c)) for v, q, c in zip(values, quiet, centre)])
     block = max(round(0.05 / step), 1)
     n = max(values.shape[1] // block, 1)
     blocks = powers[..., : n * block].reshape(*powers.shape[:2], n, -1).mean(axis=-1)
@@ -267,7 +268,7 @@ def second_train(envelopes, passage, settings):
     first_level = _shared_level(envelopes, np.clip(_smooth_levels(envelopes), 0.0, None), passage.motion)
     if _shared_level(envelopes, residual, second) < MIN_LEVEL_SHARE * first_level:
         return []
-    speed = 3.6 / slowness[peak]
+    speed = KMH / slowness[peak]
     direction = "facing" if speed > 0 else "trailing"
     return [
         Rejection("two_trains", strength, MIN_CORRELATION, f"{SECOND_TRAIN_TEXT} {abs(speed):.0f} km/h, {direction}")

@@ -9,6 +9,7 @@ from itertools import combinations
 
 import numpy as np
 
+from turnout.constants import MAD_TO_SD
 from turnout.passage.channel_checks import half_shifts
 from turnout.passage.kinematics import Motion
 from turnout.passage.result import SpeedFinding
@@ -55,7 +56,7 @@ def slowness_from_sensors(times, positions, direction: int, position_error: floa
         rows = np.vstack([design * weight[:, None], prior])
         solution = np.linalg.lstsq(rows, np.append((target - curvature) * weight, 0.0), rcond=None)[0]
         residual = target - curvature - design @ solution
-        scale = max(1.4826 * np.median(np.abs(residual)), min_scale)
+        scale = max(MAD_TO_SD * np.median(np.abs(residual)), min_scale)
         weight = np.sqrt(1.0 / np.maximum(1.0, np.abs(residual) / (2.5 * scale)))
         q, change = solution[-2:]
         if not q > 0.0:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
+from turnout.constants import KMH
 from turnout.passage.axle_patterns import Vehicle, offsets
 from turnout.passage.vehicle_sequence import closest_row
 
@@ -191,7 +192,7 @@ def _candidate(times, type_, row, settings, speed, speed_se, sigma):
     positions = offsets(vehicles)
     limit = settings.acceleration_limit
     (v, a), covariance = axle_times_to_motion(times, positions, sigma / np.sqrt(2), limit)
-    if not settings.speed_minimum / 3.6 <= v <= settings.speed_maximum / 3.6 or abs(a) > limit:
+    if not settings.speed_minimum / KMH <= v <= settings.speed_maximum / KMH or abs(a) > limit:
         return None
     elapsed = times - times[0]
     residual = np.diff(v * elapsed + 0.5 * a * elapsed**2) - np.diff(positions)

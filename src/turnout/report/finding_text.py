@@ -2,7 +2,8 @@
 
 import json
 
-from turnout.stages.mismatch_text import Z95, interval, number_in_words, parameter_in_words, title
+from turnout.constants import Z95_EXACT
+from turnout.stages.mismatch_text import interval, number_in_words, parameter_in_words, title
 
 __all__ = ["accepted_parameters", "answer", "check", "facts", "parameters", "rivals", "title"]
 ANSWERS = {
@@ -62,7 +63,11 @@ def facts(finding) -> list[tuple[str, str]]:
 def _where(finding):
     if finding["position_m"] is not None:
         error = finding["position_se_m"]
-        return f"{finding['position_m']:.1f} m" + (f" ± {Z95 * error:.2f} m" if error else "") + " from the switch toe"
+        return (
+            f"{finding['position_m']:.1f} m"
+            + (f" ± {Z95_EXACT * error:.2f} m" if error else "")
+            + " from the switch toe"
+        )
     if finding["channel"]:
         return f"sensor {finding['channel']}"
     if finding["verdict"] in ("named", "a_or_b"):

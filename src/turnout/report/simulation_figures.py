@@ -4,7 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-SPEED = 160.0 / 3.6
+from turnout.constants import KMH
+
+SPEED = 160.0 / KMH
 SENSORS = (("A1", 0.6), ("A4", 9.0), ("A7", 24.6), ("nose", 26.7), ("A11", 36.0))
 LOW_BAND, HIGH_BAND = (0.0, 40.0), (40.0, 1000.0)
 

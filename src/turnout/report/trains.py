@@ -2,6 +2,7 @@
 
 from collections import defaultdict
 
+from turnout.constants import Z95
 from turnout.registry.schema import literal
 from turnout.report.panels.train_bars import train_bars
 
@@ -98,7 +99,7 @@ def _passage(passage):
 
 
 def _with_error(value, standard_error):
-    return f"{value:.1f} ± {'?' if standard_error is None else f'{1.96 * standard_error:.1f}'}"
+    return f"{value:.1f} ± {'?' if standard_error is None else f'{Z95 * standard_error:.1f}'}"
 
 
 def _effect(effect):

@@ -1,14 +1,21 @@
 """Vehicle models: car bodies and bogies with bounce and pitch, wheels with bounce, springs and dampers between them."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from turnout.constants import GRAVITY
 from turnout.errors import SimulationError
-from turnout.simulate.force_laws import PowerLaw
+from turnout.simulate.force_laws import ForceLaw, PowerLaw
 
-GRAVITY = 9.81
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+    from typing import Any
+
 HERTZ = PowerLaw(93e9)
 WHEEL_FIELDS = ("contact", "radius", "pressing")  # fields that may differ between the wheels of a train
 
@@ -51,7 +58,7 @@ class Vehicle:
     bodies: tuple[Body, ...]
     suspensions: tuple[Suspension, ...]
     wheels: tuple[int, ...]
-    contact: object = HERTZ
+    contact: ForceLaw | tuple[ForceLaw, ...] = HERTZ
     radius: float | tuple[float, ...] = 0.43
     gravity: float = GRAVITY
     extra_links: tuple = ()
@@ -60,7 +67,7 @@ class Vehicle:
     overhang: float = 0.0
     conditions: dict = field(default_factory=dict)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for body in self.bodies:
             if not body.mass > 0.0 or (body.inertia is not None and not body.inertia > 0.0):
                 raise SimulationError(
@@ -83,33 +90,44 @@ class Vehicle:
                 )
 
     @cached_property
-    def row(self):
+    def row(self) -> np.ndarray:
         """Row of the bounce of each body; its pitch, if it has one, is the next row."""
         sizes = [1 if body.inertia is None else 2 for body in self.bodies]
         return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
 
     @property
-    def n(self):
+    def n(self) -> int:
         """Degrees of freedom."""
         return int(self.row[-1])
 
     @property
-    def wheel_rows(self):
+    def wheel_rows(self) -> np.ndarray:
         """Row of each wheel, (n_wheel,)."""
         return self.row[list(self.wheels)]
 
     @property
-    def wheel_positions(self):
+    def wheel_positions(self) -> np.ndarray:
         """Distance of each wheel behind the front one [m], (n_wheel,)."""
         return np.array([self.bodies[i].position for i in self.wheels])
 
-    def wheel_values(self, quantity):
-        """``contact``, ``radius`` or ``pressing`` of every wheel, a tuple of n_wheel."""
+    def wheel_values(self, quantity: str) -> tuple[Any, ...]:
+        """``contact``, ``radius`` or ``pressing`` of every wheel.
+
+        Parameters
+        ----------
+        quantity : str
+            Name of the field, one of ``WHEEL_FIELDS``.
+
+        Returns
+        -------
+        tuple
+            One value for each wheel.
+        """
         value = getattr(self, quantity)
         return value if isinstance(value, tuple) else (value,) * len(self.wheels)
 
     @cached_property
-    def matrices(self):
+    def matrices(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Mass, damping, stiffness (n, n) and weight (n,) [N] downwards."""
         mass, damping, stiffness = (np.zeros((self.n, self.n)) for _ in range(3))
         weight = np.zeros(self.n)
@@ -127,7 +145,7 @@ class Vehicle:
                 _add(matrix, ends, value)
         return mass, damping, stiffness, weight
 
-    def _ends(self, body, lever, sign):
+    def _ends(self, body: int, lever: float, sign: float) -> list[tuple[int, float]]:
         row = self.row[body]
         ends = [(row, sign)]
         if self.bodies[body].inertia is not None and lever:
@@ -135,7 +153,7 @@ class Vehicle:
         return ends
 
     @cached_property
-    def static_loads(self):
+    def static_loads(self) -> np.ndarray:
         """Force of each wheel on a level rigid rail [N], (n_wheel,)."""
         _, _, stiffness, weight = self.matrices
         wheels = self.wheel_rows
@@ -148,7 +166,7 @@ class Vehicle:
         return weight[wheels] - stiffness[np.ix_(wheels, sprung)] @ z
 
     @cached_property
-    def blocks(self):
+    def blocks(self) -> np.ndarray:
         """First row of each group of coupled rows, with the end; rows of a group follow each other."""
         _, damping, stiffness, _ = self.matrices
         mass = self.matrices[0]
@@ -160,11 +178,27 @@ class Vehicle:
             reach = max(reach, i, int(np.flatnonzero(coupled[i]).max(initial=i)))
         return np.array([*starts, self.n], dtype=np.int64)
 
-    def with_(self, **changes):
-        """The same vehicle with some fields changed."""
+    def with_(self, **changes: Any) -> Vehicle:
+        """The same vehicle with some fields changed.
+
+        Parameters
+        ----------
+        **changes : Any
+            New values by name of the field.
+
+        Returns
+        -------
+        Vehicle
+            A copy, checked like a new vehicle.
+
+        Raises
+        ------
+        SimulationError
+            If the changed values are not those of a vehicle.
+        """
         return replace(self, **changes)
 
-    def reverse(self):
+    def reverse(self) -> Vehicle:
         """The same vehicle in the opposite direction, its last wheel first."""
         last = float(self.wheel_positions[-1])
         pitch = {int(r) + 1 for r, b in zip(self.row, self.bodies) if b.inertia is not None}
@@ -180,32 +214,76 @@ class Vehicle:
         )  # fmt: skip
 
 
-def one_or_all(values):
-    """The common value of all wheels, or the tuple of their ``values`` if they differ."""
+def one_or_all(values: Sequence[Any]) -> Any:
+    """The common value of all wheels, or the tuple of their ``values`` if they differ.
+
+    Parameters
+    ----------
+    values : sequence
+        Value of each wheel.
+
+    Returns
+    -------
+    object
+        A single value, or a tuple with one for each wheel.
+    """
     return values[0] if all(value == values[0] for value in values) else tuple(values)
 
 
-def _add(matrix, ends, value):
+def _add(matrix: np.ndarray, ends: Iterable[tuple[int, float]], value: float) -> None:
     for a, wa in ends:
         for b, wb in ends:
             matrix[a, b] += value * wa * wb
 
 
 def car(
-    name="car",
-    body_mass=16000.0,
-    body_inertia=9e5,
-    bogie_mass=1500.0,
-    bogie_inertia=1500.0,
-    wheel_mass=750.0,
-    primary=(0.6e6, 6e3),
-    secondary=(0.25e6, 12e3),
-    half_base=1.25,
-    half_pivot=8.85,
-    **more,
-):
+    name: str = "car",
+    body_mass: float = 16000.0,
+    body_inertia: float = 9e5,
+    bogie_mass: float = 1500.0,
+    bogie_inertia: float = 1500.0,
+    wheel_mass: float = 750.0,
+    primary: tuple[float, float] = (0.6e6, 6e3),
+    secondary: tuple[float, float] = (0.25e6, 12e3),
+    half_base: float = 1.25,
+    half_pivot: float = 8.85,
+    **more: Any,
+) -> Vehicle:
     """Half a four-axle car of 10 degrees of freedom; the default load of each wheel is 53.96 kN.
 
+    Parameters
+    ----------
+    name : str
+        Name of the vehicle.
+    body_mass : float
+        Mass of half the body. [kg]
+    body_inertia : float
+        Pitch inertia of half the body. [kg m²]
+    bogie_mass : float
+        Mass of half a bogie frame. [kg]
+    bogie_inertia : float
+        Pitch inertia of half a bogie frame. [kg m²]
+    wheel_mass : float
+        Mass of half a wheelset. [kg]
+    primary : (float, float)
+        Stiffness [N/m] and damping [N s/m] between wheel and bogie.
+    secondary : (float, float)
+        Stiffness [N/m] and damping [N s/m] between bogie and body.
+    half_base : float
+        Half the wheelbase of a bogie. [m]
+    half_pivot : float
+        Half the distance of the bogie centres. [m]
+    **more : Any
+        Further fields of ``Vehicle``.
+
+    Returns
+    -------
+    Vehicle
+        Car with wheels at 0, 2 ``half_base``, 2 ``half_pivot`` and 2 (``half_base`` + ``half_pivot``) behind the front
+        axle.
+
+    Examples
+    --------
     >>> [f"{load / 1e3:.2f} kN" for load in car().static_loads]
     ['53.95 kN', '53.95 kN', '53.95 kN', '53.95 kN']
     """
@@ -223,7 +301,22 @@ def car(
     return Vehicle(name, tuple(bodies), tuple(suspensions), (2, 3, 5, 6), **more)
 
 
-def lone_wheels(mass, positions=(0.0,), **more):
-    """Wheels of ``mass`` [kg] without suspension at ``positions`` [m]; ``more`` is passed to ``Vehicle``."""
+def lone_wheels(mass: float, positions: Sequence[float] = (0.0,), **more: Any) -> Vehicle:
+    """Wheels without suspension.
+
+    Parameters
+    ----------
+    mass : float
+        Mass of each wheel. [kg]
+    positions : sequence of float
+        Position of each wheel behind the first, increasing. [m]
+    **more : Any
+        Further fields of ``Vehicle``.
+
+    Returns
+    -------
+    Vehicle
+        Vehicle with one body for each wheel.
+    """
     bodies = tuple(Body(f"wheel {k}", mass, None, position) for k, position in enumerate(positions))
     return Vehicle("wheels", bodies, (), tuple(range(len(bodies))), **more)

@@ -7,6 +7,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from turnout.config import load_configuration
+from turnout.constants import Z95
 from turnout.errors import SimulationError
 from turnout.files import write_text
 from turnout.simulate import load_track
@@ -70,7 +71,7 @@ def _check_acceptable(finding, turnout_id, anyway):
 def _is_significant(term):
     """Whether a parameter differs from its neutral value by more than half its 95 % interval."""
     neutral = {p.name: p.neutral for p in TERM_CLASSES[term["term"]].parameters}
-    return any(abs(p["value"] - neutral[name]) > 1.96 * p["se"] for name, p in term["parameters"].items())
+    return any(abs(p["value"] - neutral[name]) > Z95 * p["se"] for name, p in term["parameters"].items())
 
 
 def _write(path, text):
@@ -130,7 +131,7 @@ def _parameter_text(p, source, finding):
     text = f'{{value: {value:.4g}, unit: "{unit}", source: "{source}"'
     if value and se:
         text += f", prior: {se / abs(value):.2g}"
-    low, high = value - 1.96 * se, value + 1.96 * se
+    low, high = value - Z95 * se, value + Z95 * se
     grade = f", grade {finding['grade']}" if finding["grade"] else ""
     return f'{text}, note: "95 %: {low:.3g} to {high:.3g} {unit}, {finding["verdict"].replace("_", " ")}{grade}"}}'
 
@@ -178,5 +179,5 @@ def _identity(entry: str) -> tuple[str, ...]:
 
 def _values_text(term):
     return ", ".join(
-        f"{name} {p['value']:.4g} ± {1.96 * p['se']:.2g} {p['unit']}" for name, p in term["parameters"].items()
+        f"{name} {p['value']:.4g} ± {Z95 * p['se']:.2g} {p['unit']}" for name, p in term["parameters"].items()
     )

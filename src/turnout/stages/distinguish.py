@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+from turnout.constants import KMH
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.distinguishability import cheapest_addition, distinguishability
 from turnout.mismatch.turnout.candidates.catalogue import list_candidates
@@ -25,7 +26,7 @@ def planned_matrix(track, sensors, impact_positions, temperatures, trains, speed
     turnout = load_track(track, folder=track_folder)
     impacts = tuple((x, t) for x in impact_positions for t in temperatures)
     vehicles = {name: load_vehicle(name, folder=vehicle_folder) for name in trains}
-    passages = tuple(Train(v, n, s / 3.6, t) for n, v in vehicles.items() for s in speeds for t in temperatures)
+    passages = tuple(Train(v, n, s / KMH, t) for n, v in vehicles.items() for s in speeds for t in temperatures)
     placed_sensors = tuple(Sensor(f"S{k + 1}", x) for k, x in enumerate(sensors))
     plan = Plan(turnout, placed_sensors, impacts, passages)
     matrix = _matrix(plan, effects)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import welch
 
+from turnout.constants import Z95
 from turnout.mismatch.engine.reserved_data import reserved_fit
 
 SHOWN_DURATION = 0.8  # s of waveform in a row
@@ -250,5 +251,5 @@ def _latent_rows(diagnosis):
     centre, mean, error = diagnosis.latent.curves[name]
     label = f"missing force against {name}: it explains {100.0 * diagnosis.latent.r2[name]:.0f} %"
     x_axis = COVARIATES.get(name, (name, ""))
-    limits = [centre, mean, mean - 1.96 * error, mean + 1.96 * error]
+    limits = [centre, mean, mean - Z95 * error, mean + Z95 * error]
     return [_curve_row("latent", label, x_axis, diagnosis.latent.unit, limits)]

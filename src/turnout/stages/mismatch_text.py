@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 
+from turnout.constants import Z95_EXACT
 from turnout.mismatch.engine.score import MAX_BOUNDED_ERROR
 from turnout.stages.accepted_effects import TERM_CLASSES
 
@@ -50,7 +51,6 @@ NEGATIVE_SENTENCES = {
     "time_offset": ("delay", "Channel {channel} is early by {delay_size}"),
 }
 MIN_SURFACE_DEVIATION = 2.0  # prior standard deviations from the track file's value that are worth a sentence
-Z95 = 1.959964  # half width of a 95 % interval in standard errors
 MILLI_UNITS = {"m": "mm", "s": "ms"}
 PERCENT_UNITS = {"1/K": "% per kelvin"}
 
@@ -77,7 +77,7 @@ def interval(term, name, value, se) -> tuple[float, float]:
     """
     parameters = TERM_CLASSES[term].parameters if term in TERM_CLASSES else ()
     lower_limit = 0.0 if any(p.name == name and p.bounds[0] >= 0.0 for p in parameters) else -np.inf
-    return float(max(value - Z95 * se, min(lower_limit, value))), float(value + Z95 * se)
+    return float(max(value - Z95_EXACT * se, min(lower_limit, value))), float(value + Z95_EXACT * se)
 
 
 def parameter_in_words(term, name) -> str:
@@ -126,7 +126,7 @@ def surface_sentence(estimate) -> str:
     """
     if estimate["off"] < MIN_SURFACE_DEVIATION:
         return ""
-    half = Z95 * estimate["se"]
+    half = Z95_EXACT * estimate["se"]
     values = estimate["value"], estimate["value"] - half, estimate["value"] + half, estimate["filed"]
     value, low, high, filed = (number_in_words(v, estimate["unit"], 3) for v in values)
     name, feature = (

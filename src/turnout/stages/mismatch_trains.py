@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from turnout.constants import KMH, NEWTON_PER_TONNE
 from turnout.errors import ConfigError, SimulationError
 from turnout.mismatch.turnout.campaign import LOAD_SD
 from turnout.simulate import load_vehicle
@@ -14,8 +15,6 @@ from turnout.stages.common import number
 MAX_AXLE_RMS = 0.4  # m rms between measured axles and the vehicle file's: half a short bogie is 0.9
 MIN_SPEED_TOLERANCE = 0.03  # least share by which the axle distances may correct the speed
 MIN_AXLE_SHARE = 0.6  # share of a noted train's axles that are measured: flats and dips do not halve them
-NEWTON_PER_TONNE = 9806.65
-KMH = 3.6
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from turnout.config.events import time_problem
 from turnout.config.load import load_configuration
 from turnout.config.schema import suggestion
 from turnout.config.settings.simulate import SimulateSettings
+from turnout.constants import KMH
 from turnout.errors import ConfigError, SimulationError
 from turnout.readers.writing import WRITERS, write
 from turnout.simulate import Hammer, Sensor, load_track, load_vehicle, simulate_hammer, simulate_passage
@@ -151,7 +152,7 @@ def write_passage(request):
     recording, truth = simulate_passage(
         track,
         vehicle,
-        request["speed"] / 3.6,
+        request["speed"] / KMH,
         sensors,
         request["direction"],
         request["route"],

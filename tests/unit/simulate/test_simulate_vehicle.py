@@ -5,12 +5,13 @@ import pytest
 from scipy.linalg import eigh
 
 from turnout.config.parameters import read_parameters
+from turnout.constants import GRAVITY
 from turnout.errors import SimulationError
 from turnout.simulate import car, load_track, load_vehicle
 from turnout.simulate.parameters import REPOSITORY
 from turnout.simulate.ports import contact_ports
 from turnout.simulate.train import couple
-from turnout.simulate.vehicle import GRAVITY, Body, Suspension, Vehicle, lone_wheels
+from turnout.simulate.vehicle import Body, Suspension, Vehicle, lone_wheels
 
 AXLES = {
     "ic3": 8,

@@ -1,14 +1,17 @@
 """Passages as observations: aligned accelerations below 112 Hz at a low sampling rate."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from turnout.constants import KMH
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.case import Nuisance, Observation
-from turnout.mismatch.turnout.campaign import LOAD_SD
+from turnout.mismatch.turnout.campaign import LOAD_SD, PassageInput
 from turnout.mismatch.turnout.passage_band import band_end, band_signals, limit_band, read_at, sample_rate_of, upsample
 from turnout.mismatch.turnout.passage_model import EDGE_TIME
+from turnout.simulate.sensor import Sensor
 
 # m, s, s: distance, margin and least time for a channel's noise. 4.2 m before a wheel there is noise alone, 1.4 m
 # before it the level is six times higher.
@@ -33,8 +36,8 @@ class AlignedPassage:
     """
 
     name: str
-    passage: object
-    sensors: tuple
+    passage: PassageInput
+    sensors: tuple[Sensor, ...]
     time: np.ndarray
     reference: float
     speed: float
@@ -52,6 +55,17 @@ class AlignedPassage:
     def limit_band(self, samples, rate):
         """Rows of ``samples`` within the band of the passage."""
         return limit_band(samples, rate, high=self.high)
+
+    @property
+    def train(self) -> str:
+        """Type or number of the train, else the name of the passage."""
+        return self.passage.train or self.passage.name
+
+    @property
+    def conditions(self) -> dict[str, Any]:
+        """Conditions of the passage, as terms need them."""
+        loads = tuple(2.0 * load for load in self.passage.vehicle.static_loads)
+        return {"axle_loads": loads, "train": self.train, "name": self.name, **self.passage.conditions}
 
     def positions(self):
         """(n_wheel, n) position of every wheel [m]."""
@@ -128,7 +142,7 @@ def observation_of(aligned, data, noise, tolerance, clipped=None):
     cells, labels = _cells(aligned)
     passage = aligned.passage
     temperature = passage.conditions.get("rail_temperature")
-    condition_words = [passage.train, f"{passage.speed * 3.6:.0f} km/h"]
+    condition_words = [passage.train, f"{passage.speed * KMH:.0f} km/h"]
     covariates = {"speed": aligned.speed, "load": float(np.mean(passage.vehicle.static_loads))}
     if temperature is not None:
         condition_words.append(f"{temperature:.0f} °C")
@@ -158,7 +172,7 @@ def _cells(aligned):
     Their labels are what a cause may be bound to: sensor, train, wheel, position, condition.
     """
     passage, position = aligned.passage, aligned.positions()
-    train, speed = passage.train or passage.name, f"{passage.speed * 3.6:.0f} km/h"
+    train, speed = passage.train or passage.name, f"{passage.speed * KMH:.0f} km/h"
     index, cell_index, n = [], {}, aligned.time.size
     for sensor in aligned.sensors:
         distance = np.abs(position - sensor.place)

@@ -5,6 +5,7 @@ from html import escape
 
 import numpy as np
 
+from turnout.constants import Z95
 from turnout.report.svg import LEFT, TOP, Axis, Chart
 
 WIDTH = 952
@@ -99,7 +100,7 @@ def _bar(chart, x, width, colour, row):
         chart.line(
             [x - 0.45 * width, x + 0.45 * width], [row["null_pct"]] * 2, "chance", "95 % quantile of random models"
         )
-    half = np.nan if row["adjusted_se_pct"] is None else 1.96 * row["adjusted_se_pct"]
+    half = np.nan if row["adjusted_se_pct"] is None else Z95 * row["adjusted_se_pct"]
     mean = np.array([row["adjusted_pct"]])
     chart.points(np.array([x + 0.2 * width]), mean, "measured", 2.5, mean - half, mean + half)
 

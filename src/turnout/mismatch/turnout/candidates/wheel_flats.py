@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from turnout import physics
+from turnout.constants import MAD_TO_SD
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.turnout.passage_band import limit_band
@@ -77,7 +78,7 @@ def robust_band_level(samples, rate, start, stop):
         axis=0,
     )
     excess = loudest - background
-    spread = 1.4826 * np.median(np.abs(excess - np.median(excess, axis=1, keepdims=True)), axis=1, keepdims=True)
+    spread = MAD_TO_SD * np.median(np.abs(excess - np.median(excess, axis=1, keepdims=True)), axis=1, keepdims=True)
     return time, excess / np.maximum(spread, 1e-6)
 
 
@@ -180,7 +181,7 @@ def flat_evidence(case):
     evidence = []
     for train in case.trains:
         names = [o.name for o in case.observations if o.name in case.aligned_passages]
-        passages = [m for m in (case.aligned_passages[n] for n in names) if case.conditions_of(m)["train"] == train]
+        passages = [m for m in (case.aligned_passages[n] for n in names) if m.conditions["train"] == train]
         if not passages:
             continue
         excesses = [band_excess(m) for m in passages]
