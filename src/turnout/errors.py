@@ -144,3 +144,17 @@ REASONS = {
     "simulation_failed": "the simulation could not be completed",
     "internal_error": "a fault of this program, with its traceback",
 }
+# Reasons that concern a channel of a recording: ``turnout.records.Rejection.channel`` names it.
+CHANNEL_REASONS = frozenset(
+    (
+        "not_finite",
+        "dead_channel",
+        "sign_reversed",
+        "overload",
+        "noisy",
+        "clipped",
+        "channels_swapped",
+        "clock_drift",
+        "sensor_lost",
+    )
+)

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.fft import next_fast_len, rfft, rfftfreq
 
-from turnout.hammer_test.segmentation import MAD_TO_SD
+from turnout.constants import MAD_TO_SD
 from turnout.records import Rejection
 
 # Least number of impacts from which the spread of a test is estimated.
@@ -142,8 +142,11 @@ def _judge_gain(cuts, force, acceleration, settings):
             clipped = gain[k] > 1.0 and peak[k] > MIN_CLIPPED_PEAK * np.max(np.delete(peak, k))
             detail = f"the response is {gain[k]:.3f} of what the other blows predict from the force"
             bound = 1.0 + (limit if gain[k] > 1.0 else -limit)
-            finding = Rejection("overload" if clipped else "odd_one_out", float(gain[k]), float(bound), detail)
-            (cut.rejections if clipped else cut.notes).append(finding)
+            if clipped:
+                force = cut.channels[0].name
+                cut.rejections.append(Rejection("overload", float(gain[k]), float(bound), detail, force))
+            else:
+                cut.notes.append(Rejection("odd_one_out", float(gain[k]), float(bound), detail))
 
 
 def _spectra(cuts, settings):

@@ -8,8 +8,8 @@ test's medians: weak, out of range, noisy.
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from turnout.constants import MAD_TO_SD
 from turnout.hammer_test.contact import crossing
-from turnout.hammer_test.segmentation import MAD_TO_SD
 from turnout.records import Rejection
 
 # Steps: a parabola one step deep over m equal samples falls by 9 steps within as many samples again, and 1 by rounding.
@@ -85,10 +85,10 @@ def overload(cut, contact):
     for (x, noise), zero, channel in zip(signals, cut.zeros, cut.channels):
         if (size := value_out_of_range(x + zero, channel.limit)) is not None:
             detail = f"{channel.name} reaches {size:.4g}, its range ends at {channel.limit:.4g}"
-            return Rejection("overload", size, channel.limit, detail)
+            return Rejection("overload", size, channel.limit, detail, channel.name)
         if (rail := rail_code(x, channel.resolution, noise)) is not None:
             detail = f"{channel.name} repeats its highest code {rail[1]:.4g} in {rail[0]} samples"
-            return Rejection("overload", float(rail[0]), 2.0, detail)
+            return Rejection("overload", float(rail[0]), 2.0, detail, channel.name)
     return None
 
 
@@ -175,7 +175,7 @@ def judge_tops(cuts, deviation):
         if share > limit:
             comparison = f"the others' {median_share:.2f} allow" if usual < natural else "is natural"
             detail = f"the top of the force is flat: {share:.2f} of its half width, at most {limit:.2f} {comparison}"
-            cut.rejections.append(Rejection("overload", float(share), float(limit), detail))
+            cut.rejections.append(Rejection("overload", float(share), float(limit), detail, cut.channels[0].name))
 
 
 def _share_if_quiet(cut):
@@ -207,7 +207,8 @@ def judge_repeats(cuts):
             ):
                 earlier = cuts[first]
                 detail = f"the same samples as record {earlier.record + 1} of {earlier.recording.source or 'the test'}"
-                cuts[second].rejections.append(Rejection("duplicate", distance, MAX_REPEAT_DIFFERENCE, detail))
+                rejection = Rejection("duplicate", distance, MAX_REPEAT_DIFFERENCE, detail, record=earlier.record)
+                cuts[second].rejections.append(rejection)
 
 
 def difference(first, second) -> float:
@@ -245,16 +246,18 @@ def judge_against_median(cuts, settings):
     """
     if not cuts:
         return
+    force, response = (channel.name for channel in cuts[0].channels)
     peak = np.array([abs(c.contact.peak) for c in cuts])
     largest = np.array([_largest_response(c) for c in cuts])
     noise_before = np.array([c.contact.noise_acceleration for c in cuts])
     noise = noise_before / np.where(largest > 0.0, largest, np.inf)
     for k, cut in enumerate(cuts):
         if largest[k] <= MIN_SIGNAL_TO_NOISE * noise_before[k]:
-            _reject(cut, "dead_channel", largest[k], MIN_SIGNAL_TO_NOISE * noise_before[k], (
-                f"{cut.channels[1].name} answers with {largest[k]:.3g}, no more than its noise"))  # fmt: skip
+            text = f"{response} answers with {largest[k]:.3g}, no more than its noise"
+            _reject(cut, "dead_channel", largest[k], MIN_SIGNAL_TO_NOISE * noise_before[k], text, response)
         elif noise[k] > settings.noise:
-            _reject(cut, "noisy", noise[k], settings.noise, "rms before the blow is {0:.3f} of the peak acceleration")
+            text = f"rms before the blow is {noise[k]:.3f} of the peak acceleration"
+            _reject(cut, "noisy", noise[k], settings.noise, text, response)
     if len(cuts) < 3:
         return
     median_peak = float(np.median(peak))
@@ -265,18 +268,18 @@ def judge_against_median(cuts, settings):
         low = median_peak * min(settings.weak, np.exp(-settings.deviation * spread))
         high = median_peak * max(settings.out_of_range, np.exp(settings.deviation * spread))
         if peak[k] < low:
-            _reject(cut, "weak", peak[k], low, f"{{0:.4g}} N, the test's median is {median_peak:.4g} N")
+            _reject(cut, "weak", peak[k], low, f"{peak[k]:.4g} N, the test's median is {median_peak:.4g} N")
         elif peak[k] > high:
-            _reject(cut, "overload", peak[k], high, f"{{0:.4g}} N, the test's median is {median_peak:.4g} N")
+            _reject(cut, "overload", peak[k], high, f"{peak[k]:.4g} N, the test's median is {median_peak:.4g} N", force)
         limit = max(MIN_NOISE_LIMIT, settings.noise_over_median * median_noise)
         if noise[k] > limit and not cut.rejections:
-            _reject(cut, "noisy", noise[k], limit, f"rms before the blow is {{0:.3f}} of the peak acceleration, "
-                    f"{median_noise:.3f} in the median blow")  # fmt: skip
+            text = f"rms before the blow is {noise[k]:.3f} of the peak acceleration"
+            _reject(cut, "noisy", noise[k], limit, f"{text}, {median_noise:.3f} in the median blow", response)
 
 
 def _largest_response(cut):
     return float(np.max(np.abs(cut.acceleration[cut.contact.onset :] - cut.contact.zero_acceleration)))
 
 
-def _reject(cut, reason, value, limit, template):
-    cut.rejections.append(Rejection(reason, float(value), float(limit), template.format(float(value))))
+def _reject(cut, reason, value, limit, detail, channel=None):
+    cut.rejections.append(Rejection(reason, float(value), float(limit), detail, channel))

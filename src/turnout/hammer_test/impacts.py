@@ -79,15 +79,16 @@ def _band_edges(cuts, pulses):
 def _measure(cut, settings):
     """Measure zero lines, contacts and start of the decay of one impact, and judge it by itself."""
     contact = measure_contact(cut, settings.contact_level)
+    force, response = (channel.name for channel in cut.channels)
     if contact.zero_acceleration:
         zero = _significant_zero(cut, contact)
         cut.acceleration, cut.zeros = cut.acceleration - zero, (cut.zeros[0], zero)
     if np.ptp(cut.acceleration) == 0.0:
-        cut.rejections.append(Rejection("dead_channel", 0.0, None, f"{cut.channels[1].name} is constant"))
+        cut.rejections.append(Rejection("dead_channel", 0.0, None, f"{response} is constant", response))
     if cut.polarity < 0:
         cut.rejections.append(Rejection("sign_reversed", contact.peak, 0.0, (
-            f"{cut.channels[0].name} reads {contact.peak:.4g} N at contact: a hammer can only push; "
-            "its sign is reversed, or it is another channel")))  # fmt: skip
+            f"{force} reads {contact.peak:.4g} N at contact: a hammer can only push; "
+            "its sign is reversed, or it is another channel"), force))  # fmt: skip
     cut.contact, cut.contact_end = contact, contact.end
     _judge_start(cut, settings)
     if abs(contact.peak) > MAX_FORCE:

@@ -4,9 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from turnout.constants import MAD_TO_SD
 from turnout.records import Recording, Rejection
-
-MAD_TO_SD = 1.4826  # standard deviation of normal values over their median absolute deviation
 
 
 @dataclass
@@ -55,20 +54,23 @@ def _cut_recording(recording, force, response, settings):
     force_index, response_index = recording.index(force), recording.index(response)
     channels = recording.channels[force_index], recording.channels[response_index]
     f, a = recording.samples[force_index], recording.samples[response_index]
-    finite = np.isfinite(f) & np.isfinite(a)
+    finite = np.isfinite([f, a])
     if not finite.all():
-        f, a = np.where(np.isfinite(f), f, 0.0), np.where(np.isfinite(a), a, 0.0)
+        f, a = np.where(finite[0], f, 0.0), np.where(finite[1], a, 0.0)
     record = Cut(f, a, recording.rate, 0, 0, 1, 0.0, recording, channels)
     if f.size == 0 or np.ptp(f) == 0.0:
-        record.rejections.append(_not_finite(finite, Rejection("dead_channel", 0.0, None, f"{force} is constant")))
+        dead = Rejection("dead_channel", 0.0, None, f"{force} is constant", force)
+        record.rejections.append(_not_finite(finite, record) or dead)
         return [record]
-    zero = float(np.median(f[finite]))
+    usable = finite.all(axis=0)
+    zero = float(np.median(f[usable]))
     f = f - zero
-    noise = MAD_TO_SD * float(np.median(np.abs(f[finite])))
+    noise = MAD_TO_SD * float(np.median(np.abs(f[usable])))
     impacts, level = _find_triggers(f, noise, recording.rate, settings)
     if not impacts:
-        record.rejections.append(_not_finite(finite, Rejection("no_impact", float(np.max(np.abs(f))), level, (
-            f"the force reaches {np.max(np.abs(f)):.3g} N, a blow would exceed {level:.3g} N"))))  # fmt: skip
+        detail = f"the force reaches {np.max(np.abs(f)):.3g} N, a blow would exceed {level:.3g} N"
+        silent = Rejection("no_impact", float(np.max(np.abs(f))), level, detail)
+        record.rejections.append(_not_finite(finite, record) or silent)
         return [record]
     before = int(settings.pre_trigger * recording.rate)
     after = int(settings.window * recording.rate)
@@ -84,17 +86,20 @@ def _cut_recording(recording, force, response, settings):
         cut = Cut(
             f[window], a[window], recording.rate, *trigger_span, polarity, noise, recording, channels, (zero, 0.0)
         )
-        if not finite[window].all():
-            cut.rejections.append(_not_finite(finite[window], None, start))
+        if (rejection := _not_finite(finite[:, window], record, start)) is not None:
+            cut.rejections.append(rejection)
         cuts.append(cut)
     return cuts
 
 
-def _not_finite(finite, otherwise, start=0):
-    bad = np.flatnonzero(~finite)
+def _not_finite(finite, record, start=0):
+    """Rejection of a window from sample ``start`` on in which the force or the response is not finite, else None."""
+    bad = np.flatnonzero(~finite.all(axis=0))
     if bad.size == 0:
-        return otherwise
-    return Rejection("not_finite", float(bad.size), 0.0, f"{bad.size} samples from {start + bad[0]} on are no numbers")
+        return None
+    channel, first = record.channels[0 if not finite[0].all() else 1], int(start + bad[0])
+    detail = f"{bad.size} samples from {first} on are no numbers"
+    return Rejection("not_finite", float(bad.size), 0.0, detail, channel.name, time=first / record.rate)
 
 
 def _find_triggers(f, noise, rate, settings):

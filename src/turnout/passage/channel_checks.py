@@ -42,20 +42,23 @@ def channel_states(recording: Recording) -> tuple[ChannelState, ...]:
 def _channel_state(channel, samples, rate) -> ChannelState:
     if not np.all(np.isfinite(samples)):
         bad = np.flatnonzero(~np.isfinite(samples))
-        finding = Rejection("not_finite", float(bad.size), 0.0, f"{channel.name}: first at {bad[0] / rate:.3f} s")
+        first = float(bad[0] / rate)
+        text = f"{channel.name}: first at {first:.3f} s"
+        finding = Rejection("not_finite", float(bad.size), 0.0, text, channel.name, time=first)
         return ChannelState(channel.name, False, False, (finding,))
     spread = float(np.ptp(samples))
     if spread == 0.0:
-        return ChannelState(channel.name, False, False, (Rejection("dead_channel", 0.0, 0.0, channel.name),))
+        finding = Rejection("dead_channel", 0.0, 0.0, channel.name, channel.name)
+        return ChannelState(channel.name, False, False, (finding,))
     share, level = clipped_share(samples, channel.limit)
     findings = []
     if share > 0:
         text = f"{channel.name}: {100 * share:.3f} % of the samples at ±{level:.4g} m/s²"
-        findings.append(Rejection("clipped", share, 0.0, text))
+        findings.append(Rejection("clipped", share, 0.0, text, channel.name))
     lost_at = silent_from(samples, rate)
     if lost_at is not None:
         text = f"{channel.name}: constant from {lost_at:.2f} s on"
-        findings.append(Rejection("sensor_lost", lost_at, None, text))
+        findings.append(Rejection("sensor_lost", lost_at, None, text, channel.name, time=lost_at))
     return ChannelState(channel.name, share < 0.2, not findings, tuple(findings), lost_at)
 
 
@@ -135,10 +138,9 @@ def without_pulses(recording: Recording, sensors) -> tuple[Recording, tuple[Reje
     samples, in_pulse, valid = recording.samples.copy(), np.flatnonzero(cut), np.flatnonzero(~cut)
     for i in rows:
         samples[i, in_pulse] = np.interp(in_pulse, valid, samples[i, valid])
-    text = (
-        f"all channels: {n} electrical pulse{'s' * (n > 1)} cut out, the first at {in_pulse[0] / recording.rate:.3f} s"
-    )
-    return replace(recording, samples=samples), (Rejection("interference", float(n), 0.0, text),)
+    first = float(in_pulse[0] / recording.rate)
+    text = f"all channels: {n} electrical pulse{'s' * (n > 1)} cut out, the first at {first:.3f} s"
+    return replace(recording, samples=samples), (Rejection("interference", float(n), 0.0, text, time=first),)
 
 
 def _is_live(samples) -> bool:
@@ -193,9 +195,9 @@ def lost_sensors(envelopes, names, at_sensor, speed: float) -> list[Rejection]:
             continue
         first_silent = int(np.flatnonzero(~is_silent)[-1]) + 1
         stop = int(inside[first_silent] / step)
-        lost_at = (np.flatnonzero(level[:stop] >= MIN_RELATIVE_LEVEL * typical)[-1] + 1) * step
+        lost_at = float((np.flatnonzero(level[:stop] >= MIN_RELATIVE_LEVEL * typical)[-1] + 1) * step)
         text = f"{name}: hears nothing from {lost_at:.2f} s on, {inside.size - first_silent} axles before the last"
-        findings.append(Rejection("sensor_lost", float(lost_at), None, text))
+        findings.append(Rejection("sensor_lost", lost_at, None, text, name, time=lost_at))
     return findings
 
 
@@ -240,13 +242,12 @@ def inconsistent_channels(envelopes, sensors, settings):
     if correlation < MIN_REPAIRED_SHARE * free_correlation:
         return [], keep
     keep[list(suspects)] = False
+    names, share = [sensors[i].name for i in suspects], float(best_correlation / free_correlation)
     if len(suspects) == 2:
-        text = f"{sensors[suspects[0]].name} and {sensors[suspects[1]].name}: each hears the train in the other's place"
-        return [
-            Rejection("channels_swapped", float(best_correlation / free_correlation), MIN_CONSISTENT_SHARE, text)
-        ], keep
-    text = f"{sensors[suspects[0]].name}: hears the train at another time than its place says"
-    return [Rejection("clock_drift", float(best_correlation / free_correlation), MIN_CONSISTENT_SHARE, text)], keep
+        text = f"{' and '.join(names)}: each hears the train in the other's place"
+        return [Rejection("channels_swapped", share, MIN_CONSISTENT_SHARE, text, *names)], keep
+    text = f"{names[0]}: hears the train at another time than its place says"
+    return [Rejection("clock_drift", share, MIN_CONSISTENT_SHARE, text, *names)], keep
 
 
 def inconsistent_positions(envelopes, motion, sensors):
@@ -278,7 +279,7 @@ def inconsistent_positions(envelopes, motion, sensors):
             text = (
                 f"{sensors[i].name}: its clock is off, {mean_shift[i] / motion.speed * 1e3:.0f} ms against the others"
             )
-        findings.append(Rejection("clock_drift", float(mean_shift[i]), float(limits[i]), text))
+        findings.append(Rejection("clock_drift", float(mean_shift[i]), float(limits[i]), text, sensors[i].name))
         keep[i] = False
     return findings, keep
 

@@ -25,9 +25,39 @@ class Unit:
 
 @dataclass(frozen=True)
 class Rejection:
-    """Reason of a rejection: a code of ``turnout.errors.REASONS``, the value and the limit it violates."""
+    """Reason why data were rejected, with the facts as fields; ``detail`` states them in words, for people only.
+
+    Parameters
+    ----------
+    reason : str
+        Code of ``turnout.errors.REASONS``.
+    value : float, optional
+        Number that led to the rejection. [unit of the reason]
+    limit : float, optional
+        Limit that ``value`` violates. [unit of ``value``]
+    detail : str
+        The facts in words. No part of the program reads them.
+    channel : str, optional
+        Channel that the reason concerns. A reason of ``turnout.errors.CHANNEL_REASONS`` has one wherever the names of
+        the channels are known.
+    other_channel : str, optional
+        Channel that is exchanged with ``channel``, for "channels_swapped".
+    record : int, optional
+        Record of the file that the reason refers to, from 0. Of a "duplicate" it is the earlier record.
+    time : float, optional
+        Time from which the reason applies, from the first sample of the recording. [s]
+    """
 
     reason: str
     value: float | None = None
     limit: float | None = None
     detail: str = ""
+    channel: str | None = None
+    other_channel: str | None = None
+    record: int | None = None
+    time: float | None = None
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the channels that the reason concerns: none, one, or two that are exchanged."""
+        return tuple(name for name in (self.channel, self.other_channel) if name is not None)

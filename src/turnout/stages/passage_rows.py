@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from turnout.constants import KMH
 from turnout.errors import ReadError
 from turnout.passage.train_type import UNKNOWN
 from turnout.stages.common import number, quarantine_row, temperature
 
-KMH = 3.6
-NEWTON_PER_TONNE = 9806.65
 REMEDIES = {
     "no_train": "Delete the file, or look why the logger was triggered",
     "clipped": "Raise the range of the channel",
@@ -31,7 +30,7 @@ def finding_rows(passage, base, path, record, recording_id) -> list[dict]:
         is_whole_record = finding.reason in ("no_train", "two_trains", "train_cut_off")
         if is_whole_record and passage.status != "rejected":
             continue
-        place = f"record {record + 1}" if is_whole_record else f"record {record + 1}, {finding.detail.split(':')[0]}"
+        place = f"record {record + 1}" if is_whole_record else f"record {record + 1}, {_subject(finding)}"
         remedy = REMEDIES.get(finding.reason, "Look at the recording")
         error = ReadError(path, place, finding.detail or finding.reason, remedy, finding.reason)
         row = quarantine_row(error, base, "passage", "passage", record, recording_id)
@@ -39,6 +38,13 @@ def finding_rows(passage, base, path, record, recording_id) -> list[dict]:
         row["quarantine_id"] = row["quarantine_id"][:-4] + f"{len(rows):04x}"
         rows.append(row)
     return rows
+
+
+def _subject(finding) -> str:
+    """The part of a record that a finding concerns: its channels, all channels, or what is uncertain, in words."""
+    if finding.channels:
+        return " and ".join(finding.channels)
+    return "all channels" if finding.reason == "interference" else finding.detail
 
 
 def passage_row(passage, identity, listed, load, conditions) -> dict:

@@ -74,6 +74,8 @@ def test_records_without_a_usable_blow_say_why(hammer):
         "not_finite", "no_impact", "dead_channel", "dead_channel", "dead_channel",
     ]  # fmt: skip
     assert "5 samples from 700 on" in impacts[4].rejections[0].detail
+    assert [i.rejections[0].channel for i in impacts[4:]] == ["rail", None, "rail", "rail", "hammer"]
+    assert impacts[4].rejections[0].time == pytest.approx(700 / RATE)
 
 
 def test_a_gap_in_a_continuous_record_costs_one_blow(hammer):
@@ -151,6 +153,7 @@ def test_the_same_test_exported_twice_counts_once(hammer, digits):
     alone, both = hammer.impacts(sound), hammer.impacts([*sound, *again])
     assert [reasons(i) for i in both] == [[]] * 5 + [["duplicate"]] * 5
     assert both[5].rejections[0].detail == "the same samples as record 1 of test.uff"
+    assert [i.rejections[0].record for i in both[5:]] == [0, 1, 2, 3, 4]
     assert [i.peak for i in both[:5]] == [i.peak for i in alone]
     assert receptance_of(both).n == 5
 
