@@ -84,14 +84,14 @@ def _with_lost_sensors(passage, envelopes, sensors, lost):
     """
     on_track = [i for i, s in enumerate(sensors) if s.track in ("both", passage.track)]
     times = {sensors[i].name: passage.motion.passing(passage.offsets, sensors[i].position) for i in on_track}
-    wrong_names = {f.detail.split(":")[0] for f in passage.findings}
-    on_track = [i for i in on_track if sensors[i].name not in wrong_names]
+    doubted_names = {name for f in passage.findings for name in f.channels}
+    on_track = [i for i in on_track if sensors[i].name not in doubted_names]
     if not on_track and not lost:
         return passage
     names = [sensors[i].name for i in on_track]
     silent = lost_sensors(envelopes.select(on_track), names, times, passage.motion.speed) if on_track else ()
     lost_times = {s.name: passage.motion.passing(passage.offsets, s.position) for s in lost}
-    lost_times |= {f.detail.split(":")[0]: times[f.detail.split(":")[0]] for f in silent}
+    lost_times |= {name: times[name] for f in silent for name in f.channels}
     findings = (*passage.findings, *silent)
     return replace(
         passage,

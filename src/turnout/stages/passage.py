@@ -193,7 +193,8 @@ def _add_train(recording, started_at, recording_id, path, turnout, context, rows
 
 def _fit_rows(recording, passage, sensors, turnout, context, identity, settings):
     """One row per sensor that recorded the train and whose section has a model."""
-    unusable = {r.detail.split(":")[0] for r in passage.findings if r.reason in ("clipped", "sensor_lost")}
+    clipped = {f.channel for f in passage.findings if f.reason == "clipped"}
+    lost_from = {f.channel: f.time for f in passage.findings if f.reason == "sensor_lost"}
     rows = []
     latest = {label: model_at(models, identity["passed_at_utc"]) for label, models in context.models.items()}
     for sensor in sensors:
@@ -201,14 +202,12 @@ def _fit_rows(recording, passage, sensors, turnout, context, identity, settings)
         if sensor.name not in passage.at_sensor or section_model is None:
             continue
         times = passage.at_sensor[sensor.name]
-        lost_at = next(
-            (r.value for r in passage.findings if r.reason == "sensor_lost" and sensor.name in r.detail), None
-        )
+        lost_at = lost_from.get(sensor.name)
         if lost_at is not None:
             times = times[times + settings.score_window < lost_at]
-        clipped = sensor.name in unusable and lost_at is None
+        is_clipped = sensor.name in clipped and lost_at is None
         fit = None
-        if not clipped and len(times) >= 2:
+        if not is_clipped and len(times) >= 2:
             samples = recording.signal(sensor.name)
             other_models = {label: m.model for label, m in latest.items() if m is not None and label != sensor.section}
             fit = fit_channel(
