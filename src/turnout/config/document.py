@@ -1,24 +1,36 @@
 """YAML files as trees in which every value knows its line and column, so that an error can name them.
 
-Files that cannot be read as text or YAML raise ``ConfigError``. ``Frozen`` is a read-only mapping that can be pickled.
+``load`` reads a file of the configuration; ``turnout.config.parameters`` builds on the same tree. Files that cannot be
+read as text or YAML raise ``ConfigError``. ``Frozen`` is a read-only mapping that can be pickled.
 """
 
-import re
+from __future__ import annotations
+
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from turnout.errors import ConfigError
 
+if TYPE_CHECKING:  # imported late: a command that reads no YAML does not pay for it
+    from ruamel.yaml.constructor import BaseConstructor
+    from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
+
+    AnyNode = ScalarNode | SequenceNode | MappingNode
+
+Scalar = str | int | float | bool | None
+
 
 @contextmanager
-def as_config_errors(path: object, where: str) -> Iterator[None]:
+def as_config_errors(path: object, where: str, syntax_remedy: str = "") -> Iterator[None]:
     """Context in which a file is read and parsed; errors become a ConfigError for ``path``.
 
     Covered are files that cannot be opened (error at ``where``) or are not UTF-8, characters that YAML does not allow,
-    and an anchor inside its own content.
+    an anchor inside its own content, and with ``syntax_remedy`` wrong syntax.
     """
+    from ruamel.yaml.error import MarkedYAMLError
     from ruamel.yaml.reader import ReaderError
 
     try:
@@ -31,6 +43,12 @@ def as_config_errors(path: object, where: str) -> Iterator[None]:
     except ReaderError as error:
         problem = f"the character {chr(error.character)!r}, which no YAML file may hold"
         raise ConfigError(path, f"character {error.position + 1}", problem, "Take it away") from None
+    except MarkedYAMLError as error:
+        if not syntax_remedy:
+            raise
+        mark = error.problem_mark or error.context_mark
+        place = str(Place(str(path), mark.line + 1, mark.column + 1)) if mark else where
+        raise ConfigError(path, place, str(error.problem), syntax_remedy) from None
     except RecursionError:
         problem = "content without an end, as of an anchor that holds itself"
         raise ConfigError(path, where, problem, "Write the values out there") from None
@@ -38,14 +56,30 @@ def as_config_errors(path: object, where: str) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Place:
-    """File, line and column, counted from 1. Line 0 is a value that is built into the program."""
+    """File, line and column of a value, counted from 1. Line 0 is a value that no line of the file has.
+
+    ``entry`` is the path of the value within a parameter file, "" for the whole file. Errors then name it instead of
+    the column.
+
+    >>> str(Place("config.yaml", 3, 5)), str(Place("track.yaml", 3, 5, "rail.mass")), str(Place("track.yaml", entry=""))
+    ('line 3, column 5', 'line 3, rail.mass', 'the file')
+    """
 
     path: str
     line: int = 0
     column: int = 0
+    entry: str | None = None
 
-    def __str__(self):
-        return f"line {self.line}, column {self.column}"
+    def __str__(self) -> str:
+        if self.entry is None:
+            return f"line {self.line}, column {self.column}"
+        return ", ".join([f"line {self.line}"] * (self.line > 0) + [self.entry] * bool(self.entry)) or "the file"
+
+    def below(self, key: str | int, written: Place | None = None) -> Place:
+        """Place of the entry ``key`` below this one; its line is that of ``written`` if it is in the same file."""
+        entry = f"{self.entry}[{key}]" if isinstance(key, int) else f"{self.entry}.{key}".lstrip(".")
+        line = written if written and written.path == self.path else self
+        return Place(self.path, line.line, line.column, entry)
 
     def error(self, problem: str, remedy: str) -> ConfigError:
         """A ``ConfigError`` that points here."""
@@ -56,7 +90,7 @@ class Place:
 class Leaf:
     """One value: text, number, flag, None, or a tuple of these."""
 
-    value: object
+    value: Any  # Scalar or tuple of Scalar: its key in the schema says which
     place: Place
 
 
@@ -66,34 +100,42 @@ class Branch(dict):
     def __init__(self, place: Place):
         super().__init__()
         self.place = place
-        self.key_places: dict[str, Place] = {}
+        self.key_places: dict[str | int | None, Place] = {}
 
-    def put(self, name: str, value, place: Place) -> None:
+    def put(self, name: str, value: Any, place: Place) -> None:
         """Add a key whose name stands at ``place``."""
         self[name] = value
         self.key_places[name] = place
 
+    def place_of(self, name: str | int | None) -> Place:
+        """Where the name of a key stands; the start of the branch if it has no such key."""
+        return self.key_places.get(name, self.place)
+
+
+def compose(path: Path) -> tuple[AnyNode | None, BaseConstructor]:
+    """(root node, constructor of values from nodes) of a YAML file; the node is None if the file is empty."""
+    from ruamel.yaml import YAML
+
+    yaml = YAML(typ="safe", pure=True)
+    return yaml.compose(Path(path).read_text(encoding="utf-8")), yaml.constructor
+
 
 def load(path: Path, name: str | None = None) -> Branch:
     """The mapping in the YAML file ``path``, called ``name`` in errors; ConfigError if it is no YAML."""
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import MarkedYAMLError
-
     name = name or str(path)
-    yaml = YAML(typ="safe", pure=True)
-    try:
-        with as_config_errors(name, "line 1"):
-            node = yaml.compose(Path(path).read_text(encoding="utf-8"))
-    except MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        place = Place(name, mark.line + 1, mark.column + 1) if mark else Place(name, 1, 1)
-        raise place.error(str(error.problem), "Correct the YAML syntax there") from None
+    with as_config_errors(name, "line 1", "Correct the YAML syntax there"):
+        node, constructor = compose(path)
     if node is None:
         return Branch(Place(name, 1, 1))
-    tree = _tree(node, name, yaml.constructor)
+    tree = _tree(node, name, constructor)
     if not isinstance(tree, Branch):
         raise tree.place.error(f"{tree.value!r} where names with values are expected", "Write 'name: value' lines")
     return tree
+
+
+def place_of_node(node: AnyNode, path: str) -> Place:
+    """Where a node starts in the file ``path``."""
+    return Place(path, node.start_mark.line + 1, node.start_mark.column + 1)
 
 
 def merge_branches(*branches: Branch) -> Branch:
@@ -122,14 +164,14 @@ def leaves(tree: Branch, prefix: str = "") -> Iterator[tuple[str, Leaf]]:
             yield prefix + name, value
 
 
-def _tree(node, path, constructor, ancestors=()):
-    place = Place(path, node.start_mark.line + 1, node.start_mark.column + 1)
+def _tree(node: AnyNode, path: str, constructor: BaseConstructor, ancestors: tuple[AnyNode, ...] = ()) -> Branch | Leaf:
+    place = place_of_node(node, path)
     if node.id == "mapping":
         if any(node is ancestor for ancestor in ancestors):
             raise place.error("an anchor whose content holds the anchor itself", "Write the values out there")
         branch = Branch(place)
         for key, value in node.value:
-            key_place = Place(path, key.start_mark.line + 1, key.start_mark.column + 1)
+            key_place = place_of_node(key, path)
             name = str(key.value)
             if name in branch:
                 first = branch.key_places[name].line
@@ -141,69 +183,19 @@ def _tree(node, path, constructor, ancestors=()):
     return Leaf(_scalar(node, path, constructor), place)
 
 
-def _scalar(node, path, constructor):
+def _scalar(node: AnyNode, path: str, constructor: BaseConstructor) -> Scalar:
     from ruamel.yaml.error import MarkedYAMLError
 
+    place = place_of_node(node, path)
     if node.id != "scalar":
-        place = Place(path, node.start_mark.line + 1, node.start_mark.column + 1)
         raise place.error(f"a {node.id} inside a list", "Write plain values in lists")
-    if node.tag.endswith((":timestamp", ":str")):
+    if str(node.tag).endswith((":timestamp", ":str")):
         return node.value
     try:
         return constructor.construct_object(node)
     except (MarkedYAMLError, ValueError):
-        place = Place(path, node.start_mark.line + 1, node.start_mark.column + 1)
         problem = f"{node.value!r} with the tag {node.tag!r}, which is none of a configuration"
         raise place.error(problem, "Write a plain value without a tag") from None
-
-
-ENTRY_KEYS = re.compile(r"[^.\[\]]+")
-
-
-def line_of(path, place: str) -> int | None:
-    """Line, from 1, of an entry such as "routes.main[1].share", or of its last ancestor that exists.
-
-    None if the file cannot be read, or does not contain the first entry of the path.
-    """
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import YAMLError
-
-    try:
-        node = YAML(typ="safe", pure=True).compose(Path(path).read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, YAMLError):
-        return None
-    line = None
-    for key in ENTRY_KEYS.findall(place):
-        if (entry := _find_entry(node, key)) is None:
-            break
-        line, node = entry
-    return line
-
-
-def describe_place(path, place: str, entry: str = "") -> str:
-    """``place`` as errors name it, with the line of ``entry`` below it if that exists.
-
-    >>> describe_place("nowhere.yaml", "rail.mass"), describe_place("nowhere.yaml", "")
-    ('rail.mass', 'the file')
-    """
-    line = line_of(path, f"{place}.{entry}")
-    pieces = [f"line {line}"] if line else []
-    return ", ".join([*pieces, place] if place else pieces or ["the file"])
-
-
-def _find_entry(node, key):
-    """(line, node) of the entry ``key`` of a node, merge keys (<<) included; None if there is none."""
-    node_type = getattr(node, "id", "")
-    if node_type == "sequence":
-        item = node.value[int(key)] if key.isdigit() and int(key) < len(node.value) else None
-        return item and (item.start_mark.line + 1, item)
-    if node_type != "mapping":
-        return None
-    for name, value in node.value:
-        if name.value == key:
-            return name.start_mark.line + 1, value
-    merged = [value for name, value in node.value if name.value == "<<"]
-    return next((entry for value in merged if (entry := _find_entry(value, key))), None)
 
 
 class Frozen(Mapping):

@@ -1,7 +1,6 @@
 """Files of tracks and vehicles: what is misspelt, without its unit or impossible is refused with file and place."""
 
 from copy import deepcopy
-from types import SimpleNamespace
 
 import pytest
 
@@ -174,8 +173,8 @@ def test_whatever_stands_in_a_file_loads_or_is_refused_in_words(tmp_path, monkey
     """Never with a traceback: a YAML reader makes numbers, text, lists, mappings and nothing of what people write."""
     path, parsed = tmp_path / "file.yaml", [content]
     path.write_text("", encoding="utf-8")
-    reader = SimpleNamespace(load=lambda text: deepcopy(parsed[-1]))  # the true one takes twenty times as long
-    monkeypatch.setattr("turnout.config.parameters.YAML", lambda typ: reader)
+    # the true reader takes twenty times as long
+    monkeypatch.setattr("turnout.config.parameters.read_content", lambda path: (deepcopy(parsed[-1]), None))
     load(str(path))
     for way, wrong, other in spoilt(content):
         parsed.append(other)

@@ -2,6 +2,7 @@
 
 import pytest
 
+from turnout.config.document import Place
 from turnout.config.parameters import Number, ParameterSet
 from turnout.errors import ConfigError, SimulationError
 from turnout.simulate import uniform_track
@@ -43,4 +44,4 @@ def test_a_place_that_is_none_is_refused(first, error, said):
     share = Number(1.0, "-", "x")
     entry = {"term": "lifting_sleepers", "first": first, "last": 55.8, "share": share}
     with pytest.raises(error, match=said):
-        accepted_of([ParameterSet(entry, "t.yaml", "terms[0]")])
+        accepted_of([ParameterSet(Place("t.yaml", entry="terms[0]"), entry)])
