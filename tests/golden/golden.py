@@ -21,7 +21,14 @@ import duckdb
 HERE = Path(__file__).resolve().parent
 INPUTS = Path(os.environ.get("TURNOUT_GOLDEN_INPUTS", "/work/golden/inputs"))
 DAY = "2026-08-01"
-MAIN = "import sys; from turnout.cli import main; sys.exit(main())"
+MAIN = """
+import sys
+try:
+    from turnout.cli.main import main
+except ModuleNotFoundError:  # the code before the command line became a package
+    from turnout.cli import main
+sys.exit(main())
+"""
 # Bars and lines of progress: which of them come depends on the clock.
 PROGRESS = r"[^\r\n]*(?:\d+%\||, \d+ simulations|groups done, )[^\r\n]*[\r\n]+"
 COMMANDS = (
