@@ -5,7 +5,8 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
 
-from turnout.config import TurnoutConfig
+from turnout.config import Campaign, TurnoutConfig
+from turnout.config.events import parse_utc
 from turnout.config.merge import digest
 from turnout.records import Unit
 
@@ -25,11 +26,26 @@ def notes_of(turnout: TurnoutConfig, units: Sequence[Unit]) -> list[str]:
     for unit in units:
         if unit.campaign:
             if unit.campaign not in campaigns:
-                campaigns[unit.campaign] = digest(repr(turnout.campaigns[unit.campaign]))[:16]
+                campaigns[unit.campaign] = digest(_campaign_text(turnout.campaigns[unit.campaign]))[:16]
             notes.append(campaigns[unit.campaign])
         else:
             notes.append(_trains_digest(start_of(unit.label), starts, trains))
     return notes
+
+
+
+def _campaign_text(campaign: Campaign) -> str:
+    """The facts of a campaign in one line. Its wording is part of the keys of stored results: do not change it."""
+    facts = {
+        "date": campaign.date,
+        "started_at": campaign.started_at,
+        "rail_temperature": campaign.rail_temperature,
+        "hammer_id": campaign.hammer_id,
+        "tip": campaign.tip,
+        "operator": campaign.operator,
+        "noted": campaign.listed,
+    }
+    return f"Campaign({', '.join(f'{name}={value!r}' for name, value in facts.items())})"
 
 
 def _trains_with_time(rows: Sequence[Mapping]) -> list[tuple[datetime, list]]:
@@ -38,7 +54,7 @@ def _trains_with_time(rows: Sequence[Mapping]) -> list[tuple[datetime, list]]:
     for row in rows:
         stamp = next((value for name, value in row.items() if name.endswith("_at_utc")), "")
         try:
-            time = datetime.fromisoformat(str(stamp).removesuffix("Z")).replace(tzinfo=None)
+            time = parse_utc(str(stamp)).replace(tzinfo=None)
         except ValueError:
             continue
         entries.append((time, sorted((k, str(v)) for k, v in row.items())))
