@@ -7,6 +7,7 @@ from pathlib import Path
 
 PACKAGE = "turnout"
 ROOT = Path(__file__).parent
+WITHOUT_RESULTS = frozenset({"turnout.plots"})  # drawings for people: no result of a stage depends on them
 
 
 def fingerprint(*modules: str) -> str:
@@ -36,7 +37,7 @@ def closure(*modules: str) -> frozenset[str]:
             raise ValueError(f"no module {name} in the package {PACKAGE}")
     while queue:
         name = queue.pop()
-        if name not in names and _module_path(name):
+        if name not in names and name not in WITHOUT_RESULTS and _module_path(name):
             names.add(name)
             queue += _digest_and_imports(name)[1]
     return frozenset(names)

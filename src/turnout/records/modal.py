@@ -2,12 +2,34 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.records.unit import Rejection
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure, SubFigure
+
+
+def value_with_error(value: float, error: float | None) -> str:
+    """A value with its error, both to the last digit that the error leaves significant.
+
+    Examples
+    --------
+    >>> value_with_error(154.63, 0.83), value_with_error(611.4, 2.3), value_with_error(99.6, 0.12)
+    ('154.6 ± 0.8', '611 ± 2', '99.60 ± 0.12')
+    >>> value_with_error(154.63, None)
+    '154.6'
+    """
+    if error is None or not 0.0 < error < math.inf:
+        return f"{value:.4g}"
+    exponent = math.floor(math.log10(error))
+    n_digit = max(0, -exponent + (error < 2.0 * 10.0**exponent))
+    return f"{value:.{n_digit}f} ± {error:.{n_digit}f}"
 
 
 @dataclass(frozen=True)
@@ -36,6 +58,25 @@ class Mode:
     energy: float | None = None
     n: int = 0
 
+    @property
+    def frequency_text(self) -> str:
+        """Frequency with half its 95 % interval, such as "154.6 ± 0.8 Hz"."""
+        return f"{value_with_error(self.frequency, _half(self.frequency_low, self.frequency_high))} Hz"
+
+    @property
+    def damping_text(self) -> str:
+        """Damping ratio in percent with half its 95 % interval, such as "5.2 ± 0.3 %"."""
+        half = _half(self.damping_low, self.damping_high)
+        return f"{value_with_error(100.0 * self.damping, None if half is None else 100.0 * half)} %"
+
+    def __repr__(self) -> str:
+        return f"Mode({self.band}, {self.frequency_text}, damping {self.damping_text}, n = {self.n})"
+
+
+def _half(low: float | None, high: float | None) -> float | None:
+    """Half the width of an interval, None without one."""
+    return None if low is None or high is None else 0.5 * (high - low)
+
 
 @dataclass(frozen=True)
 class ModalModel:
@@ -45,7 +86,7 @@ class ModalModel:
     ``rejections``, or "second_order_only": the gate passed only the ballast mode, as at the paper's section A8.
     ``per_impact`` holds the estimates of each impact: impact, band, frequency, damping, frequency_se, damping_se.
     ``stabilisation`` holds those of each model order: order, frequency, damping, status. ``rejected_modes`` lists the
-    rejected candidates with the reason.
+    rejected candidates with the reason. ``receptance`` is the measured one where the caller keeps it, for ``plot``.
     """
 
     a: np.ndarray
@@ -61,6 +102,33 @@ class ModalModel:
     rejected_modes: tuple[Mapping, ...] = ()
     fit: float | None = None
     diagnostics: Mapping = field(default_factory=dict)
+    receptance: Receptance | None = None
+
+    def __repr__(self) -> str:
+        modes = ", ".join(f"{mode.band} {mode.frequency_text}" for mode in self.modes)
+        reasons = "; ".join(r.detail or r.reason for r in self.rejections)
+        n = max((mode.n for mode in self.modes), default=0)
+        return f"ModalModel({self.method}, {self.status}: {modes or reasons or 'no mode'}" + (
+            f", n = {n})" if n else ")"
+        )
+
+    def plot(self, figure: Figure | SubFigure | None = None) -> np.ndarray:
+        """Draw the modes with their errors, below the measured receptance if the model holds it.
+
+        Parameters
+        ----------
+        figure : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure by default.
+
+        Returns
+        -------
+        (n_axes,) array of matplotlib.axes.Axes
+            Receptance [m/N] over frequency [Hz], if it is known, then for each mode its damping ratio [%] over its
+            frequency [Hz]: the estimate of each impact with its standard error, the mean with its 95 % interval.
+        """
+        from turnout.plots import plot_model
+
+        return plot_model(self, figure)
 
     @property
     def order(self) -> int:
@@ -97,6 +165,29 @@ class Receptance:
     gate: str = "limit"
     decay: float = 0.0
 
+    def __repr__(self) -> str:
+        if not len(self.frequency):
+            return f"Receptance(no impact, n = {self.n})"
+        band = f"{self.frequency[0]:.3g} to {self.frequency[-1]:.4g} Hz, {len(self.frequency)} lines"
+        return f"Receptance({band}, {np.mean(self.passed):.0%} pass the gate, n = {self.n})"
+
+    def plot(self, figure: Figure | SubFigure | None = None) -> np.ndarray:
+        """Draw magnitude and coherence over frequency; lines that fail the gate are shaded.
+
+        Parameters
+        ----------
+        figure : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure by default.
+
+        Returns
+        -------
+        (2,) array of matplotlib.axes.Axes
+            Magnitude of the receptance [m/N] and coherence [-] over frequency [Hz].
+        """
+        from turnout.plots import plot_receptance
+
+        return plot_receptance(self, figure)
+
 
 @dataclass(frozen=True)
 class Impact:
@@ -125,6 +216,12 @@ class Impact:
     record: int = 0
     rejections: tuple[Rejection, ...] = ()
     notes: tuple[Rejection, ...] = ()
+
+    def __repr__(self) -> str:
+        source = f"{self.source}, record {self.record + 1}" if self.source else f"record {self.record + 1}"
+        if self.rejections:
+            return f"Impact({source}, rejected: {', '.join(r.reason for r in self.rejections)})"
+        return f"Impact({source}, accepted: {self.peak:.0f} N in {1e3 * self.contact:.2g} ms)"
 
     @property
     def accepted(self) -> bool:

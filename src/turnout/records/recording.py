@@ -9,9 +9,12 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from types import MappingProxyType
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure, SubFigure
 
 
 @dataclass(frozen=True)
@@ -92,7 +95,21 @@ class LongRecording(SampledSignals):
     started_at: datetime | None = None
     conditions: Mapping = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        return _recording_text(self)
 
+
+def _recording_text(recording: Recording | LongRecording) -> str:
+    """Kind, channels and length of a recording in one line."""
+    names = [f"{c.name} ({c.quantity})" for c in recording.channels]
+    if len(names) > MAX_NAMED_CHANNELS:
+        names = [*names[: MAX_NAMED_CHANNELS - 1], f"... {len(names)} channels"]
+    length = f"{recording.n_sample} samples at {recording.rate:g} Hz, {recording.duration:.4g} s"
+    source = f", {recording.source} record {recording.record + 1}" if recording.source else ""
+    return f"{type(recording).__name__}({recording.kind}: {', '.join(names)}; {length}{source})"
+
+
+MAX_NAMED_CHANNELS = 4  # channels of a recording that its text names
 EMPTY_MAPPING: Mapping = MappingProxyType({})
 
 
@@ -138,6 +155,26 @@ class Recording(SampledSignals):
             raise ValueError(f"sampling rate must be above 0 Hz, got {self.rate}")
         object.__setattr__(self, "samples", samples)
 
+    def __repr__(self) -> str:
+        return _recording_text(self)
+
+    def plot(self, figure: Figure | SubFigure | None = None) -> np.ndarray:
+        """Draw every channel over time, one below the other.
+
+        Parameters
+        ----------
+        figure : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure by default.
+
+        Returns
+        -------
+        (n_channel,) array of matplotlib.axes.Axes
+            Each channel in its SI unit over time [s].
+        """
+        from turnout.plots import plot_recording
+
+        return plot_recording(self, figure)
+
     @property
     def n_sample(self) -> int:
         """Samples per channel."""
@@ -163,10 +200,28 @@ class Recording(SampledSignals):
 class ReadResult:
     """Result of reading one raw file: its intact records, and an error for each damaged one.
 
-    ``long_recordings`` are the records whose samples stay in the file.
+    It is a sequence of its ``recordings``. ``long_recordings`` are the records whose samples stay in the file.
     """
 
     recordings: tuple[Recording, ...]
     errors: tuple[Exception, ...] = ()
     sha256: str = ""
     long_recordings: tuple[LongRecording, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.recordings)
+
+    def __bool__(self) -> bool:
+        return True  # a file without intact records is a result as well
+
+    def __iter__(self) -> Iterator[Recording]:
+        return iter(self.recordings)
+
+    def __getitem__(self, index: int) -> Recording:
+        return self.recordings[index]
+
+    def __repr__(self) -> str:
+        n_error = f", {len(self.errors)} damaged" if self.errors else ""
+        n_long = f", {len(self.long_recordings)} left in the file" if self.long_recordings else ""
+        first = f": {self.recordings[0]!r} ..." if self.recordings else ""
+        return f"ReadResult({len(self.recordings)} recordings{n_long}{n_error}{first})"
