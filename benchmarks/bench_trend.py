@@ -1,7 +1,7 @@
 """False alarms, delays, ranking, dates and cost of the trend charts on simulated fleets of known truth.
 
 The simulator (trend_fleet.py) is independent of the charts. Nothing was tuned on the seeds used here. The guard comes
-from another simulation with other seeds (docs/decisions/guard_factor.md), the thresholds from Siegmund's formula.
+from another simulation with other seeds (docs/decisions/guard-factor.md), the thresholds from Siegmund's formula.
 """
 
 import json

@@ -115,7 +115,7 @@ class Charts:
 
 
 def guard_factor(count, small, settings) -> np.ndarray:
-    """Factor on sigma for the error of a baseline of ``count`` campaigns; see docs/decisions/guard_factor.md.
+    """Factor on sigma for the error of a baseline of ``count`` campaigns; see docs/decisions/guard-factor.md.
 
     >>> from turnout.config.settings.trend import TrendSettings
     >>> guard_factor(np.array([52, 13]), np.array([False, False]), TrendSettings()).round(2)
