@@ -110,6 +110,42 @@ def load_configuration(folder: Path | str = "config", formats=None, to_si=None) 
     )
 
 
+def load_layout(path: Path | str, formats=None, to_si=None) -> TurnoutConfig:
+    """Configuration of one layout by itself, as of a turnout without further values; config.yaml is beside its folder.
+
+    Parameters
+    ----------
+    path : path-like
+        File of the layout, such as config/layouts/tommerup.yaml.
+    formats, to_si : optional
+        As in ``load_configuration``.
+
+    Returns
+    -------
+    TurnoutConfig
+        Its id is the name of the layout, and it has no raw folder.
+
+    Raises
+    ------
+    ConfigErrors
+        With all errors of the layout and of config.yaml.
+    ConfigError
+        If there is no such file.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise ConfigError(path, "the path", "there is no such file", "Correct it")
+    full_path = path.resolve()
+    reading = _ConfigurationReader(full_path.parent.parent, formats, to_si)
+    settings = reading.document(reading.folder / "config.yaml", settings_keys())
+    reading.errors += check_ranges(settings)
+    tree = reading.layout_of(full_path, settings)
+    if reading.errors or tree is None:
+        raise ConfigErrors(reading.errors)
+    name = path.stem
+    return TurnoutConfig(id=name, layout=name, raw="", folder=reading.folder, **Variant(tree).turnout_fields)
+
+
 def errors_of_unused_layouts(configuration: Configuration, formats=None, to_si=None) -> list[ConfigError]:
     """Errors of the layouts that no turnout uses."""
     reading = _ConfigurationReader(configuration.folder, formats, to_si)

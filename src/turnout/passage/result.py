@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from turnout.constants import KMH, Z95
 from turnout.passage.kinematics import Motion
 from turnout.passage.train_type import TypeFinding
 from turnout.records import Rejection
@@ -69,6 +70,14 @@ class Passage:
     begin: float | None = None
     end: float | None = None
     drifting: dict = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        doubts = ", ".join(dict.fromkeys(f.reason for f in self.findings))
+        if not self.n_axle or self.speed is None or self.type is None:
+            return f"Passage({self.status}: {doubts or 'no train'})"
+        speed = f"{KMH * self.speed.speed:.1f} ± {KMH * Z95 * self.speed.se:.1f} km/h"
+        words = [f"{self.n_axle} axles", speed, f"type {self.type.type}", self.direction, f"track {self.track}"]
+        return f"Passage({self.status}: {', '.join(words)}{f'; {doubts}' if doubts else ''})"
 
     @property
     def n_axle(self) -> int:

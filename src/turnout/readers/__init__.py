@@ -4,13 +4,13 @@ import logging
 from contextlib import contextmanager
 from dataclasses import replace
 
-from turnout.errors import TurnoutError
+from turnout.errors import ReadError, TurnoutError
 from turnout.readers.formats import FORMATS, detect_format, reject_spreadsheet
 from turnout.readers.interpret import convert_records
-from turnout.readers.source import load
+from turnout.readers.source import COPY_AGAIN, load
 from turnout.records import LongRecording, RawDescription, ReadResult, Recording
 
-__all__ = ["FORMATS", "read"]
+__all__ = ["FORMATS", "names_and_units", "read"]
 
 LOG = logging.getLogger("turnout.readers")
 
@@ -75,6 +75,35 @@ def read(
     long_recordings = tuple(r for r in recordings if isinstance(r, LongRecording))
     recordings_in_memory = tuple(r for r in recordings if isinstance(r, Recording))
     return ReadResult(recordings=recordings_in_memory, errors=errors, sha256=digest, long_recordings=long_recordings)
+
+
+def names_and_units(path, root, format: str = "auto") -> tuple[tuple[str, str], ...]:
+    """Name and unit of every channel of a raw file, as the file states them in its first intact record.
+
+    Parameters
+    ----------
+    path, root : path-like
+        As for ``read``.
+    format : str
+        A key of ``FORMATS``, or "auto".
+
+    Returns
+    -------
+    tuple of (str, str)
+        The unit is "" where the file states none.
+
+    Raises
+    ------
+    ReadError
+        If the file cannot be read, or holds no intact record.
+    """
+    source = load(path, root)
+    with _as_read_error(source):
+        records = _format_of(source, RawDescription((), format=format)).read_raw(source).records
+    for record in records:
+        if not isinstance(record, ReadError):
+            return tuple(zip(record.names, record.units))
+    raise records[0] if records else source.error("the file", "it holds no record", COPY_AGAIN, reason="empty")
 
 
 @contextmanager

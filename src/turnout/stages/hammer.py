@@ -1,6 +1,7 @@
 """Stage hammer: registry rows of the hammer tests of one section and campaign."""
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import timedelta
 from pathlib import PurePosixPath
@@ -9,11 +10,13 @@ from typing import Any
 import numpy as np
 
 from turnout.config.filename_pattern import compile_pattern
+from turnout.config.settings.identify import IdentifySettings
+from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.config.turnout import TurnoutConfig
 from turnout.errors import ReadError
 from turnout.hammer_test import find_impacts, receptance_of
 from turnout.modal import identify
-from turnout.records import ModalModel, Rejection, Unit
+from turnout.records import Impact, ModalModel, Receptance, Rejection, Unit
 from turnout.registry.ids import content_id
 from turnout.stages.common import (
     quarantine_row,
@@ -80,7 +83,8 @@ def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root, algo: str = "") ->
     recordings = _with_common_rate(recordings, base, rows["quarantine"], ids)
     # all impacts of the campaign at once: a fault of a whole file shows in comparison with the others
     impacts = find_impacts(recordings, force, response, turnout.settings["receptance"])
-    impacts, receptance, model = _identify_accepted(impacts, turnout)
+    settings = turnout.settings
+    impacts, receptance, model = identify_accepted(impacts, settings["receptance"], settings["identify"])
     tests = {path: _test_number(turnout, unit, path) for path in ids}
     rows["impacts"] = [impact_row(i, base, tests[i.source], ids[i.source]) for i in impacts]
     temperature = campaign.rail_temperature
@@ -131,22 +135,39 @@ def _round_rate(rate):
     return float(f"{rate:.6g}")
 
 
-def _identify_accepted(impacts, turnout):
-    """(impacts, receptance, model); impacts that the model does not describe are rejected, and the rest fitted again.
+def identify_accepted(
+    impacts: Sequence[Impact], receptance_settings: ReceptanceSettings, identify_settings: IdentifySettings
+) -> tuple[Sequence[Impact], Receptance | None, ModalModel]:
+    """Receptance and modes of one section from its accepted impacts.
 
-    With too few impacts there is no receptance, and the model is rejected.
+    Impacts that the model does not describe are rejected, and the rest is fitted again.
+
+    Parameters
+    ----------
+    impacts : sequence of Impact
+        All impacts of the section, rejected ones included.
+    receptance_settings : ReceptanceSettings
+    identify_settings : IdentifySettings
+
+    Returns
+    -------
+    impacts : sequence of Impact
+        The same, with the further rejections.
+    receptance : Receptance or None
+        None with fewer accepted impacts than ``minimum_impacts``.
+    model : ModalModel
+        Rejected where there are too few impacts or no modes.
     """
-    n_required = turnout.settings["receptance"].minimum_impacts
-    settings = turnout.settings["identify"]
+    n_required = receptance_settings.minimum_impacts
     while True:
         used = [i for i in impacts if i.accepted]
         if len(used) < n_required:
             return impacts, None, _rejected_model(len(used), n_required, impacts)
-        receptance = receptance_of(used, turnout.settings["receptance"])
+        receptance = receptance_of(used, receptance_settings)
         lead_arguments: dict[str, Any] = {}
-        if settings.method == "paper":
+        if identify_settings.method == "paper":
             lead_arguments = {"leads": [i.acceleration[: i.decay_start] for i in used]}
-        model = identify([i.decay for i in used], used[0].rate, settings, receptance, **lead_arguments)
+        model = identify([i.decay for i in used], used[0].rate, identify_settings, receptance, **lead_arguments)
         rejected = {id(used[k]): rejection for k, rejection in model.diagnostics.get("dropped_impacts", ())}
         if not rejected:
             return impacts, receptance, model
