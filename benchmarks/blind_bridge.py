@@ -19,6 +19,7 @@ from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine.candidate_search import shortlist
 from turnout.mismatch.engine.diagnose import diagnose
 from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.search import Search
 from turnout.mismatch.turnout.case import TrackCase
 from turnout.stages.mismatch_groups import groups
 from turnout.stages.mismatch_inputs import gather_inputs, track_of
@@ -87,7 +88,7 @@ def _by_diagnosis(case, settings, lesser):
 def _by_score_test(case, settings):
     """Row of the first candidate of the shortlist, if the residual exceeds the control level."""
     base = fit_jointly(case, iterations=settings.base_iterations)
-    plan = shortlist(case, base, settings)
+    plan = shortlist(Search(case, settings), base)
     if not plan or max(base.level.values()) <= settings.control_level:
         return [_row("none", None, None, None)]
     return [_row("named", plan[0].candidate, None, None)]

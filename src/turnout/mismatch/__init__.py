@@ -2,8 +2,8 @@
 
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
-from turnout.mismatch.engine.decision import Verdict
 from turnout.mismatch.engine.diagnose import Diagnosis, diagnose
 from turnout.mismatch.engine.map_fit import Fit, fit_jointly
+from turnout.mismatch.engine.verdict import Verdict
 
 __all__ = ["Candidate", "Case", "Diagnosis", "Fit", "Nuisance", "Observation", "Verdict", "diagnose", "fit_jointly"]

@@ -13,6 +13,7 @@ from turnout.mismatch.engine.cross_validation import effect_energy, gain_where_u
 from turnout.mismatch.engine.decision import judge
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.score import Score
+from turnout.mismatch.engine.search import Search
 from turnout.physics import Parameter
 
 SIZE = (Parameter("size", "-", 0.0, (-9.0, 9.0), "of a bump", "made up 2026"),)
@@ -63,9 +64,9 @@ def test_plainness_is_the_energy_of_the_change():
 )
 def test_what_one_recording_says_and_its_like_do_not(loud, gains, alone):
     case, fit = fitted(loud)
-    assert single_witness(case, fit, case.candidates[0], 25.0, gains, MismatchSettings()) == alone
+    assert single_witness(Search(case), fit, case.candidates[0], 25.0, gains) == alone
     of_a_train = replace(case.candidates[0], where={"train": "ic3"})
-    assert single_witness(case, fit, of_a_train, 25.0, gains, MismatchSettings()) == ""
+    assert single_witness(Search(case), fit, of_a_train, 25.0, gains) == ""
 
 
 @pytest.mark.parametrize(
@@ -130,16 +131,14 @@ def test_blows_at_one_spot_are_one_witness(gains, gain, alone):
     conditions = [f"{spot} {year}" for spot in (2.1, 4.2, 9.0) for year in (2025, 2026)]
     by_condition = dict(zip([*conditions, "railcar"], gains))
     case = Struck(2.1, 4.2, 9.0)
-    assert (
-        single_witness(case, None, Days((1.0, 1.0, 1.0)).candidates[0], gain, by_condition, MismatchSettings()) == alone
-    )
+    assert single_witness(Search(case), None, Days((1.0, 1.0, 1.0)).candidates[0], gain, by_condition) == alone
 
 
 def test_of_two_spots_neither_is_the_odd_one():
     case, fit = fitted((1.0, 1.0, 1.0))
     of_two = Struck(2.1, 4.2)
     gains = {"2.1 2025": 0.5, "2.1 2026": -1.0, "4.2 2025": 7.0, "4.2 2026": 6.0, "railcar": 1.0}
-    assert single_witness(of_two, fit, case.candidates[0], 15.0, gains, MismatchSettings()) == ""
+    assert single_witness(Search(of_two), fit, case.candidates[0], 15.0, gains) == ""
 
 
 @pytest.mark.parametrize("gain, answer", [(20.0, "none"), (60.0, "unknown")])

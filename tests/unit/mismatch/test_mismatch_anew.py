@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
 from turnout.mismatch.engine.evidence import score_of
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.refit import restart_leader
+from turnout.mismatch.engine.search import Search
 from turnout.physics import Parameter
 
 X = np.linspace(0.0, 1.0, 400)
@@ -44,7 +44,7 @@ class Turning(Case):
 
 def scored(case, base, start, ramp):
     found = fit_jointly(case, case.candidates, start, {"ramp": ramp}, iterations=8)
-    return score_of(case, base, found, case.candidates[0], MismatchSettings())
+    return score_of(Search(case), base, found, case.candidates[0])
 
 
 def test_a_leader_in_the_wrong_valley_is_begun_again_at_a_smaller_size():
@@ -53,7 +53,7 @@ def test_a_leader_in_the_wrong_valley_is_begun_again_at_a_smaller_size():
     base = fit_jointly(case)
     stuck = scored(case, base, [2.0, 9.0], 2.0)
     assert stuck.explained < 0.2 and abs(stuck.estimates[0][1] - LENGTH) > 1.0
-    again = restart_leader(case, base, stuck, MismatchSettings(), {}, 0)
+    again = restart_leader(Search(case), base, stuck)
     assert again.estimates[0] == pytest.approx([DEPTH, LENGTH], abs=0.02) and again.explained > 0.9
     assert again.gain > stuck.gain + 1000.0
 
@@ -62,6 +62,6 @@ def test_what_explains_enough_or_has_no_size_stays():
     case = Turning()
     base = fit_jointly(case)
     found = scored(case, base, [1.0, 4.5], 0.0)
-    assert restart_leader(case, base, found, MismatchSettings(), {}, 0) is found
+    assert restart_leader(Search(case), base, found) is found
     plain = replace(found, explained=0.1, candidate=replace(found.candidate, parameters=()))
-    assert restart_leader(case, base, plain, MismatchSettings(), {}, 0) is plain
+    assert restart_leader(Search(case), base, plain) is plain

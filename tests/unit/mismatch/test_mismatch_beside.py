@@ -9,6 +9,7 @@ from turnout.mismatch.engine.case import Case, Observation
 from turnout.mismatch.engine.evidence import score_of
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.refit import correct_for_leader
+from turnout.mismatch.engine.search import Search
 from turnout.physics import Parameter
 
 AMOUNT = (Parameter("amount", "-", 0.0, (-3.0, 3.0), "share of a shape", "made up 2026"),)
@@ -45,18 +46,19 @@ class Shapes(Case):
     def is_cheap(self, observation):
         return True
 
-    def ranked(self, settings):
+    def ranked(self):
+        search = Search(self)
         base = fit_jointly(self)
         fits = [(c, fit_jointly(self, (c,), c.starts[0])) for c in self.candidates]
-        scores = [score_of(self, base, f, c, settings) for c, f in fits]
-        return correct_for_leader(self, base, sorted(scores, key=lambda s: -s.gain), settings)
+        scores = [score_of(search, base, f, c) for c, f in fits]
+        return correct_for_leader(search, base, sorted(scores, key=lambda s: -s.gain))
 
 
 @pytest.mark.parametrize("true, kept", [({"wave": 1.0}, False), ({"wave": 1.0, "ramp": 0.8}, True)])
 def test_a_name_that_lives_on_what_leads_is_dropped_and_another_effect_is_not(true, kept):
     """A wave of nearly the right length gains hundreds of nats of the wave alone, and next to nothing beside it."""
     settings = MismatchSettings()
-    ranked = Shapes(**true).ranked(settings)
+    ranked = Shapes(**true).ranked()
     best = next(s for s in ranked if s.is_reportable)
     assert (best.gain > settings.threshold) == kept
 
@@ -65,7 +67,7 @@ def test_a_name_as_good_as_what_leads_is_kept():
     """Both explain as much of what lies half way: a law too small to act on takes nothing from one that matters."""
     settings = MismatchSettings()
     case = Shapes(**{n: size / np.linalg.norm(SHAPES[n]) for n, size in (("wave", 6.05), ("near", 6.0))})
-    ranked = case.ranked(settings)
+    ranked = case.ranked()
     near, wave = (next(s for s in ranked if s.family == n) for n in ("near", "wave"))
     assert near.is_reportable and not wave.is_reportable
     assert 0.0 < wave.gain - near.gain < settings.margin and near.gain > 10.0 * settings.threshold

@@ -5,11 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.candidate_search import shortlist
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
 from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.search import Search
 from turnout.mismatch.turnout.candidates.catalogue import MASS_STARTS, distant_mass_starts, residual_of_train
 from turnout.physics import Parameter
 
@@ -49,17 +49,16 @@ class Pitch(Case):
 @pytest.mark.parametrize("true", [0.65, 1.6])
 def test_what_lies_behind_a_hump_is_found_from_afar(true):
     """Four turns or more away a derivative says nothing of the way there: neither column nor twin promise 2 nats."""
-    settings = MismatchSettings()
     blind = Pitch(true)
-    assert shortlist(blind, fit_jointly(blind), settings) == []
+    assert shortlist(Search(blind), fit_jointly(blind)) == []
     case = Pitch(true, MASS_STARTS)
-    (found,) = shortlist(case, fit_jointly(case), settings)
+    (found,) = shortlist(Search(case), fit_jointly(case))
     assert found.start == pytest.approx([true]) and found.values == {"tune": 0.0}
 
 
 def test_a_start_from_afar_that_gains_nothing_is_not_refitted():
     case = Pitch(1.0, MASS_STARTS)
-    assert shortlist(case, fit_jointly(case), MismatchSettings()) == []
+    assert shortlist(Search(case), fit_jointly(case)) == []
 
 
 def test_only_trains_that_leave_more_than_sound_ones_are_simulated():

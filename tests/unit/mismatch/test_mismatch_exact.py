@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch import diagnose
 from turnout.mismatch.engine.candidate import Candidate
-from turnout.mismatch.engine.candidate_search import _is_same_site
+from turnout.mismatch.engine.candidate_search import is_same_site
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
 from turnout.mismatch.engine.cross_validation import signature_overlap, single_type_estimate
 from turnout.mismatch.engine.evidence import score_of
 from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.search import Search
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.physics import Parameter
@@ -101,10 +101,8 @@ def test_what_shows_elsewhere_is_not_the_shape_of_the_first(wave, ramp, alike, n
 def test_a_gain_is_sought_beside_a_lag_of_the_same_channel_and_a_mounting_is_not():
     case = TrackCase(measured_campaign(small_plan((15.0,), hammer_positions=(24.0,), passages=False), (), 7))
     of = {c.family: c for c in case.candidates if c.where.get("sensor") == "S2"}
-    assert not _is_same_site(of["sensor_gain"], of["time_offset"])
-    assert _is_same_site(of["mount_resonance"], of["time_offset"]) and _is_same_site(
-        of["sensor_gain"], of["sensor_gain"]
-    )
+    assert not is_same_site(of["sensor_gain"], of["time_offset"])
+    assert is_same_site(of["mount_resonance"], of["time_offset"]) and is_same_site(of["sensor_gain"], of["sensor_gain"])
 
 
 def with_whites(case, base, candidate, size, share):
@@ -127,7 +125,7 @@ def test_friction_is_told_by_trains(rolled_and_struck, kind, material):
     assert {c.required_data_type for c in case.candidates if c.family == "dry_friction"} == {"passage"}
     friction = next(c for c in case.candidates if c.family == "dry_friction")
     better = with_whites(case, base, friction, 3000.0, {"hammer": 1.0, "passage": 1.0, kind: 0.5})
-    assert bool(score_of(case, base, better, friction, MismatchSettings()).is_reportable) == material
+    assert bool(score_of(Search(case), base, better, friction).is_reportable) == material
 
 
 class Heard(Case):
@@ -191,7 +189,7 @@ def test_a_gain_that_blows_speak_against_is_none(blows, trains, material):
     case = Heard(blows, trains)
     (gain,), base = case.candidates, fit_jointly(case)
     refit = fit_jointly(case, (gain,), [trains])
-    assert bool(score_of(case, base, refit, gain, MismatchSettings()).is_reportable) == material
+    assert bool(score_of(Search(case), base, refit, gain).is_reportable) == material
 
 
 def test_it_is_the_blows_that_a_sensor_read_that_may_speak_against_its_gain(rolled_and_struck):

@@ -8,7 +8,7 @@ from scipy.stats import binom
 
 from turnout import physics
 from turnout.mismatch.engine.candidate import Candidate
-from turnout.mismatch.engine.diagnose import Verification
+from turnout.mismatch.engine.reserved_data import Verification
 from turnout.mismatch.engine.residual_attribution import Attribution, attribute
 from turnout.report.finding_text import facts
 from turnout.stages.mismatch_rows import finding_row

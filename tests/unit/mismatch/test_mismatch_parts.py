@@ -7,10 +7,10 @@ import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine.candidate import Candidate
-from turnout.mismatch.engine.candidate_search import _component_rivals, _with_fitted_start
+from turnout.mismatch.engine.candidate_search import component_rivals, with_fitted_start
 from turnout.mismatch.engine.case import Nuisance
 from turnout.mismatch.engine.decision import judge
-from turnout.mismatch.engine.evidence import MAX_ORDINARY_SPREADS, _is_ordinary
+from turnout.mismatch.engine.evidence import MAX_ORDINARY_SPREADS, is_within_spread
 from turnout.mismatch.engine.score import Score
 from turnout.physics import Parameter
 
@@ -69,8 +69,8 @@ def test_a_support_is_odd_against_the_spread_of_its_like(times, usual):
         psi=np.array([np.exp(times * spread)]),
         part=first,
     )
-    assert _is_ordinary(case, refit, candidate("local_pad", masking_parameter="pad_0")) == usual
-    assert not _is_ordinary(case, refit, candidate("local_pad"))
+    assert is_within_spread(case, refit, candidate("local_pad", masking_parameter="pad_0")) == usual
+    assert not is_within_spread(case, refit, candidate("local_pad"))
 
 
 def test_laws_of_the_leading_parts_are_refitted_from_their_best_starts():
@@ -80,8 +80,8 @@ def test_laws_of_the_leading_parts_are_refitted_from_their_best_starts():
     chosen = [(40.0, leader, np.array([0.4]), {}), (30.0, other, np.array([0.9]), {})]
     weak, strong = (-9.0, gap, np.array([1.0]), {}), (-2.0, gap, np.array([2.0]), {})
     scored = {"local_ballast": chosen[:1], "hanging_sleeper": [strong, (5.0, far, np.array([3.0]), {}), weak]}
-    assert _component_rivals(chosen, scored) == [strong]
-    assert _component_rivals(chosen[1:], scored) == []
+    assert component_rivals(chosen, scored) == [strong]
+    assert component_rivals(chosen[1:], scored) == []
 
 
 @pytest.mark.parametrize("behind, said", [(0.9, "a_or_b"), (1.1, "named")])
@@ -165,5 +165,5 @@ def test_a_fit_that_was_made_is_a_better_start_than_a_column():
     column = (90.0, here, np.array([0.85]), {})
     made, elsewhere = (60.0, here, np.array([0.66]), {"gain_A1": 0.0}), (70.0, there, np.array([0.9]), {"gain_A2": 0.1})
     scored = {"sensor_gain": [column, made, elsewhere]}
-    assert _with_fitted_start(column, scored) is made
-    assert _with_fitted_start(column, {"sensor_gain": [column, elsewhere]}) is column
+    assert with_fitted_start(column, scored) is made
+    assert with_fitted_start(column, {"sensor_gain": [column, elsewhere]}) is column

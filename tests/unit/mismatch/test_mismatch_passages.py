@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from turnout import physics
-from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
 from turnout.mismatch import diagnose
 from turnout.mismatch.engine.evidence import assess
 from turnout.mismatch.engine.localization import locate
 from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.search import Search
 from turnout.mismatch.turnout import TrackCase, passage_observation
 from turnout.mismatch.turnout.candidates.wheel_flats import FlatEvidence, flat_candidates
 from turnout.mismatch.turnout.passage_alignment import MIN_CORRELATION, align, low_pass
@@ -258,7 +258,7 @@ def test_a_train_that_looks_like_no_such_train_is_said_and_located(plan):
     swapped = [replace(p, vehicle=other["light"]) if p.train == "heavy" else p for p in campaign.passages]
     case = TrackCase(replace(campaign, passages=tuple(swapped)))
     assert case.mismatched_trains == ("heavy",) and len([n for n in case.notes if "likeness" in n]) == 2
-    verdict, _ = assess(case, SimpleNamespace(level={"passage": 0.1}, white=[]), (), MismatchSettings())
+    verdict, _ = assess(Search(case), SimpleNamespace(level={"passage": 0.1}, white=[]), ())
     assert verdict.answer == "unknown" and "heavy" in verdict.reason
     where = locate(case, None, cause=verdict.cause)
     assert where.frame == "train" and where.train == "heavy"

@@ -10,12 +10,12 @@ from turnout import physics
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
-from turnout.mismatch.engine.diagnose import Verification
 from turnout.mismatch.engine.evidence import assess, explained_share, score_of, worst_excess
 from turnout.mismatch.engine.map_fit import fit_jointly
-from turnout.mismatch.engine.reserved_data import fit_percent, predict_with_decoy
+from turnout.mismatch.engine.reserved_data import Verification, fit_percent, predict_with_decoy
 from turnout.mismatch.engine.score import Score
-from turnout.mismatch.engine.two_effects import retest_with_second
+from turnout.mismatch.engine.search import Findings, Search
+from turnout.mismatch.engine.two_effects import settle_pair
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.candidates.catalogue import _sensor_candidates
 from turnout.mismatch.turnout.passage_observation import AlignedPassage, observe_passage
@@ -60,16 +60,18 @@ class Alike(Case):
 
 def test_a_first_effect_is_not_credited_with_what_the_second_explains():
     """Alone it leaves most and is refused. Beside the second it is 0.0: what the pair gains is the second's."""
-    case, settings = Alike(), MismatchSettings()
+    case = Alike()
+    search = Search(case)
     like, there = case.candidates
     base = fit_jointly(case)
     first = fit_jointly(case, (like,), [0.5])
-    refused, _ = assess(case, base, [score_of(case, base, first, like, settings)], settings)
+    refused, _ = assess(search, base, [score_of(search, base, first, like)])
     pair = fit_jointly(case, (like, there), [*first.psi, 0.5], first.values)
-    second, _ = assess(case, first, [score_of(case, first, pair, there, settings)], settings)
+    second, _ = assess(search, first, [score_of(search, first, pair, there)])
     assert (refused.answer, second.answer) == ("unknown", "named")
-    verdicts, fit = retest_with_second(case, base, pair, [refused, second], settings)
-    assert [v.answer for v in verdicts] == ["unknown"] and fit is base
+    found = settle_pair(Findings(search, base, pair, (refused, second)))
+    assert [v.answer for v in found.verdicts] == ["unknown"] and found.fit is base
+    assert found.verdicts[0].trail[-1] == "first_stays_unknown"
 
 
 class OneLoud(Case):
@@ -93,22 +95,22 @@ def with_squares(square, hammer):
 @pytest.mark.parametrize(("after", "answer", "grade"), [(4.0, "unknown", ""), (2.2, "named", "B"), (1.9, "named", "A")])
 def test_a_channel_that_raises_the_alarm_is_asked_for_again(after, answer, grade):
     """A name of 13 nats that leaves the channel as loud as it was explains nothing of what was heard."""
-    case, settings = OneLoud(), MismatchSettings()
+    search = Search(OneLoud())
     factor = Parameter("factor", "-", 1.0, (0.05, 20.0), "", "made up 2026")
     pad = Candidate("local_pad", (factor,), lambda p: p, ((0.4,),), {"place": 3.0})
     base, refit = with_squares(4.0, 0.5), with_squares(after, 0.45)
-    share = explained_share(case, base, refit, settings)
+    share = explained_share(search, base, refit)
     assert share == pytest.approx(min(1.0, (4.0 - after) / 2.0))
-    verdict, _ = assess(case, base, [Score(pad, 13.0, 0.0, share, refit)], settings)
+    verdict, _ = assess(search, base, [Score(pad, 13.0, 0.0, share, refit)])
     assert verdict.answer == answer
-    assert ("A" if worst_excess(case, refit, settings) <= 1.0 else "B") == (grade or "B")
-    assert assess(case, base, [], settings)[0].answer == "unknown"
+    assert ("A" if worst_excess(search, refit) <= 1.0 else "B") == (grade or "B")
+    assert assess(search, base, [])[0].answer == "unknown"
 
 
 def test_what_a_name_leaves_in_a_channel_is_not_asked_of_a_second_effect():
     """A mounting not quite of its shape leaves its channel loud; a flat beside it has nothing to do with that."""
     first, both = (SimpleNamespace(**{**vars(with_squares(4.0, 0.5)), "candidates": c}) for c in ("m", "mf"))
-    assert explained_share(OneLoud(), first, both, MismatchSettings()) == 1.0
+    assert explained_share(Search(OneLoud()), first, both) == 1.0
 
 
 @pytest.mark.parametrize("place", [12.0, 12.07, 12.2])

@@ -9,19 +9,16 @@ import pytest
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch import diagnose
 from turnout.mismatch.engine.candidate import Candidate
-from turnout.mismatch.engine.candidate_search import Projector, _is_same_site, _required_promise
+from turnout.mismatch.engine.candidate_search import Projector, is_same_site, required_promise
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
-from turnout.mismatch.engine.decision import Verdict, judge, with_open_size
-from turnout.mismatch.engine.diagnose import _final_verdict
-from turnout.mismatch.engine.hammer_prescreen import _informed_values
+from turnout.mismatch.engine.decision import grade_name, judge
+from turnout.mismatch.engine.diagnose import grade_names
+from turnout.mismatch.engine.hammer_prescreen import informed_values
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.score import Score
-from turnout.mismatch.engine.two_effects import (
-    drop_redundant_first,
-    drop_unpredictive_second,
-    reject_if_residual_left,
-    split_rivals,
-)
+from turnout.mismatch.engine.search import Findings, Search
+from turnout.mismatch.engine.two_effects import add_second, settle_pair
+from turnout.mismatch.engine.verdict import Verdict
 from turnout.physics import Parameter
 from turnout.stages.mismatch_rows import _evidence
 
@@ -220,7 +217,7 @@ def test_a_twin_goes_back_with_its_effect_even_where_nothing_is_learnt_of_it():
     values = {"seat_A1": 0.0, "gain_A1": 0.03, "seat_A2": 0.0}
     fit = SimpleNamespace(covariance=np.diag([1e-2, 1e-4, 1e-2]), values=values)
     moved = SimpleNamespace(masking_parameter="seat_A1")
-    assert _informed_values(case, fit, moved) == {"seat_A1": 0.0, "gain_A1": 0.03}
+    assert informed_values(case, fit, moved) == {"seat_A1": 0.0, "gain_A1": 0.03}
 
 
 @pytest.mark.parametrize("error, names", [(3e-3, ("hanging_sleeper", "local_ballast")), (1e-4, ("hanging_sleeper",))])
@@ -228,7 +225,8 @@ def test_a_gap_that_no_train_closes_may_be_no_ballast_at_all(error, names):
     """2.5 ± 3 mm has no upper end: what lies beneath was never touched, and nobody can say whether it is there."""
     here, settings = {"sleeper": 7, "place": 4.2}, MismatchSettings()
     gap = Candidate("hanging_sleeper", GAP, lambda p: p, ((1e-3, 0.0),), here, unbounded_form="local_ballast")
-    verdict = with_open_size(judge([own(gap, [2.5e-3, 0.04], [error, 0.01])], 2.0, settings), settings)
+    alone = judge([own(gap, [2.5e-3, 0.04], [error, 0.01])], 2.0, settings)
+    verdict, _, _ = grade_name(alone, alone.scores[0].fit, 0.9, settings)
     assert verdict.names == names and verdict.answer == ("named" if len(names) == 1 else "a_or_b")
     assert bool(verdict.grade) == (len(names) == 1) and verdict.probability > 0.9
 
@@ -244,7 +242,7 @@ def test_a_second_gap_that_no_train_closes_may_be_no_ballast_either(error, answe
         level={"passage": 0.8}, white=[],
     )  # fmt: skip
     case = SimpleNamespace(control_level={"passage": 0.7}, cell_level={}, observations=())
-    stated = _final_verdict(second, case, both, settings)
+    (stated,) = grade_names(Findings(Search(case), both, both, (second,))).verdicts
     assert (stated.answer, stated.grade) == (answer, "B" if answer == "named" else "")
 
 
@@ -253,8 +251,8 @@ def test_a_second_of_a_kind_two_bays_on_is_the_shape_of_the_first():
         return Candidate(family, FACTOR, lambda p: p, ((0.4,),), {"place": place})
 
     first = at("local_ballast", 4.2)
-    assert _is_same_site(at("local_ballast", 5.4), first) and not _is_same_site(at("local_pad", 5.4), first)
-    assert not _is_same_site(at("local_ballast", 6.0), first) and _is_same_site(at("local_pad", 4.8), first)
+    assert is_same_site(at("local_ballast", 5.4), first) and not is_same_site(at("local_pad", 5.4), first)
+    assert not is_same_site(at("local_ballast", 6.0), first) and is_same_site(at("local_pad", 4.8), first)
 
 
 @pytest.mark.parametrize("known, offered, same", [
@@ -271,8 +269,8 @@ def test_a_wheel_known_by_its_blows_is_no_shape_of_heavy_wheels(known, offered, 
         )
 
     first, second = of(known, "axle" in known), of(offered, True)
-    assert _is_same_site(second, first) == _is_same_site(first, second) == same
-    assert _is_same_site(of(offered, False), first) and _is_same_site(first, of(offered, False))
+    assert is_same_site(second, first) == is_same_site(first, second) == same
+    assert is_same_site(of(offered, False), first) and is_same_site(first, of(offered, False))
 
 
 @pytest.mark.parametrize("left, answer", [(50.0, "named"), (5.0, "a_or_b")])
@@ -286,8 +284,11 @@ def test_a_rival_that_keeps_its_gain_on_top_of_the_leader_is_none(left, answer):
     assert torn.names == ("wave", "ripple")
     on_top = tuple(Score(c, g, 0.0, 1.0, f) for c, g, f in zip(case.candidates[1:], (59.0, left), fits[1:]))
     second = Verdict("named", ("ripple",), "A", 0.97, {}, on_top)
-    found = split_rivals(case, fit_jointly(case), torn, second, MismatchSettings())
-    assert found.answer == answer and found.names[0] == "wave"
+    base = fit_jointly(case)
+    choice = Findings(Search(case), base, fits[0], (torn,))
+    found, stands = add_second(replace(choice, choice=choice), second, on_top[0])
+    assert found.verdicts[0].answer == answer and found.verdicts[0].names[0] == "wave"
+    assert stands is (answer == "named") and len(found.verdicts) == 1 + stands
 
 
 @pytest.mark.parametrize("promised, scouted, asked", [(7.0, 7.0, 6.0), (7.0, 5.0, 12.0)])
@@ -296,8 +297,8 @@ def test_a_second_effect_that_blows_alone_promise_half_of_is_refitted(promised, 
     all recordings together, and has to be a name; a first effect is asked from 2 nats on."""
     settings, candidate = MismatchSettings(), Candidate("soft_rail", AMOUNT, tuple, ((0.5,),))
     entry, beside = (promised, candidate, np.array([0.5]), {}), SimpleNamespace(candidates=("pad",))
-    assert _required_promise(entry, beside, {candidate.key: scouted}, settings) == asked
-    assert _required_promise(entry, SimpleNamespace(candidates=()), {candidate.key: scouted}, settings) == 2.0
+    assert required_promise(entry, beside, {candidate.key: scouted}, settings) == asked
+    assert required_promise(entry, SimpleNamespace(candidates=()), {candidate.key: scouted}, settings) == 2.0
 
 
 def test_the_evidence_of_a_row_has_an_entry_for_each_verdict():
@@ -311,46 +312,45 @@ def test_the_evidence_of_a_row_has_an_entry_for_each_verdict():
 def test_a_first_name_that_the_second_leaves_nothing_to_is_dropped():
     """A ramp alone is in the recordings; a bowl that was named before it, which is half a ramp, is worth nothing beside
     it. Where both are there both stay."""
-    settings = MismatchSettings()
     for true, left in (({"ramp": 2.5}, ("ramp",)), ({"ramp": 2.5, "bowl": 2.5}, ("bowl", "ramp"))):
         case = Shapes(("ramp", "bowl"), **true)
         pair = case.candidates[::-1]
         fit = fit_jointly(case, pair, [0.1, 0.1], iterations=20)
         verdicts = [Verdict("named", (c.family,), "A", 0.97, {}, (Score(c, 50.0, 0.0, 1.0, fit),)) for c in pair]
-        found, last = drop_redundant_first(case, fit_jointly(case), fit, verdicts, settings)
-        assert tuple(v.names[0] for v in found) == left == tuple(c.family for c in last.candidates)
-    assert last.psi == pytest.approx([2.5, 2.5], abs=0.15)
+        found = settle_pair(Findings(Search(case), fit_jointly(case), fit, tuple(verdicts)))
+        assert tuple(v.names[0] for v in found.verdicts) == left == tuple(c.family for c in found.fit.candidates)
+    assert found.fit.psi == pytest.approx([2.5, 2.5], abs=0.15)
 
 
 @pytest.mark.parametrize("ripple, said", [(0.0, "named"), (3.0, "unknown")])
 def test_a_second_name_that_is_left_alone_has_to_explain_what_is_there(ripple, said):
     """Beside a bowl that was named first it needed not: the ripple could have been the bowl's shape."""
-    case, settings = Shapes(("ramp", "bowl"), ramp=2.5, ripple=ripple), MismatchSettings()
+    case = Shapes(("ramp", "bowl"), ramp=2.5, ripple=ripple)
     pair = case.candidates[::-1]
     fit = fit_jointly(case, pair, [0.1, 0.1], iterations=20)
     verdicts = [
         Verdict("named", (c.family,), "A", 0.97, {}, (Score(c, 50.0, 0.0, 0.1, fit, unmasked_gain=40.0),)) for c in pair
     ]
-    verdicts = [replace(v, posterior={v.names[0]: 0.9, "unknown": 0.1}) for v in verdicts]
-    found, last = drop_redundant_first(case, fit_jointly(case), fit, verdicts, settings)
-    assert [v.answer for v in found] == [said]
-    assert len(last.candidates) == (said == "named")
+    verdicts = tuple(replace(v, posterior={v.names[0]: 0.9, "unknown": 0.1}) for v in verdicts)
+    found = settle_pair(Findings(Search(case), fit_jointly(case), fit, verdicts))
+    assert [v.answer for v in found.verdicts] == [said]
+    assert len(found.fit.candidates) == (said == "named")
 
 
 @pytest.mark.parametrize("reserved, left", [(0.0, ("ramp",)), (0.55, ("ramp", "bowl")), (1.0, ("ramp", "bowl"))])
 def test_a_second_name_that_recordings_never_used_deny_is_dropped(reserved, left):
     """A bowl of 1.0 shows in all that is fitted. Where none of it is in the recording kept aside, the pair misses that
     by as much as it gains elsewhere; with a share of 0.55 it gains a little there, and stays."""
-    case, settings = Shapes(("ramp", "bowl"), ramp=2.5, bowl=1.0), MismatchSettings()
+    case = Shapes(("ramp", "bowl"), ramp=2.5, bowl=1.0)
     kept = 2.5 * SHAPES["ramp"] + reserved * SHAPES["bowl"] + 0.1 * np.random.default_rng(6).normal(size=X.size)
     case.reserved = (Observation("kept", "day 9", kept, np.full(X.size, 0.1)),)
     alone = fit_jointly(case, case.candidates[:1], [0.1], iterations=20)
     fit = fit_jointly(case, case.candidates, [0.1, 0.1], iterations=20)
     scores = [Score(c, 50.0, 0.0, 1.0, f) for c, f in zip(case.candidates, (alone, fit))]
-    verdicts = [Verdict("named", (s.family,), "A", 0.97, {}, (s,)) for s in scores]
-    found, last = drop_unpredictive_second(case, fit, verdicts, settings)
-    assert tuple(v.names[0] for v in found) == left == tuple(c.family for c in last.candidates)
-    assert ("bowl" in found[0].reason) is (len(left) == 1)
+    verdicts = tuple(Verdict("named", (s.family,), "A", 0.97, {}, (s,)) for s in scores)
+    found = settle_pair(Findings(Search(case), fit_jointly(case), fit, verdicts))
+    assert tuple(v.names[0] for v in found.verdicts) == left == tuple(c.family for c in found.fit.candidates)
+    assert ("bowl" in found.verdicts[0].reason) is (len(left) == 1)
 
 
 @pytest.mark.parametrize("last, grade, said", [("ramp", "A", 2), ("ramp", "B", 1), ("", "B", 2)])
@@ -358,12 +358,17 @@ def test_what_would_leave_nothing_is_no_name_where_something_is_left(last, grade
     """A drifting clock bends what its channel shows into much else: first or second, it has to explain all."""
     pair = [replace(c, must_reach_control_level=c.family == last) for c in Shapes(("bowl", "ramp")).candidates]
     posterior = {"bowl": 0.9, "ramp": 0.05, "unknown": 0.05}
-    verdicts = [
-        Verdict("named", (c.family,), grade, 0.97, dict(posterior), (Score(c, 50.0, 0.0, 1.0, None),)) for c in pair
-    ]
-    found, fit = reject_if_residual_left("base", "fit", verdicts, MismatchSettings())
-    assert (len(found), fit) == ((2, "fit") if said == 2 else (1, "base"))
-    assert said == 2 or (found[0].answer == "unknown" and "ramp would leave nothing" in found[0].reason)
+    case = SimpleNamespace(control_level={"passage": 0.7}, cell_level={}, observations=())
+    base, fit = (SimpleNamespace(level={"passage": 0.6 if grade == "A" else 0.8}, white=[]) for _ in range(2))
+    verdicts = tuple(
+        Verdict("named", (c.family,), "", 0.97, dict(posterior), (Score(c, 50.0, 0.0, 1.0, fit),)) for c in pair
+    )
+    found = grade_names(Findings(Search(case), base, fit, verdicts))
+    assert [v.grade for v in found.verdicts] == ([grade, grade] if said == 2 else [""])
+    assert found.fit is (fit if said == 2 else base)
+    first = found.verdicts[0]
+    assert said == 2 or (first.answer == "unknown" and "ramp would leave nothing" in first.reason)
+    assert said == 2 or "must_reach_control_level" in first.trail
 
 
 @pytest.mark.parametrize("ripple, answer", [(0.0, "named"), (0.12, "unknown")])

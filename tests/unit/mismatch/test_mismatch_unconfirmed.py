@@ -1,17 +1,21 @@
 """A name whose shape stays unresolved and that foretells recordings never used worse is no name."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
-from turnout.mismatch.engine.decision import Verdict
-from turnout.mismatch.engine.diagnose import Verification, diagnose
-from turnout.mismatch.engine.evidence import reserved_excess_ratio
-from turnout.mismatch.engine.two_effects import reject_if_reserved_unexplained, reject_unconfirmed
+from turnout.mismatch.engine.decision import confirm
+from turnout.mismatch.engine.diagnose import diagnose
+from turnout.mismatch.engine.reserved_data import Verification, reserved_excess_ratio
+from turnout.mismatch.engine.search import Search
+from turnout.mismatch.engine.verdict import Verdict
 from turnout.stages.mismatch_rows import sentence
 
 POSTERIOR = {"pad_preload": 0.8, "none": 0.15, "unknown": 0.05}
+WORSE = Verification(1, 27.6, 26.0, error=0.9)
 
 
 @pytest.mark.parametrize(
@@ -29,7 +33,8 @@ def test_a_model_that_foretells_nothing_is_left_to_the_rules_before():
 
 def test_a_name_of_grade_b_becomes_unknown_with_the_probability_of_that():
     settings = MismatchSettings()
-    found = reject_unconfirmed(Verdict("named", ("pad_preload",), "B", 0.97, dict(POSTERIOR)), settings)
+    name = Verdict("named", ("pad_preload",), "B", 0.97, dict(POSTERIOR))
+    (found,) = confirm((name,), WORSE, settings)
     assert (found.answer, found.names, found.grade) == ("unknown", (), "")
     assert "pad_preload" in found.reason and "worse" in found.reason
     assert sum(found.posterior.values()) == pytest.approx(1.0)
@@ -38,18 +43,24 @@ def test_a_name_of_grade_b_becomes_unknown_with_the_probability_of_that():
 
 @pytest.mark.parametrize("verdict", [Verdict("named", ("dip",), "A", 0.97), Verdict("none"), Verdict("a_or_b")])
 def test_other_answers_stay(verdict):
-    assert reject_unconfirmed(verdict, MismatchSettings()) is verdict
+    (found,) = confirm((verdict,), WORSE, MismatchSettings())
+    assert found == replace(verdict, trail=("not_contradicted",))
+
+
+def test_of_two_names_none_is_withdrawn():
+    pair = tuple(Verdict("named", (n,), "B", 0.97, dict(POSTERIOR)) for n in ("pad_preload", "dip"))
+    assert [v.answer for v in confirm(pair, WORSE, MismatchSettings())] == ["named", "named"]
 
 
 def test_nothing_is_missing_no_longer_where_what_was_never_used_is_not_foretold():
     settings = MismatchSettings()
-    found = reject_if_reserved_unexplained(
-        Verdict("none", probability=0.9, posterior={"none": 0.9, "unknown": 0.1}), settings
-    )
+    none = Verdict("none", probability=0.9, posterior={"none": 0.9, "unknown": 0.1})
+    (found,) = confirm((none,), Verification(1, 27.6, reserved_excess=2.1), settings)
     assert found.answer == "unknown" and "never used" in found.reason
     assert found.posterior["unknown"] == pytest.approx(found.probability)
     named = Verdict("named", ("dip",), "A", 0.97)
-    assert reject_if_reserved_unexplained(named, settings) is named
+    assert confirm((named,), Verification(1, 27.6, reserved_excess=2.1), settings)[0].answer == "named"
+    assert confirm((none,), Verification(1, 27.6, reserved_excess=1.9), settings)[0].answer == "none"
 
 
 def test_what_is_left_of_reserved_recordings_is_held_against_the_level_of_controls():
@@ -57,8 +68,8 @@ def test_what_is_left_of_reserved_recordings_is_held_against_the_level_of_contro
     rows = [Observation(f"o{k}", "c", np.zeros(40), 0.1, 0.5, kind) for k, kind in enumerate("aab")]
     case = with_reserved(rows, {"a": 0.5, "b": 1.0})
     predictions = [np.full(40, 0.3), np.full(40, -0.1), np.full(40, 0.1)]
-    assert reserved_excess_ratio(case, predictions, MismatchSettings()) == pytest.approx(5.0 / 0.5)
-    assert reserved_excess_ratio(with_reserved((), {}), [], MismatchSettings()) == 0.0
+    assert reserved_excess_ratio(Search(case), predictions) == pytest.approx(5.0 / 0.5)
+    assert reserved_excess_ratio(Search(with_reserved((), {})), []) == 0.0
 
 
 def with_reserved(rows, level):

@@ -10,6 +10,7 @@ from turnout.mismatch.engine import refit
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
 from turnout.mismatch.engine.map_fit import FINE_STALL, STALL, fit_jointly
 from turnout.mismatch.engine.score import Score
+from turnout.mismatch.engine.search import Search
 from turnout.mismatch.turnout.passage_observation import CLIPPING_BLUR, AlignedPassage, _clipped_samples, observation_of
 from turnout.records import Channel, Recording
 
@@ -48,9 +49,10 @@ def test_a_dear_fit_on_which_the_verdict_rests_goes_on_for_less(monkeypatch):
     assert early.cost > late.cost + 1.0
     assert fit_jointly(Bent(False), iterations=25, stall=20.0).cost == pytest.approx(late.cost, abs=0.2)  # cheap: none
     asked = []
-    monkeypatch.setattr(refit, "fit_jointly", lambda *a, stall=STALL, **k: asked.append(stall) or late)
-    refit.converge(Bent(True), early, MismatchSettings())
-    refit.continue_fit(Bent(True), early, MismatchSettings())
+    search = Search(Bent(True))
+    monkeypatch.setattr(Search, "fit", lambda *a, stall=STALL: asked.append(stall) or late)
+    search.converge(early)
+    search.continue_fit(early)
     assert set(asked[:-1]) == {FINE_STALL} and asked[-1] == STALL > FINE_STALL
 
 
@@ -63,11 +65,11 @@ def test_what_comes_near_a_name_is_fitted_to_its_end_as_leaders_are(monkeypatch,
     )
     monkeypatch.setattr(refit, "_score_task", lambda *a: score)
     monkeypatch.setattr(refit, "_polish", lambda *a: asked.append(a) or score)
-    monkeypatch.setattr(refit, "restart_leader", lambda case, fit, s, *a: s)
-    monkeypatch.setattr(refit, "_with_condition_gains", lambda case, fit, s, settings: s)
+    monkeypatch.setattr(refit, "restart_leader", lambda search, fit, s: s)
+    monkeypatch.setattr(refit, "_with_condition_gains", lambda search, fit, s: s)
     monkeypatch.setattr(refit, "_base_from_leader", lambda *a: None)
     plain = SimpleNamespace(candidates=())
-    refit.score_candidates(Bent(True), plain, MismatchSettings(), lambda *a: None, {}, 0, None)
+    refit.score_candidates(Search(Bent(True)), plain, None)
     assert len(asked) == ended
 
 
@@ -78,12 +80,15 @@ def test_only_the_first_leader_of_a_first_effect_is_begun_anew(monkeypatch, besi
     entries = [SimpleNamespace(rival=False, candidate=SimpleNamespace(key=f)) for f in "ba"]
     asked = []
     monkeypatch.setattr(refit, "shortlist", lambda *a: entries)
-    monkeypatch.setattr(refit, "_score_task", lambda case, fit, entry, *a: scores[entry.candidate.key])
-    monkeypatch.setattr(refit, "_refit_equivalent_forms", lambda case, fit, ranked, *a: ranked)
-    monkeypatch.setattr(refit, "_polish", lambda case, fit, s, *a: s)
-    monkeypatch.setattr(refit, "restart_leader", lambda case, fit, s, *a: asked.append(s.family) or s)
+    monkeypatch.setattr(refit, "_score_task", lambda search, fit, entry, *a: scores[entry.candidate.key])
+    monkeypatch.setattr(refit, "_refit_equivalent_forms", lambda search, fit, ranked: ranked)
+    monkeypatch.setattr(refit, "_polish", lambda search, fit, s: s)
+    monkeypatch.setattr(refit, "restart_leader", lambda search, fit, s: asked.append(s.family) or s)
+    monkeypatch.setattr(refit, "correct_for_leader", lambda search, fit, ranked: ranked)
+    monkeypatch.setattr(refit, "_with_condition_gains", lambda search, fit, s: s)
+    monkeypatch.setattr(refit, "_base_from_leader", lambda *a: None)
     plain = SimpleNamespace(candidates=beside)
-    refit._rank_families(Bent(True), plain, MismatchSettings(), lambda *a: None, {}, 0, None)
+    refit.score_candidates(Search(Bent(True)), plain, None)
     assert asked == begun
 
 
@@ -97,15 +102,15 @@ def test_what_the_fit_without_an_effect_had_not_come_to_is_no_evidence_for_the_e
     assert (owed > MismatchSettings().threshold) == again
     asked = []
 
-    def ranked(case, fit, *_):
+    def ranked(search, fit, *_):
         asked.append(fit.evidence)
         debt = late.evidence - fit.evidence
         return [Score(SimpleNamespace(key=k), debt + g, 0.0, 1.0, late) for k, g in (("a", 20.0), ("b", 3.0))]
 
     monkeypatch.setattr(refit, "_rank_families", ranked)
-    monkeypatch.setattr(refit, "correct_for_leader", lambda case, fit, found, settings: found)
-    monkeypatch.setattr(refit, "_with_condition_gains", lambda case, fit, s, settings: s)
-    found, fit = refit.score_candidates(Bent(True), early, MismatchSettings(), lambda *a: None, {}, 0, None)
+    monkeypatch.setattr(refit, "correct_for_leader", lambda search, fit, found: found)
+    monkeypatch.setattr(refit, "_with_condition_gains", lambda search, fit, s: s)
+    found, fit = refit.score_candidates(Search(Bent(True)), early)
     assert [s.gain for s in found] == pytest.approx([20.0, 3.0], abs=0.5)
     assert len(asked) == 1 + again and fit.evidence == pytest.approx(asked[-1])
     assert fit.evidence == pytest.approx(late.evidence, abs=0.5 if again else MismatchSettings().threshold)
@@ -133,17 +138,17 @@ def test_a_law_of_the_whole_track_that_gains_too_little_is_begun_again_farther_o
     fit = SimpleNamespace(candidates=(), psi=np.zeros(0), values={"pads": 0.7, "wave": 0.5, "time@p": 0.1}, jacobian=[])
     starts, gains = [], iter((15.0, 18.0))
 
-    def fitted(case, candidates, psi, values, *_, **__):
+    def fitted(search, candidates, psi, values, *_):
         starts.append((float(psi[-1]), *values.values()))
         made = SimpleNamespace(gain=next(gains), with_candidates=lambda c: made)
         return SimpleNamespace(without_jacobian=lambda: made)
 
     first = SimpleNamespace(gain=gain, with_candidates=lambda c: first)
-    monkeypatch.setattr(refit, "fit_jointly", fitted)
+    monkeypatch.setattr(Search, "fit", fitted)
     monkeypatch.setattr(refit, "_refit", lambda *a: first)
-    monkeypatch.setattr(refit, "score_of", lambda case, fit, refit, *a: SimpleNamespace(gain=refit.gain))
+    monkeypatch.setattr(refit, "score_of", lambda search, fit, refit, *a: SimpleNamespace(gain=refit.gain))
     entry = SimpleNamespace(candidate=candidate, start=(promised,), values={}, cheap_gain=0.0)
-    score = refit._score_task(case, fit, entry, MismatchSettings(), {}, 0)
+    score = refit._score_task(Search(case), fit, entry)
     assert starts == ([] if begun is None else [(begun, 0.7, 0.5, 0.1), (begun, 0.2, 0.5, 0.1)])
     assert score.gain == (gain if begun is None else 18.0)
 
@@ -151,7 +156,7 @@ def test_a_law_of_the_whole_track_that_gains_too_little_is_begun_again_farther_o
 def test_a_fit_is_not_made_again_where_nobody_would_be_named():
     late = fit_jointly(Bent(True), iterations=25, stall=FINE_STALL)
     silent = [Score(SimpleNamespace(key="a"), 11.0, 0.0, 1.0, late)]
-    assert refit._base_from_leader(Bent(True), late, silent, MismatchSettings(), {}, 0) is None
+    assert refit._base_from_leader(Search(Bent(True)), late, silent) is None
 
 
 def test_where_a_channel_was_at_its_range_the_passage_says_no_more_than_its_size():

@@ -87,7 +87,7 @@ class RefitTask:
     rival: bool = False
 
 
-def shortlist(case, fit, settings, promising=()):
+def shortlist(search, fit, promising=()):
     """Tasks in order of promise.
 
     If predictions are cheap, every family is refitted from every start. In an expensive case, ``prescreen`` fits the
@@ -98,17 +98,18 @@ def shortlist(case, fit, settings, promising=()):
     """
     from turnout.mismatch.engine.hammer_prescreen import prescreen
 
+    case, settings = search.case, search.settings
     candidates = [
         c
         for c in (*case.candidates, *case.residual_candidates(fit))
-        if not any(_is_same_site(c, k) for k in fit.candidates)
+        if not any(is_same_site(c, k) for k in fit.candidates)
     ]
     if not case.expensive:
         return [RefitTask(c, np.asarray(s, dtype=float), {}) for c in candidates for s in c.starts]
     by_family, prescreen_gains = {}, {}
     if fit.candidates and promising is not None:
         promising = {*promising, *(c.family for c in case.candidates if c.prescreen_group and c.n_scanned == 1)}
-    for trial in prescreen(case, fit, settings, promising if fit.candidates else None):
+    for trial in prescreen(search, fit, promising if fit.candidates else None):
         if trial.candidate in candidates:
             entry = trial.gain, trial.candidate, trial.psi, trial.values
             prescreen_gains[trial.candidate.key] = trial.gain
@@ -138,12 +139,12 @@ def shortlist(case, fit, settings, promising=()):
     selected = [
         entry
         for entry in _most_promising(by_family, settings)
-        if entry[0] > _required_promise(entry, fit, prescreen_gains, settings)
+        if entry[0] > required_promise(entry, fit, prescreen_gains, settings)
     ]
     min_gain = MIN_PROMISE_SHARE * max((entry[0] for entry in selected), default=0.0)
     chosen = [entry for rank, entry in enumerate(selected) if rank < 2 or entry[0] > min_gain]
-    selected = [(e, False) for e in chosen] + [(e, True) for e in _component_rivals(chosen, by_family)]
-    selected = [(_with_fitted_start(e, by_family), rival) for e, rival in selected]
+    selected = [(e, False) for e in chosen] + [(e, True) for e in component_rivals(chosen, by_family)]
+    selected = [(with_fitted_start(e, by_family), rival) for e, rival in selected]
     return [RefitTask(*e[1:], prescreen_gains.get(e[1].key, 0.0), rival) for e, rival in selected]
 
 
@@ -155,7 +156,7 @@ def _distant_entry(case, fit, projector, at_start, candidate):
     return 0.5 * gain - np.log(candidate.n_scanned), candidate, np.array(at_start.starts[0]), reset_values
 
 
-def _required_promise(entry, fit, prescreen_gains, settings):
+def required_promise(entry, fit, prescreen_gains, settings):
     """Promise from which an entry is refitted. Beside a first effect it must be that of a separate name. [nats]"""
     if not fit.candidates:
         return settings.promise
@@ -163,7 +164,7 @@ def _required_promise(entry, fit, prescreen_gains, settings):
     return settings.threshold * (CHEAP_PROMISE_SHARE if is_cheap_gain else 1.0)
 
 
-def _with_fitted_start(entry, by_family):
+def with_fitted_start(entry, by_family):
     """The entry, with start and nuisance parameters of the best fit of the same candidate, if there is one.
 
     A column is linear, and from it all nuisance parameters would have to return.
@@ -172,7 +173,7 @@ def _with_fitted_start(entry, by_family):
     return max(fitted, key=lambda e: e[0], default=entry)
 
 
-def _component_rivals(chosen, by_family):
+def component_rivals(chosen, by_family):
     """Best starts of other effects on the components of the first two chosen: columns hardly separate them."""
     sites = [e[1].part for e in chosen if e[1].component][:2]
     chosen_effects, best_entries = {(entry[1].family, entry[1].part) for entry in chosen}, {}
@@ -183,7 +184,7 @@ def _component_rivals(chosen, by_family):
     return list(best_entries.values())
 
 
-def _is_same_site(candidate, accepted):
+def is_same_site(candidate, accepted):
     """Whether a second effect at the position, sensor or train of an accepted one would only correct its shape.
 
     Not so for two exact effects, nor for an effect of all wheels beside one of a single wheel that is known by its

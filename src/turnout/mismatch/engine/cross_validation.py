@@ -179,7 +179,7 @@ MIN_HAMMER_POSITIONS = 3  # positions of impacts; of fewer none can be called th
 SINGLE_POSITION_LEVELS = (1.0, 0.5)
 
 
-def single_witness(case, fit, candidate, gain, by_condition, settings):
+def single_witness(search, fit, candidate, gain, by_condition):
     """The condition whose gain alone supports a name while the gain of all others together does not.
 
     "" if there is none.
@@ -194,22 +194,23 @@ def single_witness(case, fit, candidate, gain, by_condition, settings):
 
     Parameters
     ----------
-    case, fit : Case, Fit
-        The fit has ``candidate`` in it.
+    search : Search
+    fit : Fit
+        It has ``candidate`` in it.
     candidate : Candidate
     gain : float
         Of all conditions together. [nats]
     by_condition : dict
         Condition -> gain when it is left out. [nats]
-    settings : MismatchSettings
     """
-    if position := _single_hammer_position(case.hammer_positions(), gain, by_condition, settings.threshold):
+    case, threshold = search.case, search.settings.threshold
+    if position := _single_hammer_position(case.hammer_positions(), gain, by_condition, threshold):
         return position
     strongest = max(by_condition, key=by_condition.get, default="")
-    if not strongest or by_condition[strongest] <= settings.threshold or "train" in candidate.where:
+    if not strongest or by_condition[strongest] <= threshold or "train" in candidate.where:
         return ""
     other_gain = sum(by_condition.values()) - by_condition[strongest]
-    if other_gain >= settings.threshold:
+    if other_gain >= threshold:
         return ""
     energies = effect_energy(case, fit, candidate)
     min_energy = MIN_ENERGY_RATIO * energies.pop(strongest, np.inf)

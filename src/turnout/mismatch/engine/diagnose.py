@@ -1,62 +1,37 @@
 """Diagnosis of a case: fit, localize, name, model and verify, with everything that the verdict rests on."""
 
+from __future__ import annotations
+
+from collections.abc import Callable, MutableMapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from turnout.config.settings.mismatch import MismatchSettings
-from turnout.errors import SimulationError
-from turnout.mismatch.engine.cross_validation import signature_overlap
-from turnout.mismatch.engine.decision import Verdict, with_open_size
-from turnout.mismatch.engine.evidence import assess, excess_ratio, latent_force_of, reserved_excess_ratio, worst_excess
-from turnout.mismatch.engine.latent_force import LatentForce
-from turnout.mismatch.engine.localization import Location, locate
-from turnout.mismatch.engine.map_fit import MAX_CHEAP_STEPS, fit_jointly
-from turnout.mismatch.engine.refit import cached_fit, continue_fit, score_candidates, with_jacobian
-from turnout.mismatch.engine.reserved_data import fit_percent, gain_error, predict_with_decoy, reserved_fit
-from turnout.mismatch.engine.residual_attribution import attribute, cell_energies
-from turnout.mismatch.engine.two_effects import (
-    drop_redundant_first,
-    drop_unpredictive_second,
-    is_accepted_pair,
-    is_single_effect,
-    is_unknown,
-    reject_if_reserved_unexplained,
-    reject_if_residual_left,
-    reject_unconfirmed,
-    retest_with_second,
-    split_rivals,
-    with_residual_reason,
+from turnout.mismatch.engine.decision import (
+    NUMERICS_RULES,
+    NumericalError,
+    confirm,
+    first_applicable,
+    grade_name,
 )
+from turnout.mismatch.engine.evidence import assess, excess_ratio, latent_force_of, worst_excess
+from turnout.mismatch.engine.localization import Location, locate
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.refit import score_candidates
+from turnout.mismatch.engine.reserved_data import Verification, verify
+from turnout.mismatch.engine.residual_attribution import Attribution, attribute, cell_energies
+from turnout.mismatch.engine.search import Findings, Search
+from turnout.mismatch.engine.two_effects import add_second, settle_pair
+from turnout.mismatch.engine.verdict import Verdict
 
-# Share of the first effect's evidence that an error in its shape may leave to a second one: sizes err by a fifth.
-SHAPE_ERROR_SHARE = 0.05
-# Multiple of the control level. A larger residual of reserved recordings contradicts the answer "none". Three opened
-# controls reach 0.37 to 0.54, as for fitted recordings. Trains of a type that was not fitted may leave more.
-MAX_RESERVED_EXCESS = 2.0
-
-
-@dataclass(frozen=True)
-class Verification:
-    """Fit [%] of ``n`` reserved recordings: ``before``, ``after`` with the named term, with ``rival`` and with
-    ``decoy``.
-
-    ``error`` is the standard error of ``after`` less ``before``. ``reserved_excess`` is the weighted mean square
-    without a term over the control level.
-    """
-
-    n: int
-    before: float
-    after: float | None = None
-    rival: float | None = None
-    decoy: float | None = None
-    error: float | None = None
-    reserved_excess: float = 0.0
-
-    @property
-    def is_worse(self):
-        """Whether the named model predicts the reserved recordings worse, by more than the standard error."""
-        return self.error is not None and self.after < self.before - self.error
+if TYPE_CHECKING:
+    from turnout.config.settings.mismatch import MismatchSettings
+    from turnout.mismatch.engine.case import Case
+    from turnout.mismatch.engine.decision import Rule
+    from turnout.mismatch.engine.latent_force import LatentForce
+    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.score import Score
 
 
 @dataclass(frozen=True)
@@ -68,31 +43,45 @@ class Diagnosis:
     """
 
     verdicts: tuple[Verdict, ...]
-    base: object
-    fit: object
-    frames: tuple
+    base: Fit
+    fit: Fit
+    frames: tuple[Attribution, ...]
     verification: Verification
     latent: LatentForce | None = None
-    scores: tuple = ()
+    scores: tuple[Score, ...] = ()
     where: Location | None = None
 
+    def __repr__(self) -> str:
+        words = []
+        for v in self.verdicts:
+            names = " or ".join(v.names) or v.reason
+            words.append(
+                v.answer.replace("_", " ") + (f" {names}" if names else "") + f", grade {v.grade}" * bool(v.grade)
+            )
+        return f"Diagnosis({'; '.join(words)}; probability {self.probability:.2f}, {len(self.scores)} candidates)"
+
     @property
-    def verdict(self):
+    def verdict(self) -> Verdict:
         """The verdict on the first effect."""
         return self.verdicts[0]
 
     @property
-    def probability(self):
+    def probability(self) -> float:
         """Probability of all that is stated: that of the least certain verdict."""
         return min(v.probability for v in self.verdicts)
 
     @property
-    def names(self):
+    def names(self) -> tuple[str, ...]:
         """Families named, in the order in which they were found."""
         return tuple(v.names[0] for v in self.verdicts if v.answer == "named")
 
 
-def diagnose(case, settings=None, progress=None, store=None):
+def diagnose(
+    case: Case,
+    settings: MismatchSettings | None = None,
+    progress: Callable[[int, int, str], Any] | None = None,
+    store: MutableMapping[str, Any] | None = None,
+) -> Diagnosis:
     """Localize, name, model and verify what the simulator of ``case`` lacks.
 
     Parameters
@@ -109,139 +98,129 @@ def diagnose(case, settings=None, progress=None, store=None):
     Returns
     -------
     Diagnosis
+
+    Raises
+    ------
+    SimulationError
+        If the base model cannot be simulated.
     """
-    settings, store = settings or MismatchSettings(), {} if store is None else store
-    if not case.expensive:
-        settings = replace(settings, base_iterations=MAX_CHEAP_STEPS, iterations=MAX_CHEAP_STEPS)
-    report = progress or (lambda n_done, total, what: None)
-    base = cached_fit(store, "base", lambda: fit_jointly(case, iterations=settings.base_iterations))
-    case, base = _refit_with_updated_errors(case, base, settings, store)
-    frames = tuple(attribute(*cell_energies(case.observations, base.residuals)))
-    numerics = _numerics_reason(case, base, settings)
-    if numerics:
-        verdict = Verdict("numerics", reason=numerics, probability=1.0)
-        return Diagnosis(
-            (verdict,), base, base, frames, _verify(case, base, base, None, settings), latent_force_of(case, base)
-        )
-    verdicts, fit, scores, alternative = [], base, (), None
-    for effect in range(settings.effects):
-        promising = None if is_unknown(verdicts) else {s.family for s in scores if s.gain > settings.threshold}
-        scores, fit = score_candidates(case, fit, settings, report, store, effect, promising)
-        base = base if effect else fit
-        verdict, top_score = assess(case, fit, scores, settings)
-        if effect and (
-            not is_single_effect(verdict)
-            or top_score.gain < _shape_error_evidence(case, verdicts[0].scores[0], top_score)
-        ):
-            verdicts[0] = with_residual_reason(verdicts[0], verdict)
-            break
-        if alternative:
-            verdicts[0] = split_rivals(case, base, verdicts[0], verdict, settings)
-            if not is_single_effect(verdicts[0]):
-                break
-        verdicts.append(verdict)
-        if verdict.answer == "none" or top_score is None or top_score.gain <= settings.threshold:
-            break
-        continued = with_jacobian(case, top_score.fit, settings)
-        if not continued.jacobian and effect:  # the simulation fails close to it: no evidence, no next effect
-            verdicts.pop()
-            break
-        fit = continued
-        if not fit.jacobian:
-            break
-        if is_single_effect(verdict) and not is_unknown(verdicts):  # these were compared with the errors of the base
-            case, fit = _refit_with_updated_errors(case, fit, settings, store)
-        if verdict.answer == "a_or_b" and not is_single_effect(verdict):  # both may be present
-            alternative = case, [verdict], fit, scores
-        elif not case.expensive and excess_ratio(case, fit, settings) <= 1.0:
-            break
-    if is_unknown(verdicts):
-        verdicts, fit = retest_with_second(case, base, fit, verdicts, settings)
-    else:
-        verdicts, fit = drop_redundant_first(case, base, fit, verdicts, settings)
-        verdicts, fit = drop_unpredictive_second(case, fit, verdicts, settings)
-    if alternative and not is_accepted_pair(verdicts):
-        case, verdicts, fit, scores = alternative
-    verdicts = [_final_verdict(v, case, fit, settings) for v in verdicts]
-    verdicts, fit = reject_if_residual_left(base, fit, verdicts, settings)
-    verification = _verify(case, base, fit, _best_rival(verdicts[0]), settings)
-    if len(verdicts) == 1 and verification.is_worse:
-        verdicts[0] = reject_unconfirmed(verdicts[0], settings)
-    leader = next((s for s in verdicts[0].scores[:1] if s.gain > settings.threshold), None)
-    location = locate(case, base, leader, verdicts[0].cause) if verdicts[0].answer == "unknown" else None
-    if verification.reserved_excess > MAX_RESERVED_EXCESS:
-        verdicts[0] = reject_if_reserved_unexplained(verdicts[0], settings)
-    return Diagnosis(tuple(verdicts), base, fit, frames, verification, latent_force_of(case, base), scores, location)
+    search, base = _fit_base(Search.of(case, settings, progress, store))
+    frames = tuple(attribute(*cell_energies(search.case.observations, base.residuals)))
+    numerics = _assess_numerics(search, base)
+    if numerics is not None:
+        verification, latent = verify(search, base, base, None), latent_force_of(search.case, base)
+        return Diagnosis((numerics,), base, base, frames, verification, latent)
+    findings = grade_names(settle_pair(_seek_effects(search, base)))
+    search, base, fit, verdicts = findings.search, findings.base, findings.fit, findings.verdicts
+    verification = verify(search, base, fit, _best_rival(verdicts[0]))
+    verdicts = confirm(verdicts, verification, search.settings)
+    location, latent = _locate_unknown(findings, verdicts[0]), latent_force_of(search.case, base)
+    return Diagnosis(verdicts, base, fit, frames, verification, latent, findings.scores, location)
 
 
-def _refit_with_updated_errors(case, fit, settings, store):
-    """(case, fit) with errors of the observations as the model of ``fit`` gives them, and fitted again."""
-    updated = case.with_updated_errors(fit)
-    if updated is case:
-        return case, fit
-    key = f"renewed:{'+'.join(c.key for c in fit.candidates)}"
-    try:
-        return updated, cached_fit(store, key, lambda: continue_fit(updated, fit, settings), fit.candidates)
-    except SimulationError:
-        return case, fit
+def _fit_base(search: Search) -> tuple[Search, Fit]:
+    """(search, fit) without any effect, with the errors of the observations as that fit gives them."""
+    iterations = search.settings.base_iterations
+    base = search.stored_fit("base", lambda: fit_jointly(search.case, iterations=iterations))
+    assert base is not None
+    return search.with_updated_errors(base)
 
 
-def _final_verdict(verdict, case, fit, settings):
-    """A name by the last fit: graded by its residual, "a or b" if its size has no upper limit there. Others stay."""
-    if verdict.answer != "named":
-        return verdict
-    final, grade = replace(verdict.scores[0], fit=fit), "A" if worst_excess(case, fit, settings) <= 1.0 else "B"
-    return with_open_size(replace(verdict, grade=grade, scores=(final, *verdict.scores[1:])), settings)
+def _assess_numerics(search: Search, base: Fit) -> Verdict | None:
+    """Verdict "numerics" if the numerical error is too large a share of the mismatch, else None."""
+    rule, error = _numerics_rule(search, base)
+    if rule is None or rule.answer != "numerics":
+        return None
+    return Verdict("numerics", reason=rule.reason_for(error), probability=1.0, trail=(rule.name,))
 
 
-def _shape_error_evidence(case, first, second):
-    """Evidence that an error in the shape of the first effect may leave to another name. [nats]"""
-    if first.candidate.exact or second.gain >= SHAPE_ERROR_SHARE * first.gain:
-        return 0.0
-    return SHAPE_ERROR_SHARE * first.gain * signature_overlap(case, second.fit, first.candidate, second.candidate)
-
-
-def _numerics_reason(case, base, settings):
-    """A sentence if the numerical error reaches a third of the mismatch, else ""."""
-    errors = case.numerical_error(base)
+def _numerics_rule(search: Search, base: Fit) -> tuple[Rule | None, NumericalError | None]:
+    observations, errors = search.case.observations, search.case.numerical_error(base)
     if errors is None:
-        return ""
-    own_error = mismatch = 0.0
-    for o, e, r in zip(case.observations, errors, base.residuals):
-        own_error += o.effective * float(np.sum(o.whiten(e) ** 2))
+        return None, None
+    own = mismatch = 0.0
+    for o, e, r in zip(observations, errors, base.residuals):
+        own += o.effective * float(np.sum(o.whiten(e) ** 2))
         mismatch += o.effective * float(np.sum(o.whiten(r) ** 2))
-    n = sum(o.n_effective for o in case.observations)
-    material = own_error / n > 1.0 / 9.0
-    if material and own_error > settings.numerics_share**2 * mismatch:
-        return f"own numerical error is {np.sqrt(own_error / mismatch):.0%} of the mismatch: refine mesh and step first"
-    return ""
+    n = sum(o.n_effective for o in observations)
+    error = NumericalError(own, mismatch, n, search.settings.numerics_share)
+    return first_applicable(NUMERICS_RULES, error), error
 
 
-def _best_rival(verdict):
-    named = verdict.names[:1]
-    rivals = [s for s in verdict.scores if s.family not in named]
-    return rivals[0] if rivals else None
+def _seek_effects(search: Search, base: Fit) -> Findings:
+    """Verdicts on effects that are sought one after the other, each on top of those before."""
+    findings, goes_on = Findings(search, base, base), True
+    for effect in range(search.settings.effects):
+        if goes_on:
+            findings, goes_on = _seek_effect(findings, effect)
+    return findings
 
 
-def _verify(case, base, fit, rival, settings):
-    if not case.reserved:
-        return Verification(0, float("nan"))
-    n, (before, before_percent) = len(case.reserved), reserved_fit(case, base)
-    if before is None:
-        return Verification(n, float("nan"))
-    reserved_excess = reserved_excess_ratio(case, before, settings)
-    if fit is base:
-        return Verification(n, before_percent, reserved_excess=reserved_excess)
-    decoy_predictions = predict_with_decoy(case.observations, base.predictions, case.reserved, before, fit.psi.size)
-    rival_percent = reserved_fit(case, rival.fit)[1] if rival else None
-    after, after_percent = reserved_fit(case, fit)
-    error = None if after is None else gain_error(case.reserved, before, after)
-    return Verification(
-        n,
-        before_percent,
-        after_percent,
-        rival_percent,
-        fit_percent(case.reserved, decoy_predictions),
-        error,
-        reserved_excess,
-    )
+def _seek_effect(findings: Findings, effect: int) -> tuple[Findings, bool]:
+    """The findings after one more effect was sought, and whether a further one may be."""
+    search, settings = findings.search.labelled(str(effect)), findings.search.settings
+    promising = None if findings.is_unknown else {s.family for s in findings.scores if s.gain > settings.threshold}
+    scores, fit = score_candidates(search, findings.fit, promising)
+    findings = replace(findings, search=search, scores=scores, fit=fit, base=findings.base if effect else fit)
+    verdict, score = assess(search, fit, scores)
+    if effect:
+        findings, stands = add_second(findings, verdict, score)
+        return _prepare_next(findings, verdict) if stands else (findings, False)
+    findings = replace(findings, verdicts=(verdict,))
+    if verdict.answer == "none" or score is None or score.gain <= settings.threshold:
+        return findings, False
+    return _prepare_next(replace(findings, fit=search.with_jacobian(score.fit)), verdict)
+
+
+def _prepare_next(findings: Findings, verdict: Verdict) -> tuple[Findings, bool]:
+    """The findings as a further effect needs them after the last ``verdict``, and whether one may be sought."""
+    if not findings.fit.jacobian:
+        return findings, False
+    if verdict.is_single_effect and not findings.is_unknown:  # candidates were compared with the errors of the base
+        search, fit = findings.search.with_updated_errors(findings.fit)
+        findings = replace(findings, search=search, fit=fit)
+    if verdict.answer == "a_or_b" and not verdict.is_single_effect:  # both may be present
+        return replace(findings, choice=findings), True
+    search = findings.search
+    return findings, search.case.expensive or excess_ratio(search, findings.fit) > 1.0
+
+
+def grade_names(findings: Findings) -> Findings:
+    """The findings with each name graded by the last fit, by ``decision.grade_name``.
+
+    Parameters
+    ----------
+    findings : Findings
+
+    Returns
+    -------
+    Findings
+        With one verdict, "unknown", and the base fit if the last fit rejects a name.
+    """
+    search, fit = findings.search, findings.fit
+    verdicts, failing = [], None
+    for verdict in findings.verdicts:
+        if verdict.answer == "named":
+            verdict, rule, reason = grade_name(verdict, fit, worst_excess(search, fit), search.settings)
+            failing = failing or ((rule, reason) if rule.answer == "unknown" else None)
+        verdicts.append(verdict)
+    if failing is None:
+        return replace(findings, verdicts=tuple(verdicts))
+    rule, reason = failing
+    unknown = verdicts[0].as_unknown(reason, search.settings)
+    unknown = unknown if rule.name in unknown.trail else unknown.after(rule)
+    return replace(findings, verdicts=(unknown,), fit=findings.base)
+
+
+def _best_rival(verdict: Verdict) -> Score | None:
+    """Best score of another family than the named one."""
+    return next((s for s in verdict.scores if s.family not in verdict.names[:1]), None)
+
+
+def _locate_unknown(findings: Findings, verdict: Verdict) -> Location | None:
+    """Location of the residual if the answer is "unknown". None if only reserved recordings contradict "none"."""
+    if verdict.answer != "unknown" or verdict.trail[-1] == "reserved_not_explained":
+        return None
+    search = findings.search
+    leader = next((s for s in verdict.scores[:1] if s.gain > search.settings.threshold), None)
+    return locate(search.case, findings.base, leader, verdict.cause)

@@ -2,6 +2,11 @@
 candidates.
 """
 
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from turnout.mismatch.engine.cross_validation import held_out_score, single_type_estimate, weighted_mean_square
@@ -10,59 +15,86 @@ from turnout.mismatch.engine.latent_force import latent_law
 from turnout.mismatch.engine.reserved_data import is_significantly_worse, reserved_fit
 from turnout.mismatch.engine.score import Score
 
+if TYPE_CHECKING:
+    from turnout.mismatch.engine.candidate import Candidate
+    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.search import Search
+    from turnout.mismatch.engine.verdict import Verdict
+
 MAX_ORDINARY_SPREADS = 3.0  # spreads of similar components: one in 370 intact ones is beyond
 MIN_SIBLINGS = 6  # similar components; fewer give no spread
 
 
-def explained_share(case, fit, refit, settings):
+def explained_share(search: Search, fit: Fit, refit: Fit) -> float:
     """Share of the excess over the control level that ``refit`` removes, 1 if there is none.
 
     For a first effect without excess in any data type, the excess of the worst channel counts. Beside a name that
     excess may be the residual of the name, which a second effect need not explain.
+
+    Parameters
+    ----------
+    search : Search
+    fit, refit : Fit
+        Without and with the candidate.
+
+    Returns
+    -------
+    float
     """
-    control = _control_levels(case, fit, settings)
+    control = _control_levels(search, fit)
     before, after = _total_excess(fit.level, control), _total_excess(refit.level, control)
     if before == 0.0 and not fit.candidates:
-        before, after = (max(0.0, worst_channel_excess(case, f) - 1.0) for f in (fit, refit))
+        before, after = (max(0.0, worst_channel_excess(search.case, f) - 1.0) for f in (fit, refit))
     return 1.0 - after / before if before > 0.0 else 1.0
 
 
-def _control_levels(case, fit, settings):
+def _control_levels(search: Search, fit: Fit) -> dict[str, float]:
     """Control level: data type -> weighted mean square of controls."""
-    return {data_type: case.control_level.get(data_type, settings.control_level) for data_type in fit.level}
+    return {data_type: search.control_level(data_type) for data_type in fit.level}
 
 
-def _total_excess(level, control):
+def _total_excess(level: Mapping[str, float], control: Mapping[str, float]) -> float:
     return sum(max(0.0, level[data_type] - control[data_type]) for data_type in level)
 
 
-def score_of(case, fit, refit, candidate, settings):
+def score_of(search: Search, fit: Fit, refit: Fit, candidate: Candidate) -> Score:
     """Score of a candidate: gain less the logarithm of the number of sites.
 
     The gain is that of held-out conditions. In an expensive case with many nuisances it is the evidence, in which the
     first condition is predicted from the priors.
+
+    Parameters
+    ----------
+    search : Search
+    fit, refit : Fit
+        Without and with the candidate.
+    candidate : Candidate
+
+    Returns
+    -------
+    Score
     """
-    gain, by_condition = refit.evidence - fit.evidence, {}
+    case, gain, by_condition = search.case, refit.evidence - fit.evidence, {}
     if not case.expensive:
         with_candidate, without_candidate = held_out_score(case, refit), held_out_score(case, fit)
         by_condition = {c: with_candidate[c] - without_candidate[c] for c in without_candidate}
         gain = sum(by_condition.values()) if by_condition else gain
-    explained = explained_share(case, fit, refit, settings)
+    explained = explained_share(search, fit, refit)
     worst_gain = min(by_condition.values(), default=0.0)
     gain += candidate.external_evidence
-    is_ordinary = _is_ordinary(case, refit, candidate) or not _is_supported(case, fit, refit, candidate, settings)
+    is_ordinary = is_within_spread(case, refit, candidate) or not _is_supported(search, fit, refit, candidate)
     return Score(candidate, gain - np.log(candidate.n_scanned), worst_gain, explained, refit, by_condition, is_ordinary)
 
 
-def _is_supported(case, fit, refit, candidate, settings):
+def _is_supported(search: Search, fit: Fit, refit: Fit, candidate: Candidate) -> bool:
     """Whether the required observations, if any, fit better by a margin, and those that must not oppose do not."""
     gained = 0.5 * sum(
         o.effective * float(np.sum(np.square(a)) - np.sum(np.square(b))) / fit.scale[o.data_type]
-        for o, a, b in zip(case.observations, fit.white, refit.white)
+        for o, a, b in zip(search.case.observations, fit.white, refit.white)
         if o.data_type == candidate.required_data_type
     )
-    supported = not candidate.required_data_type or gained > settings.margin
-    return supported and not _is_opposed(case, fit, refit, candidate)
+    supported = not candidate.required_data_type or gained > search.settings.margin
+    return supported and not _is_opposed(search.case, fit, refit, candidate)
 
 
 def _is_opposed(case, fit, refit, candidate):
@@ -82,7 +114,7 @@ def _is_opposed(case, fit, refit, candidate):
     )
 
 
-def _is_ordinary(case, refit, candidate):
+def is_within_spread(case, refit, candidate):
     r"""Whether a component differs by no more than ``MAX_ORDINARY_SPREADS`` from similar ones, the effect included.
 
     .. math:: |\ln \psi| < 3 s, \quad s^2 = \overline{(v_j - ar v)^2} + \overline{\sigma_j^2}
@@ -102,24 +134,15 @@ def _is_ordinary(case, refit, candidate):
     return abs(float(np.log(first))) < MAX_ORDINARY_SPREADS * spread
 
 
-def excess_ratio(case, fit, settings):
+def excess_ratio(search: Search, fit: Fit) -> float:
     """Weighted mean square over the control level, the largest of the data types."""
-    control = _control_levels(case, fit, settings)
+    control = _control_levels(search, fit)
     return max(fit.level[data_type] / control[data_type] for data_type in fit.level)
 
 
-def reserved_excess_ratio(case, predictions, settings):
-    """The same for the reserved recordings with these ``predictions``; 0 if there are none."""
-    ratios = [0.0]
-    for data_type in {o.data_type for o in case.reserved}:
-        pairs = [(o, p) for o, p in zip(case.reserved, predictions) if o.data_type == data_type]
-        ratios.append(weighted_mean_square(*zip(*pairs)) / case.control_level.get(data_type, settings.control_level))
-    return max(ratios)
-
-
-def worst_excess(case, fit, settings):
+def worst_excess(search: Search, fit: Fit) -> float:
     """Largest excess ratio of ``fit``: of a data type, or of one channel of one recording."""
-    return max(excess_ratio(case, fit, settings), worst_channel_excess(case, fit))
+    return max(excess_ratio(search, fit), worst_channel_excess(search.case, fit))
 
 
 def worst_channel_excess(case, fit):
@@ -137,30 +160,38 @@ def worst_channel_excess(case, fit):
     return max(ratios)
 
 
-def assess(case, fit, scores, settings):
-    """(Verdict on these candidates on top of ``fit``, the Score that it names or would name, or None)."""
-    excess = worst_excess(case, fit, settings)
+def assess(search: Search, fit: Fit, scores: Sequence[Score]) -> tuple[Verdict, Score | None]:
+    """Verdict on candidates on top of ``fit``.
+
+    Parameters
+    ----------
+    search : Search
+    fit : Fit
+        Without the candidates.
+    scores : sequence of Score
+        The candidates, refitted on top of it.
+
+    Returns
+    -------
+    verdict : Verdict
+    score : Score or None
+        The one that the verdict names or would name. None if none is reportable.
+    """
+    case, settings = search.case, search.settings
+    excess = worst_excess(search, fit)
+    facts = {"disturbed": bool(case.disturbed_recordings), "mismatched_trains": case.mismatched_trains}
     scores = tuple(s for s in scores if s.is_reportable)
     if not scores:
-        return judge(
-            [], excess, settings, disturbed=bool(case.disturbed_recordings), mismatched_trains=case.mismatched_trains
-        ), None
+        return judge([], excess, settings, **facts), None
     leader = likeliest(scores, excess, settings)
     consistent, structure = True, 0.0
     if leader.gain > settings.threshold:
-        consistent = predicts_reserved(case, fit, leader, settings)
+        consistent = predicts_reserved(search, fit, leader)
         structure = residual_structure(case, leader.fit)
-    residual_excess = excess_ratio(case, leader.fit, settings)
     verdict = judge(
-        scores,
-        excess,
-        settings,
-        consistent,
-        structure,
-        residual_excess,
-        bool(case.disturbed_recordings),
-        case.mismatched_trains,
-    )
+        scores, excess, settings, consistent=consistent, structure=structure,
+        residual_excess=excess_ratio(search, leader.fit), **facts,
+    )  # fmt: skip
     return verdict, verdict.scores[0]
 
 
@@ -170,12 +201,26 @@ def residual_structure(case, fit):
     return max(latent.r2.values(), default=0.0) if latent else 0.0
 
 
-def predicts_reserved(case, base, score, settings):
+def predicts_reserved(search: Search, base: Fit, score: Score) -> bool:
     """Whether reserved conditions are predicted no worse than without the effect.
 
     Worse means: twice the mean square, or a lower fit that costs more evidence than one condition may lose
     (``decision.is_contradicted``), or no prediction at all.
+
+    Parameters
+    ----------
+    search : Search
+    base : Fit
+        Without the effect.
+    score : Score
+        The effect with its fit.
+
+    Returns
+    -------
+    bool
+        True if there are no reserved recordings.
     """
+    case, settings = search.case, search.settings
     if not case.reserved:
         return True
     before, after = (reserved_fit(case, f)[0] for f in (base, score.fit))

@@ -34,12 +34,13 @@ class PrescreenFit:
     before: float
 
 
-def prescreen(case, fit, settings, families=None):
+def prescreen(search, fit, families=None):
     """Fits at the best site of every family, or of these ``families``, that the cheap observations show on top of
     ``fit``.
 
     [] without cheap observations.
     """
+    case, settings = search.case, search.settings
     cheap_case = case.cheap_case()
     if cheap_case is None or (families is not None and not families):
         return []
@@ -66,14 +67,14 @@ def prescreen(case, fit, settings, families=None):
             if top is None or gain > top.gain:
                 levels = (max(f.level.values()) for f in (refit, base))
                 top = PrescreenFit(
-                    gain, candidate, refit.psi[n_psi:], _informed_values(cheap_case, refit, candidate), *levels
+                    gain, candidate, refit.psi[n_psi:], informed_values(cheap_case, refit, candidate), *levels
                 )
         if top is not None:
             prescreened.append(top)
     return sorted(prescreened, key=lambda f: -f.gain)
 
 
-def _informed_values(case, fit, candidate):
+def informed_values(case, fit, candidate):
     """Values of the nuisances that the cheap observations determine, and of the masking parameter.
 
     They do not determine the masking parameter beside the candidate. Its value in the base fit must not come on top.

@@ -1,9 +1,20 @@
 """Verification on reserved recordings: fit of base, named effect, best rival and a decoy of as many parameters."""
 
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from turnout.errors import SimulationError
+from turnout.mismatch.engine.cross_validation import weighted_mean_square
 from turnout.mismatch.engine.map_fit import JointProblem
+
+if TYPE_CHECKING:
+    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.score import Score
+    from turnout.mismatch.engine.search import Search
 
 MAX_STEPS = 8  # Gauss-Newton steps of a reserved recording's own nuisances
 MIN_COST_DECREASE = 1.0  # decrease of minus twice the log posterior; a step that gains less is the last
@@ -156,3 +167,80 @@ def predict_with_decoy(observations, predictions, reserved, reserved_predictions
     target = np.concatenate([(o.data - p) * weight for o, p, weight in fitted])
     taps = np.linalg.lstsq(rows, target, rcond=None)[0]
     return [p + columns(p) @ taps for p in reserved_predictions]
+
+
+@dataclass(frozen=True)
+class Verification:
+    """Fit [%] of ``n`` reserved recordings: ``before``, ``after`` with the named term, with ``rival`` and with
+    ``decoy``.
+
+    ``error`` is the standard error of ``after`` less ``before``. ``reserved_excess`` is the weighted mean square
+    without a term over the control level.
+    """
+
+    n: int
+    before: float
+    after: float | None = None
+    rival: float | None = None
+    decoy: float | None = None
+    error: float | None = None
+    reserved_excess: float = 0.0
+
+    @property
+    def is_worse(self) -> bool:
+        """Whether the named model predicts the reserved recordings worse, by more than the standard error."""
+        return self.error is not None and self.after is not None and self.after < self.before - self.error
+
+
+def verify(search: Search, base: Fit, fit: Fit, rival: Score | None) -> Verification:
+    """Verification of ``fit`` on the reserved recordings, beside the base fit, a rival and a decoy.
+
+    Parameters
+    ----------
+    search : Search
+    base, fit : Fit
+        Without any effect, and with those that have a name. The same fit if there are none.
+    rival : Score or None
+        Best rival of the first name.
+
+    Returns
+    -------
+    Verification
+        With ``before`` nan if there are no reserved recordings, or the base model cannot be simulated there.
+    """
+    case = search.case
+    if not case.reserved:
+        return Verification(0, float("nan"))
+    n, (before, before_percent) = len(case.reserved), reserved_fit(case, base)
+    if before is None:
+        return Verification(n, float("nan"))
+    excess = reserved_excess_ratio(search, before)
+    if fit is base:
+        return Verification(n, before_percent, reserved_excess=excess)
+    decoy = predict_with_decoy(case.observations, base.predictions, case.reserved, before, fit.psi.size)
+    rival_percent = reserved_fit(case, rival.fit)[1] if rival else None
+    after, after_percent = reserved_fit(case, fit)
+    error = None if after is None else gain_error(case.reserved, before, after)
+    decoy_percent = fit_percent(case.reserved, decoy)
+    return Verification(n, before_percent, after_percent, rival_percent, decoy_percent, error, excess)
+
+
+def reserved_excess_ratio(search: Search, predictions: list[np.ndarray]) -> float:
+    """Weighted mean square of the reserved recordings over the control level, the largest of the data types.
+
+    Parameters
+    ----------
+    search : Search
+    predictions : list of array
+        Of each reserved recording.
+
+    Returns
+    -------
+    float
+        0 if there are no reserved recordings.
+    """
+    reserved, ratios = search.case.reserved, [0.0]
+    for data_type in {o.data_type for o in reserved}:
+        pairs = [(o, p) for o, p in zip(reserved, predictions) if o.data_type == data_type]
+        ratios.append(weighted_mean_square(*zip(*pairs)) / search.control_level(data_type))
+    return max(ratios)

@@ -95,3 +95,15 @@ class Score:
             return False
         (own_sizes, error), (rival_sizes, errors) = self.estimates, rival.estimates
         return abs(own_sizes[0] - rival_sizes[k]) <= 2.0 * np.hypot(error[0], errors[k])
+
+    def is_independent_of(self, rival):
+        """Whether two effects confirm one another.
+
+        Two of one family, or of one component, do not: together they can correct nearly any shape. Those of two trains
+        do: no recording shows both.
+        """
+        trains = {s.candidate.where.get("train") for s in (self, rival)}
+        is_related = self.family == rival.family or (
+            self.candidate.component and self.candidate.part == rival.candidate.part
+        )
+        return not is_related or (len(trains) == 2 and None not in trains)

@@ -1,15 +1,21 @@
-"""Two effects at once: a name that was rejected alone is tested again with a second effect in the model.
+"""Two effects at once: a second effect beside the first, and which of the two remain.
 
-The residual of the first effect, or an error in it, may be the second. Alone each explains too little to be named.
+The residual of the first effect, or an error in it, may be the second. A name that is rejected alone is therefore
+tested again with a second effect in the model.
 """
 
-from dataclasses import replace
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.engine.cross_validation import held_out_score
-from turnout.mismatch.engine.decision import MAX_LOSS_SHARE, calibrate, judge, swap_with_unknown
+from turnout.mismatch.engine.cross_validation import held_out_score, signature_overlap
+from turnout.mismatch.engine.decision import MAX_LOSS_SHARE, PAIR_RULES, SECOND_RULES, first_applicable, judge
 from turnout.mismatch.engine.evidence import (
     assess,
     excess_ratio,
@@ -18,228 +24,330 @@ from turnout.mismatch.engine.evidence import (
     residual_structure,
     worst_excess,
 )
-from turnout.mismatch.engine.map_fit import fit_jointly
-from turnout.mismatch.engine.refit import converge
 from turnout.mismatch.engine.reserved_data import gain_error, reserved_fit
+from turnout.mismatch.engine.search import Findings, Search
+
+if TYPE_CHECKING:
+    from turnout.mismatch.engine.candidate import Candidate
+    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.score import Score
+    from turnout.mismatch.engine.verdict import Verdict
 
 MAX_RIVALS = 2  # rivals that are refitted beside the second effect
 MIN_KEPT_GAIN_SHARE = 0.5  # share of a rival's gain; one that keeps more on top of the leader explains something else
 MAX_FIT_LOSS = 3.0  # points of fit on reserved recordings; a larger loss counts
+# Share of the first effect's evidence that an error in its shape may leave to a second one: sizes err by a fifth.
+SHAPE_ERROR_SHARE = 0.05
 
 
-def is_unknown(verdicts):
-    """Whether the first verdict is "unknown"."""
-    return bool(verdicts) and verdicts[0].answer == "unknown"
+@dataclass(frozen=True)
+class SecondEvidence:
+    """What decides whether a second effect stands beside the first (``decision.SECOND_RULES``).
 
-
-def with_residual_reason(first, second):
-    """The ``first`` verdict, a name, with the reason of a ``second`` one that got no name.
-
-    The name stays, but the reader must know that a residual remains.
+    ``findings`` of the first effect, with the scores of the second. ``second`` is the verdict on these, and
+    ``score`` the one that it names, or None.
     """
-    if first.answer != "named" or second.answer != "unknown":
-        return first
-    return replace(first, reason=f"something else shows beside it: {second.reason}")
 
+    findings: Findings
+    second: Verdict
+    score: Score | None
 
-def is_single_effect(verdict):
-    """Whether a verdict states one effect: by a name, or by two forms of it that cannot be distinguished."""
-    return verdict.answer == "named" or (verdict.answer == "a_or_b" and _independent_rival(verdict) is None)
+    @property
+    def search(self) -> Search:
+        """The search that goes on."""
+        return self.findings.search
 
+    @property
+    def first(self) -> Verdict:
+        """Verdict on the first effect."""
+        return self.findings.verdicts[0]
 
-def is_accepted_pair(verdicts):
-    """Whether there are two verdicts, each of which states one effect."""
-    return len(verdicts) == 2 and all(is_single_effect(v) for v in verdicts)
+    @property
+    def named(self) -> Score:
+        """Score of the second effect, which has a name."""
+        assert self.score is not None
+        return self.score
 
+    @property
+    def gain(self) -> float:
+        """Gain of the second effect. [nats]"""
+        return self.named.gain
 
-def _independent_rival(verdict):
-    """Score of the second of two rivals that may both be present. None if one is a form of the other."""
-    rival = next((s for s in verdict.scores[1:] if s.family == verdict.names[1]), None)
-    return rival if rival is not None and _are_independent(verdict.scores[0], rival) else None
+    @property
+    def is_choice(self) -> bool:
+        """Whether the first effect is a choice of two that may both be present."""
+        return self.findings.choice is not None
 
+    @cached_property
+    def shape_error_evidence(self) -> float:
+        """Evidence that an error in the shape of the first effect may leave to another name. [nats]"""
+        first, second = self.first.scores[0], self.named
+        if first.candidate.exact or second.gain >= SHAPE_ERROR_SHARE * first.gain:
+            return 0.0
+        overlap = signature_overlap(self.search.case, second.fit, first.candidate, second.candidate)
+        return SHAPE_ERROR_SHARE * first.gain * overlap
 
-def split_rivals(case, base, verdict, second, settings):
-    """The verdict on the first of two rivals if the ``second`` effect, found on top of it, is the other one.
+    @cached_property
+    def split_first(self) -> Verdict:
+        """The verdict on the first of two rivals if the second effect, found on top of it, is the other one.
 
-    Their gains alone are similar by chance, and they explain different things. Other scores that keep their gain on top
-    of the first are left out as well. ``verdict`` itself if the second effect is another one.
-    """
-    rival = _independent_rival(verdict)
-    if rival is None or second.names[:1] != (rival.family,):
-        return verdict
-    on_top = {s.candidate.key: s.gain for s in second.scores}
-    rivals = [
-        s for s in verdict.scores if s is not rival and on_top.get(s.candidate.key, 0.0) < MIN_KEPT_GAIN_SHARE * s.gain
-    ]
-    retested, _ = assess(case, base, tuple(rivals), settings)
-    return retested if retested.answer == "named" else verdict
-
-
-def retest_with_second(case, base, fit, verdicts, settings):
-    """(verdicts, fit) after a second effect was sought on top of a rejected first one.
-
-    Both stand if the second is named, and the first or a close rival passes with the second in the model.
-    """
-    second_only = _fit_second_only(case, fit, settings) if len(verdicts) > 1 else None
-    if second_only is not None and _are_independent(verdicts[0].scores[0], verdicts[1].scores[0]):
-        pairs = list(_scores_beside_second(case, base, fit, second_only, verdicts[0].scores, settings))
-        pairs.sort(key=lambda s: (not s.is_reportable, -s.gain))
-        pair_fit = pairs[0].fit
-        consistent = predicts_reserved(case, base, pairs[0], settings)
-        excess, residual_excess = worst_excess(case, base, settings), excess_ratio(case, pair_fit, settings)
-        verdict = judge(
-            pairs,
-            excess,
-            settings,
-            consistent,
-            residual_structure(case, pair_fit),
-            residual_excess,
-            bool(case.disturbed_recordings),
+        Their gains alone are similar by chance, and they explain different things. Other scores that keep their gain on
+        top of the first are left out as well. The verdict as it is if the second effect is another one.
+        """
+        rival = self.first.independent_rival
+        if not self.is_choice or rival is None or self.second.names[:1] != (rival.family,):
+            return self.first
+        on_top = {s.candidate.key: s.gain for s in self.second.scores}
+        rivals = [
+            s
+            for s in self.first.scores
+            if s is not rival and on_top.get(s.candidate.key, 0.0) < MIN_KEPT_GAIN_SHARE * s.gain
+        ]
+        retested, _ = assess(self.search, self.findings.base, tuple(rivals))
+        return (
+            replace(retested, trail=(*self.first.trail, *retested.trail)) if retested.answer == "named" else self.first
         )
-        if verdict.answer in ("named", "a_or_b"):
-            return [verdict, *verdicts[1:]], verdict.scores[0].fit
-    return verdicts[:1], base
+
+    @cached_property
+    def continued(self) -> Fit:
+        """Fit of both effects, with derivatives unless the simulation fails close to it."""
+        return self.search.with_jacobian(self.named.fit)
 
 
-def drop_redundant_first(case, base, fit, verdicts, settings):
-    """(verdicts, fit) without a first name that deserves no name beside the second: it had absorbed the second effect.
+def add_second(findings: Findings, second: Verdict, score: Score | None) -> tuple[Findings, bool]:
+    """The findings after a second effect was sought, and whether it stands beside the first.
 
-    Both stay if each deserves one.
+    Parameters
+    ----------
+    findings : Findings
+        Those of the first effect, with the scores of the second.
+    second : Verdict
+        Verdict on these scores.
+    score : Score or None
+        The one that the verdict names or would name.
+
+    Returns
+    -------
+    findings : Findings
+        The first verdict has the reason of a second one without a name: the reader must know that a residual remains.
+    stands : bool
     """
-    if not is_accepted_pair(verdicts):
-        return verdicts, fit
-    second_only = _fit_second_only(case, fit, settings)
-    second_only = converge(case, second_only, settings) if second_only is not None else None
-    first, second = (v.scores[0] for v in verdicts)
-    if second_only is None or _evidence_gain(fit, second_only, first.candidate) > settings.threshold:
-        return verdicts, fit
-    explained = explained_share(case, base, second_only, settings)
-    single = replace(
-        second,
-        fit=second_only,
-        gain=_evidence_gain(second_only, base, second.candidate),
-        explained=explained,
-        unmasked_gain=0.0,
-    )
-    single_verdict = replace(verdicts[1], scores=(single, *verdicts[1].scores[1:]))
-    if single.explains_too_little(worst_excess(case, base, settings), settings) and not single.exemption_reason(
-        settings
-    ):
-        return [
-            _as_unknown(single_verdict, f"the best candidate explains {explained:.0%} of the excess", settings)
-        ], base
-    return [single_verdict], second_only
+    evidence = SecondEvidence(findings, second, score)
+    rule = first_applicable(SECOND_RULES, evidence)
+    first, *further = findings.verdicts
+    if rule.answer == "first":
+        kept = replace(first, reason=rule.reason_for(evidence)) if rule.reason else first
+        return findings.after(rule, verdicts=(kept, *further)), False
+    verdicts = (evidence.split_first, *further)
+    if rule.answer == "split first":
+        return findings.after(rule, verdicts=verdicts), False
+    return findings.after(rule, verdicts=(*verdicts, second), fit=evidence.continued), True
 
 
-def drop_unpredictive_second(case, fit, verdicts, settings):
-    """(verdicts, fit) without a second name with which reserved recordings are predicted worse than by the first alone.
+@dataclass(frozen=True)
+class PairEvidence:
+    """What decides which of two effects remain (``decision.PAIR_RULES``), computed when a rule asks for it."""
 
-    Worse means by more than ``MAX_FIT_LOSS`` points and the standard error of the difference.
+    findings: Findings
+
+    @property
+    def search(self) -> Search:
+        """The search that found the pair."""
+        return self.findings.search
+
+    @property
+    def first(self) -> Verdict:
+        """Verdict on the first effect."""
+        return self.findings.verdicts[0]
+
+    @property
+    def second(self) -> Verdict:
+        """Verdict on the second effect."""
+        return self.findings.verdicts[1]
+
+    @property
+    def is_choice(self) -> bool:
+        """Whether the first effect was a choice of two that may both be present."""
+        return self.findings.choice is not None
+
+    @property
+    def first_is_unknown(self) -> bool:
+        """Whether the first effect got no name alone."""
+        return self.findings.is_unknown
+
+    @property
+    def is_pair(self) -> bool:
+        """Whether there are two verdicts, each of which states one effect."""
+        return self.findings.is_pair
+
+    @property
+    def both_stand(self) -> bool:
+        """Whether there are two effects, of which neither is redundant."""
+        return self.is_pair and not self.first_is_redundant and not self.second_predicts_worse
+
+    @cached_property
+    def second_alone(self) -> Fit | None:
+        """The fit with the second effect alone, None if it cannot be simulated.
+
+        The first effect is worth what the pair gains over it.
+        """
+        fit = self.findings.fit
+        second = fit.candidates[1]
+        try:
+            return self.search.fit((second,), fit.psi[fit.part(second)], fit.values)
+        except SimulationError:
+            return None
+
+    @cached_property
+    def converged_second(self) -> Fit | None:
+        """The fit with the second effect alone, converged."""
+        return None if self.second_alone is None else self.search.converge(self.second_alone)
+
+    @cached_property
+    def first_beside_second(self) -> Verdict | None:
+        """Verdict on the first effect and its close rivals, each with the second effect in the model.
+
+        None if there is no second effect, if it cannot be simulated alone, or if the two do not confirm one another.
+        """
+        verdicts, base = self.findings.verdicts, self.findings.base
+        if len(verdicts) < 2 or self.second_alone is None:
+            return None
+        if not self.first.scores[0].is_independent_of(self.second.scores[0]):
+            return None
+        pairs = sorted(self._scores_beside_second(self.second_alone), key=lambda s: (not s.is_reportable, -s.gain))
+        pair_fit, case = pairs[0].fit, self.search.case
+        return judge(
+            pairs,
+            worst_excess(self.search, base),
+            self.search.settings,
+            consistent=predicts_reserved(self.search, base, pairs[0]),
+            structure=residual_structure(case, pair_fit),
+            residual_excess=excess_ratio(self.search, pair_fit),
+            disturbed=bool(case.disturbed_recordings),
+        )
+
+    @property
+    def first_passes_beside_second(self) -> bool:
+        """Whether the first effect, or a close rival, passes with the second in the model."""
+        verdict = self.first_beside_second
+        return verdict is not None and verdict.answer in ("named", "a_or_b")
+
+    @cached_property
+    def first_is_redundant(self) -> bool:
+        """Whether the first of a pair deserves no name beside the second: it had absorbed the second effect."""
+        if not self.is_pair or self.converged_second is None:
+            return False
+        gain = _evidence_gain(self.findings.fit, self.converged_second, self.first.scores[0].candidate)
+        return gain <= self.search.settings.threshold
+
+    @cached_property
+    def second_score(self) -> Score:
+        """Score of the second effect without the first."""
+        second, fit, base = self.second.scores[0], self.converged_second, self.findings.base
+        assert fit is not None
+        gain = _evidence_gain(fit, base, second.candidate)
+        explained = explained_share(self.search, base, fit)
+        return replace(second, fit=fit, gain=gain, explained=explained, unmasked_gain=0.0)
+
+    @property
+    def second_explains_too_little(self) -> bool:
+        """Whether the second effect without the first explains too little of the excess."""
+        excess, settings = worst_excess(self.search, self.findings.base), self.search.settings
+        return self.second_score.explains_too_little(excess, settings) and not self.second_score.exemption_reason(
+            settings
+        )
+
+    @cached_property
+    def converged_first(self) -> Fit:
+        """The fit with the first effect alone, converged."""
+        return self.search.converge(self.first.scores[0].fit)
+
+    @cached_property
+    def second_predicts_worse(self) -> bool:
+        """Whether the pair predicts the reserved recordings worse than the first effect alone.
+
+        Worse means by more than ``MAX_FIT_LOSS`` points and the standard error of the difference.
+        """
+        if not self.is_pair or not self.search.case.reserved:
+            return False
+        return self._predicts_worse_than(self.first.scores[0].fit) and self._predicts_worse_than(self.converged_first)
+
+    def _predicts_worse_than(self, first_alone: Fit) -> bool:
+        case = self.search.case
+        (before, before_percent), (after, after_percent) = (
+            reserved_fit(case, fit) for fit in (first_alone, self.findings.fit)
+        )
+        if before is None or after is None:
+            return False
+        return before_percent - after_percent > max(MAX_FIT_LOSS, gain_error(case.reserved, before, after))
+
+    def _scores_beside_second(self, second_alone: Fit) -> Iterator[Score]:
+        """The first effect's leader and its close rivals, each with its gain beside the second effect."""
+        settings, fit, scores = self.search.settings, self.findings.fit, self.first.scores
+        leader, second = scores[0], fit.candidates[1]
+        yield self._score_beside_second(fit, second_alone, leader)
+        close = leader.gain - max(settings.margin, MAX_LOSS_SHARE * leader.gain)
+        for rival in [s for s in scores[1:] if s.gain > max(close, settings.threshold)][:MAX_RIVALS]:
+            psi = np.concatenate([rival.fit.psi, fit.psi[fit.part(second)]])
+            try:
+                pair_fit = self.search.fit((rival.candidate, second), psi, fit.values)
+            except SimulationError:
+                continue
+            yield self._score_beside_second(pair_fit, second_alone, rival)
+
+    def _score_beside_second(self, pair_fit: Fit, second_alone: Fit, score: Score) -> Score:
+        """Score of a first effect by the gain of the pair over the second alone. Its explained share is the pair's."""
+        case = self.search.case
+        with_first, without_first = held_out_score(case, pair_fit), held_out_score(case, second_alone)
+        by_condition = {c: with_first[c] - without_first[c] for c in without_first}
+        gain = _evidence_gain(pair_fit, second_alone, score.candidate)
+        explained = explained_share(self.search, self.findings.base, pair_fit)
+        worst = min(by_condition.values(), default=0.0)
+        return replace(score, gain=gain, fit=pair_fit, explained=explained, worst_gain=worst, by_condition=by_condition)
+
+
+def settle_pair(findings: Findings) -> Findings:
+    """The findings with those effects that remain of a pair, by the first of ``PAIR_RULES`` that applies.
+
+    A first effect that was rejected alone passes if it does so beside the second. A first name is dropped if it adds
+    too little to the second, and a second one if reserved recordings are predicted worse with it. A choice of two
+    rivals stays one unless both stand as a pair.
+
+    Parameters
+    ----------
+    findings : Findings
+        With a verdict for each effect that was sought.
+
+    Returns
+    -------
+    Findings
     """
-    if not is_accepted_pair(verdicts) or not case.reserved:
-        return verdicts, fit
-    first, second = verdicts
-    first_only = first.scores[0].fit
-    if not _predicts_worse(case, first_only, fit):
-        return verdicts, fit
-    first_only = converge(case, first_only, settings)
-    if not _predicts_worse(case, first_only, fit):
-        return verdicts, fit
-    reason = f"something else shows beside it: {second.names[0]}, which foretells recordings never used worse"
-    return [replace(first, reason=reason)], first_only
+    evidence = PairEvidence(findings)
+    rule = first_applicable(PAIR_RULES, evidence)
+    verdicts, base = findings.verdicts, findings.base
+    if rule.answer == "choice":
+        assert findings.choice is not None
+        return findings.choice.after(rule)
+    if rule.answer == "both anew":
+        first = evidence.first_beside_second
+        assert first is not None
+        first = replace(first, trail=(*evidence.first.trail, *first.trail))
+        return findings.after(rule, verdicts=(first, *verdicts[1:]), fit=first.scores[0].fit)
+    if rule.answer == "unknown first":
+        return findings.after(rule, verdicts=verdicts[:1], fit=base)
+    if rule.answer == "first":
+        first = replace(evidence.first, reason=rule.reason_for(evidence))
+        return findings.after(rule, verdicts=(first,), fit=evidence.converged_first)
+    if rule.answer in ("second", "unknown second"):
+        score, second = evidence.second_score, evidence.second
+        second = replace(second, scores=(score, *second.scores[1:]))
+        if rule.answer == "second":
+            return findings.after(rule, verdicts=(second,), fit=score.fit)
+        second = second.as_unknown(rule.reason_for(evidence), findings.search.settings)
+        return findings.after(rule, verdicts=(second,), fit=base)
+    return findings.after(rule)
 
 
-def _predicts_worse(case, first_only, pair_fit):
-    """Whether ``pair_fit`` predicts the reserved recordings worse than ``first_only``."""
-    (before, percent_before), (after, percent_after) = (reserved_fit(case, fit) for fit in (first_only, pair_fit))
-    is_predicted = before is not None and after is not None
-    return is_predicted and percent_before - percent_after > max(MAX_FIT_LOSS, gain_error(case.reserved, before, after))
-
-
-def _evidence_gain(fit, without, candidate):
+def _evidence_gain(fit: Fit, without: Fit, candidate: Candidate) -> float:
     """Evidence for a candidate by the fits with and without it. [nats]"""
     return fit.evidence - without.evidence + candidate.external_evidence - np.log(candidate.n_scanned)
-
-
-def _are_independent(first, second):
-    """Whether two effects confirm one another.
-
-    Two of one family, or of one component, do not: together they can correct nearly any shape. Those of two trains do:
-    no recording shows both.
-    """
-    trains = {s.candidate.where.get("train") for s in (first, second)}
-    is_related = first.family == second.family or (
-        first.candidate.component and first.candidate.part == second.candidate.part
-    )
-    return not is_related or (len(trains) == 2 and None not in trains)
-
-
-def _fit_second_only(case, fit, settings):
-    """The fit with the second effect alone, None if it cannot be simulated. The first is worth what the pair gains over
-    it.
-    """
-    second = fit.candidates[1]
-    try:
-        return fit_jointly(case, (second,), fit.psi[fit.part(second)], fit.values, iterations=settings.iterations)
-    except SimulationError:
-        return None
-
-
-def _scores_beside_second(case, base, fit, second_only, scores, settings):
-    """The first effect's leader and its close rivals, each with its gain beside the second effect."""
-    leader, second = scores[0], fit.candidates[1]
-    yield _score_beside_second(case, base, fit, second_only, leader, settings)
-    close = leader.gain - max(settings.margin, MAX_LOSS_SHARE * leader.gain)
-    for rival in [s for s in scores[1:] if s.gain > max(close, settings.threshold)][:MAX_RIVALS]:
-        psi = np.concatenate([rival.fit.psi, fit.psi[fit.part(second)]])
-        try:
-            pair_fit = fit_jointly(case, (rival.candidate, second), psi, fit.values, iterations=settings.iterations)
-        except SimulationError:
-            continue
-        yield _score_beside_second(case, base, pair_fit, second_only, rival, settings)
-
-
-def _score_beside_second(case, base, pair_fit, second_only, score, settings):
-    """Score of a first effect by the gain of ``pair_fit`` over ``second_only``. Its explained share is that of the
-    pair.
-    """
-    with_first, without_first = held_out_score(case, pair_fit), held_out_score(case, second_only)
-    by_condition = {c: with_first[c] - without_first[c] for c in without_first}
-    gain = _evidence_gain(pair_fit, second_only, score.candidate)
-    explained, worst = explained_share(case, base, pair_fit, settings), min(by_condition.values(), default=0.0)
-    return replace(score, gain=gain, fit=pair_fit, explained=explained, worst_gain=worst, by_condition=by_condition)
-
-
-def reject_unconfirmed(verdict, settings):
-    """A name of grade B that predicts reserved recordings worse than no effect: unknown. Others stay."""
-    if verdict.answer != "named" or verdict.grade != "B":
-        return verdict
-    reason = f"{verdict.names[0]} leaves more than sound turnouts do and foretells recordings never used worse"
-    return _as_unknown(verdict, reason, settings)
-
-
-def reject_if_residual_left(base, fit, verdicts, settings):
-    """(verdicts, fit), or "unknown" if a name must reach the control level (``Candidate.must_reach_control_level``) and
-    the last fit, of grade B, does not.
-    """
-    named = [v for v in verdicts if v.answer == "named" and v.grade == "B"]
-    failing = next((v.names[0] for v in named if v.scores[0].candidate.must_reach_control_level), None)
-    if failing is None:
-        return verdicts, fit
-    reason = f"{failing} would leave nothing, and more is left than in sound turnouts"
-    return [_as_unknown(verdicts[0], reason, settings)], base
-
-
-def reject_if_reserved_unexplained(verdict, settings):
-    """Answer "none" while reserved recordings are not predicted as on intact track: unknown. Others stay."""
-    if verdict.answer != "none":
-        return verdict
-    return _as_unknown(verdict, "recordings that were never used are not foretold as in sound turnouts", settings)
-
-
-def _as_unknown(verdict, reason, settings):
-    probabilities = dict(verdict.posterior)
-    swap_with_unknown(probabilities)
-    probability = calibrate(probabilities, ("unknown",), settings.certainty("unknown"), settings)
-    changes = {"answer": "unknown", "names": (), "grade": "", "probability": probability, "posterior": probabilities}
-    return replace(verdict, **changes, reason=reason)

@@ -1,0 +1,221 @@
+"""A diagnosis in progress: what each of its steps needs (``Search``), and what it has found so far (``Findings``)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, MutableMapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from turnout.config.settings.mismatch import MismatchSettings
+from turnout.errors import SimulationError
+from turnout.mismatch.engine.map_fit import FINE_STALL, MAX_CHEAP_STEPS, STALL, fit_jointly
+
+if TYPE_CHECKING:
+    from turnout.mismatch.engine.candidate import Candidate
+    from turnout.mismatch.engine.case import Case
+    from turnout.mismatch.engine.decision import Rule
+    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.score import Score
+    from turnout.mismatch.engine.verdict import Verdict
+
+MAX_ROUNDS = 3  # rounds of steps for a leader; one that still gains afterwards is far from any optimum
+
+
+def _report_nothing(n_done: int, total: int, key: str) -> None:
+    """Progress of which nobody is told."""
+
+
+@dataclass(frozen=True)
+class Search:
+    """What every step of a diagnosis needs.
+
+    Attributes
+    ----------
+    case : Case
+        Observations, nuisances, simulator and candidates.
+    settings : MismatchSettings
+    store : mutable mapping
+        Fits by key. A store on disk keeps those of an interrupted run.
+    report : callable
+        Called with (number done, total, key of the candidate) after every joint fit.
+    label : str
+        Effect that is sought, the first part of the keys of its fits.
+    """
+
+    case: Case
+    settings: MismatchSettings = field(default_factory=MismatchSettings)
+    store: MutableMapping[str, Any] = field(default_factory=dict)
+    report: Callable[[int, int, str], Any] = _report_nothing
+    label: str = ""
+
+    @classmethod
+    def of(
+        cls,
+        case: Case,
+        settings: MismatchSettings | None = None,
+        report: Callable[[int, int, str], Any] | None = None,
+        store: MutableMapping[str, Any] | None = None,
+    ) -> Search:
+        """A search with the default for each argument that is None. Fits of a cheap case have more steps."""
+        settings = settings or MismatchSettings()
+        if not case.expensive:
+            settings = replace(settings, base_iterations=MAX_CHEAP_STEPS, iterations=MAX_CHEAP_STEPS)
+        return cls(case, settings, {} if store is None else store, report or _report_nothing)
+
+    def labelled(self, label: str) -> Search:
+        """The same search, for the fits of one effect."""
+        return replace(self, label=label)
+
+    def control_level(self, data_type: str) -> float:
+        """Weighted mean square that controls reach in observations of a data type."""
+        return self.case.control_level.get(data_type, self.settings.control_level)
+
+    def fit(
+        self,
+        candidates: Iterable[Candidate],
+        psi: np.ndarray,
+        values: Mapping[str, float],
+        reused_jacobian: list[np.ndarray] | None = None,
+        stall: float = STALL,
+    ) -> Fit:
+        """Joint fit of candidates from these parameters and nuisances, with the steps of a refit.
+
+        Parameters
+        ----------
+        candidates : iterable of Candidate
+        psi : (n_term,) array of float
+        values : mapping
+            Nuisance parameter -> value. Others start at their default.
+        reused_jacobian : list of array or None
+            Nuisance columns that are updated instead of computed anew.
+        stall : float
+            Gain per sample that ends the fit of an expensive case.
+
+        Returns
+        -------
+        Fit
+
+        Raises
+        ------
+        SimulationError
+            If the model cannot be simulated at the start or beside it.
+        """
+        return fit_jointly(
+            self.case, candidates, psi, values, reused_jacobian, iterations=self.settings.iterations, stall=stall
+        )
+
+    def continue_fit(self, fit: Fit, stall: float = STALL) -> Fit:
+        """The fit continued from where it is, with new derivatives. SimulationError as ``fit`` raises it."""
+        return self.fit(fit.candidates, fit.psi, fit.values, stall=stall)
+
+    def converge(self, fit: Fit) -> Fit:
+        """The fit, continued until a round of steps gains less than a name needs. Each round has new derivatives."""
+        for _ in range(MAX_ROUNDS):
+            try:
+                before, fit = fit, self.continue_fit(fit, FINE_STALL)
+            except SimulationError:
+                break
+            if fit.evidence - before.evidence < self.settings.threshold:
+                break
+        return fit
+
+    def with_jacobian(self, fit: Fit) -> Fit:
+        """The fit, continued if it has no Jacobian; unchanged if the simulation fails close to it."""
+        try:
+            return fit if fit.jacobian else self.continue_fit(fit)
+        except SimulationError:
+            return fit
+
+    def stored_fit(
+        self, key: str, compute: Callable[[], Fit | None], candidates: Iterable[Candidate] = ()
+    ) -> Fit | None:
+        """A fit by its key, computed if the store lacks it.
+
+        Parameters
+        ----------
+        key : str
+        compute : callable
+            () -> Fit, or None if the simulation fails.
+        candidates : iterable of Candidate
+            Those of the fit. They carry functions and are not stored.
+
+        Returns
+        -------
+        Fit or None
+        """
+        if key not in self.store:
+            fit = compute()
+            self.store[key] = fit.with_candidates(()) if fit is not None else None
+        stored = self.store[key]
+        return None if stored is None else stored.with_candidates(candidates)
+
+    def key_of(self, purpose: str, score: Score, fit: Fit) -> str:
+        """Key of a further fit of the candidate of ``score`` on top of ``fit``."""
+        psi = tuple(np.round(score.fit.psi, 12))
+        return f"{self.label}:{purpose}:{score.candidate.key}:{len(fit.candidates)}:{psi}"
+
+    def prior_values(self) -> dict[str, float]:
+        """Prior means of the shared nuisances that the base fit may have changed to hide an effect."""
+        return {n.name: n.mean for n in self.case.nuisances if n.owner is None and n.can_mask}
+
+    def with_updated_errors(self, fit: Fit) -> tuple[Search, Fit]:
+        """(search, fit) with errors of the observations as the model of ``fit`` gives them, and fitted again.
+
+        Both as they are if the case does not change, or if the simulation fails.
+        """
+        updated = self.case.with_updated_errors(fit)
+        if updated is self.case:
+            return self, fit
+        search = replace(self, case=updated)
+        key = f"renewed:{'+'.join(c.key for c in fit.candidates)}"
+        try:
+            refit = search.stored_fit(key, lambda: search.continue_fit(fit), fit.candidates)
+        except SimulationError:
+            return self, fit
+        assert refit is not None
+        return search, refit
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What a diagnosis has found so far.
+
+    Attributes
+    ----------
+    search : Search
+    base : Fit
+        Fit without any candidate effect.
+    fit : Fit
+        Fit with all effects that have a verdict.
+    verdicts : tuple of Verdict
+        One for each effect.
+    scores : tuple of Score
+        Candidates of the last effect that was sought.
+    choice : Findings or None
+        The findings with two rivals that may both be present. They stand unless a second effect decides.
+    """
+
+    search: Search
+    base: Fit
+    fit: Fit
+    verdicts: tuple[Verdict, ...] = ()
+    scores: tuple[Score, ...] = ()
+    choice: Findings | None = None
+
+    @property
+    def is_unknown(self) -> bool:
+        """Whether the first verdict is "unknown"."""
+        return bool(self.verdicts) and self.verdicts[0].answer == "unknown"
+
+    @property
+    def is_pair(self) -> bool:
+        """Whether there are two verdicts, each of which states one effect."""
+        return len(self.verdicts) == 2 and all(v.is_single_effect for v in self.verdicts)
+
+    def after(self, rule: Rule, **changes: Any) -> Findings:
+        """The findings with these changes, and the rule in the trail of the first verdict."""
+        changed = replace(self, **changes)
+        first, *further = changed.verdicts
+        return replace(changed, verdicts=(first.after(rule), *further))

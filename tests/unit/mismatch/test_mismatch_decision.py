@@ -1,0 +1,98 @@
+"""The decision as tables: every rule has a reason on a page, can apply, and stands in the trail of its verdict."""
+
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from turnout.config.settings.mismatch import MismatchSettings
+from turnout.mismatch.engine import decision
+from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.engine.decision import EFFECT_RULES, NAME_RULES, RULES, grade_name, judge
+from turnout.mismatch.engine.score import Score
+from turnout.mismatch.engine.verdict import ANSWERS
+from turnout.physics import Parameter
+
+TABLES = ("NUMERICS_RULES", "EFFECT_RULES", "SECOND_RULES", "PAIR_RULES", "NAME_RULES", "RESERVED_RULES")
+SIZE = (Parameter("size", "-", 0.0, (0.0, 9.0), "of a shape", "made up 2026"),)
+
+
+def score(family="soft", gain=40.0, worst=0.0, explained=1.0, size=1.0, **more):
+    candidate = Candidate(family, SIZE, dict, ((1.0,),), {"place": 3.0}, **more.pop("flags", {}))
+    fit = SimpleNamespace(psi=np.array([size]), psi_se=np.array([more.pop("error", 0.1)]), part=lambda _: slice(0, 1))
+    return Score(candidate, gain, worst, explained, fit, **more)
+
+
+def test_rules_have_names_of_their_own_and_a_page_that_exists(repository):
+    names = [rule.name for rule in RULES]
+    assert len(names) == len(set(names)) and all(re.fullmatch(r"[a-z_]+", name) for name in names)
+    assert all((repository / "docs" / rule.page).is_file() for rule in RULES)
+    assert RULES == tuple(rule for table in TABLES for rule in getattr(decision, table))
+
+
+@pytest.mark.parametrize("table", TABLES)
+def test_the_last_rule_of_a_table_applies_to_all_and_no_other_does(table):
+    rules = getattr(decision, table)
+    assert rules[-1].applies(None)
+    for rule in rules[:-1]:
+        with pytest.raises(AttributeError):
+            rule.applies(None)
+
+
+CASES = {
+    "explains_too_little": ([score(explained=0.4)], 2.0, {}),
+    "leaves_too_much": ([score()], 2.0, {"residual_excess": 4.1}),
+    "excess_without_candidate": ([score(gain=11.0)], 1.1, {}),
+    "sensors_shake_without_wheel": ([], 0.9, {"disturbed": True, "mismatched_trains": ("ic3",)}),
+    "train_unlike_its_file": ([], 0.9, {"mismatched_trains": ("ic3",)}),
+    "no_candidate_passes": ([], 0.9, {}),
+    "weak_and_contradicted": ([score(gain=23.0)], 0.9, {"consistent": False}),
+    "reserved_not_predicted": ([score(gain=25.0)], 0.9, {"consistent": False}),
+    "residual_has_structure": ([score()], 2.0, {"structure": 0.5, "residual_excess": 1.5}),
+    "single_witness": ([score(single_witness="day 2")], 2.0, {}),
+    "condition_contradicts": ([score(worst=-9.0)], 2.0, {}),
+    "size_at_limit": ([score(size=0.05, flags={"limit_form": "gap"}), score("gap", 20.0)], 2.0, {}),
+    "rival_within_margin": ([score(), score("gap", 35.0)], 2.0, {}),
+    "exempt_from_explaining": (
+        [score(explained=0.1, flags={"external_evidence": 38.0, "evidence_suffices": True})],
+        2.0,
+        {},
+    ),
+    "passes": ([score(), score("gap", 33.0)], 2.0, {}),
+}
+
+
+@pytest.mark.parametrize("name", [rule.name for rule in EFFECT_RULES])
+def test_each_rule_on_an_effect_applies_to_a_case_of_its_own(name):
+    scores, excess, facts = CASES[name]
+    verdict = judge(scores, excess, MismatchSettings(), **facts)
+    (rule,) = (r for r in EFFECT_RULES if r.name == name)
+    assert verdict.trail == (name,) and verdict.answer == rule.answer in ANSWERS and verdict.cause == rule.cause
+    assert "{" not in verdict.reason and bool(verdict.reason) == bool(rule.reason)
+
+
+def test_the_reason_holds_the_figures_of_the_case():
+    verdict = judge([score(explained=0.4)], 2.0, MismatchSettings())
+    assert verdict.reason == "the best candidate explains 40% of the excess"
+    verdict = judge([score(worst=-9.0)], 2.0, MismatchSettings())
+    assert verdict.reason == "soft makes one condition worse by 9 nats"
+
+
+@pytest.mark.parametrize(
+    "name, excess, more",
+    [
+        ("size_known_from_below", 0.9, {"error": 0.6, "flags": {"unbounded_form": "gap"}}),
+        ("reaches_control_level", 1.0, {"flags": {"must_reach_control_level": True}}),
+        ("must_reach_control_level", 1.1, {"flags": {"must_reach_control_level": True}}),
+        ("leaves_some_residual", 1.1, {}),
+    ],
+)
+def test_each_rule_on_a_name_applies_to_a_case_of_its_own(name, excess, more):
+    settings = MismatchSettings()
+    named = judge([score(**more)], 2.0, settings)
+    verdict, rule, reason = grade_name(named, named.scores[0].fit, excess, settings)
+    assert rule.name == name == verdict.trail[-1] and rule in NAME_RULES
+    assert verdict.answer == ("a_or_b" if name == "size_known_from_below" else "named")
+    assert verdict.grade == {"size_known_from_below": "", "reaches_control_level": "A"}.get(name, "B")
+    assert ("gap" in verdict.names) is (name == "size_known_from_below") and "{" not in reason
