@@ -86,11 +86,11 @@ class BandChoice:
 def choose_bands(selection: Selection, settings, receptance=None) -> BandChoice:
     """The mode of each band that is most significant for its bandwidth, if it passes the gate of ``receptance``."""
     choice = BandChoice(rejected_modes=list(selection.rejected))
+    gated_bands: list[str] = []
     if selection.fit is not None:
         _choose_strongest(choice, selection, settings)
         if receptance is not None:
-            _apply_gate(choice, selection, settings, receptance)
-    gated_bands = {r.detail.split()[0] for r in choice.rejections}
+            gated_bands = _apply_gate(choice, selection, settings, receptance)
     for band in MAIN_BANDS:
         if band not in choice.modes and band not in gated_bands:
             choice.rejections.append(Rejection("not_identified", None, None, f"{band} band holds no stable mode"))
@@ -141,6 +141,8 @@ def _assign_across_edge(choice, frequency, damping, significance, failed_tests, 
 
 
 def _apply_gate(choice, selection, settings, receptance):
+    """Remove the modes that fail the gate from ``choice``; returns their bands."""
+    gated_bands = []
     for band, m in list(choice.modes.items()):
         log_frequency, damping = selection.fit.mean[m]
         share, level = passed_share(receptance, float(np.exp(log_frequency)), float(damping))
@@ -151,6 +153,8 @@ def _apply_gate(choice, selection, settings, receptance):
         choice.rejections.append(Rejection("low_coherence", share, settings.gate_share, detail))
         entry = _rejected_mode(selection, m, "fails the coherence gate", share, settings.gate_share)
         choice.rejected_modes.append(entry)
+        gated_bands.append(band)
+    return gated_bands
 
 
 def _rejected_mode(selection, m, reason, value=None, limit=None):

@@ -236,7 +236,6 @@ def axle_counts(envelopes: SensorEnvelopes, motion: Motion, settings) -> list[Ax
     return sorted(candidates, key=lambda c: -c.contrast)
 
 
-SECOND_TRAIN_TEXT = "another train at about"  # beginning of a finding's text
 MIN_CORRELATION = 0.25  # least correlation of the residual between sensors
 MIN_LEVEL_SHARE = 0.1  # least level of the second train along its own motion, in half of the sensors, over the first's
 
@@ -270,9 +269,8 @@ def second_train(envelopes, passage, settings):
         return []
     speed = KMH / slowness[peak]
     direction = "facing" if speed > 0 else "trailing"
-    return [
-        Rejection("two_trains", strength, MIN_CORRELATION, f"{SECOND_TRAIN_TEXT} {abs(speed):.0f} km/h, {direction}")
-    ]
+    text = f"another train at about {abs(speed):.0f} km/h, {direction}"
+    return [Rejection("two_trains", strength, MIN_CORRELATION, text)]
 
 
 def _smooth_levels(envelopes):

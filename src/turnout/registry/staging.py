@@ -167,8 +167,12 @@ def quarantine_of(refusal: Refusal, arrival: Arrival) -> dict:
 
 
 def with_quarantine_id(row: dict, unit: str) -> dict:
-    """The quarantine row with its id, the hash of the unit and of its content."""
-    content = {k: row.get(k) for k in names("quarantine") if k not in ("quarantine_id", "run_id", "result_id")}
+    """The quarantine row with its id, the hash of the unit and of its content.
+
+    The channels do not count: they stand in the place as well, and rows of earlier versions have none.
+    """
+    without = ("quarantine_id", "channels", "run_id", "result_id")
+    content = {k: row.get(k) for k in names("quarantine") if k not in without}
     return row | {"quarantine_id": content_id("quarantine", unit, content)}
 
 

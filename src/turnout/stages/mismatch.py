@@ -87,7 +87,7 @@ def diagnose_visit(
         for table, group_rows in group_tables.items():
             rows[table] += group_rows
     if not members:
-        reasons = "; ".join(inputs.notes) or "neither a hammer test nor a passage"
+        reasons = "; ".join(map(str, inputs.notes)) or "neither a hammer test nor a passage"
         rows["quarantine"].append(_undiagnosed_row(unit, turnout, f"no section can be diagnosed: {reasons}"[:1000]))
     return _sort_by_severity(rows)
 
@@ -120,8 +120,8 @@ def _diagnose_group(group: Group, turnout, accepted, about, options, number) -> 
         )
         rows = finding_tables(diagnose(case, turnout.settings["mismatch"], report_progress, store), case, group, about)
     except (SimulationError, np.linalg.LinAlgError) as error:
-        reason = f"sections {', '.join(group.labels)}: {error}"
-        return {"quarantine": [_undiagnosed_row(None, turnout, "; ".join([reason, *about["notes"]])[:1000], group)]}
+        reasons = [f"sections {', '.join(group.labels)}: {error}", *map(str, about["notes"])]
+        return {"quarantine": [_undiagnosed_row(None, turnout, "; ".join(reasons)[:1000], group)]}
     replay.discard()
     store.discard()
     store["rows"] = rows

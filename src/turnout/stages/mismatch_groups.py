@@ -19,7 +19,7 @@ from turnout.config.turnout import TurnoutConfig
 from turnout.mismatch.turnout import CampaignInput
 from turnout.records import Unit
 from turnout.simulate import Sensor, TurnoutTrack
-from turnout.stages.mismatch_inputs import VisitInputs, digest_of_model
+from turnout.stages.mismatch_inputs import Note, VisitInputs, digest_of_model
 from turnout.workflow.plan import PlannedUnit, read_plan
 
 MAX_SECTION_GAP = 6.0  # m: sections further apart do not respond to the same sleeper
@@ -45,7 +45,7 @@ def groups(
     for route, labels in _neighbouring_sections(turnout, only):
         campaign = _campaign(turnout, track, inputs, route, labels)
         if campaign is not None and route not in ("main", *track.routes):
-            inputs.notes.append(f"sections {', '.join(labels)}: the track's file has no route {route}; not used")
+            inputs.notes.append(Note(f"sections {', '.join(labels)}: the track's file has no route {route}; not used"))
         elif campaign is not None:
             yield Group(_measured_labels(turnout, inputs, campaign, labels), route, campaign)
 

@@ -16,7 +16,6 @@ from turnout.content import sha256_of
 from turnout.errors import ReadError, SimulationError, TurnoutError
 from turnout.mismatch.turnout import HammerInput, PassageInput
 from turnout.passage.channel_checks import without_pulses
-from turnout.passage.sensor_stack import SECOND_TRAIN_TEXT
 from turnout.readers import read
 from turnout.records import LongRecording, Recording, Unit
 from turnout.simulate import load_track
@@ -37,6 +36,17 @@ MAX_SIMILAR_PASSAGES = 16  # similar passages per visit: twice the limit of a ca
 UNUSABLE_REASONS = ("clipped", "dead_channel", "not_finite", "sensor_lost", "channels_swapped")
 
 
+@dataclass(frozen=True)
+class Note:
+    """Why something was not used or is doubted: ``text``, and the name of the ``passage`` if it concerns one."""
+
+    text: str
+    passage: str | None = None
+
+    def __str__(self) -> str:
+        return self.text if self.passage is None else f"passage {self.passage}: {self.text}"
+
+
 @dataclass
 class VisitInputs:
     """Usable hammer ``tests`` and ``passages`` of a visit, and ``notes`` on the rest; ``sections`` by test name."""
@@ -44,7 +54,7 @@ class VisitInputs:
     tests: list[HammerInput] = field(default_factory=list)
     sections: dict[str, str] = field(default_factory=dict)
     passages: list[PassageInput] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+    notes: list[Note] = field(default_factory=list)
 
     def digest_content(self) -> list:
         """Content of the digest: all notes and passage results that a diagnosis depends on."""
@@ -52,7 +62,7 @@ class VisitInputs:
         vehicles: list[Any] = [p.vehicle for p in self.passages]
         loads = [[float(load) for load in v.static_loads] for v in vehicles]
         trains = [[p.name, p.train, p.speed, p.direction, p.route, p.conditions] for p in self.passages]
-        return [tests, trains, loads, self.notes]
+        return [tests, trains, loads, [str(note) for note in self.notes]]
 
 
 def gather_inputs(
@@ -78,9 +88,9 @@ def _recordings(unit, description, raw_root, notes, longest=None):
         try:
             result = read(path, raw_root, description, longest)
         except ReadError as error:
-            notes.append(str(error))
+            notes.append(Note(str(error)))
             continue
-        notes += [str(e) for e in result.errors]
+        notes += [Note(str(e)) for e in result.errors]
         records: list[Recording | LongRecording] = [*result.recordings, *result.long_recordings]
         yield from sorted(records, key=lambda r: r.record)
 
@@ -91,7 +101,7 @@ def _add_test(unit, turnout, raw_root, track, inputs):
         return
     position = float(turnout.section(unit.section).position)
     if fault := position_fault(unit.section, position, track):
-        inputs.notes.append(fault)
+        inputs.notes.append(Note(fault))
         return
     campaign = turnout.campaigns[unit.campaign]
     temperature = rail_temperature(recordings) if campaign.rail_temperature is None else campaign.rail_temperature
@@ -136,7 +146,7 @@ def _add_passages(unit, turnout, raw_root, track, tables, inputs):
         message = (
             f"{n} trains in it, {len(rows)} where passages were analysed: what was found of them there is not used"
         )
-        unit_inputs.notes.insert(0, f"{_passage_name(unit)}: {message}")
+        unit_inputs.notes.insert(0, Note(f"{_passage_name(unit)}: {message}"))
     inputs.notes += [note for note in unit_inputs.notes if note not in inputs.notes]
     for passage in unit_inputs.passages:
         inputs.passages.append(passage)
@@ -164,23 +174,23 @@ def _read_passages(unit, turnout, raw_root, track, rows, quarantine):
 
 def _passage_input(name, recording, row: Mapping[str, Any], turnout, track, quarantine, notes):
     """Passage of a train, None if it cannot be used; reasons and doubts are added to ``notes``."""
-    unusable = {name for q in quarantine if _is_unusable(q) for name in _channels_of(q)}
+    unusable = {channel for q in quarantine if _is_unusable(q) for channel in q.get("channels") or ()}
     unusable |= _misplaced_sensors(turnout, track, notes)
-    if SECOND_TRAIN_TEXT in (row.get("detail") or ""):
-        notes.append(f"passage {name}: two trains at the same time, not used")
+    if "two_trains" in (row.get("reason_codes") or ()):
+        notes.append(Note("two trains at the same time, not used", name))
         return None
     try:
         train = train_of(row, recording.conditions, Path(turnout.folder) / "vehicles")
     except TrainUnknownError as error:
-        notes.append(f"passage {name}: {error}")
+        notes.append(Note(str(error), name))
         return None
     has_diverging = any(s.track == "diverging" for s in turnout.sections)
-    notes += [f"passage {name}: {d}" for d in train.doubts if has_diverging or not d.startswith("track not known")]
+    notes += [Note(doubt, name) for doubt in (*train.doubts, *(train.route_doubts if has_diverging else ()))]
     usable = _usable_channels(recording, turnout, train.route, unusable)
     if excluded := sorted(unusable & {c.name for c in recording.channels}):
-        notes.append(f"passage {name}: channels {', '.join(excluded)} not used{_reasons_text(quarantine)}")
+        notes.append(Note(f"channels {', '.join(excluded)} not used{_reasons_text(quarantine)}", name))
     if not usable.channels:
-        notes.append(f"passage {name}: no sound channel on the {train.route} track")
+        notes.append(Note(f"no sound channel on the {train.route} track", name))
         return None
     heading = train.direction, train.route
     return PassageInput(
@@ -196,7 +206,7 @@ def _trains(unit, turnout, raw_root, notes):
             for train_recording, *_ in trains_in(recording, settings):
                 yield without_pulses(train_recording, sensors)[0]
         except ReadError as error:
-            notes.append(str(error))
+            notes.append(Note(str(error)))
 
 
 def _thin_out(passages):
@@ -214,11 +224,6 @@ def _similarity_key(passage):
     return passage.train, passage.route, passage.direction, len(passage.vehicle.wheels), channels
 
 
-def _channels_of(row):
-    """Channel names in a quarantine row: one, or two that are swapped."""
-    return row["place"].split(", ")[-1].split(":")[0].split(" and ")
-
-
 def _is_unusable(row):
     """Whether the channel of a quarantine row cannot be used; a slightly clipped one can."""
     slightly = row["reason_code"] == "clipped" and (row.get("measured_value") or 1.0) < MAX_CLIPPED_SHARE
@@ -228,7 +233,7 @@ def _is_unusable(row):
 def _misplaced_sensors(turnout, track, notes):
     """Names of sensors whose position contradicts the track, with notes."""
     faults = {s.name: fault for s in sensors_of(turnout) if (fault := position_fault(s.section, s.position, track))}
-    notes += [fault for fault in faults.values() if fault not in notes]
+    notes += [note for note in map(Note, faults.values()) if note not in notes]
     return set(faults)
 
 
@@ -310,9 +315,15 @@ def _extended_files(path: Path) -> list[Path]:
 
 
 def mismatch_context(turnout: str, settings=None, work="work") -> tuple[str, dict[str, dict]]:
-    """(token, tables by passage unit) from the results of the passage stage in ``work``."""
+    """(token, tables by passage unit) from the results of the passage stage in ``work``.
+
+    Results of an earlier version, which do not state the codes of all reasons, are left out: the diagnosis analyses
+    those passages itself.
+    """
     tables = {}
     for result in current_results(work, "passage", turnout):
+        if any("reason_codes" not in row for row in result.tables.get("passages", [])):
+            continue
         tables[result.unit] = {k: result.tables.get(k, []) for k in ("passages", "quarantine")}
     ids = sorted(str(r.get("passage_id")) + str(r.get("status")) for t in tables.values() for r in t["passages"])
     return hashlib.sha256(json.dumps(ids).encode()).hexdigest()[:16], tables

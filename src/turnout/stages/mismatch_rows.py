@@ -133,6 +133,7 @@ def finding_row(diagnosis, identity):
         "n_held_out": check.n,
         "parameters_json": json.dumps(fitted_parameters(diagnosis), sort_keys=True) if term else None,
         "train": train_text(where),
+        "axle": int(where["axle"]) if where.get("train") and where.get("axle") else None,
         "sentence": sentence(diagnosis),
         "next_measurement": recommendation(diagnosis) or None,
     }
@@ -275,11 +276,9 @@ def _first_notes(notes):
 
 
 def _visit_notes(about, campaign):
-    """Notes of the visit, those on passages of other groups last."""
-    prefixes = tuple(f"passage {p.name}: " for p in campaign.passages)
-    return sorted(
-        about["notes"], key=lambda note: not note.startswith(prefixes) if note.startswith("passage ") else False
-    )
+    """Notes of the visit as texts, those on passages of other groups last."""
+    names = {None, *(p.name for p in campaign.passages)}
+    return [str(note) for note in sorted(about["notes"], key=lambda note: note.passage not in names)]
 
 
 def _errors_by_candidate(fit):

@@ -147,7 +147,7 @@ def _location_text(finding, low, high):
     if finding["position_m"] is not None:
         return f"at {finding['position_m']:.1f} m"
     if finding["train"]:
-        train, _, axle = finding["train"].partition(", axle ")
+        train, axle = _train_and_axle(finding)
         return f"on axle {axle} of {train}" if axle else f"on {train}"
     if finding["channel"]:
         return f"in channel {finding['channel']}"
@@ -155,18 +155,28 @@ def _location_text(finding, low, high):
     return f"{between} that comes and goes without a wheel" if finding["locked_to"] == "clock" else between
 
 
-def _wheel_text(train_and_axle):
-    """Axle of a train in words, from the text "train, axle n".
+def _train_and_axle(finding):
+    """Name of the train that a finding is fixed to, without the axle that follows in its column, and the axle or None.
 
-    >>> _wheel_text("IC 2000, axle 3"), _wheel_text("a train")
+    >>> _train_and_axle({"train": "IC 2000, axle 3", "axle": 3}), _train_and_axle({"train": "IC 2000", "axle": None})
+    (('IC 2000', 3), ('IC 2000', None))
+    """
+    train, axle = finding["train"], finding["axle"]
+    return (train.removesuffix(f", axle {axle}") if axle else train), axle
+
+
+def _wheel_text(train, axle):
+    """Axle of a train in words.
+
+    >>> _wheel_text("IC 2000", 3), _wheel_text("a train", None)
     ('axle 3 of IC 2000', 'an axle of a train')
     """
-    train, _, axle = train_and_axle.partition(", axle ")
     return f"axle {axle} of {train}" if axle else f"an axle of {train}"
 
 
 def _sentence(term, finding) -> str:
     fixed = term["fixed"]
+    train, axle = _train_and_axle(finding) if finding["train"] else (fixed.get("train") or "a train", None)
     positions = [fixed[k] for k in ("sleeper", "support", "first", "last", "place") if k in fixed]
     shift = term["parameters"].get("shift", {"value": 0.0})["value"] if "place" in fixed else 0.0
     words = {name: number_in_words(p["value"], p["unit"]) for name, p in term["parameters"].items()}
@@ -174,8 +184,8 @@ def _sentence(term, finding) -> str:
     words |= {
         "place": f"{sum(positions) / len(positions) + shift:.1f} m" if positions else "an unknown place",
         "channel": fixed.get("channel_name") or finding["channel"] or "?",
-        "train": finding["train"] or fixed.get("train") or "a train",
-        "wheel": _wheel_text(finding["train"] or fixed.get("train") or "a train"),
+        "train": finding["train"] or train,
+        "wheel": _wheel_text(train, axle),
     }
     try:
         return _sentence_template(term).format(**words)

@@ -21,7 +21,8 @@ MIN_AXLE_SHARE = 0.6  # share of a noted train's axles that are measured: flats 
 class IdentifiedTrain:
     """Train of a passage: ``vehicle`` of ``turnout.simulate`` called ``name``, ``speed`` [m/s], ``doubts`` in words.
 
-    ``load_sd`` is the standard deviation of its sprung mass, as a share of it.
+    ``route_doubts`` are those on its route: they do not matter on a track with one route. ``load_sd`` is the standard
+    deviation of its sprung mass, as a share of it.
     """
 
     name: str
@@ -31,6 +32,7 @@ class IdentifiedTrain:
     route: str
     doubts: tuple[str, ...] = ()
     load_sd: float = LOAD_SD
+    route_doubts: tuple[str, ...] = ()
 
 
 class TrainUnknownError(Exception):
@@ -81,8 +83,9 @@ def train_of(row: Mapping, notes: Mapping, folder: Path) -> IdentifiedTrain:
         speed,
         direction,
         route,
-        (*doubts, *axle_doubts, *further_doubts, *direction_doubts, *route_doubts),
+        (*doubts, *axle_doubts, *further_doubts, *direction_doubts),
         load_sd,
+        route_doubts,
     )
 
 

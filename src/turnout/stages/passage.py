@@ -187,7 +187,8 @@ def _add_train(recording, started_at, recording_id, path, turnout, context, rows
     # The id depends on the whole row: train data, models, clusters and loads change it as well as the file does.
     # It depends on the path too, so that the row of a copy stays when that of its original is withdrawn.
     passage_id = {"passage_id": content_id("passage", path, str(recording.record), *name, row, fits)}
-    rows["passages"].append(passage_id | row)
+    # The codes repeat what the row states in words, so they are not part of the id.
+    rows["passages"].append(passage_id | row | {"reason_codes": [f.reason for f in passage.findings]})
     rows["passage_fits"] += [passage_id | fit for fit in fits]
 
 

@@ -35,6 +35,7 @@ def finding_rows(passage, base, path, record, recording_id) -> list[dict]:
         error = ReadError(path, place, finding.detail or finding.reason, remedy, finding.reason)
         row = quarantine_row(error, base, "passage", "passage", record, recording_id)
         row |= {"measured_value": _plain(finding.value), "threshold": _plain(finding.limit)}
+        row["channels"] = list(finding.channels) or None
         row["quarantine_id"] = row["quarantine_id"][:-4] + f"{len(rows):04x}"
         rows.append(row)
     return rows

@@ -35,8 +35,8 @@ from turnout.stages.common import number, rail_temperature
 from turnout.stages.mismatch_groups import _neighbouring_sections, groups, select_passages, unit_of
 from turnout.stages.mismatch_inputs import (
     MAX_SIMILAR_PASSAGES,
+    Note,
     VisitInputs,
-    _channels_of,
     _thin_out,
     digest_of_model,
     gather_inputs,
@@ -45,7 +45,7 @@ from turnout.stages.mismatch_inputs import (
 from turnout.stages.mismatch_results import Results, diagnose_turnout
 from turnout.stages.mismatch_trains import train_of
 from turnout.workflow.batches import encode
-from turnout.workflow.scan import scan
+from turnout.workflow.scan import scan, unit_id
 
 
 @pytest.fixture
@@ -124,11 +124,6 @@ def test_a_load_that_nobody_knows_is_as_open_as_from_empty_to_full(repository, k
     assert load.sd > 0.2 and load.bounds == (-2.0 * load.sd, 2.0 * load.sd)
 
 
-def test_swapped_channels_are_two():
-    assert _channels_of({"place": "record 1, A7 and A8"}) == ["A7", "A8"]
-    assert _channels_of({"place": "record 1, A7: 3 of 40"}) == ["A7"]
-
-
 def test_words_where_a_temperature_should_be_cost_the_temperature_alone(folder):
     small.roll(
         folder, speeds=(100.0,), change=lambda r: replace(r, conditions={**r.conditions, "rail_temperature": "?"})
@@ -164,21 +159,6 @@ def test_another_content_of_the_same_size_is_another_finding(folder):
     assert diagnose_turnout("t1")["mismatch_findings"][0]["finding_id"] != first
 
 
-@pytest.mark.parametrize(("detail", "used"), [("", 1), ("A: clipped; another train at about 80 km/h, facing", 0)])
-def test_of_two_trains_at_once_neither_is_simulated(folder, monkeypatch, detail, used):
-    """Also where another finding comes first."""
-    plain = mismatch_inputs.passage_unit
-
-    def found(*arguments, **more):
-        tables = plain(*arguments, **more)
-        tables["passages"][0] |= {"detail": detail, "reason": "clipped" if detail else None}
-        return tables
-
-    monkeypatch.setattr(mismatch_inputs, "passage_unit", found)
-    small.roll(folder, speeds=(100.0,))
-    assert diagnose_turnout("t1")["mismatch_findings"][0]["n_passages"] == used
-
-
 def test_the_temperature_in_the_files_is_their_median():
     recordings = [SimpleNamespace(conditions={"rail_temperature": t}) for t in ("11,5", "?", 14.0, 30)]
     assert rail_temperature(recordings) == 14.0 and rail_temperature(recordings[1:2]) is None
@@ -203,7 +183,7 @@ def test_a_route_that_the_track_has_not_is_said(folder):
     found = VisitInputs(tests, {t.name: t.name[0] for t in tests})
     made = list(groups(turnout, track_of(turnout)[0], found))
     assert [g.labels for g in made] == [("A",)]
-    assert found.notes == ["sections B: the track's file has no route diverging; not used"]
+    assert [str(note) for note in found.notes] == ["sections B: the track's file has no route diverging; not used"]
 
 
 def test_the_result_of_the_newer_recordings_is_accepted(tmp_path, monkeypatch):
@@ -286,7 +266,7 @@ def _tones_at(rate):
 def test_a_note_of_this_group_is_not_cut_off_by_those_of_others():
     from turnout.stages.mismatch_rows import _visit_notes
 
-    notes = [f"passage {k}: load not known" for k in range(20)] + ["section C: elsewhere"]
+    notes = [*(Note("load not known", f"{k}") for k in range(20)), Note("section C: elsewhere")]
     campaign = SimpleNamespace(passages=[SimpleNamespace(name="17")])
     assert _visit_notes({"notes": notes}, campaign)[:2] == ["passage 17: load not known", "section C: elsewhere"]
 
@@ -365,7 +345,7 @@ def test_a_logger_that_never_stops_gives_its_trains(logged, monkeypatch, held):
     monkeypatch.setattr(mismatch_inputs, "read", partial(read, max_whole_file_size=held))
     found = gathered(logged)
     assert [round(3.6 * p.speed, -1) for p in found.passages] == [80.0, 110.0], found.notes
-    assert len({p.name for p in found.passages}) == 2 and not [n for n in found.notes if "trains in it" in n]
+    assert len({p.name for p in found.passages}) == 2 and not [n for n in found.notes if "trains in it" in n.text]
 
 
 def test_rows_that_may_be_those_of_other_trains_are_not_used_and_that_is_said(logged, monkeypatch):
@@ -378,8 +358,47 @@ def test_rows_that_may_be_those_of_other_trains_are_not_used_and_that_is_said(lo
 
     monkeypatch.setattr(mismatch_inputs, "passage_unit", lost)
     found = gathered(logged)
-    assert not found.passages and len([n for n in found.notes if "speed is not known" in n]) == 2
-    assert [n for n in found.notes if "2 trains in it, 1 where passages were analysed" in n]
+    assert not found.passages and len([n for n in found.notes if "speed is not known" in n.text]) == 2
+    assert [n for n in found.notes if "2 trains in it, 1 where passages were analysed" in n.text]
+
+
+def gathered_with(folder, quarantine=(), **facts):
+    """Inputs from the one passage, with facts that the passage stage would state about it."""
+    turnout = turnout_in(folder)
+    (unit,) = (u for u in scan(turnout, folder / "raw").units if u.kind == "passage")
+    tables = mismatch_inputs.passage_unit(unit, turnout, folder / "raw")
+    tables = {"passages": [row | facts for row in tables["passages"]], "quarantine": list(quarantine)}
+    return gather_inputs([unit], turnout, folder / "raw", track_of(turnout)[0], {unit_id(unit): tables})
+
+
+@pytest.mark.parametrize(
+    ("channels", "used"), [(["B"], ["A"]), (["A7"], ["A", "B"]), (["A", "B"], []), (None, ["A", "B"])]
+)
+def test_channels_that_the_passage_stage_excludes_are_not_used(folder, channels, used):
+    """They are stated as a list: two that are exchanged are two, and A7 is not A."""
+    small.roll(folder, speeds=(100.0,))
+    found = gathered_with(folder, [{"reason_code": "channels_swapped", "channels": channels, "place": "record 1, A"}])
+    assert [c.name for p in found.passages for c in p.recording.channels] == used
+    assert any("not used (channels_swapped)" in n.text for n in found.notes) == (len(used) < 2)
+
+
+@pytest.mark.parametrize(("codes", "used"), [(["train_cut_off", "two_trains"], 0), (["train_cut_off"], 1), (None, 1)])
+def test_of_two_trains_at_once_neither_is_simulated_whatever_the_first_reason(folder, codes, used):
+    small.roll(folder, speeds=(100.0,))
+    found = gathered_with(folder, reason_codes=codes, detail="another train at about 90 km/h, facing")
+    assert len(found.passages) == used
+    assert [n.text for n in found.notes if "two trains" in n.text] == ["two trains at the same time, not used"] * (
+        1 - used
+    )
+
+
+def test_results_of_an_earlier_version_without_the_codes_of_all_reasons_are_analysed_again(monkeypatch):
+    results = [
+        SimpleNamespace(unit="t1/passage/old", tables={"passages": [{"passage_id": "a", "status": "partly"}]}),
+        SimpleNamespace(unit="t1/passage/new", tables={"passages": [{"passage_id": "b", "reason_codes": []}]}),
+    ]
+    monkeypatch.setattr(mismatch_inputs, "current_results", lambda *_: iter(results))
+    assert set(mismatch_inputs.mismatch_context("t1")[1]) == {"t1/passage/new"}
 
 
 @pytest.mark.parametrize(("softest", "used"), [(50.0, True), (50_000.0, False)])
