@@ -43,6 +43,14 @@ def write_atomic(path: os.PathLike, write: Callable) -> None:
         temporary.unlink(missing_ok=True)
 
 
+def changed_at(path: Path) -> int:
+    """Time of change of a file [ns since 1970], 0 if there is none."""
+    try:
+        return path.stat().st_mtime_ns
+    except (FileNotFoundError, NotADirectoryError):
+        return 0
+
+
 def write_text(path: os.PathLike, text: str) -> None:
     """Atomic write of UTF-8 text."""
     write_atomic(path, lambda stream: stream.write(text.encode()))

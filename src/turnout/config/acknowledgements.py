@@ -4,11 +4,11 @@ import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping
-from datetime import datetime, timedelta
+from datetime import timedelta
 from pathlib import Path
 
 from turnout.config.csv_table import TableError, read_csv, row_problem
-from turnout.config.events import now, time_problem, turnout_problems
+from turnout.config.events import now, parse_utc, time_problem, turnout_problems
 from turnout.config.schema import suggestion
 from turnout.errors import ConfigError
 
@@ -67,9 +67,9 @@ def row_problems(cells: Mapping, turnout_ids, variants) -> Iterator[tuple[str, s
     time_problems = {column: fault for column in times if (fault := time_problem(values[column]))}
     for column, (addition, remedy) in time_problems.items():
         yield column, f"{column} is {values[column]!r}{addition}", remedy
-    if values["action"] == "acknowledge" and not time_problems and _time(values["at"]) > now() + timedelta(days=1):
+    if values["action"] == "acknowledge" and not time_problems and parse_utc(values["at"]) > now() + timedelta(days=1):
         yield "at", f"at {values['at']} has not come yet", "Write the day on which the alarm was seen"
-    if values["until"] and not time_problems and _time(values["until"]) <= _time(values["at"]):
+    if values["until"] and not time_problems and parse_utc(values["until"]) <= parse_utc(values["at"]):
         yield (
             "until",
             f"until {values['until']} is not after at {values['at']}",
@@ -89,15 +89,11 @@ def acknowledgement_row(cells: Mapping) -> dict:
         "band": values["band"] or None,
         "action": values["action"],
         "by_whom": values["by"],
-        "at_utc": _time(values["at"]),
-        "until_utc": _time(values["until"]) if values["until"] else None,
+        "at_utc": parse_utc(values["at"]),
+        "until_utc": parse_utc(values["until"]) if values["until"] else None,
         "reason": values["reason"],
     }
     return {"acknowledgement_id": _id(row)} | row
-
-
-def _time(text: str) -> datetime:
-    return datetime.fromisoformat(text.removesuffix("Z"))
 
 
 def _id(row: dict) -> str:

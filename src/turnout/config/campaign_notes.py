@@ -8,7 +8,7 @@ from pathlib import Path
 
 from turnout.config.csv_table import Cells, TableError, read_csv, row_problem
 from turnout.config.document import Frozen, Place
-from turnout.config.events import time_problem
+from turnout.config.events import parse_utc, time_problem
 from turnout.config.turnout import Campaign
 from turnout.errors import ReadError
 
@@ -107,7 +107,7 @@ def _campaign(cells: Mapping) -> Campaign:
     text = cells["started_at_utc"]
     if time_error := time_problem(text):
         raise _CellError("started_at_utc", f"started_at_utc is {text!r}{time_error[0]}", time_error[1])
-    start = datetime.fromisoformat(text.removesuffix("Z"))
+    start = parse_utc(text)
     if abs((start - datetime.fromisoformat(date)).total_seconds()) > 2 * 86400:
         problem = f"started_at_utc {text!r} is not on the campaign's day {date}"
         raise _CellError("started_at_utc", problem, "Correct the one or the other")

@@ -50,7 +50,7 @@ def read_csv(path: Path, name: str, columns: tuple[str, ...], n_required: int, a
     if it does not exist; a broken link is a file that cannot be read.
     A row is one line: an unclosed quote is an error of its own row (``row_problem``), not of the rows below it.
     """
-    lines = [(n, line) for n, line in enumerate(_text(path, name).split("\n"), 1) if line.strip()]
+    lines = _numbered_lines(path, name)
     first, header = lines[0] if lines else (1, "")
     titles = _titles(header)
     for title in columns[:n_required]:
@@ -82,13 +82,14 @@ def row_problem(cells: Mapping) -> tuple[str, str, str] | None:
 
 def header_of(path: Path, name: str) -> tuple[str, ...]:
     """Titles of a CSV; TableError if it has none, is not UTF-8 or cannot be read."""
-    lines = [(n, line) for n, line in enumerate(_text(path, name).split("\n"), 1) if line.strip()]
+    lines = _numbered_lines(path, name)
     if not lines:
         raise TableError(Place(name, 1, 1), "an empty table", "Write its header, or remove the file")
     return _titles(lines[0][1])
 
 
-def _text(path: Path, name: str) -> str:
+def _numbered_lines(path: Path, name: str) -> list[tuple[int, str]]:
+    """(number, text) of the lines of a file that are not blank; TableError if it is not UTF-8 or cannot be read."""
     try:
         data = Path(path).read_bytes()
     except OSError as error:
@@ -101,7 +102,8 @@ def _text(path: Path, name: str) -> str:
         line = data[: error.start].count(b"\n") + 1
         column = error.start - data.rfind(b"\n", 0, error.start)
         raise TableError(Place(name, line, column), "a byte that is not UTF-8", "Save the file as UTF-8") from None
-    return text.replace("\r\n", "\n").replace("\r", "\n")
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    return [(n, line) for n, line in enumerate(lines, 1) if line.strip()]
 
 
 def _titles(header: str) -> tuple[str, ...]:

@@ -102,10 +102,19 @@ def time_problem(text: str) -> tuple[str, str] | None:
     (True, ('', 'Write YYYY-MM-DD or YYYY-MM-DDTHH:MM in UTC'))
     """
     try:
-        time = datetime.fromisoformat(text.removesuffix("Z"))
+        time = parse_utc(text)
     except ValueError:
         return "", "Write YYYY-MM-DD or YYYY-MM-DDTHH:MM in UTC"
     return (", with a time zone", "Write the time in UTC, without a zone") if time.tzinfo else None
+
+
+def parse_utc(text: str) -> datetime:
+    """Time of a cell, YYYY-MM-DD or YYYY-MM-DDTHH:MM, with or without a "Z"; ValueError for other text.
+
+    >>> parse_utc("2026-04-02T10:30Z").isoformat()
+    '2026-04-02T10:30:00'
+    """
+    return datetime.fromisoformat(text.removesuffix("Z"))
 
 
 def now() -> datetime:
@@ -122,5 +131,5 @@ def _event(cells) -> Event:
     turnout, kind = cells["turnout"], cells["kind"]
     label = cells["section"].removeprefix(f"{turnout}/") or None
     resets = _reset_bands(cells) if cells.get("resets") else RESETS[kind]
-    at = datetime.fromisoformat(cells["date"].removesuffix("Z"))
+    at = parse_utc(cells["date"])
     return Event(turnout, label, at, kind, resets, cells.get("note", ""))

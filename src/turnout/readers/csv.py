@@ -27,8 +27,8 @@ from pyarrow import csv
 from turnout.readers.csv_header import MISSING_VALUES, cell_errors, read_head, seconds_per_number, time_column
 from turnout.readers.lazy import LazyColumn
 from turnout.readers.named_arrays import RECORD_COUNT_NAMES, SAMPLE_COUNT_NAMES, START_DATE_NAMES, START_NAMES, Metadata
-from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord
-from turnout.readers.timing import BLOCK_SIZE, TEXT_PRECISION, parse_time
+from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, RawFile, RawRecord
+from turnout.readers.timing import TEXT_PRECISION, parse_time
 
 
 def read_raw(source) -> RawFile:

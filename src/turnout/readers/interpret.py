@@ -11,7 +11,7 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.lazy import BlockReader, ChannelStatistics, channel_error
-from turnout.readers.source import COPY_AGAIN
+from turnout.readers.source import COPY_AGAIN, MIN_SAMPLES
 from turnout.readers.timing import check_order, check_time, resolve_rate, start_times
 from turnout.records import Channel, LongRecording, RawChannel, RawDescription, Recording
 from turnout.units import IGNORED, conversion, to_si
@@ -154,9 +154,6 @@ def _conflict_text(statement, layout_unit):
     return f"the file says {statement}, the layout {layout_unit!r} ({layout_unit + '!'!r} would overrule the file)"
 
 
-MIN_SAMPLES = 2  # fewest samples of a record: one sample has neither rate nor spread
-
-
 def convert_records(raw, description: RawDescription, source, max_duration=None):
     """(recordings, errors) of a raw file. A damaged record does not affect the other records.
 
@@ -220,13 +217,11 @@ def _recording(record, k, n_record, description, source, max_duration):
     is_long = max_duration is not None and n_sample / rate > max_duration
     samples = np.empty((0, 0)) if is_long else block_reader(0, n_sample)
     statistics = (
-        ChannelStatistics.from_record(block_reader, n_sample).by_channel()
-        if is_long
-        else [_row_statistics(row) for row in samples]
+        ChannelStatistics.from_record(block_reader, n_sample) if is_long else ChannelStatistics.from_samples(samples)
     )
     faults = {
         i: e
-        for i, channel_statistics in enumerate(statistics)
+        for i, channel_statistics in enumerate(statistics.by_channel())
         if (e := channel_error(n_sample, channel_statistics, channel_maps[i].channel, where, source))
     }
     if faults and (description.kind != "passage" or len(faults) == len(channel_maps)):
@@ -266,13 +261,3 @@ def _sample_count(record, where, promised, source):
             where, f"it has {shortest} samples", COPY_AGAIN, reason="empty" if not shortest else "truncated"
         )
     return shortest
-
-
-def _row_statistics(row):
-    """(number of non-finite samples, index of the first, first value, whether all are equal) of a channel (n,)."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        suspect = not np.isfinite(row.sum())
-    n_bad, first_bad = 0, -1
-    if suspect and not (finite := np.isfinite(row)).all():
-        n_bad, first_bad = int(np.count_nonzero(~finite)), int(np.argmin(finite))
-    return n_bad, first_bad, row[0], bool(row[0] == row[-1] and row.min() == row.max())

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.source import RawRecord, Source
+from turnout.readers.source import BLOCK_SIZE, RawRecord, Source
 
 MIN_LAZY_SIZE = 2**16  # numbers: smaller datasets are read at once
 
@@ -96,9 +96,6 @@ def lazy_array(numbers):
 ARRAYS = (np.ndarray, LazyMatrix, LazyColumn)
 
 
-BLOCK_SIZE = 2**18  # samples of each channel that are read at a time
-
-
 @dataclass(frozen=True)
 class BlockReader:
     """``reader(start, stop)`` -> (n_channel, stop - start) SI samples of the channels ``mapped`` of a raw record.
@@ -145,11 +142,21 @@ class ChannelStatistics:
     @classmethod
     def from_record(cls, block_reader: BlockReader, n_sample: int):
         """Statistics from one pass over a record of ``n_sample`` samples."""
-        n = len(block_reader.mapped)
-        statistics = cls(np.zeros(n, int), np.full(n, -1), np.zeros(n), np.ones(n, bool))
+        statistics = cls._empty(len(block_reader.mapped))
         for start in range(0, n_sample, BLOCK_SIZE):
             statistics._add(block_reader(start, min(start + BLOCK_SIZE, n_sample)), start)
         return statistics
+
+    @classmethod
+    def from_samples(cls, samples: np.ndarray) -> "ChannelStatistics":
+        """Statistics of the samples of a record in memory."""
+        statistics = cls._empty(len(samples))
+        statistics._add(samples, 0)
+        return statistics
+
+    @classmethod
+    def _empty(cls, n: int) -> "ChannelStatistics":
+        return cls(np.zeros(n, int), np.full(n, -1), np.zeros(n), np.ones(n, bool))
 
     def by_channel(self) -> list[tuple]:
         """(n_bad, first_bad, value, constant) of each channel."""
@@ -159,7 +166,7 @@ class ChannelStatistics:
         if start == 0:
             self.value = samples[:, 0].copy()
         for i, row in enumerate(samples):
-            self.constant[i] &= bool(row[0] == self.value[i] and row.min() == row.max())
+            self.constant[i] &= bool(row[0] == self.value[i] == row[-1] and row.min() == row.max())
             with np.errstate(over="ignore", invalid="ignore"):
                 suspect = not np.isfinite(row.sum())
             if suspect and not (finite := np.isfinite(row)).all():

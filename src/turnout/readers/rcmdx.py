@@ -16,11 +16,11 @@ import numpy as np
 from turnout.errors import ReadError
 from turnout.readers.lazy import is_large, lazy_array
 from turnout.readers.named_arrays import Metadata
-from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord
+from turnout.readers.source import CONDITIONS, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord
+from turnout.readers.timing import SINGLE_PRECISION
 
 FREQUENCY_ATTRIBUTES = ("CommonTriggerFrequency", "CommonTriggerFreq", "CommonTriggerFrequence", "TriggerValue")
 METADATA_ATTRIBUTES = {*CONDITIONS, "RecordCount"}
-SINGLE_PRECISION = 2.0**-23  # the frequency is a 32 bit float
 
 
 def read_raw(source) -> RawFile:
@@ -86,7 +86,7 @@ def _record(group, notes, source):
         if len(x) != len(stamps):
             problem = f"{len(x)} samples and {len(stamps)} time stamps"
             raise source.error(f"{where}, channel {name!r}", problem, COPY_AGAIN, reason="truncated")
-    if len(stamps) < 2:
+    if len(stamps) < MIN_SAMPLES:
         raise source.error(where, f"it has {len(stamps)} samples", COPY_AGAIN, reason="empty")
     rates = {float(c.attrs[k]) for c in channels.values() for k in set(FREQUENCY_ATTRIBUTES).intersection(c.attrs)} - {
         0.0
@@ -94,7 +94,7 @@ def _record(group, notes, source):
     if len(rates) > 1:
         raise source.error(where, f"its channels name different frequencies: {sorted(rates)} Hz", reason="wrong_rate")
     time = (stamps - stamps[0]) * 1e-9
-    rate, tolerance = rates.pop() if rates else None, SINGLE_PRECISION
+    rate, tolerance = rates.pop() if rates else None, SINGLE_PRECISION  # the frequency is a 32 bit float
     names = tuple(name.rpartition(".")[2] for name in channels)
     names = names if len(set(names)) == len(names) else tuple(channels)
     return RawRecord(

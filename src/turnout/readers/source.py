@@ -20,6 +20,8 @@ from turnout.records import EMPTY_MAPPING
 
 COPY_AGAIN = "Copy the file again from the logger"
 SYSTEM_ERROR = re.compile(r"errno = (\d{1,9})\b")
+BLOCK_SIZE = 2**18  # samples of each channel that are read or checked at a time: long records need little memory
+MIN_SAMPLES = 2  # fewest samples of a record: one sample has neither rate nor spread
 MAX_COMPRESSION_RATIO = 1032  # largest ratio of unpacked to packed bytes: the bound of deflate
 # Metadata that any format may store with the samples; they become Recording.conditions.
 CONDITIONS = (
@@ -200,7 +202,7 @@ def load(path, root) -> Source:
         problem = f"the file cannot be opened ({error.strerror})"
         raise ReadError(name, "the path", problem, "Correct its permissions or copy it again") from error
     if not size:
-        raise ReadError(name, "byte 0", "the file has no bytes", "Copy the file again from the logger", reason="empty")
+        raise ReadError(name, "byte 0", "the file has no bytes", COPY_AGAIN, reason="empty")
     return Source(resolved, name, size, head)
 
 

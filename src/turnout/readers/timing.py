@@ -13,8 +13,8 @@ from zoneinfo import ZoneInfo
 import numpy as np
 
 from turnout.errors import ReadError
+from turnout.readers.source import BLOCK_SIZE
 
-BLOCK_SIZE = 2**18  # samples of a time column that are checked at a time
 STEP_SAMPLES = 2**21  # samples whose median step is the usual step
 MAX_CLOCK_DRIFT = 1e-4  # relative: two clocks of one logger with separate crystals may differ by this much
 TIME_UNITS_PER_SECOND = (1.0, 1e3, 1e6)  # a time column without unit may be in s, ms or µs

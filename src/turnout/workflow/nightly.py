@@ -15,6 +15,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from turnout.errors import TurnoutError
+from turnout.files import changed_at
 from turnout.workflow.plan import is_cut_plan, read_plan
 from turnout.workflow.run_report import failure_reason, rejected_units, unused_turnouts
 from turnout.workflow.scan import unit_id
@@ -155,19 +156,14 @@ def _clear(options: Sequence[str], profile: str) -> None:
 
 def _run(options: Sequence[str], limit: float | None, work: Path) -> int:
     """Exit code of Snakemake; if jobs died or were ended before the registry was published, publish it afterwards."""
-    started, launched, generation = time.monotonic(), _changed_at(work / "launched"), _changed_at(GENERATION)
+    started, launched, generation = time.monotonic(), changed_at(work / "launched"), changed_at(GENERATION)
     code = _snakemake(options, None if limit is None else (1.0 - PUBLISHING_SHARE) * limit)
-    had_jobs, registered = _changed_at(work / "launched") != launched, _changed_at(GENERATION) != generation
+    had_jobs, registered = changed_at(work / "launched") != launched, changed_at(GENERATION) != generation
     if code != 0 and had_jobs and not registered:
         remaining = None if limit is None else max(0.0, started + limit - time.monotonic())
         _unlock()
         _snakemake([*options, "--allowed-rules", *PUBLISHING_RULES], remaining)
     return code
-
-
-def _changed_at(path: Path) -> int:
-    """Time of change of a file [ns], 0 where there is none."""
-    return path.stat().st_mtime_ns if path.exists() else 0
 
 
 def _snakemake(options: Sequence[str], limit: float | None) -> int:
@@ -216,8 +212,8 @@ def _report(code: int, before: set, planned_before: set[str], reason: str, work:
             if (path, entry.batch) not in before:
                 processed.append(name)
                 quarantined += [name] if entry.status not in ("ok", "vanished") else []
-    newest = max(map(_changed_at, states_below(work)), default=0)
-    published = code == 0 or 0 < newest <= _changed_at(GENERATION)
+    newest = max(map(changed_at, states_below(work)), default=0)
+    published = code == 0 or 0 < newest <= changed_at(GENERATION)
     tests = rejected_units(processed, GENERATION.parent)
     unused, nothing_usable = unused_turnouts(GENERATION.parent)
     by_turnout = Counter(name.partition("/")[0] for name in {*quarantined, *tests})

@@ -9,6 +9,7 @@ from pathlib import Path
 from turnout.config import TurnoutConfig
 from turnout.config.campaign_notes import COLUMNS
 from turnout.config.csv_table import TableError, read_csv
+from turnout.config.events import parse_utc
 from turnout.errors import ReadError
 from turnout.records import Unit
 from turnout.workflow.notes import start_of
@@ -63,7 +64,7 @@ def _day(text: str) -> str | None:
 def _trains(rows, name: str, units, tolerance: timedelta) -> Iterator[ReadError]:
     """An error if no train matches a passage, but many match after a shift by whole hours."""
     passages = [start for unit in units if unit.kind == "passage" and (start := start_of(unit.label))]
-    trains = sorted(datetime.fromisoformat(row["passed_at_utc"].removesuffix("Z")) for row in rows)
+    trains = sorted(parse_utc(row["passed_at_utc"]) for row in rows)
 
     def count_fitting(hours: int) -> int:
         return sum(_has_train_near(p + timedelta(hours=hours), trains, tolerance) for p in passages)

@@ -21,7 +21,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from turnout.files import read_json, write_text
+from turnout.files import changed_at, read_json, write_text
 from turnout.workflow.state import batch_folder
 
 MARK_PREFIX = "begun-"
@@ -35,7 +35,7 @@ def started_units(state: Path) -> dict[str, str]:
     The unit started last comes last, for it is the most probable cause; so the others are not delayed by it.
     """
     units = {}
-    for mark in sorted(batch_folder(state).glob(f"{MARK_PREFIX}*"), key=_changed_at):
+    for mark in sorted(batch_folder(state).glob(f"{MARK_PREFIX}*"), key=changed_at):
         run, unit = _read_mark(mark)
         if mark == _mark_path(state, unit):  # else it is truncated: the unit was not started
             units[unit] = run
@@ -72,13 +72,6 @@ def _read_mark(mark: Path) -> tuple[str, str]:
     except FileNotFoundError:  # its unit has ended meanwhile
         return "", ""
     return run, unit
-
-
-def _changed_at(mark: Path) -> int:
-    try:
-        return mark.stat().st_mtime_ns
-    except FileNotFoundError:
-        return 0
 
 
 def _mark_path(state: Path, unit: str) -> Path:

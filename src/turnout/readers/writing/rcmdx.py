@@ -3,14 +3,14 @@
 SECTION, POSITION and TOPOLOGY are left out because they describe a moving vehicle; so is the index ``timeindex``.
 """
 
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, timedelta
 
 import h5py
 import numpy as np
 
+from turnout.readers.rcmdx import EPOCH
 from turnout.readers.writing.encode import attributes, plain_conditions
 
-EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 CHANNEL = {
     "Element": "CHANNEL",
     "TriggerMode": "TIME",
