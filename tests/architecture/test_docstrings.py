@@ -18,7 +18,7 @@ def undocumented(tree, prefix=""):
     """(line, name) of each public definition without docstring; what stands inside a private class is private."""
     for node in ast.iter_child_nodes(tree):
         if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)) and not node.name.startswith("_"):
-            if ast.get_docstring(node) is None:
+            if ast.get_docstring(node) is None and "overload" not in map(ast.unparse, node.decorator_list):
                 yield node.lineno, prefix + node.name
             if isinstance(node, ast.ClassDef):
                 yield from undocumented(node, f"{prefix}{node.name}.")

@@ -7,8 +7,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from turnout.physics import TERMS, PhysicsTerm
-from turnout.physics.term import EFFECT_TYPES
+from turnout.mismatch.turnout.candidates.rail_defects import SCANS
+from turnout.physics import TERMS, PhysicsTerm, effects_by_name
+from turnout.physics.hypothesis import (
+    ChannelSite,
+    ContactSite,
+    SaturatedChannelSite,
+    SupportMotion,
+    SupportSite,
+    TrackSite,
+    TrainSite,
+)
+from turnout.physics.term import COLUMN_TYPES, EFFECT_TYPES, FORCE_TARGETS, FRAMES
 from turnout.simulate import Sensor, car, simulate_hammer, simulate_passage, uniform_track
 from turnout.simulate.preparation import prepare
 from turnout.simulate.run import run
@@ -20,6 +30,14 @@ from turnout.units import PARAMETER_UNITS
 TRACK = uniform_track(24.0)
 TURNOUT = TurnoutTrack(TRACK, {"main": ((Cosine(13.0, 1e-3, 1.0),),)})
 SENSORS = (Sensor("A", 12.1), Sensor("B", 12.0, "sleeper"))
+SITES = (
+    SupportSite(20, 12.0, 30, 5, 35, True),
+    TrackSite(TRACK.rail, True),
+    ChannelSite("A", 4, ("blows 1:A",), True, 8.0, 6.0, 0.4),
+    SaturatedChannelSite("A", 50.0, 1.0, 20.0),
+    ContactSite((10.0, 12.1, 14.0)),
+    TrainSite("heavy", 2),
+)
 EXTRA_UNITS = {"-", "1/K", "s", "rad", "Hz", "N", "m/s²", "°C", "V", "N/m per N"}
 
 
@@ -33,7 +51,7 @@ def passage(*terms):
 
 def hammer(*terms):
     quiet = [Sensor("A", 12.1), Sensor("B", 12.3)]
-    return simulate_hammer(TRACK, 12.0, sensors=quiet, n_blows=1, duration=0.06, terms=terms)[0].samples[1:]
+    return simulate_hammer(TRACK, 12.0, sensors=quiet, n_impacts=1, duration=0.06, terms=terms)[0].samples[1:]
 
 
 @pytest.fixture(scope="module")
@@ -58,6 +76,71 @@ class TestTerm:
             assert p.bounds[0] <= getattr(example, p.name) <= p.bounds[1]
             assert len(p.meaning.split()) >= 3
             assert re.search(r"\b(18|19|20)\d\d\b", p.source), f"no year in the source {p.source!r}"
+
+    def test_it_says_what_the_person_on_site_needs(self, term):
+        example, size = term.example(), term.parameters[0]
+        words = {name: "?" for name in ("place", "channel", "train", "wheel")}
+        words |= {p.name: f"{getattr(example, p.name):.3g} {p.unit}" for p in term.parameters}
+        words |= {f"{p.name}_size": words[p.name] for p in term.parameters}
+        for text in filter(None, (term.message, term.message_negative, term.message_unbounded)):
+            sentence = text.format(**words)
+            assert len(sentence.split()) >= 3 and sentence[0].isupper() and not sentence.endswith(".")
+        assert term.message
+        assert not term.message_negative or size.bounds[0] < 0.0, "the size cannot be negative"
+        assert len(term.site_check.split()) >= 4 and not term.site_check.endswith(".")
+        assert not term.separating_test or term.separating_test.split()[0].islower()
+
+    def test_it_says_how_a_diagnosis_tests_it(self, term):
+        assert term.frame in FRAMES and term.column_type in COLUMN_TYPES
+        assert 0.0 <= term.model_error_share < 1.0 and term.smallest_reportable >= 0.0
+        assert 1 <= term.n_size_parameters <= len(term.parameters)
+        names = {term.limit_form, term.unbounded_form, *term.simpler_form[:1]} - {""}
+        assert names <= set(effects_by_name()) - {term.name}
+        found_by_a_scan = term in {effect for effect, _ in SCANS}
+        assert term.asked == bool(term.site_types or found_by_a_scan)
+        if term.column_type == "support":
+            assert len(term.example().supports) >= 1
+
+    def test_what_it_assumes_at_a_site_can_be_simulated(self, term):
+        """Its starts lie within the bounds and away from neutral, and all its fields are there."""
+        hypotheses = [h for site in SITES if isinstance(site, term.site_types) for h in term.hypotheses(site)]
+        assert len(hypotheses) >= len(term.site_types)
+        for hypothesis in hypotheses:
+            parameters = hypothesis.parameters or term.parameters
+            assert hypothesis.starts and hypothesis.n_scanned >= 1
+            assert set(parameters) == set(term.parameters) or hypothesis.parameters
+            for start in hypothesis.starts:
+                assert len(start) == len(parameters)
+                made = term(**hypothesis.fixed, **{p.name: value for p, value in zip(parameters, start)})
+                made.check()
+                assert all(p.bounds[0] <= value <= p.bounds[1] for p, value in zip(parameters, start))
+                assert start[0] != parameters[0].neutral
+                assert "{" not in made.sentence()
+
+    def test_its_pseudo_force_is_the_static_force_of_its_links_and_ports(self, term):
+        """Rail and sleeper pressed down and at rest: what its springs exert, with the signs of the track."""
+        if term.column_type != "support":
+            pytest.skip("no support effect")
+        example = term.example()
+        (j, *_), motion = example.supports, {"rail": 2e-4, "sleeper": 1e-4}
+        target, force = example.pseudo_force(
+            SupportMotion(
+                *(np.full(9, motion[name]) for name in ("rail", "sleeper")),
+                10e3,
+                TRACK.pad_stiffness[j],
+                TRACK.ballast_stiffness[j],
+            )
+        )
+        expected = 0.0
+        for link in example.links(TRACK):
+            if all(node[0] in motion for node, _ in link.ends):  # a node of its own follows the track at rest
+                expected -= link.stiffness * sum(weight * motion[node[0]] for node, weight in link.ends)
+        for port in example.ports(TRACK):
+            if port.ends[0][0][1] == j:
+                d = sum(weight * motion[node[0]] for node, weight in port.ends)
+                expected -= float(port.law.force(d - port.gap, 0.0))
+        assert target in FORCE_TARGETS
+        assert force == pytest.approx(np.full(9, expected), rel=1e-9, abs=1e-9)
 
     def test_it_vanishes_at_its_neutral_value(self, term, base):
         neutral = term.example().neutral()

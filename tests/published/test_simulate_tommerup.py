@@ -34,7 +34,7 @@ def turnout():
 
 @pytest.mark.parametrize("location", TABLE_3)
 def test_simulated_hammer_tests_land_on_table_3(turnout, location):
-    recordings = simulate_hammer(turnout, location, n_blows=10, duration=0.15, pretrigger=0.005, seed=0)
+    recordings = simulate_hammer(turnout, location, n_impacts=10, duration=0.15, pretrigger=0.005, seed=0)
     impacts = [i for i in find_impacts(recordings, "hammer", "acc_1", ReceptanceSettings()) if i.accepted]
     assert len(impacts) >= 8
     receptance = receptance_of(impacts, ReceptanceSettings())
@@ -52,7 +52,7 @@ def test_simulated_hammer_tests_land_on_table_3(turnout, location):
 
 def test_the_exceptions_are_exceptions(turnout):
     """A damping that began to fit would have to leave the list."""
-    recordings = simulate_hammer(turnout, "A7", n_blows=6, duration=0.15, pretrigger=0.005)
+    recordings = simulate_hammer(turnout, "A7", n_impacts=6, duration=0.15, pretrigger=0.005)
     impacts = [i for i in find_impacts(recordings, "hammer", "acc_1", ReceptanceSettings()) if i.accepted]
     model = identify([i.decay for i in impacts], recordings[0].rate, IdentifySettings())
     assert abs(model.mode("ballast").damping / 0.2917 - 1.0) > DAMPING

@@ -57,7 +57,7 @@ def _receptances():
     figure, axes = plt.subplots(2, 2, figsize=(8.5, 6.0), sharex=True, layout="constrained")
     for axis, (name, modes) in zip(axes.flat, printed.items()):
         position, track = resolve_location(turnout, name)
-        recordings = simulate_hammer(turnout, name, n_blows=10, duration=0.3)
+        recordings = simulate_hammer(turnout, name, n_impacts=10, duration=0.3)
         measured = receptance_of(
             [i for i in find_impacts(recordings, "hammer", "acc_1", settings) if i.accepted], settings
         )

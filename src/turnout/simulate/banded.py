@@ -6,10 +6,24 @@ from turnout.simulate.compiled import kernel
 
 
 @kernel
-def factorise(upper, lower_rows, inverse_pivot):
+def factorise(upper: np.ndarray, lower_rows: np.ndarray, inverse_pivot: np.ndarray) -> float:
     """L D L^T of a symmetric matrix without pivoting; returns the growth max|l| (a large one means lost digits).
 
     ``upper`` (half + 1, n) holds the upper diagonals; ``lower_rows[i, k]`` becomes L[i, i - 1 - k].
+
+    Parameters
+    ----------
+    upper : (half + 1, n) array
+        Upper diagonals of the matrix: ``[k, j]`` is A[j, j + k].
+    lower_rows : (n, width) array
+        Overwritten with the rows of L: ``[i, k]`` is L[i, i - 1 - k].
+    inverse_pivot : (n,) array
+        Overwritten with the inverse of each element of D.
+
+    Returns
+    -------
+    float
+        Growth: the largest |l|.
     """
     half, n = upper.shape[0] - 1, upper.shape[1]
     growth = 0.0
@@ -31,8 +45,27 @@ def factorise(upper, lower_rows, inverse_pivot):
 
 
 @kernel
-def factorise4(a, lower, upper, inverse_pivot, n):
-    """The same for half bandwidth 4 at most, unrolled: ``a`` (5, n + 4) is overwritten, ``lower`` has n + 4 rows."""
+def factorise4(a: np.ndarray, lower: np.ndarray, upper: np.ndarray, inverse_pivot: np.ndarray, n: int) -> float:
+    """The same for half bandwidth 4 at most, unrolled: ``a`` (5, n + 4) is overwritten, ``lower`` has n + 4 rows.
+
+    Parameters
+    ----------
+    a : (5, n + 4) array
+        Upper diagonals, zero in the last 4 columns; overwritten.
+    lower : (n + 4, 4) array
+        Overwritten with the rows of L.
+    upper : (n, 4) array
+        Overwritten with the rows of L^T.
+    inverse_pivot : (n,) array
+        Overwritten with the inverse of each pivot.
+    n : int
+        Number of rows of the matrix.
+
+    Returns
+    -------
+    float
+        Growth: the largest root of the sum of squares of the factors of one row.
+    """
     growth = 0.0
     for i in range(n):
         inverse = 1.0 / a[0, i]
@@ -57,8 +90,25 @@ def factorise4(a, lower, upper, inverse_pivot, n):
 
 
 @kernel
-def upper_rows(lower_rows, n, half, width):
-    """Rows of L^T: ``out[i, k]`` is L[i + 1 + k, i]."""
+def upper_rows(lower_rows: np.ndarray, n: int, half: int, width: int) -> np.ndarray:
+    """Rows of L^T: ``out[i, k]`` is L[i + 1 + k, i].
+
+    Parameters
+    ----------
+    lower_rows : (n, width) array
+        Rows of L as ``factorise`` fills them: ``[i, k]`` is L[i, i - 1 - k].
+    n : int
+        Number of rows of the matrix.
+    half : int
+        Half bandwidth.
+    width : int
+        Columns of the result, at least ``half``.
+
+    Returns
+    -------
+    (n, width) array
+        Rows of L^T, 0 beyond the half bandwidth.
+    """
     out = np.zeros((n, width), dtype=lower_rows.dtype)
     for k in range(half):
         for i in range(n - 1 - k):
@@ -67,8 +117,26 @@ def upper_rows(lower_rows, n, half, width):
 
 
 @kernel
-def solve(lower_rows, upper, inverse_pivot, x, start, n):
-    """Solve in place for ``x[start:start+n]``; unrolled for four or six diagonals."""
+def solve(
+    lower_rows: np.ndarray, upper: np.ndarray, inverse_pivot: np.ndarray, x: np.ndarray, start: int, n: int
+) -> None:
+    """Solve in place for ``x[start:start+n]``; unrolled for four or six diagonals.
+
+    Parameters
+    ----------
+    lower_rows : (n, width) array
+        Rows of L as ``factorise`` fills them: ``[i, k]`` is L[i, i - 1 - k].
+    upper : (n, width) array
+        Rows of L^T from ``upper_rows``: ``[i, k]`` is L[i + 1 + k, i].
+    inverse_pivot : (n,) array
+        Inverse of each pivot.
+    x : (n_padded,) array
+        Right-hand side; overwritten with the solution.
+    start : int
+        Index in ``x`` of the first row.
+    n : int
+        Number of rows of the matrix.
+    """
     width = lower_rows.shape[1]
     segment = x[start : start + n]
     if width == 4:
@@ -80,7 +148,7 @@ def solve(lower_rows, upper, inverse_pivot, x, start, n):
 
 
 @kernel
-def _solve4(low, up, inverse_pivot, x, n):
+def _solve4(low: np.ndarray, up: np.ndarray, inverse_pivot: np.ndarray, x: np.ndarray, n: int) -> None:
     a = 0.0 * x[0]
     b, c, d = a, a, a
     for i in range(n):
@@ -96,7 +164,7 @@ def _solve4(low, up, inverse_pivot, x, n):
 
 
 @kernel
-def _solve6(low, up, inverse_pivot, x, n):
+def _solve6(low: np.ndarray, up: np.ndarray, inverse_pivot: np.ndarray, x: np.ndarray, n: int) -> None:
     a = 0.0 * x[0]
     b, c, d, e, f = a, a, a, a, a
     for i in range(n):
@@ -114,7 +182,7 @@ def _solve6(low, up, inverse_pivot, x, n):
 
 
 @kernel
-def _solve_any(low, up, inverse_pivot, x, n):
+def _solve_any(low: np.ndarray, up: np.ndarray, inverse_pivot: np.ndarray, x: np.ndarray, n: int) -> None:
     half = low.shape[1]
     for i in range(n):
         s = x[i]
@@ -129,8 +197,22 @@ def _solve_any(low, up, inverse_pivot, x, n):
 
 
 @kernel
-def multiply(diagonals, x, start, out, n):
-    """``out[:n]`` = matrix times ``x[start:start+n]``; ``diagonals`` (2 half + 1, n) from ``all_diagonals``."""
+def multiply(diagonals: np.ndarray, x: np.ndarray, start: int, out: np.ndarray, n: int) -> None:
+    """``out[:n]`` = matrix times ``x[start:start+n]``; ``diagonals`` (2 half + 1, n) from ``all_diagonals``.
+
+    Parameters
+    ----------
+    diagonals : (2 half + 1, n) array of float
+        All diagonals of the symmetric matrix.
+    x : (n_padded,) array of float
+        Vector with at least ``half`` entries before and after the part that is multiplied.
+    start : int
+        Index in ``x`` of the first row.
+    out : (n_out,) array of float
+        Its first ``n`` entries are overwritten with the product.
+    n : int
+        Number of rows of the matrix.
+    """
     count = diagonals.shape[0]
     near = x[start - count // 2 : start + n + count // 2]  # indices counted from 0 let the loop be vectorised
     if count == 9:
@@ -148,8 +230,40 @@ def multiply(diagonals, x, start, out, n):
 
 
 @kernel
-def momentum_minus_force(mass, stiffness, v, u, by_v, by_u, start, out, n):
-    """``out[start:start+n]`` = by_v M v - by_u K u, with all 9 diagonals in one pass."""
+def momentum_minus_force(
+    mass: np.ndarray,
+    stiffness: np.ndarray,
+    v: np.ndarray,
+    u: np.ndarray,
+    by_v: complex,
+    by_u: complex,
+    start: int,
+    out: np.ndarray,
+    n: int,
+) -> None:
+    """``out[start:start+n]`` = by_v M v - by_u K u, with all 9 diagonals in one pass.
+
+    Parameters
+    ----------
+    mass : (9, n) array of float
+        All diagonals of M. [kg]
+    stiffness : (9, n) array of float
+        All diagonals of K. [N/m]
+    v : (n_padded,) array of float
+        Velocity with 4 entries or more around the part that is used. [m/s]
+    u : (n_padded,) array of float
+        Displacement, padded like ``v``. [m]
+    by_v : complex
+        Factor of M v; real for the midpoint rule. [1/s]
+    by_u : complex
+        Factor of K u; real for the midpoint rule. [-]
+    start : int
+        Index of the first row in ``v``, ``u`` and ``out``.
+    out : (n_padded,) array
+        Overwritten from ``start`` on. [N]
+    n : int
+        Number of rows of the matrix.
+    """
     near_v, near_u, inner = v[start - 4 : start + n + 4], u[start - 4 : start + n + 4], out[start : start + n]
     for i in range(n):
         m = mass[0, i] * near_v[i] + mass[1, i] * near_v[i + 1] + mass[2, i] * near_v[i + 2]
@@ -162,11 +276,45 @@ def momentum_minus_force(mass, stiffness, v, u, by_v, by_u, start, out, n):
 
 
 @kernel
-def solve_from_both_ends(low, up, pivot, low_back, up_back, pivot_back, middle, x, start, n):
+def solve_from_both_ends(
+    low: np.ndarray,
+    up: np.ndarray,
+    pivot: np.ndarray,
+    low_back: np.ndarray,
+    up_back: np.ndarray,
+    pivot_back: np.ndarray,
+    middle: np.ndarray,
+    x: np.ndarray,
+    start: int,
+    n: int,
+) -> None:
     """Solve in place with four diagonals, eliminating from both ends to four rows in the middle.
 
     Two independent recurrences run in parallel, so that neither waits for the last product of the other.
     ``low_back`` ... are the factors of the reversed matrix, ``middle`` (4, 4) is the middle block of the inverse.
+
+    Parameters
+    ----------
+    low : (n, 4) array
+        Rows of L of the matrix.
+    up : (n, 4) array
+        Rows of L^T of the matrix.
+    pivot : (n,) array
+        Inverse pivots of the matrix.
+    low_back : (n, 4) array
+        Rows of L of the reversed matrix.
+    up_back : (n, 4) array
+        Rows of L^T of the reversed matrix.
+    pivot_back : (n,) array
+        Inverse pivots of the reversed matrix.
+    middle : (4, 4) array
+        Block of the inverse at the rows (n - 4) // 2 to (n - 4) // 2 + 3.
+    x : (n_padded,) array
+        Right-hand side; overwritten with the solution.
+    start : int
+        Index in ``x`` of the first row.
+    n : int
+        Number of rows of the matrix, at least 16.
     """
     segment = x[start : start + n]
     top = (n - 4) // 2
@@ -214,8 +362,21 @@ def solve_from_both_ends(low, up, pivot, low_back, up_back, pivot_back, middle, 
         segment[last - i] = t
 
 
-def all_diagonals(upper, half):
-    """(2 half + 1, n) diagonals of a symmetric matrix: ``out[k, i]`` is A[i, i + k - half]."""
+def all_diagonals(upper: np.ndarray, half: int) -> np.ndarray:
+    """(2 half + 1, n) diagonals of a symmetric matrix: ``out[k, i]`` is A[i, i + k - half].
+
+    Parameters
+    ----------
+    upper : (n_diagonal, n) array of float
+        Upper diagonals: ``[k, i]`` is A[i, i + k].
+    half : int
+        Half bandwidth of the result, at least n_diagonal - 1.
+
+    Returns
+    -------
+    (2 half + 1, n) array of float
+        Diagonal ``half`` is the main one; entries outside the matrix are 0.
+    """
     n = upper.shape[1]
     out = np.zeros((2 * half + 1, n))
     for k in range(upper.shape[0]):
@@ -225,8 +386,25 @@ def all_diagonals(upper, half):
 
 
 @kernel
-def inverse_windows(lower_rows, upper, inverse_pivot, reach):
-    """(n, 2 reach + 1) entries of the inverse near its diagonal: ``out[r, k]`` is inverse[r, r - reach + k]."""
+def inverse_windows(lower_rows: np.ndarray, upper: np.ndarray, inverse_pivot: np.ndarray, reach: int) -> np.ndarray:
+    """(n, 2 reach + 1) entries of the inverse near its diagonal: ``out[r, k]`` is inverse[r, r - reach + k].
+
+    Parameters
+    ----------
+    lower_rows : (n, width) array
+        Rows of L as ``factorise`` fills them: ``[i, k]`` is L[i, i - 1 - k].
+    upper : (n, width) array
+        Rows of L^T from ``upper_rows``: ``[i, k]`` is L[i + 1 + k, i].
+    inverse_pivot : (n,) array
+        Inverse of each pivot.
+    reach : int
+        Half width of the windows. [rows]
+
+    Returns
+    -------
+    (n, 2 reach + 1) array
+        Row r is computed as if the inverse were 0 beyond ``reach`` rows from r.
+    """
     n = lower_rows.shape[0]
     out = np.zeros((n, 2 * reach + 1), dtype=lower_rows.dtype)
     width = lower_rows.shape[1]

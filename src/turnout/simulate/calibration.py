@@ -1,6 +1,9 @@
 """Fit pads, ballast and damping of a section to measured receptances, and report what the data do not determine."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -10,7 +13,13 @@ from turnout.simulate.frequency_response import receptance_gradient
 from turnout.simulate.hammer import resolve_location
 from turnout.simulate.matrices import assemble
 from turnout.simulate.modal_calibration import with_section
-from turnout.simulate.turnout_track import stretch_of_track
+from turnout.simulate.turnout_track import TurnoutTrack, stretch_of_track
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from turnout.simulate.links import Link
+    from turnout.simulate.track import Track
 
 # Parameter -> (tag of the links, quantity of the links, relative sd of the prior, an estimate).
 PARAMETERS = {
@@ -54,27 +63,38 @@ class Calibration:
     """
 
     section: str
-    values: dict
-    sd: dict
+    values: dict[str, float]
+    sd: dict[str, float]
     covariance: np.ndarray
-    informed: dict
-    correlated: tuple
-    misfit: dict
-    misfit_before: dict
+    informed: dict[str, bool]
+    correlated: tuple[tuple[str, str], ...]
+    misfit: dict[tuple[float, float], float]
+    misfit_before: dict[tuple[float, float], float]
     reduced: float
     n: int
-    turnout: object
+    turnout: TurnoutTrack
 
     @property
     def is_adequate(self) -> bool:
         """Whether the model with these values fits the tests."""
         return self.reduced <= MAX_CHI_SQUARED
 
-    def is_determined(self, name) -> bool:
-        """Whether the tests determine a parameter, alone or together with another one."""
+    def is_determined(self, name: str) -> bool:
+        """Whether the tests determine a parameter, alone or together with another one.
+
+        Parameters
+        ----------
+        name : str
+            Key of ``PARAMETERS``.
+
+        Returns
+        -------
+        bool
+            True also if only a combination with another parameter is determined.
+        """
         return self.informed[name] or any(name in pair for pair in self.correlated)
 
-    def __str__(self):
+    def __str__(self) -> str:
         criterion = f"about 1: met within the errors; above {MAX_CHI_SQUARED:.0f}: not met"
         lines = [
             f"{self.section}: {self.n} numbers, chi-squared per degree of freedom {self.reduced:.2f} ({criterion})"
@@ -91,7 +111,15 @@ class Calibration:
         return "\n".join(lines)
 
 
-def calibrate(turnout, section, measured, location=None, parameters=tuple(PARAMETERS), model_sd=0.03, half_length=24.0):
+def calibrate(
+    turnout: TurnoutTrack,
+    section: str,
+    measured: Sequence[MeasuredReceptance],
+    location: str | float | None = None,
+    parameters: Sequence[str] = tuple(PARAMETERS),
+    model_sd: float = 0.03,
+    half_length: float = 24.0,
+) -> Calibration:
     r"""Maximum a posteriori fit of the parameters of one section to receptances; all its supports are equal.
 
     .. math:: \min_q \sum_i \frac{|H_i(q) - \hat H_i|^2}{\sigma_i^2 + n_i (\epsilon |\hat H_i|)^2}
@@ -112,11 +140,18 @@ def calibrate(turnout, section, measured, location=None, parameters=tuple(PARAME
     model_sd : float
         Relative error ε of the model. It is smooth in frequency: the :math:`n_i` lines within
         ``ERROR_BANDWIDTH`` octaves of a line share one error. So thousands of lines do not give certainty.
+    half_length : float
+        Half length of the stretch of track that is modelled. [m]
 
     Returns
     -------
     Calibration
         Gauss-Newton covariance at the optimum, in logarithms.
+
+    Raises
+    ------
+    SimulationError
+        Without a receptance, for a parameter that is not in ``PARAMETERS`` and for an unknown section or location.
 
     References
     ----------
@@ -131,7 +166,7 @@ def calibrate(turnout, section, measured, location=None, parameters=tuple(PARAME
     centre = np.log([max(getattr(track, name)[j], 1.0) for name in parameters])
     spread = np.array([PARAMETERS[name][2] for name in parameters])
 
-    def model(logs):
+    def model(logs: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         changed = with_section(turnout, section, **dict(zip(parameters, np.exp(logs))))
         _, base = resolve_location(changed, location if location is not None else section)
         return _model_receptances(stretch_of_track(base, position, half_length), section, parameters, measured)
@@ -161,14 +196,20 @@ def calibrate(turnout, section, measured, location=None, parameters=tuple(PARAME
     )
 
 
-def _residual(model, measured, model_sd, centre, spread):
+def _residual(
+    model: Callable[[np.ndarray], list[tuple[np.ndarray, np.ndarray]]],
+    measured: Sequence[MeasuredReceptance],
+    model_sd: float,
+    centre: np.ndarray,
+    spread: np.ndarray,
+) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
     """Function of the logarithms: residuals in standard errors, those of the prior last, and the Jacobian."""
     weights = [
         1.0 / np.sqrt(m.sd**2 + _n_correlated_lines(m.frequency) * (model_sd * np.abs(m.value)) ** 2) for m in measured
     ]
     cache: dict[bytes, tuple] = {}
 
-    def residual(logs):
+    def residual(logs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         key = logs.tobytes()
         if key not in cache:
             cache.clear()
@@ -186,7 +227,7 @@ def _residual(model, measured, model_sd, centre, spread):
     return residual
 
 
-def _chi_squared(measured, modelled, model_sd):
+def _chi_squared(measured: Sequence[MeasuredReceptance], modelled: Sequence[np.ndarray], model_sd: float) -> float:
     """Sum of squared residuals in standard errors of each line alone."""
     return float(
         sum(
@@ -196,13 +237,13 @@ def _chi_squared(measured, modelled, model_sd):
     )
 
 
-def _n_correlated_lines(frequency):
+def _n_correlated_lines(frequency: np.ndarray) -> np.ndarray:
     """(n,) number of lines that share the model error with each line, including itself."""
     octaves = np.log2(frequency)
     return np.sum(np.abs(octaves[:, None] - octaves) <= ERROR_BANDWIDTH / 2.0, axis=1)
 
 
-def _correlated_pairs(parameters, correlation):
+def _correlated_pairs(parameters: Sequence[str], correlation: np.ndarray) -> tuple[tuple[str, str], ...]:
     """Pairs of parameters that the data do not separate."""
     return tuple(
         (parameters[a], parameters[b])
@@ -212,11 +253,13 @@ def _correlated_pairs(parameters, correlation):
     )
 
 
-def _stack_real_imag(value):
+def _stack_real_imag(value: np.ndarray) -> np.ndarray:
     return np.concatenate([value.real, value.imag])
 
 
-def _model_receptances(track, section, parameters, measured):
+def _model_receptances(
+    track: Track, section: str, parameters: Sequence[str], measured: Sequence[MeasuredReceptance]
+) -> list[tuple[np.ndarray, np.ndarray]]:
     """Modelled receptance and its derivatives by the logarithm of each parameter, for each measured receptance."""
     matrices = assemble(track)
     inside = {j for j, name in enumerate(track.section) if name == section}
@@ -233,11 +276,11 @@ def _model_receptances(track, section, parameters, measured):
     return modelled
 
 
-def _support_of(link):
+def _support_of(link: Link) -> int:
     return next(name[1] for name, _ in link.ends if name[0] != "rail") if len(link.ends) > 1 else link.ends[0][0][1]
 
 
-def _misfit(measured, modelled):
+def _misfit(measured: Sequence[MeasuredReceptance], modelled: Sequence[np.ndarray]) -> dict[tuple[float, float], float]:
     """Relative rms misfit in each band that has lines."""
     table = {}
     for low, high in BANDS:

@@ -1,9 +1,16 @@
 """Compute the track decay rate in one-third octave bands from the receptance of a track."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.simulate.frequency_response import responses
+
+if TYPE_CHECKING:
+    from turnout.simulate.matrices import TrackMatrices
 
 # Distances of the impacts from the accelerometer [bays] after EN 15461:2008+A1, from memory, unverified. The sum is a
 # quadrature over x, so another grid that is as fine near the accelerometer changes it little.
@@ -12,7 +19,9 @@ DISTANCES = np.concatenate([np.arange(0.0, 2.0, 0.25), np.arange(2.0, 4.0, 0.5),
 BANDS = np.array([100, 125, 160, 200, 250, 315, 400, 500, 630, 800, 1000, 1250, 1600.0])
 
 
-def track_decay_rate(matrices, sensor_position, spacing, bands=BANDS, lines_per_band=8):
+def track_decay_rate(
+    matrices: TrackMatrices, sensor_position: float, spacing: float, bands: np.ndarray = BANDS, lines_per_band: int = 8
+) -> np.ndarray:
     r"""Vertical decay rate [dB/m] in each one-third octave band, (n_band,).
 
     .. math:: DR = \frac{4.343}{\sum_n |A(x_n)|^2 \, \Delta x_n / |A(x_0)|^2}
@@ -29,6 +38,16 @@ def track_decay_rate(matrices, sensor_position, spacing, bands=BANDS, lines_per_
         Centre frequencies [Hz].
     lines_per_band : int
         Frequencies whose squared responses are averaged in a band.
+
+    Returns
+    -------
+    (n_band,) array of float
+        Decay rate in each band, energy mean over its frequencies. [dB/m]
+
+    Raises
+    ------
+    SimulationError
+        Where the track ends before the farthest impact.
 
     References
     ----------

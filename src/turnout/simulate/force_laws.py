@@ -25,7 +25,7 @@ class PowerLaw:
     damping: float = 0.0
     law_code = POWER
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not (self.stiffness > 0.0 and self.exponent >= 1.0 and self.damping >= 0.0):
             raise SimulationError(
                 f"power law: stiffness {self.stiffness!r}, exponent {self.exponent!r}, "
@@ -33,21 +33,56 @@ class PowerLaw:
             )
 
     @property
-    def numbers(self):
+    def numbers(self) -> tuple[float, float, float]:
         """The three numbers of the law in the order in which the compiled march takes them."""
         return self.stiffness, self.exponent, self.damping
 
-    def force(self, d, rate=0.0):
-        """Force [N] at deformation ``d`` [m] and ``rate`` [m/s]."""
+    def force(self, d: float | np.ndarray, rate: float | np.ndarray = 0.0) -> np.ndarray:
+        """Force [N] at deformation ``d`` [m] and ``rate`` [m/s].
+
+        Parameters
+        ----------
+        d : float or array
+            Deformation, pressing positive. [m]
+        rate : float or array
+            Rate of deformation. [m/s]
+
+        Returns
+        -------
+        array
+            Force, never negative. [N]
+        """
         d = np.maximum(d, 0.0)
         return np.maximum(0.0, self.stiffness * d**self.exponent * (1.0 + self.damping * rate))
 
-    def tangent(self, load):
-        r"""Stiffness at a static ``load`` W, :math:`p\,k^{1/p} W^{1-1/p}` [N/m]."""
+    def tangent(self, load: float) -> float:
+        r"""Stiffness at a static ``load`` W, :math:`p\,k^{1/p} W^{1-1/p}` [N/m].
+
+        Parameters
+        ----------
+        load : float
+            Static load. [N]
+
+        Returns
+        -------
+        float
+            Stiffness. [N/m]
+        """
         return self.exponent * self.stiffness ** (1 / self.exponent) * load ** (1 - 1 / self.exponent)
 
-    def approach(self, load):
-        """Deformation under a static load [m]."""
+    def approach(self, load: float) -> float:
+        """Deformation under a static load [m].
+
+        Parameters
+        ----------
+        load : float
+            Static load. [N]
+
+        Returns
+        -------
+        float
+            Deformation. [m]
+        """
         return (load / self.stiffness) ** (1 / self.exponent)
 
 
@@ -61,12 +96,25 @@ class GapLaw:
     law_code = GAP
 
     @property
-    def numbers(self):
+    def numbers(self) -> tuple[float, float, float]:
         """The three numbers of the law in the order in which the compiled march takes them."""
         return self.stiffness, self.damping, self.onset
 
-    def force(self, d, rate=0.0):
-        """Force [N]."""
+    def force(self, d: float | np.ndarray, rate: float | np.ndarray = 0.0) -> np.ndarray:
+        """Force of the support.
+
+        Parameters
+        ----------
+        d : float or array
+            Deformation, pressing positive. [m]
+        rate : float or array
+            Rate of deformation. [m/s]
+
+        Returns
+        -------
+        array
+            Force, never negative. [N]
+        """
         d = np.asarray(d, dtype=float)
         onset = np.clip(d / self.onset, 0.0, 1.0)
         return np.where(d > 0.0, np.maximum(0.0, self.stiffness * d + self.damping * rate * onset), 0.0)
@@ -86,14 +134,27 @@ class TableLaw:
     law_code = TABLE
     numbers = (0.0, 0.0, 0.0)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if len(self.deformation) < 2 or np.any(np.diff(self.deformation) <= 0.0):
             raise SimulationError(f"table law: deformations must rise, got {self.deformation!r}.")
         if not len(self.deformation) == len(self.elastic) == len(self.viscous):
             raise SimulationError("table law: deformation, elastic and viscous differ in length.")
 
-    def force(self, d, rate=0.0):
-        """Force [N]."""
+    def force(self, d: float | np.ndarray, rate: float | np.ndarray = 0.0) -> np.ndarray:
+        """Force interpolated in the table.
+
+        Parameters
+        ----------
+        d : float or array
+            Deformation, pressing positive. [m]
+        rate : float or array
+            Rate of deformation. [m/s]
+
+        Returns
+        -------
+        array
+            Force. [N]
+        """
         x, f = np.asarray(self.deformation), np.asarray(self.elastic)
         d = np.asarray(d, dtype=float)
         k = np.clip(np.searchsorted(x, d, side="right") - 1, 0, x.size - 2)
@@ -111,12 +172,25 @@ class LinearLaw:
     law_code = LINEAR
 
     @property
-    def numbers(self):
+    def numbers(self) -> tuple[float, float, float]:
         """The three numbers of the law in the order in which the compiled march takes them."""
         return self.stiffness, self.damping, self.preload
 
-    def force(self, d, rate=0.0):
-        """Force [N]."""
+    def force(self, d: float | np.ndarray, rate: float | np.ndarray = 0.0) -> np.ndarray:
+        """Force of spring, damper and static load.
+
+        Parameters
+        ----------
+        d : float or array
+            Deformation, pressing positive. [m]
+        rate : float or array
+            Rate of deformation. [m/s]
+
+        Returns
+        -------
+        array
+            Force, including the static load. [N]
+        """
         return self.preload + self.stiffness * np.asarray(d) + self.damping * np.asarray(rate)
 
 
@@ -129,12 +203,25 @@ class FrictionLaw:
     law_code = FRICTION
 
     @property
-    def numbers(self):
+    def numbers(self) -> tuple[float, float, float]:
         """The three numbers of the law in the order in which the compiled march takes them."""
         return self.limit, self.slip_rate, 0.0
 
-    def force(self, d, rate=0.0):
-        """Force [N]."""
+    def force(self, d: float | np.ndarray, rate: float | np.ndarray = 0.0) -> np.ndarray:
+        """Friction force.
+
+        Parameters
+        ----------
+        d : float or array
+            Only its shape matters. [m]
+        rate : float or array
+            Rate of deformation. [m/s]
+
+        Returns
+        -------
+        array
+            Force against the motion, at most ``limit``. [N]
+        """
         return self.limit * np.tanh(np.asarray(rate) / self.slip_rate) + 0.0 * np.asarray(d)
 
 
@@ -151,13 +238,29 @@ class LiftLaw:
     law_code = LIFT
 
     @property
-    def numbers(self):
+    def numbers(self) -> tuple[float, float, float]:
         """The three numbers of the law in the order in which the compiled march takes them."""
         return self.stiffness, self.damping, self.load
 
-    def force(self, d, rate=0.0):
-        """Force [N]."""
+    def force(self, d: float | np.ndarray, rate: float | np.ndarray = 0.0) -> np.ndarray:
+        """Tensile force that the lifted support does not transmit.
+
+        Parameters
+        ----------
+        d : float or array
+            Deformation from the static state, pressing positive. [m]
+        rate : float or array
+            Rate of deformation. [m/s]
+
+        Returns
+        -------
+        array
+            Force, 0 while the support presses. [N]
+        """
         return np.maximum(0.0, -(self.load + self.stiffness * np.asarray(d) + self.damping * np.asarray(rate)))
+
+
+ForceLaw = PowerLaw | GapLaw | TableLaw | LinearLaw | FrictionLaw | LiftLaw
 
 
 @dataclass(frozen=True)
@@ -169,6 +272,6 @@ class Port:
     """
 
     ends: tuple
-    law: object
+    law: ForceLaw
     gap: float = 0.0
     label: str = "port"

@@ -1,5 +1,9 @@
 """Compute the receptance of a track in the frequency domain, and its gradient by the parameters of the track."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from turnout.errors import SimulationError
@@ -7,11 +11,27 @@ from turnout.simulate.banded import factorise, factorise4, solve, upper_rows
 from turnout.simulate.compiled import kernel
 from turnout.simulate.matrices import link_vector
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from turnout.simulate.links import Link
+    from turnout.simulate.matrices import TrackMatrices
+
 GROWTH_LIMIT = 1e6  # largest factor without pivoting: above it six digits are lost, so solve with pivoting
 
 
 @kernel
-def _solve_lines(mass, damping, stiffness, hysteresis, omega, right, selected, width, out):
+def _solve_lines(
+    mass: np.ndarray,
+    damping: np.ndarray,
+    stiffness: np.ndarray,
+    hysteresis: np.ndarray,
+    omega: np.ndarray,
+    right: np.ndarray,
+    selected: np.ndarray,
+    width: int,
+    out: np.ndarray,
+) -> float:
     """Rows ``selected`` for all lines and right-hand sides in ``out[line, k]``; returns the largest factor."""
     half, n = mass.shape[0] - 1, mass.shape[1]
     system = np.zeros((width + 1, n + 4), dtype=np.complex128)
@@ -39,7 +59,7 @@ def _solve_lines(mass, damping, stiffness, hysteresis, omega, right, selected, w
     return worst
 
 
-def _solve_pivoted(matrices, omega, right):
+def _solve_pivoted(matrices: TrackMatrices, omega: np.ndarray, right: np.ndarray) -> np.ndarray:
     from scipy.linalg import solve_banded
 
     half, n = matrices.half, matrices.n
@@ -54,12 +74,41 @@ def _solve_pivoted(matrices, omega, right):
     return out
 
 
-def responses(matrices, frequency, points, rows=None, pivoted=False):
+def responses(
+    matrices: TrackMatrices,
+    frequency: np.ndarray | Sequence[float] | float,
+    points: Sequence[float | tuple],
+    rows: np.ndarray | Sequence[int] | None = None,
+    pivoted: bool = False,
+) -> np.ndarray:
     r"""(n_line, n_point, n) complex displacement of all degrees of freedom, or of ``rows``, under unit forces.
 
     ``points`` are positions (rail at x [m]) or names of degrees of freedom. ``frequency`` [Hz] may be 0. A complex one,
     :math:`f - i \sigma / 2 \pi`, is that of signals weighted by :math:`e^{-\sigma t}` (Laplace transform).
     It solves without pivoting unless a factor exceeds 1e6 or ``pivoted`` is set.
+
+    Parameters
+    ----------
+    matrices : TrackMatrices
+        Matrices of the track.
+    frequency : (n_line,) array of float or complex
+        Not negative. [Hz]
+    points : sequence of float or tuple
+        Points of the unit forces.
+    rows : (n_row,) array of int or None
+        Degrees of freedom to return; None: all.
+    pivoted : bool
+        Solve with pivoting.
+
+    Returns
+    -------
+    (n_line, n_point, n_row) array of complex
+        Displacement, down positive. [m/N]
+
+    Raises
+    ------
+    SimulationError
+        For a negative frequency or one that is not a number.
     """
     omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequency, dtype=complex))
     if not (np.all(np.isfinite(omega)) and np.all(omega.real >= 0.0)):
@@ -78,11 +127,34 @@ def responses(matrices, frequency, points, rows=None, pivoted=False):
     return _solve_pivoted(matrices, omega, right)[:, :, selected]
 
 
-def receptance(matrices, frequency, excited, measured):
+def receptance(
+    matrices: TrackMatrices, frequency: np.ndarray | Sequence[float], excited: float | tuple, measured: float | tuple
+) -> np.ndarray:
     r"""Receptance :math:`H = b_m^T (K + iH_s + i\omega C - \omega^2 M)^{-1} b_e` [m/N], (n_frequency,).
 
     ``excited`` and ``measured`` are positions on the rail [m] or names of degrees of freedom. If both are in one rail
     element its local compliance is added, so that both may lie between nodes.
+
+    Parameters
+    ----------
+    matrices : TrackMatrices
+        Matrices of the track.
+    frequency : (n_frequency,) array of float
+        May be 0. [Hz]
+    excited : float or tuple
+        Point of the force.
+    measured : float or tuple
+        Point of the displacement.
+
+    Returns
+    -------
+    (n_frequency,) array of complex
+        Receptance. [m/N]
+
+    Raises
+    ------
+    SimulationError
+        For a negative frequency and for a point that the track does not have.
 
     References
     ----------
@@ -107,14 +179,20 @@ def receptance(matrices, frequency, excited, measured):
     return h + _element_compliance(matrices, excited, measured)
 
 
-def _element_compliance(matrices, excited, measured):
+def _element_compliance(matrices: TrackMatrices, excited: float | tuple, measured: float | tuple) -> float:
     """Compliance between two positions in one rail element, which the motion of the nodes does not include [m/N]."""
     if isinstance(excited, tuple) or isinstance(measured, tuple):
         return 0.0
     return matrices.compliance(float(excited), float(measured))
 
 
-def receptance_gradient(matrices, frequency, excited, measured, parameters):
+def receptance_gradient(
+    matrices: TrackMatrices,
+    frequency: np.ndarray,
+    excited: float | tuple,
+    measured: float | tuple,
+    parameters: Sequence[tuple[str, Sequence[Link]]],
+) -> tuple[np.ndarray, np.ndarray]:
     r"""Receptance and its derivatives by stiffness, damping or mass of links.
 
     .. math:: \partial H / \partial p = -u_m^T (\partial Z / \partial p) u_e
@@ -142,7 +220,7 @@ def receptance_gradient(matrices, frequency, excited, measured, parameters):
     h = point_responses[:, 0][:, rows] @ weights + _element_compliance(matrices, excited, measured)
     gradient = np.zeros((omega.size, len(parameters)), dtype=complex)
     for k, (quantity, links) in enumerate(parameters):
-        factor = {"stiffness": -1.0 + 0.0 * omega, "damping": -1j * omega, "mass": omega**2}.get(quantity)
+        factor: Any = {"stiffness": -1.0 + 0.0 * omega, "damping": -1j * omega, "mass": omega**2}.get(quantity)
         for link in links:
             link_rows, weight = link_vector(link, matrices.index)
             product = (point_responses[:, 0][:, link_rows] @ weight) * (point_responses[:, 1][:, link_rows] @ weight)

@@ -1,7 +1,12 @@
 """Simulate a hammer test: impacts of an instrumented hammer on the rail, as recordings like measured ones."""
 
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from datetime import datetime
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, overload
 
 import numpy as np
 
@@ -9,11 +14,16 @@ from turnout.errors import SimulationError
 from turnout.records import Recording
 from turnout.simulate.force_laws import PowerLaw
 from turnout.simulate.links import terms_on_stretch
-from turnout.simulate.preparation import prepare
-from turnout.simulate.run import Drive, run
+from turnout.simulate.preparation import Prepared, prepare
+from turnout.simulate.run import Drive, Pulse, run
 from turnout.simulate.sensor import Sensor, actual_sensor, mean_of, record_signal
+from turnout.simulate.track import Track
 from turnout.simulate.turnout_track import TurnoutTrack, stretch_of_track, supports_within
 from turnout.simulate.vehicle import lone_wheels
+
+if TYPE_CHECKING:
+    from turnout.physics.term import PhysicsTerm
+    from turnout.simulate.run import Probe
 
 # Stiffness of the plastic tip: it gives a contact of 1.2 to 1.5 ms on ballasted track, as the paper's band of 800 Hz
 # needs; an estimate, sd 30 %.
@@ -50,32 +60,58 @@ class ImpactTruth(NamedTuple):
     peak_force: float
 
 
-def hammer_sensors(location, spacing=0.6):
-    """The two accelerometers of a test at ``location`` [m]: on the rail head at the sleeper and at mid-span."""
+def hammer_sensors(location: float, spacing: float = 0.6) -> tuple[Sensor, Sensor]:
+    """The two accelerometers of a test at ``location`` [m]: on the rail head at the sleeper and at mid-span.
+
+    Parameters
+    ----------
+    location : float
+        Position of the sleeper. [m]
+    spacing : float
+        Distance of two sleepers. [m]
+
+    Returns
+    -------
+    (Sensor, Sensor)
+        Both measure acceleration; their noise, limit and resolution are estimates.
+    """
     head = Sensor("acc_1", location, "rail head at sleeper", noise=0.05, limit=5e3, resolution=0.01)
     return head, replace(head, name="acc_2", place=location + 0.5 * spacing, mounting="rail head mid-span")
 
 
+@overload
 def simulate_hammer(
-    track,
-    location,
-    hammer=None,
-    sensors=None,
-    n_blows=10,
-    terms=(),
-    seed=0,
-    rate=20e3,
-    duration=0.5,
-    pretrigger=0.05,
-    substeps=1,
-    half_length=30.0,
-    pulse=None,
-    started_at=None,
-    conditions=None,
-    prepared=None,
-    scheme="radau",
-    truth=False,
-):
+    track: Track | TurnoutTrack, location: float | str, *arguments: Any, truth: Literal[True], **options: Any
+) -> tuple[tuple[Recording, ...], tuple[ImpactTruth, ...]]: ...
+
+
+@overload
+def simulate_hammer(
+    track: Track | TurnoutTrack, location: float | str, *arguments: Any, truth: Literal[False] = False, **options: Any
+) -> tuple[Recording, ...]: ...
+
+
+def simulate_hammer(  # type: ignore[misc]  # the overloads stand for any of the options
+    track: Track | TurnoutTrack,
+    location: float | str,
+    hammer: Hammer | None = None,
+    sensors: Sequence[Sensor] | None = None,
+    n_impacts: int = 10,
+    terms: Sequence[PhysicsTerm] = (),
+    seed: int | Sequence[int] = 0,
+    rate: float = 20e3,
+    duration: float = 0.5,
+    pretrigger: float = 0.05,
+    substeps: int = 1,
+    half_length: float = 30.0,
+    pulse: Pulse | None = None,
+    started_at: datetime | None = None,
+    conditions: Mapping[str, Any] | None = None,
+    prepared: Prepared | None = None,
+    scheme: str = "radau",
+    truth: bool = False,
+    n_blows: int | None = None,
+) -> tuple[Recording, ...] | tuple[tuple[Recording, ...], tuple[ImpactTruth, ...]]:
     """Recordings of a hammer test, one per impact; channel 0 is the force [N], down positive like the accelerations.
 
     Parameters
@@ -88,7 +124,7 @@ def simulate_hammer(
         Mass, tip and speed; by default 5.5 kg with a plastic tip.
     sensors : sequence of Sensor
         By default ``hammer_sensors(location)``.
-    n_blows : int
+    n_impacts : int
         Number of impacts, each with its own speed and position.
     terms : sequence of PhysicsTerm
         Effects added to the base model; their support numbers are those of the whole track.
@@ -98,29 +134,45 @@ def simulate_hammer(
         Sampling rate [Hz], duration [s] and time before the impact [s] of each recording.
     substeps : int
         Time steps per sample.
-    truth : bool
-        Return (recordings, tuple of ``ImpactTruth``), one of each per impact.
+    half_length : float
+        Length of track on both sides of the impact. [m]
     pulse : callable or None
         A given force [N] of time [s] instead of the hammer's mass and tip.
+    started_at : datetime or None
+        Start time that the recordings state.
+    conditions : mapping or None
+        Further conditions that the recordings state.
     prepared : Prepared
         Result of ``prepare_hammer`` with this rate, to share one factorisation; its terms and scheme are used.
+    scheme : str
+        Name of the integration scheme: "radau", "gauss" or "midpoint".
+    truth : bool
+        Return (recordings, tuple of ``ImpactTruth``), one of each per impact.
+    n_blows : int or None
+        Former name of ``n_impacts``; kept for one release.
 
     Returns
     -------
     tuple of Recording
         Of kind "hammer". Force and acceleration are means over the same step, so their ratio has no delay.
 
-    Errors: SimulationError for a position outside the track and a track prepared for another rate.
+    Raises
+    ------
+    SimulationError
+        For a position outside the track and a track prepared for another rate.
 
     Examples
     --------
     The impulse is between one and two times mass times speed, as the hammer bounces:
 
     >>> from turnout.simulate.track import uniform_track
-    >>> blow = simulate_hammer(uniform_track(30.0), 15.0, Hammer(velocity_spread=0.0), n_blows=1)[0]
+    >>> blow = simulate_hammer(uniform_track(30.0), 15.0, Hammer(velocity_spread=0.0), n_impacts=1)[0]
     >>> bool(1.0 < blow.signal("hammer").sum() / blow.rate / (5.5 * 1.2) < 2.0)
     True
     """
+    if n_blows is not None:
+        warnings.warn("simulate_hammer(n_blows=...) is now n_impacts=...", DeprecationWarning, stacklevel=2)
+        n_impacts = n_blows
     hammer, impacts = hammer or Hammer(), []
     position, _ = resolve_location(track, location)
     sensors = hammer_sensors(position) if sensors is None else tuple(sensors)
@@ -131,7 +183,7 @@ def simulate_hammer(
     channels = (replace(hammer.force, place=position), *sensors)
     channel_terms = [term for term in prepared.terms if term.effect_type == "channel"]
     recordings = []
-    for record in range(n_blows):
+    for record in range(n_impacts):
         velocity = hammer.velocity * np.exp(hammer.velocity_spread * rng.normal())
         impact_position = position + hammer.position_spread * float(np.clip(rng.normal(), -2.0, 2.0))
         clean = _simulate_impact(prepared, hammer, velocity, impact_position, probes, duration - pretrigger, pulse)
@@ -158,8 +210,44 @@ def simulate_hammer(
     return (tuple(recordings), tuple(impacts)) if truth else tuple(recordings)
 
 
-def prepare_hammer(track, location, terms=(), rate=20e3, substeps=1, half_length=30.0, scheme="radau"):
-    """Factorisation for hammer tests near ``location``, a position [m] or a name."""
+def prepare_hammer(
+    track: Track | TurnoutTrack,
+    location: float | str,
+    terms: Sequence[PhysicsTerm] = (),
+    rate: float = 20e3,
+    substeps: int = 1,
+    half_length: float = 30.0,
+    scheme: str = "radau",
+) -> Prepared:
+    """Factorisation for hammer tests near ``location``, a position [m] or a name.
+
+    Parameters
+    ----------
+    track : Track or TurnoutTrack
+        The whole track.
+    location : float or str
+        Position of the impacts [m], or the name of a location of the turnout.
+    terms : sequence of PhysicsTerm
+        Effects added to the base model, with the support numbers of the whole track.
+    rate : float
+        Sampling rate. [Hz]
+    substeps : int
+        Time steps per sample.
+    half_length : float
+        Length of track on both sides of the impact. [m]
+    scheme : str
+        Name of the integration scheme.
+
+    Returns
+    -------
+    Prepared
+        The stretch of track around the location, factorised.
+
+    Raises
+    ------
+    SimulationError
+        For an unknown location, a position with less than three supports around it and a track that carries no load.
+    """
     position, base = resolve_location(track, location)
     stretch, terms = (
         stretch_of_track(base, position, half_length),
@@ -168,19 +256,45 @@ def prepare_hammer(track, location, terms=(), rate=20e3, substeps=1, half_length
     return prepare(stretch, 1.0 / (rate * substeps), scheme, terms)
 
 
-def resolve_location(track, location):
-    """Position [m] and track of a named location, or of a position on the first route."""
+def resolve_location(track: Track | TurnoutTrack, location: float | str) -> tuple[float, Track]:
+    """Position [m] and track of a named location, or of a position on the first route.
+
+    Parameters
+    ----------
+    track : Track or TurnoutTrack
+        The whole track.
+    location : float or str
+        Position [m], or the name of a location of the turnout.
+
+    Returns
+    -------
+    (float, Track)
+        Position [m] and the track of its route.
+
+    Raises
+    ------
+    SimulationError
+        For a name that the turnout does not have.
+    """
     base = track.track if isinstance(track, TurnoutTrack) else track
     if not isinstance(location, str):
         return float(location), base
-    locations = getattr(track, "locations", {})
-    if location not in locations:
-        raise SimulationError(f"no location {location!r}; there are {', '.join(locations) or 'none'}.")
-    position, route = locations[location]
+    if not isinstance(track, TurnoutTrack) or location not in track.locations:
+        names = ", ".join(track.locations) if isinstance(track, TurnoutTrack) else ""
+        raise SimulationError(f"no location {location!r}; there are {names or 'none'}.")
+    position, route = track.locations[location]
     return float(position), track.track_of(route)
 
 
-def _simulate_impact(prepared, hammer, velocity, position, probes, duration, pulse):
+def _simulate_impact(
+    prepared: Prepared,
+    hammer: Hammer,
+    velocity: float,
+    position: float,
+    probes: Sequence[Probe],
+    duration: float,
+    pulse: Pulse | None,
+) -> np.ndarray:
     """(1 + n_probe, n_step) force on the rail and true signals of one impact."""
     if pulse is not None:
         outcome = run(prepared, duration, probes, pulses=[(position, pulse)])

@@ -1,12 +1,28 @@
 """Closed forms of infinite tracks: beam on a Winkler foundation, and Floquet's solution on discrete supports."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy.linalg import expm
 
 from turnout.errors import SimulationError
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
-def winkler_receptance(frequency, bending_stiffness, mass, stiffness, damping=0.0):
+    from turnout.simulate.rail import Rail
+    from turnout.simulate.track import Track
+
+
+def winkler_receptance(
+    frequency: np.ndarray | Sequence[float],
+    bending_stiffness: float,
+    mass: float,
+    stiffness: float,
+    damping: float = 0.0,
+) -> np.ndarray:
     r"""Point receptance of an infinite Euler-Bernoulli beam on an elastic foundation [m/N].
 
     .. math:: H = \frac{1}{8 EI \beta^3}, \qquad \beta = \Bigl(\frac{k + i\omega c - m\omega^2}{4 EI}\Bigr)^{1/4}
@@ -17,6 +33,11 @@ def winkler_receptance(frequency, bending_stiffness, mass, stiffness, damping=0.
         [Hz]
     bending_stiffness, mass, stiffness, damping : float
         EI [N m²], m [kg/m], k [N/m²], c [N s/m²].
+
+    Returns
+    -------
+    (n,) array of complex
+        Receptance. [m/N]
 
     References
     ----------
@@ -36,11 +57,26 @@ def winkler_receptance(frequency, bending_stiffness, mass, stiffness, damping=0.
     return 1.0 / (8.0 * bending_stiffness * beta**3)
 
 
-def support_stiffness(frequency, track, support=0):
-    """(n,) complex dynamic stiffness under the rail of one support of ``track`` [N/m]."""
+def support_stiffness(frequency: np.ndarray | Sequence[float], track: Track, support: int = 0) -> np.ndarray:
+    """(n,) complex dynamic stiffness under the rail of one support of ``track`` [N/m].
+
+    Parameters
+    ----------
+    frequency : (n,) array of float
+        Frequencies. [Hz]
+    track : Track
+        The track.
+    support : int
+        Number of the support.
+
+    Returns
+    -------
+    (n,) array of complex
+        Force per displacement of the rail at the support. [N/m]
+    """
     omega = 2.0 * np.pi * np.asarray(frequency, dtype=float)
 
-    def spring(name):
+    def spring(name: str) -> np.ndarray:
         k, c = getattr(track, f"{name}_stiffness")[support], getattr(track, f"{name}_damping")[support]
         loss = getattr(track, f"{name}_loss_factor")[support] if name != "subgrade" else 0.0
         return k * (1.0 + 1j * loss) + 1j * omega * c
@@ -56,7 +92,7 @@ def support_stiffness(frequency, track, support=0):
     return pad * below / (pad + below)
 
 
-def _beam_matrix(omega, rail):
+def _beam_matrix(omega: float, rail: Rail) -> np.ndarray:
     """First-order system of the rail's state (w, rotation, moment, shear) along x."""
     shear = 0.0 if rail.beam == "euler" else 1.0 / rail.shear_stiffness
     rotary = 0.0 if rail.beam == "euler" else rail.rotary_inertia
@@ -65,7 +101,7 @@ def _beam_matrix(omega, rail):
     return np.array([[0, 1, 0, shear], [0, 0, 1 / rail.bending_stiffness, 0], [0, spin, 0, -1], [push, 0, 0, 0]])
 
 
-def _bay_transfer(omega, rail, spacing, support):
+def _bay_transfer(omega: float, rail: Rail, spacing: float, support: complex) -> tuple[np.ndarray, np.ndarray]:
     """Multipliers and vectors of the transfer from one support to the next, the decaying ones first."""
     across = expm(_beam_matrix(omega, rail) * spacing)
     jump = np.eye(4, dtype=complex)
@@ -75,7 +111,9 @@ def _bay_transfer(omega, rail, spacing, support):
     return multiplier[order], vector[:, order]
 
 
-def floquet_receptance(frequency, track, offset=0.0, distance=0):
+def floquet_receptance(
+    frequency: np.ndarray | Sequence[float], track: Track, offset: float = 0.0, distance: int = 0
+) -> np.ndarray:
     """Receptance of the infinite periodic track of which ``track`` has one bay [m/N], (n,).
 
     Parameters
@@ -88,6 +126,16 @@ def floquet_receptance(frequency, track, offset=0.0, distance=0):
         Distance of the force from the support before it [m], from 0 to below the spacing.
     distance : int
         Bays from the force to the response, which is at the same offset in its bay.
+
+    Returns
+    -------
+    (n,) array of complex
+        Receptance. [m/N]
+
+    Raises
+    ------
+    SimulationError
+        For an offset outside the bay.
 
     References
     ----------
@@ -108,11 +156,23 @@ def floquet_receptance(frequency, track, offset=0.0, distance=0):
     return receptance
 
 
-def propagation(frequency, track):
+def propagation(frequency: np.ndarray | Sequence[float], track: Track) -> np.ndarray:
     r"""Wavenumbers of the two waves that propagate away from a force on the infinite periodic track.
 
-    Floquet's multiplier of a bay is :math:`e^{-i\kappa L}`. Returns (n, 2) complex κ [rad/m], the less damped wave
-    first. The real part is in the first Brillouin zone, the decay is -8.686 Im κ [dB/m].
+    Floquet's multiplier of a bay is :math:`e^{-i\kappa L}`. The real part of κ is in the first Brillouin zone; the
+    decay is -8.686 Im κ [dB/m].
+
+    Parameters
+    ----------
+    frequency : (n,) array of float
+        Above 0; the track must have damping. [Hz]
+    track : Track
+        Its rail, first support and spacing are used.
+
+    Returns
+    -------
+    (n, 2) array of complex
+        Wavenumber κ of both waves, the less damped one first. [rad/m]
     """
     spacing = float(track.support[1] - track.support[0])
     stiffness = support_stiffness(frequency, track)
@@ -123,13 +183,27 @@ def propagation(frequency, track):
     return wavenumber
 
 
-def pinned_pinned_frequency(rail, spacing):
+def pinned_pinned_frequency(rail: Rail, spacing: float) -> float:
     r"""First pinned-pinned resonance [Hz]: half a wave of the free rail between two supports.
 
     Timoshenko: the lower root of :math:`a\omega^4 - b\omega^2 + c = 0` with
     :math:`a = \rho I m/\kappa GA,\ b = m + mB^2EI/\kappa GA + \rho I B^2,\ c = EI B^4,\ B = \pi/L`;
     Euler-Bernoulli: :math:`\frac{\pi}{2L^2}\sqrt{EI/m}`.
 
+    Parameters
+    ----------
+    rail : Rail
+        Profile of the rail.
+    spacing : float
+        Distance of two supports. [m]
+
+    Returns
+    -------
+    float
+        Frequency. [Hz]
+
+    Examples
+    --------
     >>> from turnout.simulate.rail import Rail
     >>> rail = Rail(6.4155e6, 60.21, 0.4 * 81e9 * 76.7e-4, 7850 * 3.055e-5)
     >>> f"{pinned_pinned_frequency(rail, 0.6):.0f} Hz"

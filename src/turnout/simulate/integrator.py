@@ -40,15 +40,36 @@ class Scheme:
     scale: float
 
 
-def _to_real(value) -> complex:
+def _to_real(value: complex) -> float:
     return float(np.real(value))
 
 
-def scheme(name):
+def scheme(name: str) -> Scheme:
     """Scheme called "radau" (2 stages, order 3, L-stable), "gauss" (2 stages, order 4) or "midpoint".
 
     Source: Hairer and Wanner 1996, Solving ordinary differential equations II, IV.5 and IV.8.
 
+    Parameters
+    ----------
+    name : str
+        Key of ``TABLEAUX``.
+
+    Returns
+    -------
+    Scheme
+        Its coefficients, diagonalised.
+
+    Raises
+    ------
+    SimulationError
+        For a name that is not in ``TABLEAUX``.
+
+    References
+    ----------
+    Hairer and Wanner 1996, Solving ordinary differential equations II, IV.5 and IV.8.
+
+    Examples
+    --------
     >>> radau = scheme("radau")
     >>> f"{radau.rate:.6f}, w0 = {radau.weight:.6f}, end of step: δ = {abs(radau.delta):.3f}, R = {radau.carry:.0f}"
     '2.000000+1.414214j, w0 = 0.500000+1.414214j, end of step: δ = 1.000, R = 0'

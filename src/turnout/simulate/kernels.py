@@ -7,8 +7,35 @@ from turnout.simulate.force_laws import FRICTION, GAP, LIFT, LINEAR, POWER
 
 
 @kernel
-def law_force(law_code, numbers, i, table, first, last, d, rate):
-    """Force of a law with its numbers in row ``i``, and its derivatives by deformation and by rate."""
+def law_force(
+    law_code: int, numbers: np.ndarray, i: int, table: np.ndarray, first: int, last: int, d: float, rate: float
+) -> tuple[float, float, float]:
+    """Force of a law with its numbers in row ``i``, and its derivatives by deformation and by rate.
+
+    Parameters
+    ----------
+    law_code : int
+        One of the codes of ``turnout.simulate.force_laws``.
+    numbers : (n_port, 3) array of float
+        Numbers of the laws.
+    i : int
+        Row of the port.
+    table : (3, n_table) array of float
+        Deformation [m], elastic force [N] and viscous factor [N s/m] of all table laws.
+    first : int
+        First column of the port in ``table``.
+    last : int
+        Column after its last one.
+    d : float
+        Deformation, pressing positive. [m]
+    rate : float
+        Rate of deformation. [m/s]
+
+    Returns
+    -------
+    (float, float, float)
+        Force [N], its derivative by deformation [N/m] and by rate [N s/m].
+    """
     if law_code == POWER:
         if d <= 0.0:
             return 0.0, 0.0, 0.0
@@ -47,8 +74,27 @@ def law_force(law_code, numbers, i, table, first, last, d, rate):
 
 
 @kernel
-def path_at(path, path_index, start, step, x):
-    """Dip of path ``path_index`` at ``x``; constant beyond the ends of its grid."""
+def path_at(path: np.ndarray, path_index: int, start: float, step: float, x: float) -> float:
+    """Dip of path ``path_index`` at ``x``; constant beyond the ends of its grid.
+
+    Parameters
+    ----------
+    path : (n_path, n_piece, 4) array of float
+        Cubic coefficients, the highest power first.
+    path_index : int
+        Number of the path.
+    start : float
+        Position of the first piece. [m]
+    step : float
+        Length of a piece. [m]
+    x : float
+        Position of the wheel. [m]
+
+    Returns
+    -------
+    float
+        Dip, down positive. [m]
+    """
     grid_position = (x - start) / step
     k = min(max(int(np.floor(grid_position)), 0), path.shape[1] - 1)
     r = min(max(grid_position - k, 0.0), 1.0)
@@ -58,8 +104,23 @@ def path_at(path, path_index, start, step, x):
 
 
 @kernel
-def ramp_at(ramp, stand_in, x):
-    """Share (r, q) of the modelled track and of the stand-in, r² + q² = 1."""
+def ramp_at(ramp: np.ndarray, stand_in: bool, x: float) -> tuple[float, float]:
+    """Share (r, q) of the modelled track and of the stand-in, r² + q² = 1.
+
+    Parameters
+    ----------
+    ramp : (4,) array of float
+        Positions where the share of the modelled track starts to rise, is 1, starts to fall and is 0. [m]
+    stand_in : bool
+        Whether there are stand-in tracks; without them the shares are 1 and 0.
+    x : float
+        Position of the wheel. [m]
+
+    Returns
+    -------
+    (float, float)
+        Share of the modelled track and of the stand-in, each 0 to 1.
+    """
     if not stand_in:
         return 1.0, 0.0
     entry_ramp = (x - ramp[0]) / (ramp[1] - ramp[0])
@@ -74,8 +135,51 @@ def ramp_at(ramp, stand_in, x):
 
 
 @kernel
-def rail_weights(node, node_row, shear_ratio, flexible, shear_flexible, e, x, share, k, rows, weights):
-    """Fill row ``k`` of rows and weights of the rail at ``x`` in element ``e``; returns its local compliance."""
+def rail_weights(
+    node: np.ndarray,
+    node_row: np.ndarray,
+    shear_ratio: np.ndarray,
+    flexible: np.ndarray,
+    shear_flexible: np.ndarray,
+    e: int,
+    x: float,
+    share: float,
+    k: int,
+    rows: np.ndarray,
+    weights: np.ndarray,
+) -> float:
+    """Fill row ``k`` of rows and weights of the rail at ``x`` in element ``e``; returns its local compliance.
+
+    Parameters
+    ----------
+    node : (n_node,) array of float
+        Positions of the nodes. [m]
+    node_row : (n_node,) array of int
+        Row of the deflection of each node; its rotation is the next row.
+    shear_ratio : (n_element,) array of float
+        Shear ratio P of each element. [-]
+    flexible : (n_element,) array of float
+        1 / EI. [1/(N m²)]
+    shear_flexible : (n_element,) array of float
+        1 / κGA, 0 for an Euler-Bernoulli beam. [1/N]
+    e : int
+        Element that holds ``x``.
+    x : float
+        Position. [m]
+    share : float
+        Share of the modelled track, which multiplies the weights.
+    k : int
+        Row to fill.
+    rows : (n, 4) array of int
+        Its row ``k`` is overwritten.
+    weights : (n, 4) array of float
+        Its row ``k`` is overwritten.
+
+    Returns
+    -------
+    float
+        Local compliance for the share of the force. [m/N]
+    """
     h = node[e + 1] - node[e]
     s, p = (x - node[e]) / h, shear_ratio[e]
     f = share / (1.0 + p)
@@ -90,8 +194,29 @@ def rail_weights(node, node_row, shear_ratio, flexible, shear_flexible, e, x, sh
 
 
 @kernel
-def window_product(window, pad, rows, weights, a, b):
-    """b_a^T Z^-1 b_b for two port stages."""
+def window_product(window: np.ndarray, pad: int, rows: np.ndarray, weights: np.ndarray, a: int, b: int) -> complex:
+    """b_a^T Z^-1 b_b for two port stages.
+
+    Parameters
+    ----------
+    window : (n, 2 pad + 1) array
+        Windows of the inverse.
+    pad : int
+        Half width of the windows.
+    rows : (n_stage, 4) array of int
+        Rows of the rail under each port stage.
+    weights : (n_stage, 4) array of float
+        Weights of these rows.
+    a : int
+        First port stage.
+    b : int
+        Second port stage.
+
+    Returns
+    -------
+    complex
+        Displacement at stage a per force at stage b; real for the midpoint rule. [m/N]
+    """
     total = window[0, 0] * 0.0
     for i in range(4):
         weight, row = weights[a, i], rows[a, i]
@@ -104,8 +229,18 @@ def window_product(window, pad, rows, weights, a, b):
 
 
 @kernel
-def solve_dense(a, b, n):
-    """Solve in place by elimination with partial pivoting; the matrices have at most a few dozen rows."""
+def solve_dense(a: np.ndarray, b: np.ndarray, n: int) -> None:
+    """Solve in place by elimination with partial pivoting; the matrices have at most a few dozen rows.
+
+    Parameters
+    ----------
+    a : (n_row, n_row) array of float
+        Its upper left ``n`` rows and columns are the matrix; overwritten.
+    b : (n_row,) array of float
+        Right-hand side; overwritten with the solution.
+    n : int
+        Number of equations.
+    """
     for i in range(n):
         pivot_row = i
         for k in range(i + 1, n):

@@ -4,9 +4,21 @@ Several terms are added one after the other, so that the sum of all springs stay
 can be moved to a track whose supports are numbered differently.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING
 
 from turnout.errors import SimulationError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy as np
+
+    from turnout.physics.term import PhysicsTerm
+    from turnout.simulate.force_laws import Port
+    from turnout.simulate.track import Track
 
 
 @dataclass(frozen=True)
@@ -28,7 +40,7 @@ class Link:
     loss_factor: float = 0.0
     tag: str = ""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not self.ends:
             raise SimulationError(f"link {self.tag!r}: acts on no degree of freedom.")
         for value in (self.stiffness, self.damping, self.mass, self.loss_factor):
@@ -44,18 +56,46 @@ SPRING_FIELDS = {
 SHARE_TOLERANCE = 1e-9  # rounding error of shares that add up to 1
 
 
-def links_of(terms, track):
-    """Links that ``terms`` add to ``track``; terms that scale its springs come first, the others act on the result."""
+def links_of(terms: Sequence[PhysicsTerm], track: Track) -> list[Link]:
+    """Links that ``terms`` add to ``track``; terms that scale its springs come first, the others act on the result.
+
+    Parameters
+    ----------
+    terms : sequence of PhysicsTerm
+        Effects added to the base model.
+    track : Track
+        The track.
+
+    Returns
+    -------
+    list of Link
+        Links of all terms.
+    """
     links: list = []
     for term in sorted(terms, key=lambda term: not term.scales_track):
         links += term.links(with_links(track, links) if term.effect_type == "matrix" else track)
     return links
 
 
-def ports_of(terms, track):
+def ports_of(terms: Sequence[PhysicsTerm], track: Track) -> list[Port]:
     """Ports that ``terms`` add to ``track``; each law uses the springs of the track with the links of the other terms.
 
-    SimulationError if terms withhold more than the whole ballast of one sleeper: it would act in the wrong direction.
+    Parameters
+    ----------
+    terms : sequence of PhysicsTerm
+        Effects added to the base model.
+    track : Track
+        The track.
+
+    Returns
+    -------
+    list of Port
+        Ports of all terms, in the order of the terms.
+
+    Raises
+    ------
+    SimulationError
+        If terms withhold more than the whole ballast of one sleeper: it would act in the wrong direction.
     """
     ports: list = []
     withheld: dict[tuple, list] = {}
@@ -71,8 +111,21 @@ def ports_of(terms, track):
     return ports
 
 
-def with_links(track, links):
-    """``track`` with the ``links`` that act on its pads, ballast and subgrade added to the values of these."""
+def with_links(track: Track, links: Sequence[Link]) -> Track:
+    """``track`` with the ``links`` that act on its pads, ballast and subgrade added to the values of these.
+
+    Parameters
+    ----------
+    track : Track
+        The track.
+    links : sequence of Link
+        Links whose stiffness and damping are added.
+
+    Returns
+    -------
+    Track
+        The same track where no link acts on a spring of it.
+    """
     values: dict = {}
     for link in links:
         j = link.ends[0][0][1]
@@ -85,30 +138,56 @@ def with_links(track, links):
 SUPPORT_FIELDS = ("sleeper", "support", "first", "last")  # fields of terms that are support numbers
 
 
-def shift_supports(term, count):
-    """The term at the same positions of a track that has ``count`` more supports at its start."""
-    return replace(term, **{name: getattr(term, name) + count for name in _support_fields(term)})
+def shift_supports(term: PhysicsTerm, count: int) -> PhysicsTerm:
+    """The term at the same positions of a track that has ``count`` more supports at its start.
+
+    Parameters
+    ----------
+    term : PhysicsTerm
+        The effect.
+    count : int
+        Number that is added to its support numbers; may be negative.
+
+    Returns
+    -------
+    PhysicsTerm
+        A copy with other support numbers.
+    """
+    changed = {name: getattr(term, name) + count for name in _support_fields(term)}
+    return replace(term, **changed)  # type: ignore[type-var]  # every term is a dataclass
 
 
-def terms_on_stretch(terms, inside):
+def terms_on_stretch(terms: Sequence[PhysicsTerm], inside: np.ndarray) -> tuple[PhysicsTerm, ...]:
     """The terms with the support numbers of a stretch, which has the supports ``inside`` (n_support,) of the track.
 
     Terms outside it are dropped. A range of supports that is partly outside is cut to the part inside.
+
+    Parameters
+    ----------
+    terms : sequence of PhysicsTerm
+        Effects with the support numbers of the whole track.
+    inside : (n_support,) array of bool
+        Whether each support of the track is in the stretch; the stretch is contiguous.
+
+    Returns
+    -------
+    tuple of PhysicsTerm
+        Terms with the numbers of the stretch.
     """
     first, last = int(inside.argmax()), len(inside) - 1 - int(inside[::-1].argmax())
     terms_inside = []
     for term in terms:
         names = _support_fields(term)
         is_range = {"first", "last"} <= names
-        start, end = (term.first, term.last) if is_range else (first, last)
+        start, end = (getattr(term, name) for name in ("first", "last")) if is_range else (first, last)
         support_numbers = [getattr(term, name) for name in names - {"first", "last"}]
         if start > last or end < first or not all(first <= value <= last for value in support_numbers):
             continue
         if is_range:
-            term = replace(term, first=max(start, first), last=min(end, last))
+            term = replace(term, first=max(start, first), last=min(end, last))  # type: ignore[type-var]
         terms_inside.append(shift_supports(term, -first))
     return tuple(terms_inside)
 
 
-def _support_fields(term):
-    return {f.name for f in fields(term) if f.name in SUPPORT_FIELDS}
+def _support_fields(term: PhysicsTerm) -> set[str]:
+    return {f.name for f in fields(term) if f.name in SUPPORT_FIELDS}  # type: ignore[arg-type]

@@ -3,11 +3,18 @@
 Each step: free motion, the small system of all ports, their response, sensor records, the state at the end.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from turnout.simulate.banded import momentum_minus_force, multiply, solve, solve_from_both_ends
 from turnout.simulate.compiled import inline_kernel, kernel
 from turnout.simulate.port_system import evaluate, flexibility, locate_ports, newton_update
+
+if TYPE_CHECKING:
+    from turnout.simulate.state import Motion, PortArrays, RunArrays, SchemeArrays, TrackArrays, VehicleArrays
 
 MAX_ITERATIONS = 60  # Newton iterations of a step
 UNCHECKED_ITERATIONS = 12  # iterations before the residual is checked for progress
@@ -16,8 +23,46 @@ CONVERGED, NEWTON, LEFT_TRACK = range(3)
 
 
 @inline_kernel
-def free_motion(track, scheme, bodies, run, motion, step, d, e, e_stand_in, mass_v, stiff_u):
-    """Right-hand sides and solution of the step with all ports free."""
+def free_motion(
+    track: TrackArrays,
+    scheme: SchemeArrays,
+    bodies: VehicleArrays,
+    run: RunArrays,
+    motion: Motion,
+    step: int,
+    d: np.ndarray,
+    e: np.ndarray,
+    e_stand_in: np.ndarray,
+    mass_v: np.ndarray,
+    stiff_u: np.ndarray,
+) -> None:
+    """Right-hand sides and solution of the step with all ports free.
+
+    Parameters
+    ----------
+    track : TrackArrays
+        Factorised track.
+    scheme : SchemeArrays
+        Coefficients of the integration scheme.
+    bodies : VehicleArrays
+        Inverse matrices of the bodies and of the stand-in tracks.
+    run : RunArrays
+        Paths, given forces and sensors of this run.
+    motion : Motion
+        State at the start of the step.
+    step : int
+        Number of the step.
+    d : (n_padded,) array
+        Stage increment of the track; overwritten. [m]
+    e : (n_body_row,) array
+        Stage increment of the bodies; overwritten. [m]
+    e_stand_in : (n_wheel,) array
+        Stage increment of the stand-in tracks; overwritten. [m]
+    mass_v : (n,) array of float
+        Workspace for M v. [kg m/s]
+    stiff_u : (n,) array of float
+        Workspace for K u. [N]
+    """
     pad, n = track.pad, track.n
     by_v, by_u = scheme.weight * scheme.s, scheme.weight
     if track.mass.shape[0] == 9:
@@ -53,8 +98,49 @@ def free_motion(track, scheme, bodies, run, motion, step, d, e, e_stand_in, mass
 
 
 @inline_kernel
-def free_deformation(track, scheme, ports, motion, d, e, e_stand_in, rows, weights, share, dip, d0):
-    """Deformation of every port stage without any port force."""
+def free_deformation(
+    track: TrackArrays,
+    scheme: SchemeArrays,
+    ports: PortArrays,
+    motion: Motion,
+    d: np.ndarray,
+    e: np.ndarray,
+    e_stand_in: np.ndarray,
+    rows: np.ndarray,
+    weights: np.ndarray,
+    share: np.ndarray,
+    dip: np.ndarray,
+    d0: np.ndarray,
+) -> None:
+    """Deformation of every port stage without any port force.
+
+    Parameters
+    ----------
+    track : TrackArrays
+        Factorised track.
+    scheme : SchemeArrays
+        Coefficients of the integration scheme.
+    ports : PortArrays
+        Wheel contacts and ports of terms.
+    motion : Motion
+        State at the start of the step.
+    d : (n_padded,) array
+        Stage increment D of the track. [m]
+    e : (n_body_row,) array
+        Stage increment of the bodies. [m]
+    e_stand_in : (n_wheel,) array
+        Stage increment of the stand-in tracks. [m]
+    rows : (n_stage, 4) array of int
+        Rows of the rail under each port stage.
+    weights : (n_stage, 4) array of float
+        Weights of these rows.
+    share : (n_stage,) array of float
+        Share of the stand-in track at each port stage.
+    dip : (n_stage,) array of float
+        Dip or gap at each port stage. [m]
+    d0 : (n_stage,) array of float
+        Overwritten with the deformations. [m]
+    """
     stages, pad, t = scheme.node.size, track.pad, scheme.t
     u, z, y, bodies_of, wheels = motion.u, motion.z, motion.y, ports.body, ports.wheel
     for i in range(bodies_of.size):
@@ -73,8 +159,46 @@ def free_deformation(track, scheme, ports, motion, d, e, e_stand_in, rows, weigh
 
 
 @inline_kernel
-def add_port_forces(track, scheme, bodies, ports, force, rows, weights, share, d, e, e_stand_in):
-    """Add the response to the port forces to the free motion, through windows of the inverse."""
+def add_port_forces(
+    track: TrackArrays,
+    scheme: SchemeArrays,
+    bodies: VehicleArrays,
+    ports: PortArrays,
+    force: np.ndarray,
+    rows: np.ndarray,
+    weights: np.ndarray,
+    share: np.ndarray,
+    d: np.ndarray,
+    e: np.ndarray,
+    e_stand_in: np.ndarray,
+) -> None:
+    """Add the response to the port forces to the free motion, through windows of the inverse.
+
+    Parameters
+    ----------
+    track : TrackArrays
+        Factorised track.
+    scheme : SchemeArrays
+        Coefficients of the integration scheme.
+    bodies : VehicleArrays
+        Inverse matrices of the bodies and of the stand-in tracks.
+    ports : PortArrays
+        Wheel contacts and ports of terms.
+    force : (n_stage,) array of float
+        Force of each port stage. [N]
+    rows : (n_stage, 4) array of int
+        Rows of the rail under each port stage.
+    weights : (n_stage, 4) array of float
+        Weights of these rows.
+    share : (n_stage,) array of float
+        Share of the stand-in track at each port stage.
+    d : (n_padded,) array
+        Stage increment of the track, to which the response is added. [m]
+    e : (n_body_row,) array
+        Stage increment of the bodies, to which the response is added. [m]
+    e_stand_in : (n_wheel,) array
+        Stage increment of the stand-in tracks, to which the response is added. [m]
+    """
     stages, tau, window, width = scheme.node.size, scheme.tau, track.window, 2 * track.pad + 1
     body_of, wheel_of, response, stand_in_response = ports.body, ports.wheel, bodies.response, bodies.stand_in_response
     block_of, block_start = bodies.block_of, bodies.block_start
@@ -104,16 +228,50 @@ def add_port_forces(track, scheme, bodies, ports, force, rows, weights, share, d
 
 
 @inline_kernel
-def add_window(d, window, r, width, c):
-    """``d[r:r+width]`` += c times row ``r`` of the windows."""
+def add_window(d: np.ndarray, window: np.ndarray, r: int, width: int, c: complex) -> None:
+    """``d[r:r+width]`` += c times row ``r`` of the windows.
+
+    Parameters
+    ----------
+    d : (n_padded,) array
+        Vector that is changed.
+    window : (n, width) array
+        Windows of the inverse.
+    r : int
+        Row of the window, and index of its first entry in ``d``.
+    width : int
+        Width of the windows.
+    c : complex
+        Factor; real for the midpoint rule.
+    """
     near, row = d[r : r + width], window[r]
     for m in range(width):
         near[m] += c * row[m]
 
 
 @inline_kernel
-def record(track, scheme, run, motion, d, step, out):
-    """Sensor signals of the current step: mean acceleration, mean velocity or mid-step displacement."""
+def record(
+    track: TrackArrays, scheme: SchemeArrays, run: RunArrays, motion: Motion, d: np.ndarray, step: int, out: np.ndarray
+) -> None:
+    """Sensor signals of the current step: mean acceleration, mean velocity or mid-step displacement.
+
+    Parameters
+    ----------
+    track : TrackArrays
+        Factorised track.
+    scheme : SchemeArrays
+        Coefficients of the integration scheme.
+    run : RunArrays
+        Paths, given forces and sensors of this run.
+    motion : Motion
+        State at the start of the step.
+    d : (n_padded,) array
+        Stage increment D of the track. [m]
+    step : int
+        Number of the step.
+    out : (n_sensor, n_step) array of float
+        Its column ``step`` is overwritten.
+    """
     for m in range(out.shape[0]):
         value = 0.0
         for j in range(4):
@@ -130,8 +288,22 @@ def record(track, scheme, run, motion, d, step, out):
 
 
 @inline_kernel
-def advance(scheme, motion, d, e, e_stand_in):
-    """End of the step: u + scale Re(δ D) and R v + scale Re(δ s D) for track, bodies and stand-ins."""
+def advance(scheme: SchemeArrays, motion: Motion, d: np.ndarray, e: np.ndarray, e_stand_in: np.ndarray) -> None:
+    """End of the step: u + scale Re(δ D) and R v + scale Re(δ s D) for track, bodies and stand-ins.
+
+    Parameters
+    ----------
+    scheme : SchemeArrays
+        Coefficients of the integration scheme.
+    motion : Motion
+        Overwritten with the state at the end of the step.
+    d : (n_padded,) array
+        Stage increment D of the track. [m]
+    e : (n_body_row,) array
+        Stage increment of the bodies. [m]
+    e_stand_in : (n_wheel,) array
+        Stage increment of the stand-in tracks. [m]
+    """
     by_d, by_s = scheme.delta, scheme.delta * scheme.s
     for i in range(motion.u.size):
         motion.u[i] += scheme.scale * (by_d * d[i]).real
@@ -145,8 +317,46 @@ def advance(scheme, motion, d, e, e_stand_in):
 
 
 @kernel
-def march(track, scheme, bodies, ports, run, motion, n_step, out, out_force):
-    """March ``n_step`` steps; returns (status, step, port, value, iterations) and updates ``motion``."""
+def march(
+    track: TrackArrays,
+    scheme: SchemeArrays,
+    bodies: VehicleArrays,
+    ports: PortArrays,
+    run: RunArrays,
+    motion: Motion,
+    n_step: int,
+    out: np.ndarray,
+    out_force: np.ndarray,
+) -> tuple[int, int, int, float, int]:
+    """March ``n_step`` steps.
+
+    Parameters
+    ----------
+    track : TrackArrays
+        Factorised track.
+    scheme : SchemeArrays
+        Coefficients of the integration scheme.
+    bodies : VehicleArrays
+        Inverse matrices of the bodies and of the stand-in tracks.
+    ports : PortArrays
+        Wheel contacts and ports of terms.
+    run : RunArrays
+        Paths, given forces and sensors of this run.
+    motion : Motion
+        State at the start; overwritten with that at the end.
+    n_step : int
+        Number of time steps.
+    out : (n_sensor, n_step) array of float
+        Overwritten with the sensor signals.
+    out_force : (n_port, n_step) array of float
+        Overwritten with the mean force of each port over each step [N]; not if it has no columns.
+
+    Returns
+    -------
+    (int, int, int, float, int)
+        Status (``CONVERGED``, ``NEWTON`` or ``LEFT_TRACK``); step and port where the march stopped; residual [N] or
+        position [m] there; Newton iterations in total.
+    """
     stages, n_port = scheme.node.size, ports.body.size
     n = n_port * stages
     zero = scheme.tau[0] * 0.0

@@ -1,14 +1,23 @@
 """Assemble banded mass, damping and stiffness matrices of a track, and number its degrees of freedom."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.simulate.links import links_of
-from turnout.simulate.rail import element_mass, element_stiffness, local_compliance, shape_functions
+from turnout.simulate.links import Link, links_of
+from turnout.simulate.rail import Rail, element_mass, element_stiffness, local_compliance, shape_functions
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from turnout.physics.term import PhysicsTerm
+    from turnout.simulate.track import Track
 
 ROW_ORDER = {"sleeper": 0, "ballast": 1}
 
@@ -27,22 +36,22 @@ class TrackMatrices:
     hysteresis: np.ndarray
     node: np.ndarray
     node_index: np.ndarray
-    index: dict
-    rails: tuple
-    links: tuple
+    index: dict[tuple, int]
+    rails: tuple[Rail, ...]
+    links: tuple[Link, ...]
 
     @property
-    def n(self):
+    def n(self) -> int:
         """Degrees of freedom."""
         return self.mass.shape[1]
 
     @property
-    def half(self):
+    def half(self) -> int:
         """Half bandwidth."""
         return self.mass.shape[0] - 1
 
     @cached_property
-    def elements(self):
+    def elements(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Element table: length, shear ratio, EI, κGA (inf for Euler-Bernoulli), each (n_element,)."""
         h = np.diff(self.node)
         p = np.array([float(r.shear_ratio(h_e)) for r, h_e in zip(self.rails, h)])
@@ -50,8 +59,24 @@ class TrackMatrices:
         kga = np.array([np.inf if r.beam == "euler" else r.shear_stiffness for r in self.rails])
         return h, p, ei, kga
 
-    def rail_weights(self, x):
-        """Rows (4,) and weights (4,) that give the rail's deflection at ``x`` [m] between two nodes."""
+    def rail_weights(self, x: float) -> tuple[np.ndarray, np.ndarray]:
+        """Rows (4,) and weights (4,) that give the rail's deflection at ``x`` [m] between two nodes.
+
+        Parameters
+        ----------
+        x : float
+            Position on the rail. [m]
+
+        Returns
+        -------
+        (4,) array of int, (4,) array of float
+            Rows, and their weights (1, m, 1, m).
+
+        Raises
+        ------
+        SimulationError
+            For a position outside the track.
+        """
         if not self.node[0] <= x <= self.node[-1]:
             a, b = self.node[[0, -1]]
             raise SimulationError(f"place {x:.3f} m is outside the track from {a:.3f} m to {b:.3f} m.")
@@ -60,22 +85,61 @@ class TrackMatrices:
         i, j = self.node_index[e], self.node_index[e + 1]
         return np.array([i, i + 1, j, j + 1]), shape_functions((x - self.node[e]) / h, h, p)
 
-    def compliance(self, x, x_load=None):
+    def compliance(self, x: float, x_load: float | None = None) -> float:
         """Local compliance of the element between ``x`` and ``x_load`` [m/N], by default ``x`` itself.
 
         It is 0 if ``x_load`` is in another element.
+
+        Parameters
+        ----------
+        x : float
+            Position of the deflection. [m]
+        x_load : float or None
+            Position of the force. [m]
+
+        Returns
+        -------
+        float
+            Local compliance. [m/N]
         """
         e, x_load = self.element_at(x), x if x_load is None else x_load
         h = self.node[e + 1] - self.node[e]
         shares = (x - self.node[e]) / h, (x_load - self.node[e]) / h
         return float(local_compliance(*shares, h, self.rails[e])) if 0.0 <= shares[1] <= 1.0 else 0.0
 
-    def element_at(self, x):
-        """Index of the element at ``x`` [m]; on a node the one after it."""
+    def element_at(self, x: float) -> int:
+        """Index of the element at ``x`` [m]; on a node the one after it.
+
+        Parameters
+        ----------
+        x : float
+            Position on the rail. [m]
+
+        Returns
+        -------
+        int
+            Number of the element, 0 to n_element - 1.
+        """
         return min(int(np.searchsorted(self.node, x, side="right")) - 1, self.node.size - 2)
 
-    def weights(self, point):
-        """Rows and weights of a point: a number is the rail at x [m], a tuple names a degree of freedom."""
+    def weights(self, point: float | tuple) -> tuple[np.ndarray, np.ndarray]:
+        """Rows and weights of a point: a number is the rail at x [m], a tuple names a degree of freedom.
+
+        Parameters
+        ----------
+        point : float or tuple
+            Position on the rail [m] or name of a degree of freedom.
+
+        Returns
+        -------
+        array of int, array of float
+            Four rows and weights of the rail, one of a named degree of freedom.
+
+        Raises
+        ------
+        SimulationError
+            For a position or name that the track does not have.
+        """
         if isinstance(point, tuple):
             if point not in self.index:
                 raise SimulationError(f"the track has no degree of freedom {point!r}.")
@@ -83,23 +147,72 @@ class TrackMatrices:
         return self.rail_weights(float(point))
 
 
-def link_vector(link, index):
-    """Rows and weights of a link; an unknown degree of freedom is a SimulationError."""
+def link_vector(link: Link, index: Mapping[tuple, int]) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and weights of a link.
+
+    Parameters
+    ----------
+    link : Link
+        The link.
+    index : mapping
+        Row of each named degree of freedom.
+
+    Returns
+    -------
+    (n_end,) array of int, (n_end,) array of float
+        Rows and weights.
+
+    Raises
+    ------
+    SimulationError
+        For a degree of freedom that is not in ``index``.
+    """
     try:
         return np.array([index[name] for name, _ in link.ends]), np.array([weight for _, weight in link.ends])
     except KeyError as error:
         raise SimulationError(f"link {link.tag!r}: the track has no degree of freedom {error.args[0]!r}.") from None
 
 
-def assemble(track, terms=()):
-    """Matrices of ``track`` with the rails that ``terms`` change and the links that they add."""
+def assemble(track: Track, terms: Sequence[PhysicsTerm] = ()) -> TrackMatrices:
+    """Matrices of ``track`` with the rails that ``terms`` change and the links that they add.
+
+    Parameters
+    ----------
+    track : Track
+        The track.
+    terms : sequence of PhysicsTerm
+        Effects added to the base model.
+
+    Returns
+    -------
+    TrackMatrices
+        Matrices with rails and links.
+    """
     for term in terms:
         track = term.rail(track)
     return add_rails(link_matrices(track, [*track.links(), *links_of(terms, track)]), track)
 
 
-def link_matrices(track, links):
-    """Matrices of links alone, with the numbering of ``track`` and without its rail."""
+def link_matrices(track: Track, links: Sequence[Link]) -> TrackMatrices:
+    """Matrices of links alone, with the numbering of ``track`` and without its rail.
+
+    Parameters
+    ----------
+    track : Track
+        Track whose nodes are numbered.
+    links : sequence of Link
+        Links that are added up.
+
+    Returns
+    -------
+    TrackMatrices
+        Its ``rails`` are empty.
+
+    Raises
+    ------
+    SimulationError
+        For a link at a support that the track does not have.
+    """
     node, node_index, index = _number_rows(track, links)
     vectors = [link_vector(link, index) for link in links]
     half = max([1 + int(np.max(np.diff(node_index))), *(int(np.ptp(rows)) for rows, _ in vectors)])
@@ -116,15 +229,28 @@ def link_matrices(track, links):
     return TrackMatrices(mass, damping, stiffness, hysteresis, node, node_index, index, (), tuple(links))
 
 
-def add_rails(matrices, track):
-    """The matrices with the rails of ``track`` added."""
+def add_rails(matrices: TrackMatrices, track: Track) -> TrackMatrices:
+    """The matrices with the rails of ``track`` added.
+
+    Parameters
+    ----------
+    matrices : TrackMatrices
+        Matrices of the links, from ``link_matrices``.
+    track : Track
+        The track.
+
+    Returns
+    -------
+    TrackMatrices
+        A copy; ``matrices`` does not change.
+    """
     rails = tuple(track.element_rail(a, b) for a, b in pairwise(matrices.node.tolist()))
     mass, damping, stiffness = (x.copy() for x in (matrices.mass, matrices.damping, matrices.stiffness))
     _add_rail(track, rails, matrices.node, matrices.node_index, mass, damping, stiffness)
     return replace(matrices, mass=mass, damping=damping, stiffness=stiffness, rails=rails)
 
 
-def _number_rows(track, links):
+def _number_rows(track: Track, links: Sequence[Link]) -> tuple[np.ndarray, np.ndarray, dict[tuple, int]]:
     """Nodes, their rows and the row of every named degree of freedom; those of a support follow its node."""
     per_bay = track.elements_per_bay
     bays = [np.linspace(a, b, per_bay + 1)[:-1] for a, b in zip(track.support[:-1], track.support[1:])]
@@ -152,7 +278,15 @@ def _number_rows(track, links):
     return node, node_index, index
 
 
-def _add_rail(track, rails, node, node_index, mass, damping, stiffness):
+def _add_rail(
+    track: Track,
+    rails: Sequence[Rail],
+    node: np.ndarray,
+    node_index: np.ndarray,
+    mass: np.ndarray,
+    damping: np.ndarray,
+    stiffness: np.ndarray,
+) -> None:
     element_cache, length = {}, np.diff(node)
     keys = [(rail, round(h, 12)) for rail, h in zip(rails, length)]
     for key, h in zip(keys, length):
@@ -171,7 +305,7 @@ def _add_rail(track, rails, node, node_index, mass, damping, stiffness):
             np.add.at(damping, entries, rate * m[:, a, b])
 
 
-def _end_rate(track, x):
+def _end_rate(track: Track, x: float) -> float:
     """Damping rate [1/s] of an absorbing end; it grows with the square of the distance into the end."""
     if not track.end_length:
         return 0.0

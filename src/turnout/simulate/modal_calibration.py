@@ -1,6 +1,10 @@
 """Fit pads and ballast of a section so that a simulated hammer test has given resonances and damping ratios."""
 
+from __future__ import annotations
+
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -8,6 +12,14 @@ from scipy.optimize import least_squares
 from turnout.errors import SimulationError
 from turnout.simulate.hammer import Hammer, prepare_hammer, resolve_location, simulate_hammer
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from turnout.records import Recording
+    from turnout.simulate.track import Track
+    from turnout.simulate.turnout_track import TurnoutTrack
+
+Modes = Mapping[str, tuple[float, float]]  # band: frequency [Hz], damping ratio
 FREE_PARAMETERS = ("pad_stiffness", "pad_damping", "ballast_stiffness", "ballast_damping")
 # Relative accuracy of the fit, far better than the printed uncertainties, and the weak prior on the logarithms.
 FREQUENCY_SD, DAMPING_SD, PRIOR_SD = 0.002, 0.02, 3.0
@@ -25,20 +37,41 @@ class ModeFit:
     """``values`` of the section's parameters [SI]; ``fitted`` and ``targets`` map a band to (frequency, damping)."""
 
     section: str
-    values: dict
-    targets: dict
-    fitted: dict
+    values: dict[str, float]
+    targets: Modes
+    fitted: Modes
     evaluations: int
 
 
-def with_section(turnout, label, **values):
-    """The turnout with parameters of the supports of section ``label`` replaced, on every route that has it."""
+def with_section(turnout: TurnoutTrack, label: str, **values: np.ndarray | float) -> TurnoutTrack:
+    """The turnout with parameters of the supports of section ``label`` replaced, on every route that has it.
 
-    def replace_values(track):
+    Parameters
+    ----------
+    turnout : TurnoutTrack
+        The turnout.
+    label : str
+        Label of the section.
+    **values : float
+        Value of each parameter for all supports of the section [SI], by its name in ``Track``.
+
+    Returns
+    -------
+    TurnoutTrack
+        A copy.
+
+    Raises
+    ------
+    SimulationError
+        For a label that no route has.
+    """
+
+    def replace_values(track: Track) -> Track:
         inside = np.array([name == label for name in track.section])
         if not inside.any():
             return track
-        return replace(track, **{k: np.where(inside, v, getattr(track, k)) for k, v in values.items()})
+        changed: dict[str, Any] = {k: np.where(inside, v, getattr(track, k)) for k, v in values.items()}
+        return replace(track, **changed)
 
     if not any(label in track.section for track in (turnout.track, *turnout.tracks.values())):
         sections = sorted({*turnout.track.section} - {""})
@@ -47,16 +80,48 @@ def with_section(turnout, label, **values):
     return replace(turnout, track=replace_values(turnout.track), tracks=tracks)
 
 
-def section_modes(turnout, location, modes_of, n_impacts=2, half_length=20.0):
-    """Modes of a simulated test at ``location`` by ``modes_of``: band -> (frequency [Hz], damping)."""
+def section_modes(
+    turnout: TurnoutTrack,
+    location: str | float,
+    modes_of: Callable[[tuple[Recording, ...]], Modes],
+    n_impacts: int = 2,
+    half_length: float = 20.0,
+) -> Modes:
+    """Modes of a simulated test at ``location`` by ``modes_of``: band -> (frequency [Hz], damping).
+
+    Parameters
+    ----------
+    turnout : TurnoutTrack
+        The turnout.
+    location : str or float
+        Position of the impacts [m], or the name of a location.
+    modes_of : callable
+        Recordings -> modes by band.
+    n_impacts : int
+        Impacts of the simulated test.
+    half_length : float
+        Length of track on both sides of the impacts. [m]
+
+    Returns
+    -------
+    mapping
+        Modes by band; bands without a mode are missing.
+    """
     prepared = prepare_hammer(turnout, location, half_length=half_length)
     recordings = simulate_hammer(
-        turnout, location, REPEATABLE_HAMMER, n_blows=n_impacts, duration=0.15, prepared=prepared
+        turnout, location, REPEATABLE_HAMMER, n_impacts=n_impacts, duration=0.15, prepared=prepared
     )
     return modes_of(recordings)
 
 
-def fit_modes(turnout, location, targets, modes_of, section=None, evaluations=14):
+def fit_modes(
+    turnout: TurnoutTrack,
+    location: str,
+    targets: Modes,
+    modes_of: Callable[[tuple[Recording, ...]], Modes],
+    section: str | None = None,
+    evaluations: int = 14,
+) -> ModeFit:
     """``ModeFit`` of one section; the rest of the turnout does not change.
 
     Parameters
@@ -71,6 +136,13 @@ def fit_modes(turnout, location, targets, modes_of, section=None, evaluations=14
         Recordings -> a dict like ``targets``; bands without a mode are missing.
     section : str
         Section whose supports are changed, by default the one with the name of the location.
+    evaluations : int
+        Largest number of evaluations of the least-squares fit; each costs a gradient by differences.
+
+    Returns
+    -------
+    ModeFit
+        Fitted values, and the modes that the model has with them.
     """
     section = section or location
     position, track = resolve_location(turnout, location)
@@ -78,7 +150,7 @@ def fit_modes(turnout, location, targets, modes_of, section=None, evaluations=14
     start = np.log([getattr(track, name)[j] for name in FREE_PARAMETERS])
     low, high = (np.log([BOUNDS[name][k] for name in FREE_PARAMETERS]) for k in (0, 1))
 
-    def residual(logs):
+    def residual(logs: np.ndarray) -> np.ndarray:
         modes = section_modes(
             with_section(turnout, section, **dict(zip(FREE_PARAMETERS, np.exp(logs)))), location, modes_of
         )

@@ -1,16 +1,29 @@
 """Simulate a train passage: the train starts in equilibrium, rolls over the turnout and is recorded by its sensors."""
 
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.records import Recording
-from turnout.simulate.preparation import prepare
+from turnout.simulate.preparation import Prepared, prepare
 from turnout.simulate.run import Drive, run
-from turnout.simulate.sensor import actual_sensor, mean_of, record_signal
+from turnout.simulate.sensor import Sensor, actual_sensor, mean_of, record_signal
+from turnout.simulate.track import Track
 from turnout.simulate.turnout_track import TurnoutTrack
-from turnout.simulate.wheel_path import check_path
+from turnout.simulate.vehicle import Vehicle
+from turnout.simulate.wheel_path import PathPart, check_path
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from turnout.physics.term import PhysicsTerm
+    from turnout.simulate.run import Outcome
 
 POSITION_TOLERANCE = 1e-6  # m; positions are rounded to this
 
@@ -33,29 +46,53 @@ class PassageTruth:
     iterations: float
 
 
+@overload
 def simulate_passage(
-    track,
-    vehicle,
-    speed,
-    sensors,
-    direction="facing",
-    route="main",
-    roughness=None,
-    terms=(),
-    seed=0,
-    rail_seed=None,
-    rate=20e3,
-    substeps=1,
-    lead=1.0,
-    tail=1.0,
-    irregularities=(),
-    entry=6.0,
-    scheme="radau",
-    prepared=None,
-    started_at=None,
-    conditions=None,
-    truth=False,
-):
+    track: Track | TurnoutTrack,
+    vehicle: Vehicle,
+    speed: float,
+    sensors: Sequence[Sensor],
+    *arguments: Any,
+    truth: Literal[True],
+    **options: Any,
+) -> tuple[Recording, PassageTruth]: ...
+
+
+@overload
+def simulate_passage(
+    track: Track | TurnoutTrack,
+    vehicle: Vehicle,
+    speed: float,
+    sensors: Sequence[Sensor],
+    *arguments: Any,
+    truth: Literal[False] = False,
+    **options: Any,
+) -> Recording: ...
+
+
+def simulate_passage(  # type: ignore[misc]  # the overloads stand for any of the options
+    track: Track | TurnoutTrack,
+    vehicle: Vehicle,
+    speed: float,
+    sensors: Sequence[Sensor],
+    direction: str = "facing",
+    route: str = "main",
+    roughness: float | None = None,
+    terms: Sequence[PhysicsTerm] = (),
+    seed: int = 0,
+    rail_seed: int | None = None,
+    rate: float = 20e3,
+    substeps: int = 1,
+    lead: float = 1.0,
+    tail: float = 1.0,
+    irregularities: Sequence[PathPart] = (),
+    entry: float = 6.0,
+    scheme: str = "radau",
+    prepared: Prepared | None = None,
+    started_at: datetime | None = None,
+    conditions: Mapping[str, Any] | None = None,
+    truth: bool = False,
+) -> Recording | tuple[Recording, PassageTruth]:
     """Recording of ``vehicle`` passing the turnout at ``speed`` [m/s].
 
     Parameters
@@ -89,6 +126,12 @@ def simulate_passage(
         modelled track all the time. Sensors must be at least this and ``Drive.margin`` from the track's ends. [m]
     prepared : Prepared
         Result of ``prepare_passage`` with this rate, for any train, speed and path; its terms and scheme are used.
+    scheme : str
+        Name of the integration scheme: "radau", "gauss" or "midpoint".
+    started_at : datetime or None
+        Start time that the recording states.
+    conditions : mapping or None
+        Further conditions that the recording states.
     truth : bool
         Also return the PassageTruth.
 
@@ -97,8 +140,11 @@ def simulate_passage(
     Recording or (Recording, PassageTruth)
         Acceleration [m/s²] down positive; sample k is the mean over the time step around (k + 1/2) / rate.
 
-    Errors: SimulationError for a speed of zero, an unknown route, a sensor outside the track or where wheels are not
-    yet on the modelled track, a wheel that leaves the track, a track prepared for another rate.
+    Raises
+    ------
+    SimulationError
+        For a speed of zero, an unknown route, a sensor outside the track or where wheels are not yet on the modelled
+        track, a wheel that leaves the track, a track prepared for another rate.
 
     Examples
     --------
@@ -158,13 +204,59 @@ def simulate_passage(
     return recording, _truth(outcome, drive, vehicle, rate, substeps)
 
 
-def prepare_passage(track, terms=(), rate=20e3, substeps=1, scheme="radau", route="main"):
-    """Factorisation of a turnout for passages along ``route`` at this rate, shared by trains, speeds and seeds."""
+def prepare_passage(
+    track: Track | TurnoutTrack,
+    terms: Sequence[PhysicsTerm] = (),
+    rate: float = 20e3,
+    substeps: int = 1,
+    scheme: str = "radau",
+    route: str = "main",
+) -> Prepared:
+    """Factorisation of a turnout for passages along ``route`` at this rate, shared by trains, speeds and seeds.
+
+    Parameters
+    ----------
+    track : Track or TurnoutTrack
+        The track.
+    terms : sequence of PhysicsTerm
+        Effects added to the base model.
+    rate : float
+        Sampling rate. [Hz]
+    substeps : int
+        Time steps per sample.
+    scheme : str
+        Name of the integration scheme.
+    route : str
+        Route of the turnout.
+
+    Returns
+    -------
+    Prepared
+        The factorised track.
+
+    Raises
+    ------
+    SimulationError
+        If the track carries no load.
+    """
     base = track.track_of(route) if isinstance(track, TurnoutTrack) else track
     return prepare(base, 1.0 / (rate * substeps), scheme, terms)
 
 
-def _drive(turnout, vehicle, speed, sensors, sign, route, level, seed, lead, tail, irregularities, entry):
+def _drive(
+    turnout: TurnoutTrack,
+    vehicle: Vehicle,
+    speed: float,
+    sensors: Sequence[Sensor],
+    sign: int,
+    route: str,
+    level: float | None,
+    seed: int,
+    lead: float,
+    tail: float,
+    irregularities: Sequence[PathPart],
+    entry: float,
+) -> tuple[Drive, float]:
     positions = sign * np.array([sensor.place for sensor in sensors])
     length = float(vehicle.wheel_positions[-1])
     start = sign * (positions.min() - speed * lead)
@@ -177,7 +269,7 @@ def _drive(turnout, vehicle, speed, sensors, sign, route, level, seed, lead, tai
     return Drive(start, speed, sign, surfaces, entry), distance / speed
 
 
-def _check_sensor_positions(seats, track, drive):
+def _check_sensor_positions(seats: Iterable[Sensor], track: Track, drive: Drive) -> None:
     """Reject sensors where wheels are partly on the stand-in track: they would record reduced loads."""
     if drive.entry == 0.0:
         return
@@ -191,7 +283,7 @@ def _check_sensor_positions(seats, track, drive):
             )
 
 
-def _truth(outcome, drive, vehicle, rate, substeps):
+def _truth(outcome: Outcome, drive: Drive, vehicle: Vehicle, rate: float, substeps: int) -> PassageTruth:
     clean = mean_of(outcome.signals, substeps)
     time = (np.arange(clean.shape[1]) + 0.5) / rate
     position = drive.start + drive.direction * (drive.speed * time - vehicle.wheel_positions[:, None])

@@ -1,14 +1,67 @@
 """The small nonlinear system of the ports in a time step, compiled: positions, mutual flexibility, Newton's method."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from turnout.simulate.compiled import inline_kernel
 from turnout.simulate.kernels import law_force, path_at, rail_weights, ramp_at, solve_dense, window_product
 
+if TYPE_CHECKING:
+    from turnout.simulate.state import PortArrays, RunArrays, SchemeArrays, TrackArrays, VehicleArrays
+
 
 @inline_kernel
-def locate_ports(track, scheme, ports, run, step, element, x, rows, weights, local, share, dip):
-    """Rows, weights, local compliance, stand-in share and dip of every port and stage; -1 or a port off the track."""
+def locate_ports(
+    track: TrackArrays,
+    scheme: SchemeArrays,
+    ports: PortArrays,
+    run: RunArrays,
+    step: int,
+    element: np.ndarray,
+    x: np.ndarray,
+    rows: np.ndarray,
+    weights: np.ndarray,
+    local: np.ndarray,
+    share: np.ndarray,
+    dip: np.ndarray,
+) -> int:
+    """Rows, weights, local compliance, stand-in share and dip of every port and stage.
+
+    Parameters
+    ----------
+    track : TrackArrays
+        Factorised track.
+    scheme : SchemeArrays
+        Coefficients of the integration scheme.
+    ports : PortArrays
+        Wheel contacts and ports of terms.
+    run : RunArrays
+        Paths, given forces and sensors of this run.
+    step : int
+        Number of the step.
+    element : (n_port,) array of int
+        Element of each port at the last step; updated.
+    x : (n_stage,) array of float
+        Overwritten with the position of each port stage. [m]
+    rows : (n_stage, 4) array of int
+        Overwritten with the rows of the rail under each port stage.
+    weights : (n_stage, 4) array of float
+        Overwritten with the weights of these rows.
+    local : (n_stage,) array of float
+        Overwritten with the local compliance of the element. [m/N]
+    share : (n_stage,) array of float
+        Overwritten with the share of the stand-in track.
+    dip : (n_stage,) array of float
+        Overwritten with the dip of the path, or the gap of a fixed port. [m]
+
+    Returns
+    -------
+    int
+        -1, or the first port that is off the track.
+    """
     stages, n_port = scheme.node.size, ports.body.size
     # Local names here and below: taking an array out of a tuple counts a reference, which is slow inside a loop.
     body, start, fixed_rows, fixed_weights, gap = ports.body, ports.place, ports.rows, ports.weights, ports.gap
@@ -48,8 +101,40 @@ def locate_ports(track, scheme, ports, run, step, element, x, rows, weights, loc
 
 
 @inline_kernel
-def flexibility(track, scheme, bodies, ports, rows, weights, local, share, g):
-    """Fill ``g``: by how much a unit force at port stage b reduces the deformation of port stage a."""
+def flexibility(
+    track: TrackArrays,
+    scheme: SchemeArrays,
+    bodies: VehicleArrays,
+    ports: PortArrays,
+    rows: np.ndarray,
+    weights: np.ndarray,
+    local: np.ndarray,
+    share: np.ndarray,
+    g: np.ndarray,
+) -> None:
+    """Fill ``g``: by how much a unit force at port stage b reduces the deformation of port stage a.
+
+    Parameters
+    ----------
+    track : TrackArrays
+        Factorised track.
+    scheme : SchemeArrays
+        Coefficients of the integration scheme.
+    bodies : VehicleArrays
+        Inverse matrices of the bodies and of the stand-in tracks.
+    ports : PortArrays
+        Wheel contacts and ports of terms.
+    rows : (n_stage, 4) array of int
+        Rows of the rail under each port stage.
+    weights : (n_stage, 4) array of float
+        Weights of these rows.
+    local : (n_stage,) array of float
+        Local compliance of the element at each port stage. [m/N]
+    share : (n_stage,) array of float
+        Share of the stand-in track at each port stage.
+    g : (n_stage, n_stage) array of float
+        Overwritten. [m/N]
+    """
     stages, n_port, pad = scheme.node.size, ports.body.size, track.pad
     body, wheel, window, t, tau = ports.body, ports.wheel, track.window, scheme.t, scheme.tau
     block_of, block_start, response = bodies.block_of, bodies.block_start, bodies.response
@@ -80,8 +165,51 @@ def flexibility(track, scheme, bodies, ports, rows, weights, local, share, g):
 
 
 @inline_kernel
-def evaluate(scheme, ports, n, g, d0, force, previous, d, f, by_d, by_rate):
-    """Deformations and law forces of all port stages; returns the largest residual and its port."""
+def evaluate(
+    scheme: SchemeArrays,
+    ports: PortArrays,
+    n: int,
+    g: np.ndarray,
+    d0: np.ndarray,
+    force: np.ndarray,
+    previous: np.ndarray,
+    d: np.ndarray,
+    f: np.ndarray,
+    by_d: np.ndarray,
+    by_rate: np.ndarray,
+) -> tuple[float, int]:
+    """Deformations and law forces of all port stages.
+
+    Parameters
+    ----------
+    scheme : SchemeArrays
+        Coefficients of the integration scheme.
+    ports : PortArrays
+        Wheel contacts and ports of terms.
+    n : int
+        Number of port stages.
+    g : (n_stage, n_stage) array of float
+        Flexibility from ``flexibility``. [m/N]
+    d0 : (n_stage,) array of float
+        Deformation without port forces. [m]
+    force : (n_stage,) array of float
+        Assumed force of each port stage. [N]
+    previous : (n_port,) array of float
+        Deformation at the start of the step. [m]
+    d : (n_stage,) array of float
+        Overwritten with the deformations. [m]
+    f : (n_stage,) array of float
+        Overwritten with the forces of the laws. [N]
+    by_d : (n_stage,) array of float
+        Overwritten with their derivatives by deformation. [N/m]
+    by_rate : (n_stage,) array of float
+        Overwritten with their derivatives by rate. [N s/m]
+
+    Returns
+    -------
+    (float, int)
+        Largest difference between force and law [N], and its port.
+    """
     stages, inverse = scheme.node.size, scheme.inverse
     law_code, numbers, table, table_start = ports.law_code, ports.numbers, ports.table, ports.table_start
     for k in range(n):
@@ -105,8 +233,55 @@ def evaluate(scheme, ports, n, g, d0, force, previous, d, f, by_d, by_rate):
 
 
 @inline_kernel
-def newton_update(scheme, ports, order, x, cut, g, force, f, by_d, by_rate, change, matrix, right, active):
-    """One Newton step for each cluster of neighbouring ports; the iteration resolves the coupling of distant ports."""
+def newton_update(
+    scheme: SchemeArrays,
+    ports: PortArrays,
+    order: np.ndarray,
+    x: np.ndarray,
+    cut: float,
+    g: np.ndarray,
+    force: np.ndarray,
+    f: np.ndarray,
+    by_d: np.ndarray,
+    by_rate: np.ndarray,
+    change: np.ndarray,
+    matrix: np.ndarray,
+    right: np.ndarray,
+    active: np.ndarray,
+) -> None:
+    """One Newton step for each cluster of neighbouring ports; the iteration resolves the coupling of distant ports.
+
+    Parameters
+    ----------
+    scheme : SchemeArrays
+        Coefficients of the integration scheme.
+    ports : PortArrays
+        Wheel contacts and ports of terms.
+    order : (n_port,) array of int
+        Ports in order of their positions.
+    x : (n_stage,) array of float
+        Position of each port stage. [m]
+    cut : float
+        Distance from which neighbouring ports are in different clusters. [m]
+    g : (n_stage, n_stage) array of float
+        Flexibility. [m/N]
+    force : (n_stage,) array of float
+        Force of each port stage; updated. [N]
+    f : (n_stage,) array of float
+        Force of each law. [N]
+    by_d : (n_stage,) array of float
+        Derivative of each law by deformation. [N/m]
+    by_rate : (n_stage,) array of float
+        Derivative of each law by rate. [N s/m]
+    change : (n_stage,) array of float
+        Overwritten with the change of each force. [N]
+    matrix : (n_stage, n_stage) array of float
+        Workspace of the linear system.
+    right : (n_stage,) array of float
+        Workspace of its right-hand side.
+    active : (n_stage,) array of int
+        Workspace: port stages whose force depends on the deformation.
+    """
     stages, inverse = scheme.node.size, scheme.inverse
     n_port = order.size
     first = 0

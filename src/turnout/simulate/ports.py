@@ -1,15 +1,49 @@
 """Collect the wheel contacts and the ports of terms into the arrays of the time march, in order of position."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.simulate.force_laws import TABLE
+from turnout.simulate.force_laws import ForceLaw, TableLaw
 from turnout.simulate.links import ports_of
 from turnout.simulate.state import PortArrays
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
 
-def contact_ports(vehicle, surfaces, start, direction):
-    """(position, body row, wheel, surface, law) of each contact: every wheel on every surface of the route."""
+    from turnout.simulate.force_laws import Port
+    from turnout.simulate.preparation import Prepared
+    from turnout.simulate.vehicle import Vehicle
+    from turnout.simulate.wheel_path import PathPart
+
+# position at time 0 [m], row of the body, wheel, surface, law
+Contact = tuple[float, int, int, int, ForceLaw]
+
+
+def contact_ports(
+    vehicle: Vehicle, surfaces: Sequence[Sequence[PathPart]], start: float, direction: int
+) -> list[Contact]:
+    """(position, body row, wheel, surface, law) of each contact: every wheel on every surface of the route.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        The train.
+    surfaces : sequence of sequences of path parts
+        Surfaces of the route.
+    start : float
+        Position of the first wheel at time 0. [m]
+    direction : int
+        1 towards growing x, -1 the other way.
+
+    Returns
+    -------
+    list of tuple
+        Position at time 0 [m], row of the body, number of wheel and surface, force law.
+    """
     rows, contacts = vehicle.wheel_rows, []
     for wheel, (offset, law) in enumerate(zip(vehicle.wheel_positions, vehicle.wheel_values("contact"))):
         for surface in range(len(surfaces)):
@@ -17,15 +51,49 @@ def contact_ports(vehicle, surfaces, start, direction):
     return contacts
 
 
-def fixed_ports(prepared):
-    """Ports that the terms of a prepared track add."""
+def fixed_ports(prepared: Prepared) -> list[Port]:
+    """Ports that the terms of a prepared track add.
+
+    Parameters
+    ----------
+    prepared : Prepared
+        The factorised track.
+
+    Returns
+    -------
+    list of Port
+        Ports in the order of the terms.
+    """
     return ports_of(prepared.terms, prepared.track)
 
 
-def port_arrays(prepared, contacts, fixed, path_of):
+def port_arrays(
+    prepared: Prepared, contacts: Sequence[Contact], fixed: Sequence[Port], path_of: Mapping[tuple[int, int], int]
+) -> tuple[PortArrays, list[int]]:
     """``PortArrays`` in order of position, and this order as indices: contacts first, then fixed ports.
 
     ``path_of`` (wheel, surface) -> index of the path.
+
+    Parameters
+    ----------
+    prepared : Prepared
+        The factorised track.
+    contacts : sequence of tuple
+        From ``contact_ports``.
+    fixed : sequence of Port
+        From ``fixed_ports``.
+    path_of : mapping
+        Index of the path of each wheel and surface.
+
+    Returns
+    -------
+    (PortArrays, list of int)
+        Arrays, and for each port of them its number among contacts and fixed ports.
+
+    Raises
+    ------
+    SimulationError
+        For a port at more than 4 degrees of freedom, at none, or at one that the track does not have.
     """
     entries = []
     for position, row, wheel, surface, law in contacts:
@@ -55,7 +123,7 @@ def port_arrays(prepared, contacts, fixed, path_of):
     return arrays, order
 
 
-def _fixed_entry(prepared, port):
+def _fixed_entry(prepared: Prepared, port: Port) -> tuple[np.ndarray, np.ndarray, float]:
     if not 1 <= len(port.ends) <= 4:
         raise SimulationError(f"port {port.label!r}: acts on {len(port.ends)} degrees of freedom, 1 to 4 are possible.")
     matrices = prepared.matrices
@@ -67,7 +135,7 @@ def _fixed_entry(prepared, port):
     return rows, weights, float(prepared.track.support[port.ends[0][0][1]])
 
 
-def _law_table(law):
-    if law.law_code != TABLE:
+def _law_table(law: ForceLaw) -> np.ndarray:
+    if not isinstance(law, TableLaw):
         return np.zeros((3, 0))
     return np.array([law.deformation, law.elastic, law.viscous], dtype=float)

@@ -1,6 +1,9 @@
 """Factorise a track for a time step and scheme; trains, speeds and paths share the result."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +13,12 @@ from turnout.simulate.integrator import scheme as scheme_called
 from turnout.simulate.matrices import TrackMatrices, assemble
 from turnout.simulate.state import SchemeArrays, TrackArrays
 from turnout.simulate.track import Track
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from turnout.physics.term import PhysicsTerm
+    from turnout.simulate.integrator import Scheme
 
 MIN_PIVOT_RATIO = 1e-11  # pivot over its diagonal element below which the pivot is a rounded 0
 WINDOW_DECAY = 30.0  # exp(-30) = 1e-13: windows of the inverse are exact to rounding
@@ -29,11 +38,26 @@ class Prepared:
     matrices: TrackMatrices
     arrays: TrackArrays
     scheme: SchemeArrays
-    static: tuple
-    stand_ins: dict = field(default_factory=dict, init=False, compare=False, repr=False)
+    static: tuple[np.ndarray, np.ndarray, np.ndarray]
+    stand_ins: dict[float, tuple[float, float, float]] = field(
+        default_factory=dict, init=False, compare=False, repr=False
+    )
 
-    def static_response(self, rows, weights):
-        """(n,) static deflection of all degrees of freedom under a unit force with these weights."""
+    def static_response(self, rows: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Static deflection of all degrees of freedom under a unit force with these weights.
+
+        Parameters
+        ----------
+        rows : (n_end,) array of int
+            Degrees of freedom on which the force acts.
+        weights : (n_end,) array of float
+            Share of the force on each.
+
+        Returns
+        -------
+        (n,) array of float
+            Deflection of every degree of freedom. [m/N]
+        """
         lower, upper, inverse_pivot = self.static
         x = np.zeros(self.matrices.n)
         np.add.at(x, rows, weights)
@@ -42,8 +66,21 @@ class Prepared:
         solve(lower, upper, inverse_pivot, x, 0, x.size)
         return x
 
-    def check_step(self, rate, substeps):
-        """Raise SimulationError if this was prepared for another ``rate`` [Hz] or other ``substeps`` per sample."""
+    def check_step(self, rate: float, substeps: int) -> None:
+        """Check that this was prepared for a sampling rate and a number of steps per sample.
+
+        Parameters
+        ----------
+        rate : float
+            Sampling rate. [Hz]
+        substeps : int
+            Time steps per sample.
+
+        Raises
+        ------
+        SimulationError
+            If it was prepared for another time step.
+        """
         if not abs(self.dt * rate * substeps - 1.0) < 1e-9:
             raise SimulationError(
                 f"the track is prepared for steps of {self.dt:.9g} s, but {rate!r} Hz with {substeps!r} per sample "
@@ -51,13 +88,43 @@ class Prepared:
             )
 
 
-def prepare(track, dt=5e-5, scheme="radau", terms=(), decay=WINDOW_DECAY, matrices=None):
+def prepare(
+    track: Track,
+    dt: float = 5e-5,
+    scheme: str = "radau",
+    terms: Sequence[PhysicsTerm] = (),
+    decay: float = WINDOW_DECAY,
+    matrices: TrackMatrices | None = None,
+) -> Prepared:
     """Assemble and factorise ``track`` with the matrix entries of ``terms`` for steps of ``dt`` [s].
 
     The response to a force is neglected where it has decayed to exp(-``decay``). ``matrices`` are those of this track
     with these terms, if they are assembled already.
 
-    Errors: SimulationError where the track carries no load (its stiffness is not positive definite).
+    Parameters
+    ----------
+    track : Track
+        The track.
+    dt : float
+        Time step. [s]
+    scheme : str
+        Name of the integration scheme.
+    terms : sequence of PhysicsTerm
+        Effects added to the base model.
+    decay : float
+        Exponent of the decay beyond which the response to a force is neglected. [-]
+    matrices : TrackMatrices or None
+        Matrices of this track with these terms; None: assemble them.
+
+    Returns
+    -------
+    Prepared
+        The factorised track.
+
+    Raises
+    ------
+    SimulationError
+        For a time step that is not above 0, and where the track carries no load.
     """
     if not dt > 0.0:
         raise SimulationError(f"time step must be above 0 s, got {dt!r}.")
@@ -100,7 +167,7 @@ def prepare(track, dt=5e-5, scheme="radau", terms=(), decay=WINDOW_DECAY, matric
     return Prepared(track, terms, dt, scheme, matrices, arrays, _scheme_arrays(integration_scheme, dt), static)
 
 
-def _factors(system):
+def _factors(system: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     half, n = system.shape[0] - 1, system.shape[1]
     width = 4 if half <= 4 else 6 if half <= 6 else half
     lower, inverse_pivot = np.zeros((n, width), dtype=system.dtype), np.zeros(n, dtype=system.dtype)
@@ -108,7 +175,9 @@ def _factors(system):
     return lower, upper_rows(lower, n, half, width), inverse_pivot
 
 
-def _two_sided_factors(system, window, reach):
+def _two_sided_factors(
+    system: np.ndarray, window: np.ndarray, reach: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Factors of the reversed matrix and the middle block of the inverse, for half bandwidth 4 at most."""
     half, n = system.shape[0] - 1, system.shape[1]
     if half > 4 or n < 16 or reach < 4:
@@ -122,7 +191,7 @@ def _two_sided_factors(system, window, reach):
     return *_factors(reversed_system), np.ascontiguousarray(middle)
 
 
-def _reach(track, matrices, s, exponent):
+def _reach(track: Track, matrices: TrackMatrices, s: complex, exponent: float) -> int:
     """Half width of the windows: decay of EI w'''' + s² m w = 0 down to exp(-``exponent``), in rows."""
     rails = {*matrices.rails}
     decay = min(float(np.min(np.abs(np.roots([r.bending_stiffness, 0, 0, 0, s * s * r.mass]).real))) for r in rails)
@@ -135,7 +204,7 @@ def _reach(track, matrices, s, exponent):
     return int(min(max(rows) + matrices.half + 2, matrices.n - 1))
 
 
-def _scheme_arrays(integration_scheme, dt):
+def _scheme_arrays(integration_scheme: Scheme, dt: float) -> SchemeArrays:
     return SchemeArrays(
         float(dt),
         integration_scheme.rate / dt,

@@ -1,10 +1,16 @@
 """Rail elements as Timoshenko or Euler-Bernoulli beams: matrices, shape functions, compliance within an element."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.errors import SimulationError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 GAUSS_POINT, GAUSS_WEIGHT = (0.5 * v for v in np.polynomial.legendre.leggauss(6))
 GAUSS_POINT = GAUSS_POINT + 0.5
@@ -28,7 +34,7 @@ class Rail:
     damping: float = 0.0
     beam: str = "timoshenko"
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.beam not in ("timoshenko", "euler"):
             raise SimulationError(f"rail: beam {self.beam!r} is neither 'timoshenko' nor 'euler'.")
         for name in ("bending_stiffness", "mass", "shear_stiffness"):
@@ -38,26 +44,51 @@ class Rail:
             if not getattr(self, name) >= 0.0:
                 raise SimulationError(f"rail: {name} must not be negative, got {getattr(self, name)!r}.")
 
-    def shear_ratio(self, length):
-        r"""Share of shear in an element, :math:`P = 12 EI / (\kappa G A h^2)`; 0 for Euler-Bernoulli."""
+    def shear_ratio(self, length: float | np.ndarray) -> np.ndarray:
+        r"""Share of shear in an element, :math:`P = 12 EI / (\kappa G A h^2)`; 0 for Euler-Bernoulli.
+
+        Parameters
+        ----------
+        length : float or array
+            Length of the element. [m]
+
+        Returns
+        -------
+        array
+            Shear ratio P. [-]
+        """
         if self.beam == "euler":
             return 0.0 * np.asarray(length, dtype=float)
         return 12.0 * self.bending_stiffness / (self.shear_stiffness * np.asarray(length, dtype=float) ** 2)
 
 
-def in_series(rails, shares):
+def in_series(rails: Sequence[Rail], shares: Sequence[float] | np.ndarray) -> Rail:
     r"""One profile for an element with several ``rails`` in a row, each over its share of the length.
 
     Flexibilities and masses add up: :math:`1/EI = \sum p_k / EI_k`, the same for shear, :math:`m = \sum p_k m_k`.
     Rotation under a moment, shear deflection under a force and mass are exact.
 
+    Parameters
+    ----------
+    rails : sequence of Rail
+        Profiles in a row.
+    shares : sequence of float
+        Share of each in the length; their sum is 1.
+
+    Returns
+    -------
+    Rail
+        Euler-Bernoulli only if all rails are.
+
+    Examples
+    --------
     >>> soft, stiff = Rail(4e6, 50.0, 2e8), Rail(12e6, 150.0, 6e8)
     >>> half = in_series((soft, stiff), (0.5, 0.5))
     >>> round(half.bending_stiffness), half.mass
     (6000000, 100.0)
     """
 
-    def mean(name):
+    def mean(name: str) -> float:
         return sum(p * getattr(r, name) for r, p in zip(rails, shares))
 
     shear_compliance = sum(p / r.shear_stiffness for r, p in zip(rails, shares) if r.beam != "euler")
@@ -71,14 +102,31 @@ def in_series(rails, shares):
     )
 
 
-def shape_functions(s, length, shear_ratio):
+def shape_functions(s: float | np.ndarray, length: float | np.ndarray, shear_ratio: float | np.ndarray) -> np.ndarray:
     r"""Deflection of the rail at ``s`` in 0..1 of an element from its nodes' deflections and rotations.
 
     .. math:: N = \frac{1}{1+P}\,[1-3s^2+2s^3+P(1-s),\; h(s-2s^2+s^3+P(s-s^2)/2),\; \ldots]
 
-    ``s`` (...,), ``length`` [m] and ``shear_ratio`` broadcast against it; returns (..., 4), the rotations'
-    columns in m/rad. Source: the exact static solution of Timoshenko's beam (Przemieniecki 1968, ch. 11).
+    Parameters
+    ----------
+    s : float or (...,) array of float
+        Position in the element as a share of its length.
+    length : float or array
+        Length h of the element, broadcast against ``s``. [m]
+    shear_ratio : float or array
+        Shear ratio P, broadcast against ``s``. [-]
 
+    Returns
+    -------
+    (..., 4) array of float
+        Weights of deflection, rotation [m/rad], deflection and rotation [m/rad] of the two nodes.
+
+    References
+    ----------
+    The exact static solution of Timoshenko's beam: Przemieniecki 1968, ch. 11.
+
+    Examples
+    --------
     >>> shape_functions(0.25, 0.6, 0.0).round(4)
     array([ 0.8438,  0.0844,  0.1562, -0.0281])
     """
@@ -91,8 +139,25 @@ def shape_functions(s, length, shear_ratio):
     return n / (1.0 + p)[..., None]
 
 
-def rotation_functions(s, length, shear_ratio):
-    """Rotation of the cross-section at ``s`` from the nodes' values, (..., 4); derivative of N where P = 0."""
+def rotation_functions(
+    s: float | np.ndarray, length: float | np.ndarray, shear_ratio: float | np.ndarray
+) -> np.ndarray:
+    """Rotation of the cross-section at ``s`` from the nodes' values; derivative of N where P = 0.
+
+    Parameters
+    ----------
+    s : float or (...,) array of float
+        Position in the element as a share of its length.
+    length : float or array
+        Length of the element, broadcast against ``s``. [m]
+    shear_ratio : float or array
+        Shear ratio P, broadcast against ``s``. [-]
+
+    Returns
+    -------
+    (..., 4) array of float
+        Weights of deflection [rad/m], rotation, deflection [rad/m] and rotation of the two nodes.
+    """
     s, h, p = np.broadcast_arrays(np.asarray(s, dtype=float), length, shear_ratio)
     r = np.empty((*s.shape, 4))
     r[..., 0] = 6.0 * (s**2 - s) / h
@@ -102,8 +167,21 @@ def rotation_functions(s, length, shear_ratio):
     return r / (1.0 + p)[..., None]
 
 
-def element_stiffness(rail, length):
-    """(4, 4) stiffness of a rail element [N/m, N, N m] for (w, rotation) at both ends, exact in statics."""
+def element_stiffness(rail: Rail, length: float) -> np.ndarray:
+    """Stiffness of a rail element for (w, rotation) at both ends, exact in statics.
+
+    Parameters
+    ----------
+    rail : Rail
+        Profile of the rail.
+    length : float
+        Length of the element. [m]
+
+    Returns
+    -------
+    (4, 4) array of float
+        Deflections and rotations alternate. [N/m, N, N m]
+    """
     h, p = length, float(rail.shear_ratio(length))
     k = np.array(
         [
@@ -116,8 +194,21 @@ def element_stiffness(rail, length):
     return rail.bending_stiffness / ((1.0 + p) * h**3) * k
 
 
-def element_mass(rail, length):
-    """(4, 4) consistent mass of a rail element: translation with weight m, rotation with weight ρI."""
+def element_mass(rail: Rail, length: float) -> np.ndarray:
+    """Consistent mass of a rail element: translation with weight m, rotation with weight ρI.
+
+    Parameters
+    ----------
+    rail : Rail
+        Profile of the rail.
+    length : float
+        Length of the element. [m]
+
+    Returns
+    -------
+    (4, 4) array of float
+        Deflections and rotations alternate. [kg, kg m, kg m²]
+    """
     p = float(rail.shear_ratio(length))
     n = shape_functions(GAUSS_POINT, length, p)
     r = rotation_functions(GAUSS_POINT, length, p)
@@ -126,7 +217,7 @@ def element_mass(rail, length):
     return (weight * (rail.mass * n[:, :, None] * n[:, None, :] + inertia * r[:, :, None] * r[:, None, :])).sum(0)
 
 
-def local_compliance(s1, s2, length, rail):
+def local_compliance(s1: float | np.ndarray, s2: float | np.ndarray, length: float, rail: Rail) -> np.ndarray:
     r"""Deflection at ``s1`` from a unit force at ``s2`` of one element with both ends clamped [m/N].
 
     .. math:: l(s,s) = \frac{q h}{\kappa G A}
@@ -135,6 +226,24 @@ def local_compliance(s1, s2, length, rail):
     Without it a wheel rolls over nodes that are stiffer than the span between them, which writes a line
     at speed over element length into the contact force. Symmetric in ``s1`` and ``s2``.
 
+    Parameters
+    ----------
+    s1 : float or array
+        Position of the deflection as a share of the length.
+    s2 : float or array
+        Position of the force as a share of the length.
+    length : float
+        Length of the element. [m]
+    rail : Rail
+        Profile of the rail.
+
+    Returns
+    -------
+    array
+        Deflection per force; the shape of ``s1`` and ``s2`` broadcast. [m/N]
+
+    Examples
+    --------
     >>> rail = Rail(6.0e6, 60.0, 2.4e8, beam="euler")
     >>> f"{local_compliance(0.5, 0.5, 0.6, rail):.4g} m/N, h^3/(192 EI) = {0.6**3 / (192 * 6.0e6):.4g}"
     '1.875e-10 m/N, h^3/(192 EI) = 1.875e-10'

@@ -1,8 +1,15 @@
 """Generate random roughness of rail and wheel with the spectrum of ISO 3095."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from turnout.simulate.wheel_path import Sampled
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 # Limit curve of ISO 3095:2013 in one-third octave bands from 2 m down to 3.15 mm [dB re 1 µm], the class "well
 # maintained and very smooth" of Directive (EU) 2015/996; between the bands the level is linear in the logarithm.
@@ -31,19 +38,46 @@ SHORT_WAVE_LEVELS = (-5.0, -5.6, -6.2, -6.8, -7.4, -8.0, -8.6, -9.2, -9.8, -10.4
 LIMIT_LEVELS = np.array([*LONG_WAVE_LEVELS, *SHORT_WAVE_LEVELS])
 
 
-def level(wavelength, offset=0.0):
-    """One-third octave roughness level [dB re 1 µm] at ``wavelength`` [m], ``offset`` [dB] above the limit curve.
+def level(wavelength: float | np.ndarray, offset: float = 0.0) -> np.ndarray:
+    """One-third octave roughness level, ``offset`` above the limit curve.
 
     Constant above 2 m and below 3.15 mm, where the standard has no values.
 
+    Parameters
+    ----------
+    wavelength : float or array
+        Above 0. [m]
+    offset : float
+        Level above the limit curve. [dB]
+
+    Returns
+    -------
+    array
+        Level. [dB re 1 µm]
+
+    References
+    ----------
+    ISO 3095:2013, limit curve.
+
+    Examples
+    --------
     >>> [round(float(level(w)), 1) for w in (1.0, 0.4, 0.1, 0.01)], round(float(level(0.1, offset=6.0)), 1)
     ([17.1, 17.1, 4.9, -8.0], 10.9)
     """
     return np.interp(np.log(wavelength), np.log(WAVELENGTH[::-1]), LIMIT_LEVELS[::-1]) + offset
 
 
-def roughness(start, end, seed, offset=0.0, shortest=0.02, longest=3.0, step=0.005, fade=3.0):
-    r"""A realisation of roughness between two positions, as a path.
+def roughness(
+    start: float,
+    end: float,
+    seed: int | Sequence[int],
+    offset: float = 0.0,
+    shortest: float = 0.02,
+    longest: float = 3.0,
+    step: float = 0.005,
+    fade: float = 3.0,
+) -> Sampled:
+    """A realisation of roughness between two positions, as a path.
 
     The variance of a one-third octave band is :math:`10^{L/10}` µm²; it is spread evenly over the band.
 
@@ -57,6 +91,10 @@ def roughness(start, end, seed, offset=0.0, shortest=0.02, longest=3.0, step=0.0
         Level above the limit curve. [dB]
     shortest, longest : float
         Range of wavelengths [m]. Waves shorter than the contact patch, about 15 mm, do not lift a wheel.
+    step : float
+        Distance of two values of the dip. [m]
+    fade : float
+        Length over which the roughness fades in and out. [m]
 
     Returns
     -------

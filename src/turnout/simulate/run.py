@@ -1,6 +1,10 @@
 """Run one simulation: put a train or a hammer on a prepared track, integrate in time, return the signals."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,10 +13,19 @@ from turnout.simulate.between_nodes import element_deflection, is_between_nodes,
 from turnout.simulate.march import CONVERGED, LEFT_TRACK, march
 from turnout.simulate.port_system import locate_ports
 from turnout.simulate.ports import contact_ports, fixed_ports, port_arrays
-from turnout.simulate.state import PortArrays, RunArrays, stand_in_of, vehicle_arrays
+from turnout.simulate.state import Motion, PortArrays, RunArrays, stand_in_of, vehicle_arrays
 from turnout.simulate.statics import equilibrium, motion_at_rest
-from turnout.simulate.wheel_path import spline_pieces
+from turnout.simulate.wheel_path import Surfaces, spline_pieces
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from typing import NoReturn
+
+    from turnout.simulate.between_nodes import RailLoads
+    from turnout.simulate.preparation import Prepared
+    from turnout.simulate.vehicle import Vehicle
+
+Pulse = Callable[[np.ndarray], np.ndarray]  # force [N] of time [s]
 CLUSTER_CUT = 0.9  # ports closer than this [m] share one Newton system, the others couple by iteration
 
 
@@ -23,7 +36,7 @@ class Probe:
     ``order`` is 2 for acceleration, 1 for velocity, 0 for displacement.
     """
 
-    place: object
+    place: float | tuple
     order: int = 2
 
 
@@ -42,7 +55,7 @@ class Outcome:
     surface_force: np.ndarray
     port_force: np.ndarray
     iterations: float
-    motion: object
+    motion: Motion
 
 
 @dataclass(frozen=True)
@@ -57,26 +70,45 @@ class Drive:
     start: float
     speed: float
     direction: int = 1
-    surfaces: tuple = ((),)
+    surfaces: Surfaces = ((),)
     entry: float = 6.0
     margin: float = 3.0
     path_step: float = 0.005
-    free_fall: tuple | None = None
+    free_fall: tuple[float, float] | None = None
 
 
-def run(prepared, duration, probes=(), vehicle=None, drive=None, pulses=(), forces=True, tolerance=1e-6, marcher=march):
+STANDING = Drive(0.0, 0.0)  # where there is no vehicle
+
+
+def run(
+    prepared: Prepared,
+    duration: float,
+    probes: Sequence[Probe] = (),
+    vehicle: Vehicle | None = None,
+    drive: Drive | None = None,
+    pulses: Sequence[tuple[float | tuple, Pulse]] = (),
+    forces: bool = True,
+    tolerance: float = 1e-6,
+    marcher: Callable[..., tuple[int, int, int, float, int]] = march,
+) -> Outcome:
     """March for ``duration`` [s].
 
     Parameters
     ----------
     prepared : Prepared
         The track.
+    duration : float
+        Duration of the march. [s]
     probes : sequence of Probe
         Signals to record.
     vehicle, drive : Vehicle, Drive or None
         The vehicle on the track and its motion.
     pulses : sequence of (point, callable)
         Given forces [N] as functions of time [s], down positive.
+    forces : bool
+        Whether the forces of ports are returned; without them, and without probes between nodes, none are stored.
+    tolerance : float
+        Largest residual of a port force in Newton's iteration. [N]
     marcher : callable
         ``march`` (compiled) or the reference implementation in numpy.
 
@@ -84,11 +116,17 @@ def run(prepared, duration, probes=(), vehicle=None, drive=None, pulses=(), forc
     -------
     Outcome
 
-    Errors: SimulationError where a wheel leaves the track or Newton's iteration fails, with time, position and value.
+    Raises
+    ------
+    SimulationError
+        Where a wheel leaves the track or Newton's iteration fails, with time, position and value.
     """
     n_step = round(duration / prepared.dt)
     if n_step < 1:
         raise SimulationError(f"a duration of {duration!r} s is not one step of {prepared.dt!r} s.")
+    if vehicle and drive is None:
+        raise SimulationError("a vehicle needs a drive: where it starts, and how fast it is.")
+    drive = drive or STANDING
     contacts = contact_ports(vehicle, drive.surfaces, drive.start, drive.direction) if vehicle else []
     fixed = fixed_ports(prepared)
     paths, path_of, path_start = (
@@ -101,7 +139,11 @@ def run(prepared, duration, probes=(), vehicle=None, drive=None, pulses=(), forc
     arrays = _run_arrays(prepared, drive, use_stand_in, paths, path_start, probes, pulses, n_step, tolerance)
     motion = _initial_motion(prepared, vehicle, drive, ports, arrays, stand_in)
     signals = np.zeros((len(probes), n_step))
-    between_nodes = [k for k, probe in enumerate(probes) if is_between_nodes(prepared.matrices, probe.place)]
+    between_nodes = [
+        (k, probe.place, probe.order)
+        for k, probe in enumerate(probes)
+        if not isinstance(probe.place, tuple) and is_between_nodes(prepared.matrices, probe.place)
+    ]
     port_forces = np.zeros((len(order), n_step if forces or between_nodes else 0))
     status, step, port, value, iterations = marcher(
         prepared.arrays, prepared.scheme, bodies, ports, arrays, motion, n_step, signals, port_forces
@@ -115,19 +157,19 @@ def run(prepared, duration, probes=(), vehicle=None, drive=None, pulses=(), forc
     surface = by_port[: len(contacts)].reshape(*shape, port_forces.shape[1])
     force = surface.sum(axis=1)
     for loads in _applied_loads(prepared, vehicle, drive, pulses, arrays, force) if between_nodes else ():
-        for k in between_nodes:
-            deflection = element_deflection(prepared.matrices, probes[k].place, loads)
-            signals[k] += step_mean(deflection, probes[k].order, prepared.dt, loads.from_rest)
+        for k, position, derivative in between_nodes:
+            deflection = element_deflection(prepared.matrices, position, loads)
+            signals[k] += step_mean(deflection, derivative, prepared.dt, loads.from_rest)
     return Outcome(time, signals, force, surface, by_port[len(contacts) :], iterations / n_step, motion)
 
 
-def _dummy_vehicle():
+def _dummy_vehicle() -> Vehicle:
     from turnout.simulate.vehicle import lone_wheels
 
     return lone_wheels(1.0)
 
 
-def _raise_failure(status, prepared, step, port, value, ports):
+def _raise_failure(status: int, prepared: Prepared, step: int, port: int, value: float, ports: PortArrays) -> NoReturn:
     time, subject = step * prepared.dt, f"wheel {ports.wheel[port]}" if ports.wheel[port] >= 0 else f"port {port}"
     if status == LEFT_TRACK:
         a, b = prepared.matrices.node[[0, -1]]
@@ -141,14 +183,16 @@ def _raise_failure(status, prepared, step, port, value, ports):
     )
 
 
-def _stand_in(prepared, drive):
+def _stand_in(prepared: Prepared, drive: Drive) -> tuple[float, float, float]:
     position, cache = float(prepared.matrices.node[0]) + drive.margin + drive.entry, prepared.stand_ins
     if position not in cache:
         cache[position] = stand_in_of(prepared, position)
     return cache[position]
 
 
-def _wheel_paths(prepared, vehicle, drive, n_step):
+def _wheel_paths(
+    prepared: Prepared, vehicle: Vehicle, drive: Drive, n_step: int
+) -> tuple[np.ndarray, dict[tuple[int, int], int], float]:
     """Cubic pieces of every distinct path, and the path of each wheel on each surface."""
     distance = drive.speed * n_step * prepared.dt
     length = float(vehicle.wheel_positions[-1])
@@ -175,7 +219,17 @@ def _wheel_paths(prepared, vehicle, drive, n_step):
     return np.array(pieces), path_of, low
 
 
-def _run_arrays(prepared, drive, use_stand_in, paths, path_start, probes, pulses, n_step, tolerance):
+def _run_arrays(
+    prepared: Prepared,
+    drive: Drive,
+    use_stand_in: bool,
+    paths: np.ndarray,
+    path_start: float,
+    probes: Sequence[Probe],
+    pulses: Sequence[tuple[float | tuple, Pulse]],
+    n_step: int,
+    tolerance: float,
+) -> RunArrays:
     matrices, scheme = prepared.matrices, prepared.scheme
     rows, weights = np.zeros((len(probes), 4), dtype=np.int64), np.zeros((len(probes), 4))
     for k, probe in enumerate(probes):
@@ -192,11 +246,11 @@ def _run_arrays(prepared, drive, use_stand_in, paths, path_start, probes, pulses
         first, last = matrices.node[0] + drive.margin, matrices.node[-1] - drive.margin
         ramp = np.array([first, first + drive.entry, last - drive.entry, last])
     return RunArrays(
-        float(drive.direction * drive.speed) if drive else 0.0,
+        float(drive.direction * drive.speed),
         ramp,
         use_stand_in,
         float(path_start),
-        float(drive.path_step) if drive else 1.0,
+        float(drive.path_step),
         paths,
         pulse_rows,
         pulse_weights,
@@ -209,22 +263,36 @@ def _run_arrays(prepared, drive, use_stand_in, paths, path_start, probes, pulses
     )
 
 
-def _applied_loads(prepared, vehicle, drive, pulses, arrays, force):
+def _applied_loads(
+    prepared: Prepared,
+    vehicle: Vehicle | None,
+    drive: Drive,
+    pulses: Sequence[tuple[float | tuple, Pulse]],
+    arrays: RunArrays,
+    force: np.ndarray,
+) -> list[RailLoads]:
     """Loads on the rail itself: wheels, and pulses that do not act on a named degree of freedom."""
     loads = []
     if vehicle is not None:
         position = drive.start - drive.direction * np.asarray(vehicle.wheel_positions)
         ramp = arrays.ramp if arrays.stand_in else None
         loads.append(rail_loads(position, arrays.speed, force, prepared.dt, drive.free_fall is not None, ramp))
-    on_rail = [k for k, (position, _) in enumerate(pulses) if not isinstance(position, tuple)]
+    on_rail = {k: float(point) for k, (point, _) in enumerate(pulses) if not isinstance(point, tuple)}
     if on_rail:
-        position = np.array([float(pulses[k][0]) for k in on_rail])
-        pulse_force = arrays.pulse_force[on_rail] @ prepared.scheme.quadrature
+        position = np.array([*on_rail.values()])
+        pulse_force = arrays.pulse_force[[*on_rail]] @ prepared.scheme.quadrature
         loads.append(rail_loads(position, 0.0, pulse_force, prepared.dt, True))
     return loads
 
 
-def _initial_motion(prepared, vehicle, drive, ports, arrays, stand_in):
+def _initial_motion(
+    prepared: Prepared,
+    vehicle: Vehicle | None,
+    drive: Drive,
+    ports: PortArrays,
+    arrays: RunArrays,
+    stand_in: tuple[float, float, float],
+) -> Motion:
     if vehicle is None:
         return motion_at_rest(prepared, ports)
     if drive.free_fall is not None:
@@ -236,7 +304,9 @@ def _initial_motion(prepared, vehicle, drive, ports, arrays, stand_in):
     return equilibrium(prepared, vehicle, ports, _initial_ports(prepared, ports, arrays), stand_in[2])
 
 
-def _initial_ports(prepared, ports: PortArrays, arrays):
+def _initial_ports(
+    prepared: Prepared, ports: PortArrays, arrays: RunArrays
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Rows, weights, local compliance, stand-in share and dip of every port at time 0."""
     n = ports.body.size
     x, local, share, dip = (np.zeros(n) for _ in range(4))

@@ -1,12 +1,21 @@
 """Simulate the measuring system: mounting, gain, anti-alias filter, offset, noise, clipping, converter."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.records import Channel
 from turnout.simulate.run import Probe
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from turnout.physics.term import PhysicsTerm
+    from turnout.simulate.track import Track
 
 DERIVATIVE_ORDERS = {"acceleration": 2, "velocity": 1, "displacement": 0}
 ALIAS_TAPS = 63
@@ -38,12 +47,28 @@ class Sensor:
     delay: float = 0.0
     serial: str = ""
 
-    def channel(self):
+    def channel(self) -> Channel:
         """The channel of a recording."""
         return Channel(self.name, self.quantity, self.place, self.mounting, self.serial, self.limit, self.resolution)
 
-    def probe(self, track):
-        """Signal that the simulation must record."""
+    def probe(self, track: Track) -> Probe:
+        """Signal that the simulation must record.
+
+        Parameters
+        ----------
+        track : Track
+            The track; a sensor on a sleeper is on its nearest support.
+
+        Returns
+        -------
+        Probe
+            Point and derivative of the signal.
+
+        Raises
+        ------
+        SimulationError
+            For a quantity that the track does not have, and for a position outside the track.
+        """
         if self.quantity not in DERIVATIVE_ORDERS:
             raise SimulationError(f"sensor {self.name!r}: cannot record {self.quantity!r} on the track.")
         if not track.start <= self.place <= track.end:
@@ -56,25 +81,78 @@ class Sensor:
         return Probe(self.place, DERIVATIVE_ORDERS[self.quantity])
 
 
-def actual_sensor(sensor, terms):
-    """The sensor at its true position according to ``terms``."""
+def actual_sensor(sensor: Sensor, terms: Sequence[PhysicsTerm]) -> Sensor:
+    """The sensor at its true position according to ``terms``.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        The sensor as described.
+    terms : sequence of PhysicsTerm
+        Effects, of which some move sensors.
+
+    Returns
+    -------
+    Sensor
+        The same sensor where no term moves it.
+    """
     for term in terms:
         sensor = term.sensor(sensor)
     return sensor
 
 
-def mean_of(signals, substeps):
-    """(..., n) means over ``substeps`` time steps of signals (..., n * substeps); a remainder is dropped."""
+def mean_of(signals: np.ndarray, substeps: int) -> np.ndarray:
+    """Means over ``substeps`` time steps of signals; a remainder is dropped.
+
+    Parameters
+    ----------
+    signals : (..., n_step) array of float
+        Signals in time steps.
+    substeps : int
+        Time steps per sample.
+
+    Returns
+    -------
+    (..., n_sample) array of float
+        Means.
+    """
     n = signals.shape[-1] // substeps
     return signals[..., : n * substeps].reshape(*signals.shape[:-1], n, substeps).mean(axis=-1)
 
 
-def record_signal(sensor, signal, rate, rng, terms=(), substeps=1):
-    r"""Samples (n,) at ``rate`` [Hz] that a ``sensor`` records of the true ``signal`` (n * substeps,).
+def record_signal(
+    sensor: Sensor,
+    signal: np.ndarray,
+    rate: float,
+    rng: np.random.Generator,
+    terms: Sequence[PhysicsTerm] = (),
+    substeps: int = 1,
+) -> np.ndarray:
+    """Samples that a ``sensor`` records of the true ``signal``.
 
     The signal is filtered before it is sampled, to prevent aliasing.
     Mounting: :math:`1 / (1 - (f/f_0)^2 + i f / (Q f_0))`. The anti-alias filter has linear phase and its delay
     is removed, as in a sigma-delta converter. Terms of type "channel" act before the gain.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        The channel.
+    signal : (n * substeps,) array of float
+        True signal in time steps.
+    rate : float
+        Sampling rate. [Hz]
+    rng : Generator
+        Source of the noise; not used by a sensor without noise.
+    terms : sequence of PhysicsTerm
+        Effects of type "channel".
+    substeps : int
+        Time steps per sample.
+
+    Returns
+    -------
+    (n,) array of float
+        Samples in the unit of the quantity.
     """
     for term in terms:
         signal = term.channel(signal, rate * substeps, sensor)
@@ -89,7 +167,7 @@ def record_signal(sensor, signal, rate, rng, terms=(), substeps=1):
     return signal
 
 
-def _apply_filters(sensor, signal, rate, substeps):
+def _apply_filters(sensor: Sensor, signal: np.ndarray, rate: float, substeps: int) -> np.ndarray:
     """Mounting, delay and anti-alias filter in one transform, padded so that the signal does not wrap around."""
     if not (sensor.mount_frequency or sensor.delay or sensor.cutoff):
         return signal
@@ -106,7 +184,7 @@ def _apply_filters(sensor, signal, rate, substeps):
     return np.fft.irfft(np.fft.rfft(signal, padded) * transfer, padded)[: signal.size]
 
 
-def _anti_alias(cutoff, frequency, substeps):
+def _anti_alias(cutoff: float, frequency: np.ndarray, substeps: int) -> np.ndarray:
     """Amplitude of a windowed-sinc low-pass (Hamming) centred on its own delay; both in shares of the rate."""
     reach = ALIAS_TAPS // 2 * substeps
     k = np.arange(-reach, reach + 1) / substeps
@@ -118,7 +196,7 @@ def _anti_alias(cutoff, frequency, substeps):
     return cosine
 
 
-def _fast_length(n):
+def _fast_length(n: int) -> int:
     """Smallest 2^a 3^b 5^c that is at least ``n``."""
     length = 1 << (n - 1).bit_length()
     for three in (1, 3, 9, 27):

@@ -1,11 +1,17 @@
 """Arrays of the time march in the groups that the compiled code uses, with those of vehicles and stand-in tracks."""
 
+from __future__ import annotations
+
 from itertools import pairwise
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from turnout.simulate.frequency_response import receptance
+
+if TYPE_CHECKING:
+    from turnout.simulate.preparation import Prepared
+    from turnout.simulate.vehicle import Vehicle
 
 
 class TrackArrays(NamedTuple):
@@ -124,8 +130,23 @@ class Motion(NamedTuple):
     deformation: np.ndarray
 
 
-def vehicle_arrays(vehicle, scheme, stand_in):
-    """Inverse of s² M + s C + K of each block of coupled rows; ``stand_in`` is (mass, damping, stiffness)."""
+def vehicle_arrays(vehicle: Vehicle, scheme: SchemeArrays, stand_in: tuple[float, float, float]) -> VehicleArrays:
+    """Inverse of s² M + s C + K of each block of coupled rows.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        The train.
+    scheme : SchemeArrays
+        Coefficients of the integration scheme.
+    stand_in : (float, float, float)
+        Mass [kg], damping [N s/m] and stiffness [N/m] of the stand-in track of each wheel.
+
+    Returns
+    -------
+    VehicleArrays
+        Inverses and the factors of the state.
+    """
     mass, damping, stiffness, weight = vehicle.matrices
     starts = vehicle.blocks
     size, count = int(np.max(np.diff(starts))), starts.size - 1
@@ -150,11 +171,23 @@ def vehicle_arrays(vehicle, scheme, stand_in):
     )
 
 
-def stand_in_of(prepared, position):
+def stand_in_of(prepared: Prepared, position: float) -> tuple[float, float, float]:
     """Mass, damping and stiffness of one oscillator that responds like the track at ``position``, 5-200 Hz.
 
     The stiffness is the static one, so that a wheel rolls onto the modelled track without a step. Mass and damping are
     fitted to the dynamic stiffness by least squares.
+
+    Parameters
+    ----------
+    prepared : Prepared
+        The factorised track.
+    position : float
+        Position on the rail. [m]
+
+    Returns
+    -------
+    (float, float, float)
+        Mass, at least 20 kg; damping [N s/m]; stiffness [N/m].
     """
     rows, weights = prepared.matrices.rail_weights(position)
     compliance = weights @ prepared.static_response(rows, weights)[rows] + prepared.matrices.compliance(position)

@@ -1,5 +1,9 @@
 """Compute the static equilibrium of train and track, the initial state of a simulation."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from turnout.errors import SimulationError
@@ -7,9 +11,29 @@ from turnout.simulate.force_laws import POWER
 from turnout.simulate.kernels import law_force
 from turnout.simulate.state import Motion
 
+if TYPE_CHECKING:
+    from turnout.simulate.preparation import Prepared
+    from turnout.simulate.state import PortArrays
+    from turnout.simulate.vehicle import Vehicle
 
-def motion_at_rest(prepared, ports, vehicle=None):
-    """Motion of a track at rest without any force; ``vehicle`` is at its zero position without contact."""
+
+def motion_at_rest(prepared: Prepared, ports: PortArrays, vehicle: Vehicle | None = None) -> Motion:
+    """Motion of a track at rest without any force; ``vehicle`` is at its zero position without contact.
+
+    Parameters
+    ----------
+    prepared : Prepared
+        The factorised track.
+    ports : PortArrays
+        Wheel contacts and ports of terms.
+    vehicle : Vehicle or None
+        The train; None: no bodies.
+
+    Returns
+    -------
+    Motion
+        All zero, but the deformation of a port is minus its gap.
+    """
     t, n_port = prepared.arrays, ports.body.size
     wide = t.n + 2 * t.pad
     n, wheels = (vehicle.n, len(vehicle.wheels)) if vehicle else (0, 0)
@@ -26,11 +50,42 @@ def motion_at_rest(prepared, ports, vehicle=None):
     )
 
 
-def equilibrium(prepared, vehicle, ports, initial_ports, stand_in_stiffness, tolerance=1e-7):
+def equilibrium(
+    prepared: Prepared,
+    vehicle: Vehicle,
+    ports: PortArrays,
+    initial_ports: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+    stand_in_stiffness: float,
+    tolerance: float = 1e-7,
+) -> Motion:
     """Motion in static equilibrium under the weight of ``vehicle``, all velocities 0.
 
-    ``initial_ports`` is (rows, weights, local compliance, stand-in share, dip) of every port at time 0. Newton's method
-    on all port forces and wheel positions; SimulationError if the residual is not below 1e-7 N after 50 steps.
+    Newton's method on all port forces and wheel positions.
+
+    Parameters
+    ----------
+    prepared : Prepared
+        The factorised track.
+    vehicle : Vehicle
+        The train.
+    ports : PortArrays
+        Wheel contacts and ports of terms.
+    initial_ports : tuple of arrays
+        Rows, weights, local compliance, stand-in share and dip of every port at time 0.
+    stand_in_stiffness : float
+        Stiffness of the stand-in track. [N/m]
+    tolerance : float
+        Largest residual; it grows with the largest load above 100 kN. [N]
+
+    Returns
+    -------
+    Motion
+        State at rest with its port forces.
+
+    Raises
+    ------
+    SimulationError
+        If the residual is not below the tolerance after 50 steps.
     """
     rows, weights, local, share, dip = initial_ports
     n_port = ports.body.size
@@ -68,7 +123,7 @@ def equilibrium(prepared, vehicle, ports, initial_ports, stand_in_stiffness, tol
     )
 
 
-def _wheel_stiffness(vehicle, ports):
+def _wheel_stiffness(vehicle: Vehicle, ports: PortArrays) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Stiffness and load of the wheels with the sprung rows eliminated; matrix of the ports of each wheel."""
     _, _, stiffness, weight = vehicle.matrices
     wheels = vehicle.wheel_rows
@@ -82,7 +137,9 @@ def _wheel_stiffness(vehicle, ports):
     return stiff, weight[wheels] - across @ inner[:, -1], touches
 
 
-def _first_guess(ports, touches, flexibility, force, dip):
+def _first_guess(
+    ports: PortArrays, touches: np.ndarray, flexibility: np.ndarray, force: np.ndarray, dip: np.ndarray
+) -> np.ndarray:
     below = flexibility @ force + dip
     approach = np.zeros_like(force)
     for k in np.flatnonzero(ports.wheel >= 0):
@@ -95,7 +152,7 @@ def _first_guess(ports, touches, flexibility, force, dip):
         return np.array([np.min((below + approach)[row > 0.0]) for row in touches])
 
 
-def _law_forces(ports, d):
+def _law_forces(ports: PortArrays, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     f, slope = np.zeros(d.size), np.zeros(d.size)
     for k in range(d.size):
         first, last = ports.table_start[k], ports.table_start[k + 1]
@@ -103,7 +160,17 @@ def _law_forces(ports, d):
     return f, slope
 
 
-def _motion(prepared, vehicle, ports, force, wheel_z, columns, share, stand_in_stiffness, d):
+def _motion(
+    prepared: Prepared,
+    vehicle: Vehicle,
+    ports: PortArrays,
+    force: np.ndarray,
+    wheel_z: np.ndarray,
+    columns: np.ndarray,
+    share: np.ndarray,
+    stand_in_stiffness: float,
+    d: np.ndarray,
+) -> Motion:
     motion = motion_at_rest(prepared, ports, vehicle)
     pad, n = prepared.arrays.pad, prepared.arrays.n
     motion.u[pad : pad + n] = force @ columns

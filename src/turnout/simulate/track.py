@@ -1,5 +1,7 @@
 """Model of a track: one rail on supports, each with its own pad, sleeper and ballast."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -76,7 +78,7 @@ class Track:
     section: tuple[str, ...] = ()
     name: str = "track"
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         support = np.array(self.support, dtype=float)
         if support.ndim != 1 or support.size < 3 or not np.all(np.diff(support) > 0.0):
             raise SimulationError(f"{self.name}: support needs at least 3 rising places, got {support!r}.")
@@ -97,7 +99,7 @@ class Track:
 
         self._check_pad_width()
 
-    def _check_pad_width(self):
+    def _check_pad_width(self) -> None:
         """A pad on three nodes is at most 8/3 elements wide: then all three nodes carry the same."""
         element = float(np.min(np.diff(self.support))) / self.elements_per_bay
         if not 0.0 <= self.pad_width <= 8.0 / 3.0 * element:
@@ -106,7 +108,7 @@ class Track:
                 f"three nodes hold that are {element:.3f} m apart; fewer elements per bay hold more."
             )
 
-    def _support_values(self, name):
+    def _support_values(self, name: str) -> np.ndarray:
         value = np.asarray(getattr(self, name), dtype=float)
         n = self.support.size
         if value.ndim and value.shape != (n,):
@@ -116,30 +118,81 @@ class Track:
         return np.broadcast_to(value, (n,)).copy()
 
     @property
-    def start(self):
+    def start(self) -> float:
         """Position of the first node [m]."""
         return float(self.support[0])
 
     @property
-    def end(self):
+    def end(self) -> float:
         """Position of the last node [m]."""
         return float(self.support[-1])
 
-    def with_(self, **changes):
-        """The same track with some fields changed."""
+    def with_(self, **changes: Any) -> Track:
+        """The same track with some fields changed.
+
+        Parameters
+        ----------
+        **changes : Any
+            New values by name of the field.
+
+        Returns
+        -------
+        Track
+            A copy, checked like a new track.
+
+        Raises
+        ------
+        SimulationError
+            If the changed values are not those of a track.
+        """
         return replace(self, **changes)
 
-    def nearest_support(self, position):
-        """Index of the support nearest to ``position`` [m]."""
+    def nearest_support(self, position: float) -> int:
+        """Index of the support nearest to ``position`` [m].
+
+        Parameters
+        ----------
+        position : float
+            Position along the track. [m]
+
+        Returns
+        -------
+        int
+            Number of the support, the first of two at the same distance.
+        """
         return int(np.argmin(np.abs(self.support - position)))
 
-    def rail_at(self, x):
-        """Rail profile at ``x`` [m]; if stretches overlap that of the last one."""
+    def rail_at(self, x: float) -> Rail:
+        """Rail profile at ``x`` [m]; if stretches overlap that of the last one.
+
+        Parameters
+        ----------
+        x : float
+            Position along the track. [m]
+
+        Returns
+        -------
+        Rail
+            Profile.
+        """
         rails = [stretch.rail for stretch in self.stretches if stretch.start <= x < stretch.end]
         return rails[-1] if rails else self.rail
 
-    def element_rail(self, start, end):
-        """Rail profile of an element from ``start`` to ``end`` [m]; several profiles are combined in series."""
+    def element_rail(self, start: float, end: float) -> Rail:
+        """Rail profile of an element from ``start`` to ``end`` [m]; several profiles are combined in series.
+
+        Parameters
+        ----------
+        start : float
+            First node. [m]
+        end : float
+            Second node. [m]
+
+        Returns
+        -------
+        Rail
+            Profile.
+        """
         inside = {
             x for s in self.stretches for x in (s.start, s.end) if start + NODE_TOLERANCE < x < end - NODE_TOLERANCE
         }
@@ -147,15 +200,26 @@ class Track:
         rails = [self.rail_at(0.5 * (a + b)) for a, b in pairwise(cuts)]
         return in_series(rails, np.diff(cuts) / (end - start)) if inside else rails[0]
 
-    def links(self):
+    def links(self) -> list[Link]:
         """All springs, dampers and masses of the supports as links."""
         links = []
         for j in range(self.support.size):
             links.extend(self.support_links(j))
         return links
 
-    def pad_link(self, j):
-        """The pad of support ``j``."""
+    def pad_link(self, j: int) -> Link:
+        """The pad of support ``j``.
+
+        Parameters
+        ----------
+        j : int
+            Number of the support.
+
+        Returns
+        -------
+        Link
+            Between rail and sleeper; with one layer between rail and ground.
+        """
         ends: tuple = ((("rail", j), 1.0),)
         if self.pad_width and 0 < j < self.support.size - 1:
             before, behind = self._pad_shares(j)
@@ -164,7 +228,7 @@ class Track:
             ends = (*ends, (("sleeper", j), -1.0))
         return Link(ends, self.pad_stiffness[j], self.pad_damping[j], 0.0, self.pad_loss_factor[j], "pad")
 
-    def _pad_shares(self, j):
+    def _pad_shares(self, j: int) -> list[float]:
         """Shares of the nodes before and after support ``j`` in its pad.
 
         Two points of a uniform pressure over the width b are b/3 apart on average. So are shares a, 1 - 2a, a at
@@ -175,8 +239,24 @@ class Track:
         total = nearness.sum()
         return (nearness * (1.0 - np.sqrt(1.0 - total * self.pad_width / 6.0)) / total).tolist()
 
-    def ballast_link(self, j):
-        """The ballast under sleeper ``j``: to the ground, or to the ballast mass with 3 layers."""
+    def ballast_link(self, j: int) -> Link:
+        """The ballast under sleeper ``j``: to the ground, or to the ballast mass with 3 layers.
+
+        Parameters
+        ----------
+        j : int
+            Number of the support.
+
+        Returns
+        -------
+        Link
+            From the sleeper downwards.
+
+        Raises
+        ------
+        SimulationError
+            For a track of one layer.
+        """
         if self.layers == 1:
             raise SimulationError(f"{self.name}: a track of one layer has no ballast under support {j}.")
         ends: tuple = ((("sleeper", j), 1.0),)
@@ -185,8 +265,19 @@ class Track:
         values = self.ballast_stiffness[j], self.ballast_damping[j], 0.0, self.ballast_loss_factor[j]
         return Link(ends, *values, "ballast")
 
-    def support_links(self, j):
-        """Springs, dampers and masses of support ``j``, which terms can scale or remove."""
+    def support_links(self, j: int) -> list[Link]:
+        """Springs, dampers and masses of support ``j``, which terms can scale or remove.
+
+        Parameters
+        ----------
+        j : int
+            Number of the support.
+
+        Returns
+        -------
+        list of Link
+            Pad, sleeper and ballast; with 3 layers also ballast mass, subgrade and shear to the support before.
+        """
         pad = self.pad_link(j)
         if self.layers == 1:
             return [pad]
@@ -202,12 +293,39 @@ class Track:
         return links
 
 
-def uniform_track(length=96.0, spacing=0.6, rail=None, start=0.0, **values):
+def uniform_track(
+    length: float = 96.0, spacing: float = 0.6, rail: Rail | None = None, start: float = 0.0, **values: Any
+) -> Track:
     """A uniform track of ``length`` [m] with supports every ``spacing`` [m].
 
     Unless given otherwise: 60 kg/m rail, pad 300 MN/m and 30 kN s/m, half sleeper 150 kg, ballast 90 MN/m
     and 80 kN s/m per rail seat, rail damping 20 N s/m².
 
+    Parameters
+    ----------
+    length : float
+        Length, rounded to whole bays. [m]
+    spacing : float
+        Distance of two supports. [m]
+    rail : Rail or None
+        Profile of the rail; None: 60 kg/m.
+    start : float
+        Position of the first support. [m]
+    **values : Any
+        Further fields of ``Track``, or other values of those above.
+
+    Returns
+    -------
+    Track
+        The track.
+
+    Raises
+    ------
+    SimulationError
+        If the values are not those of a track.
+
+    Examples
+    --------
     >>> track = uniform_track(length=6.0)
     >>> track.support.size, float(track.pad_stiffness[3])
     (11, 300000000.0)

@@ -1,11 +1,21 @@
 """Read the track of a turnout from its file, with checks of keys, units and routes."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from turnout.simulate.rail import Rail
 from turnout.simulate.track import RailStretch, Track
 from turnout.simulate.turnout_track import TurnoutTrack
 from turnout.simulate.wheel_path import Corrugation, Cosine, Dip, Kink, Sections
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator, Mapping
+
+    from turnout.config.parameters import ParameterSet
+    from turnout.simulate.wheel_path import PathPart, Surfaces
 
 SUPPORT_UNITS = {
     "pad_stiffness": "N/m",
@@ -50,13 +60,28 @@ TRACK_KEYS = (
 )
 
 
-def turnout_track(parameters, seed=0):
+def turnout_track(parameters: ParameterSet, seed: int = 0) -> TurnoutTrack:
     """``TurnoutTrack`` from a parameter set read by ``turnout.config.parameters.read_parameters``.
 
     ``sections`` change values of ``support`` between ``from`` and ``to`` [m], later ones over earlier ones;
     ``scatter`` gives relative standard deviations that are drawn, log-normally, with ``seed``.
 
-    Errors: ConfigError with file and entry where a key is unknown or missing, or a value cannot be used.
+    Parameters
+    ----------
+    parameters : ParameterSet
+        Parameters of the whole file.
+    seed : int
+        Seed of the scatter along the track.
+
+    Returns
+    -------
+    TurnoutTrack
+        The turnout with a track for each route.
+
+    Raises
+    ------
+    ConfigError
+        With file and entry, where a key is unknown or missing or a value cannot be used.
     """
     p = parameters.allow_only(*TRACK_KEYS)
     routes = _routes(p)
@@ -75,12 +100,12 @@ def turnout_track(parameters, seed=0):
     return TurnoutTrack(tracks[first], routes, level, locations, numbers, tracks, terms, spreads)
 
 
-def _routes(p):
+def _routes(p: ParameterSet) -> dict[str, Surfaces]:
     routes = p.optional_mapping_at("routes")
     return {name: _surfaces(routes, name) for name in routes} or {"main": ((),)}
 
 
-def _surfaces(routes, name):
+def _surfaces(routes: ParameterSet, name: str) -> Surfaces:
     """Surfaces of a route: its ``common`` parts on each of its ``surfaces``, or one surface."""
     if isinstance(routes[name], list):
         return (tuple(_path_part(entry) for entry in routes.mappings_at(name)),)
@@ -92,20 +117,31 @@ def _surfaces(routes, name):
     return tuple((*common, *(_path_part(entry) for entry in surfaces.mappings_at(k))) for k in surfaces)
 
 
-def _spreads(routes):
+def _spreads(routes: ParameterSet) -> Iterator[tuple[PathPart, dict[str, float]]]:
     """(part, field -> relative standard deviation) of every part that has a prior; for a list its largest."""
     for entry in entries_of_routes(routes):
         spread: dict[str, float] = {}
         for key, number in entry.numbers():
-            name = key.removeprefix(f"{entry.place}.").split("[")[0]
+            name = key.removeprefix(f"{entry.place.entry}.").split("[")[0]
             if number.prior:
                 spread[name] = max(number.prior, spread.get(name, 0.0))
         if spread:
             yield _path_part(entry), spread
 
 
-def entries_of_routes(routes):
-    """The entry of every part of every route."""
+def entries_of_routes(routes: ParameterSet) -> Iterator[ParameterSet]:
+    """The entry of every part of every route.
+
+    Parameters
+    ----------
+    routes : ParameterSet
+        Mapping ``routes`` of a track file.
+
+    Yields
+    ------
+    ParameterSet
+        Entry with the kind and the values of a part.
+    """
     for name in routes:
         if isinstance(routes[name], list):
             yield from routes.mappings_at(name)
@@ -117,14 +153,14 @@ def entries_of_routes(routes):
             yield from surfaces.mappings_at(k)
 
 
-def _locations(p, routes):
+def _locations(p: ParameterSet, routes: Mapping[str, Surfaces]) -> dict[str, tuple[float, str]]:
     """Name -> (position [m], route); the first route where none is named."""
     section = p.optional_mapping_at("locations")
     entries = {name: section.mapping_at(name).allow_only("place", "route") for name in section}
     return {name: (e.number("place", "m"), _route_of(e, routes)) for name, e in entries.items()}
 
 
-def _route_of(entry, routes, otherwise=None):
+def _route_of(entry: ParameterSet, routes: Collection[str], otherwise: str | None = None) -> str:
     """Route that an entry names; if it names none ``otherwise`` or the first route."""
     route = entry.get("route", otherwise or next(iter(routes)))
     if route not in list(routes):
@@ -133,7 +169,7 @@ def _route_of(entry, routes, otherwise=None):
     return route
 
 
-def _track(p, route, routes, seed):
+def _track(p: ParameterSet, route: str, routes: tuple[str, ...], seed: int) -> Track:
     support = _supports(p)
     values, section = _support_values(p, support, route, routes)
     _draw_scatter(p, values, seed)
@@ -155,7 +191,7 @@ def _track(p, route, routes, seed):
     )
 
 
-def _supports(p):
+def _supports(p: ParameterSet) -> np.ndarray:
     start, end = _ends(p.mapping_at("extent").allow_only("from", "to"))
     spacing = p.number("spacing", "m")
     if not 0.0 < spacing <= 0.5 * (end - start):
@@ -164,7 +200,7 @@ def _supports(p):
     return start + spacing * np.arange(round((end - start) / spacing) + 1)
 
 
-def _ends(entry):
+def _ends(entry: ParameterSet) -> tuple[float, float]:
     """``from`` and ``to`` of an entry [m]."""
     start, end = entry.number("from", "m"), entry.number("to", "m")
     if start >= end:
@@ -174,7 +210,7 @@ def _ends(entry):
     return start, end
 
 
-def _draw_scatter(p, values, seed):
+def _draw_scatter(p: ParameterSet, values: dict[str, np.ndarray], seed: int) -> None:
     scatter = p.optional_mapping_at("scatter").allow_only(*SUPPORT_UNITS)
     rng = np.random.default_rng(seed)
     for name in scatter:
@@ -184,7 +220,9 @@ def _draw_scatter(p, values, seed):
         values[name] = values[name] * np.exp(sigma * rng.normal(size=values[name].size) - 0.5 * sigma**2)
 
 
-def _stretches(p, support, elements, route, routes):
+def _stretches(
+    p: ParameterSet, support: np.ndarray, elements: int, route: str, routes: tuple[str, ...]
+) -> Iterator[RailStretch]:
     """Stretches of other rail on ``route``; one without the middle of an element has no effect and is rejected."""
     nodes = np.interp(np.arange(elements * (support.size - 1) + 1) / elements, np.arange(support.size), support)
     middle = 0.5 * (nodes[:-1] + nodes[1:])
@@ -197,7 +235,7 @@ def _stretches(p, support, elements, route, routes):
             yield RailStretch(start, end, _rail(entry.mapping_at("rail")))
 
 
-def _rail(p):
+def _rail(p: ParameterSet) -> Rail:
     p.allow_only(*RAIL_UNITS, "damping", "beam", "name")
     values = {name: p.number(name, unit) for name, unit in RAIL_UNITS.items()}
     bending = values["youngs_modulus"] * values["second_moment"]
@@ -207,7 +245,9 @@ def _rail(p):
     return p.build(Rail, bending, values["mass"], shear, rotary, damping, p.get("beam", "timoshenko"))
 
 
-def _support_values(p, support, route, routes):
+def _support_values(
+    p: ParameterSet, support: np.ndarray, route: str, routes: tuple[str, ...]
+) -> tuple[dict[str, np.ndarray], list[str]]:
     """Values of every support on ``route`` by name, (n,) each, and the label of its section."""
     base = p.mapping_at("support").allow_only(*SUPPORT_UNITS)
     names = [name for name in SUPPORT_UNITS if name in base or name in REQUIRED_VALUES]
@@ -235,7 +275,7 @@ PATHS = {
 OPTIONAL_KEYS = ("share", "power")
 
 
-def _path_part(p):
+def _path_part(p: ParameterSet) -> PathPart:
     """One part of the path of a wheel."""
     part_type = p["kind"]
     if part_type == "sections":

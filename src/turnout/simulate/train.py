@@ -1,12 +1,20 @@
 """Build trains from parameter sets: cars on single or shared bogies, wagons on two axles, coupled units."""
 
+from __future__ import annotations
+
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.simulate.force_laws import PowerLaw
 from turnout.simulate.vehicle import WHEEL_FIELDS, Body, Suspension, Vehicle, one_or_all
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from turnout.config.parameters import ParameterSet
 
 CAR_UNITS = {"mass": "kg", "payload": "kg", "inertia": "kg m²"}
 BOGIE_UNITS = {
@@ -23,12 +31,33 @@ AXLE_UNITS = {"wheelset_mass": "kg", "suspension_stiffness": "N/m", "suspension_
 TRAIN_KEYS = ("name", "title", "car_types", "bogie_types", "axle_types", "cars", "bogies", "axles", "wheel", "length")
 
 
-def train(parameters, load=0.5, units=1):
+def train(parameters: ParameterSet, load: float = 0.5, units: int = 1) -> Vehicle:
     """Half a train (one rail) from a parameter set whose masses and springs are those of whole vehicles.
 
     ``cars`` list their type, ``centre`` [m] and the bogies or axles below them; ``bogies`` and ``axles`` list type
     and centre. Centres are from the unit's front end. A bogie of two cars is shared (Jacobs): each car rests on half of
     its secondary springs. ``load`` is the share of the payload, ``units`` the number of coupled units.
+
+    Parameters
+    ----------
+    parameters : ParameterSet
+        Parameters of a vehicle file.
+    load : float
+        Share of the payload, 0 to 1.5. [-]
+    units : int
+        Number of coupled units, at least 1.
+
+    Returns
+    -------
+    Vehicle
+        Half the train.
+
+    Raises
+    ------
+    SimulationError
+        For ``load`` or ``units`` outside these limits, and where cars and bogies do not fit together.
+    ConfigError
+        With file and entry, where a value cannot be used.
     """
     p = parameters.allow_only(*TRAIN_KEYS)
     if not 0.0 <= load <= 1.5:
@@ -62,7 +91,9 @@ def train(parameters, load=0.5, units=1):
     )
 
 
-def _add_unit(p, load, offset, bodies, suspensions, wheels):
+def _add_unit(
+    p: ParameterSet, load: float, offset: float, bodies: list[Body], suspensions: list[Suspension], wheels: list[int]
+) -> None:
     bogies, axles, cars = (p.mappings_at(name) for name in ("bogies", "axles", "cars"))
     carriers = [("bogie", b) for b in bogies] + [("axle", a) for a in axles]
     names = {str(entry.allow_only("label", "type", "centre")["label"]): k for k, (_, entry) in enumerate(carriers)}
@@ -96,17 +127,25 @@ def _add_unit(p, load, offset, bodies, suspensions, wheels):
     wheels.sort(key=lambda w: bodies[w].position)
 
 
-def _carrier_labels(car):
+def _carrier_labels(car: ParameterSet) -> list[str]:
     """Labels of the bogies and axles below a car."""
     return [str(label) for label in car.allow_only("type", "rests_on", "centre").list_at("rests_on").values()]
 
 
-def _type_values(p, table, entry, keys):
+def _type_values(p: ParameterSet, table: str, entry: ParameterSet, keys: Iterable[str]) -> ParameterSet:
     """The type of a car, bogie or axle: its values in ``table``."""
     return p.mapping_at(table).mapping_at(str(entry["type"])).allow_only(*keys)
 
 
-def _add_carrier(p, carrier_type, entry, offset, bodies, suspensions, wheels):
+def _add_carrier(
+    p: ParameterSet,
+    carrier_type: str,
+    entry: ParameterSet,
+    offset: float,
+    bodies: list[Body],
+    suspensions: list[Suspension],
+    wheels: list[int],
+) -> tuple[int, float, float]:
     """Add a bogie or axle; returns its body and half of the springs above it."""
     position = offset + entry.number("centre", "m")
     if carrier_type == "axle":
@@ -129,9 +168,23 @@ def _add_carrier(p, carrier_type, entry, offset, bodies, suspensions, wheels):
     return bogie, 0.5 * values["secondary_stiffness"], 0.5 * values["secondary_damping"]
 
 
-def couple(name, vehicles):
+def couple(name: str, vehicles: Sequence[Vehicle]) -> Vehicle:
     """One train of ``vehicles`` in a row; every wheel has the contact, radius and pressing force of its vehicle.
 
+    Parameters
+    ----------
+    name : str
+        Name of the train.
+    vehicles : sequence of Vehicle
+        Vehicles, front first; each needs its length and overhang.
+
+    Returns
+    -------
+    Vehicle
+        The train, with the conditions of its first vehicle.
+
+    Examples
+    --------
     >>> from turnout.simulate.vehicle import car
     >>> two = couple("two cars", [car(length=26.0, overhang=1.9)] * 2)
     >>> [float(p) for p in two.wheel_positions[:5]]

@@ -1,12 +1,20 @@
 """Model of a turnout: its track, and the path of a wheel along each of its routes."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from turnout.config.parameters import Number, ParameterSet
 from turnout.errors import SimulationError
 from turnout.simulate.roughness import roughness
 from turnout.simulate.track import PER_SUPPORT, Track
+from turnout.simulate.wheel_path import PathPart, Surfaces
+
+if TYPE_CHECKING:
+    from typing import Any
 
 
 @dataclass(frozen=True)
@@ -21,51 +29,152 @@ class TurnoutTrack:
     """
 
     track: Track
-    routes: dict = field(default_factory=lambda: {"main": ((),)})
+    routes: dict[str, Surfaces] = field(default_factory=lambda: {"main": ((),)})
     roughness_level: float | None = None
-    locations: dict = field(default_factory=dict)
-    numbers: tuple = ()
-    tracks: dict = field(default_factory=dict)
-    terms: tuple = ()
-    spreads: dict = field(default_factory=dict)
+    locations: dict[str, tuple[float, str]] = field(default_factory=dict)
+    numbers: tuple[tuple[str, Number], ...] = ()
+    tracks: dict[str, Track] = field(default_factory=dict)
+    terms: tuple[ParameterSet, ...] = ()
+    spreads: dict[PathPart, dict[str, float]] = field(default_factory=dict)
 
     @property
-    def name(self):
+    def name(self) -> str:
         """Name of the track."""
         return self.track.name
 
-    def track_of(self, route):
-        """The track under ``route``."""
+    def track_of(self, route: str) -> Track:
+        """The track under ``route``.
+
+        Parameters
+        ----------
+        route : str
+            Name of the route.
+
+        Returns
+        -------
+        Track
+            Its own track, or the common one.
+        """
         return self.tracks.get(route, self.track)
 
-    def is_divided_at(self, position):
-        """Whether the routes have separate supports at ``position`` [m], as behind a crossing."""
+    def is_divided_at(self, position: float) -> bool:
+        """Whether the routes have separate supports at ``position`` [m], as behind a crossing.
+
+        Parameters
+        ----------
+        position : float
+            Position along the track. [m]
+
+        Returns
+        -------
+        bool
+            Whether the tracks of the routes have different sections there.
+        """
         return len({track.section[track.nearest_support(position)] for track in self.tracks.values()}) > 1
 
-    def surfaces(self, route):
-        """Surfaces of ``route``; an unknown one is a SimulationError."""
+    def surfaces(self, route: str) -> Surfaces:
+        """Surfaces of ``route``.
+
+        Parameters
+        ----------
+        route : str
+            Name of the route.
+
+        Returns
+        -------
+        tuple of tuples of path parts
+            Parts of the path on each surface.
+
+        Raises
+        ------
+        SimulationError
+            For a route that the turnout does not have.
+        """
         if route not in self.routes:
             raise SimulationError(f"{self.name}: no route {route!r}; there are {', '.join(self.routes)}.")
         return self.routes[route]
 
-    def roughness_parts(self, start, end, seed, level=None):
-        """The roughness between two positions as path parts, () for a smooth rail."""
+    def roughness_parts(self, start: float, end: float, seed: int, level: float | None = None) -> tuple[PathPart, ...]:
+        """The roughness between two positions as path parts.
+
+        Parameters
+        ----------
+        start : float
+            First position. [m]
+        end : float
+            Last position. [m]
+        seed : int
+            Seed of the roughness.
+        level : float or None
+            Level above the limit curve [dB]; None: that of the turnout.
+
+        Returns
+        -------
+        tuple of Sampled
+            One part, or none for a smooth rail.
+        """
         level = self.roughness_level if level is None else level
         return () if level is None else (roughness(start, end, seed, level),)
 
-    def with_track(self, **changes):
-        """The same turnout with some fields of its track changed."""
+    def with_track(self, **changes: Any) -> TurnoutTrack:
+        """The same turnout with some fields of its track changed.
+
+        Parameters
+        ----------
+        **changes : Any
+            New values by name of the field of ``Track``, for the tracks of all routes.
+
+        Returns
+        -------
+        TurnoutTrack
+            A copy.
+        """
         tracks = {name: replace(track, **changes) for name, track in self.tracks.items()}
         return replace(self, track=replace(self.track, **changes), tracks=tracks)
 
 
-def supports_within(track, position, half_length):
-    """(n_support,) whether each support is in the ``stretch_of_track``."""
+def supports_within(track: Track, position: float, half_length: float) -> np.ndarray:
+    """Whether each support is in the ``stretch_of_track``.
+
+    Parameters
+    ----------
+    track : Track
+        The track.
+    position : float
+        Middle of the stretch. [m]
+    half_length : float
+        Half its length. [m]
+
+    Returns
+    -------
+    (n_support,) array of bool
+        True for the supports of the stretch.
+    """
     return np.abs(track.support - position) <= half_length
 
 
-def stretch_of_track(track, position, half_length=30.0):
-    """The track within ``half_length`` [m] of ``position``, which is enough for a hammer test."""
+def stretch_of_track(track: Track, position: float, half_length: float = 30.0) -> Track:
+    """The track within ``half_length`` [m] of ``position``, which is enough for a hammer test.
+
+    Parameters
+    ----------
+    track : Track
+        The track.
+    position : float
+        Middle of the stretch. [m]
+    half_length : float
+        Half its length. [m]
+
+    Returns
+    -------
+    Track
+        The supports of the stretch with their values.
+
+    Raises
+    ------
+    SimulationError
+        With less than three supports in the stretch.
+    """
     inside = supports_within(track, position, half_length)
     if inside.sum() < 3:
         raise SimulationError(f"{track.name}: no three supports within {half_length} m of {position} m.")

@@ -3,16 +3,28 @@
 The sum of all parts is a cubic spline on a uniform grid, C2, with straight ends.
 """
 
+from __future__ import annotations
+
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.simulate.compiled import kernel
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
+
+PathPart = Callable[[np.ndarray, int], np.ndarray]  # position [m] and wheel -> dip [m]
+Surfaces = tuple[tuple[PathPart, ...], ...]  # of a route: the parts of the path on each surface
+
 
 @kernel
-def _second_differences(value, out):
+def _second_differences(value: np.ndarray, out: np.ndarray) -> None:
     """Solve m[i-1] + 4 m[i] + m[i+1] = 6 (value[i-1] - 2 value[i] + value[i+1]), m = 0 at both ends."""
     n = value.size
     factor = np.zeros(n)
@@ -24,9 +36,21 @@ def _second_differences(value, out):
         out[i] -= factor[i] * out[i + 1]
 
 
-def uniform_pieces(value):
-    """(n - 1, 4) coefficients, highest power first, of the natural cubic spline through ``value`` (n,), unit steps.
+def uniform_pieces(value: np.ndarray | Sequence[float]) -> np.ndarray:
+    """Coefficients of the natural cubic spline through ``value`` at unit steps.
 
+    Parameters
+    ----------
+    value : (n,) array of float
+        Values on the grid, at least two.
+
+    Returns
+    -------
+    (n - 1, 4) array of float
+        Coefficients of each piece, highest power first.
+
+    Examples
+    --------
     >>> pieces = uniform_pieces(np.array([0.0, 1.0, 2.0, 3.0]))
     >>> bool(np.allclose(pieces, [[0, 0, 1, 0], [0, 0, 1, 1], [0, 0, 1, 2]]))
     True
@@ -39,8 +63,25 @@ def uniform_pieces(value):
     return np.column_stack([(b - a) / 6.0, 0.5 * a, slope, value[:-1]])
 
 
-def uniform_spline(value, start, step, x):
-    """Natural cubic spline through ``value`` at ``start`` + k ``step``, at ``x``; 0 outside the grid."""
+def uniform_spline(value: np.ndarray | Sequence[float], start: float, step: float, x: ArrayLike) -> np.ndarray:
+    """Natural cubic spline on a uniform grid; 0 outside the grid.
+
+    Parameters
+    ----------
+    value : (n,) array of float
+        Values on the grid.
+    start : float
+        Position of the first value. [m]
+    step : float
+        Distance of two values. [m]
+    x : float or array
+        Positions. [m]
+
+    Returns
+    -------
+    array
+        Value at each ``x``.
+    """
     pieces = uniform_pieces(value)
     grid_position = (np.asarray(x, dtype=float) - start) / step
     k = np.clip(np.floor(grid_position).astype(np.int64), 0, len(pieces) - 1)
@@ -62,10 +103,10 @@ class Dip:
     depth: float
     length: float
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         _check_length("dip", self.place, self.length)
 
-    def __call__(self, x, wheel=0):
+    def __call__(self, x: ArrayLike, wheel: int = 0) -> np.ndarray:
         return self.depth * np.exp(-np.abs(np.asarray(x) - self.place) / self.length)
 
 
@@ -77,10 +118,10 @@ class Cosine:
     depth: float
     length: float
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         _check_length("cosine", self.place, self.length)
 
-    def __call__(self, x, wheel=0):
+    def __call__(self, x: ArrayLike, wheel: int = 0) -> np.ndarray:
         phase = np.clip((np.asarray(x) - self.place) / self.length, -0.5, 0.5)
         return 0.5 * self.depth * (1.0 + np.cos(2.0 * np.pi * phase))
 
@@ -103,7 +144,7 @@ class Kink:
     share: float = 0.5
     power: float = 2.0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         _check_length("kink", self.place, self.length)
         if not self.power >= 1.0:
             raise SimulationError(f"kink at {self.place:.3f} m: power {self.power!r} is below 1.")
@@ -111,11 +152,11 @@ class Kink:
             raise SimulationError(f"kink at {self.place:.3f} m: share {self.share!r} is not between 0 and 1.")
 
     @property
-    def angle(self):
+    def angle(self) -> float:
         """Change of slope at the lowest point [rad]."""
         return self.power * self.depth * (1.0 / (self.share * self.length) + 1.0 / ((1.0 - self.share) * self.length))
 
-    def __call__(self, x, wheel=0):
+    def __call__(self, x: ArrayLike, wheel: int = 0) -> np.ndarray:
         distance = np.asarray(x) - self.place
         before, after = self.share * self.length, (1.0 - self.share) * self.length
         return (
@@ -132,14 +173,14 @@ class Sections:
     crossing by 8 dB, which needs 10 mm.
     """
 
-    places: tuple
-    dips: tuple
+    places: tuple[float, ...]
+    dips: tuple[float, ...]
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if len(self.places) != len(self.dips) or len(self.places) < 2 or np.any(np.diff(self.places) <= 0.0):
             raise SimulationError(f"sections: {len(self.places)} places, {len(self.dips)} dips; places must rise.")
 
-    def __call__(self, x, wheel=0):
+    def __call__(self, x: ArrayLike, wheel: int = 0) -> np.ndarray:
         from scipy.interpolate import PchipInterpolator
 
         x = np.clip(np.asarray(x, dtype=float), self.places[0], self.places[-1])
@@ -155,10 +196,10 @@ class Corrugation:
     amplitude: float
     wavelength: float
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         _check_length("corrugation", self.start, self.wavelength)
 
-    def __call__(self, x, wheel=0):
+    def __call__(self, x: ArrayLike, wheel: int = 0) -> np.ndarray:
         x = np.asarray(x, dtype=float)
         fade = np.clip(np.minimum(x - self.start, self.end - x) / self.wavelength, 0.0, 1.0)
         return (
@@ -185,11 +226,11 @@ class WheelFlat:
     phase: float = 0.0
 
     @property
-    def depth(self):
+    def depth(self) -> float:
         """Drop of the wheel's centre [m]."""
         return self.length**2 / (16.0 * self.radius)
 
-    def __call__(self, x, wheel=0):
+    def __call__(self, x: ArrayLike, wheel: int = 0) -> np.ndarray:
         x = np.asarray(x, dtype=float)
         if wheel != self.wheel:
             return np.zeros_like(x)
@@ -212,7 +253,7 @@ class OutOfRound:
     radius: float
     phase: float = 0.0
 
-    def __call__(self, x, wheel=0):
+    def __call__(self, x: ArrayLike, wheel: int = 0) -> np.ndarray:
         x = np.asarray(x, dtype=float)
         return (self.amplitude if wheel == self.wheel else 0.0) * np.cos(self.order * (x - self.phase) / self.radius)
 
@@ -225,17 +266,38 @@ class Sampled:
     step: float
     dip: np.ndarray
 
-    def __call__(self, x, wheel=0):
+    def __call__(self, x: ArrayLike, wheel: int = 0) -> np.ndarray:
         return uniform_spline(self.dip, self.start, self.step, x)
 
 
-def _check_length(path_name, position, length):
+def _check_length(path_name: str, position: float, length: float) -> None:
     if not length > 0.0:
         raise SimulationError(f"{path_name} at {position:.3f} m: a length of {length!r} m is none.")
 
 
-def check_path(path_parts, start, end, step=0.005, limit=1e-3):
-    """Reject a path with a jump of more than ``limit`` [m] that remains on a grid 2000 times finer."""
+def check_path(
+    path_parts: Sequence[PathPart], start: float, end: float, step: float = 0.005, limit: float = 1e-3
+) -> None:
+    """Reject a path with a jump of more than ``limit`` [m] that remains on a grid 2000 times finer.
+
+    Parameters
+    ----------
+    path_parts : sequence of path parts
+        Parts of the path, each checked alone.
+    start : float
+        First position. [m]
+    end : float
+        Last position. [m]
+    step : float
+        Distance of the positions that are compared. [m]
+    limit : float
+        Largest jump between two of them that is not examined further. [m]
+
+    Raises
+    ------
+    SimulationError
+        For a jump, and for a dip that is not a number.
+    """
     x = np.arange(start, end + step, step)
     for path_part in path_parts:
         p = path_part(x, 0)
@@ -249,8 +311,32 @@ def check_path(path_parts, start, end, step=0.005, limit=1e-3):
                 raise SimulationError(f"path {path_part!r} jumps by {jump * 1e3:.2f} mm at {x[k]:.3f} m.")
 
 
-def spline_pieces(path_parts, wheel, start, end, step):
-    """Cubic coefficients (n, 4) in steps of ``step`` of the sum of ``path_parts`` for one wheel, C2 spline."""
+def spline_pieces(path_parts: Sequence[PathPart], wheel: int, start: float, end: float, step: float) -> np.ndarray:
+    """Spline of the sum of ``path_parts`` for one wheel, C2.
+
+    Parameters
+    ----------
+    path_parts : sequence of path parts
+        Parts of the path.
+    wheel : int
+        Number of the wheel, counted from the front.
+    start : float
+        First position. [m]
+    end : float
+        Last position; the grid covers it. [m]
+    step : float
+        Length of a piece. [m]
+
+    Returns
+    -------
+    (n, 4) array of float
+        Cubic coefficients of each piece, highest power first.
+
+    Raises
+    ------
+    SimulationError
+        Where the sum is not a number.
+    """
     x = np.arange(start, end + 1.5 * step, step)
     dip = np.zeros_like(x)
     for path_part in path_parts:

@@ -12,7 +12,7 @@ TRACK, MASS, VELOCITY = uniform_track(30.0), 5.5, 1.2
 HAMMER = Hammer(
     MASS, VELOCITY, velocity_spread=0.0, position_spread=0.0, force=Sensor("hammer", 15.0, "hammer", "force")
 )
-SHORT = {"n_blows": 1, "duration": 0.05, "pretrigger": 0.005}
+SHORT = {"n_impacts": 1, "duration": 0.05, "pretrigger": 0.005}
 
 
 def blow(**options):
@@ -70,3 +70,9 @@ def test_a_track_prepared_for_another_step_is_refused(rate, substeps):
     with pytest.raises(SimulationError, match=r"prepared for steps of \S+ s, but 20000\.0 Hz .* ask for 5e-05 s"):
         blow(prepared=prepared)
     assert blow(prepared=prepared, rate=rate, substeps=substeps).shape[1] == round(0.05 * rate)
+
+
+def test_the_former_name_of_the_number_of_impacts_still_counts_and_warns():
+    with pytest.warns(DeprecationWarning, match="n_impacts"):
+        recordings = simulate_hammer(TRACK, 15.0, HAMMER, n_blows=2, duration=0.05, pretrigger=0.005)
+    assert len(recordings) == 2

@@ -52,14 +52,14 @@ def test_the_chain_of_a_sensor_does_what_each_stage_says():
 def test_the_same_seed_gives_the_same_bytes_and_another_one_others():
     track, sensors = uniform_track(24.0), [Sensor("A", 12.0, noise=0.1)]
     runs = [
-        simulate_hammer(track, 12.0, sensors=sensors, n_blows=2, duration=0.05, pretrigger=0.005, seed=s)
+        simulate_hammer(track, 12.0, sensors=sensors, n_impacts=2, duration=0.05, pretrigger=0.005, seed=s)
         for s in (3, 3, 4)
     ]
     assert runs[0][1].samples.tobytes() == runs[1][1].samples.tobytes() != runs[2][1].samples.tobytes()
 
 
 def test_force_and_acceleration_of_a_blow_are_those_of_a_measured_one():
-    blow = simulate_hammer(uniform_track(36.0), 18.0, Hammer(velocity_spread=0.0), n_blows=1)[0]
+    blow = simulate_hammer(uniform_track(36.0), 18.0, Hammer(velocity_spread=0.0), n_impacts=1)[0]
     assert [c.quantity for c in blow.channels] == ["force", "acceleration", "acceleration"]
     force, acceleration = blow.signal("hammer"), blow.signal("acc_1")
     contact = np.flatnonzero(force > 0.05 * force.max())
@@ -219,7 +219,7 @@ def test_friction_that_a_blow_cannot_overcome_is_a_dashpot():
     stuck = np.array(track.pad_damping)
     stuck[20] += 2e4 / SLIP_RATE
     cases = (track, (DryFriction(20, 2e4),)), (track.with_(pad_damping=stuck), ()), (track, ())
-    once = {"sensors": sensors, "n_blows": 1, "duration": 0.05, "pretrigger": 0.005}
+    once = {"sensors": sensors, "n_impacts": 1, "duration": 0.05, "pretrigger": 0.005}
     shown = [simulate_hammer(t, 12.3, terms=terms, **once)[0].samples[1:] for t, terms in cases]
     error, effect = (np.linalg.norm(shown[1] - shown[k]) for k in (0, 2))
     assert effect > 0.2 * np.linalg.norm(shown[2])

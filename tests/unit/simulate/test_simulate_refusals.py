@@ -87,7 +87,7 @@ def test_newton_that_does_not_converge_says_time_port_and_residual():
     """A force that steps up by more than the deformation can bear: open, closed, open, ... never either."""
     step = TableLaw((-1.0, 2.9e-5, 2.9e-5 + 1e-12, 1.0), (0.0, 0.0, 6e4, 6e4), (0.0, 0.0, 0.0, 0.0))
     wheel = lone_wheels(700.0, contact=step, gravity=0.0)
-    drive = Drive(12.0, 0.0, entry=0.0, thrown=(0.0, 1.0))
+    drive = Drive(12.0, 0.0, entry=0.0, free_fall=(0.0, 1.0))
     with pytest.raises(SimulationError, match=r"did not converge at 0\.0\d+ s: residual .* N at wheel 0"):
         run(prepare(TRACK, 1e-4), 0.05, [], wheel, drive)
 

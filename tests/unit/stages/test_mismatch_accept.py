@@ -11,13 +11,16 @@ import small_turnout as small
 
 from turnout import physics
 from turnout.errors import SimulationError, TurnoutError
+from turnout.mismatch.engine.case import Nuisance
+from turnout.mismatch.engine.map_fit import Fit
 from turnout.mismatch.turnout import TrackCase
+from turnout.mismatch.turnout.accepted_effects import effects_on
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
+from turnout.mismatch.turnout.predicted_case import PredictedCase
 from turnout.simulate import load_track, simulate_hammer
 from turnout.stages import mismatch
 from turnout.stages.accept_finding import accept
-from turnout.stages.accepted_effects import WHEELSET_EFFECTS, AcceptedEffect, accepted_of, describe_term, terms_on
-from turnout.stages.accepted_effects_case import AcceptedEffectsCase
+from turnout.stages.accepted_effects import AcceptedEffect, accepted_of, describe_term, terms_on
 from turnout.stages.mismatch_groups import Group
 from turnout.stages.mismatch_inputs import digest_of_model
 
@@ -115,12 +118,11 @@ def test_an_entry_without_a_route_is_replaced_by_the_same_effect_on_one(config, 
 def test_what_was_accepted_on_the_other_route_is_no_part_of_a_diagnosis(monkeypatch, tmp_path):
     given = []
 
-    def guided(case, accepted, *others):
+    def case_of(campaign, settings, accepted, cache):
         given.extend(a.route for a in accepted)
         raise SimulationError("that is all")
 
-    monkeypatch.setattr(mismatch, "TrackCase", lambda *given: None)
-    monkeypatch.setattr(mismatch, "AcceptedEffectsCase", guided)
+    monkeypatch.setattr(mismatch, "TrackCase", case_of)
     turnout = SimpleNamespace(id="t1", raw="raw", settings={"mismatch": None})
     standing = [AcceptedEffect("local_pad", {"sleeper": 18.0}, {}, route) for route in ("main", "", "diverging")]
     about = {"visit": "2026-07-25", "identity": "one", "notes": []}
@@ -176,7 +178,7 @@ def test_a_track_that_extends_itself_is_refused(config):
         load_track("a", folder=config / "tracks")
 
 
-OF_TRACK_AND_SENSORS = [t for t in physics.TERMS if t.name not in ("roughness_level", *WHEELSET_EFFECTS)]
+OF_TRACK_AND_SENSORS = [t for t in physics.TERMS if t.name != "roughness_level" and t.frame != "wheel"]
 
 
 @pytest.mark.parametrize("term", OF_TRACK_AND_SENSORS, ids=lambda t: t.name)
@@ -200,7 +202,7 @@ def test_an_accepted_gap_is_simulated(config):
     """A blow on a sleeper that hangs finds no ballast: the file's term does what the term itself does."""
     accept(finding(), config, "t1")
     track = own(config)
-    short = {"n_blows": 1, "half_length": 99.0, "duration": 0.1}
+    short = {"n_impacts": 1, "half_length": 99.0, "duration": 0.1}
     by_file = simulate_hammer(track, 18.0, terms=terms_on(track, track.track), **short)
     index = track.track.nearest_support(18.0)
     by_hand = simulate_hammer(track, 18.0, terms=(physics.HangingSleeper(index, 1.12e-3),), **short)
@@ -210,7 +212,8 @@ def test_an_accepted_gap_is_simulated(config):
 def test_accepted_effects_are_simulated_and_estimated_anew_in_a_case(config):
     """With the term in the case, the prediction is the one with the term given; its column is the derivative."""
     plan = small_plan((15.0,), passages=False, hammer_positions=(21.6, 24.0))
-    case = TrackCase(measured_campaign(plan, seed=2), families=("local_ballast",))
+    campaign = measured_campaign(plan, seed=2)
+    case = TrackCase(campaign, families=("local_ballast",))
     entry = {
         "term": "local_ballast",
         "fixed": {"sleeper": 24.0},
@@ -218,15 +221,15 @@ def test_accepted_effects_are_simulated_and_estimated_anew_in_a_case(config):
     }
     accept(finding(entry), config, "t1", anyway=True)
     accepted = accepted_of(own(config).terms)
-    alone = dict(case.rail)
-    guided = AcceptedEffectsCase(case, accepted)
-    # receptances are linearised about the rail that blows give with the effect standing, not about the one without it
-    assert case.rail == {name: guided.start_values[name] for name in alone} != alone
-    (own_nuisance,) = guided.own_nuisances
+    alone = case.predictor.rail
+    guided = TrackCase(campaign, families=("local_ballast",), accepted=accepted)
+    # passages are simulated on the rail that impacts give with the effect in place, not on the one without it
+    assert guided.predictor.rail == {name: guided.start_values[name] for name in alone} != alone
+    (own_nuisance,) = guided.accepted.nuisances
     assert own_nuisance.mean == 0.5 and own_nuisance.sd == pytest.approx(0.25)
     assert len(guided.candidates) == len(case.candidates) - 1
     values = {n.name: n.mean for n in guided.nuisances}
-    term = physics.LocalBallast(case.track().nearest_support(24.0), 0.5)
+    term = physics.LocalBallast(case.predictor.track().nearest_support(24.0), 0.5)
     with_it = guided.predict(values, (), guided.observations)
     assert all(np.array_equal(a, b) for a, b in zip(with_it, case.predict(values, (term,), case.observations)))
     jacobian = guided.nuisance_jacobian(values, (), guided.observations, with_it)
@@ -242,20 +245,6 @@ def test_a_term_that_cannot_be_told_from_no_effect_is_refused(config):
     with pytest.raises(SimulationError, match="no parameter differs"):
         accept(finding(nothing), config, "t1")
     assert accept(finding(nothing), config, "t1", anyway=True)[0].exists()
-
-
-def test_a_case_whose_errors_were_made_anew_is_guided_as_before():
-    """Errors follow the wheels that a fit finds: the case inside is another, its observations are asked of that."""
-    anew = SimpleNamespace(observations=("rough",))
-    inner = SimpleNamespace(
-        nuisances=(), candidates=("a",), start_values={}, observations=("smooth",), with_updated_errors=lambda fit: anew
-    )
-    guided = AcceptedEffectsCase(inner)
-    found = guided.with_updated_errors(None)
-    assert found.observations == ("rough",) and guided.observations == ("smooth",)
-    assert found.watch is guided.watch and found.candidates == ("a",)
-    inner.with_updated_errors = lambda fit: inner
-    assert guided.with_updated_errors(None) is guided
 
 
 def test_another_track_is_another_diagnosis(config):
@@ -282,29 +271,52 @@ def accepted_as(law, value, error):
 
 def test_an_accepted_limit_may_move_by_half_of_itself():
     """80 m/s²: beside 100,000, which stands for no limit, it would be free from 0 to anything."""
-    inner = SimpleNamespace(
-        nuisances=(), candidates=(), start_values={}, track=lambda: "track", cheap_case=lambda: None
-    )
-    (limit,) = AcceptedEffectsCase(inner, (accepted_as(physics.Clipping, 80.0, 1.0),)).own_nuisances
+    (limit,) = effects_on(None, (accepted_as(physics.Clipping, 80.0, 1.0),)).nuisances
     assert limit.sd == pytest.approx(40.0)
-    (gap,) = AcceptedEffectsCase(inner, (accepted_as(physics.HangingSleeper, 1e-3, 1e-5),)).own_nuisances
+    (gap,) = effects_on(None, (accepted_as(physics.HangingSleeper, 1e-3, 1e-5),)).nuisances
     assert gap.sd == pytest.approx(5e-4)
 
 
 def test_the_derivative_by_an_accepted_gap_goes_to_the_side_where_the_simulation_can():
     """The response is the gap in millimetres, squared; above a millimetre nothing converges: 2 less the step."""
 
-    def predict(values, terms, observations):
-        if terms[0]["gap"] > 1e-3:
-            raise SimulationError("Newton's iteration did not converge")
-        return [np.array([(1e3 * terms[0]["gap"]) ** 2])]
+    class Squared:
+        def predict(self, values, terms, observations):
+            if terms[0]["gap"] > 1e-3:
+                raise SimulationError("Newton's iteration did not converge")
+            return [np.array([(1e3 * terms[0]["gap"]) ** 2])]
 
-    inner = SimpleNamespace(
-        nuisances=(), candidates=(), start_values={}, track=lambda: "track", cheap_case=lambda: None, predict=predict,
-        nuisance_jacobian=lambda *_: [np.zeros((1, 0))],
-    )  # fmt: skip
-    guided = AcceptedEffectsCase(inner, (accepted_as(physics.HangingSleeper, 1e-3, 1e-5),))
-    (one,) = guided.own_nuisances
-    values, seen = {one.name: 1e-3}, [SimpleNamespace(name="o")]
-    (column,) = guided.nuisance_jacobian(values, (), seen, guided.predict(values, (), seen))
+        def nuisance_jacobian(self, nuisances, *others):
+            return [np.zeros((1, len(nuisances)))]
+
+    accepted = effects_on("track", (accepted_as(physics.HangingSleeper, 1e-3, 1e-5),))
+    case = PredictedCase(Squared(), (), (), accepted=accepted)
+    (gap,) = case.nuisances
+    values, observations = {gap.name: 1e-3}, [SimpleNamespace(name="o")]
+    predicted = case.predict(values, (), observations)
+    (column,) = case.nuisance_jacobian(values, (), observations, predicted)
     assert column[0, 0] == pytest.approx(1e3 * (2.0 - 0.02 * 0.5), rel=1e-6)
+
+
+def test_searches_take_accepted_effects_as_part_of_the_base_model():
+    """Fixed as fitted: no nuisance, no column of the Jacobian, and every candidate is looked at."""
+
+    class Doubled:
+        def predict(self, values, terms, observations):
+            return [2.0 * terms[0]["gap"]]
+
+    accepted = effects_on("track", (accepted_as(physics.HangingSleeper, 1e-3, 1e-5),))
+    site, candidate = Nuisance("pad", "-", 0.0, 0.1), SimpleNamespace(family="local_pad", where={})
+    case = PredictedCase(Doubled(), (), (site,), (candidate,), accepted)
+    (_, gap), values = case.nuisances, {"pad": 0.0, "hanging_sleeper.gap": 2e-3}
+    fit = fit_of(values, jacobian=[np.arange(6.0).reshape(2, 3)])
+    fixed, trimmed = case.with_fixed_effects(fit)
+    assert gap.name == "hanging_sleeper.gap" and fixed.nuisances == (site,) and fixed.candidates == (candidate,)
+    assert fixed.predict({"pad": 0.5}, (), ()) == [4e-3]
+    assert trimmed.jacobian[0].tolist() == [[0.0, 2.0], [3.0, 5.0]] and fit.jacobian[0].shape == (2, 3)
+    again, same = fixed.with_fixed_effects(trimmed)
+    assert again.predict({"pad": 0.5}, (), ()) == [4e-3] and same is trimmed
+
+
+def fit_of(values, jacobian):
+    return Fit(values, (), np.zeros(0), [], [], jacobian, {}, {}, 0.0, np.zeros((0, 0)), 0, [])
