@@ -17,7 +17,6 @@ from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.planned_case import Plan, Train, measured_campaign
 from turnout.simulate import Sensor, car, load_track
 from turnout.stages.mismatch_rows import recommendation, sentence
-from turnout.stages.mismatch_text import SENTENCES
 
 SPEED = 160.0 / 3.6
 SENSORS = (Sensor("A1", 0.6, "rail web"), Sensor("A4", 9.0, "rail web"))
@@ -246,7 +245,7 @@ def main():
         next_more=(recommendation(more) + "." if recommendation(more) else ""),
         ranking_one=ranking(diagnosis),
         ranking_more=ranking(more),
-        concealed=SENTENCES["pad_preload"].lower(),
+        concealed=physics.PadPreload.message.lower(),
         outcome=f"One train: {outcome(diagnosis)} Five trains: {outcome(more)}",
     )
     (DOCS / "paper_mismatch.md").write_text(text, encoding="utf-8")

@@ -1,7 +1,8 @@
 """Effects that a simulation may have left out, one per file. A new one is a new file and a line in TERMS.
 
-Every listed term is put through the contract tests: it vanishes at its neutral value, leaves a resting track
-alone, has units and sources, and says in words what was left out.
+The file holds everything that is known of the effect: its equation, its parameters with their sources, where a
+diagnosis tests it and what a finding says of it (``PhysicsTerm``). The contract tests ask every listed effect for each
+of these. They also check that it vanishes at its neutral value and leaves a resting track alone.
 """
 
 from turnout.physics.attached_resonator import AttachedResonator
@@ -36,37 +37,51 @@ from turnout.physics.unsprung_mass import UnsprungMass
 from turnout.physics.wheel_flat import WheelFlat
 from turnout.physics.zener_pad import ZenerPad
 
-TERMS = (
-    AttachedResonator,
-    BallastHardening,
-    BallastInertia,
-    Clipping,
-    ClockDrift,
-    ContactStiffness,
-    DryFriction,
-    HangingSleeper,
-    HighPass,
-    Hum,
-    LiftingSleepers,
+# In the order in which a diagnosis tests them at one site. Where two explain the recordings alike, the first one leads:
+# ballast is before a hanging sleeper, which looks like soft ballast to a hammer.
+TERMS: tuple[type[PhysicsTerm], ...] = (
     LocalBallast,
     LocalPad,
-    LowPass,
-    MountResonance,
-    OutOfRound,
-    PadPreload,
+    HangingSleeper,
+    AttachedResonator,
+    DryFriction,
+    BallastHardening,
     PadTemperature,
-    RailBending,
-    RailCorrugation,
+    PadPreload,
+    ZenerPad,
     RailShear,
-    RoughnessLevel,
-    SensorGain,
-    SensorPosition,
+    BallastInertia,
     SleeperMode,
-    SurfaceDip,
+    SensorGain,
+    MountResonance,
     TimeOffset,
+    SensorPosition,
+    LowPass,
+    HighPass,
+    ClockDrift,
+    Clipping,
+    Hum,
+    SurfaceDip,
+    RailCorrugation,
+    ContactStiffness,
     UnsprungMass,
     WheelFlat,
-    ZenerPad,
+    OutOfRound,
+    LiftingSleepers,
+    RailBending,
+    RoughnessLevel,
 )
 
-__all__ = ["TERMS", "Parameter", "PhysicsTerm", *(term.__name__ for term in TERMS)]
+
+def effects_by_name() -> dict[str, type[PhysicsTerm]]:
+    """All effects.
+
+    Returns
+    -------
+    dict
+        Class of the effect by its name.
+    """
+    return {term.name: term for term in TERMS}
+
+
+__all__ = ["TERMS", "Parameter", "PhysicsTerm", "effects_by_name", *(term.__name__ for term in TERMS)]

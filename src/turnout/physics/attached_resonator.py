@@ -1,13 +1,24 @@
 """A part on the rail that swings by itself: absorber, loose clip, guard rail, a mode the base model lacks."""
 
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
+from turnout.physics.hypothesis import Hypothesis, SupportMotion, SupportSite
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.links import Link
 
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from turnout.simulate.track import Track
+
 SOURCE = "Den Hartog 1934, Mechanical vibrations, ch. 3: the auxiliary mass"
+STARTS = tuple((15.0, f, 0.03) for f in np.geomspace(90.0, 500.0, 6))  # [kg, Hz, -]; it acts over half an octave
 
 
 @dataclass(frozen=True)
@@ -22,8 +33,15 @@ class AttachedResonator(PhysicsTerm):
 
     name = "attached_resonator"
     left_out = "{mass:.1f} kg resonate at {frequency:.0f} Hz on the rail over sleeper {support}"
+    message = "A mass of {mass} swings at {frequency} on the track at {place}"
+    site_check = "Look for what hangs on the rail there: a box, a rod, a heater"
+    separating_test = "a hammer test above and beside this place"
     effect_type = "matrix"
     frame = "frequency"
+    site_types = (SupportSite,)
+    column_type = "support"
+    smallest_reportable = 5.0
+    min_significance = 1.0
     parameters = (
         Parameter("mass", "kg", 0.0, (0.0, 150.0), "mass that swings on the rail", SOURCE),
         Parameter("frequency", "Hz", 300.0, (40.0, 1200.0), "its resonance on a fixed rail", SOURCE),
@@ -31,11 +49,16 @@ class AttachedResonator(PhysicsTerm):
     )
 
     @classmethod
-    def example(cls):
+    def example(cls) -> Self:
         """20 kg at 250 Hz over support 20."""
         return cls(20, 20.0, 250.0)
 
-    def links(self, track):
+    @classmethod
+    def hypotheses(cls, site: SupportSite) -> Iterator[Hypothesis]:
+        """A light mass over this support at several frequencies."""
+        yield Hypothesis(STARTS, {"support": site.support}, site.where, site.n_sites)
+
+    def links(self, track: Track) -> Sequence[Link]:
         """Links of an additional degree of freedom at the support."""
         self.check()
         if self.mass == 0.0:
@@ -47,9 +70,28 @@ class AttachedResonator(PhysicsTerm):
             Link(((node, 1.0),), mass=self.mass, tag="resonator"),
         ]
 
-    def dynamic_stiffness(self, frequency):
-        """(n,) complex stiffness added at the rail [N/m]."""
+    def dynamic_stiffness(self, frequency: ArrayLike) -> np.ndarray:
+        """Stiffness that the mass on its spring adds at the rail.
+
+        Parameters
+        ----------
+        frequency : (n,) array
+            Frequencies; an imaginary part damps them. [Hz]
+
+        Returns
+        -------
+        (n,) array of complex
+            Dynamic stiffness. [N/m]
+        """
         omega = 2.0 * np.pi * np.asarray(frequency)
         r = omega / (2.0 * np.pi * self.frequency)
         inner = 2j * self.damping * r
         return -(omega**2) * self.mass * (1.0 + inner) / (1.0 - r**2 + inner)
+
+    def pseudo_force(self, motion: SupportMotion) -> tuple[str, np.ndarray]:
+        """The inertia of the mass as if it were fixed to the rail."""
+        return "rail", -self.mass * np.gradient(np.gradient(motion.rail)) * motion.rate**2
+
+    def condensed_links(self, frequency: np.ndarray) -> list[tuple[tuple, np.ndarray]]:
+        """The stiffness of mass and spring at the rail."""
+        return [(((("rail", self.support), 1.0),), self.dynamic_stiffness(frequency))]

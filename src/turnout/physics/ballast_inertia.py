@@ -1,11 +1,20 @@
 """Ballast that moves with the sleepers and radiates into the ground."""
 
-from dataclasses import dataclass
+from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
+
+from turnout.physics.hypothesis import Hypothesis, TrackSite
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.links import Link
 
+if TYPE_CHECKING:
+    from turnout.simulate.track import Track
+
 SOURCE = "Wolf 1994, Foundation vibration analysis using simple physical models: cones"
+STARTS = ((120.0, 0.0),)  # [kg, N s/m]
 
 
 @dataclass(frozen=True)
@@ -21,19 +30,30 @@ class BallastInertia(PhysicsTerm):
 
     name = "ballast_inertia"
     left_out = "{mass:.0f} kg of ballast move with every half sleeper and {damping:.0f} N s/m radiate"
+    message = "The ballast moves with the sleepers, {mass} of it under each"
+    site_check = "Check the sleepers' mass and the ballast's depth in the track's file"
     effect_type = "matrix"
     frame = "condition"
+    site_types = (TrackSite,)
+    column_type = "track"
+    smallest_reportable = 20.0
+    prescreen_group = name  # common values of the base model change first to hide it
     parameters = (
         Parameter("mass", "kg", 0.0, (0.0, 600.0), "ballast that moves with half a sleeper", SOURCE),
         Parameter("damping", "N s/m", 0.0, (-3e4, 3e5), "radiation beyond the base model's damping", SOURCE),
     )
 
     @classmethod
-    def example(cls):
+    def example(cls) -> Self:
         """200 kg and 30 kN s/m."""
         return cls(200.0, 3e4)
 
-    def links(self, track):
+    @classmethod
+    def hypotheses(cls, site: TrackSite) -> Iterator[Hypothesis]:
+        """Some of the ballast moves and does not radiate."""
+        yield Hypothesis(STARTS)
+
+    def links(self, track: Track) -> Sequence[Link]:
         """Mass and damper under every sleeper, or every ballast mass."""
         self.check()
         if track.layers == 1 or (self.mass == 0.0 and self.damping == 0.0):

@@ -1,9 +1,19 @@
 """A contact softer or stiffer than Hertz's for the nominal profiles."""
 
-from dataclasses import dataclass, replace
+from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Self
+
+from turnout.physics.hypothesis import ContactSite, Hypothesis
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.vehicle import one_or_all
+
+if TYPE_CHECKING:
+    from turnout.simulate.vehicle import Vehicle
+
+STARTS = ((0.5,),)  # times the stiffness
 
 
 @dataclass(frozen=True)
@@ -14,19 +24,28 @@ class ContactStiffness(PhysicsTerm):
 
     name = "contact_stiffness"
     left_out = "the wheel-rail contact has {factor:.2f} times its stiffness"
+    message = "The contact of wheel and rail is {factor} times as stiff"
+    site_check = "Measure the profiles of rail and wheels"
     effect_type = "vehicle"
     frame = "train"
+    site_types = (ContactSite,)
+    smallest_reportable = 0.1
     parameters = (
         Parameter("factor", "-", 1.0, (0.1, 5.0), "contact constant over that of nominal profiles",
                   "Thompson 2009, Railway noise and vibration, ch. 3", (1.0, 0.5)),
     )  # fmt: skip
 
     @classmethod
-    def example(cls):
+    def example(cls) -> Self:
         """Half the stiffness."""
         return cls(0.5)
 
-    def vehicle(self, vehicle):
+    @classmethod
+    def hypotheses(cls, site: ContactSite) -> Iterator[Hypothesis]:
+        """A softer contact of all wheels."""
+        yield Hypothesis(STARTS)
+
+    def vehicle(self, vehicle: Vehicle) -> Vehicle:
         """The vehicle with another contact law."""
         self.check()
         laws = [replace(law, stiffness=self.factor * law.stiffness) for law in vehicle.wheel_values("contact")]

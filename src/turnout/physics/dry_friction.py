@@ -1,13 +1,22 @@
 """Dry friction in a fastening, baseplate or fishplate."""
 
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
+from turnout.physics.hypothesis import Hypothesis, SupportMotion, SupportSite
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.force_laws import FrictionLaw, Port
 
+if TYPE_CHECKING:
+    from turnout.simulate.track import Track
+
 SLIP_RATE = 2e-3  # m/s, slip rate over which the force changes sign
+STARTS = ((1500.0,),)  # N
 
 
 @dataclass(frozen=True)
@@ -19,8 +28,14 @@ class DryFriction(PhysicsTerm):
 
     name = "dry_friction"
     left_out = "dry friction of {limit:.0f} N between rail and sleeper {support}"
+    message = "Something rubs with up to {limit} at {place}"
+    site_check = "Look for a loose clip or a worn baseplate on this sleeper"
     effect_type = "port"
     frame = "amplitude"
+    site_types = (SupportSite,)
+    column_type = "support"
+    smallest_reportable = 500.0
+    required_data_type = "passage"  # for impacts of one force friction is a damper
     parameters = (
         Parameter("limit", "N", 0.0, (0.0, 2e4), "force at which the joint slips",
                   "Marino and Cicirello 2020, Experimental investigation of a single-degree-of-freedom system with "
@@ -28,11 +43,17 @@ class DryFriction(PhysicsTerm):
     )  # fmt: skip
 
     @classmethod
-    def example(cls):
+    def example(cls) -> Self:
         """1 kN at support 20."""
         return cls(20, 1000.0)
 
-    def ports(self, track):
+    @classmethod
+    def hypotheses(cls, site: SupportSite) -> Iterator[Hypothesis]:
+        """Friction at this support; only trains distinguish it from damping."""
+        if site.has_passages:
+            yield Hypothesis(STARTS, {"support": site.support}, site.where, site.n_sites)
+
+    def ports(self, track: Track) -> Sequence[Port]:
         """One port between rail and sleeper."""
         self.check()
         if self.limit == 0.0 or track.layers == 1:
@@ -40,6 +61,22 @@ class DryFriction(PhysicsTerm):
         ends = ((("rail", self.support), 1.0), (("sleeper", self.support), -1.0))
         return (Port(ends, FrictionLaw(self.limit, SLIP_RATE), label=f"friction at support {self.support}"),)
 
-    def damping_at(self, velocity_amplitude):
-        r"""Equivalent viscous damping of slip at an amplitude V well above v0, :math:`4 F_0 / (\pi V)` [N s/m]."""
+    def damping_at(self, velocity_amplitude: float) -> float:
+        r"""Equivalent viscous damping of slip at an amplitude V well above v0, :math:`4 F_0 / (\pi V)`.
+
+        Parameters
+        ----------
+        velocity_amplitude : float
+            Amplitude of the relative velocity of rail and sleeper. [m/s]
+
+        Returns
+        -------
+        float
+            Damping. [N s/m]
+        """
         return 4.0 * self.limit / (np.pi * velocity_amplitude)
+
+    def pseudo_force(self, motion: SupportMotion) -> tuple[str, np.ndarray]:
+        """The friction force at the relative velocity of rail and sleeper in the base simulation."""
+        deflection = motion.rail - motion.sleeper
+        return "pad", -self.limit * np.tanh(np.gradient(deflection) * motion.rate / SLIP_RATE)

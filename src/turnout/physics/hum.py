@@ -1,10 +1,20 @@
 """Mains or traction current in a channel."""
 
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from turnout.physics.hypothesis import ChannelSite, Hypothesis
 from turnout.physics.term import Parameter, PhysicsTerm
+
+if TYPE_CHECKING:
+    from turnout.simulate.sensor import Sensor
+
+START_SHARE = 0.1  # of the channel's peak in the band
 
 
 @dataclass(frozen=True)
@@ -22,8 +32,13 @@ class Hum(PhysicsTerm):
 
     name = "hum"
     left_out = "channel {channel_name} hums at {frequency:.1f} Hz with an amplitude of {amplitude:.3g} m/s²"
+    message = "Channel {channel} hums"
+    site_check = "Check the shield and the ground of this channel"
     effect_type = "channel"
     frame = "clock"
+    site_types = (ChannelSite,)
+    column_type = "channel"
+    n_size_parameters = 2
     parameters = (
         Parameter("sine", "m/s²", 0.0, (-50.0, 50.0), "part in phase with the record's start",
                   "EN 50163:2004, supply voltages of traction systems: 50 Hz and 16.7 Hz"),
@@ -31,19 +46,31 @@ class Hum(PhysicsTerm):
     )  # fmt: skip
 
     @classmethod
-    def example(cls):
+    def example(cls) -> Self:
         """1 m/s² at 50 Hz."""
         return cls("A", 0.8, 0.6)
 
-    def sentence(self):
+    @classmethod
+    def hypotheses(cls, site: ChannelSite) -> Iterator[Hypothesis]:
+        """A line of a tenth of this channel's peak in the passages."""
+        if site.has_passages and site.band_peak > 0.0:
+            yield Hypothesis(
+                ((START_SHARE * site.band_peak, 0.0),),
+                {"channel_name": site.name},
+                site.where,
+                site.n_sites,
+                smallest_reportable=site.material_amplitude,
+            )
+
+    def sentence(self) -> str:
         """Sentence that states what was left out."""
         return self.left_out.format(**vars(self), amplitude=float(np.hypot(self.sine, self.cosine)))
 
-    def under_conditions(self, conditions):
+    def under_conditions(self, conditions: Mapping[str, Any]) -> Self:
         """The term with the start time of the signal of this recording."""
         return replace(self, start=float(conditions.get("start", 0.0)))
 
-    def channel(self, signal, rate, sensor):
+    def channel(self, signal: np.ndarray, rate: float, sensor: Sensor) -> np.ndarray:
         """The signal with the line added."""
         self.check()
         if sensor.name != self.channel_name:

@@ -1,9 +1,16 @@
 """Sleepers that the ballast presses but does not pull."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
 
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.force_laws import LiftLaw, Port
+
+if TYPE_CHECKING:
+    from turnout.simulate.track import Track
 
 
 @dataclass(frozen=True)
@@ -25,7 +32,11 @@ class LiftingSleepers(PhysicsTerm):
 
     name = "lifting_sleepers"
     left_out = "ballast under sleepers {first} to {last} does not pull when they lift off against {dead_load:.0f} N"
+    message = "The sleepers about {place} lift off their ballast"
+    site_check = "Look under these sleepers while a train passes; tamp them"
     effect_type = "port"
+    frame = "place"
+    asked = False
     parameters = (
         Parameter(
             "share",
@@ -38,23 +49,23 @@ class LiftingSleepers(PhysicsTerm):
     )
 
     @classmethod
-    def example(cls):
+    def example(cls) -> Self:
         """Eleven sleepers; the rail is bent upwards and carries most of their weight."""
         return cls(15, 25, 1.0, dead_load=400.0)
 
     @property
-    def withheld_share(self):
+    def withheld_share(self) -> float:
         """Share of the ballast that is missing after lift-off."""
         return self.share
 
-    def ports(self, track):
+    def ports(self, track: Track) -> Sequence[Port]:
         """One port at each sleeper."""
         self.check()
         if self.share == 0.0:
             return ()
         return tuple(self._port(track, j) for j in range(self.first, self.last + 1))
 
-    def _port(self, track, j):
+    def _port(self, track: Track, j: int) -> Port:
         ballast = track.ballast_link(j)
         law = LiftLaw(*(self.share * value for value in (ballast.stiffness, ballast.damping, self.dead_load)))
         return Port(ballast.ends, law, label=f"lift of sleeper {j}")

@@ -1,11 +1,22 @@
 """A wheel that is not round."""
 
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Self
 
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.wheel_path import OutOfRound as Wave
 
+if TYPE_CHECKING:
+    import numpy as np
+
+    from turnout.simulate.track import Track
+    from turnout.simulate.vehicle import Vehicle
+
 SOURCE = "Nielsen and Johansson 2000, Out-of-round railway wheels - a literature survey"
+MIN_AMPLITUDE = 2e-5  # m, smallest reported amplitude
 
 
 @dataclass(frozen=True)
@@ -27,6 +38,8 @@ class OutOfRound(PhysicsTerm):
 
     name = "out_of_round"
     left_out = "wheel {number} of {who} has {order} waves around it with an amplitude of {amplitude:.2e} m"
+    message = "A wheel on {wheel} is out of round"
+    site_check = "Measure this wheelset's run-out; the track needs nothing"
     effect_type = "path"
     frame = "wheel"
     parameters = (
@@ -36,24 +49,24 @@ class OutOfRound(PhysicsTerm):
     )
 
     @classmethod
-    def example(cls):
+    def example(cls) -> Self:
         """0.2 mm of order 3 on the first wheel."""
         return cls(0, 2e-4, 1e-4)
 
-    def sentence(self):
+    def sentence(self) -> str:
         """Sentence that states what was left out."""
         amplitude = (self.cosine**2 + self.sine**2) ** 0.5
         who = self.train or "every train"
         return self.left_out.format(number=self.wheel + 1, who=who, order=self.order, amplitude=amplitude)
 
-    def under_conditions(self, conditions):
+    def under_conditions(self, conditions: Mapping[str, Any]) -> Self:
         """The term with the phase of a recording; no effect in another train or if the phase is unknown."""
         phases, name = dict(self.phases), conditions.get("name")
         if (self.train and conditions.get("train", self.train) != self.train) or (phases and name not in phases):
             return replace(self, cosine=0.0, sine=0.0)
         return replace(self, phases=((name, phases[name]),)) if phases else self
 
-    def paths(self, track, vehicle):
+    def paths(self, track: Track | None, vehicle: Vehicle | None) -> Sequence[Callable[..., np.ndarray]]:
         """Two waves a quarter wave apart."""
         self.check()
         if self.cosine == 0.0 and self.sine == 0.0:

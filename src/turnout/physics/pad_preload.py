@@ -1,10 +1,20 @@
 """Pads that stiffen under the train's weight."""
 
-from dataclasses import dataclass, replace
+from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Self
+
+from turnout.physics.hypothesis import Hypothesis, TrackSite
 from turnout.physics.term import Parameter, PhysicsTerm
 
+if TYPE_CHECKING:
+    from turnout.simulate.links import Link
+    from turnout.simulate.track import Track
+
 SEAT_SHARE = 0.45  # share of a wheel load on the support below it, 60 kg/m rail on 0.6 m spacing
+STARTS = ((3e3,),)  # N/m per N
 
 
 @dataclass(frozen=True)
@@ -20,25 +30,36 @@ class PadPreload(PhysicsTerm):
 
     name = "pad_preload"
     left_out = "pads stiffen by {slope:.0f} N/m per newton of seat load"
+    message = "The rail pads stiffen under load"
+    site_check = "Strike the rail beside a standing train: what a blow on unloaded track says is too soft"
+    separating_test = "a hammer test beside a standing train, or passages of another axle load"
     effect_type = "matrix"
     frame = "condition"
+    site_types = (TrackSite,)
+    smallest_reportable = 500.0
     parameters = (
         Parameter("slope", "N/m per N", 0.0, (-3e3, 2e4), "growth of pad stiffness with load",
                   "Wu and Thompson 1999, The effects of local preload on the foundation stiffness of railway track"),
     )  # fmt: skip
 
     @classmethod
-    def example(cls):
+    def example(cls) -> Self:
         """100 MN/m under 25 kN."""
         return cls(4e3)
 
-    def under_conditions(self, conditions):
+    @classmethod
+    def hypotheses(cls, site: TrackSite) -> Iterator[Hypothesis]:
+        """Pads that stiffen under a train; a hammer test has no load."""
+        if site.has_passages:
+            yield Hypothesis(STARTS)
+
+    def under_conditions(self, conditions: Mapping[str, Any]) -> Self:
         """The term at the load of a recording; without axle loads, as in a hammer test, the load is zero."""
         loads = conditions.get("axle_loads", ())
         mean = sum(loads) / len(loads) / 2.0 if len(loads) else 0.0
         return replace(self, load=SEAT_SHARE * mean)
 
-    def links(self, track):
+    def links(self, track: Track) -> Sequence[Link]:
         """Links added to every pad."""
         self.check()
         more = self.slope * self.load

@@ -1,10 +1,20 @@
 """Pads that soften when warm."""
 
-from dataclasses import dataclass, replace
+from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Self
+
+from turnout.physics.hypothesis import Hypothesis, TrackSite
 from turnout.physics.term import Parameter, PhysicsTerm
 
+if TYPE_CHECKING:
+    from turnout.simulate.links import Link
+    from turnout.simulate.track import Track
+
 REFERENCE = 15.0  # °C, temperature of the pads of the base model
+STARTS = ((0.01,),)  # 1/K
 
 
 @dataclass(frozen=True)
@@ -16,24 +26,37 @@ class PadTemperature(PhysicsTerm):
 
     name = "pad_temperature"
     left_out = "pads lose a share of {coefficient:.4f} of their stiffness per kelvin"
+    message = "The rail pads soften by {coefficient} of rail temperature"
+    site_check = "Nothing to mend: compare campaigns at one temperature only"
+    separating_test = "a hammer test at another rail temperature, 15 K away"
     effect_type = "matrix"
     scales_track = True
     frame = "condition"
+    site_types = (TrackSite,)
+    column_type = "track"
+    smallest_reportable = 1e-3
+    prescreen_group = name  # common values of the base model change first to hide it
+    required_range = ("rail_temperature", 4.0)  # K; at 1 % per kelvin: 2 % of frequency
     parameters = (
         Parameter("coefficient", "1/K", 0.0, (-0.01, 0.04), "relative loss of stiffness per kelvin",
                   "Othman 2022, Extrica 22293: rail pads lose up to 53 % when warm", (0.005, 0.01)),
     )  # fmt: skip
 
     @classmethod
-    def example(cls):
+    def example(cls) -> Self:
         """1 % per kelvin at 30 °C."""
         return cls(0.01)
 
-    def under_conditions(self, conditions):
+    @classmethod
+    def hypotheses(cls, site: TrackSite) -> Iterator[Hypothesis]:
+        """Pads that soften by a hundredth per kelvin."""
+        yield Hypothesis(STARTS)
+
+    def under_conditions(self, conditions: Mapping[str, Any]) -> Self:
         """The term at the rail temperature of a recording; an unknown one is the reference temperature."""
         return replace(self, temperature=float(conditions.get("rail_temperature", REFERENCE)))
 
-    def links(self, track):
+    def links(self, track: Track) -> Sequence[Link]:
         """Links added to every pad."""
         self.check()
         more = max(-self.coefficient * (self.temperature - REFERENCE), -0.95)
@@ -41,3 +64,9 @@ class PadTemperature(PhysicsTerm):
             return []
         pads = [track.pad_link(j) for j in range(track.support.size)]
         return [replace(k, stiffness=more * k.stiffness, damping=0.0, tag="pad_temperature") for k in pads]
+
+    def nuisance_change(self, conditions: Mapping[str, Any]) -> tuple[str, float] | None:
+        """Change of the logarithm of the common pad stiffness; None without a known temperature."""
+        if "rail_temperature" not in conditions:
+            return None
+        return "pad_stiffness", -self.coefficient * (conditions["rail_temperature"] - REFERENCE)

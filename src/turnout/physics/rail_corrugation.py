@@ -1,12 +1,27 @@
 """Waves on a stretch of rail."""
 
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
+from turnout.physics.hypothesis import ContactSite, Hypothesis
 from turnout.physics.term import Parameter, PhysicsTerm
 
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from turnout.simulate.track import Track
+    from turnout.simulate.vehicle import Vehicle
+
 SOURCE = "Grassie 2009, Rail corrugation: characteristics, causes and treatments"
+WAVELENGTHS = (0.3, 0.6)  # m, of the starts
+N_INDEPENDENT = 4  # distinguishable wavelengths in that range
+START_AMPLITUDE, SENSOR_MARGIN = 3e-5, 3.0  # m; corrugated rail beyond the sensors
+MIN_AMPLITUDE = 1e-5  # m, smallest reported amplitude of short waves: EN 13231-3 allows it on a ground rail up to 0.3 m
 
 
 @dataclass(frozen=True)
@@ -19,7 +34,7 @@ class Waves:
     cosine: float
     wavelength: float
 
-    def __call__(self, x, wheel=0):
+    def __call__(self, x: ArrayLike, wheel: int = 0) -> np.ndarray:
         x = np.asarray(x, dtype=float)
         fade = np.clip(np.minimum(x - self.start, self.end - x) / self.wavelength, 0.0, 1.0)
         phase = 2.0 * np.pi * (x - self.start) / self.wavelength
@@ -38,8 +53,12 @@ class RailCorrugation(PhysicsTerm):
 
     name = "rail_corrugation"
     left_out = "corrugation of {wavelength:.3f} m and {amplitude:.2e} m from {start:.1f} to {end:.1f} m"
+    message = "The rail is corrugated, wavelength {wavelength}"
+    site_check = "Measure the roughness of the rail; grind"
     effect_type = "path"
     frame = "wavelength"
+    site_types = (ContactSite,)
+    column_type = "path"
     parameters = (
         Parameter("sine", "m", 0.0, (-3e-4, 3e-4), "amplitude in phase with the start", SOURCE, (0.0, 6e-5)),
         Parameter("cosine", "m", 0.0, (-3e-4, 3e-4), "amplitude a quarter wave ahead", SOURCE, (0.0, 6e-5)),
@@ -47,15 +66,23 @@ class RailCorrugation(PhysicsTerm):
     )
 
     @classmethod
-    def example(cls):
+    def example(cls) -> Self:
         """50 µm over 0.3 m."""
         return cls(8.0, 16.0, 5e-5)
 
-    def sentence(self):
+    @classmethod
+    def hypotheses(cls, site: ContactSite) -> Iterator[Hypothesis]:
+        """Waves of two lengths all along the sensors."""
+        low, high = min(site.sensor_positions) - SENSOR_MARGIN, max(site.sensor_positions) + SENSOR_MARGIN
+        for length in WAVELENGTHS:
+            starts, where = ((START_AMPLITUDE, 0.0, length),), {"wavelength": length}
+            yield Hypothesis(starts, {"start": low, "end": high}, where, N_INDEPENDENT)
+
+    def sentence(self) -> str:
         """Sentence that states what was left out."""
         return self.left_out.format(**vars(self), amplitude=float(np.hypot(self.sine, self.cosine)))
 
-    def paths(self, track, vehicle):
+    def paths(self, track: Track | None, vehicle: Vehicle | None) -> Sequence[Callable[..., np.ndarray]]:
         """The waves."""
         self.check()
         if self.sine == 0.0 and self.cosine == 0.0:

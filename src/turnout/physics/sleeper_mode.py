@@ -1,13 +1,22 @@
 """Sleepers that bend: the first mode of every sleeper beside its rigid motion."""
 
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
+from turnout.physics.hypothesis import Hypothesis, TrackSite
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.links import Link
 
+if TYPE_CHECKING:
+    from turnout.simulate.track import Track
+
 SOURCE = "Grassie and Cox 1984, The dynamic response of railway track with flexible sleepers"
+STARTS = tuple((0.25, f) for f in np.geomspace(85.0, 760.0, 20))  # [-, Hz], two widths of the resonance apart
 
 
 @dataclass(frozen=True)
@@ -23,19 +32,30 @@ class SleeperMode(PhysicsTerm):
 
     name = "sleeper_mode"
     left_out = "sleepers bend at {frequency:.0f} Hz with a share of {share:.2f} of their mass"
+    message = "The sleepers bend at {frequency}"
+    site_check = "Check the kind of sleepers in the track's file"
     effect_type = "matrix"
     frame = "frequency"
+    site_types = (TrackSite,)
+    column_type = "track"
+    smallest_reportable = 0.05
+    prescreen_group = name  # common values of the base model change first to hide it
     parameters = (
         Parameter("share", "-", 0.0, (0.0, 0.95), "modal mass over half the sleeper's mass", SOURCE),
         Parameter("frequency", "Hz", 180.0, (80.0, 800.0), "resonance with the rail seats held", SOURCE),
     )
 
     @classmethod
-    def example(cls):
+    def example(cls) -> Self:
         """A quarter of the mass at 200 Hz."""
         return cls(0.25, 200.0)
 
-    def links(self, track):
+    @classmethod
+    def hypotheses(cls, site: TrackSite) -> Iterator[Hypothesis]:
+        """A quarter of the mass at several frequencies."""
+        yield Hypothesis(STARTS)
+
+    def links(self, track: Track) -> Sequence[Link]:
         """Links of an additional degree of freedom for every sleeper."""
         self.check()
         if self.share == 0.0 or track.layers == 1:

@@ -1,12 +1,34 @@
-"""The interface of an omitted effect: matrix entries, ports, paths or a channel effect, never the march itself."""
+"""The interface of an effect: how it changes the simulation, how a diagnosis tests it and what a finding says of it."""
 
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
 
 import numpy as np
 
 from turnout.errors import SimulationError
 
+if TYPE_CHECKING:
+    from turnout.physics.hypothesis import Hypothesis, SupportMotion
+    from turnout.simulate.force_laws import Port
+    from turnout.simulate.links import Link
+    from turnout.simulate.sensor import Sensor
+    from turnout.simulate.track import Track
+    from turnout.simulate.vehicle import Vehicle
+
 EFFECT_TYPES = ("matrix", "port", "path", "channel", "vehicle")
+COLUMN_TYPES = ("support", "track", "path", "channel", "")
+FORCE_TARGETS = ("rail", "sleeper", "pad")  # the force of a pad acts on the rail and reversed on the sleeper
+# What an effect is fixed to, and how the page of effects describes it.
+FRAMES = {
+    "place": "a place", "amplitude": "a place, and how far it moves", "frequency": "a frequency band",
+    "condition": "the whole track, under a condition", "sensor": "a sensor", "clock": "a channel's clock",
+    "wheel": "a wheel", "train": "a train", "wavelength": "a stretch of rail",
+}  # fmt: skip
+APPROXIMATE = 0.15  # error of an effect's size by its form; nine of another simulator: median 0.12
+ACCURATE = 0.03  # the same of gains and delays; ten of another simulator: median 0.01
 
 
 @dataclass(frozen=True)
@@ -26,69 +48,267 @@ class Parameter:
     prior: tuple[float, float] | None = None
 
 
-class PhysicsTerm:
-    """Base class of all terms. A term is a frozen dataclass with fields for its positions and its parameters.
+class SleeperState(Protocol):
+    """Motion of the sleepers of a ``track``, each (n_sleeper,) [m, m/s]."""
 
-    Class attributes: ``name``; ``left_out``, a sentence with the term's fields in braces that states what the base
-    model lacked; ``effect_type``, one of ``EFFECT_TYPES``; ``parameters``, a tuple of ``Parameter`` whose names are
-    fields. Override one of the methods below; each returns what is *added* to the base simulation.
+    track: Track
+    sleeper_position: np.ndarray
+    sleeper_velocity: np.ndarray
+
+
+class PhysicsTerm:
+    """Base class of all effects. An effect is a frozen dataclass with fields for its positions and its parameters.
+
+    Everything that is known of an effect is a class attribute or a method of its class. Fields named ``sleeper``,
+    ``support``, ``first`` and ``last`` are numbers of supports, ``channel_name`` is a channel and ``train`` a train.
+    The first parameter is the size of the effect.
+
+    Attributes
+    ----------
+    name : str
+        Name of the effect in rows, track files and options.
+    parameters : tuple of Parameter
+        What a fit estimates; their names are fields.
+    effect_type : str
+        How it enters the simulation, one of ``EFFECT_TYPES``.
+    scales_track : bool
+        Whether its links are a multiple of the track's springs; other terms then act on the result.
+    frame : str
+        What it is fixed to, one of ``FRAMES``.
+    left_out : str
+        Sentence that states what the base model lacked, with the fields in braces.
+    message : str
+        Sentence of a finding to the person who inspects the track, without a full stop. In braces: ``place``,
+        ``channel``, ``train``, ``wheel``, every parameter with its unit, and its absolute value as ``<name>_size``.
+    message_negative : str
+        The same if the first parameter is negative; "" if the sentence is the same.
+    message_unbounded : str
+        The same if of the first parameter only a lower limit is known; "" if the sentence is the same.
+    site_check : str
+        What to do on site.
+    separating_test : str
+        Measurement that separates it from its rivals; "" if none is known to do so better than more recordings.
+    asked : bool
+        Whether a diagnosis tests it. Others are known to the simulation and to track files only.
+    site_types : tuple of type
+        Classes of ``turnout.physics.hypothesis`` at which it is tested; () if only a residual suggests where.
+    column_type : str
+        How its first-order change of a prediction is computed. "support": a force at supports (``pseudo_force``) and a
+        change of links in receptances. "track": exactly in receptances, in passages as ``nuisance_change``. "path": a
+        path that all wheels follow. "channel": a change of the known signal. "": by a simulation.
+    smallest_reportable : float
+        Distance of the first ``n_size_parameters`` parameters from neutral below which nobody would act; 0 if the site
+        or the scan that suggests it determines it.
+    n_size_parameters : int
+        Number of parameters that make up the size.
+    min_significance : float
+        Standard errors of the first parameter by which the size must exceed ``smallest_reportable``.
+    model_error_share : float
+        Share by which an estimated size errs, since the model of the effect is only approximate.
+    exact : bool
+        The model of the effect is exact (a gain, a lag, a position): no residual is due to its shape.
+    component : str
+        Component that it changes. Where one effect of a component leads, all of them are refitted there.
+    limit_form : str
+        Effect that looks the same at the lower bound of the first parameter.
+    simpler_form : tuple
+        (effect, k): where the first parameter does not matter, it equals that effect with parameter k as its size.
+    unbounded_form : str
+        Effect that looks the same where only a lower limit of the first parameter is known.
+    prescreen_group : str
+        Not empty: tried on hammer tests at every site, whatever the residual promises. Effects with the same word share
+        these trials.
+    start_from_base : bool
+        False: refits start with the nuisance parameters at their priors, not at the base fit.
+    sign_ambiguous : bool
+        Hammer tests hardly tell a value from its mirror image about neutral.
+    nonlinear_in_size : bool
+        The response changes its shape with the size. A start says nothing of larger or smaller sizes.
+    required_data_type : str
+        Data type of observations that must support it. To all others it looks like another effect.
+    required_range : tuple
+        (condition, range): the recordings must have this condition and differ in it by this range. Otherwise the effect
+        could explain any difference between them. () without such a requirement.
+    evidence_suffices : bool
+        Evidence beside the observations is enough: it need not explain their residual.
+    must_reach_control_level : bool
+        It can imitate many others. It is named only if the residual falls to the control level.
+    distant_starts : tuple of float
+        Values of the first parameter that are simulated although no derivative of the base model extends that far.
     """
 
-    name = ""
-    left_out = ""
-    effect_type = ""
-    parameters: tuple[Parameter, ...] = ()
-    scales_track = False  # whether its links are a multiple of the track's springs; other terms then act on the result
+    name: ClassVar[str] = ""
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
+    effect_type: ClassVar[str] = ""
+    scales_track: ClassVar[bool] = False
+    frame: ClassVar[str] = ""
+
+    left_out: ClassVar[str] = ""
+    message: ClassVar[str] = ""
+    message_negative: ClassVar[str] = ""
+    message_unbounded: ClassVar[str] = ""
+    site_check: ClassVar[str] = ""
+    separating_test: ClassVar[str] = ""
+
+    asked: ClassVar[bool] = True
+    site_types: ClassVar[tuple[type, ...]] = ()
+    column_type: ClassVar[str] = ""
+    smallest_reportable: ClassVar[float] = 0.0
+    n_size_parameters: ClassVar[int] = 1
+    min_significance: ClassVar[float] = 0.0
+    model_error_share: ClassVar[float] = APPROXIMATE
+    exact: ClassVar[bool] = False
+    component: ClassVar[str] = ""
+    limit_form: ClassVar[str] = ""
+    simpler_form: ClassVar[tuple[str, int] | tuple[()]] = ()
+    unbounded_form: ClassVar[str] = ""
+    prescreen_group: ClassVar[str] = ""
+    start_from_base: ClassVar[bool] = True
+    sign_ambiguous: ClassVar[bool] = False
+    nonlinear_in_size: ClassVar[bool] = False
+    required_data_type: ClassVar[str] = ""
+    required_range: ClassVar[tuple[str, float] | tuple[()]] = ()
+    evidence_suffices: ClassVar[bool] = False
+    must_reach_control_level: ClassVar[bool] = False
+    distant_starts: ClassVar[tuple[float, ...]] = ()
 
     @classmethod
-    def example(cls):
+    def example(cls) -> Self:
         """A term with ordinary values for the tests: on a track of at least 40 supports with sensors "A" and "B"."""
         raise NotImplementedError(f"{cls.__name__} needs an example for its contract tests")
 
-    def links(self, track):
-        """Matrix entries: a list of ``turnout.simulate.links.Link``. Naming a new degree of freedom creates it."""
-        return ()
+    @classmethod
+    def hypotheses(cls, site: Any) -> Iterable[Hypothesis]:
+        """What a diagnosis tests at a site.
 
-    def ports(self, track):
-        """Scalar forces that matrices cannot describe: a list of ``turnout.simulate.force_laws.Port``."""
-        return ()
+        Parameters
+        ----------
+        site : SupportSite, TrackSite, ChannelSite, SaturatedChannelSite, ContactSite or TrainSite
+            A site of one of the classes in ``site_types``.
 
-    @property
-    def withheld_share(self):
-        """Share of the ballast of a sleeper that the ports of this term remove."""
-        return 0.0
-
-    def paths(self, track, vehicle):
-        """Parts of a wheel's path: callables (x, wheel) -> dip [m].
-
-        An attribute ``wheel`` restricts a part to one wheel; ``per_wheel = True`` has it evaluated for each wheel.
+        Returns
+        -------
+        iterable of Hypothesis
+            In the order of the test; none if the effect cannot be seen there.
         """
         return ()
 
-    def rail(self, track):
+    # What the effect adds to a simulation
+
+    def links(self, track: Track) -> Sequence[Link]:
+        """Matrix entries that the effect adds. Naming a new degree of freedom creates it.
+
+        Parameters
+        ----------
+        track : Track
+            The track without the effect.
+
+        Returns
+        -------
+        sequence of Link
+        """
+        return ()
+
+    def ports(self, track: Track) -> Sequence[Port]:
+        """Scalar forces that matrices cannot describe.
+
+        Parameters
+        ----------
+        track : Track
+            The track without the effect.
+
+        Returns
+        -------
+        sequence of Port
+        """
+        return ()
+
+    @property
+    def withheld_share(self) -> float:
+        """Share of the ballast of a sleeper that the ports of this term remove."""
+        return 0.0
+
+    def paths(self, track: Track | None, vehicle: Vehicle | None) -> Sequence[Callable[..., np.ndarray]]:
+        """Parts of a wheel's path.
+
+        Parameters
+        ----------
+        track : Track
+            The track under the wheels.
+        vehicle : Vehicle
+            The vehicle whose wheels follow the path.
+
+        Returns
+        -------
+        sequence of callable
+            (x, wheel) -> dip [m]. An attribute ``wheel`` restricts a part to one wheel; ``per_wheel = True`` has it
+            evaluated for each wheel.
+        """
+        return ()
+
+    def rail(self, track: Track) -> Track:
         """The track with changed rails; its supports are changed by links."""
         return track
 
-    def sensor(self, sensor):
+    def sensor(self, sensor: Sensor) -> Sensor:
         """The sensor at its true position, if its description is wrong."""
         return sensor
 
-    def under_conditions(self, conditions):
-        """The same term under the conditions of one recording (rail temperature, axle load, train)."""
+    def under_conditions(self, conditions: Mapping[str, Any]) -> Self:
+        """The same term under the conditions of one recording.
+
+        Parameters
+        ----------
+        conditions : mapping
+            What is known of the recording: ``rail_temperature`` [°C], ``axle_loads`` [N], ``train``, ``name``,
+            ``start`` [s].
+
+        Returns
+        -------
+        PhysicsTerm
+            Of the same class.
+        """
         return self
 
-    def channel(self, signal, rate, sensor):
-        """Signal that the channel of ``sensor`` records of the true ``signal`` (n,) at ``rate`` [Hz]."""
+    def channel(self, signal: np.ndarray, rate: float, sensor: Sensor) -> np.ndarray:
+        """Signal that the channel of a sensor records.
+
+        Parameters
+        ----------
+        signal : (n,) array of float
+            The true signal.
+        rate : float
+            Sampling rate. [Hz]
+        sensor : Sensor
+            The sensor of the channel.
+
+        Returns
+        -------
+        (n,) array of float
+        """
         return signal
 
-    def vehicle(self, vehicle):
+    def vehicle(self, vehicle: Vehicle) -> Vehicle:
         """The vehicle with the effect."""
         return vehicle
 
-    def force(self, state):
-        """Additional force [N] on each sleeper, down positive, (n_sleeper,), of ports that act on sleepers only.
+    def force(self, state: SleeperState) -> np.ndarray:
+        """Additional force on each sleeper, of ports that act on sleepers only.
 
-        ``state`` has ``track``, ``sleeper_position`` (n_sleeper,) [m] and ``sleeper_velocity`` [m/s].
+        Parameters
+        ----------
+        state : SleeperState
+            Motion of the sleepers of a track.
+
+        Returns
+        -------
+        (n_sleeper,) array of float
+            Force, down positive. [N]
+
+        Raises
+        ------
+        SimulationError
+            A port acts on something else than one sleeper.
         """
         force = np.zeros(len(state.sleeper_position))
         for port in self.ports(state.track):
@@ -99,16 +319,73 @@ class PhysicsTerm:
             force[j] -= weight * float(port.law.force(d, weight * state.sleeper_velocity[j]))
         return force
 
-    def neutral(self):
+    # First-order changes of predictions, for the order in which a diagnosis refits
+
+    @property
+    def supports(self) -> range:
+        """Numbers of the supports at which it acts, by its fields; empty without one."""
+        first = next((getattr(self, name) for name in ("sleeper", "support", "first") if hasattr(self, name)), None)
+        return range(0) if first is None else range(first, getattr(self, "last", first) + 1)
+
+    def pseudo_force(self, motion: SupportMotion) -> tuple[str, np.ndarray]:
+        """Force that has the same effect on the base model, to first order, at one of its ``supports``.
+
+        Parameters
+        ----------
+        motion : SupportMotion
+            Motion of the support in the base simulation.
+
+        Returns
+        -------
+        target : str
+            What the force acts on, one of ``FORCE_TARGETS``.
+        force : (n,) array of float
+            Force, down positive. [N]
+        """
+        raise NotImplementedError(f"{self.name} is not of column type 'support'")
+
+    def condensed_links(self, frequency: np.ndarray) -> list[tuple[tuple, np.ndarray]] | None:
+        """Dynamic stiffness between the degrees of freedom of the base model, for links that create their own.
+
+        Parameters
+        ----------
+        frequency : (n,) array of complex
+            Frequencies. [Hz]
+
+        Returns
+        -------
+        list of (ends, stiffness) or None
+            ``ends`` as those of a ``Link`` and (n,) complex stiffness [N/m]; None: ``links`` create none.
+        """
+        return None
+
+    def nuisance_change(self, conditions: Mapping[str, Any]) -> tuple[str, float] | None:
+        """Change of a nuisance parameter of the base model that acts like the effect in one passage, to first order.
+
+        Parameters
+        ----------
+        conditions : mapping
+            As in ``under_conditions``.
+
+        Returns
+        -------
+        (name, change) or None
+            None without an effect in that passage.
+        """
+        return None
+
+    # Values and sentences
+
+    def neutral(self) -> Self:
         """The same term with every parameter at its neutral value: it must have no effect."""
         # Every term is a dataclass; mypy does not know this of the base class.
         return replace(self, **{p.name: p.neutral for p in self.parameters})  # type: ignore[type-var]
 
-    def sentence(self):
+    def sentence(self) -> str:
         """Sentence that states what was left out, with the numbers of this term."""
         return self.left_out.format(**vars(self))
 
-    def check(self):
+    def check(self) -> None:
         """Raise SimulationError if a parameter is outside its bounds."""
         for p in self.parameters:
             value = getattr(self, p.name)

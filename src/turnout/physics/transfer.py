@@ -1,9 +1,18 @@
 """Effects in a measuring channel that are linear: one transfer function serves recordings and receptances."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy.fft import next_fast_len
 
 from turnout.physics.term import PhysicsTerm
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from turnout.simulate.sensor import Sensor
 
 
 class TransferTerm(PhysicsTerm):
@@ -13,11 +22,22 @@ class TransferTerm(PhysicsTerm):
     effect_type = "channel"
     frame = "sensor"
 
-    def transfer(self, frequency):
-        """(n,) complex factor on the spectrum at ``frequency`` [Hz]."""
+    def transfer(self, frequency: ArrayLike) -> np.ndarray:
+        """Factor on the spectrum of the channel.
+
+        Parameters
+        ----------
+        frequency : (n,) array of float
+            Frequencies. [Hz]
+
+        Returns
+        -------
+        (n,) array of complex
+            Recorded signal over true signal.
+        """
         raise NotImplementedError
 
-    def channel(self, signal, rate, sensor):
+    def channel(self, signal: np.ndarray, rate: float, sensor: Sensor) -> np.ndarray:
         """The signal with the transfer function applied, padded so that it does not wrap around."""
         self.check()
         if sensor.name != self.channel_name:

@@ -1,13 +1,24 @@
 """Pads that stiffen with frequency: a spring and damper in series beside each pad."""
 
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
+from turnout.physics.hypothesis import Hypothesis, TrackSite
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.links import Link
 
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from turnout.simulate.track import Track
+
 SOURCE = "Knothe and Grassie 1993, Modelling of railway track and vehicle/track interaction at high frequencies"
+STARTS = ((0.4,),)  # of the static stiffness
 
 
 @dataclass(frozen=True)
@@ -24,18 +35,30 @@ class ZenerPad(PhysicsTerm):
 
     name = "zener_pad"
     left_out = "pads stiffen by {ratio:.2f} of their static stiffness above 1/(2 pi {relaxation_time:.2g} s)"
+    message = "The rail pads are stiffer at high frequency than at low"
+    site_check = "Ask for the pads' dynamic stiffness; take one to the laboratory"
+    separating_test = "a hammer test with a hard tip up to 1.2 kHz"
     effect_type = "matrix"
     frame = "frequency"
+    site_types = (TrackSite,)
+    column_type = "track"
+    smallest_reportable = 0.1
+    prescreen_group = name  # common values of the base model change first to hide it
     parameters = (
         Parameter("ratio", "-", 0.0, (0.0, 10.0), "stiffness of the branch over the pad's static stiffness", SOURCE),
     )
 
     @classmethod
-    def example(cls):
+    def example(cls) -> Self:
         """A branch with the stiffness of the pad."""
         return cls(1.0)
 
-    def links(self, track):
+    @classmethod
+    def hypotheses(cls, site: TrackSite) -> Iterator[Hypothesis]:
+        """A branch of some tenths of the pad's stiffness."""
+        yield Hypothesis(STARTS)
+
+    def links(self, track: Track) -> Sequence[Link]:
         """Spring from sleeper to joint and damper from joint to rail, at every support."""
         self.check()
         if self.ratio == 0.0:
@@ -50,8 +73,23 @@ class ZenerPad(PhysicsTerm):
             links.append(Link(((("rail", j), 1.0), (("zener", j), -1.0)), damping=damping, tag="zener"))
         return links
 
-    def dynamic_stiffness(self, track, frequency, support=0):
-        """(n,) complex stiffness of one pad with its branch [N/m]."""
+    def dynamic_stiffness(self, track: Track, frequency: ArrayLike, support: int = 0) -> np.ndarray:
+        """Stiffness of one pad with its branch.
+
+        Parameters
+        ----------
+        track : Track
+            The track without the effect.
+        frequency : (n,) array of float
+            Frequencies. [Hz]
+        support : int
+            Number of the support.
+
+        Returns
+        -------
+        (n,) array of complex
+            Dynamic stiffness. [N/m]
+        """
         i_omega = 2j * np.pi * np.asarray(frequency)
         k, c = track.pad_stiffness[support], track.pad_damping[support]
         branch = self.ratio * k * i_omega * self.relaxation_time / (1.0 + i_omega * self.relaxation_time)

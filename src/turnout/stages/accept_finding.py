@@ -10,8 +10,9 @@ from turnout.config import load_configuration
 from turnout.constants import Z95
 from turnout.errors import SimulationError
 from turnout.files import write_text
+from turnout.physics import TERMS, effects_by_name
 from turnout.simulate import load_track
-from turnout.stages.accepted_effects import SUPPORT_KEYS, TERM_CLASSES, WHEELSET_EFFECTS, accepted_of
+from turnout.stages.accepted_effects import SUPPORT_KEYS, accepted_of
 from turnout.stages.mismatch_inputs import track_file
 
 # Units for values below 0.1 in SI units: SI unit -> (unit, its size in the SI unit)
@@ -56,8 +57,9 @@ def _check_acceptable(finding, turnout_id, anyway):
     prefix = f"{turnout_id}, {finding['sections']}: the verdict is {finding['verdict'].replace('_', ' ')}"
     if not finding["term_json"]:
         raise SimulationError(f"{prefix}; it carries no term that could be accepted.")
-    effects = {t["term"] for t in json.loads(finding["term_json"])}
-    if on_wheelset := effects & set(WHEELSET_EFFECTS):
+    names = {t["term"] for t in json.loads(finding["term_json"])}
+    # An effect of a wheelset does not belong in a track's file: the wheelset leaves with its train.
+    if on_wheelset := names & {effect.name for effect in TERMS if effect.frame == "wheel"}:
         raise SimulationError(f"{prefix}; {min(on_wheelset)} belongs to a wheelset, which no track file describes.")
     if not anyway and not any(_is_significant(t) for t in json.loads(finding["term_json"])):
         raise SimulationError(f"{prefix}, but no parameter differs from having no effect; --anyway accepts it.")
@@ -70,7 +72,7 @@ def _check_acceptable(finding, turnout_id, anyway):
 
 def _is_significant(term):
     """Whether a parameter differs from its neutral value by more than half its 95 % interval."""
-    neutral = {p.name: p.neutral for p in TERM_CLASSES[term["term"]].parameters}
+    neutral = {p.name: p.neutral for p in effects_by_name()[term["term"]].parameters}
     return any(abs(p["value"] - neutral[name]) > Z95 * p["se"] for name, p in term["parameters"].items())
 
 

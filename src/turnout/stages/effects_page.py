@@ -7,17 +7,10 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
-from turnout.mismatch.turnout.candidates.catalogue import SMALLEST_REPORTABLE
-from turnout.physics import TERMS
-from turnout.stages.mismatch_rows import SITE_CHECKS
+from turnout import physics
+from turnout.physics.term import FRAMES
 from turnout.stages.mismatch_text import number_in_words
 
-NOT_CANDIDATES = ("lifting_sleepers", "rail_bending", "roughness_level")  # simulated only
-FRAME_TEXT = {
-    "place": "a place", "amplitude": "a place, and how far it moves", "frequency": "a frequency band",
-    "condition": "the whole track, under a condition", "sensor": "a sensor", "clock": "a channel's clock",
-    "wheel": "a wheel", "train": "a train", "wavelength": "a stretch of rail",
-}  # fmt: skip
 PAGE_HEAD = """# What a diagnosis can name
 
 Every effect that `turnout diagnose` asks for, from the catalogue (`turnout.physics`, one file each). "Least": how far
@@ -35,28 +28,23 @@ Not asked for, but known to the simulation and to track files: {}.
 
 def page() -> str:
     """Text of the page."""
-    candidates = [t for t in TERMS if t.name not in NOT_CANDIDATES]
-    not_candidates = ", ".join(
-        _effect_name(t)[0].lower() + _effect_name(t)[1:] for t in TERMS if t.name in NOT_CANDIDATES
-    )
-    return PAGE_HEAD + "".join(_row(t) for t in candidates) + PAGE_FOOT.format(not_candidates)
+    effects = sorted(physics.TERMS, key=lambda effect: effect.name)
+    rows = "".join(_row(effect) for effect in effects if effect.asked)
+    names = [_effect_name(effect) for effect in effects if not effect.asked]
+    return PAGE_HEAD + rows + PAGE_FOOT.format(", ".join(name[0].lower() + name[1:] for name in names))
 
 
-def _row(term) -> str:
-    numbers = "; ".join(f"{p.meaning} [{p.unit}]" for p in term.parameters)
-    smallest = (
-        number_in_words(SMALLEST_REPORTABLE[term.name], term.parameters[0].unit)
-        if term.name in SMALLEST_REPORTABLE
-        else "–"
-    )
-    frame = FRAME_TEXT[getattr(term, "frame", "place")]
-    cells = _effect_name(term), f"`{term.name}`", frame, numbers, smallest, SITE_CHECKS.get(term.name, "–")
+def _row(effect) -> str:
+    numbers = "; ".join(f"{p.meaning} [{p.unit}]" for p in effect.parameters)
+    size = effect.smallest_reportable
+    smallest = number_in_words(size, effect.parameters[0].unit) if size else "–"
+    cells = _effect_name(effect), f"`{effect.name}`", FRAMES[effect.frame], numbers, smallest, effect.site_check
     return "| " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |\n"
 
 
-def _effect_name(term) -> str:
-    """First sentence of the module docstring of the term."""
-    return (import_module(term.__module__).__doc__ or "").strip().splitlines()[0].split(": ")[0].removesuffix(".")
+def _effect_name(effect) -> str:
+    """First sentence of the module docstring of the effect."""
+    return (import_module(effect.__module__).__doc__ or "").strip().splitlines()[0].split(": ")[0].removesuffix(".")
 
 
 if __name__ == "__main__":

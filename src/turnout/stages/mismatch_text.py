@@ -4,52 +4,10 @@ import json
 
 import numpy as np
 
+from turnout import physics
 from turnout.constants import Z95_EXACT
 from turnout.mismatch.engine.score import MAX_BOUNDED_ERROR
-from turnout.stages.accepted_effects import TERM_CLASSES
 
-# One sentence per effect. Fields: {place}, {channel}, {train}, {wheel}, every parameter with its unit, and its
-# absolute value as {<parameter>_size}.
-SENTENCES = {
-    "hanging_sleeper": "The sleeper at {place} hangs {gap} above its ballast",
-    "lifting_sleepers": "The sleepers about {place} lift off their ballast",
-    "local_ballast": "The ballast under the sleeper at {place} is {factor} times as stiff as its neighbours'",
-    "local_pad": "The rail pad on the sleeper at {place} is {factor} times as stiff as its neighbours'",
-    "attached_resonator": "A mass of {mass} swings at {frequency} on the track at {place}",
-    "dry_friction": "Something rubs with up to {limit} at {place}",
-    "ballast_hardening": "The ballast about {place} stiffens under load",
-    "surface_dip": "The running surface has a dip of {depth} over {length} at {place}",
-    "rail_corrugation": "The rail is corrugated, wavelength {wavelength}",
-    "rail_bending": "The rail at {place} is {factor} times as stiff in bending",
-    "rail_shear": "The rail gives more in shear than the simulation's",
-    "pad_temperature": "The rail pads soften by {coefficient} of rail temperature",
-    "pad_preload": "The rail pads stiffen under load",
-    "zener_pad": "The rail pads are stiffer at high frequency than at low",
-    "ballast_inertia": "The ballast moves with the sleepers, {mass} of it under each",
-    "sleeper_mode": "The sleepers bend at {frequency}",
-    "wheel_flat": "A wheel on {wheel} has a flat of {length}",
-    "out_of_round": "A wheel on {wheel} is out of round",
-    "unsprung_mass": "The wheelsets of {train} are {factor} times as heavy as in its file",
-    "contact_stiffness": "The contact of wheel and rail is {factor} times as stiff",
-    "sensor_gain": "Sensor {channel} reads {gain} times what it should",
-    "mount_resonance": "Sensor {channel} is not fastened firmly: its mounting resonates",
-    "time_offset": "Channel {channel} lags by {delay}",
-    "clock_drift": "The clock of channel {channel} drifts",
-    "sensor_position": "Sensor {channel} sits {shift} from where the layout has it",
-    "clipping": "Channel {channel} is cut off at {limit}",
-    "hum": "Channel {channel} hums",
-    "high_pass": "Channel {channel} loses what is slower than {corner}",
-    "low_pass": "Channel {channel} loses what is fast",
-}
-# effect -> (parameter, sentence if its standard error is too large for an upper limit)
-OPEN_SENTENCES = {
-    "hanging_sleeper": ("gap", "The sleeper at {place} hangs above its ballast, and no train here closes the gap")
-}
-# effect -> (parameter, sentence if it is negative)
-NEGATIVE_SENTENCES = {
-    "sensor_gain": ("gain", "Sensor {channel} has the wrong polarity: it reads {gain} times what it should"),
-    "time_offset": ("delay", "Channel {channel} is early by {delay_size}"),
-}
 MIN_SURFACE_DEVIATION = 2.0  # prior standard deviations from the track file's value that are worth a sentence
 MILLI_UNITS = {"m": "mm", "s": "ms"}
 PERCENT_UNITS = {"1/K": "% per kelvin"}
@@ -75,7 +33,7 @@ def interval(term, name, value, se) -> tuple[float, float]:
     >>> [round(interval(*what, 0.1, 0.1)[0], 3) for what in (("hanging_sleeper", "seated"), ("kink", "depth"))]
     [0.0, -0.096]
     """
-    parameters = TERM_CLASSES[term].parameters if term in TERM_CLASSES else ()
+    parameters = _parameters_of(term)
     lower_limit = 0.0 if any(p.name == name and p.bounds[0] >= 0.0 for p in parameters) else -np.inf
     return float(max(value - Z95_EXACT * se, min(lower_limit, value))), float(value + Z95_EXACT * se)
 
@@ -86,8 +44,13 @@ def parameter_in_words(term, name) -> str:
     >>> parameter_in_words("hanging_sleeper", "gap"), parameter_in_words("kink", "depth")
     ('gap: clearance when unloaded', 'depth')
     """
-    parameters = TERM_CLASSES[term].parameters if term in TERM_CLASSES else ()
-    return ": ".join([name, *(p.meaning for p in parameters if p.name == name)])
+    return ": ".join([name, *(p.meaning for p in _parameters_of(term) if p.name == name)])
+
+
+def _parameters_of(term):
+    """Parameters of an effect by its name, () for one outside the library."""
+    effect = physics.effects_by_name().get(term)
+    return effect.parameters if effect else ()
 
 
 PARAMETER_NAMES = {"power": "power of the flanks (1 straight, 2 parabolas)", "share": "share before the deepest point"}
@@ -189,18 +152,14 @@ def _sentence(term, finding) -> str:
     }
     try:
         return _sentence_template(term).format(**words)
-    except KeyError:  # a new effect without a sentence of its own yet
+    except KeyError:  # an effect outside the library, or one with other parameters when it was reported
         return f"{term['term'].replace('_', ' ').capitalize()} at {words['place']}"
 
 
 def _sentence_template(term) -> str:
-    name, template = NEGATIVE_SENTENCES.get(term["term"], ("", ""))
-    if name and term["parameters"][name]["value"] < 0.0:
-        return template
-    name, open_template = OPEN_SENTENCES.get(term["term"], ("", ""))
-    estimate = term["parameters"].get(name)
-    return (
-        open_template
-        if estimate and estimate["se"] > MAX_BOUNDED_ERROR * abs(estimate["value"])
-        else SENTENCES[term["term"]]
-    )
+    effect = physics.effects_by_name()[term["term"]]
+    size = term["parameters"].get(effect.parameters[0].name)
+    if effect.message_negative and size and size["value"] < 0.0:
+        return effect.message_negative
+    is_unbounded = size and size["se"] > MAX_BOUNDED_ERROR * abs(size["value"])
+    return effect.message_unbounded if effect.message_unbounded and is_unbounded else effect.message
