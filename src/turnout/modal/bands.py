@@ -3,7 +3,10 @@
 Every other mode is listed with the reason. The residues of the modes come from the receptance.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,11 +15,34 @@ from turnout.modal.selection import Selection
 from turnout.modal.state_space import continuous_pole
 from turnout.records import Rejection
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import Any
 
-def passed_share(receptance, frequency: float, damping: float) -> tuple[float, float]:
+    from numpy.typing import ArrayLike
+
+    from turnout.config.settings.identify import IdentifySettings
+    from turnout.records import Receptance
+
+
+def passed_share(receptance: Receptance, frequency: float, damping: float) -> tuple[float, float]:
     """Share of the lines in the half-power band of a mode that pass the gate, and their lowest gate level.
 
     The band is f (1 ± zeta), at least the three lines nearest to f. (0, nan) if f lies outside the lines.
+
+    Parameters
+    ----------
+    receptance : Receptance
+        Its lines, gate levels and whether each line passed.
+    frequency : float
+        Frequency of the mode. [Hz]
+    damping : float
+        Damping ratio of the mode.
+
+    Returns
+    -------
+    (float, float)
+        Share of the lines, 0 to 1, and their lowest gate level.
     """
     lines = receptance.frequency
     if not lines[0] <= frequency <= lines[-1]:
@@ -26,7 +52,7 @@ def passed_share(receptance, frequency: float, damping: float) -> tuple[float, f
     return float(np.mean(receptance.passed[inside])), float(np.min(receptance.gate_level[inside]))
 
 
-def residues_of_receptance(receptance, frequency, damping) -> np.ndarray | None:
+def residues_of_receptance(receptance: Receptance, frequency: ArrayLike, damping: ArrayLike) -> np.ndarray | None:
     r"""Residues R of the accelerance :math:`\sum_m \frac12\left(\frac{R_m}{p - s_m} +
     \frac{\bar R_m}{p - \bar s_m}\right) + d_0 + d_1 p^2` by least squares over the lines that passed.
 
@@ -35,6 +61,7 @@ def residues_of_receptance(receptance, frequency, damping) -> np.ndarray | None:
     Parameters
     ----------
     receptance : Receptance
+        Its H1, its gate and the decay of its window.
     frequency, damping : (n_mode,) arrays
         All modes of the fit, also those without a band: a mode that is missing here distorts the residues of
         the others. [Hz], [-]
@@ -46,12 +73,13 @@ def residues_of_receptance(receptance, frequency, damping) -> np.ndarray | None:
         two lines per unknown passed.
     """
     use = receptance.passed & np.isfinite(receptance.h1)
+    frequency, damping = np.asarray(frequency), np.asarray(damping)
     unknowns = 2 * len(frequency) + 2
     if np.count_nonzero(use) < 2 * unknowns:
         return None
     p = 2j * np.pi * receptance.frequency[use] + receptance.decay
     accelerance = p**2 * receptance.h1[use]
-    s = continuous_pole(np.asarray(frequency), np.asarray(damping))
+    s = continuous_pole(frequency, damping)
     plus, minus = 0.5 / (p[:, None] - s), 0.5 / (p[:, None] - s.conj())
     columns = np.hstack([plus + minus, 1j * (plus - minus), np.ones((len(p), 1)), (p[:, None] / abs(p).max()) ** 2])
     design = np.vstack([columns.real, columns.imag])
@@ -83,8 +111,23 @@ class BandChoice:
         return ("rejected", "second_order_only", "accepted")[len(main_modes)]
 
 
-def choose_bands(selection: Selection, settings, receptance=None) -> BandChoice:
-    """The mode of each band that is most significant for its bandwidth, if it passes the gate of ``receptance``."""
+def choose_bands(selection: Selection, settings: IdentifySettings, receptance: Receptance | None = None) -> BandChoice:
+    """The mode of each band that is most significant for its bandwidth, if it passes the gate of ``receptance``.
+
+    Parameters
+    ----------
+    selection : Selection
+        Modes of the test and their fit.
+    settings : IdentifySettings
+        Bands, and share of a mode's half-power band that must pass the gate.
+    receptance : Receptance or None
+        Receptance with its gate; None: no gate.
+
+    Returns
+    -------
+    BandChoice
+        Modes by band, and all others with reasons.
+    """
     choice = BandChoice(rejected_modes=list(selection.rejected))
     gated_bands: list[str] = []
     if selection.fit is not None:
@@ -97,8 +140,8 @@ def choose_bands(selection: Selection, settings, receptance=None) -> BandChoice:
     return choice
 
 
-def _choose_strongest(choice, selection, settings):
-    frequency, damping = np.exp(selection.fit.mean[:, 0]), selection.fit.mean[:, 1]
+def _choose_strongest(choice: BandChoice, selection: Selection, settings: IdentifySettings) -> None:
+    frequency, damping = np.exp(selection.mode_fit.mean[:, 0]), selection.mode_fit.mean[:, 1]
     # Divided by the bandwidth: a broad pole below a stronger mode takes up much of the residual of that mode.
     # Not by energy: two close, heavily damped poles have large opposite amplitudes.
     significance = np.median(selection.chi_squared, axis=0) / np.maximum(damping, MIN_DAMPING)
@@ -115,7 +158,14 @@ def _choose_strongest(choice, selection, settings):
         choice.rejected_modes.append(_rejected_mode(selection, m, reason + "; kept in the fit", *limits))
 
 
-def _assign_across_edge(choice, frequency, damping, significance, failed_tests, settings):
+def _assign_across_edge(
+    choice: BandChoice,
+    frequency: np.ndarray,
+    damping: np.ndarray,
+    significance: np.ndarray,
+    failed_tests: Mapping[int, tuple],
+    settings: IdentifySettings,
+) -> None:
     """Give an empty main band a mode just outside its edge, if the neighbouring band has another mode for itself.
 
     The resonance of a soft pad may lie a hertz below the edge. It would then hide the ballast resonance.
@@ -140,11 +190,13 @@ def _assign_across_edge(choice, frequency, damping, significance, failed_tests, 
             choice.modes[band], choice.modes[neighbour] = best_pair
 
 
-def _apply_gate(choice, selection, settings, receptance):
+def _apply_gate(
+    choice: BandChoice, selection: Selection, settings: IdentifySettings, receptance: Receptance
+) -> list[str]:
     """Remove the modes that fail the gate from ``choice``; returns their bands."""
     gated_bands = []
     for band, m in list(choice.modes.items()):
-        log_frequency, damping = selection.fit.mean[m]
+        log_frequency, damping = selection.mode_fit.mean[m]
         share, level = passed_share(receptance, float(np.exp(log_frequency)), float(damping))
         if share >= settings.gate_share:
             continue
@@ -157,10 +209,12 @@ def _apply_gate(choice, selection, settings, receptance):
     return gated_bands
 
 
-def _rejected_mode(selection, m, reason, value=None, limit=None):
+def _rejected_mode(
+    selection: Selection, m: int, reason: str, value: float | None = None, limit: float | None = None
+) -> dict[str, Any]:
     return {
-        "frequency": float(np.exp(selection.fit.mean[m, 0])),
-        "damping": float(selection.fit.mean[m, 1]),
+        "frequency": float(np.exp(selection.mode_fit.mean[m, 0])),
+        "damping": float(selection.mode_fit.mean[m, 1]),
         "energy": float(selection.energy[m]),
         "reason": reason,
         "value": value,

@@ -1,12 +1,18 @@
 """Compare the modes of a section between two tests: the shift, its significance and the smallest detectable shift."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import brentq
 from scipy.stats import nct, t
 
 from turnout.records import ModalModel
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 
 @dataclass(frozen=True)
@@ -48,7 +54,9 @@ class Shift:
         )
 
 
-def welch_test(first, second, level: float = 0.01, power: float = 0.8):
+def welch_test(
+    first: ArrayLike, second: ArrayLike, level: float = 0.01, power: float = 0.8
+) -> tuple[float, float, float, float, float]:
     r"""Welch's t test of two samples, with the smallest shift that it would detect.
 
     .. math:: t = \frac{m_2 - m_1}{\sqrt{s_1^2/n_1 + s_2^2/n_2}}, \quad
@@ -64,6 +72,11 @@ def welch_test(first, second, level: float = 0.01, power: float = 0.8):
     Returns
     -------
     difference, se, freedom, probability, detectable : float
+
+    Raises
+    ------
+    ValueError
+        With less than two values in a sample.
 
     References
     ----------
@@ -96,6 +109,22 @@ def detectable_shift(freedom: float, level: float = 0.01, power: float = 0.8) ->
 
     With many impacts it is the sum of two normal quantiles.
 
+    Parameters
+    ----------
+    freedom : float
+        Degrees of freedom of the test, above 0.
+    level : float
+        Two-sided probability of a false alarm.
+    power : float
+        Probability of detecting the shift.
+
+    Returns
+    -------
+    float
+        Shift over its standard error.
+
+    Examples
+    --------
     >>> print(f"{detectable_shift(1e6):.3f}")
     3.417
     """
@@ -104,12 +133,36 @@ def detectable_shift(freedom: float, level: float = 0.01, power: float = 0.8) ->
 
 
 def compare_tests(
-    first: ModalModel, second: ModalModel, band: str, parameter: str = "frequency", level=0.01, power=0.8
+    first: ModalModel,
+    second: ModalModel,
+    band: str,
+    parameter: str = "frequency",
+    level: float = 0.01,
+    power: float = 0.8,
 ) -> Shift | None:
-    """Shift of ``parameter`` ("frequency" [Hz] or "damping") of the mode in ``band`` between two tests.
+    """Shift of ``parameter`` of the mode in ``band`` between two tests.
 
     The estimates of single impacts are compared, not the fit percentages: these hardly change with the parameter.
-    None if a test has fewer than two impacts that show the mode.
+
+    Parameters
+    ----------
+    first : ModalModel
+        Model of the first test.
+    second : ModalModel
+        Model of the second test.
+    band : str
+        Band of the mode.
+    parameter : str
+        "frequency" [Hz] or "damping".
+    level : float
+        Two-sided probability of a false alarm.
+    power : float
+        Probability at which ``detectable`` is detected.
+
+    Returns
+    -------
+    Shift or None
+        The shift, or None if a test has fewer than two impacts that show the mode.
     """
     samples = [
         np.array([row[parameter] for row in model.per_impact if row["band"] == band]) for model in (first, second)

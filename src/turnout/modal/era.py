@@ -4,7 +4,10 @@ The Hankel matrices are never formed. One decay uses products by FFT and Lanczos
 matrix from running sums. The signal subspace of several decays gives the state matrices of all orders at once.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
@@ -13,12 +16,31 @@ from scipy.sparse.linalg import LinearOperator, eigsh, svds
 
 from turnout.modal.state_space import modal_parameters
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
+
 
 def hankel_rows(n_sample: int, decay_time: float | None = None) -> int:
     """Rows of the Hankel matrix of a decay: a third of the record, or half if a third is below one decay time.
 
     The shorter side limits the resolution. ``decay_time`` is that of the slowest mode [samples], None if unknown.
 
+    Parameters
+    ----------
+    n_sample : int
+        Samples of the decay.
+    decay_time : float or None
+        Decay time of the slowest mode [samples], None if unknown.
+
+    Returns
+    -------
+    int
+        Number of rows.
+
+    Examples
+    --------
     >>> hankel_rows(600), hankel_rows(600, decay_time=250.0)
     (200, 300)
     """
@@ -26,12 +48,30 @@ def hankel_rows(n_sample: int, decay_time: float | None = None) -> int:
     return n_sample // 2 if decay_time is not None and third < decay_time else third
 
 
-def hankel_operator(y, rows: int, shift: int = 0) -> LinearOperator:
+def hankel_operator(y: ArrayLike, rows: int, shift: int = 0) -> LinearOperator:
     r"""Hankel matrix :math:`H_{ij} = y_{i+j+\text{shift}}` as an operator of O(n log n) time and O(n) memory.
 
-    ``y`` is (n,); the operator is (rows, n - rows - shift) at shift 1 and one column more at shift 0 so that
-    both have ``n - rows`` columns. ValueError if no column remains.
+    Parameters
+    ----------
+    y : (n,) array of float
+        The decay.
+    rows : int
+        Rows of the matrix.
+    shift : int
+        Samples that are skipped: 0 for H0, 1 for H1.
 
+    Returns
+    -------
+    LinearOperator
+        (rows, n - rows) operator.
+
+    Raises
+    ------
+    ValueError
+        If no column remains.
+
+    Examples
+    --------
     >>> h = hankel_operator(np.array([1.0, 2.0, 4.0, 8.0]), rows=2)
     >>> h @ np.array([1.0, 0.0])
     array([1., 2.])
@@ -44,7 +84,7 @@ def hankel_operator(y, rows: int, shift: int = 0) -> LinearOperator:
     length = next_fast_len(len(samples) + max(rows, columns) - 1, real=True)
     spectrum = rfft(samples, length)
 
-    def correlate(x, n_in, n_out):
+    def correlate(x: np.ndarray, n_in: int, n_out: int) -> np.ndarray:
         reversed_x = np.ravel(x)[::-1]
         return irfft(rfft(reversed_x, length) * spectrum, length)[n_in - 1 : n_in - 1 + n_out]
 
@@ -56,7 +96,7 @@ def hankel_operator(y, rows: int, shift: int = 0) -> LinearOperator:
     )
 
 
-def gram_matrices(decays, rows: int, starts=(0,)) -> list[np.ndarray]:
+def gram_matrices(decays: ArrayLike, rows: int, starts: Sequence[int] = (0,)) -> list[np.ndarray]:
     r"""Gram matrix of the Hankel matrices of several decays set side by side, without forming them.
 
     .. math:: G_{ij} = \sum_\text{decays} \sum_{k=\text{start}}^{m-1} y_{i+k} y_{j+k}, \quad m = n - \text{rows}
@@ -67,6 +107,7 @@ def gram_matrices(decays, rows: int, starts=(0,)) -> list[np.ndarray]:
     Parameters
     ----------
     decays : (n_decay, n) array of float
+        Decays of one length.
     rows : int
         Rows of every Hankel matrix; the result has one more, so that it also holds the shifted products:
         ``G[:-1, :-1]`` is H0 H0^T and ``G[1:, :-1]`` is H1 H0^T.
@@ -77,6 +118,11 @@ def gram_matrices(decays, rows: int, starts=(0,)) -> list[np.ndarray]:
     -------
     list of (rows + 1, rows + 1) array of float
         In the squared unit of the decays.
+
+    Raises
+    ------
+    ValueError
+        If the decays are too short for the rows and starts.
 
     Examples
     --------
@@ -132,7 +178,7 @@ class Realisation:
         return frequency[ascending], damping[ascending]
 
 
-def era(decay, order: int, rows: int | None = None, rate: float = 1.0) -> Realisation:
+def era(decay: ArrayLike, order: int, rows: int | None = None, rate: float = 1.0) -> Realisation:
     r"""Eigensystem realisation algorithm for one or several free decays of one sensor.
 
     .. math:: H_0 = U S V^T, \quad A = S^{-1/2} U^T H_1 V S^{-1/2}, \quad c = U_0 S^{1/2}, \quad x_0 = S^{1/2} V_0^T
@@ -185,7 +231,7 @@ def era(decay, order: int, rows: int | None = None, rate: float = 1.0) -> Realis
     return _era_side_by_side(decay, order, rows, rate)
 
 
-def _era_single(y, order, rows, rate):
+def _era_single(y: np.ndarray, order: int, rows: int, rate: float) -> Realisation:
     columns = len(y) - rows
     h0, h1 = hankel_operator(y, rows), hankel_operator(y, rows, shift=1)
     if rows == columns:
@@ -198,7 +244,7 @@ def _era_single(y, order, rows, rate):
     return Realisation(a, root * v[0], u[0] * root, s, rate)
 
 
-def _largest_eigenpairs(h, order):
+def _largest_eigenpairs(h: LinearOperator, order: int) -> tuple[np.ndarray, np.ndarray]:
     """Eigenpairs of a symmetric operator that are largest in magnitude, largest first."""
     n = h.shape[0]
     if n < MIN_SPARSE_SIZE or order >= n - 1:
@@ -209,7 +255,7 @@ def _largest_eigenpairs(h, order):
     return w[leading], u[:, leading]
 
 
-def _largest_singular_triplets(h, order):
+def _largest_singular_triplets(h: LinearOperator, order: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     n = min(h.shape)
     if n < MIN_SPARSE_SIZE or order >= n - 1:
         u, s, vt = np.linalg.svd(h @ np.eye(h.shape[1]), full_matrices=False)
@@ -220,12 +266,12 @@ def _largest_singular_triplets(h, order):
     return u[:, leading], s[leading], vt[leading].T
 
 
-def _start_vector(h: LinearOperator):
+def _start_vector(h: LinearOperator) -> np.ndarray:
     """Start vector of the iteration: the first column of H, which has a share in every singular vector."""
     return h @ np.eye(1, h.shape[1]).ravel() + 1e-3 * np.random.default_rng(1).standard_normal(h.shape[0])
 
 
-def _era_side_by_side(decays, order, rows, rate):
+def _era_side_by_side(decays: np.ndarray, order: int, rows: int, rate: float) -> Realisation:
     (gram,) = gram_matrices(decays, rows)
     w, u = eigh(gram[:-1, :-1], subset_by_index=(rows - order, rows - 1))
     w, u = np.maximum(w[::-1], np.finfo(float).tiny), u[:, ::-1]
@@ -254,7 +300,18 @@ class Subspace:
     last_row: np.ndarray | None
 
     def state_matrix(self, order: int) -> np.ndarray:
-        """(order, order) one-sample state matrix."""
+        """One-sample state matrix of an order.
+
+        Parameters
+        ----------
+        order : int
+            Number of states, at most that of the subspace.
+
+        Returns
+        -------
+        (order, order) array of float
+            State matrix, in the coordinates of the first ``order`` singular vectors.
+        """
         block = self.transition[:order, :order]
         if self.last_row is None:
             return block
@@ -262,12 +319,28 @@ class Subspace:
         return block + np.outer(row, row @ block) / max(1.0 - row @ row, 1e-12)
 
 
-def subspaces(decays, rows: int, order: int, starts=(0,)) -> list[Subspace]:
-    r"""One subspace for each start sample.
+def subspaces(decays: np.ndarray, rows: int, order: int, starts: Sequence[int] = (0,)) -> list[Subspace]:
+    r"""Signal subspace of the decays for each start sample.
 
     Up to ``MAX_ROWS`` rows the state matrix is the least squares solution of :math:`U_\uparrow A = U_\downarrow`.
     A longer record uses only every q-th row over its full length. :math:`A = S^{-1} U^T H_1 V S^{-1}` still advances by
     one sample, so there is no decimation and no aliasing.
+
+    Parameters
+    ----------
+    decays : (n_decay, n) array of float
+        Free decays. [m/s²]
+    rows : int
+        Rows of the Hankel matrices.
+    order : int
+        Largest order.
+    starts : sequence of int
+        Numbers of leading samples that are skipped.
+
+    Returns
+    -------
+    list of Subspace
+        One subspace for each start sample.
     """
     stride = -(-rows // MAX_ROWS)
     if stride == 1:
@@ -275,18 +348,18 @@ def subspaces(decays, rows: int, order: int, starts=(0,)) -> list[Subspace]:
     return [_subspace_by_stride(decays, rows, order, start, stride) for start in starts]
 
 
-def _leading_eigenpairs(gram, order):
+def _leading_eigenpairs(gram: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray]:
     n = len(gram)
     w, u = eigh(gram, subset_by_index=(n - order, n - 1))
     return w[::-1], u[:, ::-1]
 
 
-def _subspace_by_shift(gram, order):
+def _subspace_by_shift(gram: np.ndarray, order: int) -> Subspace:
     _, u = _leading_eigenpairs(gram[:-1, :-1], order)
     return Subspace(u, np.arange(len(u)), u[:-1].T @ u[1:], u[-1])
 
 
-def _subspace_by_stride(decays, rows, order, start, stride):
+def _subspace_by_stride(decays: np.ndarray, rows: int, order: int, start: int, stride: int) -> Subspace:
     index = np.arange(0, rows, stride)
     columns = decays.shape[1] - rows
     products = np.zeros((2, len(index), len(index)))

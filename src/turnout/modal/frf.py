@@ -4,7 +4,10 @@ The band around each peak is turned into a decay. Realisations of several orders
 Also here: the response of damped modes to a smooth impact, in closed form and with its start between samples.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import eigh
@@ -13,17 +16,40 @@ from scipy.signal import find_peaks, peak_widths
 from turnout.modal.frf_fit import FrfFit, fit_each
 from turnout.modal.summary import Summary, summarise
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
+
 ORDERS = range(1, 9)  # model orders at which the band around a peak is realised
 MIN_ORDER_SHARE = 0.5  # share of the orders at which a pole must occur
 
 
-def zoomed_poles(frequency, frf, centre: float, width: float, damping_maximum: float) -> np.ndarray:
-    r"""Modes near a peak, (n_mode, 2) of ln f and zeta: poles that recur over the orders, else the half-power one.
+def zoomed_poles(
+    frequency: np.ndarray, frf: np.ndarray, centre: float, width: float, damping_maximum: float
+) -> np.ndarray:
+    r"""Modes near a peak: poles that recur over the orders, else the half-power one.
 
     The lines of the band, transformed back, are a complex decay sampled at the band's width B:
     :math:`h_k \propto \sum_m R_m \exp((s_m - i 2\pi f_0) k / B)`.
 
-    ``frequency`` (n_line,) [Hz], ``frf`` (n_frf, n_line), ``centre`` and half-power ``width`` of the peak [Hz].
+    Parameters
+    ----------
+    frequency : (n_line,) array of float
+        Evenly spaced lines of the band. [Hz]
+    frf : (n_frf, n_line) array of complex
+        Responses in the band.
+    centre : float
+        Frequency of the peak. [Hz]
+    width : float
+        Half-power width of the peak. [Hz]
+    damping_maximum : float
+        Damping ratio from which a pole is ignored.
+
+    Returns
+    -------
+    (n_mode, 2) array of float
+        Ln f [Hz] and zeta of each mode.
     """
     n = len(frequency)
     rate = n * (frequency[1] - frequency[0])
@@ -48,13 +74,13 @@ def zoomed_poles(frequency, frf, centre: float, width: float, damping_maximum: f
     return np.stack([np.log(np.abs(s) / (2.0 * np.pi)), -s.real / np.abs(s)], axis=1)
 
 
-def _gram(decay, rows):
+def _gram(decay: np.ndarray, rows: int) -> np.ndarray:
     columns = decay.shape[1] - rows
     windows = np.lib.stride_tricks.sliding_window_view(decay, columns, axis=1)
     return np.einsum("iak,ibk->ab", windows, windows.conj(), optimize=True)
 
 
-def _recurring_poles(candidates, n_order):
+def _recurring_poles(candidates: Sequence[tuple[int, complex]], n_order: int) -> list[complex]:
     """Medians of groups of poles closer than half their decay rate, if they occur at half of the orders."""
     starts, remaining = [], list(candidates)
     while remaining:
@@ -97,15 +123,15 @@ class FrfModes:
 
 
 def modes_of_frf(
-    frequency,
-    frf,
+    frequency: ArrayLike,
+    frf: ArrayLike,
     lowest: float = 0.0,
     highest: float = np.inf,
     prominence: float = 12.0,
     contrast: float = 15.0,
     damping_maximum: float = 0.3,
 ) -> FrfModes:
-    r"""Resonances of one or several responses with common poles.
+    """Resonances of one or several responses with common poles.
 
     The bands are those around the peaks of the summed power. Each band is turned into a decay, and realisations of
     several orders propose poles. Those that recur are fitted by least squares, with a local polynomial for all other
@@ -125,6 +151,7 @@ def modes_of_frf(
     contrast : float
         Smallest height of a mode over the residual of its fit. [dB]
     damping_maximum : float
+        Largest damping ratio of a mode.
 
     Returns
     -------
@@ -167,7 +194,7 @@ def modes_of_frf(
     return FrfModes(tuple(_without_duplicates(modes, rejected)), tuple(rejected))
 
 
-def _check_responses(frequency, frf):
+def _check_responses(frequency: np.ndarray, frf: np.ndarray) -> None:
     if frf.shape[1] != len(frequency) or len(frequency) < MIN_LINES:
         raise ValueError(f"{frf.shape} responses over {len(frequency)} lines; need at least {MIN_LINES} lines")
     if not (np.all(np.isfinite(frf)) and np.all(np.isfinite(frequency))):
@@ -177,7 +204,14 @@ def _check_responses(frequency, frf):
         raise ValueError(f"need evenly spaced frequencies, the steps go from {gap.min():g} to {gap.max():g} Hz")
 
 
-def _sort_modes(fits: list[FrfFit], peak_and_width, min_contrast, damping_maximum, modes, rejected):
+def _sort_modes(
+    fits: list[FrfFit],
+    peak_and_width: tuple[float, float],
+    min_contrast: float,
+    damping_maximum: float,
+    modes: list[FrfMode],
+    rejected: list[dict],
+) -> None:
     """Append every mode of a band to ``modes``, or to ``rejected`` with the reason."""
     theta = np.array([fit.theta for fit in fits])
     error = np.array([fit.error for fit in fits])
@@ -208,7 +242,7 @@ def _from_logarithm(s: Summary) -> Summary:
     return Summary(mean, mean * s.se, float(np.exp(s.low)), float(np.exp(s.high)), mean * s.spread, s.n)
 
 
-def _without_duplicates(modes, rejected):
+def _without_duplicates(modes: Sequence[FrfMode], rejected: list[dict]) -> list[FrfMode]:
     """One mode per resonance: of two closer than half their half-power width, the one with more contrast."""
     unique: list[FrfMode] = []
     for mode in modes:
@@ -231,11 +265,23 @@ def _without_duplicates(modes, rejected):
     return unique
 
 
-def haversine_pulse(time, duration):
+def haversine_pulse(time: np.ndarray, duration: np.ndarray | float) -> np.ndarray:
     r"""Force of a soft-tipped hammer over its peak, :math:`\sin^2(\pi t / T)` for 0 <= t <= T, else 0.
 
-    ``time`` [s] of any shape and ``duration`` T [s] that broadcasts with it.
+    Parameters
+    ----------
+    time : array of float
+        Time from the start of contact. [s]
+    duration : float or array
+        Length T of the contact, broadcast against ``time``. [s]
 
+    Returns
+    -------
+    array
+        Force relative to its peak, 0 to 1.
+
+    Examples
+    --------
     >>> haversine_pulse(np.array([-1.0, 0.5, 2.0]), 1.0)
     array([0., 1., 0.])
     """
@@ -243,7 +289,7 @@ def haversine_pulse(time, duration):
     return np.where(inside, np.sin(np.pi * time / duration) ** 2, 0.0)
 
 
-def pulse_response(time, pole, residue, duration):
+def pulse_response(time: ArrayLike, pole: ArrayLike, residue: ArrayLike, duration: ArrayLike) -> np.ndarray:
     r"""Response of a sum of modes to a haversine force of unit peak.
 
     .. math:: y(t) = \int_0^{\min(t, T)} \sin^2(\pi\tau/T) \, \mathrm{Re}\sum_m R_m e^{s_m (t - \tau)} d\tau

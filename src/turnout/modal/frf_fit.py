@@ -45,12 +45,26 @@ class FrfFit:
         return float(np.sum(np.abs(self.residual) ** 2 / self.noise[:, None] ** 2))
 
 
-def linearise_frf(theta, frequency, frf, noise) -> FrfFit:
+def linearise_frf(theta: np.ndarray, frequency: np.ndarray, frf: np.ndarray, noise: np.ndarray) -> FrfFit:
     r"""Local model :math:`\sum_m R_m / (i\omega - s_m) + p_0 + p_1 \omega + p_2 \omega^2` around given modes.
 
     The polynomial stands for all modes outside the band and for the conjugate poles.
 
-    ``theta`` (n_mode, 2), ``frequency`` (n_line,) [Hz], ``frf`` (n_frf, n_line), ``noise`` (n_frf,).
+    Parameters
+    ----------
+    theta : (n_mode, 2) array of float
+        Ln f [Hz] and zeta of each mode.
+    frequency : (n_line,) array of float
+        Lines of the band. [Hz]
+    frf : (n_frf, n_line) array of complex
+        Responses in the band.
+    noise : (n_frf,) array of float
+        Standard deviation of each response per real part, in its unit.
+
+    Returns
+    -------
+    FrfFit
+        Residues and residuals of these modes, with information and score.
     """
     n_mode = len(theta)
     omega = 2.0 * np.pi * frequency
@@ -76,8 +90,25 @@ def linearise_frf(theta, frequency, frf, noise) -> FrfFit:
     return FrfFit(theta, information, score, coefficient[:n_mode] * scale[:, None], residual.T, noise)
 
 
-def fit_frf(theta, frequency, frf, iterations: int = 25) -> FrfFit:
-    """Gauss-Newton from ``theta`` with halved steps, each response weighted by its own residual."""
+def fit_frf(theta: np.ndarray, frequency: np.ndarray, frf: np.ndarray, iterations: int = 25) -> FrfFit:
+    """Gauss-Newton from ``theta`` with halved steps, each response weighted by its own residual.
+
+    Parameters
+    ----------
+    theta : (n_mode, 2) array of float
+        Ln f [Hz] and zeta at the start.
+    frequency : (n_line,) array of float
+        Lines of the band. [Hz]
+    frf : (n_frf, n_line) array of complex
+        Responses in the band.
+    iterations : int
+        Largest number of iterations.
+
+    Returns
+    -------
+    FrfFit
+        The last fit, also if the iteration has not converged.
+    """
     noise = np.full(len(frf), np.sqrt(np.mean(np.abs(frf) ** 2)))
     fit = linearise_frf(np.asarray(theta, float), frequency, frf, noise)
     for _ in range(iterations):
@@ -104,12 +135,29 @@ def fit_frf(theta, frequency, frf, iterations: int = 25) -> FrfFit:
     return fit
 
 
-def fit_each(start, frequency, frf, peak_and_width) -> list[FrfFit]:
+def fit_each(
+    start: np.ndarray, frequency: np.ndarray, frf: np.ndarray, peak_and_width: tuple[float, float]
+) -> list[FrfFit]:
     """Fit each response alone, from the modes of the common fit and with as few modes as possible.
 
-    Poles that differ between responses look like close poles to a common fit. So the mode nearest to the peak
-    (``peak_and_width``: its frequency and half-power width [Hz]) is tried alone first. It stays the only one if it
-    stands ``MIN_SINGLE_CONTRAST`` over the residual.
+    Poles that differ between responses look like close poles to a common fit. So the mode nearest to the peak is tried
+    alone first. It stays the only one if it stands ``MIN_SINGLE_CONTRAST`` over the residual.
+
+    Parameters
+    ----------
+    start : (n_mode, 2) array of float
+        Ln f [Hz] and zeta at the start.
+    frequency : (n_line,) array of float
+        Lines of the band. [Hz]
+    frf : (n_frf, n_line) array of complex
+        Responses in the band.
+    peak_and_width : (float, float)
+        Frequency of the peak and its half-power width. [Hz]
+
+    Returns
+    -------
+    list of FrfFit
+        One fit for each response.
     """
     nearest = int(np.argmin(np.abs(np.exp(start[:, 0]) - peak_and_width[0])))
     single_fits = [_fit_single(start[[nearest]], frequency, response) for response in frf]
@@ -119,5 +167,5 @@ def fit_each(start, frequency, frf, peak_and_width) -> list[FrfFit]:
     return [_fit_single(common.theta, frequency, response) for response in frf]
 
 
-def _fit_single(theta, frequency, response):
+def _fit_single(theta: np.ndarray, frequency: np.ndarray, response: np.ndarray) -> FrfFit:
     return fit_frf(theta, frequency, response[None])

@@ -1,13 +1,33 @@
 """Modal identification of one section from the free decays of its hammer tests."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from turnout.modal.joint import identify_joint
 from turnout.modal.paper import identify_paper
 from turnout.records import ModalModel
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from typing import Any
+
+    import numpy as np
+
+    from turnout.config.settings.identify import IdentifySettings
+    from turnout.records import Receptance
+
 METHODS = {"joint": identify_joint, "paper": identify_paper}
 
 
-def identify(decays, rate: float, settings, receptance=None, method: str | None = None, **options) -> ModalModel:
+def identify(
+    decays: Sequence[np.ndarray],
+    rate: float,
+    settings: IdentifySettings,
+    receptance: Receptance | None = None,
+    method: str | None = None,
+    **options: Any,
+) -> ModalModel:
     r"""Modes of a section with their errors, and the state-space model built from them.
 
     .. math:: y_k = \mathrm{Re} \sum_m \alpha_{im} z_{im}^k + \text{drift} + \text{noise}, \qquad
@@ -20,6 +40,7 @@ def identify(decays, rate: float, settings, receptance=None, method: str | None 
     rate : float
         Sampling rate. [Hz]
     settings : IdentifySettings
+        Bands, limits and the method.
     receptance : Receptance, optional
         Its coherence gate rejects modes. Its H1 gives b and c for a unit impulse.
     method : "joint" or "paper", optional

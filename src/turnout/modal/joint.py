@@ -4,6 +4,10 @@ The steps: cut the decays to one length, select the modes, drop outlier impacts,
 the impacts. The model also holds the error of the choice between explanations, the stabilisation table and the noise.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from turnout.modal.bands import choose_bands, residues_of_receptance
@@ -14,11 +18,31 @@ from turnout.modal.state_space import assemble, no_decays, no_model
 from turnout.modal.summary import ImpactEstimates, cramer_rao_bound
 from turnout.records import ModalModel, Rejection
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from turnout.config.settings.identify import IdentifySettings
+    from turnout.modal.bands import BandChoice
+    from turnout.records import Mode, Receptance
+
 
 def stabilisation_rows(selection: Selection, tolerance: float) -> tuple[dict, ...]:
-    """Poles of all orders from the first sample on; "stable" where they belong to a mode of the fit."""
+    """Poles of all orders from the first sample on; "stable" where they belong to a mode of the fit.
+
+    Parameters
+    ----------
+    selection : Selection
+        Modes of the test and its stabilisation table.
+    tolerance : float
+        Relative distance in frequency, and distance in damping, up to which a pole belongs to a mode.
+
+    Returns
+    -------
+    tuple of dict
+        ``order``, ``frequency`` [Hz], ``damping``, ``emac`` and ``status`` of each pole.
+    """
     table = selection.table
-    mean = selection.fit.mean if selection.fit is not None else np.empty((0, 2))
+    mean = selection.mode_fit.mean if selection.fit is not None else np.empty((0, 2))
     rows = []
     for i in np.flatnonzero((table.start == 0) & (table.damping > 0.0)):
         near = np.abs(table.frequency[i] / np.exp(mean[:, 0]) - 1.0) < tolerance
@@ -35,8 +59,25 @@ def stabilisation_rows(selection: Selection, tolerance: float) -> tuple[dict, ..
     return tuple(rows)
 
 
-def fit_diagnostics(selection: Selection, index, dropped) -> dict:
-    """Diagnostics of the fit; ``index`` are the impacts in it, ``dropped`` (impact, Rejection) those that are not."""
+def fit_diagnostics(
+    selection: Selection, index: Sequence[int] | np.ndarray, dropped: Sequence[tuple[int, Rejection]]
+) -> dict:
+    """Diagnostics of the fit.
+
+    Parameters
+    ----------
+    selection : Selection
+        Modes of the test and their fit.
+    index : (n_impact,) array of int
+        Numbers of the impacts in the fit.
+    dropped : sequence of (int, Rejection)
+        Impacts that are not in it.
+
+    Returns
+    -------
+    dict
+        Entries of ``ModalModel.diagnostics``; only the impacts where there is no fit.
+    """
     diagnostics = {"impacts": tuple(int(i) for i in index), "dropped_impacts": tuple(dropped)}
     fit = selection.fit
     if fit is None:
@@ -55,7 +96,7 @@ def fit_diagnostics(selection: Selection, index, dropped) -> dict:
     }
 
 
-def choice_error(mode, rival_modes, max_distance: float) -> np.ndarray:
+def choice_error(mode: np.ndarray, rival_modes: Sequence[np.ndarray], max_distance: float) -> np.ndarray:
     r"""Root mean square distance of a mode in all explanations from its value in the chosen one.
 
     .. math:: \sqrt{\frac{1}{J} \sum_{j=1}^{J} (\theta_j - \theta)^2}, \quad \theta_1 = \theta
@@ -101,12 +142,24 @@ MAX_POWER_RATIO = 9.0  # residual power of an impact over that of the median imp
 MAX_OUTLIER_SHARE = 1.0 / 3.0  # share of the impacts that may be outliers; beyond it the model is wrong, not they
 
 
-def outlier_impacts(residual_power) -> list[tuple[int, Rejection]]:
-    """Impacts whose residual is three times (in power nine) that of the median impact: (row, Rejection) each.
+def outlier_impacts(residual_power: np.ndarray) -> list[tuple[int, Rejection]]:
+    """Impacts whose residual is three times (in power nine) that of the median impact.
 
-    ``residual_power`` is (n_impact,). The power of white noise over some hundred samples is known to ten per cent, so
-    such a ratio is not due to chance. Empty where more than a third would be dropped: then the model is wrong.
+    The power of white noise over some hundred samples is known to ten per cent, so such a ratio is not due to chance.
+    Empty where more than a third would be dropped: then the model is wrong.
 
+    Parameters
+    ----------
+    residual_power : (n_impact,) array of float
+        Sum of squared residuals of each impact.
+
+    Returns
+    -------
+    list of (int, Rejection)
+        Row of each outlier, and its rejection.
+
+    Examples
+    --------
     >>> [row for row, _ in outlier_impacts(np.array([1.0, 1.1, 20.0, 0.9]))]
     [2]
     """
@@ -120,12 +173,15 @@ def outlier_impacts(residual_power) -> list[tuple[int, Rejection]]:
     ]
 
 
-def common_length(decays, rate: float, settings) -> tuple[np.ndarray, np.ndarray, list[tuple[int, Rejection]]]:
+def common_length(
+    decays: Sequence[np.ndarray], rate: float, settings: IdentifySettings
+) -> tuple[np.ndarray, np.ndarray, list[tuple[int, Rejection]]]:
     """Cut the usable decays to one length, and list those that cannot be used.
 
     Parameters
     ----------
-    decays : sequence of (n,) arrays
+    decays : sequence of (n,) arrays of float
+        Decays of any length. [m/s²]
     rate : float
         [Hz]
     settings : IdentifySettings
@@ -137,6 +193,11 @@ def common_length(decays, rate: float, settings) -> tuple[np.ndarray, np.ndarray
     index : (n_usable,) array of int
         Index of each in ``decays``.
     dropped : list of (index, Rejection)
+
+    Raises
+    ------
+    ValueError
+        For a decay that is not one-dimensional.
     """
     target_length, min_length = round(settings.duration * rate), round(settings.shortest_decay * rate)
     usable, dropped = [], []
@@ -161,10 +222,34 @@ def common_length(decays, rate: float, settings) -> tuple[np.ndarray, np.ndarray
     return np.array([d[:n] for _, d in usable]), np.array([i for i, _ in usable]), dropped
 
 
-def identify_joint(decays, rate: float, settings, receptance=None, leads=None) -> ModalModel:
+def identify_joint(
+    decays: Sequence[np.ndarray],
+    rate: float,
+    settings: IdentifySettings,
+    receptance: Receptance | None = None,
+    leads: Sequence[np.ndarray] | None = None,
+) -> ModalModel:
     """Modal model of one section by joint identification; see :func:`turnout.modal.identify`.
 
     ``leads`` is not used. It exists because both methods have the same parameters.
+
+    Parameters
+    ----------
+    decays : sequence of (n,) arrays of float
+        Free decays, unfiltered. [m/s²]
+    rate : float
+        Sampling rate. [Hz]
+    settings : IdentifySettings
+        Settings of the identification.
+    receptance : Receptance or None
+        Receptance whose gate rejects modes and whose H1 gives the residues; None: no gate.
+    leads : sequence of array or None
+        Not used.
+
+    Returns
+    -------
+    ModalModel
+        Status "rejected" with reasons where no mode is identified.
     """
     records, index, dropped = common_length(decays, rate, settings)
     if not len(records):
@@ -173,7 +258,7 @@ def identify_joint(decays, rate: float, settings, receptance=None, leads=None) -
     choice = choose_bands(selection, settings, receptance)
     estimates, modes = _band_modes(selection, choice, records, index, rate, settings)
     diagnostics = fit_diagnostics(selection, index, dropped)
-    model_fields = {
+    model_fields: dict[str, Any] = {
         "rejections": tuple(choice.rejections),
         "rejected_modes": tuple(choice.rejected_modes),
         "stabilisation": stabilisation_rows(selection, settings.pole_tolerance),
@@ -185,7 +270,7 @@ def identify_joint(decays, rate: float, settings, receptance=None, leads=None) -
         estimates,
         modes,
         residues,
-        (selection.fit.unshrunken[:, list(choice.modes.values())], records),
+        (selection.mode_fit.unshrunken[:, list(choice.modes.values())], records),
         rate,
         settings,
         method="joint",
@@ -196,7 +281,13 @@ def identify_joint(decays, rate: float, settings, receptance=None, leads=None) -
     )
 
 
-def _select_without_outliers(records, index, dropped, rate, settings):
+def _select_without_outliers(
+    records: np.ndarray,
+    index: np.ndarray,
+    dropped: list[tuple[int, Rejection]],
+    rate: float,
+    settings: IdentifySettings,
+) -> tuple[Selection, np.ndarray, np.ndarray, list[tuple[int, Rejection]]]:
     """Select the modes from all impacts, and once more without the outliers if there are any."""
     selection = select_modes(records, rate, settings)
     outliers = [] if selection.fit is None else outlier_impacts(selection.residual_power)
@@ -208,7 +299,14 @@ def _select_without_outliers(records, index, dropped, rate, settings):
     return selection, records, index, dropped
 
 
-def _band_modes(selection, choice, records, index, rate, settings):
+def _band_modes(
+    selection: Selection,
+    choice: BandChoice,
+    records: np.ndarray,
+    index: np.ndarray,
+    rate: float,
+    settings: IdentifySettings,
+) -> tuple[list[ImpactEstimates], tuple[Mode, ...]]:
     """(estimates, modes) of the chosen bands; a mode with a mean damping of zero or less is removed from ``choice``."""
     accepted = []
     for e in _estimates(selection, choice, records, index, rate, settings) if choice.modes else ():
@@ -222,8 +320,15 @@ def _band_modes(selection, choice, records, index, rate, settings):
     return [e for e, _ in accepted], tuple(mode for _, mode in accepted)
 
 
-def _estimates(selection, choice, records, index, rate, settings):
-    fit = selection.fit
+def _estimates(
+    selection: Selection,
+    choice: BandChoice,
+    records: np.ndarray,
+    index: np.ndarray,
+    rate: float,
+    settings: IdentifySettings,
+) -> list[ImpactEstimates]:
+    fit = selection.mode_fit
     white = whiten(records, selection.whitening)
     columns = selection.background.columns(white.shape[1], rate)
     bound = cramer_rao_bound(fit.theta, white, rate, fit.sigma2, columns)
@@ -245,7 +350,9 @@ def _estimates(selection, choice, records, index, rate, settings):
     ]
 
 
-def _residues(modes, choice, selection, receptance):
+def _residues(
+    modes: Sequence[Mode], choice: BandChoice, selection: Selection, receptance: Receptance | None
+) -> tuple[np.ndarray, str]:
     """Residues per unit impulse from the receptance if there is one, else those of the mean decay."""
     named = [(m.frequency, m.damping) for m in modes]
     if receptance is not None:
@@ -256,10 +363,10 @@ def _residues(modes, choice, selection, receptance):
     return selection.amplitude.mean(axis=0)[list(choice.modes.values())], "mean decay [m/s²]"
 
 
-def _unassigned_modes(choice, selection, receptance):
+def _unassigned_modes(choice: BandChoice, selection: Selection, receptance: Receptance) -> list[tuple[float, float]]:
     """(frequency [Hz], damping) of the fit's modes without a band that lie among the lines that passed the gate."""
     lines = receptance.frequency[receptance.passed]
-    pairs = [(float(np.exp(f)), float(damping)) for f, damping in selection.fit.mean]
+    pairs = [(float(np.exp(f)), float(damping)) for f, damping in selection.mode_fit.mean]
     unassigned = [pairs[m] for m in range(len(pairs)) if m not in choice.modes.values()]
     return [
         (f, damping) for f, damping in unassigned if len(lines) and lines[0] < f < lines[-1] and 0.0 < damping < 0.95

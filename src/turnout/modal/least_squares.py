@@ -28,8 +28,16 @@ class WaveTable:
     n: int
 
     @classmethod
-    def of(cls, z, n: int) -> "WaveTable":
-        """Tables of (..., n_wave) complex ``z`` for ``n`` samples."""
+    def of(cls, z: np.ndarray, n: int) -> "WaveTable":
+        """Tables of the powers of ``z``.
+
+        Parameters
+        ----------
+        z : (..., n_wave) array of complex
+            Factor of each wave per sample.
+        n : int
+            Samples of the waves.
+        """
         width = int(np.ceil(np.sqrt(n)))
         fine = _first_powers(z, width + 1)
         coarse = _first_powers(fine[..., width], -(-n // width))
@@ -42,8 +50,19 @@ class WaveTable:
             return self.coarse[..., block] * self.fine[..., offset]
         return self.coarse[..., -1] * self.fine[..., -1] * self.z
 
-    def blocks(self, series) -> np.ndarray:
-        """(..., width, n_series * n_block) of (..., n_series, n) real ``series``, as :meth:`products` needs them."""
+    def blocks(self, series: np.ndarray) -> np.ndarray:
+        """Series in the order that :meth:`products` needs.
+
+        Parameters
+        ----------
+        series : (..., n_series, n) array of float
+            Real series.
+
+        Returns
+        -------
+        (..., width, n_series * n_block) array of float
+            Samples by their position in a block.
+        """
         width, n_block = self.fine.shape[-1], self.coarse.shape[-1]
         padded = np.zeros((*series.shape[:-1], n_block * width))
         padded[..., : self.n] = series
@@ -51,9 +70,21 @@ class WaveTable:
             *series.shape[:-2], width, -1
         )
 
-    def products(self, blocks) -> np.ndarray:
-        r"""(..., n_wave, n_series) of :math:`\sum_k z^k y_k`, with ``blocks`` from :meth:`blocks`.
+    def products(self, blocks: np.ndarray) -> np.ndarray:
+        """Sums of :math:`z^k y_k` over the samples.
 
+        Parameters
+        ----------
+        blocks : (..., width, n_series * n_block) array of float
+            Series y from :meth:`blocks`.
+
+        Returns
+        -------
+        (..., n_wave, n_series) array of complex
+            Sum for each wave and series.
+
+        Examples
+        --------
         >>> table = WaveTable.of(np.array([0.5 + 0j]), 4)
         >>> table.products(table.blocks(np.array([[1.0, 2.0, 4.0, 8.0]]))).real
         array([[4.]])
@@ -64,9 +95,21 @@ class WaveTable:
         inner = stacked[..., :n_wave, :, :] + 1j * stacked[..., n_wave:, :, :]
         return (inner @ self.coarse[..., None])[..., 0]
 
-    def series(self, amplitude) -> np.ndarray:
-        r"""(..., n_series, n) real series :math:`\mathrm{Re} \sum_m a_m z_m^k` of (..., n_series, n_wave) amplitudes.
+    def series(self, amplitude: np.ndarray) -> np.ndarray:
+        r"""Real series :math:`\mathrm{Re} \sum_m a_m z_m^k`.
 
+        Parameters
+        ----------
+        amplitude : (..., n_series, n_wave) array of complex
+            Amplitude of each wave in each series.
+
+        Returns
+        -------
+        (..., n_series, n) array of float
+            Samples of each series.
+
+        Examples
+        --------
         >>> WaveTable.of(np.array([0.5 + 0j]), 4).series(np.array([[8.0]]))
         array([[8., 4., 2., 1.]])
         """
@@ -77,7 +120,7 @@ class WaveTable:
         return samples.reshape(*amplitude.shape[:-1], -1)[..., : self.n]
 
 
-def geometric_sums(q, q_to_n, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def geometric_sums(q: np.ndarray, q_to_n: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     r"""Sums :math:`\sum_{k<n} k^p q^k` for p = 0, 1, 2, each from the previous one by telescoping.
 
     .. math:: (1 - q) S_0 = 1 - q^n, \quad (1 - q) S_1 = q S_0 - n q^n, \quad (1 - q) S_2 = q (2 S_1 + S_0) - n^2 q^n
@@ -89,6 +132,12 @@ def geometric_sums(q, q_to_n, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarra
     q, q_to_n : arrays of complex of one shape
         q and its n-th power.
     n : int
+        Number of terms.
+
+    Returns
+    -------
+    three arrays of complex
+        Sums for p = 0, 1 and 2.
 
     Examples
     --------
@@ -106,7 +155,7 @@ def geometric_sums(q, q_to_n, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarra
     return zero, one, two
 
 
-def _sums_near_one(log, n):
+def _sums_near_one(log: np.ndarray, n: int) -> tuple[np.ndarray, ...]:
     """The same sums for (n_q,) logarithms of q, by the exponential series."""
     k = np.arange(n) / n
     term = (log[:, None] * n) ** np.arange(SERIES_TERMS) / factorial(np.arange(SERIES_TERMS))
@@ -114,7 +163,18 @@ def _sums_near_one(log, n):
 
 
 def pair_sums(table: WaveTable) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
-    r"""(..., n_wave, n_wave) sums :math:`\sum_k k^p (z_i z_j)^k` and the same with :math:`\bar z_j`; p = 0, 1, 2."""
+    r"""(..., n_wave, n_wave) sums :math:`\sum_k k^p (z_i z_j)^k` and the same with :math:`\bar z_j`; p = 0, 1, 2.
+
+    Parameters
+    ----------
+    table : WaveTable
+        Waves z.
+
+    Returns
+    -------
+    two tuples of three arrays of complex
+        Sums of z_i z_j and of z_i times the conjugate of z_j.
+    """
     z, last = table.z, table.last()
     second = np.concatenate([z, z.conj()], axis=-1)
     second_last = np.concatenate([last, last.conj()], axis=-1)
@@ -125,7 +185,7 @@ def pair_sums(table: WaveTable) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarra
     return tuple(s[..., :m] for s in sums), tuple(s[..., m:] for s in sums)
 
 
-def _first_powers(z, n):
+def _first_powers(z: np.ndarray, n: int) -> np.ndarray:
     """z^0 ... z^(n-1) along a new last axis."""
     table = np.empty((*np.shape(z), n), dtype=complex)
     table[..., 0] = 1.0
@@ -157,8 +217,22 @@ class Linearisation:
 
 
 def drift_columns(n: int, degree: int) -> np.ndarray:
-    """(degree + 1, n) orthonormal polynomials over the record; degree -1 gives none.
+    """Orthonormal polynomials over the record; degree -1 gives none.
 
+    Parameters
+    ----------
+    n : int
+        Samples of a decay.
+    degree : int
+        Highest degree, -1 or more.
+
+    Returns
+    -------
+    (degree + 1, n) array of float
+        One polynomial per row.
+
+    Examples
+    --------
     >>> drift_columns(4, 0)
     array([[0.5, 0.5, 0.5, 0.5]])
     """
@@ -169,9 +243,23 @@ def drift_columns(n: int, degree: int) -> np.ndarray:
     return np.ascontiguousarray((q * np.sign(np.diag(r))).T)
 
 
-def powers(z, n: int) -> np.ndarray:
+def powers(z: np.ndarray, n: int) -> np.ndarray:
     """z^0 ... z^(n-1) along a new last axis, by two short tables and one product.
 
+    Parameters
+    ----------
+    z : array of complex
+        Factors, of any shape.
+    n : int
+        Number of powers.
+
+    Returns
+    -------
+    (..., n) array of complex
+        Powers of each ``z``.
+
+    Examples
+    --------
     >>> powers(np.array([2.0 + 0j]), 4).real
     array([[1., 2., 4., 8.]])
     """
@@ -180,7 +268,7 @@ def powers(z, n: int) -> np.ndarray:
     return products.reshape(*np.shape(z), -1)[..., :n]
 
 
-def linearise(theta, decays, rate, drift) -> Linearisation:
+def linearise(theta: np.ndarray, decays: np.ndarray, rate: float, drift: np.ndarray) -> Linearisation:
     r"""Residual, amplitudes and Kaufman's Jacobian of the variable projection, for all decays at once.
 
     .. math:: J = (I - B B^+) \, \mathrm{d}B \, a, \qquad r = (I - B B^+) y
@@ -193,10 +281,16 @@ def linearise(theta, decays, rate, drift) -> Linearisation:
     theta : (n_decay, n_mode, 2) or (1, n_mode, 2) array of float
         ln of the frequency in Hz, and damping ratio (inside -1 ... 1); one set may be shared by all decays.
     decays : (n_decay, n) array of float
+        Decays; whitened ones have the same poles.
     rate : float
         [Hz]
     drift : (n_drift, n) array of float
         Further columns of the model, such as :func:`drift_columns`.
+
+    Returns
+    -------
+    Linearisation
+        Residual and derivatives of each decay.
 
     References
     ----------
@@ -234,7 +328,7 @@ def linearise(theta, decays, rate, drift) -> Linearisation:
     )
 
 
-def _poles(theta, rate):
+def _poles(theta: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
     """Logarithms (group, n_mode) of the discrete poles, and (..., 2) their derivatives by ln f and zeta."""
     omega = 2.0 * np.pi * np.exp(theta[..., 0]) / rate
     zeta = theta[..., 1]
@@ -243,12 +337,14 @@ def _poles(theta, rate):
     return pole, np.stack([pole, omega * (-1.0 - 1j * zeta / damped)], axis=-1)
 
 
-def _stack_real_imag(z):
+def _stack_real_imag(z: np.ndarray) -> np.ndarray:
     """Real above imaginary parts along the axis before the last."""
     return np.concatenate([z.real, z.imag], axis=-2)
 
 
-def _gram(waves, plus, minus, drift):
+def _gram(
+    waves: WaveTable, plus: tuple[np.ndarray, ...], minus: tuple[np.ndarray, ...], drift: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Gram matrix of cosines, sines and drift, and the sums of k z^k over the drift (group, n_mode, n_drift)."""
     p, q = plus[0], minus[0]
     m, size = p.shape[-1], 2 * p.shape[-1] + len(drift)
@@ -268,7 +364,13 @@ def _gram(waves, plus, minus, drift):
     return gram, of_drift
 
 
-def _information(tilt, gram, plus, minus, of_drift):
+def _information(
+    tilt: np.ndarray,
+    gram: np.ndarray,
+    plus: tuple[np.ndarray, ...],
+    minus: tuple[np.ndarray, ...],
+    of_drift: np.ndarray,
+) -> np.ndarray:
     """J^T J (group, decay, p, p) of Re(tilt k z^k), minus its projection on the columns of the model."""
     n_group, n_decay, m, _ = tilt.shape
     flat = tilt.reshape(n_group, n_decay, 2 * m)

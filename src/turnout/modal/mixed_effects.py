@@ -42,17 +42,42 @@ class MixedFit:
         return float(self.linearisation.rss.sum())
 
 
-def degrees_of_freedom(decays, n_mode: int, n_drift: int) -> int:
-    """Number of samples minus amplitudes, drift and (shared) poles; at least one."""
+def degrees_of_freedom(decays: np.ndarray, n_mode: int, n_drift: int) -> int:
+    """Number of samples minus amplitudes, drift and (shared) poles; at least one.
+
+    Parameters
+    ----------
+    decays : (n_decay, n) array of float
+        Free decays. [m/s²]
+    n_mode : int
+        Number of modes.
+    n_drift : int
+        Number of further columns of the model.
+
+    Returns
+    -------
+    int
+        Degrees of freedom of the residual.
+    """
     return max(1, decays.size - len(decays) * (2 * n_mode + n_drift) - 2 * n_mode)
 
 
-def between_variance(value, variance):
-    r"""Variance between estimates in excess of their own variance, by the method of moments; per last axis.
+def between_variance(value: np.ndarray, variance: np.ndarray) -> np.ndarray:
+    r"""Variance between estimates in excess of their own variance, by the method of moments.
 
     .. math:: \tau^2 = \max\left(0, \frac{Q - (n-1)}{\sum w - \sum w^2 / \sum w}\right), \quad w = 1/s^2
 
-    ``value`` and ``variance`` are (n, ...); the result (...). 0 for a single estimate.
+    Parameters
+    ----------
+    value : (n, ...) array of float
+        Estimates.
+    variance : (n, ...) array of float
+        Variance of each estimate.
+
+    Returns
+    -------
+    (...) array of float
+        Variance between the estimates; 0 for a single one.
 
     References
     ----------
@@ -71,19 +96,40 @@ def between_variance(value, variance):
     return np.maximum(0.0, (q - (n - 1)) / (total - (weight**2).sum(axis=0) / total))
 
 
-def fit_common(start, decays, rate, drift, iterations=12, tolerance=1e-3):
-    """Shared modes by Gauss-Newton with reduced steps: (n_mode, 2) of ln f and zeta, and whether it converged.
+def fit_common(
+    start: np.ndarray, decays: np.ndarray, rate: float, drift: np.ndarray, iterations: int = 12, tolerance: float = 1e-3
+) -> tuple[np.ndarray, bool]:
+    """Shared modes by Gauss-Newton with reduced steps.
 
     All sums over decays are invariant to a rotation of the decays. So the decays are replaced by their principal
-    combinations, of which ``MAX_PRINCIPAL`` hold the signal. ``start`` is (n_mode, 2), ``decays`` (n_decay, n) and
-    ``drift`` (n_drift, n).
+    combinations, of which ``MAX_PRINCIPAL`` hold the signal.
+
+    Parameters
+    ----------
+    start : (n_mode, 2) array of float
+        Ln f [Hz] and zeta at the start.
+    decays : (n_decay, n) array of float
+        Free decays. [m/s²]
+    rate : float
+        Sampling rate. [Hz]
+    drift : (n_drift, n) array of float
+        Further columns of the model.
+    iterations : int
+        Largest number of iterations.
+    tolerance : float
+        Step in standard errors at which the fit has converged.
+
+    Returns
+    -------
+    (n_mode, 2) array of float, bool
+        Ln f [Hz] and zeta of each mode; whether the fit converged.
     """
     n_mode = len(start)
     mean = np.array(start, dtype=float)
     dof = degrees_of_freedom(decays, n_mode, len(drift))
     decays, dropped_power = _principal_decays(decays)
 
-    def linearise_at(theta):
+    def linearise_at(theta: np.ndarray) -> Linearisation:
         return linearise(theta[None], decays, rate, drift)
 
     current = linearise_at(mean)
@@ -109,7 +155,7 @@ def fit_common(start, decays, rate, drift, iterations=12, tolerance=1e-3):
     return mean, False
 
 
-def _principal_decays(decays):
+def _principal_decays(decays: np.ndarray) -> tuple[np.ndarray, float]:
     """The decays' principal combinations (at most ``MAX_PRINCIPAL``, n), and the power of the others."""
     if len(decays) <= MAX_PRINCIPAL:
         return decays, 0.0
@@ -117,7 +163,15 @@ def _principal_decays(decays):
     return turn[:, -MAX_PRINCIPAL:].T @ decays, float(np.sum(np.maximum(power[:-MAX_PRINCIPAL], 0.0)))
 
 
-def fit_mixed(start, decays, rate, drift, theta=None, iterations=12, tolerance=0.01) -> MixedFit:
+def fit_mixed(
+    start: np.ndarray | None,
+    decays: np.ndarray,
+    rate: float,
+    drift: np.ndarray,
+    theta: np.ndarray | None = None,
+    iterations: int = 12,
+    tolerance: float = 0.01,
+) -> MixedFit:
     r"""Modes of every impact, shrunken towards their common mean according to the spread in the data.
 
     .. math:: z_i = \theta_i + (J^T J)^{-1} J^T r, \quad
@@ -135,8 +189,18 @@ def fit_mixed(start, decays, rate, drift, theta=None, iterations=12, tolerance=0
     rate : float
         [Hz]
     drift : (n_drift, n) array of float
+        Further columns of the model.
     theta : (n_decay, n_mode, 2) array of float, optional
         Modes of each decay from an earlier fit; ``start`` is then not used.
+    iterations : int
+        Largest number of iterations.
+    tolerance : float
+        Step in errors of single impacts at which the fit has converged.
+
+    Returns
+    -------
+    MixedFit
+        Modes of each impact and their mean.
 
     References
     ----------
@@ -168,23 +232,23 @@ def fit_mixed(start, decays, rate, drift, theta=None, iterations=12, tolerance=0
     return result if n_decay == 1 else MixedFit(**{**result.__dict__, "converged": False})
 
 
-def _limit_step(theta, previous):
+def _limit_step(theta: np.ndarray, previous: np.ndarray) -> np.ndarray:
     """The new modes, with the step limited and the damping between its limits."""
     theta = previous + np.clip(theta - previous, -MAX_STEP, MAX_STEP)
     theta[..., 1] = np.clip(theta[..., 1], MIN_DAMPING, MAX_DAMPING)
     return theta
 
 
-def _normalise(matrix):
+def _normalise(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     diagonal = np.sqrt(np.maximum(np.einsum("...jj->...j", matrix), 1e-300))
     return diagonal, matrix / (diagonal[..., :, None] * diagonal[..., None, :])
 
 
-def _inverse(matrix):
+def _inverse(matrix: np.ndarray) -> np.ndarray:
     diagonal, scaled = _normalise(matrix)
     size = matrix.shape[-1]
     return np.linalg.inv(scaled + RIDGE * np.eye(size)) / (diagonal[..., :, None] * diagonal[..., None, :])
 
 
-def _solve(matrix, vector):
+def _solve(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
     return _inverse(matrix) @ vector

@@ -3,7 +3,10 @@
 The significance of a mode or a drift comes from chi-squared tests of amplitudes, per impact and over all impacts.
 """
 
+from __future__ import annotations
+
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.stats import chi2
@@ -11,13 +14,29 @@ from scipy.stats import chi2
 from turnout.modal.least_squares import Linearisation, linearise
 from turnout.modal.mixed_effects import MixedFit, degrees_of_freedom, fit_mixed
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from turnout.config.settings.identify import IdentifySettings
+    from turnout.modal.stabilization import Candidate
+
 
 def mode_chi_squared(linearisation: Linearisation, sigma2: float) -> np.ndarray:
     r"""Squared amplitude of each mode in each impact over its covariance: chi-squared(2) if the mode is absent.
 
     .. math:: \chi^2 = a^T \left(\sigma^2 [(B^T B)^{-1}]_{mm}\right)^{-1} a
 
-    Returns (n_decay, n_mode); ``sigma2`` is the variance of the noise.
+    Parameters
+    ----------
+    linearisation : Linearisation
+        Fit of the modes.
+    sigma2 : float
+        Variance of the noise.
+
+    Returns
+    -------
+    (n_decay, n_mode) array of float
+        Statistic of each mode in each impact.
     """
     n_mode = linearisation.amplitude.shape[1]
     inverse = np.linalg.inv(linearisation.gram)
@@ -27,8 +46,23 @@ def mode_chi_squared(linearisation: Linearisation, sigma2: float) -> np.ndarray:
     return (a**2 * ss - 2.0 * a * b * cs + b**2 * cc) / (np.maximum(cc * ss - cs**2, 1e-300) * sigma2)
 
 
-def columns_chi_squared(linearisation: Linearisation, sigma2: float, columns) -> float:
-    """Statistic of columns of the model (a drift, a hum): chi-squared(n_decay times columns) if they are absent."""
+def columns_chi_squared(linearisation: Linearisation, sigma2: float, columns: Sequence[int] | np.ndarray) -> float:
+    """Statistic of columns of the model (a drift, a hum): chi-squared(n_decay times columns) if they are absent.
+
+    Parameters
+    ----------
+    linearisation : Linearisation
+        Fit of the modes.
+    sigma2 : float
+        Variance of the noise.
+    columns : sequence of int
+        Numbers of the columns of the model.
+
+    Returns
+    -------
+    float
+        Statistic, summed over the decays.
+    """
     columns = np.asarray(columns)
     block = np.linalg.inv(linearisation.gram)[:, columns[:, None], columns]
     value = linearisation.coefficient[:, columns]
@@ -36,8 +70,20 @@ def columns_chi_squared(linearisation: Linearisation, sigma2: float, columns) ->
 
 
 def common_probability(statistic: np.ndarray) -> np.ndarray:
-    """Probability of the sum over impacts of chi-squared(2) values if the mode is absent; (n_mode,).
+    """Probability of the sum over impacts of chi-squared(2) values if the mode is absent.
 
+    Parameters
+    ----------
+    statistic : array
+        (n_decay, n_mode) values of ``mode_chi_squared``.
+
+    Returns
+    -------
+    (n_mode,) array of float
+        Probability for each mode.
+
+    Examples
+    --------
     >>> print(common_probability(np.array([[0.0], [0.0]])))
     [1.]
     """
@@ -45,7 +91,20 @@ def common_probability(statistic: np.ndarray) -> np.ndarray:
 
 
 def share_of_impacts(statistic: np.ndarray, probability: float = 0.01) -> np.ndarray:
-    """Share of impacts in which the mode alone is significant at ``probability``; (n_mode,)."""
+    """Share of impacts in which the mode alone is significant.
+
+    Parameters
+    ----------
+    statistic : array
+        (n_decay, n_mode) values of ``mode_chi_squared``.
+    probability : float
+        Level of significance.
+
+    Returns
+    -------
+    (n_mode,) array of float
+        Share for each mode, 0 to 1.
+    """
     return (statistic > chi2.isf(probability, 2)).mean(axis=0)
 
 
@@ -54,11 +113,28 @@ MAX_SCREENING_PROBABILITY = (
 )
 MIN_LISTED_PRESENCE = 0.2  # share of orders and starts from which on a rejected pole is listed
 # During the search a fit within a tenth of the errors of single impacts is accurate enough to choose modes.
-SEARCH_OPTIONS = {"iterations": 24, "tolerance": 0.1}
+SEARCH_OPTIONS: dict[str, Any] = {"iterations": 24, "tolerance": 0.1}
 
 
-def rejection(candidate, reason, value, limit) -> dict:
-    """A row of ``rejected_modes``."""
+def rejection(candidate: Candidate, reason: str, value: float, limit: float) -> dict:
+    """A row of ``rejected_modes``.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        The candidate that failed.
+    reason : str
+        Why it is no mode.
+    value : float
+        Value that failed the test.
+    limit : float
+        Limit of the test.
+
+    Returns
+    -------
+    dict
+        Frequency [Hz], damping, energy and emac of the candidate, with reason, value and limit.
+    """
     return {
         "frequency": float(candidate.frequency),
         "damping": float(candidate.damping),
@@ -70,8 +146,25 @@ def rejection(candidate, reason, value, limit) -> dict:
     }
 
 
-def filter_reappearing(candidates, rate, settings):
-    """Candidates that occur at enough orders and starts, and above the lowest frequency that a record can resolve."""
+def filter_reappearing(
+    candidates: Iterable[Candidate], rate: float, settings: IdentifySettings
+) -> tuple[list[Candidate], list[dict]]:
+    """Candidates that occur at enough orders and starts, and above the lowest frequency that a record can resolve.
+
+    Parameters
+    ----------
+    candidates : iterable of Candidate
+        Poles that recur.
+    rate : float
+        Sampling rate. [Hz]
+    settings : IdentifySettings
+        Settings of the identification.
+
+    Returns
+    -------
+    (list of Candidate, list of dict)
+        Candidates by energy, at most two more than half the largest order; rows of the rejected ones.
+    """
     min_frequency = 0.5 / settings.duration
     max_listed_frequency = 1.5 * max(high for _, _, high in settings.bands())
     accepted, rejected = [], []
@@ -89,13 +182,52 @@ def filter_reappearing(candidates, rate, settings):
     return accepted[:max_modes], rejected
 
 
-def start_values(candidates) -> np.ndarray:
-    """(n_mode, 2) ln f and zeta of candidates."""
+def start_values(candidates: Iterable[Candidate]) -> np.ndarray:
+    """Modes of candidates as the fits need them.
+
+    Parameters
+    ----------
+    candidates : iterable of Candidate
+        Candidates.
+
+    Returns
+    -------
+    (n_mode, 2) array of float
+        Ln f [Hz] and zeta.
+    """
     return np.array([[np.log(c.frequency), c.damping] for c in candidates]).reshape(-1, 2)
 
 
-def screen(candidates, decays, rate, columns, settings, rejected):
-    """Drop candidates that are not significant at the poles of the realisation: the clear ones first, then singly."""
+def screen(
+    candidates: list[Candidate],
+    decays: np.ndarray,
+    rate: float,
+    columns: np.ndarray,
+    settings: IdentifySettings,
+    rejected: list[dict],
+) -> list[Candidate]:
+    """Drop candidates that are not significant at the poles of the realisation: the clear ones first, then singly.
+
+    Parameters
+    ----------
+    candidates : list of Candidate
+        Candidate poles.
+    decays : (n_decay, n) array of float
+        Free decays. [m/s²]
+    rate : float
+        Sampling rate. [Hz]
+    columns : (n_column, n) array of float
+        Columns of the background.
+    settings : IdentifySettings
+        Settings of the identification.
+    rejected : list of dict
+        Rows of rejected candidates, to which those dropped here are added.
+
+    Returns
+    -------
+    list of Candidate
+        The candidates that remain.
+    """
     limit = settings.false_mode_probability
     while candidates:
         linearisation = linearise(start_values(candidates)[None], decays, rate, columns)
@@ -111,20 +243,45 @@ def screen(candidates, decays, rate, columns, settings, rejected):
 
 
 def fit_and_prune(
-    candidates,
-    decays,
-    rate,
-    columns,
-    settings,
-    rejected,
+    candidates: list[Candidate],
+    decays: np.ndarray,
+    rate: float,
+    columns: np.ndarray,
+    settings: IdentifySettings,
+    rejected: list[dict],
     previous: MixedFit | None = None,
     max_damping: float | None = None,
     indispensable: set | None = None,
-):
-    """Maximum likelihood with all modes; drops the worst mode that fails a test until none does: (fit, candidates).
+) -> tuple[MixedFit | None, list[Candidate]]:
+    """Maximum likelihood with all modes; drops the worst mode that fails a test until none does.
 
-    ``indispensable`` collects the candidates (by identity) that are not redundant; they are not tested again.
     The fits have the accuracy of ``SEARCH_OPTIONS``, enough to choose modes.
+
+    Parameters
+    ----------
+    candidates : list of Candidate
+        Candidate poles.
+    decays : (n_decay, n) array of float
+        Free decays. [m/s²]
+    rate : float
+        Sampling rate. [Hz]
+    columns : (n_column, n) array of float
+        Columns of the background.
+    settings : IdentifySettings
+        Settings of the identification.
+    rejected : list of dict
+        Rows of rejected candidates, to which those dropped here are added.
+    previous : MixedFit or None
+        Fit of the same candidates whose modes are the start.
+    max_damping : float or None
+        Damping up to which a pole may stay in the fit although it is no mode; None: only modes stay.
+    indispensable : set or None
+        Identities of candidates that are not redundant and not tested again; extended.
+
+    Returns
+    -------
+    (MixedFit or None, list of Candidate)
+        Fit of the modes that pass, None if none does, and their candidates.
     """
     if not candidates:
         return None, candidates
@@ -137,11 +294,12 @@ def fit_and_prune(
             worst, (reason, value, limit) = failures[0]
             smaller = None
         else:
-            worst, smaller, probability = _redundant_mode(
+            redundant, smaller, probability = _redundant_mode(
                 fit, candidates, decays, rate, columns, settings, indispensable
             )
-            if worst is None:
+            if redundant is None:
                 return fit, candidates
+            worst = redundant
             reason, value, limit = "splits a stronger mode", probability, settings.false_mode_probability
         fitted = replace(candidates[worst], frequency=np.exp(fit.shrunken_mean[worst, 0]), damping=fit.mean[worst, 1])
         rejected.append(rejection(fitted, reason, value, limit))
@@ -151,7 +309,15 @@ def fit_and_prune(
         fit = smaller or fit_mixed(np.delete(fit.shrunken_mean, worst, axis=0), decays, rate, columns, **SEARCH_OPTIONS)
 
 
-def _redundant_mode(fit, candidates, decays, rate, columns, settings, indispensable):
+def _redundant_mode(
+    fit: MixedFit,
+    candidates: list[Candidate],
+    decays: np.ndarray,
+    rate: float,
+    columns: np.ndarray,
+    settings: IdentifySettings,
+    indispensable: set[int],
+) -> tuple[int | None, MixedFit | None, float]:
     """A mode that overlaps a stronger one and is not needed for the fit: (index, fit without it, probability).
 
     Poles that differ between impacts look like two poles to a realisation of all impacts, but not to a fit of each.
@@ -173,10 +339,26 @@ def _redundant_mode(fit, candidates, decays, rate, columns, settings, indispensa
     return None, None, 1.0
 
 
-def mode_failures(fit: MixedFit, settings, max_damping=None) -> list[tuple[int, tuple[str, float, float]]]:
-    """Every mode that fails a test, as (index, (reason, value, limit)), the weakest first.
+def mode_failures(
+    fit: MixedFit, settings: IdentifySettings, max_damping: float | None = None
+) -> list[tuple[int, tuple[str, float, float]]]:
+    """Every mode that fails a test, the weakest first.
 
     With ``max_damping`` only the tests for a pole to stay in a fit apply: it is present and damped less than this.
+
+    Parameters
+    ----------
+    fit : MixedFit
+        Fit of all modes.
+    settings : IdentifySettings
+        Settings of the identification.
+    max_damping : float or None
+        Largest damping ratio of a pole that stays; None: all tests of a mode.
+
+    Returns
+    -------
+    list of (int, (str, float, float))
+        Index, reason, value and limit.
     """
     n_mode = len(fit.mean)
     statistic = mode_chi_squared(fit.linearisation, fit.sigma2)

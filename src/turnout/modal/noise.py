@@ -3,7 +3,10 @@
 The noise is an autoregressive model of the residual; decays are whitened with it.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import solve_toeplitz
@@ -14,13 +17,29 @@ from turnout.modal.least_squares import drift_columns, linearise
 from turnout.modal.mixed_effects import degrees_of_freedom
 from turnout.modal.mode_tests import columns_chi_squared
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
-def noise_filter(residual, order_maximum: int) -> np.ndarray:
+    from turnout.config.settings.identify import IdentifySettings
+    from turnout.modal.stabilization import Stabilisation
+
+
+def noise_filter(residual: np.ndarray, order_maximum: int) -> np.ndarray:
     r"""Whitening filter of residuals, its order by the Bayesian information criterion.
 
     .. math:: e_k = \sum_{j=0}^p a_j r_{k-j}, \quad a_0 = 1
 
-    ``residual`` is (n_decay, n); returns (p + 1,) coefficients, [1.] for white noise.
+    Parameters
+    ----------
+    residual : (n_decay, n) array of float
+        Residuals of the fit.
+    order_maximum : int
+        Highest order p.
+
+    Returns
+    -------
+    (p + 1,) array of float
+        Coefficients, [1.] for white noise.
 
     References
     ----------
@@ -47,11 +66,25 @@ def noise_filter(residual, order_maximum: int) -> np.ndarray:
     return coefficients
 
 
-def whiten(decays, whitening) -> np.ndarray:
+def whiten(decays: np.ndarray, whitening: np.ndarray) -> np.ndarray:
     """Decays through the whitening filter, without its first samples; the poles stay the same.
 
     A sum of exponentials through a finite filter is the same sum with other amplitudes.
 
+    Parameters
+    ----------
+    decays : (n_decay, n) array of float
+        Free decays. [m/s²]
+    whitening : (p + 1,) array of float
+        Coefficients of ``noise_filter``.
+
+    Returns
+    -------
+    (n_decay, n - p) array of float
+        Filtered decays.
+
+    Examples
+    --------
     >>> whiten(np.array([[1.0, 0.5, 0.25]]), np.array([1.0, -0.5]))
     array([[0., 0.]])
     """
@@ -73,24 +106,67 @@ class Background:
     hum: tuple[float, ...] = ()
 
     def columns(self, n: int, rate: float) -> np.ndarray:
-        """(n_column, n) columns of the model: cosine and sine of each hum, then the polynomials."""
+        """Columns of the model: cosine and sine of each hum, then the polynomials.
+
+        Parameters
+        ----------
+        n : int
+            Samples of a decay.
+        rate : float
+            Sampling rate. [Hz]
+
+        Returns
+        -------
+        (n_column, n) array of float
+            Columns, of unit norm.
+        """
         phase = 2.0 * np.pi * np.array(self.hum)[:, None] * np.arange(n) / rate
         scale = np.sqrt(2.0 / n)
         return np.vstack([scale * np.cos(phase), scale * np.sin(phase), drift_columns(n, self.drift_degree)])
 
 
-def max_drift_degree(n: int, rate: float, settings) -> int:
+def max_drift_degree(n: int, rate: float, settings: IdentifySettings) -> int:
     """Highest degree of a drift below the ballast band, at most ``settings.drift_maximum``.
 
     A polynomial of degree d over a record of length T holds frequencies up to (d + 1) / (2 T).
+
+    Parameters
+    ----------
+    n : int
+        Samples of a decay.
+    rate : float
+        Sampling rate. [Hz]
+    settings : IdentifySettings
+        Settings of the identification.
+
+    Returns
+    -------
+    int
+        Degree; -1 for a record too short for a constant.
     """
     return min(settings.drift_maximum, int(2.0 * settings.ballast_low * n / rate) - 1)
 
 
-def hum_frequencies(table, n: int, rate: float, settings) -> tuple[float, ...]:
-    """Harmonics of ``settings.hum_sources`` at which an undamped pole recurs over orders and starts. [Hz]
+def hum_frequencies(table: Stabilisation, n: int, rate: float, settings: IdentifySettings) -> tuple[float, ...]:
+    """Harmonics of ``settings.hum_sources`` at which an undamped pole recurs over orders and starts.
 
-    Undamped: it decays or grows by less than a factor of two over the ``n`` samples. ``table`` is a Stabilisation.
+    Undamped: it decays or grows by less than a factor of two over the ``n`` samples.
+
+    Parameters
+    ----------
+    table : Stabilisation
+        Poles over orders and starts.
+    n : int
+        Samples of a decay.
+    rate : float
+        Sampling rate. [Hz]
+    settings : IdentifySettings
+        Settings of the identification.
+
+    Returns
+    -------
+    tuple of float
+        Frequencies of the hum. [Hz]
     """
     hum: list[float] = []
     for source in settings.hum_sources:
@@ -105,11 +181,27 @@ def hum_frequencies(table, n: int, rate: float, settings) -> tuple[float, ...]:
     return tuple(hum)
 
 
-def is_locked_to_impact(frequency: float, theta, decays, rate: float) -> bool:
-    """Whether the oscillation at ``frequency`` [Hz] beside the modes ``theta`` (n_mode, 2) starts with every impact.
+def is_locked_to_impact(frequency: float, theta: np.ndarray, decays: np.ndarray, rate: float) -> bool:
+    """Whether an oscillation beside the modes starts with every impact.
 
     The phases of hum are random, those of a lightly damped mode agree between impacts. This is Rayleigh's test at
     ``PHASE_SIGNIFICANCE``; three impacts or fewer are not enough for it.
+
+    Parameters
+    ----------
+    frequency : float
+        Frequency of the oscillation. [Hz]
+    theta : (n_mode, 2) array of float
+        Ln f [Hz] and zeta of the modes; those near ``frequency`` do not count.
+    decays : (n_decay, n) array of float
+        Free decays. [m/s²]
+    rate : float
+        Sampling rate. [Hz]
+
+    Returns
+    -------
+    bool
+        False also where there are too few impacts to tell.
 
     References
     ----------
@@ -126,15 +218,31 @@ def is_locked_to_impact(frequency: float, theta, decays, rate: float) -> bool:
     return bool(probability < PHASE_SIGNIFICANCE)
 
 
-def significant_background(theta, decays, rate, largest: Background) -> Background:
-    """The part of ``largest`` that is significant beside the modes ``theta`` (n_decay, n_mode, 2).
+def significant_background(theta: np.ndarray, decays: np.ndarray, rate: float, largest: Background) -> Background:
+    """The part of ``largest`` that is significant beside the modes.
 
     First each hum is tested. The drift gets the lowest degree above which no term is significant.
+
+    Parameters
+    ----------
+    theta : (n_decay, n_mode, 2) array of float
+        Ln f [Hz] and zeta of each decay.
+    decays : (n_decay, n) array of float
+        Free decays. [m/s²]
+    rate : float
+        Sampling rate. [Hz]
+    largest : Background
+        Background with all terms that may be there.
+
+    Returns
+    -------
+    Background
+        Its hum and degree are those of ``largest`` or less.
     """
     n_decay, n = decays.shape
     n_mode = theta.shape[1]
 
-    def probability(background, columns):
+    def probability(background: Background, columns: Iterable[int]) -> float:
         linearisation = linearise(theta, decays, rate, background.columns(n, rate))
         drift = linearisation.gram.shape[-1] - 2 * n_mode
         sigma2 = linearisation.rss.sum() / degrees_of_freedom(decays, n_mode, drift)

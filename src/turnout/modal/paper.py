@@ -3,6 +3,10 @@
 It exists for comparison. Its bias is simulated at the identified model and reported with the result.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 from scipy.signal import butter, sosfilt, sosfiltfilt
 
@@ -16,16 +20,39 @@ from turnout.modal.state_space import assemble, continuous_pole, no_decays, no_m
 from turnout.modal.summary import ImpactEstimates
 from turnout.records import ModalModel, Rejection
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
+
+    from turnout.config.settings.identify import IdentifySettings
+    from turnout.modal.selection import Selection
+    from turnout.records import Mode, Receptance
+
 MAX_EDGE_SHARE = 0.45  # highest edge of a filter as a share of the sampling rate
 
 
-def split_bands(records, rate: float, settings) -> tuple[np.ndarray, ...]:
-    """Records below and above the split frequency, (n, n_sample) each; filtered over their whole length.
+def split_bands(records: ArrayLike, rate: float, settings: IdentifySettings) -> tuple[np.ndarray, ...]:
+    """Records below and above the split frequency, filtered over their whole length.
 
     At a low sampling rate the upper band ends earlier; if nothing remains of it there is only the lower one.
 
     Butterworth low-pass at ``split_frequency`` and band-pass from there to ``paper_band_high``, forwards and
     backwards if ``paper_zero_phase``. The paper names neither filter nor order nor phase.
+
+    Parameters
+    ----------
+    records : (n, n_sample) array of float
+        Records with their contact. [m/s²]
+    rate : float
+        Sampling rate. [Hz]
+    settings : IdentifySettings
+        Settings of the identification.
+
+    Returns
+    -------
+    tuple of (n, n_sample) arrays of float
+        Lower and upper band; only the lower one at a low sampling rate.
 
     References
     ----------
@@ -40,8 +67,20 @@ def split_bands(records, rate: float, settings) -> tuple[np.ndarray, ...]:
     return tuple(apply_filter(sos, np.asarray(records, dtype=float), axis=-1) for sos in filters)
 
 
-def second_order_mode(decay, rate: float) -> tuple[float, float]:
-    """Frequency [Hz] and damping of the mode of a square, order-2 realisation; nan if its poles are real.
+def second_order_mode(decay: np.ndarray, rate: float) -> tuple[float, float]:
+    """Mode of a square, order-2 realisation.
+
+    Parameters
+    ----------
+    decay : (n,) array of float
+        Filtered decay. [m/s²]
+    rate : float
+        Sampling rate. [Hz]
+
+    Returns
+    -------
+    (float, float)
+        Frequency [Hz] and damping ratio, nan if the poles are real.
 
     References
     ----------
@@ -51,10 +90,32 @@ def second_order_mode(decay, rate: float) -> tuple[float, float]:
     return (float(frequency[0]), float(damping[0])) if len(frequency) else (np.nan, np.nan)
 
 
-def band_modes(records, starts, n: int, rate: float, settings) -> np.ndarray:
-    """(n_band, n_record, 2) frequencies [Hz] and damping ratios of ballast and railpad band, nan without a mode.
+def band_modes(
+    records: Sequence[np.ndarray] | np.ndarray,
+    starts: Sequence[int] | np.ndarray,
+    n: int,
+    rate: float,
+    settings: IdentifySettings,
+) -> np.ndarray:
+    """Mode of each band of each record.
 
-    ``records`` include the contact. ``starts`` are the first samples of the decays, ``n`` is their length.
+    Parameters
+    ----------
+    records : sequence of (n_sample,) arrays of float
+        Records with their contact. [m/s²]
+    starts : (n_record,) array of int
+        First sample of each decay.
+    n : int
+        Samples of a decay.
+    rate : float
+        Sampling rate. [Hz]
+    settings : IdentifySettings
+        Settings of the identification.
+
+    Returns
+    -------
+    (2, n_record, 2) array of float
+        Frequency [Hz] and damping ratio in ballast and railpad band, nan without a mode.
     """
     modes = np.full((2, len(records), 2), np.nan)
     for i, (record, start) in enumerate(zip(records, starts, strict=True)):
@@ -69,7 +130,14 @@ DECAY_DELAY = 2e-4  # s from the end of contact to the start of the decay
 
 
 def simulated_bias(
-    frequency, damping, amplitude, noise: float, n: int, rate: float, settings, bands=("ballast", "railpad")
+    frequency: np.ndarray,
+    damping: np.ndarray,
+    amplitude: np.ndarray,
+    noise: float,
+    n: int,
+    rate: float,
+    settings: IdentifySettings,
+    bands: Sequence[str] = ("ballast", "railpad"),
 ) -> dict:
     """Bias of the procedure on decays of known modes.
 
@@ -134,6 +202,18 @@ def simulated_bias(
 def bias_sentence(bias: dict) -> str:
     """The bias as a sentence, printed with every result of the paper's procedure.
 
+    Parameters
+    ----------
+    bias : dict
+        Result of ``simulated_bias``.
+
+    Returns
+    -------
+    str
+        The sentence.
+
+    Examples
+    --------
     >>> bias_sentence({"ballast": {"frequency_percent": -10.9, "damping_percent": -10.0, "found": 1.0, "n": 12}})
     'simulated bias of method paper at this model (12 blows): ballast f -10.9 %, zeta -10.0 %, found 100 %'
     """
@@ -145,13 +225,33 @@ def bias_sentence(bias: dict) -> str:
     return f"simulated bias of method paper at this model ({n} blows): " + "; ".join(clauses)
 
 
-def identify_paper(decays, rate: float, settings, receptance=None, leads=None) -> ModalModel:
+def identify_paper(
+    decays: Sequence[np.ndarray],
+    rate: float,
+    settings: IdentifySettings,
+    receptance: Receptance | None = None,
+    leads: Sequence[np.ndarray] | None = None,
+) -> ModalModel:
     """The paper's procedure; the settings supply what the paper leaves open. See :func:`turnout.modal.identify`.
 
-    ``leads`` are the samples before each decay (pre-trigger and contact), one (n_lead,) array each. The filters run
-    over them too. Without them the filters start at the decay, which adds an error.
+    Parameters
+    ----------
+    decays : sequence of (n,) arrays of float
+        Free decays, unfiltered. [m/s²]
+    rate : float
+        Sampling rate. [Hz]
+    settings : IdentifySettings
+        Settings of the identification.
+    receptance : Receptance or None
+        Receptance whose gate rejects modes; None: no gate.
+    leads : sequence of (n_lead,) arrays of float, or None
+        Samples before each decay: pre-trigger and contact. The filters run over them too. Without them the filters
+        start at the decay, which adds an error. [m/s²]
 
-    The result's ``diagnostics`` hold ``simulated_bias`` per band and ``bias_words``, the same to print.
+    Returns
+    -------
+    ModalModel
+        Its ``diagnostics`` hold ``simulated_bias`` per band and ``bias_words``, the same to print.
     """
     records, index, dropped = common_length(decays, rate, settings)
     if not len(records):
@@ -166,7 +266,7 @@ def identify_paper(decays, rate: float, settings, receptance=None, leads=None) -
         "filters_start_at": "decay" if leads is None else "record"
     }
     estimates, rejections = _estimates(band_values, records, index, settings, receptance)
-    model_fields = {
+    model_fields: dict[str, Any] = {
         "rejections": tuple(rejections),
         "stabilisation": stabilisation_rows(selection, settings.pole_tolerance),
     }
@@ -190,11 +290,17 @@ def identify_paper(decays, rate: float, settings, receptance=None, leads=None) -
     )
 
 
-def _band_edges(band, settings):
+def _band_edges(band: str, settings: IdentifySettings) -> tuple[float, float]:
     return next((low, high) for name, low, high in settings.bands() if name == band)
 
 
-def _estimates(band_values, records, index, settings, receptance):
+def _estimates(
+    band_values: np.ndarray,
+    records: np.ndarray,
+    index: np.ndarray,
+    settings: IdentifySettings,
+    receptance: Receptance | None,
+) -> tuple[list[ImpactEstimates], list[Rejection]]:
     """Second-order estimates of each band over the impacts, without errors: the procedure gives none."""
     strength = np.linalg.norm(records, axis=1)
     estimates, rejections = [], []
@@ -218,32 +324,36 @@ def _estimates(band_values, records, index, settings, receptance):
     return estimates, rejections
 
 
-def _amplitude(modes, records, rate):
+def _amplitude(modes: Sequence[Mode], records: np.ndarray, rate: float) -> np.ndarray:
     theta = np.array([[np.log(m.frequency), m.damping] for m in modes])
     common = np.broadcast_to(theta, (len(records), *theta.shape))
     return linearise(common, records, rate, drift_columns(records.shape[1], -1)).amplitude.mean(axis=0)
 
 
-def _model_bias(selection, modes, amplitude, n, rate, settings):
+def _model_bias(
+    selection: Selection, modes: Sequence[Mode], amplitude: np.ndarray, n: int, rate: float, settings: IdentifySettings
+) -> dict[str, Any]:
     """Bias at the modes of the joint fit if it has modes in these bands, else at those of the procedure."""
     truth = {m.band: (m.frequency, m.damping, amplitude[i]) for i, m in enumerate(modes)}
-    noise = np.sqrt(selection.fit.sigma2) if selection.fit is not None else 0.0
+    noise = np.sqrt(selection.mode_fit.sigma2) if selection.fit is not None else 0.0
     if selection.fit is not None:
-        frequency = np.exp(selection.fit.mean[:, 0])
+        frequency = np.exp(selection.mode_fit.mean[:, 0])
         for band in truth:
             low, high = _band_edges(band, settings)
             inside = np.flatnonzero((frequency >= low) & (frequency < high))
             if len(inside):
                 m = max(inside, key=lambda k: np.median(selection.chi_squared[:, k]))
                 mean_amplitude = selection.amplitude[:, m].mean()
-                truth[band] = (frequency[m], selection.fit.mean[m, 1], mean_amplitude)
+                truth[band] = (frequency[m], selection.mode_fit.mean[m, 1], mean_amplitude)
     named = [band for band in ("ballast", "railpad") if band in truth]
     f, zeta, alpha = (np.array(column) for column in zip(*(truth[band] for band in named), strict=True))
     bias = simulated_bias(f, zeta, alpha, float(noise), n, rate, settings, named)
     return {"simulated_bias": bias, "bias_words": bias_sentence(bias)}
 
 
-def _common_impacts(estimates, records, index):
+def _common_impacts(
+    estimates: Sequence[ImpactEstimates], records: np.ndarray, index: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Modes and decays of the impacts in which every band has a mode, for the validation fit."""
     common = set(index)
     for e in estimates:

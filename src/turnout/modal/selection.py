@@ -4,7 +4,10 @@ An explanation of the decays consists of modes, background and noise. Several ex
 information criterion.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.stats import chi2
@@ -31,6 +34,12 @@ from turnout.modal.noise import (
 )
 from turnout.modal.stabilization import DAMPING_RANGE, Stabilisation, candidates, likely_poles, stabilisation
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from turnout.config.settings.identify import IdentifySettings
+    from turnout.modal.stabilization import Candidate
+
 MAX_NOISE_PASSES = 3  # fits with a new whitening filter
 # Relative difference of residual sums up to which two fits are the same. Two distinct optima differ by more.
 RSS_TOLERANCE = 1e-4
@@ -56,19 +65,29 @@ class Explanation:
 
 
 def explain(
-    start, decays, rate, background, settings, largest_background=None, max_damping=None, known_fits=None
+    start: list[Candidate],
+    decays: np.ndarray,
+    rate: float,
+    background: Background,
+    settings: IdentifySettings,
+    largest_background: Background | None = None,
+    max_damping: float | None = None,
+    known_fits: list[MixedFit] | None = None,
 ) -> Explanation:
     """Maximum likelihood from candidates ``start``, pruned until each mode passes its tests.
 
     Parameters
     ----------
     start : list of Candidate
+        Candidate poles.
     decays : (n_decay, n) array of float
+        Free decays, unfiltered. [m/s²]
     rate : float
         [Hz]
     background : Background
         Background of the first fit.
     settings : IdentifySettings
+        Limits of the tests.
     largest_background : Background, optional
         The part of it that is significant beside the modes of the first fit replaces ``background``.
     max_damping : float, optional
@@ -76,6 +95,11 @@ def explain(
     known_fits : list of MixedFit, optional
         First fits of explanations with this ``background``; this one is added. If it is there already it is not
         continued: ``fit`` is then None.
+
+    Returns
+    -------
+    Explanation
+        Its ``fit`` is None if all candidates failed.
     """
     explanation = Explanation(None, [], background)
     columns = background.columns(decays.shape[1], rate)
@@ -94,16 +118,20 @@ def explain(
     return explanation
 
 
-def _is_same_fit(fit, reference):
+def _is_same_fit(fit: MixedFit, reference: MixedFit) -> bool:
     """Whether two fits of the same decays have converged to the same modes."""
     return len(fit.mean) == len(reference.mean) and abs(fit.rss / reference.rss - 1.0) < RSS_TOLERANCE
 
 
-def _refine_noise(explanation, decays, rate, settings, max_damping):
+def _refine_noise(
+    explanation: Explanation, decays: np.ndarray, rate: float, settings: IdentifySettings, max_damping: float | None
+) -> None:
     """Fit the decays whitened by the residual noise of the last fit, until the order of the noise is constant."""
     columns = explanation.background.columns(decays.shape[1], rate)
     indispensable: set = set()
     for _ in range(MAX_NOISE_PASSES):
+        if explanation.fit is None:
+            break
         residual = linearise(explanation.fit.theta, decays, rate, columns).residual
         previous, explanation.whitening = explanation.whitening, noise_filter(residual, settings.noise_order_maximum)
         white = whiten(decays, explanation.whitening)
@@ -119,12 +147,27 @@ def _refine_noise(explanation, decays, rate, settings, max_damping):
             max_damping,
             indispensable,
         )
-        if explanation.fit is None or len(explanation.whitening) == 1 or len(explanation.whitening) == len(previous):
+        if len(explanation.whitening) == 1 or len(explanation.whitening) == len(previous):
             break
 
 
-def polish(explanation: Explanation, decays, rate) -> Explanation:
-    """The same explanation with its fit iterated to convergence."""
+def polish(explanation: Explanation, decays: np.ndarray, rate: float) -> Explanation:
+    """The same explanation with its fit iterated to convergence.
+
+    Parameters
+    ----------
+    explanation : Explanation
+        An explanation of ``decays``.
+    decays : (n_decay, n) array of float
+        Free decays. [m/s²]
+    rate : float
+        Sampling rate. [Hz]
+
+    Returns
+    -------
+    Explanation
+        A copy; the same one where there is no fit.
+    """
     if explanation.fit is None:
         return explanation
     white = whiten(decays, explanation.whitening)
@@ -132,7 +175,7 @@ def polish(explanation: Explanation, decays, rate) -> Explanation:
     return replace(explanation, fit=fit_mixed(None, white, rate, columns, theta=explanation.fit.theta))
 
 
-def akaike_criterion(explanation: Explanation, decays) -> float:
+def akaike_criterion(explanation: Explanation, decays: np.ndarray) -> float:
     r"""Akaike information criterion of an explanation: the smaller one is the likelier.
 
     .. math:: N \ln\frac{\sum r^2}{N} + 2 k
@@ -140,6 +183,23 @@ def akaike_criterion(explanation: Explanation, decays) -> float:
     with :math:`N` samples in all. :math:`k` counts the modes and noise of the test, and the amplitudes and background
     of every decay. The modes of single decays count as far as they are not shrunken to the mean. Each mode has passed a
     stricter test, so the criterion need not prevent a mode too many.
+
+    Parameters
+    ----------
+    explanation : Explanation
+        An explanation of ``decays``.
+    decays : (n_decay, n) array of float
+        Free decays. [m/s²]
+
+    Returns
+    -------
+    float
+        The criterion; only differences for the same decays have a meaning.
+
+    Raises
+    ------
+    ValueError
+        For an explanation without a fit.
 
     References
     ----------
@@ -179,13 +239,20 @@ class Selection:
     fit: MixedFit | None = None
     presence: np.ndarray = field(default_factory=lambda: np.empty(0))
     energy: np.ndarray = field(default_factory=lambda: np.empty(0))
-    chi_squared: np.ndarray | None = None
-    amplitude: np.ndarray | None = None
-    residual_power: np.ndarray | None = None
+    chi_squared: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
+    amplitude: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
+    residual_power: np.ndarray = field(default_factory=lambda: np.empty(0))
     whitening: np.ndarray = field(default_factory=lambda: np.ones(1))
     background: Background = field(default_factory=Background)
     failed_tests: dict = field(default_factory=dict)
     rival_modes: list = field(default_factory=list)
+
+    @property
+    def mode_fit(self) -> MixedFit:
+        """The fit of a selection that has modes; ValueError for one that has none."""
+        if self.fit is None:
+            raise ValueError("a selection without modes has no fit")
+        return self.fit
 
     @property
     def is_visible(self) -> np.ndarray:
@@ -193,7 +260,7 @@ class Selection:
         return self.chi_squared > chi2.isf(0.01, 2)
 
 
-def select_modes(decays, rate, settings) -> Selection:
+def select_modes(decays: np.ndarray, rate: float, settings: IdentifySettings) -> Selection:
     """Select modes: over-ordered realisations, candidate poles, maximum likelihood, and tests of each mode.
 
     The first explanation starts from poles that recur over the orders. If it leaves coloured noise or needs a drift,
@@ -206,6 +273,12 @@ def select_modes(decays, rate, settings) -> Selection:
     rate : float
         [Hz]
     settings : IdentifySettings
+        Limits of the tests, bands and orders.
+
+    Returns
+    -------
+    Selection
+        Its ``fit`` is None if there are no modes.
     """
     n = decays.shape[1]
     rows = hankel_rows(n)
@@ -243,7 +316,9 @@ def select_modes(decays, rate, settings) -> Selection:
     return result
 
 
-def _alternative_explanations(explanation, table, decays, rate, settings):
+def _alternative_explanations(
+    explanation: Explanation, table: Stabilisation, decays: np.ndarray, rate: float, settings: IdentifySettings
+) -> Iterator[Explanation]:
     """Explanations from the likeliest poles until one is not doubtful: without a drift, then with the one found."""
     hum, drift = explanation.background.hum, explanation.background.drift_degree
     for background, max_lists in ((Background(-1, hum), MAX_START_LISTS), (Background(drift, hum), 1))[
@@ -262,11 +337,23 @@ def _alternative_explanations(explanation, table, decays, rate, settings):
                     return
 
 
-def energy_shares(amplitude, theta) -> np.ndarray:
-    r"""Share of each mode in the sum of their energies, :math:`\sum_i |a_{im}|^2 / (4 \zeta \omega)`, (n_mode,).
+def energy_shares(amplitude: np.ndarray, theta: np.ndarray) -> np.ndarray:
+    r"""Share of each mode in the sum of their energies, :math:`\sum_i |a_{im}|^2 / (4 \zeta \omega)`.
 
-    ``amplitude`` (n_decay, n_mode) complex; ``theta`` (n_decay, n_mode, 2) holds ln f and damping.
+    Parameters
+    ----------
+    amplitude : (n_decay, n_mode) array of complex
+        Amplitudes at the start of the decays. [m/s²]
+    theta : (n_decay, n_mode, 2) array of float
+        Ln f [Hz] and zeta of each decay.
 
+    Returns
+    -------
+    (n_mode,) array of float
+        Share of each mode; their sum is 1.
+
+    Examples
+    --------
     >>> theta = np.array([[[np.log(100.0), 0.1], [np.log(400.0), 0.1]]])
     >>> energy_shares(np.array([[1.0 + 0j, 1.0]]), theta)
     array([0.8, 0.2])

@@ -3,7 +3,10 @@
 A second list of candidates comes from the order whose maximum likelihood fit to the mean decay is the likeliest.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +15,11 @@ from turnout.modal.least_squares import linearise
 from turnout.modal.mixed_effects import fit_common
 from turnout.modal.mode_tests import mode_chi_squared
 from turnout.modal.state_space import continuous_pole, modal_parameters
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from turnout.config.settings.identify import IdentifySettings
 
 MAX_POLE_RADIUS = 1.002  # factor per sample by which an oscillation may grow: a hum may seem to grow this much
 
@@ -45,19 +53,27 @@ class Candidate:
     members: np.ndarray
 
 
-def stabilisation(decays, rate, rows, order_maximum, starts=(0,)) -> Stabilisation:
-    r"""Oscillating poles of all decays together, for every even order up to ``order_maximum`` and every start.
+def stabilisation(
+    decays: np.ndarray, rate: float, rows: int, order_maximum: int, starts: Sequence[int] = (0,)
+) -> Stabilisation:
+    """Oscillating poles of all decays together, for every even order up to ``order_maximum`` and every start.
 
     All orders come from one decomposition for each start; see :func:`turnout.modal.era.subspaces`.
 
     Parameters
     ----------
     decays : (n_decay, n) array of float
+        Free decays. [m/s²]
     rate : float
         [Hz]
     rows, order_maximum : int
     starts : sequence of int
         Numbers of leading samples that are skipped.
+
+    Returns
+    -------
+    Stabilisation
+        One row per pole.
     """
     total = float(np.sum(decays**2))
     columns = []
@@ -77,7 +93,7 @@ def stabilisation(decays, rate, rows, order_maximum, starts=(0,)) -> Stabilisati
     return Stabilisation(starts_of, orders_of, frequency, damping, energy, emac, cells)
 
 
-def amplitude_coherence(shape, z, index) -> np.ndarray:
+def amplitude_coherence(shape: np.ndarray, z: np.ndarray, index: np.ndarray) -> np.ndarray:
     r"""Extended modal amplitude coherence of each mode after one decay time, 0 to 1.
 
     .. math:: \mathrm{EMAC} = \min(|r|, |r|^{-1}) \, \max\left(0, 1 - \frac{|\arg r|}{\pi/4}\right), \quad
@@ -88,8 +104,14 @@ def amplitude_coherence(shape, z, index) -> np.ndarray:
     shape : (n_row, n_mode) array of complex
         Observability of each mode along the rows of the Hankel matrix.
     z : (n_mode,) array of complex
+        Poles of the sampled system.
     index : (n_row,) array of int
         Samples at which the rows begin.
+
+    Returns
+    -------
+    (n_mode,) array of float
+        Coherence of each mode.
 
     References
     ----------
@@ -113,7 +135,7 @@ def amplitude_coherence(shape, z, index) -> np.ndarray:
     return np.minimum(size, 1.0 / np.maximum(size, 1e-300)) * turned
 
 
-def _energy(amplitude, z, n):
+def _energy(amplitude: np.ndarray, z: np.ndarray, n: int) -> np.ndarray:
     """Energy of each pole over ``n`` samples, all decays together."""
     square = np.minimum(np.abs(z) ** 2, 1.0 - 1e-12)
     return (np.abs(amplitude) ** 2).sum(axis=1) * (1.0 - square**n) / (2.0 * (1.0 - square))
@@ -124,6 +146,20 @@ def candidates(table: Stabilisation, tolerance: float, damping_maximum: float) -
 
     Two poles are one mode if they are closer than ``tolerance`` times their magnitude. ``presence`` is the share of the
     pairs of order and start that have the pole, from the lowest order on at which the group occurs.
+
+    Parameters
+    ----------
+    table : Stabilisation
+        Poles over orders and starts.
+    tolerance : float
+        Distance of two poles relative to their magnitude, below which they are one mode.
+    damping_maximum : float
+        Damping ratio from which a pole is ignored.
+
+    Returns
+    -------
+    list of Candidate
+        Groups, also those that occur only once.
     """
     plausible = (table.damping > 0.0) & (table.damping < damping_maximum)
     pole = np.full(len(table.frequency), np.nan, dtype=complex)
@@ -152,7 +188,7 @@ def candidates(table: Stabilisation, tolerance: float, damping_maximum: float) -
     return sorted(groups, key=lambda c: -c.energy)
 
 
-def _largest_group(pole, ungrouped, tolerance, table):
+def _largest_group(pole: np.ndarray, ungrouped: np.ndarray, tolerance: float, table: Stabilisation) -> np.ndarray:
     """Ungrouped poles near the one with the most neighbours; in a tie that of the most energetic."""
     index = np.flatnonzero(ungrouped)
     distance = np.abs(pole[index, None] - pole[None, index])
@@ -168,8 +204,15 @@ MIN_ORDER = 8  # lowest model order whose poles are fitted
 DAMPING_RANGE = (2e-3, 0.9)  # damping ratios of usable poles
 
 
-def likely_poles(table: Stabilisation, decays, rate: float, columns, settings, max_lists=1) -> list[list[Candidate]]:
-    """Up to ``max_lists`` lists of candidates: each has the poles of one order, the likeliest list first.
+def likely_poles(
+    table: Stabilisation,
+    decays: np.ndarray,
+    rate: float,
+    columns: np.ndarray,
+    settings: IdentifySettings,
+    max_lists: int = 1,
+) -> list[list[Candidate]]:
+    """Up to ``max_lists`` lists of candidates: each has the poles of one order.
 
     These poles need not recur. The leading right singular vector of the decays is their weighted mean: as long as one
     decay, with the noise of one and the signal of all. It is fitted by maximum likelihood from the poles of each order.
@@ -178,12 +221,22 @@ def likely_poles(table: Stabilisation, decays, rate: float, columns, settings, m
     Parameters
     ----------
     table : Stabilisation
+        Poles over orders and starts.
     decays : (n_decay, n) array of float
+        Free decays. [m/s²]
     rate : float
         [Hz]
     columns : (n_column, n) array of float
         Columns of the background.
     settings : IdentifySettings
+        Settings of the identification.
+    max_lists : int
+        Largest number of lists.
+
+    Returns
+    -------
+    list of lists of Candidate
+        The likeliest list first.
     """
     _, size, shape = np.linalg.svd(decays, full_matrices=False)
     shared = size[:1, None] * shape[:1]
@@ -202,7 +255,9 @@ def likely_poles(table: Stabilisation, decays, rate: float, columns, settings, m
     ]
 
 
-def _as_candidates(poles, shared, rate, columns, n_pole):
+def _as_candidates(
+    poles: np.ndarray, shared: np.ndarray, rate: float, columns: np.ndarray, n_pole: int
+) -> list[Candidate]:
     linearisation = linearise(poles[None], shared, rate, columns)
     share = np.abs(linearisation.amplitude[0]) ** 2 / (poles[:, 1] * np.exp(poles[:, 0]))
     return [
@@ -211,7 +266,7 @@ def _as_candidates(poles, shared, rate, columns, n_pole):
     ]
 
 
-def _prune_poles(theta, shared, rate, columns):
+def _prune_poles(theta: np.ndarray, shared: np.ndarray, rate: float, columns: np.ndarray) -> tuple[float, np.ndarray]:
     """(criterion, modes) at which dropping the least significant mode no longer reduces the criterion."""
     n = shared.size
     lowest_criterion, poles = np.inf, theta[:0]

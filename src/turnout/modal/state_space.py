@@ -7,14 +7,28 @@ Convert between the poles of a sampled system and frequencies and damping ratios
 Fit of each held-out impact by the modes of the other impacts, and the fit of random modes to compare with.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
 
 from turnout.modal.least_squares import drift_columns, linearise, powers
 from turnout.records import ModalModel, Rejection
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from typing import Any
 
-def modal_parameters(pole, rate):
+    from numpy.typing import ArrayLike
+
+    from turnout.config.settings.identify import IdentifySettings
+    from turnout.modal.summary import ImpactEstimates
+    from turnout.records import Mode
+
+
+def modal_parameters(pole: ArrayLike, rate: float) -> tuple[np.ndarray, np.ndarray]:
     r"""Undamped natural frequency and damping ratio of discrete poles.
 
     .. math:: s = f_s \ln z, \quad f_n = |s| / 2\pi, \quad \zeta = -\mathrm{Re}(s) / |s|
@@ -50,13 +64,30 @@ def modal_parameters(pole, rate):
     return magnitude / (2.0 * np.pi), damping
 
 
-def continuous_pole(frequency, damping):
-    r"""Pole in the upper half plane of an underdamped mode. [1/s]
+def continuous_pole(frequency: ArrayLike, damping: ArrayLike) -> np.ndarray:
+    r"""Pole in the upper half plane of an underdamped mode.
 
     .. math:: s = 2\pi f_n (-\zeta + i\sqrt{1-\zeta^2})
 
-    ``frequency`` [Hz] and ``damping`` (below 1, else ValueError) of any matching shape.
+    Parameters
+    ----------
+    frequency : float or array
+        Undamped natural frequency. [Hz]
+    damping : float or array
+        Damping ratio, below 1 in magnitude, broadcast against ``frequency``.
 
+    Returns
+    -------
+    (...) array of complex
+        Pole s. [1/s]
+
+    Raises
+    ------
+    ValueError
+        For a damping ratio of 1 or more.
+
+    Examples
+    --------
     >>> s = continuous_pole(1.0 / (2.0 * np.pi), 0.6)
     >>> print(f"{s:.1f}")
     -0.6+0.8j
@@ -67,9 +98,30 @@ def continuous_pole(frequency, damping):
     return 2.0 * np.pi * np.asarray(frequency) * (-damping + 1j * np.sqrt(1.0 - damping**2))
 
 
-def discrete_pole(frequency, damping, rate):
+def discrete_pole(frequency: ArrayLike, damping: ArrayLike, rate: float) -> np.ndarray:
     r"""Pole of the sampled mode, :math:`z = \exp(s / f_s)`; the inverse of :func:`modal_parameters`.
 
+    Parameters
+    ----------
+    frequency : float or array
+        Undamped natural frequency. [Hz]
+    damping : float or array
+        Damping ratio, below 1 in magnitude.
+    rate : float
+        Sampling rate. [Hz]
+
+    Returns
+    -------
+    (...) array of complex
+        Pole z.
+
+    Raises
+    ------
+    ValueError
+        For a damping ratio of 1 or more.
+
+    Examples
+    --------
     >>> f, zeta = modal_parameters(discrete_pole(99.45, 0.2912, 20e3), 20e3)
     >>> print(f"{f:.2f} Hz, {zeta:.4f}")
     99.45 Hz, 0.2912
@@ -77,10 +129,20 @@ def discrete_pole(frequency, damping, rate):
     return np.exp(continuous_pole(frequency, damping) / rate)
 
 
-def fit_percent(measured, residual) -> np.ndarray:
-    r"""Fit of each decay, :math:`100 (1 - \|a - \hat a\| / \|a - \bar a\|)`. [%]
+def fit_percent(measured: np.ndarray, residual: np.ndarray) -> np.ndarray:
+    r"""Fit of each decay, :math:`100 (1 - \|a - \hat a\| / \|a - \bar a\|)`.
 
-    ``measured`` and ``residual`` are (n_decay, n); nan for a constant decay.
+    Parameters
+    ----------
+    measured : (n_decay, n) array of float
+        Measured decays.
+    residual : (n_decay, n) array of float
+        Measured minus modelled decays.
+
+    Returns
+    -------
+    (n_decay,) array of float
+        Fit of each decay, nan for a constant one. [%]
 
     References
     ----------
@@ -96,10 +158,22 @@ def fit_percent(measured, residual) -> np.ndarray:
         return np.where(centred > 0.0, 100.0 * (1.0 - np.linalg.norm(residual, axis=-1) / centred), np.nan)
 
 
-def held_out_fit(theta, decays, rate) -> np.ndarray:
-    """Fit of each decay with the mean modes of all other decays, amplitudes refitted. [%]
+def held_out_fit(theta: np.ndarray, decays: np.ndarray, rate: float) -> np.ndarray:
+    """Fit of each decay with the mean modes of all other decays, amplitudes refitted.
 
-    ``theta`` (n_decay, n_mode, 2) holds ln f [Hz] and zeta of each decay. A single decay gives nan.
+    Parameters
+    ----------
+    theta : (n_decay, n_mode, 2) array of float
+        Ln f [Hz] and zeta of each decay.
+    decays : (n_decay, n) array of float
+        Free decays. [m/s²]
+    rate : float
+        Sampling rate. [Hz]
+
+    Returns
+    -------
+    (n_decay,) array of float
+        Fit, nan for a single decay. [%]
     """
     n = len(decays)
     if n < 2:
@@ -109,11 +183,31 @@ def held_out_fit(theta, decays, rate) -> np.ndarray:
     return fit_percent(decays, linearise(mean_modes, decays, rate, drift_columns(decays.shape[1], -1)).residual)
 
 
-def random_mode_fits(decays, rate, bands, draws: int, seed: int = 20171001) -> np.ndarray:
-    """Median fit over the decays for ``draws`` random mode sets, one mode in each band; (draws,). [%]
+def random_mode_fits(
+    decays: np.ndarray, rate: float, bands: Sequence[tuple[float, float]], draws: int, seed: int = 20171001
+) -> np.ndarray:
+    """Median fit over the decays for random mode sets, one mode in each band.
 
-    Frequencies are uniform in the logarithm within ``bands`` ((low, high) [Hz] each), damping ratios uniform
-    from 0.02 to 0.3. Amplitudes are fitted like those of the real modes: this is the fit that free amplitudes give.
+    Frequencies are uniform in the logarithm within the bands, damping ratios uniform from 0.02 to 0.3. Amplitudes are
+    fitted like those of the real modes: this is the fit that free amplitudes give.
+
+    Parameters
+    ----------
+    decays : (n_decay, n) array of float
+        Free decays. [m/s²]
+    rate : float
+        Sampling rate. [Hz]
+    bands : sequence of (float, float)
+        Lowest and highest frequency of each band. [Hz]
+    draws : int
+        Number of mode sets.
+    seed : int
+        Seed of the draws.
+
+    Returns
+    -------
+    (draws,) array of float
+        Median fit of each draw. [%]
     """
     rng = np.random.default_rng(seed)
     low, high = np.log(np.array(bands, dtype=float)).T
@@ -175,8 +269,23 @@ def balanced_pair(pole: complex, residue: complex) -> tuple[np.ndarray, np.ndarr
     return a, c * (1.0, -1.0), c
 
 
-def block_model(poles, residues) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A block-diagonal, b and c of several modes in turn: (2m, 2m), (2m,), (2m,)."""
+def block_model(
+    poles: Sequence[complex] | Sequence[np.ndarray] | np.ndarray, residues: Sequence[complex] | np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Block-diagonal state matrix of several modes in turn.
+
+    Parameters
+    ----------
+    poles : (m,) array of complex
+        Poles in the upper half plane, inside the unit circle.
+    residues : (m,) array of complex
+        Residue of each pole, not 0.
+
+    Returns
+    -------
+    (2m, 2m), (2m,) and (2m,) arrays of float
+        State matrix, input and output vector.
+    """
     order = 2 * len(poles)
     a, b, c = np.zeros((order, order)), np.zeros(order), np.zeros(order)
     for i, (pole, residue) in enumerate(zip(poles, residues, strict=True)):
@@ -186,18 +295,18 @@ def block_model(poles, residues) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def assemble(
-    estimates,
-    modes,
-    residues,
-    validation_set,
+    estimates: Sequence[ImpactEstimates],
+    modes: tuple[Mode, ...],
+    residues: np.ndarray,
+    validation_set: tuple[np.ndarray, np.ndarray],
     rate: float,
-    settings,
+    settings: IdentifySettings,
     *,
-    method,
-    status,
-    diagnostics,
-    scale,
-    **model_fields,
+    method: str,
+    status: str,
+    diagnostics: dict[str, Any],
+    scale: str,
+    **model_fields: Any,
 ) -> ModalModel:
     """Modal model of one section.
 
@@ -214,8 +323,22 @@ def assemble(
     rate : float
         [Hz]
     settings : IdentifySettings
+        Bands, and number of random mode sets.
+    method : str
+        Name of the method, "joint" or "paper".
+    status : str
+        "accepted" or "second_order_only".
+    diagnostics : dict
+        Diagnostics of the fit, to which those of the model are added.
+    scale : str
+        What the residues are the response to, with their unit.
     model_fields
         ``rejections``, ``rejected_modes``, ``stabilisation`` of the model.
+
+    Returns
+    -------
+    ModalModel
+        The model, with its fits in ``diagnostics``.
     """
     a, b, c = block_model([discrete_pole(m.frequency, m.damping, rate) for m in modes], residues)
     theta, records = validation_set
@@ -244,15 +367,51 @@ def assemble(
     )
 
 
-def no_model(rate, method, rejections, diagnostics, **extras) -> ModalModel:
-    """A rejected model, with its reasons."""
+def no_model(
+    rate: float, method: str, rejections: tuple[Rejection, ...], diagnostics: dict[str, Any], **extras: Any
+) -> ModalModel:
+    """A rejected model, with its reasons.
+
+    Parameters
+    ----------
+    rate : float
+        Sampling rate. [Hz]
+    method : str
+        Name of the method.
+    rejections : tuple of Rejection
+        Reasons.
+    diagnostics : dict
+        Diagnostics of the fit.
+    **extras : Any
+        Further fields of ``ModalModel``.
+
+    Returns
+    -------
+    ModalModel
+        Model of order 0.
+    """
     empty = np.empty(0)
     return ModalModel(
         np.empty((0, 0)), empty, empty, rate, (), method, "rejected", rejections, diagnostics=diagnostics, **extras
     )
 
 
-def no_decays(rate, method, dropped) -> ModalModel:
-    """A rejected model without a usable decay; ``dropped`` are (impact, Rejection)."""
+def no_decays(rate: float, method: str, dropped: Sequence[tuple[int, Rejection]]) -> ModalModel:
+    """A rejected model without a usable decay.
+
+    Parameters
+    ----------
+    rate : float
+        Sampling rate. [Hz]
+    method : str
+        Name of the method.
+    dropped : sequence of (int, Rejection)
+        Number of each impact, and why its decay is not usable.
+
+    Returns
+    -------
+    ModalModel
+        Model of order 0.
+    """
     rejection = Rejection("not_identified", 0, 1, "no decay is long enough" if dropped else "no decays")
     return no_model(rate, method, (rejection, *(r for _, r in dropped)), {"dropped_impacts": tuple(dropped)})

@@ -22,7 +22,7 @@ class Summary:
     n: int
 
 
-def summarise(value, se, confidence: float = 0.95, shared_se: float = 0.0) -> Summary:
+def summarise(value: np.ndarray, se: np.ndarray, confidence: float = 0.95, shared_se: float = 0.0) -> Summary:
     r"""Random-effects mean of estimates that each have a standard error.
 
     .. math:: m = \frac{\sum w_i x_i}{\sum w_i}, \quad w_i = \frac{1}{s_i^2 + \tau^2}, \quad
@@ -37,8 +37,19 @@ def summarise(value, se, confidence: float = 0.95, shared_se: float = 0.0) -> Su
     value, se : (n,) array of float
         Estimates and standard errors, same unit; ValueError if there are none.
     confidence : float
+        Probability of the interval.
     shared_se : float
         Standard error that all estimates share, such as that of the choice of a model. The spread does not show it.
+
+    Returns
+    -------
+    Summary
+        Mean with error, interval and spread.
+
+    Raises
+    ------
+    ValueError
+        If there are no estimates.
 
     References
     ----------
@@ -108,6 +119,16 @@ class ImpactEstimates:
 
         The weights follow the strength of each impact, not its stated error. The error of a noisy impact depends on
         its estimate, so weighting by it would bias the mean.
+
+        Parameters
+        ----------
+        confidence : float
+            Probability of the intervals.
+
+        Returns
+        -------
+        Mode
+            The mode with errors and intervals.
         """
         error = np.median(self.error * self.strength[:, None], axis=0) / self.strength[:, None]
         error = np.nan_to_num(error, nan=MIN_ERROR) if len(error) > 1 else error
@@ -133,11 +154,13 @@ class ImpactEstimates:
         )
 
 
-def _none_if_nan(value) -> float | None:
+def _none_if_nan(value: float) -> float | None:
     return None if np.isnan(value) else float(value)
 
 
-def cramer_rao_bound(theta, decays, rate, sigma2, columns=None):
+def cramer_rao_bound(
+    theta: np.ndarray, decays: np.ndarray, rate: float, sigma2: float | np.ndarray, columns: np.ndarray | None = None
+) -> np.ndarray:
     r"""Smallest standard errors that any unbiased estimator can have: poles shared, amplitudes free in each decay.
 
     .. math:: \mathrm{cov} \ge \sigma^2 \left(\sum_i J_i^T J_i\right)^{-1}
