@@ -5,7 +5,22 @@ import os
 
 
 def sha256_of(path: os.PathLike | str) -> str:
-    """sha256 of a file's bytes, 64 hexadecimal digits; OSError if it is absent or not readable.
+    """sha256 of the bytes of a file.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+
+    Returns
+    -------
+    str
+        64 hexadecimal digits.
+
+    Raises
+    ------
+    OSError
+        If it is absent or not readable.
 
     Examples
     --------

@@ -1,6 +1,8 @@
 """Exceptions of the program. Each message tells a track engineer what to do next."""
 
 import errno
+from collections.abc import Iterable, Sequence
+from os import PathLike
 
 
 class TurnoutError(Exception):
@@ -31,7 +33,7 @@ class ReadError(TurnoutError):
     A7_1.uff, record 7 of 30: ends after 1312 of 4096 samples. Copy the file again.
     """
 
-    def __init__(self, path, where, problem, remedy, reason="unreadable"):
+    def __init__(self, path: PathLike | str, where: str, problem: str, remedy: str, reason: str = "unreadable"):
         super().__init__(f"{path}, {where}: {problem}. {remedy}.")
         if reason not in REASONS:
             raise ValueError(f"reason {reason!r} is not in turnout.errors.REASONS")
@@ -42,9 +44,16 @@ class PartlyComputed(Exception):
     """The program failed on some records of a unit; ``tables`` holds the rows of all other records.
 
     ``faults`` holds (path, record from 0, exception) of each record that could not be computed.
+
+    Parameters
+    ----------
+    tables : dict of str to list of dict
+        Rows of the other records, by table.
+    faults : sequence of tuple of (str, int, Exception)
+        Path, record from 0, and exception of each record that could not be computed.
     """
 
-    def __init__(self, tables, faults):
+    def __init__(self, tables: dict[str, list[dict]], faults: Sequence[tuple[str, int, Exception]]):
         path, record, error = faults[0]
         super().__init__(f"{path}, record {record + 1}: {type(error).__name__}: {error}")
         self.tables, self.faults = tables, faults
@@ -54,17 +63,34 @@ class ConfigError(TurnoutError):
     """A configuration file contains something that cannot be used.
 
     ``place`` is "line 12, column 5" or the key; ``remedy`` is what to write instead.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    place : str
+        "line 12, column 5", or the key.
+    problem : str
+        What is wrong there.
+    remedy : str
+        What to write instead: a sentence without its full stop.
     """
 
-    def __init__(self, path, place, problem, remedy):
+    def __init__(self, path: PathLike | str, place: str, problem: str, remedy: str):
         super().__init__(f"{path}, {place}: {problem}. {remedy}.")
         self.path, self.place, self.problem, self.remedy = str(path), place, problem, remedy
 
 
 class ConfigErrors(TurnoutError):
-    """All configuration errors of one pass; ``errors`` is their list."""
+    """All configuration errors of one pass; ``errors`` is their list.
 
-    def __init__(self, errors):
+    Parameters
+    ----------
+    errors : iterable of Exception
+        The errors, in the order of the message.
+    """
+
+    def __init__(self, errors: Iterable[Exception]):
         super().__init__("\n".join(str(e) for e in errors))
         self.errors = list(errors)
 
@@ -84,16 +110,39 @@ SYSTEM_ERRNOS = {errno.ENOSPC, errno.EDQUOT, errno.EMFILE, errno.ENFILE}
 
 
 def is_infrastructure(error: BaseException) -> bool:
-    """Whether ``error`` is a fault of the machine or the network, not of the data of the unit."""
+    """Whether an exception is a fault of the machine or the network, not of the data of the unit.
+
+    Parameters
+    ----------
+    error : BaseException
+        Any exception.
+
+    Returns
+    -------
+    bool
+        True also for faults that end the whole job, such as a full disk.
+    """
     return is_transient(error) or (isinstance(error, OSError) and error.errno in SYSTEM_ERRNOS)
 
 
 def is_transient(error: BaseException) -> bool:
-    """Whether ``error`` is a transient fault: its unit is left for the next run while the other units continue.
+    """Whether an exception is a transient fault: its unit is left for the next run while the other units continue.
 
     Examples are a bad sector, a server that does not answer, a file without read permission, and too little free
     memory.
 
+    Parameters
+    ----------
+    error : BaseException
+        Any exception.
+
+    Returns
+    -------
+    bool
+        True for a fault that concerns one file.
+
+    Examples
+    --------
     >>> [is_transient(OSError(code, "")) for code in (errno.EIO, errno.ENOSPC)]
     [True, False]
     """

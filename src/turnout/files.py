@@ -11,11 +11,24 @@ import secrets
 import stat
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 
 def temporary_path(path: Path) -> Path:
     """Hidden name in the folder of ``path`` for an unfinished file; no other process or machine uses it.
 
+    Parameters
+    ----------
+    path : Path
+        File that is going to be written.
+
+    Returns
+    -------
+    Path
+        A new path at each call.
+
+    Examples
+    --------
     >>> name = temporary_path(Path("pages/a.html"))
     >>> name.parent.name, name.name.startswith(".a.html."), name.suffix, name == temporary_path(Path("pages/a.html"))
     ('pages', True, '.tmp', False)
@@ -23,10 +36,23 @@ def temporary_path(path: Path) -> Path:
     return path.with_name(f".{path.name}.{secrets.token_hex(6)}.tmp")
 
 
-def write_atomic(path: os.PathLike, write: Callable) -> None:
-    """Call ``write(stream)`` on a temporary file in the same folder, flush it to the disk, then rename it to ``path``.
+def write_atomic(path: os.PathLike | str, write: Callable) -> None:
+    """Write a file in one step.
 
-    An existing file keeps its permissions. If ``write`` or the disk fails (OSError), it keeps its content as well.
+    The content is written to a temporary file in the same folder, flushed to the disk, then renamed. An existing file
+    keeps its permissions. If ``write`` or the disk fails, it keeps its content as well.
+
+    Parameters
+    ----------
+    path : path-like
+        File to write; its folder is created.
+    write : callable
+        Called with the binary stream of the temporary file.
+
+    Raises
+    ------
+    OSError
+        If the disk fails or is full.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -44,21 +70,59 @@ def write_atomic(path: os.PathLike, write: Callable) -> None:
 
 
 def changed_at(path: Path) -> int:
-    """Time of change of a file [ns since 1970], 0 if there is none."""
+    """Time of change of a file [ns since 1970], 0 if there is none.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    int
+        Time in nanoseconds.
+    """
     try:
         return path.stat().st_mtime_ns
     except (FileNotFoundError, NotADirectoryError):
         return 0
 
 
-def write_text(path: os.PathLike, text: str) -> None:
-    """Atomic write of UTF-8 text."""
+def write_text(path: os.PathLike | str, text: str) -> None:
+    """Atomic write of UTF-8 text.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    text : str
+        Its new content.
+
+    Raises
+    ------
+    OSError
+        If the disk fails or is full.
+    """
     write_atomic(path, lambda stream: stream.write(text.encode()))
 
 
-def write_if_changed(path: os.PathLike, text: str) -> bool:
+def write_if_changed(path: os.PathLike | str, text: str) -> bool:
     """Write ``text`` unless it is already the content; so the file's time is that of its last change.
 
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    text : str
+        Its new content.
+
+    Returns
+    -------
+    bool
+        Whether it was written.
+
+    Examples
+    --------
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     write_if_changed(f"{folder}/plan", "a"), write_if_changed(f"{folder}/plan", "a")
@@ -71,8 +135,21 @@ def write_if_changed(path: os.PathLike, text: str) -> bool:
     return True
 
 
-def is_truncated(path: os.PathLike, end: str) -> bool:
-    """Whether an existing file lacks its last line ``end``; only the end of the file is read."""
+def is_truncated(path: os.PathLike | str, end: str) -> bool:
+    """Whether an existing file lacks its last line ``end``; only the end of the file is read.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    end : str
+        Last line of a complete file.
+
+    Returns
+    -------
+    bool
+        False if there is no such file.
+    """
     try:
         with open(path, "rb") as stream:
             stream.seek(max(0, stream.seek(0, os.SEEK_END) - len(end.encode())))
@@ -81,8 +158,21 @@ def is_truncated(path: os.PathLike, end: str) -> bool:
         return False
 
 
-def read_json(path: os.PathLike, default):
-    """Content of a JSON file of ``work/``; ``default`` if it is absent, or (with a warning) if it is truncated."""
+def read_json(path: os.PathLike | str, default: Any) -> Any:
+    """Content of a JSON file of ``work/``.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    default : any
+        Result for a file that is absent, or (with a warning) truncated.
+
+    Returns
+    -------
+    any
+        The content, or ``default``.
+    """
     try:
         return json.loads(Path(path).read_text(encoding="utf-8"))
     except FileNotFoundError:

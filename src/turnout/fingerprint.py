@@ -11,14 +11,30 @@ WITHOUT_RESULTS = frozenset({"turnout.plots"})  # drawings for people: no result
 
 
 def fingerprint(*modules: str) -> str:
-    """16 hexadecimal characters over the syntax trees of ``modules`` and of all that they import from this package.
+    """Hash of the syntax trees of modules and of all that they import from this package.
 
-    Imports inside functions count. Those under ``if TYPE_CHECKING:`` never run and do not count. A package counts if it
-    is itself imported from, and ``import_module(f"turnout.readers.{name}")`` counts as every module of
-    ``turnout.readers``. Data files (CSV, SQL) in the folder of an imported module count by their bytes. A folder
-    without modules (templates, SQL) counts for the modules that name it in a string. ValueError for a
-    module that does not exist.
+    Imports inside functions count. A package counts if it is itself imported from, and
+    ``import_module(f"turnout.readers.{name}")`` counts as every module of ``turnout.readers``. Data files (CSV, SQL) in
+    the folder of an imported module count by their bytes. A folder without modules (templates, SQL) counts for the
+    modules that name it in a string.
 
+    Parameters
+    ----------
+    *modules : str
+        Names such as "turnout.modal".
+
+    Returns
+    -------
+    str
+        16 hexadecimal digits.
+
+    Raises
+    ------
+    ValueError
+        For a module that does not exist.
+
+    Examples
+    --------
     >>> fingerprint("turnout.errors") == fingerprint("turnout.errors")
     True
     >>> fingerprint("turnout.errors") == fingerprint("turnout.records")
@@ -30,7 +46,23 @@ def fingerprint(*modules: str) -> str:
 
 
 def closure(*modules: str) -> frozenset[str]:
-    """Names of ``modules`` and of every module of this package that they import, directly or not."""
+    """Names of ``modules`` and of every module of this package that they import, directly or not.
+
+    Parameters
+    ----------
+    *modules : str
+        Names such as "turnout.modal".
+
+    Returns
+    -------
+    frozenset of str
+        Names, those of ``modules`` included.
+
+    Raises
+    ------
+    ValueError
+        For a module that does not exist.
+    """
     names, queue = set(), list(modules)
     for name in modules:
         if _module_path(name) is None:
@@ -98,7 +130,7 @@ def _data_in_folder(folder: Path) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
     return tuple(p for p in entries if p.suffix in (".csv", ".sql")), tuple(folders)
 
 
-def _has_docstring(node) -> bool:
+def _has_docstring(node: ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
     first = node.body[0] if node.body else None
     return isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant) and isinstance(first.value.value, str)
 

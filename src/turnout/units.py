@@ -132,9 +132,22 @@ class Conversion:
 
 
 def conversion(unit: str) -> Conversion:
-    """Conversion of numbers in ``unit`` to SI; a leading factor is the value of one step or of full scale.
+    """Conversion of numbers in a unit to SI; a leading factor is the value of one step or of full scale.
 
-    ValueError for a unit that is not in the table. "µ" may be either of its two code points.
+    Parameters
+    ----------
+    unit : str
+        Unit as a file or layout writes it; "µ" may be either of its two code points.
+
+    Returns
+    -------
+    Conversion
+        Dimension, scale and offset.
+
+    Raises
+    ------
+    ValueError
+        For a unit that is not in the table.
 
     Examples
     --------
@@ -207,7 +220,7 @@ def to_si(quantity: str, unit: str, sensitivity: float | None = None, sensitivit
     raise ValueError(f"a sensitivity in {sensitivity_unit!r} does not lead from {unit!r} to {SI[quantity]!r}")
 
 
-def _split_fraction(unit):
+def _split_fraction(unit: str) -> tuple[Conversion, Conversion]:
     """Numerator and denominator of a unit: "mV/(m/s²)" -> voltage, acceleration; "m/s²/V" -> acceleration, voltage."""
     text = unit.strip()
     for numerator, _, denominator in (text.partition("/"), text.rpartition("/")):
@@ -218,6 +231,6 @@ def _split_fraction(unit):
     raise ValueError(f"the sensitivity's unit {unit!r} is not of the form mV/N, mV/(m/s²), N/count")
 
 
-def _strip_brackets(text):
+def _strip_brackets(text: str) -> str:
     text = text.strip()
     return text[1:-1] if text.startswith("(") and text.endswith(")") else text

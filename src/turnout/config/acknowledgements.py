@@ -1,16 +1,22 @@
 """Reader of config/acknowledgements.csv: who has seen an alarm, or suppresses it until a date, and why."""
 
+from __future__ import annotations
+
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from datetime import timedelta
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from turnout.config.csv_table import TableError, read_csv, row_problem
 from turnout.config.events import now, parse_utc, time_problem, turnout_problems
 from turnout.config.schema import suggestion
 from turnout.errors import ConfigError
+
+if TYPE_CHECKING:
+    from turnout.config.merge import Variant
 
 COLUMNS = ("turnout", "section", "band", "action", "by", "at", "until", "reason")
 ACTIONS = ("acknowledge", "suppress")
@@ -18,13 +24,30 @@ BANDS = ("ballast", "railpad", "amplitude")
 
 
 def read_acknowledgements(
-    path: Path, name: str = "acknowledgements.csv", turnout_ids=None, variants: Mapping | None = None
+    path: Path,
+    name: str = "acknowledgements.csv",
+    turnout_ids: Collection[str] | None = None,
+    variants: Mapping[str, Variant] | None = None,
 ) -> tuple[list[dict], list[ConfigError]]:
-    """Valid rows as rows of the table ``acknowledgements``, and every error of the other rows.
+    """Read config/acknowledgements.csv; without the file there are no rows.
 
-    Without the file there are no rows. Empty ``section`` or ``band`` mean all of the turnout; section "*"
-    is its median. ``turnout_ids`` and ``variants`` are the turnouts and their configuration; None: neither turnout nor
-    section is checked.
+    Empty ``section`` or ``band`` mean all of the turnout; section "*" is its median.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    name : str
+        What errors call the file.
+    turnout_ids : collection of str or None
+        Ids of the turnouts; None: neither turnout nor section is checked.
+    variants : mapping of str to Variant or None
+        Merged configuration by turnout; turnouts without one are not checked for sections.
+
+    Returns
+    -------
+    tuple of (list of dict, list of ConfigError)
+        Valid rows as rows of the table ``acknowledgements``, and every error of the other rows.
     """
     if not os.path.lexists(path):
         return [], []
@@ -44,8 +67,25 @@ def read_acknowledgements(
     return rows, errors
 
 
-def row_problems(cells: Mapping, turnout_ids, variants) -> Iterator[tuple[str, str, str]]:
-    """(column, problem, remedy) of every error in a row."""
+def row_problems(
+    cells: Mapping, turnout_ids: Collection[str] | None, variants: Mapping[str, Variant]
+) -> Iterator[tuple[str, str, str]]:
+    """Every error in a row of acknowledgements.csv.
+
+    Parameters
+    ----------
+    cells : mapping
+        Text of a row by column.
+    turnout_ids : collection of str or None
+        Ids of the turnouts; None: neither turnout nor section is checked.
+    variants : mapping of str to Variant
+        Merged configuration by turnout; turnouts without one are not checked for sections.
+
+    Yields
+    ------
+    tuple of (str, str, str)
+        Column, problem and remedy.
+    """
     values = {column: cells.get(column, "") for column in COLUMNS}
     if line_problem := row_problem(cells):
         yield line_problem
@@ -78,7 +118,18 @@ def row_problems(cells: Mapping, turnout_ids, variants) -> Iterator[tuple[str, s
 
 
 def acknowledgement_row(cells: Mapping) -> dict:
-    """The row of the table ``acknowledgements`` for a valid row of the file."""
+    """The row of the table ``acknowledgements`` for a valid row of the file.
+
+    Parameters
+    ----------
+    cells : mapping
+        Text of a valid row by column.
+
+    Returns
+    -------
+    dict
+        Row of the table ``acknowledgements``, with its id.
+    """
     values = {column: cells.get(column, "") for column in COLUMNS}
     section = values["section"]
     if section and section != "*" and "/" not in section:

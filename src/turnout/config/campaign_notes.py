@@ -18,9 +18,19 @@ TRAIN_RANGES = {"speed_kmh": (1, 400), "axle_load_t": (0.1, 60), "n_axles": (1, 
 
 
 def read_campaigns(path: Path, name: str) -> tuple[dict[str, Campaign], list[ReadError]]:
-    """Campaigns by date, and an error for each row that cannot be used. Without the file there are none.
+    """Read campaigns.csv; without the file there are no campaigns.
 
-    The temperature of a campaign is None if its cell is empty.
+    Parameters
+    ----------
+    path : Path
+        The file.
+    name : str
+        What errors call the file.
+
+    Returns
+    -------
+    tuple of (dict of str to Campaign, list of ReadError)
+        Campaigns by date, their temperature None if its cell is empty; and an error for each row that cannot be used.
     """
     campaigns: dict[str, Campaign] = {}
 
@@ -41,19 +51,40 @@ class Campaigns(Frozen):
     ('2024-05-13T12:00:00', False)
     """
 
-    def __getitem__(self, date):
+    def __getitem__(self, date: str) -> Campaign:
         return self._values[date] if date in self._values else unlisted_campaign(date)
 
 
 def unlisted_campaign(date: str) -> Campaign:
-    """A campaign that is not in campaigns.csv: it starts at noon of its day and has no other data."""
+    """A campaign that is not in campaigns.csv: it starts at noon of its day and has no other data.
+
+    Parameters
+    ----------
+    date : str
+        Day of the campaign, YYYY-MM-DD.
+
+    Returns
+    -------
+    Campaign
+        The campaign, with ``listed`` False.
+    """
     return Campaign(date, datetime.fromisoformat(date + "T12:00"), listed=False)
 
 
 def read_trains(path: Path, name: str) -> tuple[tuple[dict[str, str], ...], list[ReadError]]:
-    """Rows of trains.csv as text, in the order of the file, and an error for each row that cannot be used.
+    """Read trains.csv, additional columns included; without the file there are no rows.
 
-    Additional columns are read too. Without the file there are no rows.
+    Parameters
+    ----------
+    path : Path
+        The file.
+    name : str
+        What errors call the file.
+
+    Returns
+    -------
+    tuple of (tuple of dict of str to str, list of ReadError)
+        Rows as text in the order of the file, and an error for each row that cannot be used.
     """
     trains: list[Cells] = []
 
@@ -75,7 +106,14 @@ class _CellError(Exception):
     """A cell that cannot be used: (column, problem, remedy)."""
 
 
-def _read_rows(path, name, titles, n_required, add_row: Callable[[Cells], None], allow_others=False) -> list[ReadError]:
+def _read_rows(
+    path: Path,
+    name: str,
+    titles: tuple[str, ...],
+    n_required: int,
+    add_row: Callable[[Cells], None],
+    allow_others: bool = False,
+) -> list[ReadError]:
     """Call ``add_row`` with every row; return the errors of the header and of the rows that cannot be used."""
     try:
         table = read_csv(path, name, titles, n_required, allow_others)

@@ -1,6 +1,7 @@
 """Consistency checks over several keys of a layout: references to names, units, file patterns, limits."""
 
 from collections.abc import Callable, Iterator
+from typing import Any
 from zoneinfo import available_timezones
 
 from turnout.config.document import Branch, merge_branches
@@ -8,12 +9,24 @@ from turnout.config.filename_pattern import compile_pattern
 from turnout.config.schema import settings_keys, suggestion
 from turnout.errors import ConfigError
 
+# (quantity, unit, sensitivity, sensitivity_unit) -> conversion, as turnout.units.to_si
+ToSi = Callable[[str, str, float | None, str], Any]
 
-def check_consistency(tree: Branch, to_si: Callable | None = None) -> Iterator[ConfigError]:
-    """Every consistency error of a merged layout whose single keys are valid.
 
-    ``to_si(quantity, unit, sensitivity, sensitivity_unit)`` raises ValueError for units that cannot be
-    converted. Without it units are not checked.
+def check_consistency(tree: Branch, to_si: ToSi | None = None) -> Iterator[ConfigError]:
+    """Check what several keys of a layout state together. Its single keys must be valid.
+
+    Parameters
+    ----------
+    tree : Branch
+        Merged layout.
+    to_si : callable or None
+        Converts units, as ``turnout.units.to_si``; None: units are not checked.
+
+    Yields
+    ------
+    ConfigError
+        Every error, at the value to correct.
     """
     labels = tuple(tree["sections"])
     if "hammer" in tree:
@@ -32,7 +45,7 @@ def check_consistency(tree: Branch, to_si: Callable | None = None) -> Iterator[C
                 yield leaf.place.error(f"no section {leaf.value!r}", suggestion(leaf.value, labels))
 
 
-def _hammer_errors(tree: Branch, to_si, min_peak_force: float) -> Iterator[ConfigError]:
+def _hammer_errors(tree: Branch, to_si: ToSi | None, min_peak_force: float) -> Iterator[ConfigError]:
     channels = tree["channels"]
     for role in ("force", "response", "validation"):
         leaf = tree.get(role)
@@ -50,7 +63,7 @@ def _hammer_errors(tree: Branch, to_si, min_peak_force: float) -> Iterator[Confi
     yield from _channel_errors(tree, to_si)
 
 
-def _channel_errors(tree: Branch, to_si) -> Iterator[ConfigError]:
+def _channel_errors(tree: Branch, to_si: ToSi | None) -> Iterator[ConfigError]:
     if zone := tree.get("time_zone"):
         if zone.value not in available_timezones():
             yield zone.place.error(f"time_zone is {zone.value!r}", "Write an IANA name such as Europe/Copenhagen")
@@ -71,7 +84,7 @@ def _channel_errors(tree: Branch, to_si) -> Iterator[ConfigError]:
         sources[source.value] = name
 
 
-def _value(channel: Branch, key: str):
+def _value(channel: Branch, key: str) -> Any:
     return channel[key].value if key in channel else None
 
 
@@ -81,7 +94,7 @@ def _min_peak_force(tree: Branch) -> float:
     return written.value if written else settings_keys()["receptance"].spec["softest_blow"].default
 
 
-def _unit_errors(name: str, channel: Branch, to_si: Callable) -> Iterator[ConfigError]:
+def _unit_errors(name: str, channel: Branch, to_si: ToSi) -> Iterator[ConfigError]:
     values = {k: channel[k].value for k in ("unit", "sensitivity", "sensitivity_unit") if k in channel}
     if values.get("unit") is None:
         return

@@ -15,7 +15,17 @@ BROKEN_LINE = "a line that is no row"
 
 
 class TableError(Exception):
-    """Error of a whole table: place, problem and remedy; ``error`` is the same as ConfigError."""
+    """Error of a whole table: place, problem and remedy; ``error`` is the same as ConfigError.
+
+    Parameters
+    ----------
+    place : Place
+        Where the error is.
+    problem : str
+        What is wrong there.
+    remedy : str
+        What to write instead.
+    """
 
     def __init__(self, place: Place, problem: str, remedy: str):
         super().__init__(problem)
@@ -30,7 +40,22 @@ class Cells(dict):
     titles: tuple[str, ...] = ()
 
     def place(self, name: str, line: int, column: str) -> Place:
-        """Where the cell of ``column`` starts; the start of the line if it has no such cell."""
+        """Where the cell of ``column`` starts; the start of the line if it has no such cell.
+
+        Parameters
+        ----------
+        name : str
+            What errors call the file.
+        line : int
+            Number of the line, from 1.
+        column : str
+            Title of the column.
+
+        Returns
+        -------
+        Place
+            Where its cell starts; the start of the line if it has no such cell.
+        """
         return Place(name, line, dict(zip((*self.titles, EXTRA_CELLS), _cell_columns(self.text))).get(column, 1))
 
 
@@ -43,12 +68,34 @@ class CsvTable:
 
 
 def read_csv(path: Path, name: str, columns: tuple[str, ...], n_required: int, allow_others: bool = False) -> CsvTable:
-    """Read a CSV. Its header must have the first ``n_required`` of ``columns``, and no titles outside ``columns``.
+    """Read a CSV.
 
-    With ``allow_others`` an unknown title is an error only if it resembles a title that is missing. Errors call the
-    file ``name``. TableError is raised if it cannot be read, is not UTF-8 or lacks a required title, FileNotFoundError
-    if it does not exist; a broken link is a file that cannot be read.
     A row is one line: an unclosed quote is an error of its own row (``row_problem``), not of the rows below it.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    name : str
+        What errors call the file.
+    columns : tuple of str
+        Titles that the header may have.
+    n_required : int
+        How many of ``columns``, from the first, the header must have.
+    allow_others : bool
+        Accept an unknown title unless it resembles a title that is missing.
+
+    Returns
+    -------
+    CsvTable
+        Rows below the header, and errors of the header despite which they can be read.
+
+    Raises
+    ------
+    TableError
+        If the file cannot be read, is not UTF-8 or lacks a required title. A broken link is a file that cannot be read.
+    FileNotFoundError
+        If the file does not exist.
     """
     lines = _numbered_lines(path, name)
     first, header = lines[0] if lines else (1, "")
@@ -68,8 +115,20 @@ def read_csv(path: Path, name: str, columns: tuple[str, ...], n_required: int, a
 
 
 def row_problem(cells: Mapping) -> tuple[str, str, str] | None:
-    """(column, problem, remedy) if a line is no valid row of its table, else None.
+    """Error of a line that is no valid row of its table.
 
+    Parameters
+    ----------
+    cells : mapping
+        Text of the row by column.
+
+    Returns
+    -------
+    tuple of (str, str, str) or None
+        Column, problem and remedy; None for a valid row.
+
+    Examples
+    --------
     >>> row_problem(_cells('tamping,"machine 09-3X', ("kind", "note")))[1]
     'a double quote that is not closed in its line'
     """
@@ -81,7 +140,25 @@ def row_problem(cells: Mapping) -> tuple[str, str, str] | None:
 
 
 def header_of(path: Path, name: str) -> tuple[str, ...]:
-    """Titles of a CSV; TableError if it has none, is not UTF-8 or cannot be read."""
+    """Titles of a CSV.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    name : str
+        What errors call the file.
+
+    Returns
+    -------
+    tuple of str
+        Titles without blanks around them.
+
+    Raises
+    ------
+    TableError
+        If the file has no header, is not UTF-8 or cannot be read.
+    """
     lines = _numbered_lines(path, name)
     if not lines:
         raise TableError(Place(name, 1, 1), "an empty table", "Write its header, or remove the file")
@@ -117,7 +194,9 @@ def _titles(header: str) -> tuple[str, ...]:
     return tuple(titles)
 
 
-def _title_problem(title, titles, k, columns, allow_others) -> tuple[str, str] | None:
+def _title_problem(
+    title: str, titles: tuple[str, ...], k: int, columns: tuple[str, ...], allow_others: bool
+) -> tuple[str, str] | None:
     """(problem, remedy) of the ``k``-th title if it cannot be used, else None."""
     if title in titles[:k]:
         return f"column {title!r} for the second time", "Keep one of them"

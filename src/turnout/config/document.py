@@ -6,7 +6,7 @@ read as text or YAML raise ``ConfigError``. ``Frozen`` is a read-only mapping th
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,11 +24,23 @@ Scalar = str | int | float | bool | None
 
 
 @contextmanager
-def as_config_errors(path: object, where: str, syntax_remedy: str = "") -> Iterator[None]:
-    """Context in which a file is read and parsed; errors become a ConfigError for ``path``.
+def as_config_errors(path: Path | str, where: str, syntax_remedy: str = "") -> Iterator[None]:
+    """Context in which a file is read and parsed; errors become a ConfigError for this file.
 
-    Covered are files that cannot be opened (error at ``where``) or are not UTF-8, characters that YAML does not allow,
-    an anchor inside its own content, and with ``syntax_remedy`` wrong syntax.
+    Parameters
+    ----------
+    path : Path or str
+        What errors call the file.
+    where : str
+        Place in an error of the file as a whole.
+    syntax_remedy : str
+        Remedy of wrong YAML syntax; "": such an error is not converted.
+
+    Raises
+    ------
+    ConfigError
+        If the file cannot be opened or is not UTF-8, has a character that YAML does not allow, an anchor inside its own
+        content, or wrong syntax.
     """
     from ruamel.yaml.error import MarkedYAMLError
     from ruamel.yaml.reader import ReaderError
@@ -76,13 +88,39 @@ class Place:
         return ", ".join([f"line {self.line}"] * (self.line > 0) + [self.entry] * bool(self.entry)) or "the file"
 
     def below(self, key: str | int, written: Place | None = None) -> Place:
-        """Place of the entry ``key`` below this one; its line is that of ``written`` if it is in the same file."""
+        """Place of an entry below this one, in a parameter file.
+
+        Parameters
+        ----------
+        key : str or int
+            Name of the entry, or its number in a list, from 0.
+        written : Place or None
+            Where the entry stands; it gives the line if it is in the same file.
+
+        Returns
+        -------
+        Place
+            The place, with the path of the entry.
+        """
         entry = f"{self.entry}[{key}]" if isinstance(key, int) else f"{self.entry}.{key}".lstrip(".")
         line = written if written and written.path == self.path else self
         return Place(self.path, line.line, line.column, entry)
 
     def error(self, problem: str, remedy: str) -> ConfigError:
-        """A ``ConfigError`` that points here."""
+        """A ``ConfigError`` that points here.
+
+        Parameters
+        ----------
+        problem : str
+            What is wrong there.
+        remedy : str
+            What to write instead.
+
+        Returns
+        -------
+        ConfigError
+            The error; it is returned, not raised.
+        """
         return ConfigError(self.path, str(self), problem, remedy)
 
 
@@ -95,7 +133,13 @@ class Leaf:
 
 
 class Branch(dict):
-    """A mapping from names to ``Leaf`` or ``Branch``; ``place`` is its start, ``key_places`` those of its names."""
+    """A mapping from names to ``Leaf`` or ``Branch``; ``place`` is its start, ``key_places`` those of its names.
+
+    Parameters
+    ----------
+    place : Place
+        Where the mapping starts.
+    """
 
     def __init__(self, place: Place):
         super().__init__()
@@ -103,17 +147,54 @@ class Branch(dict):
         self.key_places: dict[str | int | None, Place] = {}
 
     def put(self, name: str, value: Any, place: Place) -> None:
-        """Add a key whose name stands at ``place``."""
+        """Add a key.
+
+        Parameters
+        ----------
+        name : str
+            Name of the key.
+        value : Leaf, Branch or any
+            Its value.
+        place : Place
+            Where its name stands.
+        """
         self[name] = value
         self.key_places[name] = place
 
     def place_of(self, name: str | int | None) -> Place:
-        """Where the name of a key stands; the start of the branch if it has no such key."""
+        """Where the name of a key stands.
+
+        Parameters
+        ----------
+        name : str, int or None
+            Name of a key.
+
+        Returns
+        -------
+        Place
+            Where the name stands; the start of the branch if it has no such key.
+        """
         return self.key_places.get(name, self.place)
 
 
 def compose(path: Path) -> tuple[AnyNode | None, BaseConstructor]:
-    """(root node, constructor of values from nodes) of a YAML file; the node is None if the file is empty."""
+    """Parse a YAML file without conversion of its values.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    tuple of (AnyNode or None, BaseConstructor)
+        Root node, None for an empty file; constructor of values from nodes.
+
+    Raises
+    ------
+    MarkedYAMLError
+        For wrong syntax. OSError and UnicodeDecodeError are not converted either.
+    """
     from ruamel.yaml import YAML
 
     yaml = YAML(typ="safe", pure=True)
@@ -121,7 +202,25 @@ def compose(path: Path) -> tuple[AnyNode | None, BaseConstructor]:
 
 
 def load(path: Path, name: str | None = None) -> Branch:
-    """The mapping in the YAML file ``path``, called ``name`` in errors; ConfigError if it is no YAML."""
+    """The mapping in a YAML file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    name : str or None
+        What errors call the file; None: its path.
+
+    Returns
+    -------
+    Branch
+        Names and values with their places; empty for an empty file.
+
+    Raises
+    ------
+    ConfigError
+        If the file cannot be read, is no YAML, or is no mapping.
+    """
     name = name or str(path)
     with as_config_errors(name, "line 1", "Correct the YAML syntax there"):
         node, constructor = compose(path)
@@ -134,12 +233,36 @@ def load(path: Path, name: str | None = None) -> Branch:
 
 
 def place_of_node(node: AnyNode, path: str) -> Place:
-    """Where a node starts in the file ``path``."""
+    """Where a node starts in the file ``path``.
+
+    Parameters
+    ----------
+    node : AnyNode
+        Node of the file.
+    path : str
+        What errors call the file.
+
+    Returns
+    -------
+    Place
+        Its line and column.
+    """
     return Place(path, node.start_mark.line + 1, node.start_mark.column + 1)
 
 
 def merge_branches(*branches: Branch) -> Branch:
-    """Merge branches leaf by leaf; later branches win. A list is one leaf and is replaced as a whole."""
+    """Merge branches leaf by leaf; later branches win. A list is one leaf and is replaced as a whole.
+
+    Parameters
+    ----------
+    *branches : Branch
+        At least one; the place of the first one is kept.
+
+    Returns
+    -------
+    Branch
+        A new branch; the values are shared.
+    """
     merged = Branch(branches[0].place)
     for branch in branches:
         for name, value in branch.items():
@@ -150,13 +273,37 @@ def merge_branches(*branches: Branch) -> Branch:
     return merged
 
 
-def plain_values(tree):
-    """The values without their places: dict, tuple, text, numbers."""
+def plain_values(tree: Branch | Leaf) -> Any:
+    """The values without their places.
+
+    Parameters
+    ----------
+    tree : Branch or Leaf
+        Tree of a file.
+
+    Returns
+    -------
+    dict, tuple, str, number, bool or None
+        Dictionaries for branches, values for leaves.
+    """
     return {k: plain_values(v) for k, v in tree.items()} if isinstance(tree, Branch) else tree.value
 
 
 def leaves(tree: Branch, prefix: str = "") -> Iterator[tuple[str, Leaf]]:
-    """``("hammer.rate", leaf)`` for every value, in order."""
+    """Every value with the path of its key, in order.
+
+    Parameters
+    ----------
+    tree : Branch
+        Tree of a file.
+    prefix : str
+        Put before each path.
+
+    Yields
+    ------
+    tuple of (str, Leaf)
+        Path such as "hammer.rate", and the value with its place.
+    """
     for name, value in tree.items():
         if isinstance(value, Branch):
             yield from leaves(value, f"{prefix}{name}.")
@@ -201,26 +348,33 @@ def _scalar(node: AnyNode, path: str, constructor: BaseConstructor) -> Scalar:
 class Frozen(Mapping):
     """Read-only view of a dictionary; unlike MappingProxyType it can be pickled.
 
+    Parameters
+    ----------
+    values : mapping or iterable of tuple of (any, any)
+        Content; it is copied.
+
+    Examples
+    --------
     >>> Frozen({"a": 1})["a"]
     1
     """
 
     __slots__ = ("_values",)
 
-    def __init__(self, values=()):
+    def __init__(self, values: Mapping | Iterable[tuple[Any, Any]] = ()):
         self._values = dict(values)
 
-    def __getitem__(self, name):
+    def __getitem__(self, name: Any) -> Any:
         return self._values[name]
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[Any]:
         return iter(self._values)
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self._values)
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"{type(self).__name__}({self._values!r})"
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[type, tuple[dict]]:
         return type(self), (self._values,)

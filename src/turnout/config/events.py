@@ -1,14 +1,20 @@
 """Reader of config/events.csv: maintenance that starts a new epoch of a resonance."""
 
+from __future__ import annotations
+
 import os
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from turnout.config.csv_table import TableError, read_csv, row_problem
 from turnout.config.schema import NO_TURNOUT, suggestion
 from turnout.errors import ConfigError
+
+if TYPE_CHECKING:
+    from turnout.config.merge import Variant
 
 # Resonances that start a new epoch after each kind of work, where the row does not name them.
 RESETS = {
@@ -39,13 +45,29 @@ class Event:
 
 
 def read_events(
-    path: Path, name: str, turnout_ids, variants
+    path: Path, name: str, turnout_ids: Collection[str] | None, variants: Mapping[str, Variant]
 ) -> tuple[list[Event], list[ConfigError], list[ConfigError]]:
-    """(events in order of time, errors of rows that cannot be used, warnings). Without the file there are no events.
+    """Read config/events.csv; without the file there are no events.
 
-    Warnings concern events of an unknown turnout or section and events dated more than a year ahead. An unknown
-    turnout may be misspelt, or it was removed and its history keeps its events.
-    ``turnout_ids`` is None if turnouts.tsv itself has errors: then turnouts are not checked.
+    An event of an unknown turnout is only a warning: the turnout may be misspelt, or it was removed and its history
+    keeps its events.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    name : str
+        What errors call the file.
+    turnout_ids : collection of str or None
+        Ids of the turnouts; None if turnouts.tsv itself has errors: then turnouts are not checked.
+    variants : mapping of str to Variant
+        Merged configuration by turnout.
+
+    Returns
+    -------
+    tuple of (list of Event, list of ConfigError, list of ConfigError)
+        Events in order of time; errors of rows that cannot be used; warnings about unknown turnouts or sections and
+        about dates more than a year ahead.
     """
     if not os.path.lexists(path):
         return [], [], []
@@ -69,7 +91,7 @@ def read_events(
     return sorted(events, key=lambda e: (e.at, e.turnout, e.section or "", e.kind)), errors, warnings
 
 
-def _row_problems(cells) -> Iterator[tuple[str, str, str]]:
+def _row_problems(cells: Mapping[str, str]) -> Iterator[tuple[str, str, str]]:
     """(column, problem, remedy) of every error in a row."""
     if line_problem := row_problem(cells):
         yield line_problem
@@ -84,8 +106,25 @@ def _row_problems(cells) -> Iterator[tuple[str, str, str]]:
         yield "resets", f"resets is {cells['resets']!r}", suggestion(min(unknown), ("ballast", "railpad", "none"))
 
 
-def turnout_problems(cells, turnout_ids, variants) -> Iterator[tuple[str, str, str]]:
-    """Errors in ``turnout`` and ``section`` of a row; none if ``turnout_ids`` is None (turnouts.tsv has errors)."""
+def turnout_problems(
+    cells: Mapping[str, str], turnout_ids: Collection[str] | None, variants: Mapping[str, Variant]
+) -> Iterator[tuple[str, str, str]]:
+    """Errors in ``turnout`` and ``section`` of a row.
+
+    Parameters
+    ----------
+    cells : mapping of str to str
+        Text of the row by column.
+    turnout_ids : collection of str or None
+        Ids of the turnouts; None if turnouts.tsv itself has errors: then turnouts are not checked.
+    variants : mapping of str to Variant
+        Merged configuration by turnout.
+
+    Yields
+    ------
+    tuple of (str, str, str)
+        Column, problem and remedy; nothing if ``turnout_ids`` is None.
+    """
     turnout, label = cells["turnout"], cells["section"].removeprefix(f"{cells['turnout']}/")
     if turnout_ids is not None and turnout not in turnout_ids:
         yield "turnout", f"turnout {turnout!r} has no row in turnouts.tsv", suggestion(turnout, turnout_ids, NO_TURNOUT)
@@ -96,8 +135,20 @@ def turnout_problems(cells, turnout_ids, variants) -> Iterator[tuple[str, str, s
 
 
 def time_problem(text: str) -> tuple[str, str] | None:
-    """(problem, remedy) of a time in UTC; None if it is valid.
+    """Error of a time that is not in UTC or not in ISO 8601.
 
+    Parameters
+    ----------
+    text : str
+        Text of the cell.
+
+    Returns
+    -------
+    tuple of (str, str) or None
+        Addition to the problem, and remedy; None for a valid time.
+
+    Examples
+    --------
     >>> time_problem("2026-04-02") is None, time_problem("2.4.2026")
     (True, ('', 'Write YYYY-MM-DD or YYYY-MM-DDTHH:MM in UTC'))
     """
@@ -111,6 +162,23 @@ def time_problem(text: str) -> tuple[str, str] | None:
 def parse_utc(text: str) -> datetime:
     """Time of a cell, YYYY-MM-DD or YYYY-MM-DDTHH:MM, with or without a "Z"; ValueError for other text.
 
+    Parameters
+    ----------
+    text : str
+        Text of a cell that ``time_problem`` accepts.
+
+    Returns
+    -------
+    datetime
+        The time, naive as in the tables.
+
+    Raises
+    ------
+    ValueError
+        For other text.
+
+    Examples
+    --------
     >>> parse_utc("2026-04-02T10:30Z").isoformat()
     '2026-04-02T10:30:00'
     """
@@ -122,11 +190,11 @@ def now() -> datetime:
     return datetime.now(UTC).replace(tzinfo=None)
 
 
-def _reset_bands(cells) -> tuple[str, ...]:
+def _reset_bands(cells: Mapping[str, str]) -> tuple[str, ...]:
     return tuple(sorted(word for word in cells.get("resets", "").replace("+", " ").split() if word != "none"))
 
 
-def _event(cells) -> Event:
+def _event(cells: Mapping[str, str]) -> Event:
     """The event of a valid row."""
     turnout, kind = cells["turnout"], cells["kind"]
     label = cells["section"].removeprefix(f"{turnout}/") or None

@@ -14,10 +14,29 @@ REQUIRED_FIELDS = {"hammer": ("campaign", "section"), "passages": ("time",)}
 
 @lru_cache(maxsize=256)
 def compile_pattern(pattern: str, branch: str, sections: tuple[str, ...] = ()) -> re.Pattern:
-    """Regular expression of a pattern: one named group per field; ``*`` is anything but a slash.
+    """Regular expression of a pattern of file names: one named group per field; ``*`` is anything but a slash.
 
-    ``branch`` is "hammer" or "passages". Raises ValueError with the remedy.
+    Parameters
+    ----------
+    pattern : str
+        Pattern below the raw folder of a turnout.
+    branch : str
+        "hammer" or "passages".
+    sections : tuple of str
+        Labels that ``{section}`` stands for; none: any text.
 
+    Returns
+    -------
+    Pattern
+        The compiled expression.
+
+    Raises
+    ------
+    ValueError
+        For an unknown or missing field; the message has the remedy.
+
+    Examples
+    --------
     >>> match = compile_pattern("hammer/{campaign}/{section}_{test}.{ext}", "hammer", ("A7", "AS"))
     >>> match.fullmatch("hammer/2024-05-13/A7_2.uff").groupdict()
     {'campaign': '2024-05-13', 'section': 'A7', 'test': '2', 'ext': 'uff'}

@@ -4,6 +4,7 @@ import json
 import textwrap
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 from turnout.config.document import load, plain_values
 from turnout.config.events import COLUMNS as EVENT_COLUMNS
@@ -24,7 +25,22 @@ JSON_TYPE = {"text": "string", "number": "number", "integer": "integer", "flag":
 
 
 def generate_files(folder: Path, docs: Path, defaults: bool = False) -> dict[Path, str]:
-    """Text of every generated file; changed values in config.yaml stay unless ``defaults`` is set."""
+    """Text of every generated file.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the configuration.
+    docs : Path
+        Folder of the documentation.
+    defaults : bool
+        Write the default of every setting, instead of the values that config.yaml has now.
+
+    Returns
+    -------
+    dict of Path to str
+        Path -> text; nothing is written.
+    """
     path = Path(folder) / "config.yaml"
     present = plain_values(load(path)) if path.exists() and not defaults else {}
     layout, override = layout_keys(), layout_keys()
@@ -40,6 +56,18 @@ def generate_files(folder: Path, docs: Path, defaults: bool = False) -> dict[Pat
 def config_yaml(present: dict) -> str:
     r"""Text of config.yaml, with unit, limits and reason in a comment above each key.
 
+    Parameters
+    ----------
+    present : dict
+        Section -> setting -> value, where it is not the default.
+
+    Returns
+    -------
+    str
+        The whole text.
+
+    Examples
+    --------
     >>> "\n  # 1 to 4096: one job" in config_yaml({}), "\n  shards: 64\n" in config_yaml({"fleet": {"shards": 64}})
     (True, True)
     """
@@ -59,6 +87,18 @@ def config_yaml(present: dict) -> str:
 def describe_key(key: Key) -> str:
     """Unit, limits and reason of a key as text.
 
+    Parameters
+    ----------
+    key : Key
+        Key of the schema.
+
+    Returns
+    -------
+    str
+        One line, without a full stop.
+
+    Examples
+    --------
     >>> describe_key(Key("number", "the paper's gate", minimum=0.0, maximum=1.0))
     "0 to 1: the paper's gate"
     """
@@ -79,7 +119,22 @@ def describe_key(key: Key) -> str:
 
 
 def schema(keys: dict, title: str, whole: bool) -> str:
-    """JSON schema for editors. The program itself checks with the same keys and gives more detailed errors."""
+    """JSON schema for editors. The program itself checks with the same keys and gives more detailed errors.
+
+    Parameters
+    ----------
+    keys : dict
+        Name -> Key, Group or NamedEntries.
+    title : str
+        Title of the schema.
+    whole : bool
+        Whether required keys must be there.
+
+    Returns
+    -------
+    str
+        JSON text.
+    """
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title}
     return json.dumps(head | _object_schema(keys, whole), indent=1, ensure_ascii=False) + "\n"
 
@@ -94,7 +149,7 @@ def _object_schema(keys: dict, whole: bool) -> dict:
     return result
 
 
-def _property_schema(rule, whole: bool) -> dict:
+def _property_schema(rule: Key | Group | NamedEntries, whole: bool) -> dict:
     if isinstance(rule, Group):
         return {"description": rule.meaning} | _object_schema(rule.spec, whole and not rule.fragment)
     if isinstance(rule, NamedEntries):
@@ -168,7 +223,7 @@ def _table(keys: list[tuple[str, Key]], with_default: bool = False) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _yaml(value) -> str:
+def _yaml(value: Any) -> str:
     """A value in YAML notation."""
     if isinstance(value, tuple):
         return "[" + ", ".join(_yaml(v) for v in value) + "]"

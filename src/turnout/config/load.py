@@ -1,7 +1,7 @@
 """Reading and checking of the whole configuration of a fleet, and the source of every value in it."""
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -9,7 +9,7 @@ from typing import Any
 from turnout.config import merge
 from turnout.config.acknowledgements import read_acknowledgements
 from turnout.config.campaign_notes import Campaigns, read_campaigns, read_trains
-from turnout.config.consistency import check_consistency
+from turnout.config.consistency import ToSi, check_consistency
 from turnout.config.document import Branch, Frozen, Place, leaves, load, merge_branches, plain_values
 from turnout.config.events import Event, read_events
 from turnout.config.merge import ROW_KEYS, SECTION_ROW_KEYS, Variant, with_row
@@ -43,11 +43,40 @@ class Configuration:
         return tuple(self.rows)
 
     def hash_of(self, turnout: str, unit_kind: str = "") -> str:
-        """Hash of the configuration of one turnout: of all of it, or of what units of ``unit_kind`` use."""
+        """Hash of the configuration of one turnout.
+
+        Parameters
+        ----------
+        turnout : str
+            Id of the turnout.
+        unit_kind : str
+            "hammer", "passage" or "mismatch": only what such a unit uses; "": all of it.
+
+        Returns
+        -------
+        str
+            32 hexadecimal digits.
+        """
         return self.variants[turnout].hashes[unit_kind]
 
     def turnout(self, turnout: str) -> TurnoutConfig:
-        """The merged configuration of one turnout; ConfigError for an unknown id."""
+        """The merged configuration of one turnout.
+
+        Parameters
+        ----------
+        turnout : str
+            Id of the turnout.
+
+        Returns
+        -------
+        TurnoutConfig
+            Its configuration, without the notes of the raw folder.
+
+        Raises
+        ------
+        ConfigError
+            For an unknown id.
+        """
         if turnout not in self.rows:
             place = Place(str(self.folder / "turnouts.tsv"), 1, 1)
             raise place.error(f"no turnout {turnout!r}", suggestion(turnout, self.rows, NO_TURNOUT))
@@ -62,24 +91,67 @@ class Configuration:
 
 
 def with_raw(turnout: TurnoutConfig, raw_root: Path) -> TurnoutConfig:
-    """The turnout with the campaigns and trains that are listed in its raw folder; invalid rows are left out."""
+    """The turnout with the campaigns and trains that are listed in its raw folder; invalid rows are left out.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+        Configuration of the turnout.
+    raw_root : Path
+        The raw root.
+
+    Returns
+    -------
+    TurnoutConfig
+        A copy with the notes.
+    """
     return read_notes(turnout, raw_root)[0]
 
 
 def read_notes(turnout: TurnoutConfig, raw_root: Path) -> tuple[TurnoutConfig, list[ReadError]]:
-    """The turnout with the campaigns and trains of its raw folder, and an error for each invalid row."""
+    """The turnout with the campaigns and trains of its raw folder, and an error for each invalid row.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+        Configuration of the turnout.
+    raw_root : Path
+        The raw root.
+
+    Returns
+    -------
+    tuple of (TurnoutConfig, list of ReadError)
+        A copy with the notes, and the errors.
+    """
     folder = Path(raw_root) / turnout.raw
     campaigns, campaign_errors = read_campaigns(folder / "campaigns.csv", f"{turnout.raw}/campaigns.csv")
     trains, train_errors = read_trains(folder / "trains.csv", f"{turnout.raw}/trains.csv")
     return replace(turnout, campaigns=Campaigns(campaigns), trains=trains), campaign_errors + train_errors
 
 
-def load_configuration(folder: Path | str = "config", formats=None, to_si=None) -> Configuration:
+def load_configuration(
+    folder: Path | str = "config", formats: Collection[str] | None = None, to_si: ToSi | None = None
+) -> Configuration:
     """Read and check config.yaml, turnouts.tsv, layouts/, overrides/, events.csv and acknowledgements.csv.
 
-    Raises ConfigErrors with all errors: file, line, column, problem, remedy.
-    ``formats`` are the names of the readers, ``to_si`` converts units. Without them formats and units of channels
-    are not checked.
+    Parameters
+    ----------
+    folder : Path or str
+        Folder of the configuration.
+    formats : collection of str or None
+        Names of the readers; None: formats are not checked.
+    to_si : callable or None
+        Converts units, as ``turnout.units.to_si``; None: units of channels are not checked.
+
+    Returns
+    -------
+    Configuration
+        The configuration of the fleet, with warnings.
+
+    Raises
+    ------
+    ConfigErrors
+        With all errors: file, line, column, problem, remedy.
     """
     reading = _ConfigurationReader(Path(folder), formats, to_si)
     reading.check_extensions()
@@ -110,15 +182,17 @@ def load_configuration(folder: Path | str = "config", formats=None, to_si=None) 
     )
 
 
-def load_layout(path: Path | str, formats=None, to_si=None) -> TurnoutConfig:
+def load_layout(path: Path | str, formats: Collection[str] | None = None, to_si: ToSi | None = None) -> TurnoutConfig:
     """Configuration of one layout by itself, as of a turnout without further values; config.yaml is beside its folder.
 
     Parameters
     ----------
     path : path-like
         File of the layout, such as config/layouts/tommerup.yaml.
-    formats, to_si : optional
-        As in ``load_configuration``.
+    formats : collection of str or None
+        Names of the readers; None: formats are not checked.
+    to_si : callable or None
+        Converts units, as ``turnout.units.to_si``; None: units of channels are not checked.
 
     Returns
     -------
@@ -146,8 +220,25 @@ def load_layout(path: Path | str, formats=None, to_si=None) -> TurnoutConfig:
     return TurnoutConfig(id=name, layout=name, raw="", folder=reading.folder, **Variant(tree).turnout_fields)
 
 
-def errors_of_unused_layouts(configuration: Configuration, formats=None, to_si=None) -> list[ConfigError]:
-    """Errors of the layouts that no turnout uses."""
+def errors_of_unused_layouts(
+    configuration: Configuration, formats: Collection[str] | None = None, to_si: ToSi | None = None
+) -> list[ConfigError]:
+    """Errors of the layouts that no turnout uses.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Configuration of the fleet.
+    formats : collection of str or None
+        Names of the readers; None: formats are not checked.
+    to_si : callable or None
+        Converts units, as ``turnout.units.to_si``; None: units of channels are not checked.
+
+    Returns
+    -------
+    list of ConfigError
+        Errors in the order of the file names.
+    """
     reading = _ConfigurationReader(configuration.folder, formats, to_si)
     settings = reading.document(reading.folder / "config.yaml", settings_keys())
     used = {row.values["layout"] for row in configuration.rows.values()}
@@ -160,7 +251,7 @@ def errors_of_unused_layouts(configuration: Configuration, formats=None, to_si=N
 class _ConfigurationReader:
     """Reads the files of the configuration and collects all errors."""
 
-    def __init__(self, folder: Path, formats, to_si):
+    def __init__(self, folder: Path, formats: Collection[str] | None, to_si: ToSi | None):
         self.folder, self.formats, self.to_si = folder, formats, to_si
         self.errors: list[ConfigError] = []
         self.layouts: dict[str, Branch | None] = {}
@@ -225,7 +316,7 @@ class _ConfigurationReader:
         self.errors += errors
         return bool(errors)
 
-    def _format_errors(self, tree: Branch):
+    def _format_errors(self, tree: Branch) -> Iterator[ConfigError]:
         for branch in ("hammer", "passages"):
             leaf = tree.get(branch, {}).get("format")
             if leaf and self.formats is not None and leaf.value not in (allowed := ("auto", *self.formats)):
@@ -263,8 +354,21 @@ class _ConfigurationReader:
         return Variant(tree)
 
 
-def sources(configuration: Configuration, turnout: str) -> Iterator[tuple[str, object, str]]:
-    """``(key, value, "file, line")`` of every value, defaults included."""
+def sources(configuration: Configuration, turnout: str) -> Iterator[tuple[str, Any, str]]:
+    """The source of every value of a turnout, defaults included.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Configuration of the fleet.
+    turnout : str
+        Id of the turnout.
+
+    Yields
+    ------
+    tuple of (str, any, str)
+        Key, value, and its file and line or "default".
+    """
     row = configuration.rows[turnout]
     for column, value in row.values.items():
         yield column, value, _place_text(row.place(column))
@@ -279,5 +383,5 @@ def sources(configuration: Configuration, turnout: str) -> Iterator[tuple[str, o
             yield key, value, _place_text(written[key].place) if key in written else "default"
 
 
-def _place_text(place) -> str:
+def _place_text(place: Place) -> str:
     return f"{place.path}, line {place.line}"

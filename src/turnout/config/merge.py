@@ -7,6 +7,7 @@ import hashlib
 import json
 from dataclasses import asdict, dataclass
 from functools import cached_property
+from typing import Any
 
 from turnout.config.document import Branch, Frozen, Leaf, Place, merge_branches, plain_values
 from turnout.config.schema import fill_settings
@@ -23,13 +24,35 @@ USED_BY_UNIT = {
 }
 
 
-def digest(value) -> str:
-    """32 hex characters that change when ``value`` (dicts, tuples, numbers, text) does."""
+def digest(value: Any) -> str:
+    """32 hex characters that change when ``value`` (dicts, tuples, numbers, text) does.
+
+    Parameters
+    ----------
+    value : any
+        Dictionaries, lists, tuples, numbers and text.
+
+    Returns
+    -------
+    str
+        The first half of a sha256; the order of keys does not change it.
+    """
     return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()[:32]
 
 
 def hashes(values: dict) -> dict[str, str]:
-    """``config_hash`` under "", and the hash of what each kind of unit uses. Defaults count like written values."""
+    """Hashes of a merged configuration. Defaults count like written values.
+
+    Parameters
+    ----------
+    values : dict
+        The merged tree as plain values.
+
+    Returns
+    -------
+    dict of str to str
+        The hash of all of it under "", and of what each kind of unit uses.
+    """
     branches = {k: v for k, v in values.items() if k not in ("description", "settings")}
     # the division of a run into shards changes no result
     filled_settings = {name: asdict(s) for name, s in settings(values["settings"]).items() if name != "fleet"}
@@ -40,12 +63,34 @@ def hashes(values: dict) -> dict[str, str]:
 
 
 def settings(values: dict) -> Frozen:
-    """Settings of every section."""
+    """Settings of every section.
+
+    Parameters
+    ----------
+    values : dict
+        Section -> setting -> value, where it is not the default.
+
+    Returns
+    -------
+    Frozen
+        Section -> instance of its settings class.
+    """
     return Frozen({name: fill_settings(cls, values.get(name, {})) for name, cls in parts().items()})
 
 
 def sections(values: dict) -> tuple[Section, ...]:
-    """Sections in the order of the layout."""
+    """Sections in the order of the layout.
+
+    Parameters
+    ----------
+    values : dict
+        Label -> keys of the section.
+
+    Returns
+    -------
+    tuple of Section
+        One section per label.
+    """
     keys = ("panel", "track", "position", "pad", "sleeper")
     return tuple(
         Section(label, **{k: section[k] for k in keys if section.get(k) is not None})
@@ -54,7 +99,18 @@ def sections(values: dict) -> tuple[Section, ...]:
 
 
 def hammer(tree: Branch) -> HammerConfig | None:
-    """Configuration of the hammer tests: the branch ``hammer``, changed per section by the section's ``hammer``."""
+    """Configuration of the hammer tests: the branch ``hammer``, changed per section by the section's ``hammer``.
+
+    Parameters
+    ----------
+    tree : Branch
+        Merged layout.
+
+    Returns
+    -------
+    HammerConfig or None
+        The configuration; None if the layout has no hammer tests.
+    """
     if "hammer" not in tree:
         return None
     descriptions: dict[str, RawDescription] = {}
@@ -72,7 +128,18 @@ def hammer(tree: Branch) -> HammerConfig | None:
 
 
 def passages(tree: Branch) -> PassageConfig | None:
-    """Configuration of the passage recordings, with the section of every channel."""
+    """Configuration of the passage recordings, with the section of every channel.
+
+    Parameters
+    ----------
+    tree : Branch
+        Merged layout.
+
+    Returns
+    -------
+    PassageConfig or None
+        The configuration; None if the layout has no passages.
+    """
     if "passages" not in tree:
         return None
     values = plain_values(tree["passages"])
@@ -82,7 +149,22 @@ def passages(tree: Branch) -> PassageConfig | None:
 
 
 def description(values: dict, kind: str, positions: dict[str, float]) -> RawDescription:
-    """Description of the raw files of one kind; the position of a sensor is that in ``positions`` plus its offset."""
+    """Description of the raw files of one kind.
+
+    Parameters
+    ----------
+    values : dict
+        Branch ``hammer`` or ``passages`` as plain values.
+    kind : str
+        "hammer" or "passage".
+    positions : dict of str to float
+        Channel -> position of its section; the offset of the sensor is added. [m]
+
+    Returns
+    -------
+    RawDescription
+        What the readers check and convert by.
+    """
     channels = []
     for name, channel in values["channels"].items():
         fields = {k: _as_float(k, v) for k, v in channel.items() if k not in ("offset", "section") and v is not None}
@@ -99,7 +181,7 @@ def description(values: dict, kind: str, positions: dict[str, float]) -> RawDesc
     )
 
 
-def _as_float(name: str, value):
+def _as_float(name: str, value: Any) -> Any:
     """Physical values as float, even if written as integers."""
     return float(value) if name in ("rate", "sensitivity", "limit", "resolution") and value is not None else value
 
@@ -143,7 +225,20 @@ class Variant:
 
 
 def with_row(layout: Branch, row: Row) -> Branch:
-    """The layout, changed by the technical columns of a row."""
+    """The layout, changed by the technical columns of a row.
+
+    Parameters
+    ----------
+    layout : Branch
+        Merged layout.
+    row : Row
+        Row of turnouts.tsv.
+
+    Returns
+    -------
+    Branch
+        A new tree; the layout itself if the row has no technical column.
+    """
     changes = Branch(layout.place)
     for column, (group, key) in ROW_KEYS.items():
         if column in row.values and group in layout:

@@ -6,16 +6,19 @@ Ranges of settings are checked as well: the low end must be below the high end, 
 
 import math
 import re
-from collections.abc import Iterator
-from dataclasses import MISSING, dataclass, fields, is_dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
 from difflib import get_close_matches
 from functools import cache
 from types import UnionType
-from typing import Union, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from turnout.config.document import Branch, Leaf
 from turnout.config.settings import parts
 from turnout.errors import ConfigError
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 NO_TURNOUT = "There are no turnouts yet: add one with 'turnout add ID LAYOUT'"
 VALUE_TYPES = {
@@ -43,7 +46,7 @@ class Key:
     pattern: str = ""
     many: bool = False
     nullable: bool = False
-    default: object = None
+    default: Any = None  # of any of the types in TYPE_NAMES, or a tuple of them
 
 
 @dataclass(frozen=True)
@@ -74,9 +77,29 @@ class FleetWideKey:
     required: bool = False
 
 
-def suggestion(name: str, allowed, none: str = "There is none to choose from") -> str:
-    """Remedy for an unknown ``name``; ``none`` if nothing is allowed.
+Rule = Key | NamedEntries | Group | FleetWideKey
+T = TypeVar("T", bound="DataclassInstance")
 
+
+def suggestion(name: str, allowed: Iterable[Any], none: str = "There is none to choose from") -> str:
+    """Remedy for an unknown name.
+
+    Parameters
+    ----------
+    name : str
+        The name as it was written.
+    allowed : iterable of any
+        The names that may be written.
+    none : str
+        Remedy if nothing is allowed.
+
+    Returns
+    -------
+    str
+        The most similar name if there is one, and the allowed names.
+
+    Examples
+    --------
     >>> suggestion("posiiton", ["position", "panel"])
     "Did you mean 'position'? Allowed: panel, position"
     """
@@ -88,9 +111,23 @@ def suggestion(name: str, allowed, none: str = "There is none to choose from") -
     return (f"Did you mean {close[0]!r}? " if close else "") + f"Allowed: {listed}"
 
 
-def value_problem(key: Key, value) -> tuple[str, str] | None:
-    """None if ``value`` fits ``key``, else (problem, remedy).
+def value_problem(key: Key, value: Any) -> tuple[str, str] | None:
+    """Compare a value with its key.
 
+    Parameters
+    ----------
+    key : Key
+        Type, limits and choices.
+    value : any
+        The value as it was written; a list as a tuple.
+
+    Returns
+    -------
+    tuple of (str, str) or None
+        Problem and remedy; None if the value fits.
+
+    Examples
+    --------
     >>> value_problem(Key("number", "rate", unit="Hz", above=0), -1)
     ('-1', 'Write a number above 0 Hz')
     """
@@ -118,7 +155,22 @@ def value_problem(key: Key, value) -> tuple[str, str] | None:
 
 
 def check(spec: dict, tree: Branch, whole: bool = True) -> Iterator[ConfigError]:
-    """Every error of ``tree`` against ``spec``; without ``whole`` required names may be missing."""
+    """Compare a tree with its schema.
+
+    Parameters
+    ----------
+    spec : dict
+        Name -> Key, Group, NamedEntries or FleetWideKey.
+    tree : Branch
+        Tree of a file, or of merged files.
+    whole : bool
+        Whether required names must be there.
+
+    Yields
+    ------
+    ConfigError
+        Every error, at the name or value to correct.
+    """
     misspelt = set()
     for name, value in tree.items():
         rule = spec.get(name)
@@ -189,6 +241,18 @@ def settings_keys() -> dict[str, Group]:
 def keys_of(cls: type) -> dict[str, Key | Group]:
     """Key of every field of a settings dataclass; nested dataclasses become groups.
 
+    Parameters
+    ----------
+    cls : type
+        Settings dataclass.
+
+    Returns
+    -------
+    dict of str to Key or Group
+        Field -> Key, or Group for a nested dataclass.
+
+    Examples
+    --------
     >>> from turnout.config.settings.fleet import FleetSettings
     >>> keys_of(FleetSettings)["checkpoint_time"].unit
     's'
@@ -197,26 +261,51 @@ def keys_of(cls: type) -> dict[str, Key | Group]:
     return {f.name: _key(cls, f, hints[f.name]) for f in fields(cls)}
 
 
-def fill_settings(cls: type, values: dict):
-    """Instance of ``cls`` with ``values`` in place of its defaults."""
+def fill_settings(cls: type[T], values: dict) -> T:
+    """Instance of ``cls`` with ``values`` in place of its defaults.
+
+    Parameters
+    ----------
+    cls : type
+        Settings dataclass.
+    values : dict
+        Field -> value; a whole number is accepted where the default is a float.
+
+    Returns
+    -------
+    dataclass
+        The settings.
+    """
     arguments = {}
     for field in fields(cls):
         if field.name in values:
             value, default = values[field.name], default_of(field)
             if is_dataclass(default):
-                value = fill_settings(type(default), value)
+                nested: Any = type(default)
+                value = fill_settings(nested, value)
             elif isinstance(default, float) and isinstance(value, int):
                 value = float(value)
             arguments[field.name] = value
     return cls(**arguments)
 
 
-def default_of(field):
-    """Default of a dataclass field."""
-    return field.default_factory() if field.default is MISSING else field.default
+def default_of(field: Field) -> Any:
+    """Default of a dataclass field.
+
+    Parameters
+    ----------
+    field : Field
+        Field of a settings dataclass.
+
+    Returns
+    -------
+    any
+        Its default.
+    """
+    return field.default if field.default_factory is MISSING else field.default_factory()
 
 
-def _key(cls, field, hint) -> Key | Group:
+def _key(cls: type, field: Field, hint: Any) -> Key | Group:
     default, metadata = default_of(field), field.metadata
     if is_dataclass(default):
         return Group(keys_of(type(default)), _first_line(type(default)))
@@ -310,7 +399,18 @@ FLEET_WIDE: dict[str, tuple[str, ...]] = {"fleet": (), "trend": (), "passage": (
 
 
 def layout_keys(merged: bool = False) -> dict:
-    """Keys of a layout or an override, its own settings included; ``merged``: with the settings of the fleet."""
+    """Keys of a layout or an override, its own settings included.
+
+    Parameters
+    ----------
+    merged : bool
+        With the settings that hold for the whole fleet, as after merging.
+
+    Returns
+    -------
+    dict
+        Name -> Key, Group or NamedEntries.
+    """
     return {
         "description": Key("text", "what this layout is, for people"),
         "sections": NamedEntries(SECTION, LABEL, "one entry per monitored section", required=True),
@@ -354,7 +454,18 @@ def ends_of_ranges() -> Iterator[tuple[str, str, str]]:
 
 
 def check_ranges(settings: Branch) -> Iterator[ConfigError]:
-    """An error for every range of ``settings`` whose low end is not below its high end. Single keys must be valid."""
+    """Check that the low end of every range of the settings is below its high end. Single keys must be valid.
+
+    Parameters
+    ----------
+    settings : Branch
+        Tree of the settings.
+
+    Yields
+    ------
+    ConfigError
+        An error for each range that is not, at its first written end.
+    """
     for section, low, high in (*ends_of_ranges(), *ADJACENT_RANGES):
         written = settings.get(section, {})
         leaves = [written[name] for name in (low, high) if name in written]

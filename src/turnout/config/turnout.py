@@ -91,12 +91,39 @@ class TurnoutConfig:
     folder: Path = Path("config")
 
     def section(self, label: str) -> Section:
-        """The section called ``label``; KeyError lists the existing labels."""
+        """The section with a label.
+
+        Parameters
+        ----------
+        label : str
+            Label as in the layout.
+
+        Returns
+        -------
+        Section
+            The section.
+
+        Raises
+        ------
+        KeyError
+            For an unknown label; the message lists the labels.
+        """
         for section in self.sections:
             if section.label == label:
                 return section
         raise KeyError(f"turnout {self.id} has no section {label!r}; it has {[s.label for s in self.sections]}")
 
     def section_id(self, label: str) -> str:
-        """Id of a section in the registry."""
+        """Id of a section in the registry.
+
+        Parameters
+        ----------
+        label : str
+            Label as in the layout.
+
+        Returns
+        -------
+        str
+            "<turnout>/<label>".
+        """
         return f"{self.id}/{label}"

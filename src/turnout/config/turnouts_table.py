@@ -4,7 +4,7 @@ import csv
 import io
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -58,7 +58,18 @@ class Row:
         return self.values.get("raw", self.id)
 
     def place(self, column: str) -> Place:
-        """Where the cell of ``column`` starts."""
+        """Where the cell of ``column`` starts.
+
+        Parameters
+        ----------
+        column : str
+            Title of the column.
+
+        Returns
+        -------
+        Place
+            Where its cell starts; the start of the line if the table has no such column.
+        """
         if column not in self.header:
             return Place(self.path, self.line, 1)
         before = self.cells[: self.header.index(column)]
@@ -66,7 +77,20 @@ class Row:
 
 
 def read_table(path: Path, name: str) -> tuple[list[Row], list[ConfigError]]:
-    """Valid rows of turnouts.tsv, and the errors of the other rows."""
+    """Valid rows of turnouts.tsv, and the errors of the other rows.
+
+    Parameters
+    ----------
+    path : Path
+        turnouts.tsv.
+    name : str
+        What errors call the file.
+
+    Returns
+    -------
+    tuple of (list of Row, list of ConfigError)
+        The rows in their order, and the errors.
+    """
     if not os.path.lexists(path):
         return [], [ConfigError(name, "line 1", "no such file", "Run 'turnout add ID LAYOUT' to begin one")]
     try:
@@ -100,7 +124,7 @@ def read_table(path: Path, name: str) -> tuple[list[Row], list[ConfigError]]:
     return rows, errors
 
 
-def _header_errors(header, name, line) -> Iterator[ConfigError]:
+def _header_errors(header: tuple[str, ...], name: str, line: int) -> Iterator[ConfigError]:
     column = 1
     if problem := separator_problem(header):
         yield Place(name, line, 1).error(*problem)
@@ -117,9 +141,21 @@ def _header_errors(header, name, line) -> Iterator[ConfigError]:
             yield Place(name, line, 1).error(f"no column {title!r}", f"Add it: {key.meaning}")
 
 
-def separator_problem(cells) -> tuple[str, str] | None:
-    """(problem, remedy) if the cells of a line are separated by something other than tabs, else None.
+def separator_problem(cells: Sequence[str]) -> tuple[str, str] | None:
+    """Error of a line whose cells are not separated by tabs.
 
+    Parameters
+    ----------
+    cells : sequence of str
+        The line, split at tabs.
+
+    Returns
+    -------
+    tuple of (str, str) or None
+        Problem and remedy; None if it is separated by tabs or has one cell.
+
+    Examples
+    --------
     >>> separator_problem(("turnout;layout",)), separator_problem(("turnout", "layout"))
     (('semicolons between the columns', 'Put tabs between the columns'), None)
     """
@@ -129,7 +165,7 @@ def separator_problem(cells) -> tuple[str, str] | None:
     return None
 
 
-def _row(text, line, header, name) -> tuple[Row, list[ConfigError]]:
+def _row(text: str, line: int, header: tuple[str, ...], name: str) -> tuple[Row, list[ConfigError]]:
     cells = tuple(text.split("\t"))
     row = Row({}, line, cells, header, name)
     if separator_error := separator_problem(cells):
@@ -142,7 +178,8 @@ def _row(text, line, header, name) -> tuple[Row, list[ConfigError]]:
         cell = cell.strip()
         if not cell:
             continue
-        value, key = cell, ROW[title]
+        value: str | float = cell
+        key = ROW[title]
         if key.value_type == "number":
             try:
                 value = float(cell)
@@ -165,6 +202,18 @@ def _row(text, line, header, name) -> tuple[Row, list[ConfigError]]:
 def leads_out(path: str) -> bool:
     """Whether a relative path leads out of its folder.
 
+    Parameters
+    ----------
+    path : str
+        Path as it is written in a table or layout.
+
+    Returns
+    -------
+    bool
+        True for an absolute path, and for one with ".." or a backslash.
+
+    Examples
+    --------
     >>> leads_out("line_7/T00042"), leads_out("../other"), leads_out("/data")
     (False, True, True)
     """
@@ -173,7 +222,13 @@ def leads_out(path: str) -> bool:
 
 @contextmanager
 def restore_on_error(path: Path) -> Iterator[None]:
-    """Context that restores the content of ``path`` if an exception is raised inside it."""
+    """Context that restores the content of ``path`` if an exception is raised inside it.
+
+    Parameters
+    ----------
+    path : Path
+        File that is restored; one that was absent is deleted.
+    """
     path = Path(path)
     before = path.read_bytes() if os.path.lexists(path) else None
     try:
@@ -186,17 +241,49 @@ def restore_on_error(path: Path) -> Iterator[None]:
         raise
 
 
-def one_line(text: object) -> str:
-    """Text of a cell: None becomes empty, line breaks and tabs become blanks.
+def one_line(text: Any) -> str:
+    r"""Text of a cell: None becomes empty, line breaks and tabs become blanks.
 
-    >>> one_line("machine 09-3X\\n at night ")
+    Parameters
+    ----------
+    text : any
+        Any value; None is empty.
+
+    Returns
+    -------
+    str
+        Text without line breaks and tabs.
+
+    Examples
+    --------
+    >>> one_line("machine 09-3X\n at night ")
     'machine 09-3X at night'
     """
     return re.sub(r"\s+", " ", "" if text is None else str(text)).strip()
 
 
 def append_csv(path: Path, values: Mapping[str, str], columns: tuple[str, ...]) -> str:
-    """Add one row to a CSV and return its line; a new table gets ``columns``. ConfigError if a value has no column."""
+    """Add one row to a CSV; a new table gets a header.
+
+    Parameters
+    ----------
+    path : Path
+        The table.
+    values : mapping of str to str
+        Column -> text; columns without a value stay empty.
+    columns : tuple of str
+        Header of a new table.
+
+    Returns
+    -------
+    str
+        The line that was added.
+
+    Raises
+    ------
+    ConfigError
+        If a value has no column in the header.
+    """
     try:
         header = header_of(path, str(path)) if path.exists() else columns
     except TableError as fault:
@@ -207,7 +294,27 @@ def append_csv(path: Path, values: Mapping[str, str], columns: tuple[str, ...]) 
 
 
 def append_tsv(path: Path, values: Mapping[str, str], columns: tuple[str, ...]) -> str:
-    """As ``append_csv``, for a table with tabs between its columns and # before comments."""
+    """As ``append_csv``, for a table with tabs between its columns and # before comments.
+
+    Parameters
+    ----------
+    path : Path
+        The table.
+    values : mapping of str to str
+        Column -> text; columns without a value stay empty.
+    columns : tuple of str
+        Header of a new table.
+
+    Returns
+    -------
+    str
+        The line that was added.
+
+    Raises
+    ------
+    ConfigError
+        If a value has no column, or the table has no header or no tabs.
+    """
     header = columns
     if path.exists():
         try:

@@ -1,13 +1,15 @@
 """Readers of raw files: ``read`` converts a file of any supported format to recordings in SI units."""
 
 import logging
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from os import PathLike
 
 from turnout.errors import ReadError, TurnoutError
-from turnout.readers.formats import FORMATS, detect_format, reject_spreadsheet
+from turnout.readers.formats import FORMATS, Format, detect_format, reject_spreadsheet
 from turnout.readers.interpret import convert_records
-from turnout.readers.source import COPY_AGAIN, load
+from turnout.readers.source import COPY_AGAIN, RawRecord, Source, load
 from turnout.records import LongRecording, RawDescription, ReadResult, Recording
 
 __all__ = ["FORMATS", "names_and_units", "read"]
@@ -18,8 +20,8 @@ MAX_WHOLE_FILE_SIZE = 32 * 2**20  # bytes: a file up to this size is read into m
 
 
 def read(
-    path,
-    root,
+    path: PathLike | str,
+    root: PathLike | str,
     description: RawDescription,
     max_duration: float | None = None,
     max_whole_file_size: int = MAX_WHOLE_FILE_SIZE,
@@ -77,7 +79,7 @@ def read(
     return ReadResult(recordings=recordings_in_memory, errors=errors, sha256=digest, long_recordings=long_recordings)
 
 
-def names_and_units(path, root, format: str = "auto") -> tuple[tuple[str, str], ...]:
+def names_and_units(path: PathLike | str, root: PathLike | str, format: str = "auto") -> tuple[tuple[str, str], ...]:
     """Name and unit of every channel of a raw file, as the file states them in its first intact record.
 
     Parameters
@@ -101,13 +103,14 @@ def names_and_units(path, root, format: str = "auto") -> tuple[tuple[str, str], 
     with _as_read_error(source):
         records = _format_of(source, RawDescription((), format=format)).read_raw(source).records
     for record in records:
-        if not isinstance(record, ReadError):
+        if isinstance(record, RawRecord):
             return tuple(zip(record.names, record.units))
-    raise records[0] if records else source.error("the file", "it holds no record", COPY_AGAIN, reason="empty")
+    damaged = [record for record in records if isinstance(record, ReadError)]
+    raise damaged[0] if damaged else source.error("the file", "it holds no record", COPY_AGAIN, reason="empty")
 
 
 @contextmanager
-def _as_read_error(source):
+def _as_read_error(source: Source) -> Iterator[None]:
     """Turn any unexpected exception of a reader into a ReadError of this file; the traceback goes to the log."""
     try:
         yield
@@ -119,7 +122,7 @@ def _as_read_error(source):
         raise source.error("the file", problem) from error
 
 
-def _format_of(source, description):
+def _format_of(source: Source, description: RawDescription) -> Format:
     reject_spreadsheet(source)
     if description.format == "auto":
         return detect_format(source)

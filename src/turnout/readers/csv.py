@@ -18,21 +18,42 @@ The last line must end with a line break: without it a truncated number looks li
 
 import codecs
 import io
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
+from mmap import mmap
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 from pyarrow import csv
 
+from turnout.errors import ReadError
 from turnout.readers.csv_header import MISSING_VALUES, cell_errors, read_head, seconds_per_number, time_column
-from turnout.readers.lazy import LazyColumn
+from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.named_arrays import RECORD_COUNT_NAMES, SAMPLE_COUNT_NAMES, START_DATE_NAMES, START_NAMES, Metadata
-from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, RawFile, RawRecord
+from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.timing import TEXT_PRECISION, parse_time
 
 
-def read_raw(source) -> RawFile:
-    """Records of a text file."""
+def read_raw(source: Source) -> RawFile:
+    """Records of a text file.
+
+    Parameters
+    ----------
+    source : Source
+        The text file.
+
+    Returns
+    -------
+    RawFile
+        One record, or one per number in the column ``record``.
+
+    Raises
+    ------
+    ReadError
+        If the head, the columns or a number cannot be read, or the last line is incomplete.
+    """
     is_utf16 = source.head[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
     lazy = source.lazy and not is_utf16
     data = source.mapped if lazy else _in_utf8(source) if is_utf16 else source.data
@@ -53,13 +74,15 @@ def read_raw(source) -> RawFile:
     return RawFile(records, facts.count(RECORD_COUNT_NAMES))
 
 
-def _in_utf8(source):
+def _in_utf8(source: Source) -> bytes:
     """A file that a spreadsheet saved as "Unicode" (UTF-16), converted to UTF-8."""
     with source.parsed_by("Python", "the text in UTF-16"):
         return source.data.decode("utf-16").encode()
 
 
-def _columns_in_memory(source, data, offset, separator, names, time):
+def _columns_in_memory(
+    source: Source, data: bytes | mmap, offset: int, separator: str, names: Sequence[str], time: int | None
+) -> list[Column]:
     """All columns as arrays."""
     options = _options(data, offset, separator, len(names))
     line = _line_number(data, offset)
@@ -68,30 +91,57 @@ def _columns_in_memory(source, data, offset, separator, names, time):
     return [column.to_numpy(zero_copy_only=False) for column in table.columns]
 
 
-def _lazy_columns(source, data, offset, separator, names, time):
+def _lazy_columns(
+    source: Source, data: bytes | mmap, offset: int, separator: str, names: Sequence[str], time: int | None
+) -> list[Column]:
     """Columns that read their numbers when sliced; a time column is read at once."""
     options = _options(data, offset, separator, len(names))
     rows = RowReader(source.path, offset, options)
     line = _line_number(data, offset)
     with source.parsed_by("pyarrow", f"the numbers after line {line}"), cell_errors(source, line, names):
         times = rows.scan(time)
-    columns = [rows.column(i) for i in range(len(names))]
-    return columns if time is None else [*columns[:time], times, *columns[time + 1 :]]
+    columns: list[Column] = [rows.column(i) for i in range(len(names))]
+    if time is not None and times is not None:
+        columns[time] = times
+    return columns
 
 
-def _line_number(data, offset):
+def _line_number(data: bytes | mmap, offset: int) -> int:
     return data[:offset].count(b"\n")
 
 
 class RowReader:
-    """Reads the rows of a text file in order; a request for earlier rows starts again at the beginning."""
+    """Reads the rows of a text file in order; a request for earlier rows starts again at the beginning.
 
-    def __init__(self, path, offset, options):
+    Parameters
+    ----------
+    path : Path
+        The text file.
+    offset : int
+        Byte at which the numbers begin.
+    options : dict of str to any
+        Options of ``pyarrow.csv.open_csv``.
+    """
+
+    def __init__(self, path: Path, offset: int, options: dict[str, Any]):
         self.path, self.offset, self.options = path, offset, options
-        self.n_row, self.begin, self.batches, self.reader = 0, 0, [], None
+        self.n_row, self.begin = 0, 0
+        self.batches: list[pa.RecordBatch] = []
+        self.reader: csv.CSVStreamingReader | None = None
 
-    def scan(self, time):
-        """Count the rows; return column number ``time``, (n_row,), or None if ``time`` is None."""
+    def scan(self, time: int | None) -> np.ndarray | None:
+        """Count the rows and read the time column.
+
+        Parameters
+        ----------
+        time : int or None
+            Number of the time column, from 0; None: there is none.
+
+        Returns
+        -------
+        (n_row,) array or None
+            The time as it is written; None without a time column.
+        """
         values = []
         for batch in self._open():
             self.n_row += batch.num_rows
@@ -99,16 +149,27 @@ class RowReader:
                 values.append(batch.column(time).to_numpy(zero_copy_only=False))
         return None if time is None else np.concatenate(values)
 
-    def column(self, i):
-        """Column number ``i``."""
+    def column(self, i: int) -> LazyColumn:
+        """Column number ``i``.
+
+        Parameters
+        ----------
+        i : int
+            Number of the column, from 0.
+
+        Returns
+        -------
+        LazyColumn
+            Its numbers, read when it is sliced.
+        """
         return LazyColumn(lambda start, stop: self._read_rows(i, start, stop), self.n_row, np.dtype(float))
 
-    def _open(self):
+    def _open(self) -> csv.CSVStreamingReader:
         file = self.path.open("rb")
         file.seek(self.offset)
         return csv.open_csv(file, **self.options)
 
-    def _read_rows(self, i, start, stop):
+    def _read_rows(self, i: int, start: int, stop: int) -> np.ndarray:
         if self.reader is None or start < self.begin:
             self.reader, self.begin, self.batches = self._open(), 0, []
         end = self.begin + sum(batch.num_rows for batch in self.batches)
@@ -121,7 +182,7 @@ class RowReader:
         return table.column(i).to_numpy()
 
 
-def _options(data, offset, separator, width):
+def _options(data: bytes | mmap, offset: int, separator: str, width: int) -> dict[str, Any]:
     """Options of pyarrow for the numbers from byte ``offset`` on."""
     dot_offset = data.find(b".", offset)
     has_decimal_comma = separator != "," and data.find(b",", offset, dot_offset if dot_offset >= 0 else len(data)) >= 0
@@ -137,14 +198,22 @@ def _options(data, offset, separator, width):
     return {"read_options": reading, "parse_options": parsing, "convert_options": converting}
 
 
-def _records(columns, names, units, time, facts, source, unclear):
+def _records(
+    columns: list[Column],
+    names: Sequence[str],
+    units: Sequence[str],
+    time: int | None,
+    facts: Metadata,
+    source: Source,
+    unclear: tuple[tuple[str, float], ...],
+) -> Iterator[RawRecord | ReadError]:
     """The records: one of all rows, or one per number in the column ``record``."""
     lower = [name.strip().lower() for name in names]
     number = columns[lower.index("record")] if "record" in lower else None
     selected = [i for i, name in enumerate(lower) if name != "record" and i != time]
     if len(selected) > 1 and not names[selected[-1]] and _is_empty(columns[selected[-1]]):
         selected.pop()
-    seconds = None if time is None else columns[time] * seconds_per_number(units[time], source)
+    seconds = None if time is None else np.asarray(columns[time]) * seconds_per_number(units[time], source)
     n_row = len(columns[0])
     edges = [0, n_row]
     if number is not None:
@@ -176,5 +245,5 @@ def _records(columns, names, units, time, facts, source, unclear):
         )
 
 
-def _is_empty(column):
+def _is_empty(column: Column) -> bool:
     return all(np.isnan(column[a : a + BLOCK_SIZE]).all() for a in range(0, len(column), BLOCK_SIZE))

@@ -5,7 +5,9 @@ It also finds the time column and its unit, and explains cells that are no numbe
 
 import re
 import unicodedata
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from mmap import mmap
 
 import pyarrow as pa
 
@@ -19,17 +21,29 @@ from turnout.readers.named_arrays import (
     STEP_NAMES,
     TIME_NAMES,
 )
-from turnout.readers.source import COPY_AGAIN
+from turnout.readers.source import COPY_AGAIN, Source
 from turnout.units import conversion
 
 TIME_WORDS = (*TIME_NAMES, "zeit", "tid", "temps", "tempo", "tiempo", "tijd")
 SECONDS_PER_UNIT = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "µs": 1e-6, "us": 1e-6}
 
 
-def time_column(names, units):
-    """Number of the time column: by its name, else by its unit; None without one.
+def time_column(names: Sequence[str], units: Sequence[str]) -> int | None:
+    """Number of the time column: by its name, else by its unit.
 
     No sensor measures in seconds, so a unit of time identifies the column in any language.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names of the columns.
+    units : sequence of str
+        Unit of each column, "" if not stated.
+
+    Returns
+    -------
+    int or None
+        Number of the column, from 0; None without one.
 
     Examples
     --------
@@ -43,26 +57,54 @@ def time_column(names, units):
     return next((i for i, unit in enumerate(units) if unit.strip() and _plain_unit(unit) in SECONDS_PER_UNIT), None)
 
 
-def seconds_per_number(unit, source):
-    """Seconds per number in the time column; ReadError for an unknown unit of time."""
+def seconds_per_number(unit: str, source: Source) -> float:
+    """Seconds per number in the time column.
+
+    Parameters
+    ----------
+    unit : str
+        Unit of the time column as it is written; "" means seconds.
+    source : Source
+        The text file.
+
+    Returns
+    -------
+    float
+        Factor that converts its numbers to seconds. [s]
+
+    Raises
+    ------
+    ReadError
+        For an unknown unit of time.
+    """
     if _plain_unit(unit) not in SECONDS_PER_UNIT:
         remedy = f"Export the time in one of {', '.join(SECONDS_PER_UNIT)[2:]}"
         raise source.error("the time column", f"its unit {unit!r} is not known", remedy, reason="unit_unknown")
     return SECONDS_PER_UNIT[_plain_unit(unit)]
 
 
-def _plain_unit(unit):
+def _plain_unit(unit: str) -> str:
     return unit.strip().replace("\u03bc", "µ")
 
 
 NAME_WITH_UNIT = re.compile(r"^(.*?)\s*[\[(]([^\[\]]*)[\])]$")
 
 
-def names_among(lines):
-    """(number of the line of names, number of the line of units or None) of lines with one cell per column.
+def names_among(lines: Sequence[Sequence[str]]) -> tuple[int, int | None]:
+    """Find the line of names and the line of units among the lines above the numbers.
 
     The names are in the line above the units. Without a line of units they are in the last line that names a time or
     has units in brackets, because comments may follow. Else they are in the last line.
+
+    Parameters
+    ----------
+    lines : sequence of sequence of str
+        Cells of each line, one per column.
+
+    Returns
+    -------
+    tuple of (int, int or None)
+        Number of the line of names and of that of the units, from 0; None without a line of units.
 
     Examples
     --------
@@ -78,13 +120,13 @@ def names_among(lines):
     return next((i for i in range(last, -1, -1) if _are_names(lines[i])), last), None
 
 
-def _are_units(cells, share):
+def _are_units(cells: Sequence[str], share: float) -> bool:
     """Whether at least this share of the filled cells are units."""
     filled_cells = [cell for cell in cells if cell]
     return sum(map(_is_unit, filled_cells)) >= share * len(filled_cells)
 
 
-def _is_unit(cell):
+def _is_unit(cell: str) -> bool:
     """Whether a cell is a known unit, a meaningless one, or anything in brackets; "12 m" is a length."""
     bare = cell.strip("[]() ")
     if cell[0] in "[(" or bare.casefold() in MEANINGLESS_UNITS or bare.replace("\u03bc", "µ") in SECONDS_PER_UNIT:
@@ -95,7 +137,7 @@ def _is_unit(cell):
         return False
 
 
-def _are_names(cells):
+def _are_names(cells: Sequence[str]) -> bool:
     """Whether a cell names the time or has a unit in brackets; not if any cell starts with a digit, as in "08:30"."""
     if any(cell[:1].isdigit() for cell in cells):
         return False
@@ -115,9 +157,21 @@ INVALID_VALUE = re.compile(
 )
 
 
-def is_unreadable_number(cell):
-    """Whether a cell is a number with thousands marks or the mark of a missing one; an empty cell is neither.
+def is_unreadable_number(cell: str) -> bool:
+    """Whether a cell is a number with thousands marks or the mark of a missing number.
 
+    Parameters
+    ----------
+    cell : str
+        Text of the cell, without blanks around it.
+
+    Returns
+    -------
+    bool
+        False for an empty cell and for any other text.
+
+    Examples
+    --------
     >>> is_unreadable_number("-1.234,5"), is_unreadable_number("#NV"), is_unreadable_number("13.05.2024")
     (True, True, False)
     """
@@ -125,8 +179,23 @@ def is_unreadable_number(cell):
 
 
 @contextmanager
-def cell_errors(source, line, names):
-    """Turn pyarrow's error about a cell in the rows below ``line`` into a ReadError with its line and column."""
+def cell_errors(source: Source, line: int, names: Sequence[str]) -> Iterator[None]:
+    """Context that converts pyarrow's error about a cell to a ReadError with its line and column.
+
+    Parameters
+    ----------
+    source : Source
+        The text file.
+    line : int
+        Number of the last line above the rows, from 1.
+    names : sequence of str
+        Names of the columns.
+
+    Raises
+    ------
+    ReadError
+        If a cell in the rows is no number.
+    """
     try:
         yield
     except pa.ArrowInvalid as error:
@@ -157,7 +226,11 @@ FREQUENCY_LINE = re.compile(r"^#?[^\d\[(]+[\[(]?([kM]?Hz)?[\])]?[\s:=,;]*([\d.,]
 NO_RATE_WORDS = re.compile(r"filt|pass|paß|cut|grenz|band|coup|cort|tagli|græns|eigen|reson|netz|mains", re.IGNORECASE)
 
 
-def _decode_line(data):
+# notes, names and units of the columns, byte of the first number, separator, unclear lines with their frequency [Hz]
+Head = tuple[dict[str, float | str], list[str], list[str], int, str, tuple[tuple[str, float], ...]]
+
+
+def _decode_line(data: bytes) -> str:
     """One line as text: UTF-8, else Windows-1252 of older western loggers."""
     try:
         return data.decode("utf-8-sig").strip("\r\n")
@@ -165,8 +238,27 @@ def _decode_line(data):
         return data.decode("cp1252", "replace").strip("\r\n")
 
 
-def read_head(data, source):
-    """(notes, names, units, offset of the first number, separator, lines with a frequency in unknown words)."""
+def read_head(data: bytes | mmap, source: Source) -> Head:
+    """Read the lines above the numbers, and find where the numbers begin.
+
+    Parameters
+    ----------
+    data : bytes or mmap
+        Bytes of the file.
+    source : Source
+        The text file.
+
+    Returns
+    -------
+    tuple
+        Notes of the head by name; names and units of the columns; byte of the first number; separator; and (line,
+        frequency [Hz]) of the lines with a frequency in unknown words.
+
+    Raises
+    ------
+    ReadError
+        If no line of numbers follows.
+    """
     notes: dict[str, float | str] = {}
     text_lines: list[str] = []
     unclear: list[tuple[str, float]] = []
@@ -203,7 +295,7 @@ def read_head(data, source):
     raise source.error("the file", problem, "Export numbers between semicolons, tabs or commas, the time in seconds")
 
 
-def _plain(name):
+def _plain(name: str) -> str:
     """A name without case, accents, spaces and apostrophes.
 
     >>> _plain("Fréquence d’échantillonnage")
@@ -213,7 +305,7 @@ def _plain(name):
     return re.sub(r"[\s'’]", "_", "".join(c for c in letters if not unicodedata.combining(c)))
 
 
-def _frequency(line):
+def _frequency(line: str) -> float | None:
     """The only frequency [Hz] in a line; None if it has none, several, or that of a filter.
 
     >>> _frequency("# Vzorkovací kmitočet: 10 kHz"), _frequency("Tiefpass: 4000 Hz"), _frequency("0.5-10000 Hz")
@@ -226,11 +318,11 @@ def _frequency(line):
     return value if isinstance(value, float) else None
 
 
-def _cells(line, separator):
+def _cells(line: str, separator: str) -> list[str]:
     return [cell.strip().strip('"') for cell in line.split(separator)]
 
 
-def _is_number(cell):
+def _is_number(cell: str) -> bool:
     try:
         float(cell.replace(",", "."))
     except ValueError:
@@ -238,7 +330,7 @@ def _is_number(cell):
     return True
 
 
-def _value(text):
+def _value(text: str) -> float | str:
     """A number in Hz or s if the text begins with one ("51200 Hz", "12,8 kHz"), else the text."""
     first, *words = text.split() or [""]
     dated = "-" in first[1:].lower().replace("e-", "")
@@ -247,7 +339,7 @@ def _value(text):
     return float(first.replace(",", ".")) * UNIT_SCALES.get(words[0].strip("[]()") if words else "", 1.0)
 
 
-def _names(lines, cells):
+def _names(lines: list[list[str]], cells: list[str]) -> tuple[list[str], list[str]]:
     """(names, units) from the lines between the head and the first line of numbers, ``cells``.
 
     A separator after the last number, as in "1;2;", makes a column without a name.

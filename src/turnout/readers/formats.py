@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 
-from turnout.readers.source import Source
+from turnout.readers.source import RawFile, Source
 
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
@@ -21,12 +21,28 @@ class Format:
     signature: Callable[[bytes], bool] = lambda head: False
     meaning: str = ""
 
-    def read_raw(self, source: Source):
-        """The file's records, not converted. The module is imported only now: h5py alone costs 0.1 s."""
+    def read_raw(self, source: Source) -> RawFile:
+        """The file's records, not converted. The module is imported only now: h5py alone costs 0.1 s.
+
+        Parameters
+        ----------
+        source : Source
+            The raw file.
+
+        Returns
+        -------
+        RawFile
+            The records as they are in the file, and the number of records that it states.
+
+        Raises
+        ------
+        ReadError
+            If the file as a whole cannot be read.
+        """
         return import_module(f"turnout.readers.{self.module}").read_raw(source)
 
 
-def _is_hdf5(head):
+def _is_hdf5(head: bytes) -> bool:
     return any(head[at : at + 8] == HDF5_SIGNATURE for at in (0, 512, 1024, 2048))
 
 
@@ -49,7 +65,23 @@ FORMATS = {
 
 
 def detect_format(source: Source) -> Format:
-    """The format of a file, by its first bytes or else by its extension; ReadError if neither is known."""
+    """The format of a file, by its first bytes or else by its extension.
+
+    Parameters
+    ----------
+    source : Source
+        The raw file.
+
+    Returns
+    -------
+    Format
+        The first entry of ``FORMATS`` that fits.
+
+    Raises
+    ------
+    ReadError
+        If neither the first bytes nor the extension are those of a known format.
+    """
     head = source.head
     extension = source.path.suffix.lower()
     for entry in FORMATS.values():
@@ -76,8 +108,19 @@ FIRST_ZIP_ENTRIES = (
 )
 
 
-def reject_spreadsheet(source):
-    """ReadError if the first bytes are those of Excel or OpenDocument, whatever the name of the file."""
+def reject_spreadsheet(source: Source) -> None:
+    """Stop if the first bytes are those of Excel or OpenDocument, whatever the name of the file.
+
+    Parameters
+    ----------
+    source : Source
+        The raw file.
+
+    Raises
+    ------
+    ReadError
+        If they are; the remedy is to export text.
+    """
     zipped = source.head[:4] == b"PK\x03\x04" and source.head[30:].startswith(FIRST_ZIP_ENTRIES)
     if zipped or source.head.startswith(OLD_EXCEL):
         remedy = "Save it from the spreadsheet as CSV, text with separated columns"

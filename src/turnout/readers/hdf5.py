@@ -5,6 +5,8 @@
 checksum, so that damage is limited to one record.
 """
 
+from typing import Any
+
 import h5py
 import numpy as np
 
@@ -20,14 +22,30 @@ from turnout.readers.named_arrays import (
     raw_file,
     vectors,
 )
-from turnout.readers.source import RawFile
+from turnout.readers.source import RawFile, Source
 from turnout.readers.timing import check_simultaneous
 
 UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units")
 
 
-def read_raw(source) -> RawFile:
-    """Records of an HDF5 file."""
+def read_raw(source: Source) -> RawFile:
+    """Records of an HDF5 file.
+
+    Parameters
+    ----------
+    source : Source
+        The HDF5 file.
+
+    Returns
+    -------
+    RawFile
+        Its records; a dataset that cannot be read makes its record an error.
+
+    Raises
+    ------
+    ReadError
+        If the file cannot be opened, or its groups are no records.
+    """
     if source.lazy:
         with source.parsed_by("HDF5"):
             # not closed here: a dataset keeps its file open as long as it exists
@@ -38,7 +56,7 @@ def read_raw(source) -> RawFile:
     return raw_file(variables, source)
 
 
-def _variables(group, source):
+def _variables(group: h5py.Group, source: Source) -> dict[str, Any]:
     """Members and attributes of a group in one dictionary; a ReadError for a dataset that cannot be read."""
     creation = group[group.name].id.get_create_plist()  # the id of a File does not have it
     is_order_tracked = creation.get_link_creation_order() & h5py.h5p.CRT_ORDER_TRACKED
@@ -72,7 +90,7 @@ def _variables(group, source):
     return variables
 
 
-def _apply_clocks(variables, clocks, source):
+def _apply_clocks(variables: dict[str, Any], clocks: dict[str, dict], source: Source) -> None:
     """Use the rate or step that datasets state individually as the common one; a different one is an error."""
     for name in (*vectors(variables), *matrices(variables)):
         try:
@@ -85,13 +103,13 @@ def _apply_clocks(variables, clocks, source):
             variables[name] = error
 
 
-def _values(dataset):
+def _values(dataset: h5py.Dataset) -> Any:
     if h5py.check_string_dtype(dataset.dtype) is not None:
         return dataset.asstr()[()]
     return dataset[()]
 
 
-def _attribute(value):
+def _attribute(value: Any) -> Any:
     if isinstance(value, bytes):
         return value.decode("utf-8", "replace").strip()
     if isinstance(value, np.ndarray) and value.size == 1:

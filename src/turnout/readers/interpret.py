@@ -3,15 +3,17 @@
 It assigns the channels of a file to those of the layout, converts units and checks what the layout states.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.lazy import BlockReader, ChannelStatistics, channel_error
-from turnout.readers.source import COPY_AGAIN, MIN_SAMPLES
+from turnout.readers.source import COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
 from turnout.readers.timing import check_order, check_time, resolve_rate, start_times
 from turnout.records import Channel, LongRecording, RawChannel, RawDescription, Recording
 from turnout.units import IGNORED, conversion, to_si
@@ -30,11 +32,34 @@ class ChannelMapping:
     offset: float
 
 
-def channel_mappings(record, channels, where, source):
-    """One ChannelMapping per channel that is read, in the layout's order; ReadError if file and layout disagree.
+def channel_mappings(
+    record: RawRecord, channels: Sequence[RawChannel], where: str, source: Source
+) -> tuple[ChannelMapping, ...]:
+    """Assign the channels of the layout to rows of the file.
 
-    ``RawChannel.limit`` and ``resolution`` are in SI already. Channels with the quantity "ignored" are not read and
-    may be absent.
+    ``RawChannel.limit`` and ``resolution`` are in SI already. Channels with the quantity "ignored" are not read and may
+    be absent.
+
+    Parameters
+    ----------
+    record : RawRecord
+        The record as it is in the file.
+    channels : sequence of RawChannel
+        Channels of the layout.
+    where : str
+        The record, for the message.
+    source : Source
+        The raw file.
+
+    Returns
+    -------
+    tuple of ChannelMapping
+        One mapping per channel that is read, in the order of the layout.
+
+    Raises
+    ------
+    ReadError
+        If file and layout disagree about channels or units.
     """
     channels = [c for c in channels if c.quantity != IGNORED or _has_channel(record, c.source, where, source)]
     indices = [index_of(record, channel.source, where, source) for channel in channels]
@@ -56,8 +81,30 @@ def channel_mappings(record, channels, where, source):
     )
 
 
-def index_of(record, wanted, where, source):
-    """Row of the channel that the layout calls ``wanted``: a number, a name, or an alias of the format."""
+def index_of(record: RawRecord, wanted: str | int, where: str, source: Source) -> int:
+    """Row of the channel that the layout calls ``wanted``: a number, a name, or an alias of the format.
+
+    Parameters
+    ----------
+    record : RawRecord
+        The record as it is in the file.
+    wanted : str or int
+        Number of the channel from 0, its name, or an alias of the format.
+    where : str
+        The record, for the message.
+    source : Source
+        The raw file.
+
+    Returns
+    -------
+    int
+        Number of the row, from 0.
+
+    Raises
+    ------
+    ReadError
+        If there is no such channel, or more than one.
+    """
     if isinstance(wanted, int):
         if 0 <= wanted < len(record.names):
             return wanted
@@ -86,7 +133,7 @@ def index_of(record, wanted, where, source):
     raise source.error(where, problem, hint, reason="channel_missing")
 
 
-def _has_channel(record, wanted, where, source):
+def _has_channel(record: RawRecord, wanted: str | int, where: str, source: Source) -> bool:
     try:
         index_of(record, wanted, where, source)
     except ReadError:
@@ -94,7 +141,7 @@ def _has_channel(record, wanted, where, source):
     return True
 
 
-def _channel_mapping(index, file_unit, raw: RawChannel, where, source):
+def _channel_mapping(index: int, file_unit: str, raw: RawChannel, where: str, source: Source) -> ChannelMapping:
     try:
         conversion_to_si = to_si(raw.quantity, resolve_unit(file_unit, raw.unit), raw.sensitivity, raw.sensitivity_unit)
     except ValueError as error:
@@ -114,11 +161,28 @@ def _channel_mapping(index, file_unit, raw: RawChannel, where, source):
     return ChannelMapping(index, channel, sign * conversion_to_si.scale, sign * conversion_to_si.offset)
 
 
-def resolve_unit(file_unit, layout_unit):
-    """Unit of the raw numbers. File and layout must agree if both state one; "V!" in a layout overrules the file.
+def resolve_unit(file_unit: str, layout_unit: str | None) -> str:
+    """Unit of the raw numbers, from the file and the layout.
 
-    If the file states counts, the layout gives the value of one count: a voltage, or a unit with a factor. The layout
-    overrules meaningless labels. ValueError for any other unknown unit.
+    Both must agree if both state one; "V!" in a layout overrules the file. If the file states counts, the layout gives
+    the value of one count: a voltage, or a unit with a factor. The layout overrules meaningless labels.
+
+    Parameters
+    ----------
+    file_unit : str
+        Unit that the file states, "" without one.
+    layout_unit : str or None
+        Unit that the layout states, or None.
+
+    Returns
+    -------
+    str
+        The unit that holds, which may have a factor.
+
+    Raises
+    ------
+    ValueError
+        If no unit is stated, the units differ, or the file's unit is not known.
 
     Examples
     --------
@@ -145,20 +209,43 @@ def resolve_unit(file_unit, layout_unit):
     return layout_unit
 
 
-def _is_meaningless(unit):
+def _is_meaningless(unit: str) -> bool:
     """Whether a label is no unit: a placeholder, or a number that some loggers write there."""
     return unit.casefold() in MEANINGLESS_UNITS or unit.replace(".", "", 1).isdigit()
 
 
-def _conflict_text(statement, layout_unit):
+def _conflict_text(statement: str, layout_unit: str) -> str:
     return f"the file says {statement}, the layout {layout_unit!r} ({layout_unit + '!'!r} would overrule the file)"
 
 
-def convert_records(raw, description: RawDescription, source, max_duration=None):
-    """(recordings, errors) of a raw file. A damaged record does not affect the other records.
+def convert_records(
+    raw: RawFile, description: RawDescription, source: Source, max_duration: float | None = None
+) -> tuple[tuple[Recording | LongRecording, ...], tuple[ReadError, ...]]:
+    """Convert the records of a raw file to recordings; a damaged record does not affect the others.
 
     In a passage a dead or non-finite channel is left out of the recording and adds an error. A hammer test needs all
-    its channels. A record of more than ``max_duration`` seconds becomes a ``LongRecording`` if the source is lazy.
+    its channels.
+
+    Parameters
+    ----------
+    raw : RawFile
+        The records as they are in the file.
+    description : RawDescription
+        What the layout states about the file.
+    source : Source
+        The raw file.
+    max_duration : float or None
+        A longer record becomes a ``LongRecording`` if the source is lazy; None: all are read. [s]
+
+    Returns
+    -------
+    tuple of (tuple of Recording or LongRecording, tuple of ReadError)
+        Recordings of the intact records; errors of the others and of channels that were left out.
+
+    Raises
+    ------
+    ReadError
+        If the file holds no record.
     """
     if not raw.records and not raw.expected:
         raise source.error("the file", "it holds no record", COPY_AGAIN, reason="empty")
@@ -182,7 +269,7 @@ def convert_records(raw, description: RawDescription, source, max_duration=None)
     return tuple(recordings), tuple(errors)
 
 
-def _count_errors(raw, description, source):
+def _count_errors(raw: RawFile, description: RawDescription, source: Source) -> Iterator[ReadError]:
     """Errors where the number of records differs from that stated by the layout or by the file itself."""
     n_present = len(raw.records)
     layout_remedy = _copy_or_correct("records", description.n_records)
@@ -198,12 +285,14 @@ def _count_errors(raw, description, source):
         yield source.error(f"record {description.n_records + 1}", problem, remedy, reason="wrong_length")
 
 
-def _copy_or_correct(key, promised):
+def _copy_or_correct(key: str, promised: int | None) -> str:
     """Remedy if a file holds less than the layout's ``key`` states: either may be wrong."""
     return f"{COPY_AGAIN}; if it is whole, correct '{key}: {promised}' in the layout (null: any number)"
 
 
-def _recording(record, k, n_record, description, source, max_duration):
+def _recording(
+    record: RawRecord, k: int, n_record: int, description: RawDescription, source: Source, max_duration: float | None
+) -> tuple[Recording | LongRecording, list[ReadError]]:
     """(recording, errors of channels left out) of raw record ``k``; ReadError if the record cannot be used."""
     where = f"record {k + 1} of {n_record}"
     n_sample = _sample_count(record, where, description.n_samples, source)
@@ -227,7 +316,7 @@ def _recording(record, k, n_record, description, source, max_duration):
     if faults and (description.kind != "passage" or len(faults) == len(channel_maps)):
         raise next(iter(faults.values()))
     usable = [i for i in range(len(channel_maps)) if i not in faults]
-    fields = {
+    fields: dict[str, Any] = {
         "rate": rate,
         "channels": tuple(channel_maps[i].channel for i in usable),
         "kind": description.kind,
@@ -241,7 +330,7 @@ def _recording(record, k, n_record, description, source, max_duration):
     return Recording(samples=samples if not faults else samples[usable], **fields), channel_errors
 
 
-def _sample_count(record, where, promised, source):
+def _sample_count(record: RawRecord, where: str, promised: int | None, source: Source) -> int:
     lengths = {name: len(x) for name, x in zip(record.names, record.samples)}
     shortest = min(lengths.values(), default=0)
     longest = max(lengths.values(), default=0)

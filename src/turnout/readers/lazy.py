@@ -1,17 +1,53 @@
 """Lazy arrays: samples of a long record stay in the file and are read and converted in blocks on request."""
 
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.source import BLOCK_SIZE, RawRecord, Source
+from turnout.records import Channel
+
+if TYPE_CHECKING:
+    from turnout.readers.interpret import ChannelMapping
+
+Take = Callable[[int, int], np.ndarray]  # (start, stop) -> the samples between these indices
+
+
+class Numbers(Protocol):
+    """Numbers in a file or in memory, which are read when they are sliced."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Length of each axis."""
+
+    @property
+    def dtype(self) -> Any:
+        """Type of the numbers."""
+
+    def __getitem__(self, selection: Any, /) -> np.ndarray: ...
+
 
 MIN_LAZY_SIZE = 2**16  # numbers: smaller datasets are read at once
 
 
-def is_large(dataset) -> bool:
-    """Whether a dataset may be the samples of a long record: many numbers in one or two dimensions."""
+def is_large(dataset: Any) -> bool:
+    """Whether a dataset may be the samples of a long record: many numbers in one or two dimensions.
+
+    Parameters
+    ----------
+    dataset : any
+        Dataset of h5py or an array; it has ``dtype``, ``ndim`` and ``size``.
+
+    Returns
+    -------
+    bool
+        True from ``MIN_LAZY_SIZE`` numbers on.
+    """
     return dataset.dtype.kind in "fiu" and dataset.ndim in (1, 2) and dataset.size >= MIN_LAZY_SIZE
 
 
@@ -20,11 +56,18 @@ class LazyMatrix:
 
     ``numbers`` has ``shape`` and ``dtype`` and is sliced like a two-dimensional array. The last block is cached, so
     that all rows of a block cost one access to the file.
+
+    Parameters
+    ----------
+    numbers : Numbers
+        Matrix in a file, (n_row, n_column) as it is stored.
+    transposed : bool
+        Exchange the axes.
     """
 
     ndim = 2
 
-    def __init__(self, numbers, transposed: bool = False):
+    def __init__(self, numbers: Numbers, transposed: bool = False):
         self.numbers, self.transposed = numbers, transposed
         self.dtype = np.dtype(numbers.dtype)
         self.shape = tuple(numbers.shape)[::-1] if transposed else tuple(numbers.shape)
@@ -32,22 +75,46 @@ class LazyMatrix:
         self.last: tuple[tuple[int, int] | None, np.ndarray] = (None, np.empty((0, 0)))
 
     @property
-    def T(self):
+    def T(self) -> LazyMatrix:
         """The same matrix with its axes exchanged."""
         return LazyMatrix(self.numbers, not self.transposed)
 
-    def __len__(self):
+    def __len__(self) -> int:
         return self.shape[0]
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[LazyColumn]:
         return (LazyColumn(self.row_of(k), self.shape[1], self.dtype) for k in range(len(self)))
 
-    def row_of(self, k):
-        """Function (start, stop) -> samples of row ``k``."""
+    def row_of(self, k: int) -> Take:
+        """Function (start, stop) -> samples of row ``k``.
+
+        Parameters
+        ----------
+        k : int
+            Number of the row, from 0.
+
+        Returns
+        -------
+        Take
+            Reads the samples of this row from one index up to another.
+        """
         return lambda start, stop: self.block(start, stop)[k]
 
-    def block(self, start, stop) -> np.ndarray:
-        """All rows from ``start`` to ``stop``, (n_row, stop - start)."""
+    def block(self, start: int, stop: int) -> np.ndarray:
+        """All rows from ``start`` to ``stop``, (n_row, stop - start).
+
+        Parameters
+        ----------
+        start : int
+            First column, from 0.
+        stop : int
+            Column behind the last one.
+
+        Returns
+        -------
+        (n_row, stop - start) array
+            The numbers of the block.
+        """
         if self.last[0] != (start, stop):
             block = self.numbers[start:stop].T if self.transposed else self.numbers[:, start:stop]
             self.last = (start, stop), block
@@ -57,6 +124,17 @@ class LazyMatrix:
 class LazyColumn:
     """A row of samples in a file, (n,), which ``take(start, stop)`` reads when it is sliced.
 
+    Parameters
+    ----------
+    take : Take
+        ``take(start, stop)`` reads the samples from ``start`` up to ``stop``.
+    n : int
+        Number of samples.
+    dtype : dtype
+        Type of the numbers.
+
+    Examples
+    --------
     >>> column = LazyColumn(lambda start, stop: np.arange(start, stop), 10, np.dtype(float))
     >>> len(column), column[7:99].tolist(), float(np.asarray(column).sum())
     (10, [7, 8, 9], 45.0)
@@ -64,23 +142,35 @@ class LazyColumn:
 
     ndim = 1
 
-    def __init__(self, take, n: int, dtype):
+    def __init__(self, take: Take, n: int, dtype: Any):
         self.take, self.shape, self.size, self.dtype = take, (n,), n, np.dtype(dtype)
 
-    def __len__(self):
+    def __len__(self) -> int:
         return self.size
 
-    def __getitem__(self, selection: slice):
+    def __getitem__(self, selection: slice) -> np.ndarray:
         start, stop, step = selection.indices(self.size)
         return self.take(start, max(stop, start))[::step]
 
-    def __array__(self, dtype=None, copy=None):
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
         return np.asarray(self[:], dtype=dtype)
 
 
-def lazy_array(numbers):
+def lazy_array(numbers: Numbers) -> LazyColumn | LazyMatrix:
     """``LazyColumn`` or ``LazyMatrix`` of anything that is sliced like an array; axes of length 1 are dropped.
 
+    Parameters
+    ----------
+    numbers : Numbers
+        Dataset of one or two dimensions in a file.
+
+    Returns
+    -------
+    LazyColumn or LazyMatrix
+        A column if at most one axis is longer than 1, else a matrix.
+
+    Examples
+    --------
     >>> lazy_array(np.ones((1, 5))).shape, lazy_array(np.ones((5, 1))).shape, lazy_array(np.ones((2, 5))).shape
     ((5,), (5,), (2, 5))
     """
@@ -94,6 +184,8 @@ def lazy_array(numbers):
 
 
 ARRAYS = (np.ndarray, LazyMatrix, LazyColumn)
+Array = np.ndarray | LazyMatrix | LazyColumn
+Column = np.ndarray | LazyColumn  # samples of one channel, (n_sample,)
 
 
 @dataclass(frozen=True)
@@ -104,7 +196,7 @@ class BlockReader:
     """
 
     record: RawRecord
-    mapped: tuple
+    mapped: tuple[ChannelMapping, ...]
     where: str
     source: Source
     state: tuple[int, int] | None
@@ -121,8 +213,19 @@ class BlockReader:
                     row += mapping.offset
         return samples
 
-    def subset(self, rows) -> "BlockReader":
-        """The same reader for some of the channels."""
+    def subset(self, rows: Sequence[int]) -> BlockReader:
+        """The same reader for some of the channels.
+
+        Parameters
+        ----------
+        rows : sequence of int
+            Indices of the channels in ``mapped``.
+
+        Returns
+        -------
+        BlockReader
+            A reader of these channels in this order.
+        """
         return BlockReader(self.record, tuple(self.mapped[i] for i in rows), self.where, self.source, self.state)
 
 
@@ -140,29 +243,58 @@ class ChannelStatistics:
     constant: np.ndarray
 
     @classmethod
-    def from_record(cls, block_reader: BlockReader, n_sample: int):
-        """Statistics from one pass over a record of ``n_sample`` samples."""
+    def from_record(cls, block_reader: BlockReader, n_sample: int) -> ChannelStatistics:
+        """Statistics from one pass over a record of ``n_sample`` samples.
+
+        Parameters
+        ----------
+        block_reader : BlockReader
+            Reads the samples of the record in blocks.
+        n_sample : int
+            Number of samples of each channel.
+
+        Returns
+        -------
+        ChannelStatistics
+            Statistics of all samples.
+
+        Raises
+        ------
+        ReadError
+            If the file is damaged in one of the blocks.
+        """
         statistics = cls._empty(len(block_reader.mapped))
         for start in range(0, n_sample, BLOCK_SIZE):
             statistics._add(block_reader(start, min(start + BLOCK_SIZE, n_sample)), start)
         return statistics
 
     @classmethod
-    def from_samples(cls, samples: np.ndarray) -> "ChannelStatistics":
-        """Statistics of the samples of a record in memory."""
+    def from_samples(cls, samples: np.ndarray) -> ChannelStatistics:
+        """Statistics of the samples of a record in memory.
+
+        Parameters
+        ----------
+        samples : (n_channel, n_sample) array of float
+            In the SI unit of each channel.
+
+        Returns
+        -------
+        ChannelStatistics
+            Statistics of all samples.
+        """
         statistics = cls._empty(len(samples))
         statistics._add(samples, 0)
         return statistics
 
     @classmethod
-    def _empty(cls, n: int) -> "ChannelStatistics":
+    def _empty(cls, n: int) -> ChannelStatistics:
         return cls(np.zeros(n, int), np.full(n, -1), np.zeros(n), np.ones(n, bool))
 
-    def by_channel(self) -> list[tuple]:
+    def by_channel(self) -> list[tuple[int, int, float, bool]]:
         """(n_bad, first_bad, value, constant) of each channel."""
         return list(zip(self.n_bad, self.first_bad, self.value, self.constant))
 
-    def _add(self, samples, start):
+    def _add(self, samples: np.ndarray, start: int) -> None:
         if start == 0:
             self.value = samples[:, 0].copy()
         for i, row in enumerate(samples):
@@ -175,8 +307,29 @@ class ChannelStatistics:
                 self.n_bad[i] += np.count_nonzero(~finite)
 
 
-def channel_error(n_sample, statistics, channel, where, source) -> ReadError | None:
-    """ReadError of a channel that is not finite or constant; None for an intact one."""
+def channel_error(
+    n_sample: int, statistics: tuple[int, int, float, bool], channel: Channel, where: str, source: Source
+) -> ReadError | None:
+    """ReadError of a channel that is not finite or constant; None for an intact one.
+
+    Parameters
+    ----------
+    n_sample : int
+        Number of samples of the channel.
+    statistics : tuple of (int, int, float, bool)
+        Number of non-finite samples, index of the first of them, first sample, whether all are equal.
+    channel : Channel
+        The channel; one that measures temperature may be constant.
+    where : str
+        The record, for the message.
+    source : Source
+        The raw file.
+
+    Returns
+    -------
+    ReadError or None
+        The error, None for an intact channel.
+    """
     place = f"{where}, channel {channel.name!r}"
     n_bad, first_bad, value, constant = statistics
     if n_bad:

@@ -4,21 +4,40 @@ The package lvm_read is not used: it turns unreadable numbers into NaN, does not
 some 2 µs per number. Layout: National Instruments, "Specification for the LabVIEW Measurement File".
 """
 
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+
 import numpy as np
 import pyarrow as pa
 from pyarrow import csv
 
 from turnout.errors import ReadError
 from turnout.readers.named_arrays import Metadata
-from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, number_or_text
+from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, Source, number_or_text
 from turnout.readers.timing import TEXT_PRECISION, check_simultaneous, parse_time, start_offsets, step_precision
 
 END_OF_HEADER = b"***End_of_Header***"
 SEPARATORS = {"Tab": "\t", "Comma": ",", "Semicolon": ";"}
 
 
-def read_raw(source) -> RawFile:
-    """Records of an LVM file; the head of the file may state their number (``Records``)."""
+def read_raw(source: Source) -> RawFile:
+    """Records of an LVM file; the head of the file may state their number (``Records``).
+
+    Parameters
+    ----------
+    source : Source
+        The LabVIEW measurement file.
+
+    Returns
+    -------
+    RawFile
+        One record per segment.
+
+    Raises
+    ------
+    ReadError
+        If the header has no end, or no segment follows.
+    """
     lines = source.data[: source.data.find(END_OF_HEADER)].decode("latin-1").splitlines()
     head = _fields(lines, _separator(lines))
     if END_OF_HEADER not in source.data:
@@ -28,7 +47,7 @@ def read_raw(source) -> RawFile:
     if not starts:
         raise source.error("the file", "no segment of samples follows its header", COPY_AGAIN, reason="empty")
     edges = [*starts, len(source.data)]
-    records = []
+    records: list[RawRecord | ReadError] = []
     for k, start in enumerate(starts):
         try:
             records.append(_record(source, start, edges[k + 1], head, separator, k, len(starts)))
@@ -37,17 +56,17 @@ def read_raw(source) -> RawFile:
     return RawFile(tuple(records), Metadata(head, source).count(("records",)))
 
 
-def _separator(lines):
+def _separator(lines: Sequence[str]) -> str:
     named = next((line for line in lines if line.startswith("Separator")), "Separator\tTab")
     return SEPARATORS.get(named[10:].strip().strip(",;"), "\t")
 
 
-def _fields(lines, separator):
+def _fields(lines: Sequence[str], separator: str) -> dict[str, str]:
     pairs = (line.split(separator) for line in lines)
     return {cells[0].strip(): cells[1].strip() for cells in pairs if len(cells) > 1 and cells[0].strip()}
 
 
-def _segments(data):
+def _segments(data: bytes) -> list[int]:
     """Offsets of the lines "Channels ..." at which the segments begin."""
     offsets, offset = [], data.find(END_OF_HEADER)
     while (offset := data.find(b"\nChannels", offset)) >= 0:
@@ -56,7 +75,9 @@ def _segments(data):
     return offsets
 
 
-def _record(source, start, stop, head, separator, k, n):
+def _record(
+    source: Source, start: int, stop: int, head: Mapping[str, str], separator: str, k: int, n: int
+) -> RawRecord:
     """One segment: its header of one column per channel, then rows of X_Value, the channels and a comment."""
     where = f"record {k + 1} of {n}"
     end = source.data.find(END_OF_HEADER, start, stop)
@@ -103,16 +124,18 @@ def _record(source, start, stop, head, separator, k, n):
     )
 
 
-def _per_channel(fields, name, count):
+def _per_channel(fields: Mapping[str, list[str]], name: str, count: int) -> list[str]:
     """The field ``name`` of each channel, "" if absent."""
     return [*fields.get(name, []), *[""] * count][:count]
 
 
-def _parse_date_and_time(date, clock):
+def _parse_date_and_time(date: str, clock: str) -> datetime | None:
     return parse_time(f"{date.replace('/', '-')}T{clock.replace(',', '.')[:15]}")
 
 
-def _columns(source, body, separator, decimal_mark, count, n_x_columns, where):
+def _columns(
+    source: Source, body: bytes, separator: str, decimal_mark: str, count: int, n_x_columns: int, where: str
+) -> list[np.ndarray]:
     """One array per channel: the rows up to the blank line that ends a segment."""
     body = body.replace(b"\r", b"")
     for segment_end in (b"\n\n", b"\n" + separator.encode() + b"\n"):
@@ -134,7 +157,7 @@ def _columns(source, body, separator, decimal_mark, count, n_x_columns, where):
     return [column.to_numpy(zero_copy_only=False) for column in table.columns]
 
 
-def _table(body, width, separator, decimal_mark, indices):
+def _table(body: bytes, width: int, separator: str, decimal_mark: str, indices: Sequence[int]) -> pa.Table:
     names = [str(i) for i in range(width)]
     return csv.read_csv(
         pa.py_buffer(body),

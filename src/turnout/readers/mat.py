@@ -5,21 +5,38 @@ have reversed axes. The number of channels and the longer axis identify the axes
 """
 
 import warnings
+from typing import Any
 
 import h5py
 import numpy as np
 import pymatreader
 
-from turnout.readers.lazy import is_large, lazy_array
+from turnout.readers.lazy import LazyColumn, LazyMatrix, is_large, lazy_array
 from turnout.readers.named_arrays import TIME_NAMES, Alphabetical, raw_file
-from turnout.readers.source import RawFile
+from turnout.readers.source import RawFile, Source
 
 HEADER_SIZE = 128  # bytes of the header of version 5
 VERSION_73 = b"MATLAB 7.3"
 
 
-def read_raw(source) -> RawFile:
-    """Records of a MATLAB file."""
+def read_raw(source: Source) -> RawFile:
+    """Records of a MATLAB file.
+
+    Parameters
+    ----------
+    source : Source
+        The MATLAB file.
+
+    Returns
+    -------
+    RawFile
+        Its records.
+
+    Raises
+    ------
+    ReadError
+        If the file is truncated, cannot be read, or its variables are no records.
+    """
     if source.size < HEADER_SIZE:
         raise source.error("the header", f"the file ends after {source.size} bytes", reason="truncated")
     with source.parsed_by("pymatreader"), warnings.catch_warnings():
@@ -32,7 +49,7 @@ def read_raw(source) -> RawFile:
     )
 
 
-def _lazy_arrays(source):
+def _lazy_arrays(source: Source) -> dict[str, LazyColumn | LazyMatrix]:
     """Arrays of version 7.3 outside structures, which stay in the file. Version 5 cannot be read in parts."""
     file = h5py.File(source.path, "r")  # not closed here: a dataset keeps its file open
     return {
@@ -42,7 +59,7 @@ def _lazy_arrays(source):
     }
 
 
-def _plain_variables(value, mapping_type):
+def _plain_variables(value: Any, mapping_type: type[dict]) -> Any:
     """The value with dictionaries of ``mapping_type`` and arrays; a structure array becomes numbered records."""
     if isinstance(value, dict):
         members = {name: _plain_variables(v, mapping_type) for name, v in value.items()}

@@ -20,31 +20,65 @@ The names that loggers use in European languages are listed here in lower case, 
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.lazy import ARRAYS
-from turnout.readers.source import CONDITIONS, RawFile, RawRecord
+from turnout.readers.lazy import ARRAYS, Array, Column
+from turnout.readers.source import CONDITIONS, RawFile, RawRecord, Source
 from turnout.readers.timing import EXACT_PRECISION, SINGLE_PRECISION, is_single_precision, parse_time, step_precision
 
 RECORD_NAME = re.compile(r"^(?:record|rec|segment|impact|hit)[_ ]?(\d+)$", re.IGNORECASE)
 
 
-def numbered_names(names):
-    """[(number, name)] of the ``names`` that are "record", "impact" ... with a number.
+def numbered_names(names: Iterable[str]) -> list[tuple[int, str]]:
+    """Names of records, "record", "impact" ... with a number.
 
+    Parameters
+    ----------
+    names : iterable of str
+        Names of variables or groups.
+
+    Returns
+    -------
+    list of tuple of (int, str)
+        (number, name) of those that name a record, in the given order.
+
+    Examples
+    --------
     >>> numbered_names(["rate", "hit_02", "Record 10"])
     [(2, 'hit_02'), (10, 'Record 10')]
     """
     return [(int(m[1]), name) for name in names if (m := RECORD_NAME.match(name))]
 
 
-def records_in_order(numbered, variables, source):
+def records_in_order(
+    numbered: Iterable[tuple[int, str]], variables: Mapping[str, Any], source: Source
+) -> Iterator[Any]:
     """Values of the records in the order of their numbers, None for a missing number.
 
     If the gaps outnumber the records, no record counts as missing: a clock or a counter numbered them.
+
+    Parameters
+    ----------
+    numbered : iterable of tuple of (int, str)
+        (number, name) of each record.
+    variables : mapping of str to any
+        Name -> value, the other variables included.
+    source : Source
+        The raw file.
+
+    Yields
+    ------
+    any
+        The value of each record in turn, None for a missing number.
+
+    Raises
+    ------
+    ReadError
+        If two names have the same number.
     """
     names: dict[int, list[str]] = {}
     for number, name in sorted(numbered):
@@ -60,8 +94,19 @@ def records_in_order(numbered, variables, source):
             yield variables[candidates[0]] if candidates else None
 
 
-def natural_sort_key(name):
-    """Key that sorts "record_2" before "record_10"."""
+def natural_sort_key(name: str) -> list[int | str]:
+    """Key that sorts "record_2" before "record_10".
+
+    Parameters
+    ----------
+    name : str
+        Name with numbers in it.
+
+    Returns
+    -------
+    list of int or str
+        Its texts and numbers in turn.
+    """
     return [int(piece) if piece.isdigit() else piece for piece in re.split(r"(\d+)", name)]
 
 
@@ -69,11 +114,27 @@ class Alphabetical(dict):
     """Variables of a file that sorts them alphabetically: their order carries no information."""
 
 
-def match_units(names, units, labels, ordered):
-    """Unit of each of ``names``: by the ``labels`` that belong to the units, else by order; "" if unknown.
+def match_units(names: Sequence[str], units: list[str], labels: Sequence[str], ordered: bool) -> list[str] | None:
+    """Unit of each of ``names``: by the ``labels`` that belong to the units, else by order.
 
-    None if the units differ and the names are not ``ordered``: then the assignment is unknown.
+    Parameters
+    ----------
+    names : sequence of str
+        Names of the channels.
+    units : list of str
+        Units that the file lists.
+    labels : sequence of str
+        Names that the file lists for these units; case does not matter.
+    ordered : bool
+        Whether the order of ``names`` is that of the file.
 
+    Returns
+    -------
+    list of str or None
+        One unit per name, "" if unknown; None if the units differ and nothing assigns them.
+
+    Examples
+    --------
     >>> match_units(["rail", "sleeper"], ["g", "m/s²"], ["Sleeper", "rail"], ordered=False)
     ['m/s²', 'g']
     >>> match_units(["rail", "sleeper"], ["g", "m/s²"], [], ordered=True)
@@ -121,14 +182,40 @@ RECORD_COUNT_NAMES = ("n_records", "n_record")
 
 
 class Metadata:
-    """Metadata of the samples of a group of variables; missing entries are taken from the ``parent`` group."""
+    """Metadata of the samples of a group of variables; missing entries are taken from the ``parent`` group.
 
-    def __init__(self, variables: Mapping, source, parent: "Metadata | None" = None):
+    Parameters
+    ----------
+    variables : mapping
+        Names and values of the group; upper and lower case count as equal, except for "t".
+    source : Source
+        The raw file.
+    parent : 'Metadata or None'
+        Metadata of the group above.
+    """
+
+    def __init__(self, variables: Mapping, source: Source, parent: "Metadata | None" = None):
         self.lower = {(k if k == "t" else k.lower()): v for k, v in variables.items() if k != "T"}
         self.parent, self.source = parent, source
 
-    def get(self, names):
-        """The first variable of ``names``, here or in a parent group; ReadError if it is damaged."""
+    def get(self, names: Sequence[str]) -> Any:
+        """The first variable of ``names``, here or in a parent group; ReadError if it is damaged.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Spellings of one entry, in lower case.
+
+        Returns
+        -------
+        any
+            Value of the first spelling that exists, here or in a parent group; None without one.
+
+        Raises
+        ------
+        ReadError
+            If the variable is damaged.
+        """
         for name in names:
             if (value := self.lower.get(name)) is not None:
                 if isinstance(value, ReadError):
@@ -136,30 +223,90 @@ class Metadata:
                 return value
         return self.parent.get(names) if self.parent else None
 
-    def record_value(self, names, k, n):
-        """As ``get``, but entry ``k`` if there is one entry per record."""
+    def record_value(self, names: Sequence[str], k: int, n: int) -> Any:
+        """As ``get``, but entry ``k`` if there is one entry per record.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Spellings of one entry, in lower case.
+        k : int
+            Number of the record, from 0.
+        n : int
+            Number of records.
+
+        Returns
+        -------
+        any
+            As ``get``, but entry ``k`` if there is one entry per record.
+
+        Raises
+        ------
+        ReadError
+            If the variable is damaged.
+        """
         value = self.get(names)
         if isinstance(value, (list, tuple)) or (isinstance(value, np.ndarray) and value.ndim):
             value = np.ravel(np.asarray(value))
             value = value[k if value.size == n else 0] if value.size else None
         return value.item() if isinstance(value, np.generic) and value.dtype.kind != "M" else value
 
-    def number(self, names, k=0, n=1):
-        """As ``record_value``, but a float; ReadError if it is no number."""
+    def number(self, names: Sequence[str], k: int = 0, n: int = 1) -> float | None:
+        """As ``record_value``, but a float; ReadError if it is no number.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Spellings of one entry, in lower case.
+        k : int
+            Number of the record, from 0.
+        n : int
+            Number of records.
+
+        Returns
+        -------
+        float or None
+            As ``record_value``, but a float.
+
+        Raises
+        ------
+        ReadError
+            If it is no number.
+        """
         value = self.record_value(names, k, n)
         try:
             return None if value is None else float(value)
         except (TypeError, ValueError) as error:
             raise self.source.error(f"variable {names[0]!r}", f"{value!r} is no number") from error
 
-    def count(self, names, k=0, n=1):
-        """As ``number``, but a whole number above 0."""
+    def count(self, names: Sequence[str], k: int = 0, n: int = 1) -> int | None:
+        """As ``number``, but a whole number above 0.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Spellings of one entry, in lower case.
+        k : int
+            Number of the record, from 0.
+        n : int
+            Number of records.
+
+        Returns
+        -------
+        int or None
+            As ``number``, but a whole number above 0.
+
+        Raises
+        ------
+        ReadError
+            If it is no such number.
+        """
         value = self.number(names, k, n)
         if value is None or (1 <= value < 2**53 and value == int(value)):
             return None if value is None else int(value)
         raise self.source.error(f"variable {names[0]!r}", f"{value!r} is no whole number above 0")
 
-    def rate(self):
+    def rate(self) -> float | None:
         """Sampling rate [Hz], None if not stated."""
         rate = self.number(RATE_NAMES)
         if rate is None and (step := self.number(STEP_NAMES)):
@@ -167,21 +314,61 @@ class Metadata:
         return rate
 
     def rate_fields(self, min_tolerance: float = EXACT_PRECISION) -> dict:
-        """``rate`` [Hz] and ``rate_tolerance`` of a RawRecord; ``min_tolerance`` is the precision of the format."""
+        """Fields ``rate`` and ``rate_tolerance`` of a RawRecord.
+
+        Parameters
+        ----------
+        min_tolerance : float
+            Relative precision of numbers in this format.
+
+        Returns
+        -------
+        dict
+            The rate, from a rate or a step [Hz], None if not stated; the relative precision of its statement.
+
+        Raises
+        ------
+        ReadError
+            If rate or step is no number.
+        """
         rate, step = self.number(RATE_NAMES), self.number(STEP_NAMES)
         if rate is None and step:
             return {"rate": 1.0 / step, "rate_tolerance": max(step_precision(step), min_tolerance)}
         tolerance = SINGLE_PRECISION if rate is not None and is_single_precision(rate) else EXACT_PRECISION
         return {"rate": rate, "rate_tolerance": max(tolerance, min_tolerance)}
 
-    def conditions(self, k, n):
-        """Conditions that are stored with the samples."""
+    def conditions(self, k: int, n: int) -> dict[str, Any]:
+        """Conditions that are stored with the samples.
+
+        Parameters
+        ----------
+        k : int
+            Number of the record, from 0.
+        n : int
+            Number of records.
+
+        Returns
+        -------
+        dict of str to any
+            Name -> value of the conditions that are stored with the samples of record ``k``.
+        """
         values = {name: self.record_value((name,), k, n) for name in CONDITIONS}
         return {name: value for name, value in values.items() if value is not None}
 
 
-def list_of_texts(value) -> list[str]:
-    """A list of texts from the form in which a library returns it."""
+def list_of_texts(value: Any) -> list[str]:
+    """A list of texts from the form in which a library returns it.
+
+    Parameters
+    ----------
+    value : any
+        Text, bytes, a list or an array of these, or None.
+
+    Returns
+    -------
+    list of str
+        The texts without blanks around them; empty for None.
+    """
     if value is None:
         return []
     if isinstance(value, (str, bytes)):
@@ -191,8 +378,28 @@ def list_of_texts(value) -> list[str]:
     ]
 
 
-def raw_file(variables: Mapping, source, parent: Metadata | None = None) -> RawFile:
-    """All records in ``variables``; a damaged value is a ReadError."""
+def raw_file(variables: Mapping, source: Source, parent: Metadata | None = None) -> RawFile:
+    """Interpret named variables as records.
+
+    Parameters
+    ----------
+    variables : mapping
+        Name -> array, text, number, ReadError of a damaged value, or mapping of these.
+    source : Source
+        The raw file.
+    parent : Metadata or None
+        Metadata of the group that holds these variables.
+
+    Returns
+    -------
+    RawFile
+        All records, and the number of records that the file states.
+
+    Raises
+    ------
+    ReadError
+        If the variables do not say which arrays are the samples.
+    """
     facts = Metadata(variables, source, parent)
     expected = facts.count(RECORD_COUNT_NAMES)
     numbered = numbered_names(variables)
@@ -211,7 +418,7 @@ def raw_file(variables: Mapping, source, parent: Metadata | None = None) -> RawF
     return RawFile(tuple(records), expected)
 
 
-def _numbered_record(value, k, n, where, facts, source):
+def _numbered_record(value: Any, k: int, n: int, where: str, facts: Metadata, source: Source) -> RawRecord | ReadError:
     """One numbered record, or its error."""
     try:
         if value is None:
@@ -231,7 +438,9 @@ def _numbered_record(value, k, n, where, facts, source):
         return source.error(where, f"it is no single record ({error})", "Check how the file was exported")
 
 
-def _group_records(variables, facts, source, k=0, n=1):
+def _group_records(
+    variables: Mapping[str, Any], facts: Metadata, source: Source, k: int = 0, n: int = 1
+) -> list[RawRecord]:
     """The records of a group whose variables are samples."""
     if damaged := [v for v in variables.values() if isinstance(v, ReadError)]:
         raise damaged[0]
@@ -256,7 +465,7 @@ def _group_records(variables, facts, source, k=0, n=1):
     return [_raw_record(tuple(channels), list(channels.values()), units, facts, k, n)]
 
 
-def _units_of(channels, facts, ordered, where, source):
+def _units_of(channels: Mapping[str, Array], facts: Metadata, ordered: bool, where: str, source: Source) -> list[str]:
     """The unit of each variable that is a channel, "" if the file does not state it."""
     entry = facts.get(UNIT_NAMES)
     if isinstance(entry, Mapping):
@@ -269,14 +478,36 @@ def _units_of(channels, facts, ordered, where, source):
     return units
 
 
-def matrices(variables):
-    """Arrays that can be samples in two or three dimensions."""
+def matrices(variables: Mapping[str, Any]) -> dict[str, Any]:
+    """Arrays that can be samples in two or three dimensions.
+
+    Parameters
+    ----------
+    variables : mapping of str to any
+        Name -> value of any type.
+
+    Returns
+    -------
+    dict of str to any
+        Those that are numeric arrays with at least two numbers along one axis.
+    """
     arrays = {name: v for name, v in variables.items() if isinstance(v, ARRAYS) and v.dtype.kind in "fiu"}
     return {name: v for name, v in arrays.items() if v.ndim in (2, 3) and min(v.shape) >= 1 and max(v.shape) > 1}
 
 
-def vectors(variables):
-    """Vectors that can be channels; those much shorter than the longest are metadata, not samples."""
+def vectors(variables: Mapping[str, Any]) -> dict[str, Any]:
+    """Vectors that can be channels; those much shorter than the longest are metadata, not samples.
+
+    Parameters
+    ----------
+    variables : mapping of str to any
+        Name -> value of any type.
+
+    Returns
+    -------
+    dict of str to any
+        Numeric vectors that are longer than half of the longest and have no name of metadata.
+    """
     reserved_names = {
         *RATE_NAMES,
         *STEP_NAMES,
@@ -297,7 +528,7 @@ def vectors(variables):
     return {name: v for name, v in candidates.items() if 2 * v.size > longest}
 
 
-def _record(block, facts, k, n, where, source):
+def _record(block: Any, facts: Metadata, k: int, n: int, where: str, source: Source) -> RawRecord:
     """The record of a matrix (channel, sample) or (sample, channel)."""
     block = np.atleast_2d(block) if isinstance(block, np.ndarray) else block
     names, units = list_of_texts(facts.get(CHANNEL_NAMES)), list_of_texts(facts.get(UNIT_NAMES))
@@ -312,7 +543,9 @@ def _record(block, facts, k, n, where, source):
     return _raw_record(names, list(block), units, facts, k, n)
 
 
-def _raw_record(names, samples, units, facts, k, n):
+def _raw_record(
+    names: Sequence[str], samples: list[Column], units: Sequence[str], facts: Metadata, k: int, n: int
+) -> RawRecord:
     time = facts.get(TIME_NAMES)
     time = np.asarray(time, dtype=float) if isinstance(time, np.ndarray) and time.size == len(samples[0]) else None
     return RawRecord(

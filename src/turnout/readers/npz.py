@@ -4,11 +4,27 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.named_arrays import raw_file
-from turnout.readers.source import RawFile
+from turnout.readers.source import RawFile, Source
 
 
-def read_raw(source) -> RawFile:
-    """Records of an archive; a wrong checksum of a member affects only its record."""
+def read_raw(source: Source) -> RawFile:
+    """Records of an archive.
+
+    Parameters
+    ----------
+    source : Source
+        The NumPy archive.
+
+    Returns
+    -------
+    RawFile
+        Its records; a wrong checksum of a member affects only its record.
+
+    Raises
+    ------
+    ReadError
+        If the archive cannot be opened, or its arrays are no records.
+    """
     variables = {}
     with source.parsed_by("numpy"), np.load(source.path, allow_pickle=False) as archive:
         for name in archive.files:

@@ -5,19 +5,37 @@ metadata of its field. A truncated file lacks its footer and cannot be opened; p
 """
 
 import json
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from turnout.readers.lazy import LazyColumn
+from turnout.errors import ReadError
+from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.named_arrays import RECORD_COUNT_NAMES, START_NAMES, TIME_NAMES, Metadata
-from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord
+from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.timing import TEXT_PRECISION, parse_time
 
 
-def read_raw(source) -> RawFile:
-    """Records of a Parquet file."""
+def read_raw(source: Source) -> RawFile:
+    """Records of a Parquet file.
+
+    Parameters
+    ----------
+    source : Source
+        The Parquet file.
+
+    Returns
+    -------
+    RawFile
+        One record, or one per number in the column ``record``.
+
+    Raises
+    ------
+    ReadError
+        If the file cannot be opened or a page is damaged.
+    """
     with source.parsed_by("pyarrow"):
         file = pq.ParquetFile(source.path, page_checksum_verification=True)
         schema, n_row = file.schema_arrow, file.metadata.num_rows
@@ -32,7 +50,7 @@ def read_raw(source) -> RawFile:
     time = next((name for name in columns if name.lower() in TIME_NAMES), None)
     names = [name for name, x in columns.items() if name != time and x.dtype.kind in "fiu"]
     n = len(edges) - 1
-    records = []
+    records: list[RawRecord | ReadError] = []
     for k in range(n):
         span = slice(edges[k], edges[k + 1])
         promised = facts.count(("n_samples",), k, n)
@@ -54,7 +72,7 @@ def read_raw(source) -> RawFile:
     return RawFile(tuple(records) if n_row else (), facts.count(RECORD_COUNT_NAMES))
 
 
-def _columns(file, rows):
+def _columns(file: pq.ParquetFile, rows: "RowGroupReader | None") -> dict[str, Column]:
     """Name -> numbers, or a lazy column if ``rows`` is given; a time column is always read."""
     names = file.schema_arrow.names
     if rows is None:
@@ -63,25 +81,43 @@ def _columns(file, rows):
     lazy_names = [f.name for f in file.schema_arrow if (pa.types.is_floating(f.type) or pa.types.is_integer(f.type))]
     lazy_names = [name for name in lazy_names if name.lower() not in TIME_NAMES]
     table = file.read([name for name in names if name not in lazy_names], use_threads=False)
-    columns_in_memory = {name: table.column(name).to_numpy() for name in table.column_names}
-    lazy_columns = {name: rows.column(name) for name in lazy_names}
-    return {name: columns_in_memory.get(name, lazy_columns.get(name)) for name in names}
+    columns: dict[str, Column] = {name: table.column(name).to_numpy() for name in table.column_names}
+    columns |= {name: rows.column(name) for name in lazy_names}
+    return {name: columns[name] for name in names}
 
 
 class RowGroupReader:
-    """Reads row groups of a file; two adjacent ones are cached, because a block may lie across their border."""
+    """Reads row groups of a file; two adjacent ones are cached, because a block may lie across their border.
 
-    def __init__(self, file):
-        self.file, self.groups = file, {}
+    Parameters
+    ----------
+    file : pq.ParquetFile
+        The open file.
+    """
+
+    def __init__(self, file: pq.ParquetFile):
+        self.file = file
+        self.groups: dict[int, pa.Table] = {}
         sizes = [file.metadata.row_group(k).num_rows for k in range(file.num_row_groups)]
         self.edges = np.concatenate([[0], np.cumsum(sizes)]).astype(int)
 
-    def column(self, name):
-        """One column, read lazily."""
+    def column(self, name: str) -> LazyColumn:
+        """One column, read lazily.
+
+        Parameters
+        ----------
+        name : str
+            Name of the column.
+
+        Returns
+        -------
+        LazyColumn
+            Its numbers, read when it is sliced.
+        """
         dtype = self.file.schema_arrow.field(name).type.to_pandas_dtype()
         return LazyColumn(lambda start, stop: self._read_rows(name, start, stop), int(self.edges[-1]), dtype)
 
-    def _read_rows(self, name, start, stop):
+    def _read_rows(self, name: str, start: int, stop: int) -> np.ndarray:
         first, last = np.searchsorted(self.edges, [start, max(stop - 1, start)], side="right") - 1
         pieces = []
         for k in range(first, last + 1):
@@ -89,14 +125,14 @@ class RowGroupReader:
             pieces.append(self._group(k).column(name).to_numpy()[low:high])
         return np.concatenate(pieces)
 
-    def _group(self, k):
+    def _group(self, k: int) -> pa.Table:
         if k not in self.groups:
             self.groups = {i: group for i, group in self.groups.items() if abs(i - k) == 1}
             self.groups[k] = self.file.read_row_group(k, use_threads=False)
         return self.groups[k]
 
 
-def _notes(schema):
+def _notes(schema: pa.Schema) -> dict[str, Any]:
     """The metadata of the schema as variables, decoded from JSON where possible."""
     raw = {k.decode("utf-8", "replace"): v.decode("utf-8", "replace") for k, v in (schema.metadata or {}).items()}
     notes = {}
@@ -108,12 +144,12 @@ def _notes(schema):
     return {**notes, **notes.get("turnout", {})} if isinstance(notes.get("turnout", {}), dict) else notes
 
 
-def _unit(field):
+def _unit(field: pa.Field) -> str:
     metadata = field.metadata or {}
     return next((metadata[k].decode("utf-8", "replace") for k in (b"unit", b"units") if k in metadata), "")
 
 
-def _seconds(time):
+def _seconds(time: np.ndarray) -> np.ndarray:
     """A time column in seconds; time stamps are counted from the first one."""
     if time.dtype.kind == "M":
         return (time - time[0]).astype("timedelta64[ns]").astype(float) * 1e-9

@@ -7,8 +7,9 @@ nanoseconds since 1970 UTC, one per sample, and must agree with ``CommonTriggerF
 Layout: OpenRail Association, RCM-DX Specification 2.0.
 """
 
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from datetime import UTC, datetime, timedelta
+from typing import Any
 
 import h5py
 import numpy as np
@@ -16,15 +17,31 @@ import numpy as np
 from turnout.errors import ReadError
 from turnout.readers.lazy import is_large, lazy_array
 from turnout.readers.named_arrays import Metadata
-from turnout.readers.source import CONDITIONS, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord
+from turnout.readers.source import CONDITIONS, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
 from turnout.readers.timing import SINGLE_PRECISION
 
 FREQUENCY_ATTRIBUTES = ("CommonTriggerFrequency", "CommonTriggerFreq", "CommonTriggerFrequence", "TriggerValue")
 METADATA_ATTRIBUTES = {*CONDITIONS, "RecordCount"}
 
 
-def read_raw(source) -> RawFile:
-    """Records of an RCM-DX file, in the order of its sessions."""
+def read_raw(source: Source) -> RawFile:
+    """Records of an RCM-DX file, in the order of its sessions.
+
+    Parameters
+    ----------
+    source : Source
+        The RCM-DX file.
+
+    Returns
+    -------
+    RawFile
+        One record per data source that samples in time.
+
+    Raises
+    ------
+    ReadError
+        If the file cannot be opened, or has no group RCMDX.
+    """
     with source.parsed_by("HDF5"), _open(source) as file:
         if "RCMDX" not in file:
             raise source.error("the root", "there is no group RCMDX", "Set the format in the layout to hdf5")
@@ -34,7 +51,7 @@ def read_raw(source) -> RawFile:
         for group, notes in data_sources:
             try:
                 with source.parsed_by("HDF5", f"data source {group.name!r}"):
-                    record = _record(group, notes, source)
+                    record: RawRecord | ReadError | None = _record(group, notes, source)
             except ReadError as error:
                 record = error
             if record is not None:
@@ -44,7 +61,7 @@ def read_raw(source) -> RawFile:
     return RawFile(tuple(record for _, record in records), Metadata(notes, source).count(("recordcount",)))
 
 
-def _open(source):
+def _open(source: Source) -> AbstractContextManager[h5py.File]:
     """The file; with a lazy source the datasets keep it open."""
     file = h5py.File(source.path, "r")
     return nullcontext(file) if source.lazy else file
@@ -53,7 +70,7 @@ def _open(source):
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
-def _data_sources(group, notes, data_sources):
+def _data_sources(group: h5py.Group, notes: dict[str, Any], data_sources: list[tuple[h5py.Group, dict]]) -> None:
     """Append every group that holds time stamps and channels, with the metadata of its parent groups."""
     notes = {**notes, **{k: group.attrs[k] for k in METADATA_ATTRIBUTES.intersection(group.attrs)}}
     if isinstance(group.get("timestamp"), h5py.Dataset) and any(_is_channel(m) for m in group.values()):
@@ -64,15 +81,15 @@ def _data_sources(group, notes, data_sources):
             _data_sources(member, notes, data_sources)
 
 
-def _is_channel(member):
+def _is_channel(member: Any) -> bool:
     return isinstance(member, h5py.Group) and isinstance(member.get("data"), h5py.Dataset)
 
 
-def _text(value):
+def _text(value: Any) -> str:
     return (value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)).strip()
 
 
-def _record(group, notes, source):
+def _record(group: h5py.Group, notes: dict[str, Any], source: Source) -> RawRecord | None:
     """The record of one data source; None if it is not sampled in time."""
     channels = {name: member for name, member in group.items() if _is_channel(member)}
     modes = {_text(c.attrs.get("TriggerMode", "TIME")).upper() for c in channels.values()}
@@ -81,7 +98,7 @@ def _record(group, notes, source):
     where = f"data source {group.name!r}"
     stamps = group["timestamp"][()]
     data = [c["data"] for c in channels.values()]
-    samples = [lazy_array(d) if source.lazy and is_large(d) else d[()] for d in data]
+    samples: list[Any] = [lazy_array(d) if source.lazy and is_large(d) else d[()] for d in data]
     for name, x in zip(channels, samples):
         if len(x) != len(stamps):
             problem = f"{len(x)} samples and {len(stamps)} time stamps"
@@ -110,5 +127,5 @@ def _record(group, notes, source):
     )
 
 
-def _plain(value):
+def _plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else _text(value)

@@ -1,22 +1,29 @@
 """Input and output of the readers: the ``Source`` of a raw file, and its records as they are in the file."""
 
+from __future__ import annotations
+
 import hashlib
 import math
 import mmap
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import datetime
 from functools import cached_property
+from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.content import sha256_of
 from turnout.errors import ReadError, TurnoutError, is_infrastructure
 from turnout.records import EMPTY_MAPPING
+
+if TYPE_CHECKING:
+    from turnout.readers.lazy import LazyColumn
 
 COPY_AGAIN = "Copy the file again from the logger"
 SYSTEM_ERROR = re.compile(r"errno = (\d{1,9})\b")
@@ -41,6 +48,18 @@ CONDITIONS = (
 def number_or_text(text: str) -> float | str:
     """A condition as a float if it is a number, else as text.
 
+    Parameters
+    ----------
+    text : str
+        Value as it is written in the file.
+
+    Returns
+    -------
+    float or str
+        The number, or the same text.
+
+    Examples
+    --------
     >>> number_or_text("12.5"), number_or_text("main")
     (12.5, 'main')
     """
@@ -89,15 +108,46 @@ class Source:
             return hashlib.sha256(self.data).hexdigest()
         return sha256_of(self.path)
 
-    def error(self, where, problem, remedy=COPY_AGAIN, reason="unreadable") -> ReadError:
-        """The ReadError of this file at ``where``."""
+    def error(self, where: str, problem: str, remedy: str = COPY_AGAIN, reason: str = "unreadable") -> ReadError:
+        """The ReadError of this file at ``where``.
+
+        Parameters
+        ----------
+        where : str
+            Position in the file: record, channel, byte or line.
+        problem : str
+            What is wrong there.
+        remedy : str
+            What to do, a sentence without its full stop.
+        reason : str
+            A key of ``turnout.errors.REASONS``.
+
+        Returns
+        -------
+        ReadError
+            The error; it is returned, not raised.
+        """
         return ReadError(self.name, where, problem, remedy, reason=reason)
 
     @contextmanager
-    def parsed_by(self, library, where="the file", reason="unreadable"):
+    def parsed_by(self, library: str, where: str = "the file", reason: str = "unreadable") -> Iterator[None]:
         """Context of a call of ``library``: any exception it raises on damaged bytes becomes a ReadError.
 
         A fault of the machine is no damage and is raised unchanged.
+
+        Parameters
+        ----------
+        library : str
+            Name of the library, for the message.
+        where : str
+            Position in the file that the call reads.
+        reason : str
+            A key of ``turnout.errors.REASONS`` for damaged bytes.
+
+        Raises
+        ------
+        ReadError
+            If the call raises an exception that is no fault of the machine.
         """
         try:
             yield
@@ -117,7 +167,7 @@ class Source:
             raise self.error(where, f"{library} cannot read it ({message})", reason=reason) from error
 
 
-def _infrastructure_error(error):
+def _infrastructure_error(error: Exception) -> Exception | None:
     """``error`` if it is a fault of the machine, an OSError if the text of an HDF5 error states one, else None."""
     if is_infrastructure(error):
         return error
@@ -126,7 +176,7 @@ def _infrastructure_error(error):
     return fault if fault and is_infrastructure(fault) else None
 
 
-def _requests_more_memory_than(n_byte, error):
+def _requests_more_memory_than(n_byte: float, error: Exception) -> bool:
     """Whether numpy failed to allocate an array of more bytes: such a length comes from damaged bytes."""
     shape, dtype = getattr(error, "shape", None), getattr(error, "dtype", None)
     return shape is not None and dtype is not None and math.prod(shape) * dtype.itemsize > n_byte
@@ -143,7 +193,7 @@ class RawRecord:
     """
 
     names: tuple[str, ...]
-    samples: Sequence
+    samples: Sequence[np.ndarray | LazyColumn]
     rate: float | None = None
     units: tuple[str, ...] = ()
     rate_tolerance: float = 1e-9
@@ -153,7 +203,7 @@ class RawRecord:
     aliases: tuple[tuple[str, ...], ...] = ()
     unclear: tuple[tuple[str, float], ...] = ()
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         object.__setattr__(self, "units", tuple(self.units) or ("",) * len(self.names))
         if not len(self.names) == len(self.samples) == len(self.units):
             raise ValueError(f"{len(self.names)} names, {len(self.samples)} channels, {len(self.units)} units")
@@ -173,10 +223,27 @@ class RawFile:
 HEAD_SIZE = 4096  # bytes, enough for every signature
 
 
-def load(path, root) -> Source:
-    """The file at ``path`` (relative to ``root``, or absolute inside it); ReadError if it cannot be used.
+def load(path: PathLike | str, root: PathLike | str) -> Source:
+    """The raw file at ``path``, of which only the first bytes are read.
 
-    A symbolic link that leads out of the raw root is an error.
+    Parameters
+    ----------
+    path : path-like
+        Relative to ``root``, or absolute inside it.
+    root : path-like
+        The raw root. A symbolic link that leads out of it is an error.
+
+    Returns
+    -------
+    Source
+        Path, name, size and first bytes of the file.
+
+    Raises
+    ------
+    ReadError
+        If the file is outside the raw root, absent, empty or cannot be opened.
+    OSError
+        For a fault of the machine.
     """
     root = Path(root)
     remedy = "Put the file under the raw root or correct the turnout's pattern"
@@ -206,7 +273,7 @@ def load(path, root) -> Source:
     return Source(resolved, name, size, head)
 
 
-def _name(path, root, base):
+def _name(path: PathLike | str, root: Path, base: Path) -> str:
     """The path relative to the raw root if it lies inside, with forward slashes."""
     path = Path(path)
     for start in (root, base):

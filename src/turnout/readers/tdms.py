@@ -5,14 +5,16 @@ and the length of each channel with ``wf_samples``.
 """
 
 import struct
+from collections.abc import Mapping
 from contextlib import nullcontext
+from typing import Any, BinaryIO
 
 import nptdms
 
 from turnout.errors import ReadError
-from turnout.readers.lazy import LazyColumn
+from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.named_arrays import RECORD_COUNT_NAMES, START_NAMES, Metadata, natural_sort_key
-from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord
+from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.timing import check_simultaneous, parse_time, start_offsets, step_precision
 
 nptdms.log.log_manager.set_level("ERROR")  # find_truncation turns what it would warn of into an error
@@ -20,8 +22,24 @@ LEAD_IN = 28  # bytes: tag, mask, version, offset of the next segment, offset of
 UNFINISHED_SEGMENT = 0xFFFFFFFFFFFFFFFF
 
 
-def read_raw(source) -> RawFile:
-    """Records of a TDMS file, in the natural order of the groups' names."""
+def read_raw(source: Source) -> RawFile:
+    """Records of a TDMS file, in the natural order of the groups' names.
+
+    Parameters
+    ----------
+    source : Source
+        The TDMS file.
+
+    Returns
+    -------
+    RawFile
+        One record per group with samples; an incomplete one is an error.
+
+    Raises
+    ------
+    ReadError
+        If npTDMS cannot read the file.
+    """
     file = source.path.open("rb")  # not the path: npTDMS would use an index file in the same folder
     with nullcontext() if source.lazy else file:
         truncation = find_truncation(file, source.size)
@@ -39,8 +57,21 @@ def read_raw(source) -> RawFile:
     return RawFile(tuple(records), Metadata(tdms.properties, source).count(RECORD_COUNT_NAMES))
 
 
-def find_truncation(file, size: int) -> str:
-    """Text that says where a file of ``size`` bytes is truncated; "" for a complete one."""
+def find_truncation(file: BinaryIO, size: int) -> str:
+    """Follow the lead-ins of the segments to the end of the file.
+
+    Parameters
+    ----------
+    file : BinaryIO
+        The open file.
+    size : int
+        Its size. [bytes]
+
+    Returns
+    -------
+    str
+        Where it is truncated; "" for a complete file.
+    """
     position = 0
     while position < size:
         file.seek(position)
@@ -56,13 +87,13 @@ def find_truncation(file, size: int) -> str:
     return "" if position == size else f"it ends at byte {size} of {position}"
 
 
-def _damaged_paths(tdms):
+def _damaged_paths(tdms: nptdms.TdmsFile) -> set[str]:
     """Paths of the channels of the last, incomplete segment."""
     statuses = tdms.file_status.channel_statuses or {}
     return {path for path, status in statuses.items() if status.read_length < status.expected_length}
 
 
-def _record(group, *context):
+def _record(group: nptdms.TdmsGroup, *context: Any) -> RawRecord | ReadError:
     """One group as a record, or its error."""
     try:
         return _complete_record(group, *context)
@@ -70,7 +101,15 @@ def _record(group, *context):
         return error
 
 
-def _complete_record(group, k, n, names, damaged, properties, source):
+def _complete_record(
+    group: nptdms.TdmsGroup,
+    k: int,
+    n: int,
+    names: set[str],
+    damaged: set[str],
+    properties: Mapping[str, Any],
+    source: Source,
+) -> RawRecord:
     where = f"record {k + 1} of {n} (group {group.name!r})"
     channels = group.channels()
     if missing := names - {c.name for c in channels}:
@@ -99,7 +138,7 @@ def _complete_record(group, k, n, names, damaged, properties, source):
     )
 
 
-def _common_step(channels, where, source):
+def _common_step(channels: list[nptdms.TdmsChannel], where: str, source: Source) -> float:
     """Step [s] of all channels, 0 if not stated; a channel begins at its time stamp plus ``wf_start_offset``."""
     facts = [Metadata(c.properties, source) for c in channels]
     steps = [f.number(("wf_increment",)) or 0.0 for f in facts]
@@ -109,7 +148,7 @@ def _common_step(channels, where, source):
     return steps[0]
 
 
-def _numbers(channel, lazy):
+def _numbers(channel: nptdms.TdmsChannel, lazy: bool) -> Column:
     """All numbers of a channel, or a lazy column: npTDMS can skip what is not requested."""
     if not lazy or channel.dtype.kind not in "fiu":
         return channel[:]

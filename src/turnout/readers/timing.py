@@ -6,21 +6,23 @@ Rates are compared to the precision with which a file can state them: double, si
 import math
 import re
 from bisect import bisect_left, bisect_right
+from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime, timedelta
 from math import isfinite
+from typing import Any
 from zoneinfo import ZoneInfo
 
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.source import BLOCK_SIZE
+from turnout.readers.source import BLOCK_SIZE, RawRecord, Source
 
 STEP_SAMPLES = 2**21  # samples whose median step is the usual step
 MAX_CLOCK_DRIFT = 1e-4  # relative: two clocks of one logger with separate crystals may differ by this much
 TIME_UNITS_PER_SECOND = (1.0, 1e3, 1e6)  # a time column without unit may be in s, ms or µs
 
 
-def rate_of_time(time):
+def rate_of_time(time: np.ndarray) -> tuple[float, float, int | None]:
     r"""Sampling rate of a time column, and the relative precision its digits allow.
 
     .. math:: f_s = \frac{n - 1}{t_{n-1} - t_0}, \quad
@@ -59,14 +61,29 @@ def rate_of_time(time):
     return float(rate), float(max(2 * deviation / span, 1e-9)), None
 
 
-def _blocks(time):
+def _blocks(time: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
     """(first index, samples) of consecutive blocks that share one sample; so hours need little memory."""
     for start in range(0, max(time.size - 1, 1), BLOCK_SIZE):
         yield start, time[start : start + BLOCK_SIZE + 1]
 
 
-def check_time(time, where, source):
-    """ReadError if a time column runs backwards, is not finite, jumps over missing samples, or is not even."""
+def check_time(time: np.ndarray, where: str, source: Source) -> None:
+    """Check that a time column increases evenly.
+
+    Parameters
+    ----------
+    time : (n,) array of float
+        The time column. [s]
+    where : str
+        The record, for the message.
+    source : Source
+        The raw file.
+
+    Raises
+    ------
+    ReadError
+        If it runs backwards, is not finite, jumps over missing samples, or is not even.
+    """
     for start, block in _blocks(time):
         if not np.isfinite(block).all():
             problem = f"the time of sample {start + int(np.argmin(np.isfinite(block)))} is not a number"
@@ -89,7 +106,7 @@ def check_time(time, where, source):
     _check_even(time, rate, where, source)
 
 
-def _check_even(time, rate, where, source):
+def _check_even(time: np.ndarray, rate: float, where: str, source: Source) -> None:
     """ReadError if time deviates from a straight line by more than one step plus the drift of a crystal.
 
     Rounding to printed digits stays within one step, or time would stand still. Each block has its own line, because
@@ -108,7 +125,7 @@ def _check_even(time, rate, where, source):
             raise source.error(where, problem, remedy, reason="wrong_rate")
 
 
-def _check_unclear_lines(unclear, promised, source):
+def _check_unclear_lines(unclear: Sequence[tuple[str, float]], promised: float, source: Source) -> None:
     """ReadError if a file states frequencies in unknown words and none of them is the rate of the layout."""
     if unclear and all(abs(frequency - promised) > 1e-3 * promised for _, frequency in unclear):
         line = unclear[0][0][:60]
@@ -119,11 +136,32 @@ def _check_unclear_lines(unclear, promised, source):
         raise source.error("the head", problem, remedy, reason="wrong_rate")
 
 
-def resolve_rate(record, promised, where, source):
+def resolve_rate(record: RawRecord, promised: float | None, where: str, source: Source) -> float:
     """The rate of the layout if that of the file agrees with it to the file's precision; without one, that of the file.
 
     A rate printed with few digits (UFF58: 1/51200 s as 1.95312E-05) becomes the whole number of Hz with the same
     printed digits, if there is only one.
+
+    Parameters
+    ----------
+    record : RawRecord
+        The record as it is in the file.
+    promised : float or None
+        Rate that the layout states, or None. [Hz]
+    where : str
+        The record, for the message.
+    source : Source
+        The raw file.
+
+    Returns
+    -------
+    float
+        The sampling rate. [Hz]
+
+    Raises
+    ------
+    ReadError
+        If neither states a rate, they disagree, or rate and time column disagree.
     """
     rate, tolerance = _stated_rate(record, where, source)
     if rate is None:
@@ -146,7 +184,7 @@ def resolve_rate(record, promised, where, source):
     return float(whole) if is_unique and abs(rate - whole) <= rate * tolerance else float(rate)
 
 
-def _stated_rate(record, where, source):
+def _stated_rate(record: RawRecord, where: str, source: Source) -> tuple[float | None, float]:
     """(rate [Hz], tolerance) that a record states, else that of its time column; ReadError if these disagree."""
     rate, tolerance = record.rate, record.rate_tolerance
     if rate is not None and (not isfinite(rate) or rate <= 0):
@@ -166,9 +204,23 @@ def _stated_rate(record, where, source):
 TIME_FORMAT = "%Y-%m-%d %H:%M:%S.%f"
 
 
-def to_utc(stamp, time_zone):
+def to_utc(stamp: datetime | None, time_zone: str) -> datetime | None:
     """Naive UTC of a file's start time; a time stamp without a zone is in ``time_zone`` (IANA name).
 
+    Parameters
+    ----------
+    stamp : datetime or None
+        Start time that the file states, or None.
+    time_zone : str
+        IANA name of the zone of a time stamp without one.
+
+    Returns
+    -------
+    datetime or None
+        Naive UTC; None without a time stamp, or for one that no calendar has.
+
+    Examples
+    --------
     >>> from datetime import datetime
     >>> to_utc(datetime(2024, 5, 13, 12, 0), "Europe/Zurich")
     datetime.datetime(2024, 5, 13, 10, 0)
@@ -183,20 +235,35 @@ def to_utc(stamp, time_zone):
         return None
 
 
-def start_times(stamps, time_zone):
-    """[(record, naive UTC)] of [(record, time stamp)] of one file, in its order.
+def start_times(stamps: Iterable[tuple[int, datetime | None]], time_zone: str) -> list[tuple[int, datetime | None]]:
+    """Start times of the records of one file in UTC.
 
     In the hour that comes twice in autumn a stamp means the first one, unless the record would precede its predecessor.
 
+    Parameters
+    ----------
+    stamps : iterable of tuple of (int, datetime or None)
+        (record, time stamp) in the order of the file.
+    time_zone : str
+        IANA name of the zone of time stamps without one.
+
+    Returns
+    -------
+    list of tuple of (int, datetime or None)
+        (record, naive UTC) in the same order.
+
+    Examples
+    --------
     >>> from datetime import datetime
     >>> stamps = enumerate([datetime(2024, 10, 27, 2, 55), datetime(2024, 10, 27, 2, 5)])
     >>> [f"{start:%H:%M}" for _, start in start_times(stamps, "Europe/Copenhagen")]
     ['00:55', '01:05']
     """
-    starts, latest = [], None
+    starts: list[tuple[int, datetime | None]] = []
+    latest: datetime | None = None
     for record, stamp in stamps:
         start = to_utc(stamp, time_zone)
-        if start is not None and latest is not None and start < latest and stamp.tzinfo is None:
+        if stamp and start and latest and start < latest and stamp.tzinfo is None:
             second = to_utc(stamp.replace(fold=1), time_zone)
             start = second if second is not None and second >= latest else start
         starts.append((record, start))
@@ -204,8 +271,21 @@ def start_times(stamps, time_zone):
     return starts
 
 
-def check_order(starts, source):
-    """{record: ReadError} for the fewest records without which all others are in order of time."""
+def check_order(starts: Sequence[tuple[int, datetime | None]], source: Source) -> dict[int, ReadError]:
+    """Errors of the fewest records without which all others are in order of time.
+
+    Parameters
+    ----------
+    starts : sequence of tuple of (int, datetime or None)
+        (record, naive UTC) in the order of the file.
+    source : Source
+        The raw file.
+
+    Returns
+    -------
+    dict of int to ReadError
+        Number of the record -> its error.
+    """
     errors: dict[int, ReadError] = {}
     timed = [(record, start) for record, start in starts if start is not None]
     ordered = _longest_ordered([start for _, start in timed])
@@ -223,7 +303,7 @@ def check_order(starts, source):
     return errors
 
 
-def _longest_ordered(starts):
+def _longest_ordered(starts: Sequence[Any]) -> list[int]:
     """Indices of the longest non-decreasing subsequence of ``starts``; of several, the earliest.
 
     >>> _longest_ordered([2099, 2001, 2002, 1970, 2002])
@@ -248,10 +328,21 @@ DOTTED_DATE = re.compile(r"(\d{1,2})\.\s?(\d{1,2})\.\s?(\d{4})[\sT,;]+(\d{1,2}):
 MONTHS = {m: i for i, m in enumerate("jan feb mar apr may jun jul aug sep oct nov dec".split(), start=1)}
 
 
-def parse_time(value):
-    """datetime of ISO 8601 text, numpy datetime64 (UTC), seconds since 1970 (UTC) or a MATLAB datenum; else None.
+def parse_time(value: Any) -> datetime | None:
+    """Time of a time stamp in any of the forms that files use.
 
-    With dots the day comes first, "13.05.2024 10:00"; dates with slashes are ambiguous and not read.
+    These are ISO 8601 text, numpy datetime64 (UTC), seconds since 1970 (UTC) and a MATLAB datenum. With dots the day
+    comes first, "13.05.2024 10:00"; dates with slashes are ambiguous and not read.
+
+    Parameters
+    ----------
+    value : any
+        The time stamp as a library returns it.
+
+    Returns
+    -------
+    datetime or None
+        The time, with a zone if the file states one; None for any other value.
 
     Examples
     --------
@@ -280,11 +371,23 @@ def parse_time(value):
     return None
 
 
-def parse_uff_time(text):
-    """datetime of UFF's ID line 3, DD-MMM-YY HH:MM:SS; None for any other text.
+def parse_uff_time(text: str) -> datetime | None:
+    """Time in ID line 3 of a Universal File, DD-MMM-YY HH:MM:SS.
 
     Two-digit years from 70 on are 1970 to 1999.
 
+    Parameters
+    ----------
+    text : str
+        The line.
+
+    Returns
+    -------
+    datetime or None
+        The time; None for any other text.
+
+    Examples
+    --------
     >>> parse_uff_time("18-Apr-16 13:49:58")
     datetime.datetime(2016, 4, 18, 13, 49, 58)
     """
@@ -308,6 +411,18 @@ MIN_DIGITS = 4
 def is_single_precision(value: float) -> bool:
     """Whether a number may have been stored as a 32 bit float.
 
+    Parameters
+    ----------
+    value : float
+        A finite number.
+
+    Returns
+    -------
+    bool
+        True if conversion to 32 bit and back does not change it.
+
+    Examples
+    --------
     >>> is_single_precision(float(np.float32(1 / 44100))), is_single_precision(1 / 44100)
     (True, False)
     """
@@ -321,6 +436,18 @@ def step_precision(step: float) -> float:
     One unit, not half a unit: some exporters truncate instead of rounding. A step of fewer than four digits is taken as
     exact: 5E-05 is not a truncated number.
 
+    Parameters
+    ----------
+    step : float
+        Time step as the file states it. [s]
+
+    Returns
+    -------
+    float
+        Relative precision.
+
+    Examples
+    --------
     >>> print(f"{step_precision(2.267574e-05):.1e} {step_precision(5e-05):.1e} {step_precision(1 / 44100):.1e}")
     4.4e-07 1.0e-09 1.0e-09
     """
@@ -329,22 +456,55 @@ def step_precision(step: float) -> float:
     return max(EXACT_PRECISION, printed, SINGLE_PRECISION if is_single_precision(step) else 0.0)
 
 
-def start_offsets(stamps):
-    """Start of each channel relative to the first one [s]; all 0 if not all time stamps are comparable.
+def start_offsets(stamps: Sequence[datetime | None]) -> list[float]:
+    """Start of each channel relative to the first one.
 
+    Parameters
+    ----------
+    stamps : sequence of datetime or None
+        Start time of each channel, None if not stated.
+
+    Returns
+    -------
+    list of float
+        Offsets, all 0 if not all time stamps are comparable. [s]
+
+    Examples
+    --------
     >>> from datetime import datetime
     >>> start_offsets([datetime(2024, 5, 13, 10, 0, 1), datetime(2024, 5, 13, 10, 0, 0, 500_000)])
     [0.0, -0.5]
     """
-    if None in stamps or len({stamp.tzinfo is None for stamp in stamps}) > 1:
+    stated = [stamp for stamp in stamps if stamp is not None]
+    if len(stated) < len(stamps) or len({stamp.tzinfo is None for stamp in stated}) > 1:
         return [0.0] * len(stamps)
-    return [(stamp - stamps[0]).total_seconds() for stamp in stamps]
+    return [(stamp - stated[0]).total_seconds() for stamp in stated]
 
 
-def check_simultaneous(names, steps, starts, where, source):
-    """ReadError if channels state different steps [s] (0: not stated), or starts [s] more than half a step apart.
+def check_simultaneous(
+    names: Sequence[str], steps: Sequence[float], starts: Sequence[float], where: str, source: Source
+) -> None:
+    """Check that all channels have the same step, and starts within half a step.
 
     Multiplexed converters cause smaller differences of the starts.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names of the channels.
+    steps : sequence of float
+        Time step of each channel, 0 if not stated. [s]
+    starts : sequence of float
+        Start of each channel. [s]
+    where : str
+        The record, for the message.
+    source : Source
+        The raw file.
+
+    Raises
+    ------
+    ReadError
+        If steps differ, or starts differ by more than half a step.
     """
     step = steps[0]
     if any(abs(channel_step - step) > TEXT_PRECISION * abs(step) for channel_step in steps):

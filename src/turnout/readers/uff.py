@@ -3,16 +3,22 @@
 import gzip
 import re
 from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from os import PathLike
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.lazy import LazyColumn
-from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, load, number_or_text
+from turnout.readers.lazy import Column, LazyColumn
+from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, Source, load, number_or_text
 from turnout.readers.timing import check_simultaneous, parse_uff_time
 from turnout.readers.uff_datasets import UffDataset, declares_si, read_datasets
 
+# ID line 1; entity, node and direction of the response; label and unit of the ordinate
+ChannelKey = tuple[str, str, int, int, str, str]
 PROMISED_RECORDS = re.compile(r"record \d+ of (\d+)$")
 TIME_RESPONSE, FREQUENCY_RESPONSE, TIME_AXIS = 1, 4, 17
 # Unit of a specific data type (records 9 and 10) without a label, if dataset 164 declares SI.
@@ -36,18 +42,33 @@ class FrequencyResponses:
     names: tuple[str, ...]
 
 
-def read_raw(source) -> RawFile:
+def read_raw(source: Source) -> RawFile:
     """Records of all time responses in the file.
 
     The name of a channel is ID line 1. The response entity, the label of the ordinate and the degree of freedom
     ("12 +Z") are accepted as well. The version or sequence number (record 6, field 3) is the number of the record. If
     it is the same in all sets, the order of the channels defines the records. "record k of n" in ID line 5, as this
     program writes it, states n records.
+
+    Parameters
+    ----------
+    source : Source
+        The Universal File.
+
+    Returns
+    -------
+    RawFile
+        The records; a damaged set makes its record an error.
+
+    Raises
+    ------
+    ReadError
+        If the file holds no time response.
     """
     data = source.mapped if source.lazy else source.data
     all_sets = read_datasets(data)
     if source.lazy:
-        all_sets = tuple(replace(s, data=_lazy_column(s.data, data, source.path)) for s in all_sets)
+        all_sets = tuple(replace(s, data=_lazy_column(np.asarray(s.data), data, source.path)) for s in all_sets)
     sets = [s for s in all_sets if s.dataset_type in ("", "58", "58b")]
     wanted = [s for s in sets if s.damage or _is_time_response(s)]
     if not wanted or not any(s.dataset_type for s in wanted):
@@ -56,13 +77,13 @@ def read_raw(source) -> RawFile:
     return RawFile(tuple(_records(wanted, declares_si(data, all_sets), source)), _promised_count(wanted))
 
 
-def _promised_count(sets):
+def _promised_count(sets: Sequence[UffDataset]) -> int | None:
     """Number of records that the sets state for the file, or None."""
     matches = [m for s in sets if s.ids and (m := PROMISED_RECORDS.match(s.ids[4]))]
     return max((int(m[1]) for m in matches), default=None)
 
 
-def _lazy_column(numbers, mapped, path):
+def _lazy_column(numbers: np.ndarray, mapped: Any, path: Path) -> Column:
     """A lazy column of the bytes of the file that ``numbers`` is a view of; ``numbers`` itself if it is none."""
     base = np.frombuffer(mapped, np.uint8).__array_interface__["data"][0]
     offset = numbers.__array_interface__["data"][0] - base
@@ -76,13 +97,12 @@ def _lazy_column(numbers, mapped, path):
     )
 
 
-def _is_time_response(dataset: UffDataset):
-    return dataset.func_type == TIME_RESPONSE or (
-        dataset.func_type == 0 and dataset.labels and dataset.labels[0][0] == TIME_AXIS
-    )
+def _is_time_response(dataset: UffDataset) -> bool:
+    is_untyped = dataset.func_type == 0 and bool(dataset.labels)
+    return dataset.func_type == TIME_RESPONSE or (is_untyped and dataset.labels[0][0] == TIME_AXIS)
 
 
-def _records(sets, is_si, source):
+def _records(sets: Sequence[UffDataset], is_si: bool, source: Source) -> Iterator[RawRecord | ReadError]:
     """RawRecord or ReadError per record, in order."""
     nameless = [s for s in sets if not s.labels]
     named = [s for s in sets if s.labels]
@@ -122,7 +142,7 @@ def _records(sets, is_si, source):
         yield source.error(f"record {n + 1}, byte {dataset.offset}", dataset.damage, COPY_AGAIN, reason="truncated")
 
 
-def _channel_key(dataset: UffDataset):
+def _channel_key(dataset: UffDataset) -> ChannelKey:
     """Key of a set's channel: all its names."""
     return (
         dataset.ids[0] if dataset.ids[0] not in ("", "NONE") else "",
@@ -132,7 +152,9 @@ def _channel_key(dataset: UffDataset):
     )
 
 
-def _record(group, channels, k, n, is_si, source):
+def _record(
+    group: Mapping[ChannelKey, UffDataset], channels: Sequence[ChannelKey], k: int, n: int, is_si: bool, source: Source
+) -> RawRecord | ReadError:
     """One record from the sets of its channels, or its error."""
     for key in channels:
         dataset = group.get(key)
@@ -163,14 +185,14 @@ def _record(group, channels, k, n, is_si, source):
     )
 
 
-def _axis(dataset):
+def _axis(dataset: UffDataset) -> tuple[float, float]:
     """(start, mean step) of a set's abscissa [s]."""
     if dataset.x is None or len(dataset.x) < 2:
         return dataset.start, dataset.step
     return float(dataset.x[0]), float(dataset.x[-1] - dataset.x[0]) / (len(dataset.x) - 1)
 
 
-def _channel_name(key):
+def _channel_name(key: ChannelKey) -> str:
     """The name of a channel: ID line 1, or the first of its other names that is not empty."""
     return next(
         (name for name in (key[0], key[1], key[4]) if name and name != "NONE"),
@@ -178,24 +200,24 @@ def _channel_name(key):
     )
 
 
-def _distinct_names(channels):
+def _distinct_names(channels: Sequence[ChannelKey]) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:
     """(names, aliases): the names are of the first type that differs for all channels."""
     dofs = [_dof_name(("", *key[2:4])) for key in channels]
-    name_lists = [[key[i] for key in channels] for i in (0, 1, 4)] + [dofs]
+    name_lists = [[key[0] for key in channels], [key[1] for key in channels], [key[4] for key in channels], dofs]
     distinct_lists = [names for names in name_lists if len(set(names)) == len(names) and not {"", "NONE"} & set(names)]
     names = distinct_lists[0] if distinct_lists else [_channel_name(key) for key in channels]
     aliases = tuple(tuple(a for a in (key[0], key[1], key[4], dof) if a) for key, dof in zip(channels, dofs))
     return tuple(names), aliases
 
 
-def _unit(axis, is_si):
+def _unit(axis: tuple[int, str, str], is_si: bool) -> str:
     """Unit of an ordinate: its label, else the unit of its data type if the file declares SI."""
     data_type, _, label = axis
     blank = label.upper() in ("", "NONE", "UNKNOWN")
     return (SI_OF_TYPE.get(data_type, "") if is_si else "") if blank else label
 
 
-def _precision(text):
+def _precision(text: str) -> float:
     """Relative size of one unit in the last printed digit: "1.95312E-05" -> 5.1e-6.
 
     One unit, not half a unit: some exporters truncate instead of rounding.
@@ -205,18 +227,32 @@ def _precision(text):
     return 1.0 / float(digits) if digits.isdigit() else 1e-5
 
 
-def _conditions(text):
+def _conditions(text: str) -> dict[str, float | str]:
     """Conditions in ID line 4, as in "rail_temperature=12.3; track=main"; other text is ignored."""
     pairs = dict(item.strip().split("=", 1) for item in text.split(";") if item.count("=") == 1)
     return {name: number_or_text(value) for name, value in pairs.items() if name in CONDITIONS}
 
 
-def read_frf(path, root=".") -> FrequencyResponses:
+def read_frf(path: PathLike | str, root: PathLike | str = ".") -> FrequencyResponses:
     """Frequency response functions (function type 4) of a Universal File, plain or gzipped.
 
-    ReadError if one is damaged or their frequencies differ.
+    Parameters
+    ----------
+    path : path-like
+        Relative to ``root``, or absolute inside it.
+    root : path-like
+        Folder outside which no file is opened.
 
-    ``units`` are the label of the ordinate over that of its denominator if the file has both.
+    Returns
+    -------
+    FrequencyResponses
+        The functions with their frequencies; their unit is the label of the ordinate over that of its denominator if
+        the file has both.
+
+    Raises
+    ------
+    ReadError
+        If there is no frequency response, one is damaged, or their frequencies differ.
     """
     source = load(path, root)
     data = source.data
@@ -247,12 +283,12 @@ def read_frf(path, root=".") -> FrequencyResponses:
     )
 
 
-def _frf_unit(dataset, is_si):
+def _frf_unit(dataset: UffDataset, is_si: bool) -> str:
     numerator, denominator = (_unit(axis, is_si) for axis in dataset.labels[1:3])
     return numerator if not denominator or "/N" in numerator else f"({numerator})/({denominator})"
 
 
-def _dof_name(dof):
+def _dof_name(dof: tuple[str, int, int]) -> str:
     name, node, direction = dof
     name = "" if name == "NONE" else name
     return f"{name} {node} {DIRECTIONS.get(direction, direction)}".strip()

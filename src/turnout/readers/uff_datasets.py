@@ -7,12 +7,17 @@ Layout: Structural Dynamics Research Laboratory, University of Cincinnati, Unive
 """
 
 import re
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from mmap import mmap
+from typing import Any
 
 import numpy as np
 
+from turnout.readers.lazy import Column
+
+Header = dict[str, Any]  # fields of records 1 to 11; those of a ``UffDataset`` are below "set"
 END_58B = re.compile(rb"\r?\n? {4}-1 *(?:\r?\n|\r|$)")
 REST_OF_LINE = re.compile(rb" *(?:\r?\n|\r|$)")
 
@@ -26,7 +31,20 @@ class Delimiter:
 
 
 def find_delimiter(data: bytes | mmap, position: int) -> Delimiter | None:
-    """The first delimiter from ``position`` on; plain search, because a regular expression is slow on large files."""
+    """The first delimiter from ``position`` on; plain search, because a regular expression is slow on large files.
+
+    Parameters
+    ----------
+    data : bytes or mmap
+        Bytes of the file.
+    position : int
+        Byte from which to search.
+
+    Returns
+    -------
+    Delimiter or None
+        The delimiter; None if there is no further one.
+    """
     start = position
     while (start := data.find(b"    -1", start)) >= 0:
         line_end = REST_OF_LINE.match(data, start + 6)
@@ -36,16 +54,30 @@ def find_delimiter(data: bytes | mmap, position: int) -> Delimiter | None:
     return None
 
 
-def _numbers_per_value(header):
+def _numbers_per_value(header: Header) -> int:
     """Numbers stored for each value."""
     return (2 if header["complex"] else 1) + (0 if header["even"] else 1)
 
 
-def binary_numbers(data, at, header):
-    """(numbers, position after the set, damage) of a 58b set.
+def binary_numbers(data: bytes | mmap, at: int, header: Header) -> tuple[np.ndarray, int, str]:
+    """Numbers of a 58b set.
 
     If header and closing delimiter disagree, the delimiter counts: some exporters write 0 as byte count, and some
     declare single precision and write double.
+
+    Parameters
+    ----------
+    data : bytes or mmap
+        Bytes of the file.
+    at : int
+        Byte at which the numbers begin.
+    header : Header
+        Fields of the header, as ``read_datasets`` reads them.
+
+    Returns
+    -------
+    tuple of (array, int, str)
+        Numbers as they are stored; byte after the set; explanation of the damage, "" for an intact set.
     """
     if header["float_format"] not in (0, 2):
         closing_delimiter = find_delimiter(data, at)
@@ -69,8 +101,23 @@ def binary_numbers(data, at, header):
     return values, closing.end() if closing else len(data), damage
 
 
-def ascii_numbers(data, at, header):
-    """(numbers, position after the set, damage) of a 58 set: fixed columns, not always separated by blanks."""
+def ascii_numbers(data: bytes | mmap, at: int, header: Header) -> tuple[np.ndarray, int, str]:
+    """Numbers of a 58 set: fixed columns, not always separated by blanks.
+
+    Parameters
+    ----------
+    data : bytes or mmap
+        Bytes of the file.
+    at : int
+        Byte at which the numbers begin.
+    header : Header
+        Fields of the header, as ``read_datasets`` reads them.
+
+    Returns
+    -------
+    tuple of (array, int, str)
+        Numbers as they are stored; byte after the set; explanation of the damage, "" for an intact set.
+    """
     closing_delimiter = find_delimiter(data, at)
     damage = "" if closing_delimiter else "the set is not closed by -1"
     body = data[at : closing_delimiter.start if closing_delimiter else len(data)]
@@ -88,7 +135,7 @@ def ascii_numbers(data, at, header):
     return values, position, damage
 
 
-def _numbers(body, widths):
+def _numbers(body: bytes, widths: Sequence[int]) -> np.ndarray:
     """Numbers in lines of fixed columns; the last line may be shorter, and exporters may strip blanks at its end."""
     width = sum(widths)
     lines = [line for line in body.replace(b"\r", b"").split(b"\n") if line and not line.isspace()]
@@ -107,12 +154,26 @@ def _numbers(body, widths):
     return np.concatenate([values, last_values])
 
 
-def _edges(widths):
+def _edges(widths: Sequence[int]) -> list[tuple[int, int]]:
     return list(pairwise(np.cumsum([0, *widths])))
 
 
-def split_columns(values, header):
-    """(ordinates, abscissae or None, damage) from the numbers of a set."""
+def split_columns(values: np.ndarray, header: Header) -> tuple[np.ndarray, np.ndarray | None, str]:
+    """Ordinates and abscissae from the numbers of a set.
+
+    Parameters
+    ----------
+    values : (n,) array of float
+        Numbers as they are stored.
+    header : Header
+        Fields of the header, as ``read_datasets`` reads them.
+
+    Returns
+    -------
+    tuple of (array, array or None, str)
+        Ordinates, float or complex; abscissae, None if they are even; explanation if their number is not that of the
+        header.
+    """
     per_value = _numbers_per_value(header)
     promised = header["set"]["promised"]
     n = min(len(values) // per_value, promised)
@@ -152,13 +213,24 @@ class UffDataset:
     step: float = 0.0
     step_text: str = ""
     labels: tuple[tuple[int, str, str], ...] = ()
-    data: np.ndarray = field(default_factory=lambda: np.empty(0))
+    data: Column = field(default_factory=lambda: np.empty(0))
     x: np.ndarray | None = None
     damage: str = ""
 
 
 def read_datasets(data: bytes | mmap) -> tuple[UffDataset, ...]:
-    """All data sets of a file in their order; sets of other types have only ``dataset_type`` and ``offset``."""
+    """All data sets of a Universal File.
+
+    Parameters
+    ----------
+    data : bytes or mmap
+        Bytes of the file.
+
+    Returns
+    -------
+    tuple of UffDataset
+        All data sets in their order; sets of other types have only ``dataset_type`` and ``offset``.
+    """
     datasets = []
     position = 0
     while (begin := find_delimiter(data, position)) is not None:
@@ -177,8 +249,21 @@ def read_datasets(data: bytes | mmap) -> tuple[UffDataset, ...]:
     return tuple(datasets)
 
 
-def declares_si(data: bytes, sets) -> bool:
-    """Whether dataset 164 declares SI: unit code 1, or factors of 1 from the file's units to SI."""
+def declares_si(data: bytes | mmap, sets: Iterable[UffDataset]) -> bool:
+    """Whether dataset 164 declares SI: unit code 1, or factors of 1 from the file's units to SI.
+
+    Parameters
+    ----------
+    data : bytes
+        Bytes of the file.
+    sets : iterable of UffDataset
+        All data sets of the file.
+
+    Returns
+    -------
+    bool
+        False without a dataset 164, or with one that cannot be read.
+    """
     for dataset in sets:
         if dataset.dataset_type == "164":
             lines, _ = _lines(data, data.find(b"\n", dataset.offset) + 1, 3)
@@ -190,7 +275,7 @@ def declares_si(data: bytes, sets) -> bool:
     return False
 
 
-def _read_dataset(data, begin):
+def _read_dataset(data: bytes | mmap, begin: Delimiter) -> tuple[UffDataset, int]:
     """(set, position after its closing delimiter)."""
     start = begin.end
     lines, at = _lines(data, start, HEADER_LINES)
@@ -221,7 +306,7 @@ def _read_dataset(data, begin):
     return dataset, position
 
 
-def _lines(data, position, count):
+def _lines(data: bytes | mmap, position: int, count: int) -> tuple[list[str], int]:
     """(lines, position after them), without splitting the whole of a large file."""
     lines: list[str] = []
     while len(lines) < count and position < len(data):
@@ -234,7 +319,7 @@ def _lines(data, position, count):
     return lines, position
 
 
-def _decode_text(raw):
+def _decode_text(raw: bytes) -> str:
     """Header text: UTF-8 if valid, else Latin-1 (older exporters' "m/s²")."""
     try:
         return raw.decode("utf-8")
@@ -242,18 +327,18 @@ def _decode_text(raw):
         return raw.decode("latin-1")
 
 
-def _fields(line, widths):
+def _fields(line: str, widths: Sequence[int]) -> list[str]:
     """Fixed columns of one line, stripped."""
     edges = np.cumsum([0, *widths])
     line = line.ljust(80)
     return [line[a:b].strip() for a, b in pairwise(edges)]
 
 
-def _integer(text):
+def _integer(text: str) -> int:
     return int(text) if text else 0
 
 
-def _header(lines):
+def _header(lines: Sequence[str]) -> Header:
     """Fields of records 1 to 11; ValueError for an invalid number."""
     first = _fields(lines[0], [6, 1, 6, 6])
     dof = _fields(lines[6], [5, 10, 5, 10, 11, 10, 4, 11, 10, 4])

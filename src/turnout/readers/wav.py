@@ -9,20 +9,37 @@ import json
 import struct
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, BinaryIO
 
 import numpy as np
 import soundfile
 
 from turnout.readers.lazy import LazyMatrix
 from turnout.readers.named_arrays import CHANNEL_NAMES, START_NAMES, UNIT_NAMES, Metadata, list_of_texts
-from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord
+from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.timing import parse_time
 
 UNKNOWN_LENGTH = 0xFFFFFFFF
 
 
-def read_raw(source) -> RawFile:
-    """The record of an audio file."""
+def read_raw(source: Source) -> RawFile:
+    """The record of an audio file.
+
+    Parameters
+    ----------
+    source : Source
+        The audio file.
+
+    Returns
+    -------
+    RawFile
+        Its only record.
+
+    Raises
+    ------
+    ReadError
+        If the file is truncated or libsndfile cannot read it.
+    """
     with source.path.open("rb", buffering=0) as raw:  # libsndfile shares its position
         if truncation := find_truncation(raw, source.size):
             raise source.error("the header", truncation, COPY_AGAIN, reason="truncated")
@@ -61,7 +78,7 @@ class Frames:
     dtype = np.dtype(float)
 
     @property
-    def shape(self):
+    def shape(self) -> tuple[int, int]:
         """Number of frames and of channels."""
         return self.n_frame, self.n_channel
 
@@ -72,8 +89,21 @@ class Frames:
             return file.read(stop - start, dtype="float64", always_2d=True)
 
 
-def find_truncation(file, size: int) -> str:
-    """Text that says where a RIFF file of ``size`` bytes is truncated; "" if complete or of another format."""
+def find_truncation(file: BinaryIO, size: int) -> str:
+    """Follow the chunks of a RIFF file to its end.
+
+    Parameters
+    ----------
+    file : BinaryIO
+        The open file.
+    size : int
+        Its size. [bytes]
+
+    Returns
+    -------
+    str
+        Where it is truncated; "" for a complete file and for other formats.
+    """
     head = file.read(36)
     if head[:4] not in (b"RIFF", b"RF64"):
         return ""
@@ -97,7 +127,7 @@ def find_truncation(file, size: int) -> str:
     return f"it ends after {size} of {expected_size} bytes" if expected_size > size + 1 else ""
 
 
-def _long_sizes(head):
+def _long_sizes(head: bytes) -> dict[bytes, int]:
     """Sizes above 4 GiB, from the chunk ds64 of an RF64 file."""
     if head[:4] != b"RF64" or head[12:16] != b"ds64" or len(head) < 36:
         return {}
@@ -105,7 +135,7 @@ def _long_sizes(head):
     return {b"RIFF": riff, b"data": samples}
 
 
-def _notes(comment):
+def _notes(comment: str) -> dict[str, Any]:
     try:
         notes = json.loads(comment) if comment else {}
     except ValueError:

@@ -17,6 +17,8 @@ packed with their type and are read as numpy arrays. Only batches that a state f
 killed job.
 """
 
+from __future__ import annotations
+
 import base64
 import errno
 import hashlib
@@ -27,10 +29,14 @@ from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass
 from datetime import date, datetime
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from turnout.files import write_atomic
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 COLUMNS = ("unit", "turnout", "kind", "key", "algo", "status", "rows")
 
@@ -49,7 +55,25 @@ class UnitResult:
 
 
 def write_batch(folder: Path, results: Iterable[UnitResult]) -> Path:
-    """Write one batch into ``folder``, named by its content; the same results give the same file name."""
+    """Write one batch, named by its content; the same results give the same file name.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the batches of a shard.
+    results : iterable of UnitResult
+        Results of units; their order does not matter.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    TypeError
+        If a row holds a value that is no JSON, such as a set.
+    """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -62,8 +86,26 @@ def write_batch(folder: Path, results: Iterable[UnitResult]) -> Path:
     return path
 
 
-def read_results(path: os.PathLike, units: Container[str] | None = None) -> Iterator[UnitResult]:
-    """Results of one batch, sorted by unit; only those of ``units`` if given, other rows are not decoded."""
+def read_results(path: os.PathLike | str, units: Container[str] | None = None) -> Iterator[UnitResult]:
+    """Results of one batch, sorted by unit.
+
+    Parameters
+    ----------
+    path : path-like
+        The batch.
+    units : container of str or None
+        Only the results of these units; rows of others are not decoded. None: all.
+
+    Yields
+    ------
+    UnitResult
+        One result per unit.
+
+    Raises
+    ------
+    ArrowException
+        If the file is damaged.
+    """
     import pyarrow.parquet as pq
 
     file = pq.ParquetFile(path)
@@ -77,13 +119,25 @@ def read_results(path: os.PathLike, units: Container[str] | None = None) -> Iter
                 yield UnitResult(**{column: row[column] for column in COLUMNS[:-1]}, tables=decode(row["rows"]))
 
 
-def _units(rows) -> list[str]:
+def _units(rows: Any) -> list[str]:
     return rows.column("unit").to_pylist()
 
 
-def read_batch(path: os.PathLike) -> Iterator[tuple[str, str, list[dict]]]:
-    """``(unit, table, rows)`` of one batch, sorted by unit; ``rows`` as in columns.csv without ``run_id``.
+def read_batch(path: os.PathLike | str) -> Iterator[tuple[str, str, list[dict]]]:
+    """Tables of one batch, sorted by unit.
 
+    Parameters
+    ----------
+    path : path-like
+        The batch.
+
+    Yields
+    ------
+    tuple of (str, str, list of dict)
+        Unit, table, and its rows as in columns.csv without ``run_id``; tables without rows are left out.
+
+    Examples
+    --------
     >>> import tempfile
     >>> rows = {"recordings": [{"recording_id": "ab", "n_records": 10}], "quarantine": []}
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -97,8 +151,24 @@ def read_batch(path: os.PathLike) -> Iterator[tuple[str, str, list[dict]]]:
                 yield result.unit, table, rows
 
 
-def is_readable(path: os.PathLike) -> bool:
-    """Whether a batch exists and its Parquet footer can be read; the columns are not checked."""
+def is_readable(path: os.PathLike | str) -> bool:
+    """Whether a batch exists and its Parquet footer can be read; the columns are not checked.
+
+    Parameters
+    ----------
+    path : path-like
+        The batch.
+
+    Returns
+    -------
+    bool
+        False if the file is absent or damaged.
+
+    Raises
+    ------
+    OSError
+        For a fault of the machine: the batch may be intact.
+    """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -113,8 +183,21 @@ def is_readable(path: os.PathLike) -> bool:
     return True
 
 
-def read_column(path: os.PathLike, *names: str) -> list[tuple]:
-    """The columns ``names`` of a batch for all its units; fast, because ``rows`` is not read."""
+def read_column(path: os.PathLike | str, *names: str) -> list[tuple]:
+    """Some columns of a batch for all its units; fast, because ``rows`` is not read.
+
+    Parameters
+    ----------
+    path : path-like
+        The batch.
+    *names : str
+        Names of the columns.
+
+    Returns
+    -------
+    list of tuple
+        One tuple per unit, in the order of ``names``.
+    """
     import pyarrow.parquet as pq
 
     groups = pq.ParquetFile(path).iter_batches(columns=list(names))
@@ -124,6 +207,23 @@ def read_column(path: os.PathLike, *names: str) -> list[tuple]:
 def encode(tables: dict[str, list[dict]]) -> str:
     """JSON of the rows of one unit; equal rows give equal text.
 
+    Parameters
+    ----------
+    tables : dict of str to list of dict
+        Table -> rows; values are JSON types, times or numpy arrays.
+
+    Returns
+    -------
+    str
+        JSON text.
+
+    Raises
+    ------
+    TypeError
+        If a row holds a value of another type.
+
+    Examples
+    --------
     >>> encode({"modes": [{"frequency_hz": np.float64(69.1), "damping_ratio": float("nan")}]})
     '{"modes":[{"damping_ratio":null,"frequency_hz":69.1}]}'
     """
@@ -131,11 +231,22 @@ def encode(tables: dict[str, list[dict]]) -> str:
 
 
 def decode(text: str) -> dict[str, list[dict]]:
-    """Rows from the JSON of ``encode``; packed arrays become numpy arrays."""
+    """Rows from the JSON of ``encode``; packed arrays become numpy arrays.
+
+    Parameters
+    ----------
+    text : str
+        Text that ``encode`` returned.
+
+    Returns
+    -------
+    dict of str to list of dict
+        Table -> rows; times remain text.
+    """
     return json.loads(text, object_hook=_unpack)
 
 
-def _string_array(values: Iterable[str]):
+def _string_array(values: Iterable[str]) -> pa.LargeStringArray:
     """Arrow strings without ``pa.array``, which imports pandas and doubles the time of a small job."""
     import pyarrow as pa
 
@@ -148,7 +259,7 @@ def _header(result: UnitResult) -> tuple[str, ...]:
     return tuple(getattr(result, name) for name in COLUMNS[:-1])
 
 
-def _plain(value):
+def _plain(value: Any) -> Any:
     """``value`` converted to JSON types."""
     if isinstance(value, dict):
         return {str(k): _plain(v) for k, v in value.items()}
@@ -168,7 +279,7 @@ def _plain(value):
     raise TypeError(f"a row holds a {type(value).__name__}: {value!r}")
 
 
-def _unpack(pairs: dict):
+def _unpack(pairs: dict) -> Any:
     if "__array__" in pairs:
         return np.frombuffer(base64.b64decode(pairs["data"]), dtype=pairs["__array__"])
     return pairs

@@ -4,13 +4,28 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 
-from turnout.config import Configuration, Event, TurnoutConfig, with_raw
+from turnout.config import Configuration, Event, Section, TurnoutConfig, with_raw
 from turnout.registry.ids import content_id
 from turnout.workflow.plan import read_plan, read_problems
 
 
 def configuration_rows(configuration: Configuration, raw_root: Path, plans: Iterable[Path]) -> dict[str, list[dict]]:
-    """Rows by table, sorted; a campaign with files that is missing in campaigns.csv has a row, too."""
+    """Registry rows of the configuration, sorted.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Configuration of the fleet.
+    raw_root : Path
+        The raw root, for the campaigns that are listed there.
+    plans : iterable of Path
+        Plan files; those that do not exist are left out.
+
+    Returns
+    -------
+    dict of str to list of dict
+        Table -> rows; a campaign with files that is missing in campaigns.csv has a row, too.
+    """
     plans = [p for p in plans if Path(p).exists()]
     measured: dict[str, set[str]] = {}
     for plan in plans:
@@ -42,7 +57,7 @@ def _turnout(turnout: TurnoutConfig) -> dict:
     }
 
 
-def _section(turnout: TurnoutConfig, section) -> dict:
+def _section(turnout: TurnoutConfig, section: Section) -> dict:
     return {
         "section_id": turnout.section_id(section.label),
         "turnout_id": turnout.id,
@@ -108,7 +123,18 @@ def _excluded_files(plan: Path) -> list[dict]:
 
 
 def fleet_hash(configuration: Configuration) -> str:
-    """Hash of all turnouts, their configurations and events."""
+    """Hash of all turnouts, their configurations and events.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Configuration of the fleet.
+
+    Returns
+    -------
+    str
+        Changes with everything that rows of the configuration are made of.
+    """
     hashes = [
         [t, configuration.hash_of(t), json.dumps(configuration.rows[t].values)] for t in sorted(configuration.ids)
     ]

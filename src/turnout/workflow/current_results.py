@@ -10,18 +10,45 @@ from turnout.workflow.state import batch_folder, load_state
 
 
 class DamagedBatch(TurnoutError):
-    """Results that another stage needs cannot be read; ``batch`` is their file."""
+    """Results that another stage needs cannot be read; ``batch`` is their file.
+
+    Parameters
+    ----------
+    batch : Path
+        File of the results.
+    error : Exception
+        Why it cannot be read.
+    """
 
     def __init__(self, batch: Path, error: Exception):
         super().__init__(f"{batch} cannot be read ({error}). The next run computes its units again.")
         self.batch = batch
 
 
-def current_results(work, stage: str, turnout: str) -> Iterator[UnitResult]:
-    """Current results of ``stage`` below ``work``: of each unit the one in the batch that the state names.
+def current_results(work: Path | str, stage: str, turnout: str) -> Iterator[UnitResult]:
+    """Current results of one turnout: of each unit the one in the batch that the state names.
 
     Results in earlier batches are out of date. If the number of shards was changed, several states may contain the
     turnout; the one written last counts.
+
+    Parameters
+    ----------
+    work : Path or str
+        Folder ``work`` of the workflow.
+    stage : str
+        Name of the stage, as in ``work/<stage>``.
+    turnout : str
+        Id of the turnout.
+
+    Yields
+    ------
+    UnitResult
+        One result per unit.
+
+    Raises
+    ------
+    DamagedBatch
+        If a batch cannot be read.
     """
     states = sorted((Path(work) / stage).glob("*.json"), key=lambda p: (p.stat().st_mtime_ns, p.name), reverse=True)
     for state in states:

@@ -31,16 +31,39 @@ class Original:
 
 
 def originals_of(entry: UnitState) -> list[str]:
-    """Units whose files a unit holds as copies."""
+    """Units whose files a unit holds as copies.
+
+    Parameters
+    ----------
+    entry : UnitState
+        State of the unit.
+
+    Returns
+    -------
+    list of str
+        Names of these units; none if it holds no copies.
+    """
     return [line.removeprefix(COPY_PREFIX) for line in entry.key.split("\n") if line.startswith(COPY_PREFIX)]
 
 
 def copies(units: Mapping[str, UnitState]) -> dict[str, dict[str, str]]:
-    """Copy -> {content: unit in which it counts}, of units with rows, within one turnout and kind.
+    """Units that hold copies of files, within one turnout and kind.
 
     A unit is a copy as a whole if another one has all of its files. Of units that share some files, and of two with the
     same files, the first by name keeps them. Files that were already excluded from a unit remain excluded.
 
+    Parameters
+    ----------
+    units : mapping of str to UnitState
+        Unit -> state, of one shard.
+
+    Returns
+    -------
+    dict of str to dict of str to str
+        Unit -> content -> unit in which that file counts; only units with rows take part.
+
+    Examples
+    --------
     >>> units = {name: UnitState("", "", "", "ok", "", held) for name, held in
     ...          {"t/passage/b": "1", "t/passage/a": "1 3", "t/passage/c": "2 3", "u/passage/a": "1"}.items()}
     >>> copies(units)
@@ -82,7 +105,24 @@ def _whole_copies(contents_by_unit: Mapping[str, frozenset[str]], holders: Mappi
 def originals(
     name: str, counts_in: Mapping[str, str], units: Mapping[str, UnitState], wanted: Mapping[str, PlannedUnit]
 ) -> dict[str, Original]:
-    """Path -> original, of the files of a unit whose content counts in another one, ``counts_in``."""
+    """Originals of the copied files of a unit.
+
+    Parameters
+    ----------
+    name : str
+        The unit with the copies.
+    counts_in : mapping of str to str
+        Content -> unit in which it counts.
+    units : mapping of str to UnitState
+        Unit -> state, of one shard.
+    wanted : mapping of str to PlannedUnit
+        Unit -> planned unit, of the same shard.
+
+    Returns
+    -------
+    dict of str to Original
+        Path -> original.
+    """
     return {
         path: Original(original_unit, _path_in_unit(content, wanted[original_unit].unit, units[original_unit]))
         for (path, *_), content in zip(wanted[name].unit.files, units[name].all_contents)
@@ -91,12 +131,38 @@ def originals(
 
 
 def without_copies(unit: Unit, copied: Mapping[str, Original]) -> Unit:
-    """The unit without the files that count in other units."""
+    """The unit without the files that count in other units.
+
+    Parameters
+    ----------
+    unit : Unit
+        The unit.
+    copied : mapping of str to Original
+        Path -> original, of the files that count in other units.
+
+    Returns
+    -------
+    Unit
+        The unit with its other files.
+    """
     return replace(unit, files=tuple(file for file in unit.files if file[0] not in copied))
 
 
 def key_without(key: str, copied: Mapping[str, Original]) -> str:
-    """The ``key`` of a unit that is computed without its copied files; it names the units of the originals."""
+    """The ``key`` of a unit that is computed without its copied files; it names the units of the originals.
+
+    Parameters
+    ----------
+    key : str
+        Key of the unit with all its files.
+    copied : mapping of str to Original
+        Path -> original, of the files that count in other units.
+
+    Returns
+    -------
+    str
+        The same key without copies, else one that names the units of the originals.
+    """
     if not copied:
         return key
     named = "".join(f"\n{COPY_PREFIX}{unit}" for unit in sorted({o.unit for o in copied.values()}))
@@ -104,7 +170,22 @@ def key_without(key: str, copied: Mapping[str, Original]) -> str:
 
 
 def with_copy_rows(result: UnitResult, unit: Unit, copied: Mapping[str, Original]) -> UnitResult:
-    """The ``result`` of the remaining files of ``unit``, with quarantine rows that name the copies."""
+    """Add quarantine rows that name the copies to a result.
+
+    Parameters
+    ----------
+    result : UnitResult
+        Result of the other files of the unit.
+    unit : Unit
+        The unit.
+    copied : mapping of str to Original
+        Path -> original, of the files that count in other units.
+
+    Returns
+    -------
+    UnitResult
+        The result with these rows; the same one without copies.
+    """
     if not copied:
         return result
     there = {path: copied[path].path for path, *_ in unit.files if path in copied}
@@ -139,7 +220,20 @@ Units = Mapping[str, UnitState]
 
 
 def moved_units(units: Units, wanted: Collection[str]) -> list[str]:
-    """Missing units of which all files have rows in other units of the same state."""
+    """Missing units of which all files have rows in other units of the same state.
+
+    Parameters
+    ----------
+    units : Units
+        Unit -> state, of one shard.
+    wanted : collection of str
+        Units that are planned now.
+
+    Returns
+    -------
+    list of str
+        Names of the units.
+    """
     holders = _holders(
         {content for name in _missing_units(units, wanted) for content in units[name].own_contents}, [(units, wanted)]
     )
@@ -149,16 +243,45 @@ def moved_units(units: Units, wanted: Collection[str]) -> list[str]:
 
 
 def withdrawal(name: str, entry: UnitState) -> UnitResult:
-    """The empty result that supersedes the rows of a unit."""
+    """The empty result that supersedes the rows of a unit.
+
+    Parameters
+    ----------
+    name : str
+        The unit.
+    entry : UnitState
+        Its present state.
+
+    Returns
+    -------
+    UnitResult
+        Result without tables and with the status "vanished".
+    """
     turnout, kind, _ = name.split("/", 2)
     return UnitResult(name, turnout, kind, VANISHED, entry.algo, VANISHED, {})
 
 
 def withdraw_moved(work: Path, stages: Iterable[str], shards: Iterable[str], limits: FleetSettings) -> int:
-    """Withdraw units that were moved to a turnout of another shard, after the jobs of all shards; returns their number.
+    """Withdraw units that were moved to a turnout of another shard, after the jobs of all shards.
 
     A rerun of the shard is requested, so that stages that use its results omit them, too. A stage that gathers its own
     units plans only some of them: one of these has moved when its turnout holds none of its files.
+
+    Parameters
+    ----------
+    work : Path
+        Folder ``work`` of the workflow.
+    stages : iterable of str
+        Names of the stages.
+    shards : iterable of str
+        Names of the shards that took part in the run.
+    limits : FleetSettings
+        Settings of the checkpoints.
+
+    Returns
+    -------
+    int
+        Number of withdrawn units.
     """
     plans = {shard: work / "plan" / f"{shard}.json" for shard in shards}
     wanted = {shard: {unit_id(p.unit) for p in read_plan(plan)} for shard, plan in plans.items() if plan.exists()}

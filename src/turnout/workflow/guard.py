@@ -2,8 +2,9 @@
 
 import logging
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from turnout.config import TurnoutConfig
 from turnout.errors import PartlyComputed, ReadError, is_infrastructure
@@ -16,13 +17,48 @@ LOG = logging.getLogger("turnout.workflow")
 
 
 def compute_guarded(
-    compute: Callable, unit: Unit, turnout: TurnoutConfig, raw_root: Path, key: str, algo: str, strict: bool, **extra
+    compute: Callable,
+    unit: Unit,
+    turnout: TurnoutConfig,
+    raw_root: Path,
+    key: str,
+    algo: str,
+    strict: bool,
+    **extra: Any,
 ) -> UnitResult:
-    """Result of ``compute(unit, turnout, raw_root, algo=algo)``.
+    """Compute a unit; a ReadError, and each record named by PartlyComputed, becomes a quarantine row.
 
-    A ReadError becomes a quarantine row, and so does each record named by PartlyComputed. Any other exception is a
-    fault of the program: it becomes a quarantine row with reason internal_error, with the traceback in the log. With
-    ``strict`` it is raised. Faults of the machine (bad sector, disk full, out of memory) are always raised.
+    Any other exception is a fault of the program: it becomes a quarantine row with reason internal_error, with the
+    traceback in the log.
+
+    Parameters
+    ----------
+    compute : callable
+        Function of the stage: (unit, turnout, raw_root, algo=...) -> tables.
+    unit : Unit
+        The unit.
+    turnout : TurnoutConfig
+        Configuration of its turnout.
+    raw_root : Path
+        The raw root.
+    key : str
+        Key of the result.
+    algo : str
+        Version of the code of the stage.
+    strict : bool
+        Raise faults of the program.
+    **extra : any
+        Further arguments of ``compute``.
+
+    Returns
+    -------
+    UnitResult
+        Tables with the status of the unit.
+
+    Raises
+    ------
+    OSError
+        For a fault of the machine (bad sector, disk full); MemoryError likewise.
     """
     try:
         tables, faults = _compute(compute, unit, turnout, raw_root, algo=algo, **extra)
@@ -42,8 +78,23 @@ def compute_guarded(
     return UnitResult(unit_id(unit), unit.turnout, unit.kind, key, algo, status_of(tables), tables)
 
 
-def death_rows(unit: Unit, *_, **__) -> dict[str, list[dict]]:
-    """Rows of a unit whose process dies each time it is computed."""
+def death_rows(unit: Unit, *_: Any, **__: Any) -> dict[str, list[dict]]:
+    """Rows of a unit whose process dies each time it is computed.
+
+    Parameters
+    ----------
+    unit : Unit
+        The unit.
+    *_ : any
+        Not used: the arguments of a function of a stage.
+    **__ : any
+        Not used.
+
+    Returns
+    -------
+    dict of str to list of dict
+        One quarantine row.
+    """
     finding = "the process died that computed it, and again where it was computed alone"
     remedy = (
         "Look in the machine's log whether its memory ended, and whether its files are whole; "
@@ -54,7 +105,9 @@ def death_rows(unit: Unit, *_, **__) -> dict[str, list[dict]]:
     }
 
 
-def _compute(compute, *args, **extra):
+def _compute(
+    compute: Callable, *args: Any, **extra: Any
+) -> tuple[dict[str, list[dict]], Sequence[tuple[str, int, Exception]]]:
     """(tables, faults); the faults of single records do not affect the rows of the others."""
     try:
         return compute(*args, **extra), ()
@@ -65,6 +118,18 @@ def _compute(compute, *args, **extra):
 def status_of(tables: dict[str, list[dict]]) -> str:
     """Status of a unit from its rows: "ok", "partly", "quarantined" or "internal_error".
 
+    Parameters
+    ----------
+    tables : dict of str to list of dict
+        Table -> rows of the unit.
+
+    Returns
+    -------
+    str
+        The status.
+
+    Examples
+    --------
     >>> status_of({"quarantine": [{"reason_code": "truncated"}], "recordings": [{}]})
     'partly'
     """
@@ -76,8 +141,33 @@ def status_of(tables: dict[str, list[dict]]) -> str:
     return "partly" if any(rows for table, rows in tables.items() if table != "quarantine") else "quarantined"
 
 
-def quarantine_row(unit: Unit, path: str, reason: str, where: str, finding: str, remedy: str, record=None) -> dict:
-    """Row of ``quarantine`` for a unit as a whole, or for one record of it."""
+def quarantine_row(
+    unit: Unit, path: str, reason: str, where: str, finding: str, remedy: str, record: int | None = None
+) -> dict:
+    """Row of ``quarantine`` for a unit as a whole, or for one record of it.
+
+    Parameters
+    ----------
+    unit : Unit
+        The unit.
+    path : str
+        File, relative to the raw root.
+    reason : str
+        A key of ``turnout.errors.REASONS``.
+    where : str
+        Record, channel or line in the file.
+    finding : str
+        What is wrong there.
+    remedy : str
+        What to do.
+    record : int or None
+        Record from 0; None: the unit as a whole.
+
+    Returns
+    -------
+    dict
+        The row, with its id.
+    """
     row = {
         "quarantine_id": content_id("quarantine", path, str(record), unit.kind, reason, finding),
         "turnout_id": unit.turnout,

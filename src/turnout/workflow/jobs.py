@@ -3,7 +3,10 @@
 import logging
 import os
 import sys
+from collections.abc import Callable, Iterable
+from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from turnout import __version__
 from turnout.config import load_configuration
@@ -21,10 +24,33 @@ from turnout.workflow.state import batch_paths, state_of, state_of_mark
 from turnout.workflow.tasks import Stage
 
 
-def stage_job(plan, mark, log, params, threads: int) -> Summary:
-    """Run one stage of one shard and write its ``mark``; the state file is in the same folder.
+def stage_job(plan: PathLike | str, mark: PathLike | str, log: Any, params: Any, threads: int) -> Summary:
+    """Run one stage of one shard and write its mark; the state file is in the same folder.
 
-    ``params`` holds kind, chain, algo, job and, where needed, context and gather.
+    Parameters
+    ----------
+    plan : path-like
+        Plan file of the shard.
+    mark : path-like
+        Mark of the shard, the output of the rule.
+    log : any
+        Log file of the job; Snakemake gives a list with one name.
+    params : Params
+        kind, chain, algo, job and, where needed, context and gather.
+    threads : int
+        Processes that may run at a time.
+
+    Returns
+    -------
+    Summary
+        Numbers of units.
+
+    Raises
+    ------
+    DamagedBatch
+        If results of another stage cannot be read; they are computed again in the next run.
+    TurnoutError
+        If the configuration or the state of the shard cannot be used.
     """
     _log_to(log)
     stage = Stage(params.kind, params.chain, params.algo, params.get("context"), params.get("gather"))
@@ -43,8 +69,30 @@ def stage_job(plan, mark, log, params, threads: int) -> Summary:
     return summary
 
 
-def verdict_job(marks, output, log, params) -> QualityGate:
-    """Check the quality of the run; SystemExit with 1 where it fails."""
+def verdict_job(marks: Iterable[PathLike | str], output: PathLike | str, log: Any, params: Any) -> QualityGate:
+    """Check the quality of the run.
+
+    Parameters
+    ----------
+    marks : iterable of path-like
+        Marks of all shards of the stages that are judged.
+    output : path-like
+        File of the judged batches.
+    log : any
+        Log file of the job; Snakemake gives a list with one name.
+    params : Params
+        job, again.
+
+    Returns
+    -------
+    QualityGate
+        Numbers of new units and complaints.
+
+    Raises
+    ------
+    SystemExit
+        With 1 if the run fails.
+    """
     _log_to(log)
     states = [state_of_mark(mark) for mark in marks]
     try:
@@ -57,10 +105,21 @@ def verdict_job(marks, output, log, params) -> QualityGate:
     return gate
 
 
-def register_job(register, generation, log, params) -> None:
+def register_job(register: Callable, generation: PathLike | str, log: Any, params: Any) -> None:
     """Register the batches of all shards, including those that take no part in this run.
 
     Before that, units that were moved to a turnout of another shard are withdrawn from the old one.
+
+    Parameters
+    ----------
+    register : callable
+        ``turnout.registry.register.register``, or a function with its arguments.
+    generation : path-like
+        Generation file of the registry, the output of the rule.
+    log : any
+        Log file of the job; Snakemake gives a list with one name.
+    params : Params
+        job, stages, shards, configuration, again.
     """
     _log_to(log)
     configuration = load_configuration(params.job["configuration"])
@@ -79,7 +138,7 @@ def register_job(register, generation, log, params) -> None:
     _report(f"register: {result.n_units} units, {sum(result.rows.values())} rows, {result.n_refused} refused")
 
 
-def _log_to(log) -> None:
+def _log_to(log: Any) -> None:
     """Write messages to the log file of the job, and warnings to the screen, too."""
     Path(str(log)).parent.mkdir(parents=True, exist_ok=True)
     form = logging.Formatter("%(levelname)s %(message)s")
@@ -91,6 +150,6 @@ def _log_to(log) -> None:
     logging.getLogger("turnout").setLevel(logging.INFO)
 
 
-def _report(what) -> None:
+def _report(what: Any) -> None:
     logging.getLogger("turnout.workflow").info("%s", what)
     print(what, file=sys.stderr, flush=True)

@@ -1,11 +1,13 @@
 """Prepare the workflow before its first job: options, shards, plan files."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, date, datetime
 from pathlib import Path
+from typing import Any
 
 from turnout.config import Configuration, load_configuration
+from turnout.config.consistency import ToSi
 from turnout.config.schema import suggestion
 from turnout.errors import ConfigError
 from turnout.files import write_text
@@ -51,14 +53,48 @@ class Launch:
     day: str = ""
 
     def threads(self, cores: int | None) -> int:
-        """Processes per job when ``cores`` are shared among the shards."""
+        """Processes per job when ``cores`` are shared among the shards.
+
+        Parameters
+        ----------
+        cores : int or None
+            Cores of the run; None: one.
+
+        Returns
+        -------
+        int
+            At least 1.
+        """
         return max(1, (cores or 1) // len(self.shards))
 
 
-def launch(options: Mapping, scan: bool, formats=None, to_si=None) -> Launch:
+def launch(options: Mapping, scan: bool, formats: Collection[str] | None = None, to_si: ToSi | None = None) -> Launch:
     """Read the configuration and, with ``scan``, update the plan files.
 
     ``options`` are those of ``snakemake --config``; ConfigErrors where they or the configuration are invalid.
+
+    Parameters
+    ----------
+    options : mapping
+        Those of ``snakemake --config``, see ``OPTIONS``.
+    scan : bool
+        Scan the raw folders and write the plan files; False in a job.
+    formats : collection of str or None
+        Names of the readers; None: formats are not checked.
+    to_si : callable or None
+        Converts units, as ``turnout.units.to_si``; None: units of channels are not checked.
+
+    Returns
+    -------
+    Launch
+        Parameters of the run.
+
+    Raises
+    ------
+    ConfigErrors
+        If the configuration has errors.
+    ConfigError
+        If an option is invalid, or so many files are missing that a disk is probably not mounted.
     """
     for name in options:
         if name not in OPTIONS:
@@ -110,7 +146,7 @@ def launch_time() -> datetime | None:
         return None
 
 
-def _day(value) -> str:
+def _day(value: Any) -> str:
     """The given day, else the day on which the run began, which is the same for all of its jobs."""
     if not value:
         return (launch_time() or datetime.now(UTC)).date().isoformat()
@@ -133,7 +169,7 @@ def _distinct_settings(configuration: Configuration) -> list[Mapping]:
     return [variant.turnout_fields["settings"] for variant in variants]
 
 
-def _turnouts(value, configuration: Configuration) -> tuple[str, ...] | None:
+def _turnouts(value: Any, configuration: Configuration) -> tuple[str, ...] | None:
     if value is None or value == "":
         return None
     ids = [str(t).strip() for t in (value if isinstance(value, list) else str(value).split(","))]
@@ -142,7 +178,7 @@ def _turnouts(value, configuration: Configuration) -> tuple[str, ...] | None:
     return tuple(sorted(set(ids)))
 
 
-def _number(value) -> int:
+def _number(value: Any) -> int:
     if not isinstance(value, int) or not 1 <= value <= 4096:
         raise ConfigError("--config", "shards", repr(value), "Write a whole number from 1 to 4096")
     return value

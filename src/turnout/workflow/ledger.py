@@ -15,6 +15,13 @@ class Ledger:
     """State of one shard, written to ``path`` at every checkpoint.
 
     A kill or a fault at any time loses only the results that are not yet in a batch.
+
+    Parameters
+    ----------
+    path : Path
+        State file of the shard.
+    limits : FleetSettings
+        Settings of the checkpoints.
     """
 
     def __init__(self, path: Path, limits: FleetSettings):
@@ -33,7 +40,17 @@ class Ledger:
             LOG.warning("%s cannot be read: %d units are computed again where their files are there", names, n_unit)
 
     def keep(self, result: UnitResult, stamp: str, contents: str = "") -> None:
-        """Add a result; ``stamp`` and ``contents`` identify what it was computed from."""
+        """Add a result; a checkpoint follows when enough time has passed or enough results wait.
+
+        Parameters
+        ----------
+        result : UnitResult
+            Result of a unit.
+        stamp : str
+            Digest of names, sizes and times of its files.
+        contents : str
+            Content hashes of its files, as ``short_contents`` writes them.
+        """
         self._waiting.append((result, stamp, contents))
         late = time.monotonic() - self._saved_at >= self.limits.checkpoint_time
         if late or len(self._waiting) >= self.limits.checkpoint_units:

@@ -7,10 +7,11 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from types import FrameType
 
 from filelock import FileLock, Timeout
 
@@ -51,7 +52,7 @@ class NightReport:
     nothing_usable: bool = False
     reason: str = ""
 
-    def __str__(self):
+    def __str__(self) -> str:
         well = "every job ran, but nothing could be used" if self.nothing_usable else "sound"
         outcome = {0: well, EXIT_TIME_LIMIT: "stopped at the time limit"}.get(
             self.code, f"failed with exit code {self.code}"
@@ -74,11 +75,31 @@ class NightReport:
 
 
 def nightly(options: Sequence[str], profile: str, limit: float | None = None, work: Path = Path("work")) -> NightReport:
-    """Run the workflow once, with ``options`` passed to Snakemake.
+    """Run the workflow once.
 
-    ``profile`` is a folder of profiles/; ``limit`` [s] ends a run that hangs or takes longer than the night. If jobs
-    die or are ended, the finished results are published without the rest. A signal that ends this process ends
-    Snakemake first. TurnoutError where there is no such profile, or another run is active.
+    If jobs die or are ended, the finished results are published without the rest. A signal that ends this process ends
+    Snakemake first.
+
+    Parameters
+    ----------
+    options : sequence of str
+        Options of Snakemake.
+    profile : str
+        Folder of profiles/.
+    limit : float or None
+        Time after which a run is ended that hangs or takes longer than the night; None: no limit. [s]
+    work : Path
+        Folder ``work`` of the workflow.
+
+    Returns
+    -------
+    NightReport
+        The report of the run.
+
+    Raises
+    ------
+    TurnoutError
+        If there is no such profile, or another run is active.
     """
     _require_profile(Path(profile))
     work.mkdir(exist_ok=True)
@@ -107,10 +128,10 @@ def _require_profile(profile: Path) -> None:
 
 
 @contextmanager
-def _signals_raise():
+def _signals_raise() -> Iterator[None]:
     """Let SIGTERM and SIGHUP raise SystemExit, as Ctrl-C raises KeyboardInterrupt, so that Snakemake is ended."""
 
-    def end(number, frame):
+    def end(number: int, frame: FrameType | None) -> None:
         raise SystemExit(128 + number)
 
     ending = [n for n in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(n) is not signal.SIG_IGN]  # nohup

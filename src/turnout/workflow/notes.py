@@ -15,9 +15,21 @@ MAX_FILE_DURATION = timedelta(days=2)  # maximum duration of one file of a conti
 
 
 def notes_of(turnout: TurnoutConfig, units: Sequence[Unit]) -> list[str]:
-    """A digest per unit; it changes when its campaign is corrected, or a train in its time.
+    """Digest of the notes of each unit; it changes when its campaign is corrected, or a train in its time.
 
     A file lasts until the next one begins; one of a continuous logger contains the trains of a day.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+        Configuration of the turnout with its notes.
+    units : sequence of Unit
+        Its units.
+
+    Returns
+    -------
+    list of str
+        One text per unit, "" without notes.
     """
     campaigns: dict[str, str] = {}
     trains = sorted(_trains_with_time(turnout.trains), key=lambda entry: entry[0])
@@ -31,7 +43,6 @@ def notes_of(turnout: TurnoutConfig, units: Sequence[Unit]) -> list[str]:
         else:
             notes.append(_trains_digest(start_of(unit.label), starts, trains))
     return notes
-
 
 
 def _campaign_text(campaign: Campaign) -> str:
@@ -62,7 +73,18 @@ def _trains_with_time(rows: Sequence[Mapping]) -> list[tuple[datetime, list]]:
 
 
 def start_of(label: str) -> datetime | None:
-    """Start time of a passage file from its name; None without a time."""
+    """Start time of a passage file from its name.
+
+    Parameters
+    ----------
+    label : str
+        Label of its unit, which is a part of the path.
+
+    Returns
+    -------
+    datetime or None
+        Naive UTC; None without a valid time.
+    """
     stamp = re.search(r"\d{8}T\d{6}Z", label)
     try:
         return datetime.strptime(stamp[0], "%Y%m%dT%H%M%SZ") if stamp else None

@@ -2,7 +2,7 @@
 
 from bisect import bisect_left
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import date, datetime, timedelta
 from pathlib import Path
 
@@ -19,9 +19,23 @@ MIN_SHIFTED_PASSAGES = 3  # passages that a shift must match to trains: fewer ma
 
 
 def note_contradictions(turnout: TurnoutConfig, raw_root: Path, units: Iterable[Unit]) -> Iterator[ReadError]:
-    """An error for each row without files, and for files without a row; ``turnout`` includes its notes.
+    """Compare the notes of a turnout with its files.
 
     Without campaigns.csv no row is required. Invalid rows are reported by ``read_notes``.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+        Configuration of the turnout with its notes.
+    raw_root : Path
+        The raw root.
+    units : iterable of Unit
+        Its units.
+
+    Yields
+    ------
+    ReadError
+        An error for each row without files, and for files without a row.
     """
     units = list(units)
     yield from _campaigns(Path(raw_root) / turnout.raw / "campaigns.csv", f"{turnout.raw}/campaigns.csv", units)
@@ -30,12 +44,12 @@ def note_contradictions(turnout: TurnoutConfig, raw_root: Path, units: Iterable[
         yield from _trains(turnout.trains, f"{turnout.raw}/trains.csv", units, timedelta(seconds=tolerance))
 
 
-def _campaigns(path: Path, name: str, units) -> Iterator[ReadError]:
+def _campaigns(path: Path, name: str, units: Sequence[Unit]) -> Iterator[ReadError]:
     try:
         table = read_csv(path, name, COLUMNS, 2)
     except (OSError, TableError):
         return
-    n_files = Counter(unit.campaign for unit in units if unit.kind == "hammer" for _ in unit.files)
+    n_files = Counter(unit.campaign or "" for unit in units if unit.kind == "hammer" for _ in unit.files)
     days_in_notes = set()
     for line, cells in table.rows:
         day = _day(cells["campaign"])
@@ -61,7 +75,9 @@ def _day(text: str) -> str | None:
         return None
 
 
-def _trains(rows, name: str, units, tolerance: timedelta) -> Iterator[ReadError]:
+def _trains(
+    rows: Sequence[Mapping[str, str]], name: str, units: Sequence[Unit], tolerance: timedelta
+) -> Iterator[ReadError]:
     """An error if no train matches a passage, but many match after a shift by whole hours."""
     passages = [start for unit in units if unit.kind == "passage" and (start := start_of(unit.label))]
     trains = sorted(parse_utc(row["passed_at_utc"]) for row in rows)

@@ -27,6 +27,20 @@ def shard_of(turnout: str, shards: int) -> str:
 
     The check value of CRC-32 is cbf43926 for "123456789"; its last six bits are 38.
 
+    Parameters
+    ----------
+    turnout : str
+        Id of the turnout.
+    shards : int
+        Number of shards.
+
+    Returns
+    -------
+    str
+        Name such as "38of64".
+
+    Examples
+    --------
     >>> shard_of("123456789", 64)
     '38of64'
     """
@@ -34,19 +48,61 @@ def shard_of(turnout: str, shards: int) -> str:
 
 
 def shard_name(number: int, shards: int) -> str:
-    """Name of a shard from its ``number``, counted from 0."""
+    """Name of a shard.
+
+    Parameters
+    ----------
+    number : int
+        Its number, from 0.
+    shards : int
+        Number of shards.
+
+    Returns
+    -------
+    str
+        Name such as "38of64".
+    """
     return f"{number:02d}of{shards:02d}"
 
 
-def shard_names(shards: int, turnouts=None) -> list[str]:
-    """Names of all shards, or of those of the ``turnouts``."""
+def shard_names(shards: int, turnouts: Iterable[str] | None = None) -> list[str]:
+    """Names of all shards, or of those of the ``turnouts``.
+
+    Parameters
+    ----------
+    shards : int
+        Number of shards.
+    turnouts : iterable of str or None
+        Only the shards of these turnouts; None: all.
+
+    Returns
+    -------
+    list of str
+        Sorted names.
+    """
     if turnouts is None:
         return [shard_name(i, shards) for i in range(shards)]
     return sorted({shard_of(t, shards) for t in turnouts})
 
 
 def parse_shard_name(name: str) -> tuple[int, int]:
-    """Number of a shard and number of shards from its name."""
+    """Number of a shard and number of shards from its name.
+
+    Parameters
+    ----------
+    name : str
+        Name such as "38of64".
+
+    Returns
+    -------
+    tuple of (int, int)
+        The two numbers, 38 and 64.
+
+    Raises
+    ------
+    ConfigError
+        If it is no such name.
+    """
     if not re.fullmatch(SHARD_NAME, name):
         raise ConfigError("shard", "name", repr(name), "Write a name like 00of64")
     number, count = name.split("of")
@@ -72,11 +128,35 @@ def write_plans(
     turnouts: Iterable[str] | None = None,
     accept_vanished: bool = False,
 ) -> list[str]:
-    """Scan the raw folders and write ``folder``/<shard>.json where the content changed; returns the names of shards.
+    """Scan the raw folders and write ``folder``/<shard>.json where the content changed.
 
-    ``turnouts`` limits the scan to their shards, and to those with a truncated plan. A plan contains no time of scan
-    and no absolute path, so it changes only with its content. Plans of another number of shards are deleted, because
-    they would not be updated. ConfigError if so many known files are missing that a disk is probably not mounted.
+    A plan contains no time of scan and no absolute path, so it changes only with its content. Plans of another number
+    of shards are deleted, because they would not be updated.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Configuration of the fleet.
+    raw_root : Path
+        The raw root.
+    folder : Path
+        Folder of the plans.
+    shards : int
+        Number of shards.
+    turnouts : iterable of str or None
+        Scan only their shards, and those with a truncated plan; None: all.
+    accept_vanished : bool
+        Accept that many known files are missing.
+
+    Returns
+    -------
+    list of str
+        Names of the scanned shards.
+
+    Raises
+    ------
+    ConfigError
+        If so many known files are missing that a disk is probably not mounted.
     """
     texts, missing = _scan_turnouts(configuration, raw_root, folder, shards, turnouts)
     if not accept_vanished and (error := missing.error(configuration.settings["fleet"], raw_root)):
@@ -98,7 +178,20 @@ class MissingFiles:
     n_known: int
 
     def error(self, settings: FleetSettings, raw_root: Path) -> ConfigError | None:
-        """Error that stops a run if so many files are missing that a disk is probably not mounted, else None."""
+        """Error that stops a run if so many files are missing that a disk is probably not mounted.
+
+        Parameters
+        ----------
+        settings : FleetSettings
+            Numbers of missing files from which a run stops.
+        raw_root : Path
+            The raw root.
+
+        Returns
+        -------
+        ConfigError or None
+            The error; None if few files are missing.
+        """
         if len(self.files) <= max(settings.vanished_files, settings.vanished_share * self.n_known):
             return None
         remedy = (
@@ -107,18 +200,39 @@ class MissingFiles:
         )
         return ConfigError(str(raw_root), "raw root", f"{self}, first {self.files[0]}", remedy)
 
-    def __str__(self):
+    def __str__(self) -> str:
         return f"{len(self.files)} known file{'s are' if len(self.files) != 1 else ' is'} gone"
 
 
 def missing_files(
     configuration: Configuration, raw_root: Path, folder: Path, shards: int, turnouts: Iterable[str] | None = None
 ) -> MissingFiles:
-    """Files that the next run will find missing, compared with the plans in ``folder``; nothing is written."""
+    """Files that the next run will find missing, compared with the plans; nothing is written.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Configuration of the fleet.
+    raw_root : Path
+        The raw root.
+    folder : Path
+        Folder of the plans.
+    shards : int
+        Number of shards.
+    turnouts : iterable of str or None
+        Only the shards of these turnouts; None: all.
+
+    Returns
+    -------
+    MissingFiles
+        The files, and the number of known ones.
+    """
     return _scan_turnouts(configuration, raw_root, folder, shards, turnouts)[1]
 
 
-def _scan_turnouts(configuration, raw_root, folder, shards, turnouts) -> tuple[dict[Path, str], MissingFiles]:
+def _scan_turnouts(
+    configuration: Configuration, raw_root: Path, folder: Path, shards: int, turnouts: Iterable[str] | None
+) -> tuple[dict[Path, str], MissingFiles]:
     """New text of each plan, and the files of the existing plans that are missing now."""
     for turnout in turnouts or ():
         configuration.turnout(turnout)
@@ -144,12 +258,39 @@ def _scan_turnouts(configuration, raw_root, folder, shards, turnouts) -> tuple[d
 
 
 def is_cut_plan(path: Path) -> bool:
-    """Whether a plan file exists and is truncated."""
+    """Whether a plan file exists and is truncated.
+
+    Parameters
+    ----------
+    path : Path
+        The plan file.
+
+    Returns
+    -------
+    bool
+        False if there is no such file.
+    """
     return is_truncated(path, PLAN_END)
 
 
 def read_plan(path: Path) -> Iterator[PlannedUnit]:
-    """Units of a plan file."""
+    """Units of a plan file.
+
+    Parameters
+    ----------
+    path : Path
+        The plan file.
+
+    Yields
+    ------
+    PlannedUnit
+        One planned unit after the other.
+
+    Raises
+    ------
+    ValueError
+        If the file is truncated.
+    """
     for entry in json.loads(Path(path).read_text(encoding="utf-8"))["turnouts"]:
         for kind, label, section, campaign, note, files in entry["units"]:
             files = tuple((f"{entry['raw']}/{name}", size, time) for name, size, time in files)
@@ -158,7 +299,18 @@ def read_plan(path: Path) -> Iterator[PlannedUnit]:
 
 
 def read_problems(path: Path) -> Iterator[tuple[str, dict]]:
-    """``(turnout, problem)`` of a plan file; a problem has path, where, found, remedy, reason."""
+    """Excluded files of a plan file.
+
+    Parameters
+    ----------
+    path : Path
+        The plan file.
+
+    Yields
+    ------
+    tuple of (str, dict)
+        Id of the turnout, and its problem: path, where, found, remedy, reason.
+    """
     for entry in json.loads(Path(path).read_text(encoding="utf-8"))["turnouts"]:
         for problem in entry["problems"]:
             yield entry["turnout"], dict(zip(("path", "where", "found", "remedy", "reason"), problem))

@@ -24,7 +24,22 @@ class LostTask:
 
 
 def map_in_order(function: Callable, tasks: Sequence, threads: int) -> Iterator:
-    """``function(task)`` for each of ``tasks``, in their order; in this process if one is enough."""
+    """Call a function for each task; in this process if one is enough.
+
+    Parameters
+    ----------
+    function : callable
+        Called with one task.
+    tasks : sequence
+        The tasks.
+    threads : int
+        Processes at a time.
+
+    Yields
+    ------
+    any
+        Results in the order of the tasks; ``LostTask`` for one whose process died.
+    """
     if threads <= 1 or len(tasks) <= 1:
         yield from map(function, tasks)
     else:
@@ -32,11 +47,25 @@ def map_in_order(function: Callable, tasks: Sequence, threads: int) -> Iterator:
 
 
 def map_in_processes(function: Callable, tasks: Sequence, threads: int) -> Iterator:
-    """``function(task)`` for each of ``tasks``, in their order, in child processes.
+    """Call a function for each task in child processes.
 
     If one of them dies, ``LostTask`` takes the place of the results in progress, and new processes continue with the
     remaining tasks. Processes are forked before the first result, so ``function`` need not be picklable; it must not
     have started threads by then.
+
+    Parameters
+    ----------
+    function : callable
+        Called with one task.
+    tasks : sequence
+        The tasks.
+    threads : int
+        Processes at a time.
+
+    Yields
+    ------
+    any
+        Results in the order of the tasks; ``LostTask`` for one without a result.
     """
     global _CALL
     _CALL, remaining = function, list(tasks)
@@ -74,14 +103,14 @@ def _end_with_parent() -> None:
     parent = multiprocessing.parent_process()
     assert parent is not None, "it is called in the processes of a pool"
 
-    def watch(join=parent.join):
+    def watch(join: Callable[[], None] = parent.join) -> None:
         join()
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
 
 
-def _submit(pool: ProcessPoolExecutor, task) -> Future:
+def _submit(pool: ProcessPoolExecutor, task: Any) -> Future:
     """Future of a task; it holds an exception if the pool is broken already."""
     try:
         return pool.submit(_call_task, task)
@@ -91,6 +120,6 @@ def _submit(pool: ProcessPoolExecutor, task) -> Future:
         return future
 
 
-def _call_task(task):
+def _call_task(task: Any) -> Any:
     assert _CALL is not None, "in_processes has set it before the processes were forked"
     return _CALL(task)

@@ -34,18 +34,32 @@ class QualityGate:
     unsound: bool = False
     damaged: tuple[Path, ...] = ()
 
-    def __str__(self):
+    def __str__(self) -> str:
         summary = f"{self.units} units computed, {self.quarantined} with rows in quarantine"
         faults = f", {self.internal_errors} internal errors" if self.internal_errors else ""
         return summary + faults + "".join(f"\n{c}" for c in self.complaints)
 
 
 def judge(states: Iterable[Path], configuration: Configuration, judged: Iterable[str] = ()) -> QualityGate:
-    """Judge all batches that ``states`` name, except those already ``judged``.
+    """Judge the batches of all states.
 
     Complaints: a batch that cannot be read; an internal error; a unit without a result because of a fault of the
     machine; and, for the fleet or for one line with at least ``quarantine_units`` units, a share in quarantine above
     ``quarantine_share``.
+
+    Parameters
+    ----------
+    states : iterable of Path
+        State files of the shards.
+    configuration : Configuration
+        Configuration of the fleet: settings of the gate, lines of the turnouts.
+    judged : iterable of str
+        Batches that are not judged again.
+
+    Returns
+    -------
+    QualityGate
+        Numbers of units and complaints.
     """
     states, before, names = list(states), set(judged), []
     status, lines = {}, {}
@@ -103,11 +117,30 @@ def _read(path: Path, damaged: dict[Path, str]) -> list[tuple]:
 
 
 def check_quality(states: Iterable[Path], configuration: Configuration, output: Path) -> QualityGate:
-    """Judge the batches that ``output`` does not name yet, and write it; TurnoutError, ``output`` unchanged, if bad.
+    """Judge the batches that ``output`` does not name yet, and write it.
 
     Nights with too few units to be judged are added up. Bad units are judged again together with later ones, until
     there are enough newer units to be judged by themselves. Otherwise a small fleet would fail for months, until its
     bad units are a small share of all. A run over some turnouts keeps the state of the others.
+
+    Parameters
+    ----------
+    states : iterable of Path
+        State files of the shards.
+    configuration : Configuration
+        Configuration of the fleet: settings of the gate, lines of the turnouts.
+    output : Path
+        File of the judged batches.
+
+    Returns
+    -------
+    QualityGate
+        Numbers of units, without complaints.
+
+    Raises
+    ------
+    TurnoutError
+        If there are complaints; ``output`` is unchanged.
     """
     output, states, min_units = Path(output), list(states), configuration.settings["fleet"].quarantine_units
     doubts = output.with_name("doubts.json")  # not in the output, which Snakemake restores after a failed job

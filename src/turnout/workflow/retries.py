@@ -30,9 +30,19 @@ JOB_ENDED = "its job ended while it was computed"
 
 
 def started_units(state: Path) -> dict[str, str]:
-    """Units that were started and have not ended, and the run that first started each; ``state`` is the state file.
+    """Units that were started and have not ended.
 
     The unit started last comes last, for it is the most probable cause; so the others are not delayed by it.
+
+    Parameters
+    ----------
+    state : Path
+        State file of the shard.
+
+    Returns
+    -------
+    dict of str to str
+        Unit -> run that first started it.
     """
     units = {}
     for mark in sorted(batch_folder(state).glob(f"{MARK_PREFIX}*"), key=changed_at):
@@ -47,6 +57,15 @@ def mark_started(state: Path, unit: str, run: str) -> Iterator[None]:
     """Mark a unit as started until the block ends, also by an exception; an existing complete mark keeps its run.
 
     The mark is not flushed to the disk: it is for a process that dies, not for a machine that does.
+
+    Parameters
+    ----------
+    state : Path
+        State file of the shard.
+    unit : str
+        Name of the unit.
+    run : str
+        Start time of the run, "" outside a run.
     """
     mark = _mark_path(state, unit)
     if _read_mark(mark)[1] != unit:
@@ -61,7 +80,15 @@ def mark_started(state: Path, unit: str, run: str) -> Iterator[None]:
 
 
 def clear_mark(state: Path, unit: str) -> None:
-    """Remove the mark of a unit if there is one."""
+    """Remove the mark of a unit if there is one.
+
+    Parameters
+    ----------
+    state : Path
+        State file of the shard.
+    unit : str
+        Name of the unit.
+    """
     _mark_path(state, unit).unlink(missing_ok=True)
 
 
@@ -87,23 +114,47 @@ class Postponed:
 
 
 def read_postponed(state: Path) -> tuple[int, dict[str, str]]:
-    """(number of requested reruns of a shard, {unit: fault}); ``state`` is its state file.
+    """Postponed units of a shard, and the number of requested reruns.
 
     The number is a parameter of the job: a higher one makes it run again without a change of the plan.
+
+    Parameters
+    ----------
+    state : Path
+        State file of the shard.
+
+    Returns
+    -------
+    tuple of (int, dict of str to str)
+        Number of reruns; unit -> fault.
     """
     content = read_json(_postponed_path(state), {"jobs": 0, "units": {}})
     return content["jobs"], content["units"]
 
 
 def note_postponed(state: Path, units: Mapping[str, str]) -> None:
-    """Write the postponed ``units`` of a shard; no file if there are none and were none before."""
+    """Write the postponed units of a shard; no file if there are none and were none before.
+
+    Parameters
+    ----------
+    state : Path
+        State file of the shard.
+    units : mapping of str to str
+        Unit -> fault.
+    """
     jobs, before = read_postponed(state)
     if units or before:
         _write(state, jobs + bool(units), units)
 
 
 def request_rerun(state: Path) -> None:
-    """Make the job of a shard run again without postponed units, for instance because a batch is damaged."""
+    """Make the job of a shard run again without postponed units, for instance because a batch is damaged.
+
+    Parameters
+    ----------
+    state : Path
+        State file of the shard.
+    """
     jobs, units = read_postponed(state)
     _write(state, jobs + 1, units)
 
@@ -120,7 +171,18 @@ ATTEMPTS_FOLDER = Path("work/attempts")
 
 
 def attempts(job: str) -> int:
-    """Number of unfinished attempts of ``job``; -1, a new value, where the file is truncated."""
+    """Number of unfinished attempts of ``job``; -1, a new value, where the file is truncated.
+
+    Parameters
+    ----------
+    job : str
+        Name of the job.
+
+    Returns
+    -------
+    int
+        0 if the job has not failed.
+    """
     try:
         return int((ATTEMPTS_FOLDER / job).read_text(encoding="utf-8"))
     except FileNotFoundError:
@@ -131,7 +193,15 @@ def attempts(job: str) -> int:
 
 @contextmanager
 def attempt(job: str, before: int) -> Iterator[None]:
-    """Count one more attempt than ``before`` until the block ends without an exception."""
+    """Count one more attempt than ``before`` until the block ends without an exception.
+
+    Parameters
+    ----------
+    job : str
+        Name of the job.
+    before : int
+        Number of unfinished attempts so far.
+    """
     write_text(ATTEMPTS_FOLDER / job, str(before + 1))
     yield
     write_text(ATTEMPTS_FOLDER / job, str(before))

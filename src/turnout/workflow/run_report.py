@@ -21,10 +21,20 @@ MAX_REASON_LENGTH = 300  # characters of a message in the report
 
 
 def failure_reason(since: int = 0) -> str:
-    """Reason of a failed run in a few words; "" if unknown. ``since`` is its start [ns since 1970].
+    """Reason of a failed run in a few words.
 
     It is the first failed rule with its log. If only the rule verdict failed, it is the first complaint of the quality
     gate. If no rule failed, it is the message that stopped the run before any job.
+
+    Parameters
+    ----------
+    since : int
+        Start of the run; older logs do not count. [ns since 1970]
+
+    Returns
+    -------
+    str
+        The reason, "" if unknown.
     """
     written = sorted((path.stat().st_mtime_ns, path) for path in LOGS.glob("*.snakemake.log"))
     texts = [path.read_text(encoding="utf-8", errors="replace") for time, path in written if time >= since]
@@ -69,12 +79,36 @@ group by turnout_id order by turnout_id"""
 
 
 def rejected_units(units: Collection[str], registry: Path) -> list[str]:
-    """Those of the ``units`` whose hammer test was rejected."""
+    """Those of the ``units`` whose hammer test was rejected.
+
+    Parameters
+    ----------
+    units : collection of str
+        Names of units; those of passages are never rejected.
+    registry : Path
+        Folder of the registry.
+
+    Returns
+    -------
+    list of str
+        Names of the rejected units; none without a registry.
+    """
     return [unit for (unit,) in _query(registry, REJECTED_SQL, [list(units)])] if units else []
 
 
 def unused_turnouts(registry: Path) -> tuple[list[str], bool]:
-    """Turnouts with files but without any accepted test or passage; and whether that holds for all."""
+    """Turnouts with files but without any accepted test or passage; and whether that holds for all.
+
+    Parameters
+    ----------
+    registry : Path
+        Folder of the registry.
+
+    Returns
+    -------
+    tuple of (list of str, bool)
+        Ids of the turnouts, sorted; False without a registry.
+    """
     rows = _query(registry, UNUSED_SQL, [])
     return [turnout for turnout, _ in rows], any(nothing for _, nothing in rows)
 

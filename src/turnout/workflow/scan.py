@@ -1,12 +1,13 @@
 """Scan the raw folder of one turnout: group files into units, and report files that match no pattern."""
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from datetime import datetime
 from functools import lru_cache
 from operator import attrgetter
 from pathlib import Path
+from re import Match, Pattern
 
 from turnout.config import TurnoutConfig
 from turnout.config.filename_pattern import compile_pattern
@@ -22,7 +23,15 @@ _name = attrgetter("name")
 
 
 class RawFolder:
-    """All files below a raw folder: ``files`` are (path below it, entry), sorted; ``problems`` are excluded entries."""
+    """All files below a raw folder: ``files`` are (path below it, entry), sorted; ``problems`` are excluded entries.
+
+    Parameters
+    ----------
+    raw_root : Path
+        The raw root.
+    raw : str
+        Folder of the turnout below it.
+    """
 
     def __init__(self, raw_root: Path, raw: str):
         self.root, self.raw = os.path.realpath(raw_root), raw
@@ -32,9 +41,19 @@ class RawFolder:
         self._collect(top, "", (os.path.realpath(top),))
 
     def stat(self, inside: str, entry: os.DirEntry) -> tuple[str, int, int] | None:
-        """(path below the raw root, size, time of change [ns]); None for a file that is gone or cannot be read.
+        """Size and time of a file; one that cannot be read is added to ``problems``.
 
-        The latter is added to ``problems``.
+        Parameters
+        ----------
+        inside : str
+            Path below the raw folder.
+        entry : os.DirEntry
+            Entry of its folder.
+
+        Returns
+        -------
+        tuple of (str, int, int) or None
+            Path below the raw root, size, time of change [ns]; None for a file that is gone or cannot be read.
         """
         try:
             status = entry.stat()
@@ -121,7 +140,20 @@ class Scan:
 
 
 def scan(turnout: TurnoutConfig, raw_root: Path) -> Scan:
-    """Units of one turnout from the file names in its raw folder; no file is opened."""
+    """Units of one turnout from the file names in its raw folder; no file is opened.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+        Configuration of the turnout.
+    raw_root : Path
+        The raw root.
+
+    Returns
+    -------
+    Scan
+        Its units and the excluded files.
+    """
     result, names = Scan(), _names(turnout)
     by_unit: dict[tuple, list] = {}
     matched, unmatched = set(), []
@@ -141,20 +173,32 @@ def scan(turnout: TurnoutConfig, raw_root: Path) -> Scan:
         entries = tuple(sorted(e for e in [folder.stat(*file) for file in files] if e))
         if entries:
             result.units.append(Unit(turnout.id, kind, label, entries, turnout.hashes[kind], section, campaign))
-    result.problems += [*folder.problems, *_unmatched_files(turnout, unmatched, matched, names)]
+    result.problems += [*folder.problems, *_unmatched_files(turnout, unmatched, matched)]
     return result
 
 
 def unit_id(unit: Unit) -> str:
     """Name of a unit in batches and state files.
 
+    Parameters
+    ----------
+    unit : Unit
+        The unit.
+
+    Returns
+    -------
+    str
+        "<turnout>/<kind>/<label>".
+
+    Examples
+    --------
     >>> unit_id(Unit("t1", "hammer", "A7/2024-05-13", (), ""))
     't1/hammer/A7/2024-05-13'
     """
     return f"{unit.turnout}/{unit.kind}/{unit.label}"
 
 
-def _names(turnout: TurnoutConfig) -> list[tuple]:
+def _names(turnout: TurnoutConfig) -> list[tuple[str, Pattern]]:
     names = []
     if turnout.hammer:
         names.append(
@@ -165,16 +209,16 @@ def _names(turnout: TurnoutConfig) -> list[tuple]:
     return names
 
 
-def _label(kind, match, inside, turnout) -> tuple:
+def _label(kind: str, match: Match, inside: str, turnout: TurnoutConfig) -> tuple:
     """Kind, label, section and campaign of the unit that a file belongs to."""
     if kind == "hammer":
         section, campaign = match["section"], match["campaign"]
         return kind, f"{section}/{campaign}", section, campaign
-    fixed = turnout.passages.files.partition("{")[0]
+    fixed = turnout.passages.files.partition("{")[0] if turnout.passages else ""
     return kind, inside.removeprefix(fixed), None, None
 
 
-def _time_problem(match) -> tuple[str, str] | None:
+def _time_problem(match: Match) -> tuple[str, str] | None:
     """Problem of the day or time in a file name, and its remedy; None if it is a valid date.
 
     >>> import re
@@ -201,9 +245,8 @@ def _is_calendar_time(text: str, form: str) -> bool:
     return True
 
 
-def _unmatched_files(turnout, unmatched: list[str], matched: set, names: Iterable) -> Iterator[ReadError]:
-    patterns = {"hammer": turnout.hammer, "passage": turnout.passages}
-    pattern_words = " or ".join(repr(patterns[kind].files) for kind, _ in names)
+def _unmatched_files(turnout: TurnoutConfig, unmatched: list[str], matched: set[str]) -> Iterator[ReadError]:
+    pattern_words = " or ".join(repr(kind.files) for kind in (turnout.hammer, turnout.passages) if kind)
     for inside in unmatched:
         remedy = f"Rename it after {pattern_words}, or add its section to the layout {turnout.layout!r}"
         finding = "its name follows no pattern of the layout"

@@ -9,6 +9,7 @@ from collections.abc import Callable, Collection, Container, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
+from typing import Any, TextIO
 
 from turnout.config import Configuration
 from turnout.errors import is_transient
@@ -36,9 +37,19 @@ LOG_INTERVAL = 30.0
 
 
 class Progress:
-    """Shows how many units are done: a bar on a terminal, else a line every ``LOG_INTERVAL`` seconds."""
+    """Shows how many units are done: a bar on a terminal, else a line every ``LOG_INTERVAL`` seconds.
 
-    def __init__(self, name: str, total: int, stream=None):
+    Parameters
+    ----------
+    name : str
+        Name of the work, before the numbers.
+    total : int
+        Number of units.
+    stream : TextIO or None
+        Where to write; None: standard error.
+    """
+
+    def __init__(self, name: str, total: int, stream: TextIO | None = None):
         self.name, self.total, self.n_done, self.quarantined = name, total, 0, 0
         self.stream = stream or sys.stderr
         self.next_line = time.monotonic() + LOG_INTERVAL
@@ -49,7 +60,13 @@ class Progress:
             self.bar = tqdm(total=total, desc=name, unit="unit", file=self.stream)
 
     def step(self, quarantined: bool) -> None:
-        """One more unit is done."""
+        """One more unit is done.
+
+        Parameters
+        ----------
+        quarantined : bool
+            Whether the unit has rows in quarantine.
+        """
         self.n_done += 1
         self.quarantined += quarantined
         if self.bar:
@@ -88,7 +105,7 @@ class Summary:
     stale: int = 0
     postponed: int = 0
 
-    def __str__(self):
+    def __str__(self) -> str:
         words = f"{self.shard}: {self.n_known} known, {self.processed} processed, {self.quarantined} quarantined"
         more = {
             "internal errors": self.internal_errors, "postponed": self.postponed,
@@ -138,7 +155,14 @@ class _Run:
     """One call of ``run_shard``."""
 
     def __init__(
-        self, path: Path, stage: Stage, configuration: Configuration, raw_root: Path, threads, strict, launched
+        self,
+        path: Path,
+        stage: Stage,
+        configuration: Configuration,
+        raw_root: Path,
+        threads: int,
+        strict: bool,
+        launched: datetime | None,
     ):
         self.path, self.name = path, f"{stage.kind} {path.stem}"
         self.stage, self.raw_root = stage, raw_root
@@ -297,6 +321,6 @@ def _name(task: Task) -> str:
     return unit_id(task.planned.unit)
 
 
-def _no_rows(*_, **__) -> dict[str, list[dict]]:
+def _no_rows(*_: Any, **__: Any) -> dict[str, list[dict]]:
     """Rows of a unit with no other files than copies: none."""
     return {}

@@ -61,23 +61,53 @@ class State:
     batches: list[str] = field(default_factory=list)
 
     def drop_batches(self, batches: Collection[str]) -> int:
-        """Remove ``batches`` and their units, which then count as new; returns the number of units."""
+        """Remove batches and their units, which then count as new.
+
+        Parameters
+        ----------
+        batches : collection of str
+            Names of the files.
+
+        Returns
+        -------
+        int
+            Number of removed units.
+        """
         before = len(self.units)
         self.units = {unit: entry for unit, entry in self.units.items() if entry.batch not in batches}
         self.batches = [b for b in self.batches if b not in batches]
         return before - len(self.units)
 
     def save(self, path: Path) -> None:
-        """Write the state in one step; from then on the results of its batches count."""
+        """Write the state in one step; from then on the results of its batches count.
+
+        Parameters
+        ----------
+        path : Path
+            The state file.
+        """
         units = {u: [k.stamp, k.key, k.algo, k.status, k.batch, k.contents] for u, k in sorted(self.units.items())}
         lines = ",\n".join(f"{json.dumps(u, ensure_ascii=False)}:{json.dumps(v)}" for u, v in units.items())
         write_text(path, f'{{"batches":{json.dumps(self.batches)},"units":{{\n{lines}{STATE_END}')
 
 
 def load_state(path: Path) -> State:
-    """State in ``path``; empty without a file, and rebuilt from the batches if the file is truncated.
+    """State of a shard; empty without a file, and rebuilt from the batches if the file is truncated.
 
-    TurnoutError if the file has other content.
+    Parameters
+    ----------
+    path : Path
+        The state file.
+
+    Returns
+    -------
+    State
+        The state.
+
+    Raises
+    ------
+    TurnoutError
+        If the file has other content.
     """
     if is_cut_state(path):
         LOG.warning("%s is cut: it is made again from its batches", path)
@@ -94,7 +124,18 @@ def load_state(path: Path) -> State:
 
 
 def is_cut_state(path: Path) -> bool:
-    """Whether a state file exists and is truncated."""
+    """Whether a state file exists and is truncated.
+
+    Parameters
+    ----------
+    path : Path
+        The state file.
+
+    Returns
+    -------
+    bool
+        False if there is no such file.
+    """
     return is_truncated(path, STATE_END)
 
 
@@ -113,7 +154,18 @@ def _from_batches(folder: Path) -> State:
 
 
 def state_lock(state: Path) -> FileLock:
-    """Lock for writing a state."""
+    """Lock for writing a state.
+
+    Parameters
+    ----------
+    state : Path
+        The state file.
+
+    Returns
+    -------
+    FileLock
+        Lock that other processes respect; it is not yet acquired.
+    """
     state.parent.mkdir(parents=True, exist_ok=True)
     return FileLock(state.parent / f".{state.stem}.lock")
 
@@ -122,37 +174,115 @@ def mark_of(state: Path) -> Path:
     """Mark file, the output that Snakemake knows: work/hammer/00of01.json -> work/hammer/00of01.done.
 
     The state itself is no output, because Snakemake deletes the output of a failed job.
+
+    Parameters
+    ----------
+    state : Path
+        The state file.
+
+    Returns
+    -------
+    Path
+        File beside the state.
     """
     return Path(state).with_suffix(".done")
 
 
 def states_below(work: Path) -> list[Path]:
-    """State files of all stages and shards, including those of earlier numbers of shards."""
+    """State files of all stages and shards, including those of earlier numbers of shards.
+
+    Parameters
+    ----------
+    work : Path
+        Folder ``work`` of the workflow.
+
+    Returns
+    -------
+    list of Path
+        Sorted paths.
+    """
     return sorted(p for p in work.glob("*/*of*.json") if p.parent.name != "plan")
 
 
-def state_of_mark(mark: os.PathLike) -> Path:
-    """State file of a mark: work/hammer/00of01.done -> work/hammer/00of01.json."""
+def state_of_mark(mark: os.PathLike | str) -> Path:
+    """State file of a mark: work/hammer/00of01.done -> work/hammer/00of01.json.
+
+    Parameters
+    ----------
+    mark : path-like
+        Mark file, as Snakemake gives it.
+
+    Returns
+    -------
+    Path
+        File beside the mark.
+    """
     return Path(mark).with_suffix(".json")
 
 
 def batch_folder(state: Path) -> Path:
-    """Folder of the batches of a state file: work/hammer/00of01.json -> work/hammer/00of01."""
+    """Folder of the batches of a state file: work/hammer/00of01.json -> work/hammer/00of01.
+
+    Parameters
+    ----------
+    state : Path
+        The state file.
+
+    Returns
+    -------
+    Path
+        Folder beside the state.
+    """
     return Path(state).with_suffix("")
 
 
 def state_of(batch: Path) -> Path:
-    """State file of the shard that a batch belongs to."""
+    """State file of the shard that a batch belongs to.
+
+    Parameters
+    ----------
+    batch : Path
+        File of a batch.
+
+    Returns
+    -------
+    Path
+        The state file; it need not exist.
+    """
     return batch.parent.with_name(f"{batch.parent.name}.json")
 
 
 def batch_paths(states: Iterable[Path]) -> list[Path]:
-    """Batch files that the ``states`` name, shard by shard in the order of writing."""
+    """Batch files that the ``states`` name, shard by shard in the order of writing.
+
+    Parameters
+    ----------
+    states : iterable of Path
+        State files.
+
+    Returns
+    -------
+    list of Path
+        Files, some of which may be damaged.
+    """
     return [batch_folder(Path(s)) / name for s in states for name in load_state(Path(s)).batches]
 
 
 def remove_orphans(state: State, folder: Path) -> int:
-    """Delete batches that ``state`` does not name, and temporary files, left by a killed job; returns their number."""
+    """Delete batches that a state does not name, and temporary files, left by a killed job.
+
+    Parameters
+    ----------
+    state : State
+        State of the shard.
+    folder : Path
+        Folder of its batches.
+
+    Returns
+    -------
+    int
+        Number of deleted files.
+    """
     named, count = set(state.batches), 0
     for path in [*folder.glob("batch-*.parquet"), *folder.glob(".*.tmp")]:
         if path.name not in named:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from turnout.config import Configuration, TurnoutConfig, with_raw
 from turnout.config.merge import digest
@@ -23,28 +24,82 @@ from turnout.workflow.state import ELSEWHERE_MARK, State
 
 
 def stamp_of(planned: PlannedUnit) -> str:
-    """Digest of configuration, notes, and name, size and time of each file; no file is opened."""
+    """Digest of configuration, notes, and name, size and time of each file; no file is opened.
+
+    Parameters
+    ----------
+    planned : PlannedUnit
+        The unit with its notes.
+
+    Returns
+    -------
+    str
+        32 hexadecimal digits.
+    """
     unit = planned.unit
     return digest([unit.config_hash, planned.note, unit.files])
 
 
 def contents_of(planned: PlannedUnit, raw_root: Path) -> list[str | None]:
-    """sha256 of each file of a unit, None for a missing one; OSError where one cannot be read."""
+    """Hashes of the files of a unit.
+
+    Parameters
+    ----------
+    planned : PlannedUnit
+        The unit with its notes.
+    raw_root : Path
+        The raw root.
+
+    Returns
+    -------
+    list of str or None
+        sha256 of each file in the order of the unit, None for a missing one.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be read.
+    """
     return [_content(os.path.join(raw_root, path)) for path, *_ in planned.unit.files]
 
 
 def key_of(planned: PlannedUnit, contents: Sequence[str | None]) -> str:
-    """Digest of configuration, notes, and name and content of each file."""
+    """Digest of configuration, notes, and name and content of each file.
+
+    Parameters
+    ----------
+    planned : PlannedUnit
+        The unit with its notes.
+    contents : sequence of str or None
+        sha256 of each file, None for a missing one.
+
+    Returns
+    -------
+    str
+        32 hexadecimal digits.
+    """
     unit = planned.unit
     files = [[path, content] for (path, *_), content in zip(unit.files, contents, strict=True)]
     return digest([unit.config_hash, planned.note, files])
 
 
 def short_contents(contents: Sequence[str | None], elsewhere: Container[int] = ()) -> str:
-    """Text of the contents for a state: the first 16 digits of each hash; "" if a file was missing.
+    """Text of the contents for a state: the first 16 digits of each hash.
 
-    ``elsewhere`` are the indices of files that count in other units.
+    Parameters
+    ----------
+    contents : sequence of str or None
+        sha256 of each file, None for a missing one.
+    elsewhere : container of int
+        Indices of files that count in other units.
 
+    Returns
+    -------
+    str
+        The text; "" if a file is missing.
+
+    Examples
+    --------
     >>> short_contents(["e3b0c44298fc1c149afbf4c8996fb924", "0123456789abcdef0123456789abcdef"], {1})
     'e3b0c44298fc1c14 -0123456789abcdef'
     """
@@ -76,12 +131,28 @@ class Stage:
     kind: str
     compute: Callable | str
     algo: str
-    context: Callable[[str, Mapping], tuple[Token, object]] | str | None = None
+    context: Callable[[str, Mapping], tuple[Token, Any]] | str | None = None
     gather: Callable[[Path, Configuration], Iterable[PlannedUnit]] | str | None = None
 
 
 def load_function(function: Callable | str) -> Callable:
-    """Function from its name "package.module:name"; a user's own module must be in the folder of the run."""
+    """Function from its name; a user's own module must be in the folder of the run.
+
+    Parameters
+    ----------
+    function : callable or str
+        "package.module:name", or the function itself.
+
+    Returns
+    -------
+    callable
+        The function.
+
+    Raises
+    ------
+    ImportError
+        If there is no such module.
+    """
     if callable(function):
         return function
     module, _, name = function.partition(":")
@@ -91,7 +162,20 @@ def load_function(function: Callable | str) -> Callable:
 
 
 def with_token(planned: PlannedUnit, token: Token) -> PlannedUnit:
-    """The planned unit, with the token of the stage's context appended to its note."""
+    """The planned unit, with the token of the stage's context appended to its note.
+
+    Parameters
+    ----------
+    planned : PlannedUnit
+        The unit with its notes.
+    token : Token
+        Text, or function of the unit that returns text.
+
+    Returns
+    -------
+    PlannedUnit
+        A copy with the longer note.
+    """
     return replace(planned, note=planned.note + (token if isinstance(token, str) else token(planned.unit)))
 
 
@@ -102,20 +186,45 @@ class Task:
     planned: PlannedUnit
     turnout: TurnoutConfig
     stamp: str
-    context: object = None
+    context: Any = None  # what the function ``context`` of its stage returns for the turnout
     copied: Mapping[str, Original] = field(default_factory=dict)
 
 
 class Tasks:
-    """Compares a plan with the state of its shard; the configuration of each turnout is read once, when needed."""
+    """Compares a plan with the state of its shard; the configuration of each turnout is read once, when needed.
+
+    Parameters
+    ----------
+    state : State
+        State of the shard; stamps of unchanged units are brought up to date in it.
+    stage : Stage
+        The computation.
+    configuration : Configuration
+        Configuration of the fleet.
+    raw_root : Path
+        The raw root.
+    """
 
     def __init__(self, state: State, stage: Stage, configuration: Configuration, raw_root: Path):
         self.state, self.stage, self.configuration, self.raw_root = state, stage, configuration, raw_root
-        self._contexts: dict[str, tuple[Token, object]] = {}
+        self._contexts: dict[str, tuple[Token, Any]] = {}
         self._turnouts: dict[str, TurnoutConfig | None] = {}
 
     def due(self, wanted: Mapping[str, PlannedUnit], only: Sequence[str] | None) -> tuple[list[Task], int]:
-        """Tasks of all units to compute, sorted, and the number of units that wait for a new plan."""
+        """Find all units to compute.
+
+        Parameters
+        ----------
+        wanted : mapping of str to PlannedUnit
+            Unit -> planned unit.
+        only : sequence of str or None
+            Only units of these turnouts; None: all.
+
+        Returns
+        -------
+        tuple of (list of Task, int)
+            Tasks sorted by unit, and the number of units that wait for a new plan.
+        """
         due, stale = [], 0
         for name in sorted(wanted):
             if only is not None and wanted[name].unit.turnout not in only:
@@ -130,7 +239,18 @@ class Tasks:
         return due, stale
 
     def task(self, planned: PlannedUnit) -> Task | None:
-        """The task of one unit; None if the configuration has changed since the plan."""
+        """The task of one unit.
+
+        Parameters
+        ----------
+        planned : PlannedUnit
+            The unit with its notes.
+
+        Returns
+        -------
+        Task or None
+            The task; None if the configuration has changed since the plan.
+        """
         unit = planned.unit
         turnout = self._turnout(unit.turnout)
         if turnout is None or turnout.hashes[unit.kind] != unit.config_hash:
@@ -140,7 +260,20 @@ class Tasks:
         return Task(planned, turnout, stamp_of(planned), value)
 
     def is_known(self, name: str, wanted: Mapping[str, PlannedUnit]) -> bool:
-        """Whether the state has the result of the unit as it is planned now."""
+        """Whether the state has the result of the unit as it is planned now.
+
+        Parameters
+        ----------
+        name : str
+            The unit.
+        wanted : mapping of str to PlannedUnit
+            Unit -> planned unit.
+
+        Returns
+        -------
+        bool
+            False if its stamp or the version of the code differs.
+        """
         entry = self.state.units.get(name)
         return entry is not None and (entry.stamp, entry.algo) == (self._stamp(wanted[name]), self.stage.algo)
 
@@ -151,12 +284,12 @@ class Tasks:
         """True for a unit without copies, and for one whose originals have not changed."""
         return all(o in wanted and self.is_known(o, wanted) for o in originals_of(self.state.units[name]))
 
-    def _context(self, turnout: str) -> tuple[Token, object]:
+    def _context(self, turnout: str) -> tuple[Token, Any]:
         if turnout not in self._contexts:
             self._contexts[turnout] = self._compute_context(turnout)
         return self._contexts[turnout]
 
-    def _compute_context(self, turnout: str) -> tuple[Token, object]:
+    def _compute_context(self, turnout: str) -> tuple[Token, Any]:
         if not self.stage.context:
             return "", None
         try:

@@ -80,8 +80,21 @@ class MismatchSettings:
         0.333, "-", "own numerical error over mismatch above which no cause is named", 0.01, 1.0
     )
 
-    def certainty(self, answer, disturbed=False):
-        """Share of answers like this one that were right in opened cases."""
+    def certainty(self, answer: str, disturbed: bool = False) -> float:
+        """Share of answers like this one that were right in opened cases.
+
+        Parameters
+        ----------
+        answer : str
+            Answer of a diagnosis: "none", "unknown", or any other for a named effect.
+        disturbed : bool
+            Whether sensors shook while no wheel was near.
+
+        Returns
+        -------
+        float
+            Probability that the answer is right.
+        """
         if answer == "unknown" and disturbed:
             return self.certainty_clock
         return {"none": self.certainty_none, "unknown": self.certainty_unknown}.get(answer, self.certainty_named)

@@ -1,13 +1,48 @@
 """Field of a settings dataclass with unit, limits and the reason of its default."""
 
 from dataclasses import field
+from typing import Any
 
 
-def setting(default, unit="", why="", minimum=None, maximum=None, choices=None):
-    """Dataclass field with metadata ``unit``, ``why``, ``minimum``, ``maximum``, ``choices``.
+def setting(
+    default: Any,
+    unit: str = "",
+    why: str = "",
+    minimum: float | None = None,
+    maximum: float | None = None,
+    choices: tuple | None = None,
+) -> Any:
+    """Dataclass field with metadata.
 
     The JSON schema, the default configuration file and the table in the documentation are generated from it.
 
+    Parameters
+    ----------
+    default : any
+        Value of the setting; a list as a tuple, because settings are immutable.
+    unit : str
+        Unit of the value, "" without one.
+    why : str
+        Meaning, and reason of the default.
+    minimum : float or None
+        Smallest value that is allowed; None: no limit.
+    maximum : float or None
+        Largest value that is allowed; None: no limit.
+    choices : tuple or None
+        The only values that are allowed; None: any.
+
+    Returns
+    -------
+    Field
+        The field; typed as any, so that it fits the annotation of the setting.
+
+    Raises
+    ------
+    TypeError
+        If the default is mutable.
+
+    Examples
+    --------
     >>> from dataclasses import dataclass, fields
     >>> @dataclass(frozen=True)
     ... class Gate:

@@ -6,7 +6,9 @@ that ``read(write(x)) == x``.
 
 from collections.abc import Sequence
 from importlib import import_module
+from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from turnout.readers.writing.encode import raw_records
 from turnout.records import RawDescription, Recording
@@ -29,12 +31,12 @@ WRITERS = {
 
 def write(
     recordings: Sequence[Recording],
-    path,
+    path: PathLike | str,
     format: str,
     description: RawDescription | None = None,
     *,
     single: bool = False,
-    **options,
+    **options: Any,
 ) -> Path:
     """Write recordings (one per record, with the same channels) to ``path`` and return it.
 

@@ -1,12 +1,25 @@
 """Writer of text: ``# name: value`` lines, names with units in brackets, numbers with 17 digits."""
 
+from collections.abc import Sequence
+from pathlib import Path
+
 import numpy as np
 
-from turnout.readers.writing.encode import iso_text, plain_conditions
+from turnout.readers.writing.encode import RecordToWrite, iso_text, plain_conditions
 
 
-def write_raw(records, path, decimal_comma=False):
-    """Write a column ``record`` and one per channel; with ``decimal_comma`` the separator is a semicolon."""
+def write_raw(records: Sequence[RecordToWrite], path: Path, decimal_comma: bool = False) -> None:
+    """Write a column ``record`` and a column per channel.
+
+    Parameters
+    ----------
+    records : sequence of RecordToWrite
+        Records of one file.
+    path : Path
+        File to write.
+    decimal_comma : bool
+        Write decimal commas, with semicolons between the columns.
+    """
     first = records[0]
     separator = ";" if decimal_comma else ","
     lengths = {len(record.samples[0]) for record in records}

@@ -1,17 +1,49 @@
 """Conversion of SI samples to the numbers of a raw file: the inverse of ``turnout.readers.interpret``."""
 
-from datetime import UTC
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
 from zoneinfo import ZoneInfo
 
 import h5py
 import numpy as np
 
 from turnout.readers.source import RawRecord
+from turnout.records import RawChannel, RawDescription, Recording
 from turnout.units import IGNORED, SI, to_si
 
 
-def raw_records(recordings, description, dtype):
-    """One RawRecord per recording, in the units, names, signs and order of ``description`` (None: SI)."""
+@dataclass(frozen=True)
+class RecordToWrite(RawRecord):
+    """A record whose samples are arrays in memory and whose rate [Hz] is known."""
+
+    samples: Sequence[np.ndarray]
+    rate: float
+
+
+def raw_records(recordings: Sequence[Recording], description: RawDescription | None, dtype: str) -> list[RecordToWrite]:
+    """Convert recordings to the records of a raw file.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        Recordings with the same channels and rate.
+    description : RawDescription or None
+        Units, names, signs and order of the channels in the file; None: SI.
+    dtype : str
+        Type of the numbers in the file, "float32" or "float64".
+
+    Returns
+    -------
+    list of RecordToWrite
+        One record per recording.
+
+    Raises
+    ------
+    ValueError
+        If there is no recording, or their channels or rates differ.
+    """
     if not recordings:
         raise ValueError("there is no recording to write")
     first = recordings[0]
@@ -20,7 +52,7 @@ def raw_records(recordings, description, dtype):
     return [_raw_record(recording, description, dtype) for recording in recordings]
 
 
-def _raw_record(recording, description, dtype):
+def _raw_record(recording: Recording, description: RawDescription | None, dtype: str) -> RecordToWrite:
     if description is None:
         columns = [(c.name, SI[c.quantity], x) for c, x in zip(recording.channels, recording.samples)]
         zone = "UTC"
@@ -30,7 +62,7 @@ def _raw_record(recording, description, dtype):
         columns = [_column(recording, channel) for channel in wanted]
         zone = description.time_zone
     start = recording.started_at
-    return RawRecord(
+    return RecordToWrite(
         names=tuple(name for name, _, _ in columns),
         samples=[np.asarray(x, dtype=dtype) for _, _, x in columns],
         rate=recording.rate,
@@ -40,7 +72,7 @@ def _raw_record(recording, description, dtype):
     )
 
 
-def _column(recording, channel):
+def _column(recording: Recording, channel: RawChannel) -> tuple[str, str, np.ndarray]:
     """(name, unit, raw numbers) of one channel of the description."""
     unit = (channel.unit or SI[channel.quantity]).removesuffix("!")
     conversion_to_si = to_si(channel.quantity, unit, channel.sensitivity, channel.sensitivity_unit)
@@ -51,25 +83,68 @@ def _column(recording, channel):
     return (channel.source if isinstance(channel.source, str) else channel.name), label, samples
 
 
-def iso_text(moment):
-    """ISO 8601 text with the offset of the time zone, "" for None."""
+def iso_text(moment: datetime | None) -> str:
+    """ISO 8601 text of a time.
+
+    Parameters
+    ----------
+    moment : datetime or None
+        The time, or None.
+
+    Returns
+    -------
+    str
+        Text with the offset of the time zone; "" for None.
+    """
     return "" if moment is None else moment.isoformat()
 
 
-def plain_conditions(conditions):
-    """Conditions as plain numbers and text."""
+def plain_conditions(conditions: Mapping[str, Any]) -> dict[str, float | str]:
+    """Conditions as plain numbers and text.
+
+    Parameters
+    ----------
+    conditions : mapping of str to any
+        Name -> number or any other value.
+
+    Returns
+    -------
+    dict of str to float or str
+        Name -> float or text.
+    """
     return {k: float(v) if isinstance(v, (int, float, np.number)) else str(v) for k, v in conditions.items()}
 
 
-def fixed_text(text):
+def fixed_text(text: str) -> np.ndarray:
     """Text for an HDF5 attribute, of fixed length.
 
     Text of variable length is stored in the global heap, and the HDF5 library can loop forever over a damaged heap.
+
+    Parameters
+    ----------
+    text : str
+        The text; an empty one is stored as a blank.
+
+    Returns
+    -------
+    array
+        One text of fixed length in UTF-8.
     """
     data = text.encode("utf-8") or b" "
     return np.array(data, dtype=h5py.string_dtype("utf-8", len(data)))
 
 
-def attributes(values):
-    """A dictionary of numbers and text as HDF5 attributes."""
+def attributes(values: Mapping[str, Any]) -> dict[str, Any]:
+    """A dictionary of numbers and text as HDF5 attributes.
+
+    Parameters
+    ----------
+    values : mapping of str to any
+        Name -> number or text.
+
+    Returns
+    -------
+    dict of str to any
+        The same, with texts of fixed length.
+    """
     return {key: fixed_text(value) if isinstance(value, str) else value for key, value in values.items()}

@@ -1,12 +1,23 @@
 """Writer of HDF5 in the layout of ``turnout.readers.hdf5``: a group per record, a dataset per channel, checksums."""
 
+from collections.abc import Sequence
+from pathlib import Path
+
 import h5py
 
-from turnout.readers.writing.encode import attributes, fixed_text, iso_text, plain_conditions
+from turnout.readers.writing.encode import RecordToWrite, attributes, fixed_text, iso_text, plain_conditions
 
 
-def write_raw(records, path):
-    """Write attributes ``rate`` and ``n_records`` at the root, ``started_at`` and conditions at each record."""
+def write_raw(records: Sequence[RecordToWrite], path: Path) -> None:
+    """Write attributes ``rate`` and ``n_records`` at the root, ``started_at`` and conditions at each record.
+
+    Parameters
+    ----------
+    records : sequence of RecordToWrite
+        Records of one file.
+    path : Path
+        File to write.
+    """
     with h5py.File(path, "w", libver=("v110", "latest")) as file:
         file.attrs["rate"] = records[0].rate
         file.attrs["n_records"] = len(records)

@@ -1,14 +1,27 @@
 """Writer of LabVIEW measurement files: a segment per record, separated by tabs, no X column."""
 
+from collections.abc import Sequence
+from pathlib import Path
+
 import numpy as np
 
-from turnout.readers.writing.encode import plain_conditions
+from turnout.readers.writing.encode import RecordToWrite, plain_conditions
 
 END = "***End_of_Header***"
 
 
-def write_raw(records, path, decimal_comma=False):
-    """Write rows of numbers with 17 digits (9 in single precision)."""
+def write_raw(records: Sequence[RecordToWrite], path: Path, decimal_comma: bool = False) -> None:
+    """Write rows of numbers with 17 digits (9 in single precision).
+
+    Parameters
+    ----------
+    records : sequence of RecordToWrite
+        Records of one file.
+    path : Path
+        File to write.
+    decimal_comma : bool
+        Write decimal commas.
+    """
     first = records[0]
     head = ["LabVIEW Measurement", "Writer_Version\t2", "Reader_Version\t2", "Separator\tTab"]
     head += [f"Decimal_Separator\t{',' if decimal_comma else '.'}", "Multi_Headings\tYes", "X_Columns\tNo"]
@@ -22,10 +35,10 @@ def write_raw(records, path, decimal_comma=False):
             file.write(text.replace(".", ",") if decimal_comma else text)
 
 
-def _segment(record, digits):
+def _segment(record: RecordToWrite, digits: str) -> str:
     n = len(record.names)
 
-    def row(name, values):
+    def row(name: str, values: Sequence[str]) -> str:
         return "\t".join([name, *values, ""])
 
     lines = [row("Channels", [str(n)]), row("Samples", [str(len(record.samples[0]))] * n)]

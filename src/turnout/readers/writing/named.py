@@ -1,12 +1,26 @@
 """Named variables of npz and MATLAB files, in the layout of ``turnout.readers.named_arrays``."""
 
-from turnout.readers.writing.encode import iso_text, plain_conditions
+from collections.abc import Sequence
+from typing import Any
+
+from turnout.readers.writing.encode import RecordToWrite, iso_text, plain_conditions
 
 
-def variables(records):
-    """All variables but the samples: ``rate``, ``channels``, ``units``, ``n_records``, ``started_at``, conditions."""
+def variables(records: Sequence[RecordToWrite]) -> dict[str, Any]:
+    """All variables except the samples.
+
+    Parameters
+    ----------
+    records : sequence of RecordToWrite
+        Records with the same channels and rate.
+
+    Returns
+    -------
+    dict of str to any
+        ``rate``, ``channels``, ``units``, ``n_records``, conditions; ``started_at`` if all records have a start.
+    """
     first = records[0]
-    values = {
+    values: dict[str, Any] = {
         "rate": first.rate,
         "n_records": float(len(records)),
         "channels": list(first.names),

@@ -1,16 +1,27 @@
 """Writer of Parquet in the layout of ``turnout.readers.parquet``, with a checksum on every page."""
 
 import json
+from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from turnout.readers.writing.encode import RecordToWrite
 from turnout.readers.writing.named import variables
 
 
-def write_raw(records, path):
-    """Write a column ``record``, a column per channel, and the metadata as JSON in the schema."""
+def write_raw(records: Sequence[RecordToWrite], path: Path) -> None:
+    """Write a column ``record``, a column per channel, and the metadata as JSON in the schema.
+
+    Parameters
+    ----------
+    records : sequence of RecordToWrite
+        Records of one file.
+    path : Path
+        File to write.
+    """
     first = records[0]
     lengths = [len(record.samples[0]) for record in records]
     notes = {**variables(records), "n_samples": lengths}

@@ -3,13 +3,15 @@
 SECTION, POSITION and TOPOLOGY are left out because they describe a moving vehicle; so is the index ``timeindex``.
 """
 
-from datetime import UTC, timedelta
+from collections.abc import Sequence
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
 
 import h5py
 import numpy as np
 
 from turnout.readers.rcmdx import EPOCH
-from turnout.readers.writing.encode import attributes, plain_conditions
+from turnout.readers.writing.encode import RecordToWrite, attributes, plain_conditions
 
 CHANNEL = {
     "Element": "CHANNEL",
@@ -22,8 +24,18 @@ CHANNEL = {
 }
 
 
-def write_raw(records, path, station="TURNOUT"):
-    """Write sessions, named by their first time stamp; records without a start time are put 1 min apart."""
+def write_raw(records: Sequence[RecordToWrite], path: Path, station: str = "TURNOUT") -> None:
+    """Write sessions, named by their first time stamp; records without a start time are put 1 min apart.
+
+    Parameters
+    ----------
+    records : sequence of RecordToWrite
+        Records of one file.
+    path : Path
+        File to write.
+    station : str
+        Name of the measuring station; it is a part of the names of all groups.
+    """
     with h5py.File(path, "w") as file:
         root = file.create_group("RCMDX")
         root.attrs.update({"Major": np.int16(2), "Minor": np.int16(0), "RecordCount": np.int32(len(records))})
@@ -34,7 +46,7 @@ def write_raw(records, path, station="TURNOUT"):
             _session(platform, record, start.astimezone(UTC), station)
 
 
-def _session(platform, record, start, station):
+def _session(platform: h5py.Group, record: RecordToWrite, start: datetime, station: str) -> None:
     first = int((start - EPOCH) / timedelta(microseconds=1)) * 1000
     n = len(record.samples[0])
     stamps = first + np.round(np.arange(n) * (1e9 / record.rate)).astype("int64")

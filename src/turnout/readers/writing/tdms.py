@@ -1,13 +1,25 @@
 """Writer of TDMS: a group and a segment per record, waveform properties on every channel."""
 
+from collections.abc import Sequence
+from datetime import datetime
+from pathlib import Path
+
 import numpy as np
 from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
 
-from turnout.readers.writing.encode import plain_conditions
+from turnout.readers.writing.encode import RecordToWrite, plain_conditions
 
 
-def write_raw(records, path):
-    """Write one segment per record, so that a truncated file loses its last records only."""
+def write_raw(records: Sequence[RecordToWrite], path: Path) -> None:
+    """Write one segment per record, so that a truncated file loses its last records only.
+
+    Parameters
+    ----------
+    records : sequence of RecordToWrite
+        Records of one file.
+    path : Path
+        File to write.
+    """
     with TdmsWriter(str(path)) as writer:
         for k, record in enumerate(records):
             root = RootObject(properties={"n_records": len(records)})
@@ -31,6 +43,6 @@ def write_raw(records, path):
             writer.write_segment([root, group, *channels])
 
 
-def _utc(moment):
+def _utc(moment: datetime) -> np.datetime64:
     """A time stamp in UTC, as TDMS stores it."""
     return np.datetime64(int(moment.timestamp() * 1_000_000), "us")

@@ -1,15 +1,37 @@
 """Writer of WAV: one continuous record; names, units and start time are JSON in the comment."""
 
 import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import soundfile
 
-from turnout.readers.writing.encode import iso_text, plain_conditions
+from turnout.readers.writing.encode import RecordToWrite, iso_text, plain_conditions
 
 
-def write_raw(records, path, subtype=None, full_scale=1.0):
-    """Write one record; ``subtype`` PCM_16 or PCM_24 stores fractions of ``full_scale`` (in the channels' unit)."""
+def write_raw(
+    records: Sequence[RecordToWrite], path: Path, subtype: str | None = None, full_scale: float = 1.0
+) -> None:
+    """Write one record.
+
+    Parameters
+    ----------
+    records : sequence of RecordToWrite
+        Records of one file.
+    path : Path
+        File to write.
+    subtype : str or None
+        PCM_16 or PCM_24 stores fractions of ``full_scale``; None stores the numbers as floats.
+    full_scale : float
+        Largest number that PCM can store, in the unit of the channels.
+
+    Raises
+    ------
+    ValueError
+        If there is more than one record, or a sample exceeds ``full_scale``.
+    """
     if len(records) != 1:
         raise ValueError(f"a WAV file holds one record, not {len(records)}: write one file per record")
     (record,) = records
@@ -23,7 +45,11 @@ def write_raw(records, path, subtype=None, full_scale=1.0):
         steps = np.clip(np.rint(samples * 2.0 ** (bits - 1)), -(2.0 ** (bits - 1)), 2.0 ** (bits - 1) - 1)
         samples = steps.astype("int32") << (32 - bits)
     rate = round(record.rate)
-    notes = {"channels": record.names, "started_at": iso_text(record.started_at), **plain_conditions(record.conditions)}
+    notes: dict[str, Any] = {
+        "channels": record.names,
+        "started_at": iso_text(record.started_at),
+        **plain_conditions(record.conditions),
+    }
     notes["units"] = record.units if full_scale == 1.0 else ["count"] * len(record.names)
     if rate != record.rate:
         notes["rate"] = record.rate
