@@ -6,7 +6,7 @@ import numpy as np
 
 from turnout import physics
 from turnout.constants import Z95_EXACT
-from turnout.mismatch.engine.score import MAX_BOUNDED_ERROR
+from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 MIN_SURFACE_DEVIATION = 2.0  # prior standard deviations from the track file's value that are worth a sentence
 MILLI_UNITS = {"m": "mm", "s": "ms"}
@@ -161,5 +161,5 @@ def _sentence_template(term) -> str:
     size = term["parameters"].get(effect.parameters[0].name)
     if effect.message_negative and size and size["value"] < 0.0:
         return effect.message_negative
-    is_unbounded = size and size["se"] > MAX_BOUNDED_ERROR * abs(size["value"])
+    is_unbounded = size and size["se"] > THRESHOLDS.max_bounded_error * abs(size["value"])
     return effect.message_unbounded if effect.message_unbounded and is_unbounded else effect.message

@@ -1,5 +1,6 @@
 """The decision as tables: every rule has a reason on a page, can apply, and stands in the trail of its verdict."""
 
+import ast
 import re
 from types import SimpleNamespace
 
@@ -11,6 +12,7 @@ from turnout.mismatch.engine import decision
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.decision import EFFECT_RULES, NAME_RULES, RULES, grade_name, judge
 from turnout.mismatch.engine.score import Score
+from turnout.mismatch.engine.thresholds import THRESHOLDS, threshold_rows
 from turnout.mismatch.engine.verdict import ANSWERS
 from turnout.physics import Parameter
 
@@ -96,3 +98,26 @@ def test_each_rule_on_a_name_applies_to_a_case_of_its_own(name, excess, more):
     assert verdict.answer == ("a_or_b" if name == "size_known_from_below" else "named")
     assert verdict.grade == {"size_known_from_below": "", "reaches_control_level": "A"}.get(name, "B")
     assert ("gap" in verdict.names) is (name == "size_known_from_below") and "{" not in reason
+
+
+def test_every_threshold_has_a_reason_and_a_source(repository):
+    rows = threshold_rows()
+    assert len(rows) == len({name for name, *_ in rows}) > 70
+    for name, value, unit, reason, source in rows:
+        assert getattr(THRESHOLDS, name) == value and unit and len(reason.split()) >= 3, name
+        is_page = source.endswith(".md")
+        assert not is_page or (repository / "docs" / source).is_file(), source
+        assert is_page or source in ("convention", "numerical") or re.search(r"(19|20)\d\d$", source), source
+
+
+def test_no_module_of_the_engine_has_thresholds_of_its_own(repository):
+    """Only whole numbers up to 4, halves and guards against a division by zero or an underflow stand in the code."""
+    plain = {0, 1, 2, 3, 4, 0.5, 9, 10, 12, 100, 1e7}  # 9, 12: digits; 10, 100: decibels and percent; 1e7: a width
+    folder = repository / "src" / "turnout" / "mismatch" / "engine"
+    for path in sorted(folder.glob("*.py")):
+        if path.name == "thresholds.py":
+            continue
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Constant) and isinstance(node.value, (int, float)):
+                guard = 0.0 < abs(node.value) <= 1e-6
+                assert guard or abs(node.value) in plain, f"{path.name}:{node.lineno}: {node.value}"

@@ -8,7 +8,8 @@ import pytest
 from turnout import physics
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
 from turnout.mismatch.engine.levenberg_marquardt import DampedSteps
-from turnout.mismatch.engine.map_fit import MAX_CHEAP_STEPS, JointProblem, fit_jointly
+from turnout.mismatch.engine.map_fit import JointProblem, fit_jointly
+from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.hammer_case import HammerCase
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
@@ -32,7 +33,7 @@ def test_whatever_the_start_the_end_is_the_same(seed):
     for k in range(4):
         far = 0.7 * np.random.default_rng(k).normal(size=len(case.nuisances)) if k else np.zeros(len(case.nuisances))
         start = {n.name: n.mean + f * n.sd for n, f in zip(case.nuisances, far)}
-        ends.append(float(fit_jointly(case, values=start, iterations=MAX_CHEAP_STEPS).cost))
+        ends.append(float(fit_jointly(case, values=start, iterations=THRESHOLDS.max_cheap_steps).cost))
     assert np.ptp(ends) < 1.0  # half a nat; a fit ends where ten steps in a row would gain no more
 
 

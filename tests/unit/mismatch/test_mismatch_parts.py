@@ -10,8 +10,9 @@ from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.candidate_search import component_rivals, with_fitted_start
 from turnout.mismatch.engine.case import Nuisance
 from turnout.mismatch.engine.decision import judge
-from turnout.mismatch.engine.evidence import MAX_ORDINARY_SPREADS, is_within_spread
+from turnout.mismatch.engine.evidence import is_within_spread
 from turnout.mismatch.engine.score import Score
+from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.physics import Parameter
 
 FACTOR = (Parameter("factor", "-", 1.0, (0.05, 20.0), "share of stiffness", "made up 2026"),)
@@ -54,7 +55,7 @@ def test_a_gap_elsewhere_or_one_that_explains_nothing_is_no_limit():
 
 @pytest.mark.parametrize(
     "times, usual",
-    [(0.9 * MAX_ORDINARY_SPREADS, True), (1.1 * MAX_ORDINARY_SPREADS, False), (-1.1 * MAX_ORDINARY_SPREADS, False)],
+    [(share * THRESHOLDS.max_ordinary_spreads, abs(share) < 1.0) for share in (0.9, 1.1, -1.1)],
 )
 def test_a_support_is_odd_against_the_spread_of_its_like(times, usual):
     """Seven other pads have logarithms of mean 0.3 and variance 4e-2, each known to a variance of 9e-2; pad 0 is its

@@ -8,9 +8,10 @@ import pytest
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine import refit
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
-from turnout.mismatch.engine.map_fit import FINE_STALL, STALL, fit_jointly
+from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.search import Search
+from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.mismatch.turnout.passage_observation import CLIPPING_BLUR, AlignedPassage, _clipped_samples, observation_of
 from turnout.records import Channel, Recording
 
@@ -45,15 +46,15 @@ def test_a_dear_jacobian_is_made_anew_on_a_long_way():
 
 def test_a_dear_fit_on_which_the_verdict_rests_goes_on_for_less(monkeypatch):
     """Twenty of the cost per sample are 1,200 in all, which ends it early; leaders go on for a fifth of others'."""
-    early, late = (fit_jointly(Bent(True), iterations=25, stall=s) for s in (20.0, FINE_STALL))
+    early, late = (fit_jointly(Bent(True), iterations=25, stall=s) for s in (20.0, THRESHOLDS.fine_stall))
     assert early.cost > late.cost + 1.0
     assert fit_jointly(Bent(False), iterations=25, stall=20.0).cost == pytest.approx(late.cost, abs=0.2)  # cheap: none
     asked = []
     search = Search(Bent(True))
-    monkeypatch.setattr(Search, "fit", lambda *a, stall=STALL: asked.append(stall) or late)
+    monkeypatch.setattr(Search, "fit", lambda *a, stall=THRESHOLDS.stall: asked.append(stall) or late)
     search.converge(early)
     search.continue_fit(early)
-    assert set(asked[:-1]) == {FINE_STALL} and asked[-1] == STALL > FINE_STALL
+    assert set(asked[:-1]) == {THRESHOLDS.fine_stall} and asked[-1] == THRESHOLDS.stall > THRESHOLDS.fine_stall
 
 
 @pytest.mark.parametrize(("gain", "ended"), [(5.0, 0), (8.0, 1), (20.0, 1)])
@@ -97,7 +98,7 @@ def test_what_the_fit_without_an_effect_had_not_come_to_is_no_evidence_for_the_e
     """A leader with 20 nats of its own, fitted to its end, on top of a fit that had stopped before: from the leader's
     nuisances that one comes to its end as well. What it owed goes off, and where that is more than a name needs, all
     are asked again on top of the better fit."""
-    early, late = (fit_jointly(Bent(True), iterations=25, stall=s) for s in (stall, FINE_STALL))
+    early, late = (fit_jointly(Bent(True), iterations=25, stall=s) for s in (stall, THRESHOLDS.fine_stall))
     owed = late.evidence - early.evidence
     assert (owed > MismatchSettings().threshold) == again
     asked = []
@@ -154,7 +155,7 @@ def test_a_law_of_the_whole_track_that_gains_too_little_is_begun_again_farther_o
 
 
 def test_a_fit_is_not_made_again_where_nobody_would_be_named():
-    late = fit_jointly(Bent(True), iterations=25, stall=FINE_STALL)
+    late = fit_jointly(Bent(True), iterations=25, stall=THRESHOLDS.fine_stall)
     silent = [Score(SimpleNamespace(key="a"), 11.0, 0.0, 1.0, late)]
     assert refit._base_from_leader(Search(Bent(True)), late, silent) is None
 

@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from turnout.mismatch.engine.thresholds import THRESHOLDS
+
 
 @dataclass(frozen=True)
 class Candidate:
@@ -84,7 +86,7 @@ class Candidate:
     smallest_reportable: float = 0.0
     sign_ambiguous: bool = False
     masking_parameter: str = ""
-    masking_sd: float = 0.7
+    masking_sd: float = THRESHOLDS.masking_sd
     from_masking: Callable[[float], float] | None = None
     promise: float | None = None
     start_nuisances: Mapping[str, float] = field(default_factory=dict)

@@ -11,6 +11,7 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.map_fit import JointProblem
+from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 
 def masked_candidates(case, fit):
@@ -52,7 +53,7 @@ def gain_with_wide_prior(m, s, tau, wide_sd):
     >>> gain_with_wide_prior(0.0, 0.1, 0.1, 0.7) is None
     True
     """
-    if s >= 0.999 * tau:
+    if s >= THRESHOLDS.uninformed_sd_share * tau:
         return None
     data_variance = 1.0 / (1.0 / s**2 - 1.0 / tau**2)
     data_mean = m * data_variance / s**2
@@ -61,15 +62,6 @@ def gain_with_wide_prior(m, s, tau, wide_sd):
         1.0 / narrow_variance - 1.0 / wide_variance
     )
     return float(gain), float(data_mean * wide_sd**2 / wide_variance)
-
-
-SAME_SITE_DISTANCE = 0.95  # m, one and a half sleeper bays: effects of two families that are closer count as one
-# m, two sleeper bays. A second effect of the same family that is closer is an error in the shape of the first.
-SAME_EFFECT_DISTANCE = 1.5
-# Share of the required promise of a second effect, if only the cheap observations promise it: others will add to it.
-CHEAP_PROMISE_SHARE = 0.5
-# Share of the leader's estimated gain. From the third candidate on, those that promise less are not refitted.
-MIN_PROMISE_SHARE = 0.1
 
 
 @dataclass(frozen=True)
@@ -141,8 +133,10 @@ def shortlist(search, fit, promising=()):
         for entry in _most_promising(by_family, settings)
         if entry[0] > required_promise(entry, fit, prescreen_gains, settings)
     ]
-    min_gain = MIN_PROMISE_SHARE * max((entry[0] for entry in selected), default=0.0)
-    chosen = [entry for rank, entry in enumerate(selected) if rank < 2 or entry[0] > min_gain]
+    min_gain = THRESHOLDS.min_promise_share * max((entry[0] for entry in selected), default=0.0)
+    chosen = [
+        entry for rank, entry in enumerate(selected) if rank < THRESHOLDS.n_always_refitted or entry[0] > min_gain
+    ]
     selected = [(e, False) for e in chosen] + [(e, True) for e in component_rivals(chosen, by_family)]
     selected = [(with_fitted_start(e, by_family), rival) for e, rival in selected]
     return [RefitTask(*e[1:], prescreen_gains.get(e[1].key, 0.0), rival) for e, rival in selected]
@@ -161,7 +155,7 @@ def required_promise(entry, fit, prescreen_gains, settings):
     if not fit.candidates:
         return settings.promise
     is_cheap_gain = entry[0] == prescreen_gains.get(entry[1].key)
-    return settings.threshold * (CHEAP_PROMISE_SHARE if is_cheap_gain else 1.0)
+    return settings.threshold * (THRESHOLDS.cheap_promise_share if is_cheap_gain else 1.0)
 
 
 def with_fitted_start(entry, by_family):
@@ -196,7 +190,8 @@ def is_same_site(candidate, accepted):
     of_one_wheel = {(c.evidence_suffices, "axle" in c.where) for c in (candidate, accepted)}
     if (candidate.exact and accepted.exact) or of_one_wheel == {(True, True), (False, False)}:
         return False
-    max_distance = SAME_EFFECT_DISTANCE if candidate.family == accepted.family else SAME_SITE_DISTANCE
+    is_same_effect = candidate.family == accepted.family
+    max_distance = THRESHOLDS.same_effect_distance if is_same_effect else THRESHOLDS.same_site_distance
     is_near = "place" in a and "place" in b and abs(a["place"] - b["place"]) < max_distance
     return is_near or any(k in a and a[k] == b.get(k) for k in ("sensor", "train"))
 
@@ -218,13 +213,13 @@ def _predicted_change(case, fit, candidate, k):
 
 
 def _most_promising(by_family, settings):
-    """The best start of each of the first ``refits`` families. Of the first three also their second best site."""
+    """The best start of each of the first ``refits`` families. Of the first few also their second best site."""
     ranked = [sorted(entries, key=lambda e: -e[0]) for entries in by_family.values()]
     ranked.sort(key=lambda entries: -entries[0][0])
     chosen = []
     for rank, entries in enumerate(ranked[: settings.refits]):
         chosen.append(entries[0])
-        if rank < 3:
+        if rank < THRESHOLDS.n_families_with_sites:
             chosen += [e for e in entries[1:] if e[1].key != entries[0][1].key][: settings.joint_starts - 1]
     return chosen
 
@@ -259,16 +254,18 @@ class Projector:
         if size <= 1e-12 * float(column @ column) or size <= 0.0:
             return 0.0, 1.0
         optimum = slope / size if not candidate.nonlinear_in_size else 1.0
-        share = float(np.clip(optimum, 0.1, _max_multiple(candidate, candidate.starts[start])))
+        share = float(
+            np.clip(optimum, THRESHOLDS.min_start_multiple, _max_multiple(candidate, candidate.starts[start]))
+        )
         return 2.0 * share * slope - share**2 * size, share
 
 
 def _max_multiple(candidate, start):
-    """Largest multiple of the distance from neutral to ``start`` within the bounds, at most 3."""
-    multiple = 3.0
+    """Largest multiple of the distance from neutral to ``start`` within the bounds and the range of a column."""
+    multiple = THRESHOLDS.max_start_multiple
     for p, s in list(zip(candidate.parameters, start))[:1]:
         distance = s - p.neutral
         if distance:
             limit = p.bounds[1] if distance > 0 else p.bounds[0]
             multiple = min(multiple, abs(limit - p.neutral) / abs(distance))
-    return max(multiple, 0.1)
+    return max(multiple, THRESHOLDS.min_start_multiple)

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ class Observation:
             return None
         scaled = self.modes / self.sigma[:, None]
         eigenvalues, eigenvectors = np.linalg.eigh(scaled.T @ scaled)
-        keep = eigenvalues > 1e-4
+        keep = eigenvalues > THRESHOLDS.min_mode_energy
         eigenvalues = eigenvalues[keep]
         directions = (scaled @ eigenvectors[:, keep] / np.sqrt(eigenvalues)).astype(self.modes.dtype)
         return directions, 1.0 - 1.0 / np.sqrt(1.0 + eigenvalues)
@@ -185,13 +186,13 @@ class Case:
         for members in groups.values():
             shifted = dict(values)
             for k in members:
-                shifted[self.nuisances[k].name] += 0.1 * self.nuisances[k].sd
+                shifted[self.nuisances[k].name] += THRESHOLDS.nuisance_step * self.nuisances[k].sd
             predicted = self.predict(shifted, terms, observations)
             for k in members:
                 nuisance = self.nuisances[k]
                 for o, new, old, jacobian in zip(observations, predicted, base, jacobians):
                     if nuisance.owner in (None, o.name):
-                        jacobian[:, k] = (new - old) / (0.1 * nuisance.sd)
+                        jacobian[:, k] = (new - old) / (THRESHOLDS.nuisance_step * nuisance.sd)
         return jacobians
 
     def own_jacobian(self, values, terms, observation, predicted, names):

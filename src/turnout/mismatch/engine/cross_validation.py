@@ -8,8 +8,7 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.map_fit import JointProblem
-
-MIN_RECORDINGS = 3  # recordings; a jackknife over fewer has no meaning
+from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 
 def held_out_score(case, fit):
@@ -44,7 +43,7 @@ def jackknife_errors(case, fit, data_type):
     normal = np.eye(theta.size) + sum(p.gram / fit.scale[p.data_type] for p in sums)
     right = (joint.mean - theta) / joint.sd + sum(p.across / fit.scale[p.data_type] for p in sums)
     selected = [p for p in sums if p.data_type == data_type]
-    if len(selected) < MIN_RECORDINGS:
+    if len(selected) < THRESHOLDS.min_recordings:
         return np.zeros(theta.size)
     scale = fit.scale[data_type]
     jackknifed = np.array([np.linalg.solve(normal - p.gram / scale, right - p.across / scale) for p in selected])
@@ -168,17 +167,6 @@ def _energy_by_sensor(observation, energy):
     return np.bincount(code[observation.cells[inside]], energy[inside], minlength=level.size)
 
 
-# A recording that must confirm an effect: share of the effect's energy in the main witness, and number of them.
-MIN_ENERGY_RATIO, MIN_WITNESSES = 0.5, 2
-# Share of the largest energy of an effect in a recording below which it does not show: a tenth in amplitude.
-MAX_MASKED_ENERGY = 0.01
-# Share of the evidence that held-out conditions must show. Less: most of it is the prior penalty of nuisances.
-MIN_HELD_OUT_SHARE = 0.5
-MIN_HAMMER_POSITIONS = 3  # positions of impacts; of fewer none can be called the exception
-# Levels in thresholds: the impacts at one position gain more, all other conditions together gain less.
-SINGLE_POSITION_LEVELS = (1.0, 0.5)
-
-
 def single_witness(search, fit, candidate, gain, by_condition):
     """The condition whose gain alone supports a name while the gain of all others together does not.
 
@@ -213,8 +201,8 @@ def single_witness(search, fit, candidate, gain, by_condition):
     if other_gain >= threshold:
         return ""
     energies = effect_energy(case, fit, candidate)
-    min_energy = MIN_ENERGY_RATIO * energies.pop(strongest, np.inf)
-    return strongest if sum(energy >= min_energy for energy in energies.values()) >= MIN_WITNESSES else ""
+    min_energy = THRESHOLDS.min_energy_ratio * energies.pop(strongest, np.inf)
+    return strongest if sum(energy >= min_energy for energy in energies.values()) >= THRESHOLDS.min_witnesses else ""
 
 
 def _single_hammer_position(hammer_positions, gain, by_condition, threshold):
@@ -226,15 +214,15 @@ def _single_hammer_position(hammer_positions, gain, by_condition, threshold):
     for condition, condition_gain in by_condition.items():
         if condition in hammer_positions:
             gains[hammer_positions[condition]] = gains.get(hammer_positions[condition], 0.0) + condition_gain
-    if len(gains) < MIN_HAMMER_POSITIONS:
+    if len(gains) < THRESHOLDS.min_hammer_positions:
         return ""
     strongest = max(gains, key=gains.get)
     other_gain = sum(by_condition.values()) - gains[strongest]
-    if other_gain > 0.0 and gains[strongest] + other_gain < MIN_HELD_OUT_SHARE * gain:
+    if other_gain > 0.0 and gains[strongest] + other_gain < THRESHOLDS.min_held_out_share * gain:
         return ""
     return (
         f"all blows at {strongest:g} m"
-        if any(gains[strongest] > s * threshold > other_gain for s in SINGLE_POSITION_LEVELS)
+        if any(gains[strongest] > s * threshold > other_gain for s in THRESHOLDS.single_position_levels)
         else ""
     )
 
@@ -257,5 +245,7 @@ def gain_where_unmasked(case, fit, by_condition):
     for candidate in fit.candidates:
         energies = effect_energy(case, fit, candidate)
         largest = max(energies.values(), default=np.inf)
-        unmasked = {c: gain for c, gain in unmasked.items() if energies.get(c, largest) < MAX_MASKED_ENERGY * largest}
+        unmasked = {
+            c: gain for c, gain in unmasked.items() if energies.get(c, largest) < THRESHOLDS.max_masked_energy * largest
+        }
     return float(sum(unmasked.values()))

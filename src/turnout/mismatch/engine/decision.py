@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
+from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.mismatch.engine.verdict import Verdict, calibrate, posterior, swap_with_unknown
 
 if TYPE_CHECKING:
@@ -24,15 +25,6 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.score import Score
     from turnout.mismatch.engine.two_effects import PairEvidence, SecondEvidence
 
-# Thresholds of gain. A weaker name that held-out recordings contradict is no evidence of any effect.
-WEAK_GAIN = 2.0
-# nats, odds of 20 to 1: lead of the simpler form over one with an extra parameter that has no effect.
-SIMPLER_FORM_LEAD = 3.0
-# Share of the gain. A held-out condition that loses more, and more than half a threshold, contradicts the name.
-MAX_LOSS_SHARE = 0.2
-# Multiple of the control level. A larger residual of reserved recordings contradicts the answer "none". Three opened
-# controls reach 0.37 to 0.54, as for fitted recordings. Trains of a type that was not fitted may leave more.
-MAX_RESERVED_EXCESS = 2.0
 
 Facts = TypeVar("Facts")
 
@@ -155,8 +147,8 @@ RESERVED_RULES: tuple[Rule[ReservedEvidence], ...] = (
     Rule("reserved_predicted_worse", lambda e: e.is_single_name_of_grade_b and e.verification.is_worse, "unknown",
          "{e.verdict.names[0]} leaves more than sound turnouts do and foretells recordings never used worse", ENDS),
     Rule("reserved_not_explained",
-         lambda e: e.verdict.answer == "none" and e.verification.reserved_excess > MAX_RESERVED_EXCESS, "unknown",
-         "recordings that were never used are not foretold as in sound turnouts", HOW),
+         lambda e: e.verdict.answer == "none" and e.verification.reserved_excess > THRESHOLDS.max_reserved_excess,
+         "unknown", "recordings that were never used are not foretold as in sound turnouts", HOW),
     Rule("not_contradicted", _always, "", "", HOW),
 )
 # fmt: on
@@ -166,7 +158,7 @@ RULES = (*NUMERICS_RULES, *EFFECT_RULES, *SECOND_RULES, *PAIR_RULES, *NAME_RULES
 
 def is_contradicted(worst_gain: float, gain: float, settings: MismatchSettings) -> bool:
     """Whether a held-out condition, with gain ``worst_gain``, contradicts a name that gains ``gain`` in all."""
-    return worst_gain < -max(0.5 * settings.threshold, MAX_LOSS_SHARE * gain)
+    return worst_gain < -max(THRESHOLDS.contradiction_threshold * settings.threshold, THRESHOLDS.max_loss_share * gain)
 
 
 def likeliest(scores: Sequence[Score], excess: float, settings: MismatchSettings) -> Score:
@@ -252,7 +244,7 @@ class EffectEvidence:
         """Whether no candidate passes, or only a weak one that other conditions contradict, without any excess."""
         if not self.has_leader:
             return True
-        is_weak = self.leader.gain < WEAK_GAIN * self.settings.threshold
+        is_weak = self.leader.gain < THRESHOLDS.weak_gain * self.settings.threshold
         return (self.contradicted or not self.consistent) and is_weak and self.excess <= 1.0
 
     @property
@@ -275,7 +267,8 @@ class EffectEvidence:
         """Reportable candidates within the margin of the leader, less those of which it is a simpler form."""
         leads = ((s, self.leader.gain - s.gain) for s in self.ranked[1:] if s.is_reportable)
         close = [(s, lead) for s, lead in leads if lead < self.settings.margin]
-        return [s for s, lead in close if not (self.leader.is_simpler_form_of(s) and lead > SIMPLER_FORM_LEAD)]
+        min_lead = THRESHOLDS.simpler_form_lead
+        return [s for s, lead in close if not (self.leader.is_simpler_form_of(s) and lead > min_lead)]
 
     def names(self, answer: str) -> tuple[str, ...]:
         """Families that an answer names."""
@@ -331,7 +324,7 @@ class NumericalError:
     @property
     def is_material(self) -> bool:
         """Whether the own error exceeds a third of the tolerated error."""
-        return self.own / self.n > 1.0 / 9.0
+        return self.own / self.n > THRESHOLDS.max_numerical_error
 
     @property
     def exceeds_limit(self) -> bool:

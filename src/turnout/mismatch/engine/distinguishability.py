@@ -6,9 +6,7 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.map_fit import JointProblem, fit_jointly
-
-LINEAR_SHARE = 0.02  # share of a size at which an effect is linear; effects with a threshold are taken at full size
-MIN_EVIDENCE = 5.0  # nats, odds of 150 to 1: two effects are distinguished
+from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 
 @dataclass(frozen=True)
@@ -23,7 +21,7 @@ class Distinguishability:
     loss: np.ndarray
     detectability: np.ndarray
 
-    def confused_with(self, name, min_evidence=MIN_EVIDENCE):
+    def confused_with(self, name, min_evidence=THRESHOLDS.min_evidence):
         """Effects that cannot be distinguished from ``name``, with "none" if it cannot be detected at all."""
         row = self.names.index(name)
         confused_names = [] if self.detectability[row] >= min_evidence else ["none"]
@@ -62,7 +60,7 @@ def distinguishability(case, strengths=None):
     names, columns = [], []
     for candidate in _one_per_family(case.candidates, strengths or {}):
         start = np.asarray((strengths or {}).get(candidate.key, candidate.starts[0]), dtype=float)
-        share = 1.0 if getattr(candidate.term(start), "effect_type", "port") == "port" else LINEAR_SHARE
+        share = 1.0 if getattr(candidate.term(start), "effect_type", "port") == "port" else THRESHOLDS.linear_share
         values = candidate.neutral + share * (start - candidate.neutral)
         try:
             new = case.predict(fit.values, (candidate.term(values),), case.observations)
@@ -92,12 +90,12 @@ def _one_per_family(candidates, strengths):
         yield chosen[0] if chosen else members[len(members) // 2]
 
 
-def cheapest_addition(base, additions, min_evidence=MIN_EVIDENCE):
+def cheapest_addition(base, additions, min_evidence=THRESHOLDS.min_evidence):
     """(name, pairs distinguished, nats gained) of the addition that resolves most pairs, the cheapest among equals.
 
     ``base`` is a Distinguishability, ``additions`` name -> (cost, Distinguishability of the plan with it).
     """
-    ranked = []
+    ranked, most = [], THRESHOLDS.max_useful_evidence
     for name, (cost, extended) in additions.items():
         common = [n for n in base.names if n in extended.names]
         gained = resolved = 0.0
@@ -108,7 +106,7 @@ def cheapest_addition(base, additions, min_evidence=MIN_EVIDENCE):
                 before = base.loss[base.names.index(a), base.names.index(b)]
                 after = extended.loss[extended.names.index(a), extended.names.index(b)]
                 resolved += before < min_evidence <= after
-                gained += max(0.0, min(after, 50.0) - min(before, 50.0))
+                gained += max(0.0, min(after, most) - min(before, most))
             before, after = base.detectability[base.names.index(a)], extended.detectability[extended.names.index(a)]
             resolved += before < min_evidence <= after
         ranked.append((-resolved, cost, name, gained))

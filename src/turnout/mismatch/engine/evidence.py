@@ -14,15 +14,13 @@ from turnout.mismatch.engine.decision import is_contradicted, judge, likeliest
 from turnout.mismatch.engine.latent_force import latent_law
 from turnout.mismatch.engine.reserved_data import is_significantly_worse, reserved_fit
 from turnout.mismatch.engine.score import Score
+from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
     from turnout.mismatch.engine.map_fit import Fit
     from turnout.mismatch.engine.search import Search
     from turnout.mismatch.engine.verdict import Verdict
-
-MAX_ORDINARY_SPREADS = 3.0  # spreads of similar components: one in 370 intact ones is beyond
-MIN_SIBLINGS = 6  # similar components; fewer give no spread
 
 
 def explained_share(search: Search, fit: Fit, refit: Fit) -> float:
@@ -115,7 +113,7 @@ def _is_opposed(case, fit, refit, candidate):
 
 
 def is_within_spread(case, refit, candidate):
-    r"""Whether a component differs by no more than ``MAX_ORDINARY_SPREADS`` from similar ones, the effect included.
+    r"""Whether a component differs by no more than ``max_ordinary_spreads`` from similar ones, the effect included.
 
     .. math:: |\ln \psi| < 3 s, \quad s^2 = \overline{(v_j - ar v)^2} + \overline{\sigma_j^2}
 
@@ -127,11 +125,11 @@ def is_within_spread(case, refit, candidate):
     siblings = [k for k, n in enumerate(case.nuisances) if n.name.removeprefix(f"{stem}_").isdigit()]
     siblings = [k for k in siblings if case.nuisances[k].name != candidate.masking_parameter]
     first = refit.psi[refit.part(candidate).start]
-    if len(siblings) < MIN_SIBLINGS or first <= 0.0:
+    if len(siblings) < THRESHOLDS.min_siblings or first <= 0.0:
         return False
     values = np.array([refit.values[case.nuisances[k].name] for k in siblings])
     spread = np.sqrt(values.var() + np.mean(np.diag(refit.covariance)[siblings]))
-    return abs(float(np.log(first))) < MAX_ORDINARY_SPREADS * spread
+    return abs(float(np.log(first))) < THRESHOLDS.max_ordinary_spreads * spread
 
 
 def excess_ratio(search: Search, fit: Fit) -> float:

@@ -11,11 +11,8 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.candidate_search import Projector, scaled_start
-from turnout.mismatch.engine.map_fit import MAX_CHEAP_STEPS, fit_jointly
-
-TRIAL_STEPS, MAX_TRIAL_STARTS = 4, 5  # steps of a trial fit; largest number of starts that are tried by trial fits
-UNINFORMED_SD_SHARE = 0.999  # share of the prior standard deviation that remains: the data say nothing
-MIN_STEP_GAIN = 0.5  # nats; a step that gains less ends a fit of the prescreening
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 
 @dataclass(frozen=True)
@@ -46,9 +43,16 @@ def prescreen(search, fit, families=None):
         return []
     accepted, n_psi = fit.candidates, fit.psi.size
     broad_case = cheap_case.with_broad_errors()
-    broad_fit = fit_jointly(broad_case, accepted, fit.psi, iterations=MAX_CHEAP_STEPS, min_gain=MIN_STEP_GAIN)
+    broad_fit = fit_jointly(
+        broad_case, accepted, fit.psi, iterations=THRESHOLDS.max_cheap_steps, min_gain=THRESHOLDS.min_cheap_step_gain
+    )
     base = fit_jointly(
-        cheap_case, accepted, broad_fit.psi, broad_fit.values, iterations=MAX_CHEAP_STEPS, min_gain=MIN_STEP_GAIN
+        cheap_case,
+        accepted,
+        broad_fit.psi,
+        broad_fit.values,
+        iterations=THRESHOLDS.max_cheap_steps,
+        min_gain=THRESHOLDS.min_cheap_step_gain,
     )
     entries = _column_entries(case, broad_case, broad_fit, accepted) + _column_entries(case, cheap_case, base, accepted)
     prescreened, trial_gains = [], {}
@@ -81,7 +85,7 @@ def informed_values(case, fit, candidate):
     """
     sd = np.sqrt(np.diag(fit.covariance))
     is_informed = {
-        n.name: s < UNINFORMED_SD_SHARE * n.sd or n.name == candidate.masking_parameter
+        n.name: s < THRESHOLDS.uninformed_sd_share * n.sd or n.name == candidate.masking_parameter
         for n, s in zip(case.nuisances, sd)
     }
     return {name: fit.values[name] for name, informed in is_informed.items() if informed}
@@ -113,7 +117,7 @@ def _likeliest_starts(members, broad_case, broad_fit, accepted, settings, trial_
 
     Families that the base model absorbs (``prescreen_group``) are tried at every site by a few steps of the broad fit.
     Families of one group share these ``trial_gains``. A family of the whole track is tried from its
-    ``MAX_TRIAL_STARTS`` most promising starts.
+    ``max_trial_starts`` most promising starts.
     """
     best_starts = {}
     for gain, candidate, start in sorted(members, key=lambda m: m[0]):
@@ -121,7 +125,7 @@ def _likeliest_starts(members, broad_case, broad_fit, accepted, settings, trial_
     group = next(iter(best_starts.values()))[1].prescreen_group
     if group and len(best_starts) == 1:
         starts = {tuple(start): (candidate, start) for _, candidate, start in sorted(members, key=lambda m: m[0])}
-        trials = list(starts.values())[-MAX_TRIAL_STARTS:]
+        trials = list(starts.values())[-THRESHOLDS.max_trial_starts :]
         return [
             max(trials, key=lambda m: _trial_gain(broad_case, broad_fit, accepted, *m)) if trials[1:] else trials[0]
         ]
@@ -147,7 +151,7 @@ def _trial_gain(broad_case, broad_fit, accepted, candidate, start):
             (*accepted, candidate),
             psi,
             {n.name: n.mean for n in broad_case.nuisances},
-            iterations=TRIAL_STEPS,
+            iterations=THRESHOLDS.n_trial_steps,
         )
     except SimulationError:
         return -np.inf
@@ -166,13 +170,18 @@ def _fit_candidates(broad_case, cheap_case, candidates, psi, max_cost):
             candidates,
             psi,
             {n.name: n.mean for n in broad_case.nuisances},
-            iterations=MAX_CHEAP_STEPS,
-            min_gain=MIN_STEP_GAIN,
+            iterations=THRESHOLDS.max_cheap_steps,
+            min_gain=THRESHOLDS.min_cheap_step_gain,
         )
         if broad_fit.cost > max_cost:
             return None
         return fit_jointly(
-            cheap_case, candidates, broad_fit.psi, broad_fit.values, iterations=MAX_CHEAP_STEPS, min_gain=MIN_STEP_GAIN
+            cheap_case,
+            candidates,
+            broad_fit.psi,
+            broad_fit.values,
+            iterations=THRESHOLDS.max_cheap_steps,
+            min_gain=THRESHOLDS.min_cheap_step_gain,
         )
     except SimulationError:
         return None

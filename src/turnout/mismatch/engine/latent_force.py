@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-MAX_PIECES = 24  # largest number of pieces of the free law; each needs at least 20 samples
+from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class LatentForce:
         return name if name and self.r2[name] > 0.0 else ""
 
 
-def latent_law(force, covariates, unit="N", blocks=10):
+def latent_law(force, covariates, unit="N", blocks=THRESHOLDS.n_held_out_blocks):
     r"""Free law of a missing force for each covariate, tested on held-out blocks of time.
 
     A piecewise constant law over equally filled classes; :math:`R^2 = 1 - \overline{(f - \hat f_{-b})^2} /
@@ -43,7 +43,9 @@ def latent_law(force, covariates, unit="N", blocks=10):
     for name, x in covariates.items():
         x = np.asarray(x, dtype=float)
         good = np.isfinite(x) & np.isfinite(force)
-        levels = int(min(MAX_PIECES, np.unique(x[good]).size, good.sum() // 20))
+        levels = int(
+            min(THRESHOLDS.max_pieces, np.unique(x[good]).size, good.sum() // THRESHOLDS.min_samples_per_piece)
+        )
         if levels < 2:
             continue
         edges = np.quantile(x[good], np.linspace(0.0, 1.0, levels + 1)[1:-1])

@@ -5,11 +5,7 @@ The damping rises until the cost falls.
 
 import numpy as np
 
-MAX_TRIES = 8  # trials of one step, each with more damping than the last
-DAMPING_INCREASE, DAMPING_DECREASE = 6.0, 0.2  # factors on the damping after a failed and after an accepted step
-HOLD_DAMPING = 1e12  # times the diagonal: the parameter does not move
-MIN_DECREASE_SHARE = 0.1  # share of the least decrease for which the fit goes on; steps that predict less are not tried
-FIRST_DAMPING, MIN_DAMPING = 1e-2, 1e-4  # times the diagonal: the first damping, and the one below which it is set to 0
+from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 
 class DampedSteps:
@@ -28,7 +24,7 @@ class DampedSteps:
             sums[o.data_type] = tuple(a + b for a, b in zip(old, new))
         pull = (joint.mean - theta) / joint.sd
         squares = {data_type: p[2] for data_type, p in sums.items()}
-        for _ in range(5):
+        for _ in range(THRESHOLDS.n_scale_iterations):
             scale = {data_type: max(1.0, squares[data_type] / sums[data_type][3]) for data_type in sums}
             self.normal = np.eye(theta.size) + sum(p[0] / scale[k] for k, p in sums.items())
             self.right = pull + sum(p[1] / scale[k] for k, p in sums.items())
@@ -44,13 +40,15 @@ class DampedSteps:
         joint, diagonal = self.joint, np.diag(self.normal)
         reach, damping_factors = joint.reach / joint.sd, np.full(self.theta.size, damping)
         lowest, highest = self.theta <= joint.low, self.theta >= joint.high
-        for _ in range(12):
+        for _ in range(THRESHOLDS.n_reach_iterations):
             step = np.linalg.solve(self.normal + np.diag(diagonal * damping_factors), self.right)
-            is_held = ((lowest & (step < 0.0)) | (highest & (step > 0.0))) & (damping_factors < HOLD_DAMPING)
+            is_held = ((lowest & (step < 0.0)) | (highest & (step > 0.0))) & (damping_factors < THRESHOLDS.hold_damping)
             excess = np.maximum(np.abs(step) / reach - 1.0, 0.0)
-            if excess.max(initial=0.0) < 0.05 and not is_held.any():
+            if excess.max(initial=0.0) < THRESHOLDS.max_overreach and not is_held.any():
                 break
-            damping_factors = np.where(is_held, HOLD_DAMPING, damping_factors + (1.0 + damping_factors) * excess)
+            damping_factors = np.where(
+                is_held, THRESHOLDS.hold_damping, damping_factors + (1.0 + damping_factors) * excess
+            )
         return joint.sd * np.clip(step, -reach, reach)
 
     def predicted_decrease(self, step):
@@ -64,9 +62,9 @@ class DampedSteps:
         (None, 0) if there is none, or if none predicts a tenth of the least decrease for which the fit goes on.
         """
         joint = self.joint
-        for _ in range(MAX_TRIES):
+        for _ in range(THRESHOLDS.max_damping_tries):
             step = self.damped_step(damping)
-            if self.predicted_decrease(step) < MIN_DECREASE_SHARE * joint.min_decrease:
+            if self.predicted_decrease(step) < THRESHOLDS.min_decrease_share * joint.min_decrease:
                 break
             trial = np.clip(self.theta + step, joint.low, joint.high)
             predictions = joint.predict_or_none(trial)
@@ -79,8 +77,8 @@ class DampedSteps:
                         predictions,
                         residuals,
                         new_cost,
-                    ), damping * DAMPING_DECREASE if damping > MIN_DAMPING else 0.0
-            damping = max(DAMPING_INCREASE * damping, FIRST_DAMPING)
+                    ), damping * THRESHOLDS.damping_decrease if damping > THRESHOLDS.min_damping else 0.0
+            damping = max(THRESHOLDS.damping_increase * damping, THRESHOLDS.first_damping)
         return None, 0.0
 
 

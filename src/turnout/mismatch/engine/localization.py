@@ -15,9 +15,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from turnout.mismatch.engine.candidate_search import Projector
+from turnout.mismatch.engine.thresholds import THRESHOLDS
 
-AMPLITUDES = np.concatenate([[0.0], np.geomspace(0.03, 3e4, 21)])
-NOISE_FACTORS = np.geomspace(1.0, 100.0, 25)
+AMPLITUDES = np.concatenate(
+    [[0.0], np.geomspace(THRESHOLDS.min_amplitude, THRESHOLDS.max_amplitude, THRESHOLDS.n_amplitudes)]
+)
+NOISE_FACTORS = np.geomspace(1.0, THRESHOLDS.max_noise_factor, THRESHOLDS.n_noise_factors)
 
 
 @dataclass(frozen=True)
@@ -122,13 +125,6 @@ def _level_evidence(space, columns, residual, floor):
             )
 
 
-MIN_HAMMER_EVIDENCE = 6.0  # nats that impacts must add before a channel is blamed: its fault shows in impacts, too
-POSITION_MARGIN = (
-    6.0  # nats within which positions are not distinguished: odds of 400 to 1, less the errors of the model
-)
-MIN_EXPLAINED_SHARE = 0.25  # share of the excess from which a rejected candidate counts as evidence for its site
-
-
 @dataclass(frozen=True)
 class Location:
     """Location of a residual.
@@ -184,7 +180,7 @@ def locate(case, fit, leader=None, cause=""):
         return Location("train", case.mismatched_trains[0], 0.0, train=case.mismatched_trains[0])
     floor = {o.data_type: case.control_level.get(o.data_type, 1.0) for o in case.observations}
     witnesses = sorted(_credible_evidence(case, weigh_spaces(case, fit, floor)), key=lambda w: -w.nats)
-    is_credible = leader is not None and leader.explained >= MIN_EXPLAINED_SHARE
+    is_credible = leader is not None and leader.explained >= THRESHOLDS.min_explained_share
     if is_credible and (not witnesses or leader.gain > witnesses[0].nats):
         return replace(_location_of_candidate(leader), measured_range=case.measured_range)
     return replace(_location_of_evidence(witnesses), measured_range=case.measured_range) if witnesses else None
@@ -202,7 +198,7 @@ def _credible_evidence(case, witnesses):
         if (
             w.frame == "sensor"
             and hammer_names
-            and sum(w.by_space.get(name, 0.0) for name in hammer_names) < MIN_HAMMER_EVIDENCE
+            and sum(w.by_space.get(name, 0.0) for name in hammer_names) < THRESHOLDS.min_hammer_evidence
         ):
             continue
         if nats > 0.0:
@@ -224,7 +220,9 @@ def _location_of_evidence(witnesses):
         by_frame.setdefault(w.frame, w.nats)
     fields = {"next_best": {k: round(v, 1) for k, v in by_frame.items() if k != strongest.frame}}
     if strongest.frame == "place":
-        positions = [w.level for w in witnesses if w.frame == "place" and strongest.nats - w.nats < POSITION_MARGIN]
+        positions = [
+            w.level for w in witnesses if w.frame == "place" and strongest.nats - w.nats < THRESHOLDS.position_margin
+        ]
         fields |= {"place": strongest.level, "low": min(positions), "high": max(positions)}
     elif strongest.frame == "wheel":
         fields |= {"train": strongest.level[0], "axle": strongest.level[1]}

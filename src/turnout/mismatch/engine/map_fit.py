@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.engine.levenberg_marquardt import FIRST_DAMPING, DampedSteps, broyden_update
+from turnout.mismatch.engine.levenberg_marquardt import DampedSteps, broyden_update
+from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 
 @dataclass(frozen=True)
@@ -81,18 +82,21 @@ def terms_of(candidates, psi):
     return tuple(terms)
 
 
-MAX_TERM_STEP = 0.35  # largest step of a term's parameter as a share of its bounds
-MIN_GAIN = 0.05  # nats; a smaller gain ends the iteration
-MAX_CHEAP_STEPS = 60  # steps of a fit to cheap observations alone: some valleys are long
-REFRESH_STEPS = 4  # steps after which the Jacobian of an expensive case is computed anew
-STALL = 5e-4  # of minus twice the log posterior per sample; a fit of an expensive case that gains less ends
-FINE_STALL = 1e-4  # the same for fits on which the verdict rests
+MAX_CHEAP_STEPS = THRESHOLDS.max_cheap_steps
 
 
 class JointProblem:
     """Least-squares problem of a case with some candidates: all that does not change between steps."""
 
-    def __init__(self, case, candidates=(), observations=None, iterations=6, min_gain=MIN_GAIN, stall=STALL):
+    def __init__(
+        self,
+        case,
+        candidates=(),
+        observations=None,
+        iterations=THRESHOLDS.n_steps,
+        min_gain=THRESHOLDS.min_gain,
+        stall=THRESHOLDS.stall,
+    ):
         self.case, self.candidates = case, tuple(candidates)
         self.observations = tuple(case.observations if observations is None else observations)
         self.parameters = [p for c in self.candidates for p in c.parameters]
@@ -180,9 +184,9 @@ class JointProblem:
 
     def _column(self, theta, k, predictions):
         p = self.parameters[k - self.n]
-        step = 0.02 * min(
-            p.bounds[1] - p.bounds[0], 10.0 * self.sd[k], max(abs(theta[k] - p.neutral), 0.1 * _max_step(p))
-        )
+        size = max(abs(theta[k] - p.neutral), THRESHOLDS.min_derivative_size * _max_step(p))
+        scales = p.bounds[1] - p.bounds[0], THRESHOLDS.derivative_sds * self.sd[k], size
+        step = THRESHOLDS.derivative_step * min(scales)
         step = -step if theta[k] + step > p.bounds[1] else step
         values, psi = self.split(theta)
         terms = terms_of(self.candidates, psi)
@@ -204,11 +208,11 @@ class JointProblem:
 
 def _prior(p):
     low, high = p.bounds
-    return p.prior if p.prior else (0.5 * (low + high), 0.6 * (high - low))
+    return p.prior if p.prior else (0.5 * (low + high), THRESHOLDS.default_prior_sd * (high - low))
 
 
 def _max_step(p):
-    return MAX_TERM_STEP * (p.bounds[1] - p.bounds[0])
+    return THRESHOLDS.max_term_step * (p.bounds[1] - p.bounds[0])
 
 
 def cost_at(case, candidates, psi, values):
@@ -225,9 +229,9 @@ def fit_jointly(
     values=None,
     reused_jacobian=None,
     observations=None,
-    iterations=6,
-    min_gain=MIN_GAIN,
-    stall=STALL,
+    iterations=THRESHOLDS.n_steps,
+    min_gain=THRESHOLDS.min_gain,
+    stall=THRESHOLDS.stall,
 ):
     r"""Maximum of the posterior of nuisances and term parameters together.
 
@@ -251,7 +255,13 @@ def fit_jointly(
         if reused_jacobian is not None:
             jacobian = joint.with_new_cheap_columns(theta, predictions, jacobian)
         theta, predictions, residuals, jacobian, cost = _iterate(
-            joint, theta, predictions, residuals, jacobian, cost, REFRESH_STEPS if reused_jacobian is None else 0
+            joint,
+            theta,
+            predictions,
+            residuals,
+            jacobian,
+            cost,
+            THRESHOLDS.n_refresh_steps if reused_jacobian is None else 0,
         )
     return _fit_result(joint, theta, predictions, residuals, jacobian, cost)
 
@@ -277,7 +287,7 @@ def _iterate(joint, theta, predictions, residuals, jacobian, cost, refresh_steps
         n_since_refresh += 1
         if (
             gain < min_decrease
-            and not (improvement and damping > FIRST_DAMPING)
+            and not (improvement and damping > THRESHOLDS.first_damping)
             and (n_since_refresh == 1 or not (expensive and refresh_steps))
         ):
             break

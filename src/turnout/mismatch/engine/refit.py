@@ -16,7 +16,8 @@ from turnout.errors import SimulationError
 from turnout.mismatch.engine.candidate_search import RefitTask, shortlist
 from turnout.mismatch.engine.cross_validation import gain_where_unmasked, held_out_score, single_witness
 from turnout.mismatch.engine.evidence import score_of
-from turnout.mismatch.engine.map_fit import FINE_STALL, JointProblem, cost_at
+from turnout.mismatch.engine.map_fit import JointProblem, cost_at
+from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.map_fit import Fit
     from turnout.mismatch.engine.score import Score
     from turnout.mismatch.engine.search import Search
-
-SIZE_FACTORS = (1.0, 0.75, 0.5)  # shares of a leader's first two parameters: its response is nonlinear in both
 
 
 def restart_leader(search: Search, fit: Fit, score: Score) -> Score:
@@ -66,7 +65,7 @@ def _cheapest_psi(case: Case, score: Score, values: dict[str, float]) -> np.ndar
     """``psi`` with the first two parameters of the leader at those shares of their values that cost least."""
     candidate, psi_slice = score.candidate, score.fit.part(score.candidate)
     sizes, costs = score.fit.psi[psi_slice], []
-    for shares in product(SIZE_FACTORS, repeat=min(2, sizes.size)):
+    for shares in product(THRESHOLDS.size_factors, repeat=min(2, sizes.size)):
         psi, size = np.array(score.fit.psi), np.array(sizes)
         size[0] = candidate.neutral[0] + shares[0] * (sizes[0] - candidate.neutral[0])
         size[1 : len(shares)] = sizes[1 : len(shares)] * shares[1:]
@@ -78,16 +77,6 @@ def _cheapest_psi(case: Case, score: Score, values: dict[str, float]) -> np.ndar
     if not costs:
         raise SimulationError(f"{candidate.key} cannot be simulated at any size")
     return np.array(min(costs)[1])
-
-
-MIN_HELD_SHARE = 0.5  # share of the gain from the cheap observations; a refit that gains less has not converged
-MIN_COMPONENT_GAIN = 0.5  # thresholds that an effect of a component must gain before its other effects are refitted
-MIN_LEADER_GAIN = 0.5  # thresholds of gain from which a leader is fitted to convergence
-# Thresholds promised by the cheap observations beyond which a start needs derivatives of its own.
-FAR_START_GAIN = 4.0
-# Multiple of the promised size from which an effect that gained too little is restarted: the base fit masks part of it.
-OVERSHOOT_FACTOR = 2.0
-MAX_HALVINGS = 4  # halvings of a start that costs more than no effect; a sixteenth of it is linear
 
 
 def score_candidates(search: Search, fit: Fit, promising: Collection[str] | None = ()) -> tuple[tuple[Score, ...], Fit]:
@@ -129,7 +118,7 @@ def _rank_families(search: Search, fit: Fit, promising: Collection[str] | None) 
     """Best score of each family on top of ``fit``, leaders fitted to convergence."""
     tasks = shortlist(search, fit, promising)
     scores: dict[str, Score] = {}
-    best_gain, min_gain = -np.inf, MIN_COMPONENT_GAIN * search.settings.threshold
+    best_gain, min_gain = -np.inf, THRESHOLDS.min_component_gain * search.settings.threshold
     for index, task in enumerate(tasks):
         if task.rival:
             if best_gain < min_gain:
@@ -151,8 +140,10 @@ def _refine_leaders(search: Search, fit: Fit, ranked: list[Score]) -> list[Score
     settings = search.settings
     ranked = _refit_equivalent_forms(search, fit, ranked)
     material = [s for s in ranked if s.is_reportable][:2]
-    min_close_gain = min(material[0].gain - settings.margin, MIN_HELD_SHARE * material[0].gain) if material else 0.0
-    leaders = [s for s in material if s.gain > max(MIN_LEADER_GAIN * settings.threshold, min_close_gain)]
+    min_close_gain = (
+        min(material[0].gain - settings.margin, THRESHOLDS.min_held_share * material[0].gain) if material else 0.0
+    )
+    leaders = [s for s in material if s.gain > max(THRESHOLDS.min_leader_gain * settings.threshold, min_close_gain)]
     polished = [_polish(search, fit, s) for s in leaders]
     if polished and not fit.candidates:  # beside another effect the residual is also an error in its shape
         polished[0] = restart_leader(search, fit, polished[0])
@@ -170,7 +161,7 @@ def _base_from_leader(search: Search, fit: Fit, ranked: Sequence[Score]) -> Fit 
 
     def compute() -> Fit | None:
         try:
-            return search.converge(search.fit(fit.candidates, fit.psi, leader.fit.values, stall=FINE_STALL))
+            return search.converge(search.fit(fit.candidates, fit.psi, leader.fit.values, stall=THRESHOLDS.fine_stall))
         except SimulationError:
             return None
 
@@ -250,7 +241,7 @@ def _score_task(search: Search, fit: Fit, task: RefitTask, best_gain: float = 0.
     threshold, candidate, is_channel = search.settings.threshold, task.candidate, task.candidate.frame == "sensor"
     accepted = "+".join(c.key for c in fit.candidates)
     key = f"{search.label}:{accepted}:{candidate.key}:{tuple(np.round(task.start, 12))}"
-    is_far = is_channel and task.cheap_gain > FAR_START_GAIN * threshold
+    is_far = is_channel and task.cheap_gain > THRESHOLDS.far_start_gain * threshold
     refit = search.stored_fit(key, lambda: _refit(search, fit, task, is_far), (*fit.candidates, candidate))
     if refit is None:
         return None
@@ -260,8 +251,8 @@ def _score_task(search: Search, fit: Fit, task: RefitTask, best_gain: float = 0.
     whole_track = candidate.n_scanned == 1 and candidate.start_from_base
     if whole_track and score.gain < threshold:
         score = max(score, _score_from_farther(search, fit, task, score, key), key=lambda s: s.gain)
-    min_cheap_gain = max(threshold, MIN_HELD_SHARE * best_gain if is_channel else 0.0)
-    if score.gain < MIN_HELD_SHARE * task.cheap_gain and task.cheap_gain > min_cheap_gain:
+    min_cheap_gain = max(threshold, THRESHOLDS.min_held_share * best_gain if is_channel else 0.0)
+    if score.gain < THRESHOLDS.min_held_share * task.cheap_gain and task.cheap_gain > min_cheap_gain:
         return _polish(search, fit, score)
     return score
 
@@ -275,7 +266,7 @@ def _score_from_farther(search: Search, fit: Fit, task: RefitTask, score: Score,
     """
     candidate, candidates = task.candidate, (*fit.candidates, task.candidate)
     first, start = candidate.parameters[0], np.array(task.start, dtype=float)
-    start[0] = np.clip(first.neutral + OVERSHOOT_FACTOR * (start[0] - first.neutral), *first.bounds)
+    start[0] = np.clip(first.neutral + THRESHOLDS.overshoot_factor * (start[0] - first.neutral), *first.bounds)
     psi, values = np.concatenate([fit.psi, start]), {**fit.values, **task.values}
     scores = [score]
     for label, start_values in (("farther", values), ("unbent", values | search.prior_values())):
@@ -377,7 +368,7 @@ def _backtrack(case: Case, candidates: tuple[Candidate, ...], psi: np.ndarray, f
     """
     n, psi = len(candidates[-1].parameters), np.array(psi, dtype=float)
     neutral = candidates[-1].parameters[0].neutral
-    for _ in range(MAX_HALVINGS):
+    for _ in range(THRESHOLDS.max_halvings):
         try:
             if cost_at(case, candidates, psi, fit.values) <= fit.cost:
                 break

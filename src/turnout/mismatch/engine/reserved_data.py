@@ -10,15 +10,12 @@ import numpy as np
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.cross_validation import weighted_mean_square
 from turnout.mismatch.engine.map_fit import JointProblem
+from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.map_fit import Fit
     from turnout.mismatch.engine.score import Score
     from turnout.mismatch.engine.search import Search
-
-MAX_STEPS = 8  # Gauss-Newton steps of a reserved recording's own nuisances
-MIN_COST_DECREASE = 1.0  # decrease of minus twice the log posterior; a step that gains less is the last
-N_BLOCKS = 25  # stretches of a recording over which scatter is estimated
 
 
 def fit_percent(observations, predictions, centre=True):
@@ -49,7 +46,7 @@ def reserved_fit(case, fit):
 def gain_error(observations, before, after):
     r"""Standard error of ``fit_percent`` of ``after`` less that of ``before``, in points.
 
-    Jackknife over ``N_BLOCKS`` stretches of each observation, each in all of its rows (Efron and Stein 1981): with the
+    Jackknife over ``n_blocks`` stretches of each observation, each in all of its rows (Efron and Stein 1981): with the
     gain :math:`d_i` of all stretches but one, :math:`\sqrt{(m - 1) / m \sum (d_i - \bar d)^2}`. Both fits lack the same
     roughness, and so do all sensors under one train. The gain is therefore more certain than either fit.
     """
@@ -60,28 +57,28 @@ def gain_error(observations, before, after):
 
 
 def _block_squares(o, before, after):
-    """(3, N_BLOCKS) weighted sums of squares of the residuals ``before`` and ``after``, and of the recording."""
+    """(3, n_blocks) weighted sums of squares of the residuals ``before`` and ``after``, and of the recording."""
     residuals = (o.data - before, o.data - after, o.data - np.mean(o.data))
     return [_block_sums(o, (p / o.sigma) ** 2) for p in residuals]
 
 
 def _block_sums(o, squares):
-    """(N_BLOCKS,) sums of ``squares`` (n,) over stretches of the observation, each in all of its rows."""
+    """(n_blocks,) sums of ``squares`` (n,) over stretches of the observation, each in all of its rows."""
     per_sample = squares.reshape(o.rows, -1).sum(axis=0)
-    return [o.effective * float(np.sum(b)) for b in np.array_split(per_sample, N_BLOCKS)]
+    return [o.effective * float(np.sum(b)) for b in np.array_split(per_sample, THRESHOLDS.n_blocks)]
 
 
 def is_significantly_worse(observations, before, after, points):
     """Whether ``after`` fits worse than ``before`` by more than ``points`` of fit and than two standard errors.
 
-    The standard error is that of the difference of weighted squares over ``N_BLOCKS`` stretches of each observation,
+    The standard error is that of the difference of weighted squares over ``n_blocks`` stretches of each observation,
     each in all of its rows. One in six names that say nothing about these observations reaches one standard error.
     """
     losses = (((o.data - a) ** 2 - (o.data - b) ** 2) / o.sigma**2 for o, b, a in zip(observations, before, after))
     block_losses = [block_loss for o, d in zip(observations, losses) for block_loss in _block_sums(o, d)]
     error = np.std(block_losses, ddof=1) * np.sqrt(len(block_losses))
     return (
-        sum(block_losses) > 2.0 * error
+        sum(block_losses) > THRESHOLDS.loss_errors * error
         and fit_percent(observations, after) < fit_percent(observations, before) - points
     )
 
@@ -101,15 +98,15 @@ def predict_reserved(case, fit, observations):
         return predictions
     residuals = joint.residuals(predictions)
     cost = joint.cost(theta, residuals)
-    for _ in range(MAX_STEPS):
+    for _ in range(THRESHOLDS.max_reserved_steps):
         step = _owned_step(case, joint, theta, fit.terms, predictions, residuals, is_owned)
-        trials = (_try_step(joint, theta, is_owned, 0.5**h * step) for h in range(3))
+        trials = (_try_step(joint, theta, is_owned, 0.5**h * step) for h in range(THRESHOLDS.n_step_trials))
         improvement = next((f for f in trials if f is not None and f[3] < cost), None)
         if improvement is None:
             break
         gain = cost - improvement[3]
         theta, predictions, residuals, cost = improvement
-        if gain < MIN_COST_DECREASE:
+        if gain < THRESHOLDS.min_cost_decrease:
             break
     return predictions
 

@@ -10,9 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import t as student
 
-MIN_CELLS = 8  # cells of a frame; fewer are not tested
-MIN_LEVELS = 3  # levels; of two none can be called the exception
-MIN_CELL_SHARE = 0.5  # share of the median number of cells; the mean of a level with fewer scatters too much
+from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 
 @dataclass(frozen=True)
@@ -61,7 +59,7 @@ def attribute(energy, labels):
 
     .. math:: t = \frac{m_{max} - m}{s \sqrt{1 + 1/(L-1)}}, \qquad p = \min(1,\; L\, P(T_{L-2} > t))
 
-    p is 1 if fewer than ``MIN_LEVELS`` levels have enough cells to be compared.
+    p is 1 if fewer than ``min_levels`` levels have enough cells to be compared.
 
     Parameters
     ----------
@@ -83,12 +81,12 @@ def attribute(energy, labels):
     for name, values in labels.items():
         keep = np.array([level is not None for level in values], dtype=bool)
         _, first, code = np.unique(values[keep].astype(str), return_index=True, return_inverse=True)
-        if first.size < 2 or keep.sum() < MIN_CELLS:
+        if first.size < 2 or keep.sum() < THRESHOLDS.min_cells:
             continue
         e = _without_other_frames(energy[keep], name, {k: c[keep] for k, c in codes.items()})
         count = np.bincount(code)
         mean = np.bincount(code, e) / count
-        comparable = np.flatnonzero(count >= MIN_CELL_SHARE * np.median(count))
+        comparable = np.flatnonzero(count >= THRESHOLDS.min_cell_share * np.median(count))
         top = comparable[int(np.argmax(mean[comparable]))]
         share = float(np.sum(count * (mean - e.mean()) ** 2) / max(np.sum((e - e.mean()) ** 2), 1e-12))
         effect = 10.0 / np.log(10.0) * (mean[top] - e[code != top].mean())
@@ -104,7 +102,7 @@ def outlier_p_value(means):
     >>> round(outlier_p_value(np.array([0.0, 0.1, -0.1, 3.0])), 3), outlier_p_value(np.array([0.0, 3.0]))
     (0.003, 1.0)
     """
-    if means.size < MIN_LEVELS:
+    if means.size < THRESHOLDS.min_levels:
         return 1.0
     remaining = np.delete(means, int(np.argmax(means)))
     spread = max(float(np.std(remaining, ddof=1)), 1e-12) * np.sqrt(1.0 + 1.0 / remaining.size)
@@ -118,7 +116,7 @@ def _without_other_frames(e, name, codes):
     absorb the difference.
     """
     e = e - e.mean()
-    for _ in range(2):
+    for _ in range(THRESHOLDS.n_sweeps):
         for other_name, code in codes.items():
             if other_name == name or _is_nested(code, codes[name]) or np.unique(code).size >= e.size // 2:
                 continue

@@ -4,8 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-# Standard error as a share of a size above which only a lower limit is known: 95 % reach beyond twice the size.
-MAX_BOUNDED_ERROR = 0.5
+from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 
 @dataclass(frozen=True)
@@ -79,7 +78,7 @@ class Score:
         if not self.candidate.unbounded_form:
             return False
         sizes, errors = self.estimates
-        return bool(errors[0] > MAX_BOUNDED_ERROR * abs(sizes[0] - self.candidate.neutral[0]))
+        return bool(errors[0] > THRESHOLDS.max_bounded_error * abs(sizes[0] - self.candidate.neutral[0]))
 
     def is_limit_of(self, rival):
         """Whether ``rival`` at the same site is at its bound, within a standard error, where it looks like this one."""

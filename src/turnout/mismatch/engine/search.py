@@ -10,7 +10,8 @@ import numpy as np
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
-from turnout.mismatch.engine.map_fit import FINE_STALL, MAX_CHEAP_STEPS, STALL, fit_jointly
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.map_fit import Fit
     from turnout.mismatch.engine.score import Score
     from turnout.mismatch.engine.verdict import Verdict
-
-MAX_ROUNDS = 3  # rounds of steps for a leader; one that still gains afterwards is far from any optimum
 
 
 def _report_nothing(n_done: int, total: int, key: str) -> None:
@@ -61,7 +60,8 @@ class Search:
         """A search with the default for each argument that is None. Fits of a cheap case have more steps."""
         settings = settings or MismatchSettings()
         if not case.expensive:
-            settings = replace(settings, base_iterations=MAX_CHEAP_STEPS, iterations=MAX_CHEAP_STEPS)
+            steps = THRESHOLDS.max_cheap_steps
+            settings = replace(settings, base_iterations=steps, iterations=steps)
         return cls(case, settings, {} if store is None else store, report or _report_nothing)
 
     def labelled(self, label: str) -> Search:
@@ -78,7 +78,7 @@ class Search:
         psi: np.ndarray,
         values: Mapping[str, float],
         reused_jacobian: list[np.ndarray] | None = None,
-        stall: float = STALL,
+        stall: float = THRESHOLDS.stall,
     ) -> Fit:
         """Joint fit of candidates from these parameters and nuisances, with the steps of a refit.
 
@@ -106,15 +106,15 @@ class Search:
             self.case, candidates, psi, values, reused_jacobian, iterations=self.settings.iterations, stall=stall
         )
 
-    def continue_fit(self, fit: Fit, stall: float = STALL) -> Fit:
+    def continue_fit(self, fit: Fit, stall: float = THRESHOLDS.stall) -> Fit:
         """The fit continued from where it is, with new derivatives. SimulationError as ``fit`` raises it."""
         return self.fit(fit.candidates, fit.psi, fit.values, stall=stall)
 
     def converge(self, fit: Fit) -> Fit:
         """The fit, continued until a round of steps gains less than a name needs. Each round has new derivatives."""
-        for _ in range(MAX_ROUNDS):
+        for _ in range(THRESHOLDS.max_rounds):
             try:
-                before, fit = fit, self.continue_fit(fit, FINE_STALL)
+                before, fit = fit, self.continue_fit(fit, THRESHOLDS.fine_stall)
             except SimulationError:
                 break
             if fit.evidence - before.evidence < self.settings.threshold:

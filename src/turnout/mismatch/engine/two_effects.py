@@ -15,7 +15,7 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.cross_validation import held_out_score, signature_overlap
-from turnout.mismatch.engine.decision import MAX_LOSS_SHARE, PAIR_RULES, SECOND_RULES, first_applicable, judge
+from turnout.mismatch.engine.decision import PAIR_RULES, SECOND_RULES, first_applicable, judge
 from turnout.mismatch.engine.evidence import (
     assess,
     excess_ratio,
@@ -26,18 +26,13 @@ from turnout.mismatch.engine.evidence import (
 )
 from turnout.mismatch.engine.reserved_data import gain_error, reserved_fit
 from turnout.mismatch.engine.search import Findings, Search
+from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
     from turnout.mismatch.engine.map_fit import Fit
     from turnout.mismatch.engine.score import Score
     from turnout.mismatch.engine.verdict import Verdict
-
-MAX_RIVALS = 2  # rivals that are refitted beside the second effect
-MIN_KEPT_GAIN_SHARE = 0.5  # share of a rival's gain; one that keeps more on top of the leader explains something else
-MAX_FIT_LOSS = 3.0  # points of fit on reserved recordings; a larger loss counts
-# Share of the first effect's evidence that an error in its shape may leave to a second one: sizes err by a fifth.
-SHAPE_ERROR_SHARE = 0.05
 
 
 @dataclass(frozen=True)
@@ -82,10 +77,10 @@ class SecondEvidence:
     def shape_error_evidence(self) -> float:
         """Evidence that an error in the shape of the first effect may leave to another name. [nats]"""
         first, second = self.first.scores[0], self.named
-        if first.candidate.exact or second.gain >= SHAPE_ERROR_SHARE * first.gain:
+        if first.candidate.exact or second.gain >= THRESHOLDS.shape_error_share * first.gain:
             return 0.0
         overlap = signature_overlap(self.search.case, second.fit, first.candidate, second.candidate)
-        return SHAPE_ERROR_SHARE * first.gain * overlap
+        return THRESHOLDS.shape_error_share * first.gain * overlap
 
     @cached_property
     def split_first(self) -> Verdict:
@@ -101,7 +96,7 @@ class SecondEvidence:
         rivals = [
             s
             for s in self.first.scores
-            if s is not rival and on_top.get(s.candidate.key, 0.0) < MIN_KEPT_GAIN_SHARE * s.gain
+            if s is not rival and on_top.get(s.candidate.key, 0.0) < THRESHOLDS.min_kept_gain_share * s.gain
         ]
         retested, _ = assess(self.search, self.findings.base, tuple(rivals))
         return (
@@ -266,7 +261,7 @@ class PairEvidence:
     def second_predicts_worse(self) -> bool:
         """Whether the pair predicts the reserved recordings worse than the first effect alone.
 
-        Worse means by more than ``MAX_FIT_LOSS`` points and the standard error of the difference.
+        Worse means by more than ``max_fit_loss`` points and the standard error of the difference.
         """
         if not self.is_pair or not self.search.case.reserved:
             return False
@@ -279,15 +274,15 @@ class PairEvidence:
         )
         if before is None or after is None:
             return False
-        return before_percent - after_percent > max(MAX_FIT_LOSS, gain_error(case.reserved, before, after))
+        return before_percent - after_percent > max(THRESHOLDS.max_fit_loss, gain_error(case.reserved, before, after))
 
     def _scores_beside_second(self, second_alone: Fit) -> Iterator[Score]:
         """The first effect's leader and its close rivals, each with its gain beside the second effect."""
         settings, fit, scores = self.search.settings, self.findings.fit, self.first.scores
         leader, second = scores[0], fit.candidates[1]
         yield self._score_beside_second(fit, second_alone, leader)
-        close = leader.gain - max(settings.margin, MAX_LOSS_SHARE * leader.gain)
-        for rival in [s for s in scores[1:] if s.gain > max(close, settings.threshold)][:MAX_RIVALS]:
+        close = leader.gain - max(settings.margin, THRESHOLDS.max_loss_share * leader.gain)
+        for rival in [s for s in scores[1:] if s.gain > max(close, settings.threshold)][: THRESHOLDS.max_rivals]:
             psi = np.concatenate([rival.fit.psi, fit.psi[fit.part(second)]])
             try:
                 pair_fit = self.search.fit((rival.candidate, second), psi, fit.values)

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from turnout.mismatch.engine.thresholds import THRESHOLDS
+
 if TYPE_CHECKING:
     from turnout.config.settings.mismatch import MismatchSettings
     from turnout.mismatch.engine.decision import Rule
@@ -104,11 +106,14 @@ def posterior(scores: Sequence[Score], excess: float, settings: MismatchSettings
     unexplained = 1.0 - min(1.0, max(0.0, explained))
     unknown = settings.unknown_offset
     if excess > 1.0:
-        unknown += 2.0 * settings.threshold * np.log(excess) * (0.2 + unexplained) / settings.explained
+        share = THRESHOLDS.unknown_share + unexplained
+        unknown += THRESHOLDS.unknown_slope * settings.threshold * np.log(excess) * share / settings.explained
     top = max([0.0, unknown, *best_gains.values()])
     logits = {"none": 0.0, "unknown": min(unknown, max([0.0, *best_gains.values()]) + settings.threshold), **best_gains}
-    prior = {"none": 0.5, "unknown": 0.1, **dict.fromkeys(best_gains, 0.4 / max(1, len(best_gains)))}
-    scaled = {n: prior[n] * np.exp(max(-700.0, (v - top) / settings.temperature)) for n, v in logits.items()}
+    prior = {"none": THRESHOLDS.prior_none, "unknown": THRESHOLDS.prior_unknown}
+    prior |= dict.fromkeys(best_gains, THRESHOLDS.prior_families / max(1, len(best_gains)))
+    exponents = {n: max(-THRESHOLDS.max_exponent, (v - top) / settings.temperature) for n, v in logits.items()}
+    scaled = {n: prior[n] * np.exp(v) for n, v in exponents.items()}
     total = sum(scaled.values())
     return {name: float(v / total) for name, v in scaled.items()}
 
@@ -151,7 +156,8 @@ def calibrate(
     >>> round(calibrate({"a": 0.5, "none": 0.5}, ("a",), 0.5, MismatchSettings()), 6)
     0.5
     """
-    raw = min(1.0 - 1e-3, max(1e-3, sum(probabilities.get(name, 0.0) for name in chosen)))
+    least = THRESHOLDS.min_probability
+    raw = min(1.0 - least, max(least, sum(probabilities.get(name, 0.0) for name in chosen)))
     odds = (1.0 - settings.softmax_share) * _logit(certainty) + settings.softmax_share * _logit(raw)
     probability = float(1.0 / (1.0 + np.exp(-odds)))
     outside = sum(v for name, v in probabilities.items() if name not in chosen)
