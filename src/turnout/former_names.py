@@ -36,6 +36,7 @@ class FormerNames:
             from importlib.machinery import ModuleSpec
 
             return ModuleSpec(fullname, _EmptyPackage(now), is_package=True)
+        _forget_empty_packages(fullname)
         message = f"{fullname} was renamed in Turnout 0.2. Import {now} instead"
         raise ModuleNotFoundError(message, name=fullname)
 
@@ -55,9 +56,20 @@ class _EmptyPackage:
         def missing(name: str) -> None:
             if name.startswith("__"):
                 raise AttributeError(name)
+            _forget_empty_packages(f"{module.__name__}.{name}")
             raise ImportError(f"{module.__name__} was renamed in Turnout 0.2. Import {name} from {self.now} instead")
 
         module.__dict__["__getattr__"] = missing
+
+
+def _forget_empty_packages(fullname: str) -> None:
+    """Take the empty packages above ``fullname`` away again: ``turnout.receptance`` is a function as well."""
+    parts = fullname.split(".")[:-1]
+    for n in range(len(parts), 1, -1):
+        module = sys.modules.get(".".join(parts[:n]))
+        if isinstance(getattr(getattr(module, "__spec__", None), "loader", None), _EmptyPackage):
+            del sys.modules[".".join(parts[:n])]
+            vars(sys.modules[".".join(parts[: n - 1])]).pop(parts[n - 1], None)
 
 
 def announce_former_names() -> None:

@@ -37,6 +37,12 @@ class Configuration:
     acknowledgements: tuple[dict, ...] = ()
     warnings: tuple[ConfigError, ...] = ()
 
+    def __repr__(self) -> str:
+        layouts = sorted({row.values["layout"] for row in self.rows.values()})
+        n_warning = f", {len(self.warnings)} warnings" if self.warnings else ""
+        names = f"{len(self.rows)} turnouts, layouts: {', '.join(layouts[:4])}{' ...' if len(layouts) > 4 else ''}"
+        return f"Configuration({self.folder}: {names}, {len(self.events)} events{n_warning})"
+
     @property
     def ids(self) -> tuple[str, ...]:
         """Ids of all turnouts, in the order of turnouts.tsv."""

@@ -90,6 +90,13 @@ class TurnoutConfig:
     trains: tuple[Mapping[str, str], ...] = ()
     folder: Path = Path("config")
 
+    def __repr__(self) -> str:
+        kinds = [
+            name for name, part in (("hammer tests", self.hammer), ("passages", self.passages)) if part is not None
+        ]
+        sections = f"{len(self.sections)} sections"
+        return f"TurnoutConfig({self.id}, layout {self.layout}: {', '.join([sections, *kinds])})"
+
     def section(self, label: str) -> Section:
         """The section with a label.
 

@@ -18,6 +18,18 @@ if TYPE_CHECKING:
 def value_with_error(value: float, error: float | None) -> str:
     """A value with its error, both to the last digit that the error leaves significant.
 
+    Parameters
+    ----------
+    value : float
+        The value. [any unit]
+    error : float or None
+        Its error; None for the value alone. [same unit]
+
+    Returns
+    -------
+    str
+        Without unit.
+
     Examples
     --------
     >>> value_with_error(154.63, 0.83), value_with_error(611.4, 2.3), value_with_error(99.6, 0.12)
@@ -105,12 +117,11 @@ class ModalModel:
     receptance: Receptance | None = None
 
     def __repr__(self) -> str:
-        modes = ", ".join(f"{mode.band} {mode.frequency_text}" for mode in self.modes)
-        reasons = "; ".join(r.detail or r.reason for r in self.rejections)
-        n = max((mode.n for mode in self.modes), default=0)
-        return f"ModalModel({self.method}, {self.status}: {modes or reasons or 'no mode'}" + (
-            f", n = {n})" if n else ")"
-        )
+        modes = [f"{mode.band} {mode.frequency_text}" for mode in self.modes]
+        n = [f"n = {max(mode.n for mode in self.modes)}"] if modes else []
+        reasons = [r.detail or r.reason for r in self.rejections]
+        words = "; ".join(text for text in (", ".join([*modes, *n]), *reasons) if text)
+        return f"ModalModel({self.method}, {self.status}: {words or 'no mode'})"
 
     def plot(self, figure: Figure | SubFigure | None = None) -> np.ndarray:
         """Draw the modes with their errors, below the measured receptance if the model holds it.
@@ -136,7 +147,18 @@ class ModalModel:
         return self.a.shape[0]
 
     def mode(self, band: str) -> Mode | None:
-        """The mode of ``band``, or None."""
+        """The mode of ``band``, or None.
+
+        Parameters
+        ----------
+        band : str
+            "ballast", "railpad" or "other".
+
+        Returns
+        -------
+        Mode or None
+            The first mode of that band.
+        """
         return next((m for m in self.modes if m.band == band), None)
 
 

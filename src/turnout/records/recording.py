@@ -54,7 +54,7 @@ class Samples(Protocol):
         """One channel per row."""
 
     @property
-    def read(self):
+    def read(self) -> Callable[[int, int], np.ndarray]:
         """(start, stop) -> (n_channel, stop - start)."""
 
 
@@ -67,11 +67,33 @@ class SampledSignals:
         return self.n_sample / self.rate
 
     def of_quantity(self: Samples, quantity: str) -> tuple[int, ...]:
-        """Rows of all channels that measure ``quantity``."""
+        """Rows of all channels that measure ``quantity``.
+
+        Parameters
+        ----------
+        quantity : str
+            "force", "acceleration", "velocity", "displacement", "strain" or "temperature".
+
+        Returns
+        -------
+        tuple of int
+            Rows, increasing.
+        """
         return tuple(i for i, c in enumerate(self.channels) if c.quantity == quantity)
 
     def blocks(self: Samples, length: float) -> Iterator[np.ndarray]:
-        """The whole recording in consecutive blocks of ``length`` seconds, (n_channel, n) each."""
+        """The whole recording in consecutive blocks of ``length`` seconds, (n_channel, n) each.
+
+        Parameters
+        ----------
+        length : float
+            Length of a block. [s]
+
+        Yields
+        ------
+        (n_channel, n) array of float
+            In the SI unit of each channel; the last block may be shorter.
+        """
         step = max(round(length * self.rate), 1)
         for start in range(0, self.n_sample, step):
             yield self.read(start, min(start + step, self.n_sample))
@@ -147,7 +169,7 @@ class Recording(SampledSignals):
     started_at: datetime | None = None
     conditions: Mapping = field(default_factory=dict)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         samples = np.asarray(self.samples, dtype=float)
         if samples.ndim != 2 or samples.shape[0] != len(self.channels):
             raise ValueError(f"{samples.shape} samples do not match {len(self.channels)} channels")
@@ -181,18 +203,61 @@ class Recording(SampledSignals):
         return self.samples.shape[1]
 
     def read(self, start: int, stop: int) -> np.ndarray:
-        """(n_channel, stop - start) samples."""
+        """(n_channel, stop - start) samples.
+
+        Parameters
+        ----------
+        start, stop : int
+            First sample, and the one after the last.
+
+        Returns
+        -------
+        (n_channel, stop - start) array of float
+            In the SI unit of each channel.
+        """
         return self.samples[:, start:stop]
 
     def index(self, name: str) -> int:
-        """Row of the channel called ``name``; KeyError lists the names there are."""
+        """Row of the channel called ``name``; KeyError lists the names there are.
+
+        Parameters
+        ----------
+        name : str
+            Name of a channel.
+
+        Returns
+        -------
+        int
+            Its row.
+
+        Raises
+        ------
+        KeyError
+            There is no such channel; the message lists the names there are.
+        """
         for i, channel in enumerate(self.channels):
             if channel.name == name:
                 return i
         raise KeyError(f"no channel {name!r}; there are {[c.name for c in self.channels]}")
 
     def signal(self, name: str) -> np.ndarray:
-        """(n_sample,) samples of the channel called ``name``, in its SI unit."""
+        """(n_sample,) samples of the channel called ``name``, in its SI unit.
+
+        Parameters
+        ----------
+        name : str
+            Name of a channel.
+
+        Returns
+        -------
+        (n_sample,) array of float
+            In the SI unit of the channel.
+
+        Raises
+        ------
+        KeyError
+            There is no such channel.
+        """
         return self.samples[self.index(name)]
 
 

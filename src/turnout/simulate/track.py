@@ -78,6 +78,10 @@ class Track:
     section: tuple[str, ...] = ()
     name: str = "track"
 
+    def __repr__(self) -> str:
+        n_support, extent = len(self.support), f"{self.support[0]:g} to {self.support[-1]:g} m"
+        return f"Track({self.name}: {extent}, {n_support} supports, {self.layers} layers)"
+
     def __post_init__(self) -> None:
         support = np.array(self.support, dtype=float)
         if support.ndim != 1 or support.size < 3 or not np.all(np.diff(support) > 0.0):

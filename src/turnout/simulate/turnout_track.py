@@ -37,6 +37,12 @@ class TurnoutTrack:
     terms: tuple[ParameterSet, ...] = ()
     spreads: dict[PathPart, dict[str, float]] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        locations = f", locations {', '.join(self.locations)}" if self.locations else ""
+        n_effect = f", {len(self.terms)} accepted effects" if self.terms else ""
+        extent = f"{self.track.start:g} to {self.track.end:g} m"
+        return f"TurnoutTrack({self.name or 'unnamed'}: {extent}, routes {', '.join(self.routes)}{locations}{n_effect})"
+
     @property
     def name(self) -> str:
         """Name of the track."""

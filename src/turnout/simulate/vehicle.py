@@ -67,6 +67,10 @@ class Vehicle:
     overhang: float = 0.0
     conditions: dict = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        length = f"{self.wheel_positions[-1]:.1f} m from the first to the last axle"
+        return f"Vehicle({self.name}: {len(self.wheels)} axles, {len(self.bodies)} bodies, {length})"
+
     def __post_init__(self) -> None:
         for body in self.bodies:
             if not body.mass > 0.0 or (body.inertia is not None and not body.inertia > 0.0):

@@ -1,0 +1,1 @@
+"""Functions for scripts and notebooks, offered as names of ``turnout``; thin over those of the packages."""
