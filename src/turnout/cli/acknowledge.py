@@ -9,6 +9,8 @@ chart is off the list until the date. Both are lines of config/acknowledgements.
 
 import argparse
 
+from turnout.cli.options import add_configuration, add_registry
+
 OPEN_ALARMS_QUERY = """
     select 1 from alarms
     where closed_at_utc is null and turnout_id = $1 and section_id = coalesce($2, section_id)
@@ -25,10 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--reason", required=True, help="why")
     parser.add_argument("--suppress-until", metavar="DATE", default="", help="silence it until then, YYYY-MM-DD")
     parser.add_argument("--at", default="", help="when it was said, UTC; now if not given")
-    parser.add_argument("--registry", default="results/registry", help="where open alarms are looked up (%(default)s)")
-    parser.add_argument(
-        "--configuration", "--config", default="config", help="folder of the configuration (%(default)s)"
-    )
+    add_registry(parser, help="where open alarms are looked up (%(default)s)")
+    add_configuration(parser)
 
 
 def run(args: argparse.Namespace) -> int:

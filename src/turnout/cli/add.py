@@ -5,6 +5,8 @@ turnout add tommerup_s3 tommerup --raw line_7/T00043 --name "Tommerup, switch 3"
 
 import argparse
 
+from turnout.cli.options import add_configuration
+
 HELP = "add a turnout"
 
 
@@ -17,9 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     for column, key in list(ROW.items())[2:]:
         unit = f" [{key.unit}]" if key.unit else ""
         parser.add_argument("--" + column.replace("_", "-"), dest=column, metavar="…", help=key.meaning + unit)
-    parser.add_argument(
-        "--configuration", "--config", default="config", help="folder of the configuration (%(default)s)"
-    )
+    add_configuration(parser)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -10,23 +10,7 @@ effects of your own, one file each; --panel crossing puts all cases into crossin
 does) and publish it before anybody diagnoses.
 """
 
-import argparse
-
-
-def at_least_one(text: str) -> int:
-    """The number of ``text``, 1 or more; argparse.ArgumentTypeError otherwise.
-
-    >>> at_least_one("4")
-    4
-    """
-    try:
-        number = int(text)
-    except ValueError:
-        number = 0
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of 1 or more")
-    return number
-
+from turnout.cli.options import at_least_one
 
 HELP = "prove the diagnosis on concealed effects: make, diagnose, reveal, score"
 

@@ -8,6 +8,8 @@ parameters whose simulated test has these resonances [Hz] and damping ratios. No
 are printed as they stand in the track's file. Without --track it is that of the turnout.
 """
 
+from turnout.cli.options import add_configuration, add_track, add_turnout
+
 HELP = "fit a simulated section to measured receptances"
 PRINTED_UNITS = {
     "pad_stiffness": "MN/m",
@@ -21,12 +23,10 @@ PRINTED_UNITS = {
 def add_arguments(parser):
     """Options of the command."""
     parser.add_argument("files", nargs="*", help="hammer tests of the section")
-    parser.add_argument(
-        "--track", help="file in config/tracks, or its path (default: the turnout's own, else tommerup)"
-    )
+    add_track(parser)
     parser.add_argument("--section", required=True, help="section of the track file")
-    parser.add_argument("--turnout", help="id in config/turnouts.tsv, for the track and the channels of the files")
-    parser.add_argument("--configuration", "--config", default="config", help="configuration folder (default config)")
+    add_turnout(parser, "id in config/turnouts.tsv, for the track and the channels of the files", required=False)
+    add_configuration(parser, help="configuration folder (default config)")
     parser.add_argument("--modes", nargs="+", metavar="BAND=HZ/ZETA", help="resonances to meet instead of files")
 
 

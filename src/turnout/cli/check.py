@@ -5,15 +5,15 @@ Every error is one line: file, line, column, what stands there, what to write in
 
 import argparse
 
+from turnout.cli.options import add_configuration, add_raw
+
 HELP = "check configuration and file names"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Folders of configuration and raw files."""
-    parser.add_argument(
-        "--configuration", "--config", default="config", help="folder of the configuration (%(default)s)"
-    )
-    parser.add_argument("--raw", help="raw root (raw, where it is there)")
+    add_configuration(parser)
+    add_raw(parser, help="raw root (raw, where it is there)", default=None)
     parser.add_argument("--formats", action="store_true", help="list the raw formats")
 
 

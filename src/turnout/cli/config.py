@@ -9,6 +9,8 @@ turnout config generate --check    say what is out of date, change nothing
 import argparse
 import sys
 
+from turnout.cli.options import add_configuration
+
 HELP = "show or generate configuration"
 
 
@@ -23,9 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     generate.add_argument("--defaults", action="store_true", help="do not keep values changed in config.yaml")
     generate.add_argument("--docs", default="docs", help="folder of the documentation (%(default)s)")
     for sub in (show, generate):
-        sub.add_argument(
-            "--configuration", "--config", default="config", help="folder of the configuration (%(default)s)"
-        )
+        add_configuration(sub)
 
 
 def run(args: argparse.Namespace) -> int:

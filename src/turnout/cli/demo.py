@@ -7,7 +7,7 @@ The same seed gives the same samples. The configuration that comes with the prog
 turnouts.
 """
 
-from turnout.cli.blind import at_least_one
+from turnout.cli.options import add_cores
 
 HELP = "make a demonstration fleet and run everything on it"
 
@@ -17,7 +17,7 @@ def add_arguments(parser):
     parser.add_argument("--seed", type=int, default=1, help="another seed makes another fleet (default 1)")
     parser.add_argument("--campaigns", type=int, default=24, help="campaigns per turnout (default 24)")
     parser.add_argument("--passages", type=int, default=12, help="train passages per turnout (default 12)")
-    parser.add_argument("--cores", type=at_least_one, default=None, help="processors to use (default: all)")
+    add_cores(parser, "processors to use (default: all)", default=None)
     parser.add_argument("--only-raw", action="store_true", help="make the raw files and stop")
 
 

@@ -13,23 +13,25 @@ again for that.
 import sys
 import time
 
+from turnout.cli.options import add_configuration, add_pages, add_raw, add_registry, add_track, add_turnout, add_work
+
 HELP = "say what the simulation of a turnout leaves out"
 
 
 def add_arguments(parser):
     """Options of the command."""
-    parser.add_argument("--turnout", required=True, help="id in config/turnouts.tsv")
+    add_turnout(parser, "id in config/turnouts.tsv")
     parser.add_argument("--sections", nargs="+", default=(), help="only these sections")
     parser.add_argument(
         "--visit",
         help="YYYY-MM-DD, YYYY-MM, or 'all' together (effects of temperature need several days): default the newest",
     )
-    parser.add_argument("--track", help="file in config/tracks; default: the turnout's own, else its layout's")
-    parser.add_argument("--configuration", "--config", default="config", help="configuration folder (%(default)s)")
-    parser.add_argument("--raw", default="raw", help="folder of raw files (%(default)s)")
-    parser.add_argument("--work", default="work", help="where fits and results are kept (%(default)s)")
-    parser.add_argument("--registry", default="results/registry", help="what --accept looks in, too (%(default)s)")
-    parser.add_argument("--pages", default="results/pages", help="where the page goes (%(default)s)")
+    add_track(parser, help="file in config/tracks; default: the turnout's own, else its layout's")
+    add_configuration(parser, help="configuration folder (%(default)s)")
+    add_raw(parser)
+    add_work(parser, "where fits and results are kept (%(default)s)")
+    add_registry(parser, help="what --accept looks in, too (%(default)s)")
+    add_pages(parser, "where the page goes (%(default)s)")
     parser.add_argument("--budget", type=float, metavar="MINUTES", help="stop after so long and keep what is done")
     parser.add_argument("--accept", action="store_true", help="write what was named into the turnout's track file")
     parser.add_argument("--finding", metavar="ID", help="which finding to accept, where several are named")
@@ -44,7 +46,7 @@ def run(args):
     results = Results(args.work, args.turnout, args.registry)
     if args.accept:
         return _accept(args, results)
-    from turnout.stages.accepted_effects_case import BudgetSpentError
+    from turnout.stages.budget import BudgetSpentError
 
     try:
         _save_and_print(args, results, _diagnose(args))

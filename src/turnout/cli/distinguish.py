@@ -8,13 +8,15 @@ column's best strength and with all nuisances free; "none" is the base model. Be
 a name needs 12 in the column "none" and 6 against each rival: plan for that.
 """
 
+from turnout.cli.options import add_configuration, add_track
+
 HELP = "which effects a planned campaign can tell apart"
 
 
 def add_arguments(parser):
     """Options of the command."""
-    parser.add_argument("--track", default="tommerup", help="file in config/tracks (%(default)s)")
-    parser.add_argument("--configuration", "--config", default="config", help="configuration folder (%(default)s)")
+    add_track(parser, help="file in config/tracks (%(default)s)", default="tommerup")
+    add_configuration(parser, help="configuration folder (%(default)s)")
     parser.add_argument("--sensors", nargs="+", type=float, required=True, metavar="M", help="places on the rail [m]")
     parser.add_argument("--blows", nargs="*", type=float, default=(), metavar="M", help="places of the hammer [m]")
     parser.add_argument("--temperatures", nargs="+", type=float, default=(15.0,), metavar="C", help="of the rail [°C]")

@@ -10,6 +10,8 @@ again. Which resonance a kind resets is the program's choice unless --resets say
 
 import argparse
 
+from turnout.cli.options import add_configuration, add_registry
+
 HELP = "list maintenance, or enter it"
 
 
@@ -21,10 +23,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--resets", default="", help="'ballast', 'railpad', 'ballast railpad' or 'none'")
     parser.add_argument("--note", default="", help="free text")
     parser.add_argument("--effect", action="store_true", help="what the entered work did, from the registry")
-    parser.add_argument("--registry", default="results/registry", help="folder of the registry (%(default)s)")
-    parser.add_argument(
-        "--configuration", "--config", default="config", help="folder of the configuration (%(default)s)"
-    )
+    add_registry(parser)
+    add_configuration(parser)
 
 
 def run(args: argparse.Namespace) -> int:

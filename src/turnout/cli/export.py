@@ -9,6 +9,8 @@ Delta Lake needs the extra: pip install -e '.[lakehouse]'
 
 import argparse
 
+from turnout.cli.options import add_registry
+
 HELP = "write tables and views as Parquet, CSV or Delta Lake"
 DEFAULT_TABLES = ("turnouts", "sections", "events", "campaigns", "modes_current", "charts", "baselines", "alarms",
          "chart_states", "worklist")  # fmt: skip
@@ -21,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--only", nargs="+", metavar="NAME", help=f"tables and views; usually {', '.join(DEFAULT_TABLES)}"
     )
     parser.add_argument("--format", choices=("parquet", "csv", "delta"), default="parquet", help="(%(default)s)")
-    parser.add_argument("--registry", default="results/registry", help="folder of the registry (%(default)s)")
+    add_registry(parser)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -14,22 +14,22 @@ Exit code 1 where a test gives no resonance, 2 where the command cannot be follo
 
 import argparse
 
+from turnout.cli.options import add_configuration, add_raw, add_turnout
+
 HELP = "analyse one hammer test and say what is in it"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The files, the turnout, and options for what the file names do not give."""
     parser.add_argument("file", nargs="+", help="files of the test, in any format that is read")
-    parser.add_argument("--turnout", required=True, help="id of the turnout, for its sections and channels")
+    add_turnout(parser, "id of the turnout, for its sections and channels")
     parser.add_argument("--section", help="label of the section, where the file's name does not say it")
     parser.add_argument("--campaign", help="day of the campaign, YYYY-MM-DD, where neither name nor file says it")
     parser.add_argument(
         "--figure", metavar="OUT.svg", help="draw receptance, coherence, decay and blows into this file"
     )
-    parser.add_argument(
-        "--configuration", "--config", default="config", help="folder of the configuration (%(default)s)"
-    )
-    parser.add_argument("--raw", help="raw root, for what was noted of the campaign (raw)")
+    add_configuration(parser)
+    add_raw(parser, help="raw root, for what was noted of the campaign (raw)", default=None)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -8,6 +8,7 @@ Exit code 1 where no train is found, 2 where the command cannot be followed.
 
 import argparse
 
+from turnout.cli.options import add_configuration, add_turnout, add_work
 from turnout.constants import KMH
 
 HELP = "analyse one passage file and say what is in it"
@@ -16,11 +17,9 @@ HELP = "analyse one passage file and say what is in it"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The recording, its turnout, and the folder of its models."""
     parser.add_argument("file", help="passage recording, in any format that is read")
-    parser.add_argument("--turnout", required=True, help="id of the turnout, for its sensors and models")
-    parser.add_argument(
-        "--configuration", "--config", default="config", help="folder of the configuration (%(default)s)"
-    )
-    parser.add_argument("--work", default="work", help="folder of the last run (%(default)s)")
+    add_turnout(parser, "id of the turnout, for its sensors and models")
+    add_configuration(parser)
+    add_work(parser, "folder of the last run (%(default)s)")
     parser.add_argument("--no-fit", action="store_true", help="only find the train, fit no model")
 
 
@@ -102,7 +101,7 @@ def _fit_lines(recording, passage, turnout, context, settings) -> list[str]:
             lines.append(f"  {sensor.name:<10}{reason}")
             continue
         samples, times = recording.signal(sensor.name), passage.at_sensor[sensor.name]
-        fit = fit_channel(samples, recording.rate, times, passage.motion.speed, model.model, settings)
+        fit = fit_channel(samples, recording.rate, times, passage.train_motion.speed, model.model, settings)
         if fit.scores is None:
             lines.append(f"  {sensor.name:<10}{fit.detail}")
             continue

@@ -12,7 +12,7 @@ import csv
 import sys
 from decimal import Decimal
 
-from turnout.cli.blind import at_least_one
+from turnout.cli.options import add_csv, add_registry, at_least_one
 
 HELP = "ask the registry in SQL"
 
@@ -20,8 +20,8 @@ HELP = "ask the registry in SQL"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The query, the folder of the registry and the output."""
     parser.add_argument("sql", nargs="?", help="a query; '-' reads it from standard input")
-    parser.add_argument("--registry", default="results/registry", help="folder of the registry (%(default)s)")
-    parser.add_argument("--csv", metavar="FILE", help="write comma-separated values there, '-' = standard output")
+    add_registry(parser)
+    add_csv(parser)
     parser.add_argument("--rows", type=at_least_one, default=60, help="rows shown at most (%(default)s)")
     parser.add_argument("--list", action="store_true", help="name the tables, views and macros")
 

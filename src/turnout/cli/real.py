@@ -5,7 +5,7 @@ a five-hit hammer test (hit 0 overloaded, hit 2 double, by its authors' word), t
 beams with published modes, and vendors' UFF files. Everything lies below real/.
 """
 
-from turnout.cli.blind import at_least_one
+from turnout.cli.options import add_cores
 
 HELP = "run everything on recordings made by others"
 
@@ -13,7 +13,7 @@ HELP = "run everything on recordings made by others"
 def add_arguments(parser):
     """Options of the command."""
     parser.add_argument("--folder", default="real", help="where everything goes (default real)")
-    parser.add_argument("--cores", type=at_least_one, default=2, help="processors to use (default 2)")
+    add_cores(parser, "processors to use (default 2)", default=2)
 
 
 def run(args):

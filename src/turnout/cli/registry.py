@@ -10,7 +10,7 @@ describe   tables, views and macros with their columns, units and meanings
 
 import argparse
 
-from turnout.cli.blind import at_least_one
+from turnout.cli.options import add_registry, at_least_one
 
 HELP = "check, compact, move or describe the registry"
 ACTIONS = ("check", "compact", "vacuum", "relocate", "rebuild", "describe")
@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The action, the folder and the options of single actions."""
     parser.add_argument("action", choices=ACTIONS)
     parser.add_argument("name", nargs="?", help="describe: only this table, view or macro")
-    parser.add_argument("--registry", default="results/registry", help="folder of the registry (%(default)s)")
+    add_registry(parser)
     parser.add_argument("--quick", action="store_true", help="check: do not read the files whole")
     parser.add_argument(
         "--at-least", type=at_least_one, default=2, metavar="N", help="compact: only where N files lie (2)"

@@ -5,20 +5,20 @@ turnout report --day 2026-03-01      list and states as of that day, as far as t
 turnout report --turnouts tommerup_s1 tommerup_s2
 """
 
-from turnout.cli.blind import at_least_one
+from turnout.cli.options import add_cores, add_pages, add_registry
 
 HELP = "write the pages of fleet and turnouts"
 
 
 def add_arguments(parser):
     """Options of the command."""
-    parser.add_argument("--registry", default="results/registry", help="folder of the registry (%(default)s)")
-    parser.add_argument("--pages", default="results/pages", help="where the pages go (%(default)s)")
+    add_registry(parser)
+    add_pages(parser, "where the pages go (%(default)s)")
     parser.add_argument(
         "--turnouts", "--turnout", nargs="+", metavar="ID", help="only these turnouts' pages, and the fleet's"
     )
     parser.add_argument("--day", metavar="DATE", help="list and states of that day, YYYY-MM-DD, instead of today")
-    parser.add_argument("--cores", type=at_least_one, default=1, help="processes that draw pages (%(default)s)")
+    add_cores(parser, "processes that draw pages (%(default)s)", default=1)
 
 
 def run(args):

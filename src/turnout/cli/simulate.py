@@ -9,6 +9,8 @@ pipeline finds it; what is true of it goes to a file of the same name below --tr
 each blow fell and how hard, or the wheels' forces.
 """
 
+from turnout.cli.options import add_configuration, add_raw, add_track, add_turnout
+
 HELP = "simulate a hammer test or a train passage"
 
 
@@ -34,14 +36,10 @@ def add_arguments(parser):
     passage.add_argument("--route", default="main", help="route of the track file (default main)")
     passage.add_argument("--direction", choices=("facing", "trailing"), default="facing")
     for sub in (hammer, passage):
-        sub.add_argument(
-            "--track", help="file in config/tracks, or its path (default: the turnout's own, else tommerup)"
-        )
-        sub.add_argument("--turnout", help="id in config/turnouts.tsv")
-        sub.add_argument(
-            "--configuration", "--config", dest="config", default="config", help="its folder (default config)"
-        )
-        sub.add_argument("--raw", default="raw", help="folder of raw files (default raw)")
+        add_track(sub)
+        add_turnout(sub, "id in config/turnouts.tsv", required=False)
+        add_configuration(sub, help="its folder (default config)", dest="config")
+        add_raw(sub, help="folder of raw files (default raw)")
         sub.add_argument("--truth", help="folder for what is true; the pipeline does not read it")
         sub.add_argument("--out", help="file to write instead of a place below --raw")
         sub.add_argument("--format", help="format of the file (default: by the ending of --out, else hdf5)")

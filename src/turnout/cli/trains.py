@@ -10,6 +10,7 @@ setting passage.assets names; the next run uses them, and computes the passages 
 import argparse
 from pathlib import Path
 
+from turnout.cli.options import add_configuration, add_raw, add_registry
 from turnout.constants import KMH
 
 HELP = "learn axle loads and clusters from the trains so far"
@@ -18,11 +19,9 @@ HELP = "learn axle loads and clusters from the trains so far"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The turnouts, and the folders of configuration, recordings and registry."""
     parser.add_argument("--turnout", nargs="*", help="only the loads of these turnouts")
-    parser.add_argument(
-        "--configuration", "--config", default="config", help="folder of the configuration (%(default)s)"
-    )
-    parser.add_argument("--raw", default="raw", help="folder of the recordings (%(default)s)")
-    parser.add_argument("--registry", default="results/registry", help="folder of the registry (%(default)s)")
+    add_configuration(parser)
+    add_raw(parser, help="folder of the recordings (%(default)s)")
+    add_registry(parser)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -9,6 +9,7 @@ turnout worklist --csv list.csv
 import argparse
 import csv
 
+from turnout.cli.options import add_csv, add_registry
 from turnout.cli.query import open_output
 
 FIRST_MEASUREMENT_QUERY = "select min(measured_at_utc) from charts where state <> 'wrong_time'"
@@ -17,10 +18,10 @@ HELP = "tomorrow's list: what to inspect, what to plan, where nothing can be sai
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Folder of the registry, date of the list and output file."""
-    parser.add_argument("--registry", default="results/registry", help="folder of the registry (%(default)s)")
+    add_registry(parser)
     parser.add_argument("--asof", metavar="DATE", help="as it was then: YYYY-MM-DD, UTC")
     parser.add_argument("--all", action="store_true", help="every row; open alarms are never left out anyway")
-    parser.add_argument("--csv", metavar="FILE", help="write comma-separated values there, '-' = standard output")
+    add_csv(parser)
 
 
 def run(args: argparse.Namespace) -> int:
