@@ -46,7 +46,7 @@ def _folder(config, subfolder):
 def _matrix(plan, effects):
     case = PlannedCase(plan, families=effects)
     if effects and (unknown := sorted({*effects} - {c.family for c in case.candidates})):
-        names = ", ".join(sorted({c.family for c in list_candidates(case)}))
+        names = ", ".join(sorted({c.family for c in list_candidates(case.data)}))
         raise SimulationError(f"no effect {unknown[0]!r} in such a campaign; there are {names}.")
     return distinguishability(case)
 

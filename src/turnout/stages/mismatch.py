@@ -14,7 +14,7 @@ from turnout.errors import ReadError, SimulationError, TurnoutError
 from turnout.mismatch.engine.diagnose import diagnose
 from turnout.mismatch.turnout import TrackCase
 from turnout.records import Unit
-from turnout.stages.accepted_effects_case import AcceptedEffectsCase, BudgetSpentError, Watch
+from turnout.stages.budget import Budget, BudgetSpentError, Watch
 from turnout.stages.checkpoint import Checkpoint, Replay
 from turnout.stages.common import quarantine_row
 from turnout.stages.mismatch_groups import Group, groups, members_of
@@ -113,11 +113,9 @@ def _diagnose_group(group: Group, turnout, accepted, about, options, number) -> 
     replay = Replay(Path(options.fits), f"{name}-predictions", (about["identity"],))
     report_progress = options.progress(group, *number) if options.progress else None
     try:
-        track_case = TrackCase(group.campaign, turnout.settings["mismatch"])
         accepted = tuple(a for a in accepted if a.is_on(group.route))
-        case = AcceptedEffectsCase(
-            track_case, accepted, options.watch, replay if options.watch.deadline is not None else None
-        )
+        budget = Budget(options.watch, None if options.watch.deadline is None else replay)
+        case = TrackCase(group.campaign, turnout.settings["mismatch"], accepted=accepted, cache=budget)
         rows = finding_tables(diagnose(case, turnout.settings["mismatch"], report_progress, store), case, group, about)
     except (SimulationError, np.linalg.LinAlgError) as error:
         reasons = [f"sections {', '.join(group.labels)}: {error}", *map(str, about["notes"])]

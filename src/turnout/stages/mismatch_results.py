@@ -8,7 +8,7 @@ from turnout.errors import SimulationError
 from turnout.files import write_text
 from turnout.fingerprint import fingerprint
 from turnout.registry.database import open_registry
-from turnout.stages.accepted_effects_case import Watch
+from turnout.stages.budget import Watch
 from turnout.stages.mismatch import Options, diagnose_visit
 from turnout.stages.mismatch_groups import unit_of, visits
 from turnout.stages.mismatch_inputs import mismatch_context

@@ -5,9 +5,9 @@ from datetime import datetime
 
 import numpy as np
 
+from turnout import physics
 from turnout.registry.ids import content_id
 from turnout.stages.accepted_effects import describe_term
-from turnout.stages.accepted_effects_case import accepted_estimates
 from turnout.stages.mismatch_curves import (
     band_of,
     band_of_impacts,
@@ -20,50 +20,8 @@ from turnout.stages.mismatch_text import headline, interval, surface_sentence
 
 MAX_CELL_DISTANCE = 0.3  # m: a cell of the residual closer than this is at the finding
 FALSE_DISCOVERY_RATE = 0.05  # expected share of false ones among the frames reported
-SITE_CHECKS = {
-    "hanging_sleeper": "Look under this sleeper while a train passes; tamp it",
-    "local_ballast": "Compare the ballast of this sleeper with its neighbours'; tamp or drain",
-    "local_pad": "Take out the pad of this sleeper",
-    "surface_dip": "Measure the running surface there with a straightedge; weld or grind",
-    "wheel_flat": "Send the wheelset to the lathe; the track needs nothing",
-    "unsprung_mass": "Check the vehicle file of this train",
-    "sensor_gain": "Calibrate this sensor, look at its polarity, swap it with its neighbour",
-    "mount_resonance": "Fasten this sensor again and strike the rail beside it",
-    "time_offset": "Check the clock of this channel",
-    "sensor_position": "Measure where this sensor sits",
-    "clipping": "Raise the range of this channel",
-    "hum": "Check the shield and the ground of this channel",
-    "clock_drift": "Check the clock of this channel",
-    "low_pass": "Check filter and cable of this channel",
-    "high_pass": "Check the coupling of this channel's amplifier",
-    "ballast_hardening": "Look for fine material or frost in this ballast; compare its settlement under a heavy train",
-    "dry_friction": "Look for a loose clip or a worn baseplate on this sleeper",
-    "attached_resonator": "Look for what hangs on the rail there: a box, a rod, a heater",
-    "rail_corrugation": "Measure the roughness of the rail; grind",
-    "out_of_round": "Measure this wheelset's run-out; the track needs nothing",
-    "pad_temperature": "Nothing to mend: compare campaigns at one temperature only",
-    "pad_preload": "Strike the rail beside a standing train: what a blow on unloaded track says is too soft",
-    "zener_pad": "Ask for the pads' dynamic stiffness; take one to the laboratory",
-    "rail_shear": "Check the rail profile in the track's file",
-    "ballast_inertia": "Check the sleepers' mass and the ballast's depth in the track's file",
-    "sleeper_mode": "Check the kind of sleepers in the track's file",
-    "contact_stiffness": "Measure the profiles of rail and wheels",
-}
-SEPARATING_TESTS = {
-    "pad_temperature": "a hammer test at another rail temperature, 15 K away",
-    "pad_preload": "a hammer test beside a standing train, or passages of another axle load",
-    "zener_pad": "a hammer test with a hard tip up to 1.2 kHz",
-    "hanging_sleeper": "passages of a lighter and a heavier train, and a hammer test on this sleeper",
-    "local_ballast": "passages of a lighter and a heavier train",
-    "local_pad": "a hammer test at this sleeper and at its neighbours",
-    "surface_dip": "passages at another speed",
-    "wheel_flat": "another passage of this train",
-    "mount_resonance": "a hammer test beside this sensor",
-    "time_offset": "passages at another speed",
-    "sensor_position": "passages at another speed",
-    "attached_resonator": "a hammer test above and beside this place",
-}
 SUPPORT_SPACING = 0.6  # m between supports
+GENERAL_CHECK = "Look at the place; repeat the measurement after the work"
 GENERAL_TEST = "hammer tests at the points between, and a train of another load and speed"
 
 
@@ -98,11 +56,12 @@ def location_text(diagnosis):
 
 def recommendation(diagnosis):
     """What to check on site, or which measurement would decide."""
-    verdict = diagnosis.verdict
+    verdict, effects = diagnosis.verdict, physics.effects_by_name()
     if verdict.answer == "named":
-        return SITE_CHECKS.get(verdict.names[0], "Look at the place; repeat the measurement after the work")
+        return effects[verdict.names[0]].site_check if verdict.names[0] in effects else GENERAL_CHECK
     if verdict.answer == "a_or_b":
-        return f"Measure {SEPARATING_TESTS.get(verdict.names[0], SEPARATING_TESTS.get(verdict.names[1], GENERAL_TEST))}"
+        tests = (effects[name].separating_test for name in verdict.names[:2] if name in effects)
+        return f"Measure {next(filter(None, tests), GENERAL_TEST)}"
     return f"Measure {GENERAL_TEST}" if verdict.answer == "unknown" else ""
 
 
@@ -249,7 +208,7 @@ def _summary_columns(diagnosis, case, group, about) -> dict:
     campaign, fit = group.campaign, diagnosis.fit
     positions = [s.place for s in campaign.sensors] + [t.place for t in campaign.hammer]
     terms = [
-        describe_term(t, c, se, case.track()) | _term_evidence(v)
+        describe_term(t, c, se, case.predictor.track()) | _term_evidence(v)
         for t, c, se, v in zip(fit.terms, fit.candidates, _errors_by_candidate(fit), diagnosis.verdicts)
     ]  # fmt: skip
     return {
@@ -339,7 +298,7 @@ def parameter_rows(diagnosis, case, row) -> list[dict]:
         for name, p in term["parameters"].items():
             channel = term["fixed"].get("channel_name")
             rows.append(_parameter_row(term["term"], position, channel, name, p["value"], p["se"], p["unit"], False))
-    for v in accepted_estimates(case, diagnosis.fit):
+    for v in case.accepted.estimates(case.nuisances, diagnosis.fit):
         a = v["accepted"]
         channel = a.fixed.get("channel_name")
         rows.append(_parameter_row(a.family, a.place, channel, v["name"], v["value"], v["se"], v["unit"], True))
@@ -350,7 +309,7 @@ def parameter_rows(diagnosis, case, row) -> list[dict]:
 
 def surface_estimates(case, fit) -> list[dict]:
     """Estimates of uncertain numbers of the running surface in the track's file."""
-    surface = getattr(case, "surface", None)
+    surface = case.predictor.site.surface
     return list(surface.estimate(case, fit)) if surface else []
 
 

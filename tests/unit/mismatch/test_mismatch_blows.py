@@ -13,7 +13,7 @@ from turnout.errors import SimulationError
 from turnout.mismatch import diagnose
 from turnout.mismatch.turnout import CampaignInput, TrackCase, receptance_observation, sensitivity
 from turnout.mismatch.turnout.campaign import HammerInput
-from turnout.mismatch.turnout.observations import hammer_observations
+from turnout.mismatch.turnout.observations import observe_tests
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.mismatch.turnout.receptance_model import ReceptanceModel
 from turnout.simulate import uniform_track
@@ -111,7 +111,7 @@ def test_a_rail_soft_in_shear_is_sized_against_the_rail_of_its_file(plan):
     """The fits start from a rail moved to where blows have it; what is named is still what the file's rail lacks, 4 per
     GN beside its own 4.1."""
     case, found = found_in(plan, physics.RailShear(4.0))
-    assert case.rail["rail_shear"] < -0.05
+    assert case.predictor.rail["rail_shear"] < -0.05
     assert found.names[:1] == ("rail_shear",)
     assert abs(found.fit.psi[0] - 4.0) < 2.0 * found.fit.psi_se[0]
 
@@ -119,15 +119,15 @@ def test_a_rail_soft_in_shear_is_sized_against_the_rail_of_its_file(plan):
 def test_a_shear_law_is_tried_in_the_rail_that_blows_bent():
     """What a term says of the rail is said of its file; the rest stays as blows found it, for passages as well."""
     case = TrackCase(measured_campaign(small_plan((15.0,), hammer_positions=(24.0,), passages=False), (), 3))
-    case.recentre({"rail_bending": 0.03, "rail_shear": -0.2})
-    file, bent = case.nominal.turnout.track.rail, case.track().rail
+    predictor = case.predictor.recentred({"rail_bending": 0.03, "rail_shear": -0.2})
+    file, bent = predictor.site.nominal.turnout.track.rail, predictor.track().rail
     assert bent.shear_stiffness == pytest.approx(np.exp(-0.2) * file.shear_stiffness)
-    sheared = case.track(terms=(physics.LocalPad(3, 2.0), physics.RailShear(2.0))).rail
+    sheared = predictor.track(terms=(physics.LocalPad(3, 2.0), physics.RailShear(2.0))).rail
     assert sheared.shear_stiffness == file.shear_stiffness
     assert sheared.bending_stiffness == pytest.approx(np.exp(0.03) * file.bending_stiffness)
-    assert case.track(terms=(physics.LocalPad(3, 2.0),)).rail == bent
-    case.recentre({"rail_bending": 0.01})
-    assert case.track(terms=(physics.RailShear(2.0),)).rail.bending_stiffness < sheared.bending_stiffness
+    assert predictor.track(terms=(physics.LocalPad(3, 2.0),)).rail == bent
+    predictor = predictor.recentred({"rail_bending": 0.01})
+    assert predictor.track(terms=(physics.RailShear(2.0),)).rail.bending_stiffness < sheared.bending_stiffness
 
 
 def test_a_receptance_follows_the_rail_however_far_it_goes(plan):
@@ -136,7 +136,7 @@ def test_a_receptance_follows_the_rail_however_far_it_goes(plan):
     (name, pair), *_ = case.frf_pairs.items()
     values = {n.name: n.mean for n in case.nuisances} | {"rail_shear": -0.41}
     (found,) = case.predict(values, (), [o for o in case.observations if o.name == name])
-    track = case.nominal.turnout.track
+    track = case.data.site.nominal.turnout.track
     softer = replace(track.rail, shear_stiffness=track.rail.shear_stiffness * np.exp(-0.41))
     model = ReceptanceModel(track.with_(rail=softer), ())
     exact = receptance_observation.split_complex(
@@ -148,10 +148,8 @@ def test_a_receptance_follows_the_rail_however_far_it_goes(plan):
 def test_a_blow_is_not_asked_of_sensors_far_from_it():
     """At 8 m the tolerance of a model has 1 + (8 / 1.5)^2 = 29 times its variance at the blow."""
     plan = small_plan((15.0,), hammer_positions=(20.4, 30.0), passages=False)
-    case = SimpleNamespace(
-        campaign=measured_campaign(plan), saturated={}, settings=MismatchSettings(), notes=[], frf_pairs={}
-    )
-    heard = {(p.test.place, p.channel) for p in case.frf_pairs.values()} if list(hammer_observations(case)) else set()
+    pairs = observe_tests(measured_campaign(plan), MismatchSettings().pair_tolerance).frf_pairs
+    heard = {(p.test.place, p.channel) for p in pairs.values()}
     assert heard == {(20.4, s.name) for s in plan.sensors} | {(30.0, "S2"), (30.0, "S3"), (30.0, "S4")}
 
 
@@ -163,7 +161,7 @@ def test_a_blow_slips_in_a_loose_joint_and_sticks_in_a_tight_one(plan, limit, mo
     support = plan.turnout.track.nearest_support(22.2)
     case = TrackCase(measured_campaign(plan, (physics.DryFriction(support, limit),), 3))
     values = {n.name: n.mean for n in case.nuisances}
-    term = physics.DryFriction(case.nominal.turnout.track.nearest_support(22.2), limit)
+    term = physics.DryFriction(case.data.site.nominal.turnout.track.nearest_support(22.2), limit)
     before, after = (case.predict(values, terms, case.observations) for terms in ((), (term,)))
     left, change = (sum(np.sum((o.data - p) ** 2) for o, p in zip(case.observations, q)) for q in (after, before))
     assert left < most**2 * change
@@ -177,8 +175,8 @@ def test_a_derivative_goes_to_the_side_where_the_simulation_can():
             raise SimulationError("too heavy")
         return np.array([values["load"] ** 2])
 
-    case = SimpleNamespace(predict_passage=simulated)
-    found = sensitivity._difference(case, {"load": 3.0}, (), None, np.array([9.0]), "load", 0.1)
+    predictor = SimpleNamespace(predict_passage=simulated)
+    found = sensitivity._difference(predictor, {"load": 3.0}, (), None, np.array([9.0]), "load", 0.1)
     assert found == pytest.approx([5.9])
 
 

@@ -10,11 +10,12 @@ from turnout.mismatch.engine.candidate_search import shortlist
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.search import Search
-from turnout.mismatch.turnout.candidates.catalogue import MASS_STARTS, distant_mass_starts, residual_of_train
-from turnout.physics import Parameter
+from turnout.mismatch.turnout.candidates.catalogue import distant_starts, residual_of_train
+from turnout.physics import Parameter, UnsprungMass
 
 FACTOR = (Parameter("factor", "-", 1.0, (0.4, 2.5), "times the pitch", "made up 2026", (1.0, 0.3)),)
 T = np.linspace(0.0, 1.0, 300)
+MASSES = UnsprungMass.distant_starts
 
 
 class Pitch(Case):
@@ -51,13 +52,13 @@ def test_what_lies_behind_a_hump_is_found_from_afar(true):
     """Four turns or more away a derivative says nothing of the way there: neither column nor twin promise 2 nats."""
     blind = Pitch(true)
     assert shortlist(Search(blind), fit_jointly(blind)) == []
-    case = Pitch(true, MASS_STARTS)
+    case = Pitch(true, MASSES)
     (found,) = shortlist(Search(case), fit_jointly(case))
     assert found.start == pytest.approx([true]) and found.values == {"tune": 0.0}
 
 
 def test_a_start_from_afar_that_gains_nothing_is_not_refitted():
-    case = Pitch(1.0, MASS_STARTS)
+    case = Pitch(1.0, MASSES)
     assert shortlist(Search(case), fit_jointly(case)) == []
 
 
@@ -67,8 +68,8 @@ def test_only_trains_that_leave_more_than_sound_ones_are_simulated():
     rms = {"loud 1": 1.0, "loud 2": np.sqrt(3.0), "quiet": np.sqrt(0.5), "blows": 9.0}
     seen = [Observation(n, n, np.zeros(40), np.ones(40), effective=0.5) for n in names]
     case = SimpleNamespace(
-        observations=seen, control_level={"passage": 0.7}, conditions_of=lambda made: {"train": made},
-        aligned_passages={n: train for n, train in names.items() if train},
+        observations=seen, control_level={"passage": 0.7},
+        aligned_passages={n: SimpleNamespace(conditions={"train": train}) for n, train in names.items() if train},
         candidates=[Candidate("unsprung_mass", FACTOR, float, ((1.4,),), {"train": t}) for t in "ab"],
     )  # fmt: skip
     fit = SimpleNamespace(white=[np.full(40, rms[o.name]) for o in seen])
@@ -76,5 +77,5 @@ def test_only_trains_that_leave_more_than_sound_ones_are_simulated():
         case, fit, "b"
     ) == pytest.approx(0.5)
     assert residual_of_train(case, fit, "c") == 0.0
-    found = distant_mass_starts(case, fit)
-    assert [(c.where["train"], start) for c, start in found] == [("a", (m,)) for m in MASS_STARTS]
+    found = distant_starts(case, fit)
+    assert [(c.where["train"], start) for c, start in found] == [("a", (m,)) for m in MASSES]

@@ -149,6 +149,7 @@ class OnlyWaves(Case):
     def __init__(self):
         rng = np.random.default_rng(11)
         self.waves = Waves(PLACES, 0.0)
+        self.predictor = SimpleNamespace(waves=self.waves)
         self.nuisances = tuple(self.waves.nuisances())
         self.observations = (Observation("a", "a", rng.normal(size=400), 1.0, data_type="passage"),)
         self.columns = rng.normal(size=(400, len(self.nuisances))) / self.waves.sd

@@ -1,6 +1,5 @@
 """Derivatives of receptances by parameters of terms, without solving the track again."""
 
-from copy import copy
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -11,7 +10,7 @@ from turnout import physics
 from turnout.mismatch.turnout import TrackCase, receptance_observation
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.mismatch.turnout.receptance_model import AddedLinks, changed_links
-from turnout.mismatch.turnout.screening import CHANNEL_EFFECTS, _pair_channel_changes
+from turnout.mismatch.turnout.screening import _pair_channel_changes
 from turnout.simulate import uniform_track
 from turnout.simulate.turnout_track import TurnoutTrack
 
@@ -73,7 +72,9 @@ def test_what_is_no_change_of_links_is_predicted(somewhere, old, new):
 
 def test_links_that_are_others_are_no_small_step(somewhere):
     case, values = somewhere
-    model = case.pair_sensitivity(values, (physics.LocalBallast(J, 0.5),), next(iter(case.frf_pairs.values()))).model
+    model = case.predictor.pair_sensitivity(
+        values, (physics.LocalBallast(J, 0.5),), next(iter(case.frf_pairs.values()))
+    ).model
     assert changed_links(model, (physics.LocalBallast(J + 1, 0.5),)) is None
     assert changed_links(model, (physics.LocalPad(J, 0.5),)) is None
     ends, impedance = changed_links(model, (physics.LocalBallast(J, 0.5),))
@@ -84,7 +85,7 @@ def test_an_added_link_changes_a_receptance_as_a_track_that_has_it(somewhere):
     """A pad, and a mass on a spring, at three supports, at their starts: one link each, so exact."""
     case, values = somewhere
     chosen = [(c, 0) for c in case.candidates if c.family in ("local_pad", "attached_resonator")][::7]
-    added = AddedLinks(case, SimpleNamespace(values=values, terms=()), chosen)
+    added = AddedLinks(case.predictor, values, (), chosen)
     for o in case.observations[:3]:
         (before,) = case.predict(values, (), [o])
         for (c, k), found in zip(chosen, added.changes(case.frf_pairs[o.name]).values()):
@@ -99,7 +100,7 @@ def test_what_a_channel_does_to_a_receptance_is_what_the_case_predicts(somewhere
     values = values | {"rail_shear": 0.02}
     predicted = case.predict(values, (), case.observations)
     fit, told = SimpleNamespace(values=values, terms=(), predictions=predicted), set()
-    chosen = [(c, 0) for c in case.candidates if c.family in CHANNEL_EFFECTS]
+    chosen = [(c, 0) for c in case.candidates if c.term(c.starts[0]).column_type == "channel"]
     for o, old in zip(case.observations, predicted):
         for c, found in zip(*_heard(case, fit, o, old, chosen)):
             (after,) = case.predict(values, (c.term(c.starts[0]),), [o])
@@ -118,10 +119,10 @@ def _heard(case, fit, observation, old, chosen):
 def test_a_sensor_moved_from_the_rail_to_a_sleeper_is_another_seat(somewhere):
     """The same channel at the same place, mounted otherwise in the second test: each pair is predicted as if alone."""
     case, values = somewhere
-    (first, second), found = [o for o in case.observations if ":S1" in o.name][:2], copy(case)
+    first, second = [o for o in case.observations if ":S1" in o.name][:2]
     sleeper = replace(case.frf_pairs[second.name].sensor, mounting="sleeper")
-    found.frf_pairs = {**case.frf_pairs, second.name: replace(case.frf_pairs[second.name], sensor=sleeper)}
-    found._clear_caches()
+    pairs = {**case.frf_pairs, second.name: replace(case.frf_pairs[second.name], sensor=sleeper)}
+    found = case.predictor.with_recordings(pairs, {})
     (alone,), (beside,) = case.predict(values, (), [first]), found.predict(values, (), [first])
     assert np.allclose(alone, beside, atol=0.0, rtol=1e-9)
     (there,), (moved,) = case.predict(values, (), [second]), found.predict(values, (), [second])

@@ -62,7 +62,9 @@ def test_a_support_is_odd_against_the_spread_of_its_like(times, usual):
     own candidate; ballast is not its like, nor is what all pads have in common."""
     values = 0.3 + 0.2 * np.sqrt(7.0 / 6.0) * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 0.0])
     names = ["pad_0", *(f"pad_{k + 1}" for k in range(7)), "ballast_3", "pad_stiffness"]
-    case = SimpleNamespace(nuisances=[Nuisance(n, "-", 0.0, 0.1) for n in names])
+    nuisances = [Nuisance(n, "-", 0.0, 0.1, group="pad", index=k) for k, n in enumerate(names[:8])]
+    nuisances += [Nuisance("ballast_3", "-", 0.0, 0.1, group="ballast", index=3)]
+    case = SimpleNamespace(nuisances=[*nuisances, Nuisance("pad_stiffness", "-", 0.0, 0.1, group="pad")])
     spread = np.sqrt(4e-2 + 9e-2)
     refit = SimpleNamespace(
         values=dict(zip(names, [9.0, *values, 9.0, 9.0])),

@@ -1,6 +1,5 @@
 """Passages: columns against the simulation, a flat found in the residual, our own numerics."""
 
-from copy import copy
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -36,7 +35,7 @@ def sound(plan):
 @pytest.mark.parametrize("wavelength", [0.9, 0.5])
 def test_the_derivative_by_a_wave_of_the_rail_points_where_the_simulation_goes(sound, wavelength):
     case, values = sound
-    name = case.waves.names[2 * int(np.argmin(np.abs(case.waves.lengths - wavelength)))]
+    name = case.predictor.waves.names[2 * int(np.argmin(np.abs(case.predictor.waves.lengths - wavelength)))]
     index = [n.name for n in case.nuisances].index(name)
     seen = [o for o in case.observations if o.name == "heavy 2"]
     before = case.predict(values, (), seen)
@@ -60,7 +59,7 @@ def test_derivatives_of_passages_are_those_beside_the_term(sound, term):
     """A wave of the rail and a pad, seen by S3 where, when and as loud as the term says, pressed by such wheels."""
     case, values = sound
     (seen,) = (o for o in case.observations if o.name == "heavy 2")
-    wave = case.waves.names[2 * int(np.argmin(np.abs(case.waves.lengths - 0.7)))]
+    wave = case.predictor.waves.names[2 * int(np.argmin(np.abs(case.predictor.waves.lengths - 0.7)))]
     row = [s.name for s in case.aligned_passages["heavy 2"].sensors].index("S3")
     before = case.predict(values, (term,), [seen])[0]
     jacobian = case.nuisance_jacobian(values, (term,), [seen], [before])[0]
@@ -79,14 +78,14 @@ def test_a_wave_is_as_loud_as_simulated_where_supports_differ(sound, hangs):
     hangs gives way. 0.93 and 14 % are met; with the rail of the middle alone it is a third less, with the hanging
     sleeper on its bed a sixth."""
     case, values = sound
-    middle = int(np.argmin(np.abs(case.track().support - 24.0)))
+    middle = int(np.argmin(np.abs(case.predictor.track().support - 24.0)))
     term = (physics.HangingSleeper(middle, 1.5e-3, 0.05),) if hangs else ()
     values = values if term else {**values, f"ballast_{middle}": -1.5}
     (seen,) = (o for o in case.observations if o.name == "heavy 2")
     before = case.predict(values, term, [seen])[0]
     jacobian = case.nuisance_jacobian(values, term, [seen], [before])[0]
     for wavelength in (0.55, 0.45, 0.38):
-        wave = case.waves.names[2 * int(np.argmin(np.abs(case.waves.lengths - wavelength)))]
+        wave = case.predictor.waves.names[2 * int(np.argmin(np.abs(case.predictor.waves.lengths - wavelength)))]
         index = [n.name for n in case.nuisances].index(wave)
         change = case.predict({**values, wave: values[wave] + case.nuisances[index].sd}, term, [seen])[0] - before
         column, change = seen.whiten(jacobian[:, index]), seen.whiten(change) / case.nuisances[index].sd
@@ -161,24 +160,24 @@ def test_one_sensor_that_disagrees_does_not_cost_the_passage_but_a_wrong_train_d
     case, values = sound
     passage = next(p for p in case.campaign.passages if p.name == "heavy 2")
     sensors = case.aligned_passages["heavy 2"].sensors
-    signals = case.passage_simulator(values, (), passage)(passage, passage.vehicle, passage.speed, sensors)
-    reference, speed, _ = align(passage, low_pass(passage.recording, sensors), signals, case.solver.rate)
+    signals = case.predictor.passage_simulator(values, (), passage)(passage, passage.vehicle, passage.speed, sensors)
+    reference, speed, _ = align(passage, low_pass(passage.recording, sensors), signals, case.predictor.solver.rate)
     rows = [passage.recording.index(s.name) for s in sensors]
 
     def reversed_(*which):
         samples = passage.recording.samples.copy()
         samples[[rows[k] for k in which]] *= -1.0
         turned = replace(passage, recording=replace(passage.recording, samples=samples))
-        return align(turned, low_pass(turned.recording, sensors), signals, case.solver.rate)
+        return align(turned, low_pass(turned.recording, sensors), signals, case.predictor.solver.rate)
 
     found = reversed_(wrong)
     assert found[2] > MIN_CORRELATION and found[0] == pytest.approx(reference, abs=2.6e-3)  # two steps of the search
     assert found[1] == pytest.approx(speed, rel=0.003)
     assert reversed_(wrong, wrong + 2)[2] < MIN_CORRELATION
-    light = case.passage_simulator(values, (), passage)(
+    light = case.predictor.passage_simulator(values, (), passage)(
         passage, case.aligned_passages["light 2"].passage.vehicle, passage.speed, sensors
     )
-    assert align(passage, low_pass(passage.recording, sensors), light, case.solver.rate)[2] < MIN_CORRELATION
+    assert align(passage, low_pass(passage.recording, sensors), light, case.predictor.solver.rate)[2] < MIN_CORRELATION
 
 
 def test_blows_many_times_as_strong_as_any_axle_do_not_hide_which_train_it_is(sound):
@@ -187,19 +186,19 @@ def test_blows_many_times_as_strong_as_any_axle_do_not_hide_which_train_it_is(so
     case, values = sound
     passage = next(p for p in case.campaign.passages if p.name == "heavy 2")
     sensors = case.aligned_passages["heavy 2"].sensors
-    signals = case.passage_simulator(values, (), passage)(passage, passage.vehicle, passage.speed, sensors)
+    signals = case.predictor.passage_simulator(values, (), passage)(passage, passage.vehicle, passage.speed, sensors)
     quiet = low_pass(passage.recording, sensors)
-    reference = align(passage, quiet, signals, case.solver.rate)[0]
+    reference = align(passage, quiet, signals, case.predictor.solver.rate)[0]
     time = np.arange(quiet.shape[1]) / 800.0
     struck = sum(np.exp(-(((time - reference - 0.02 - 0.16 * k) / 0.01) ** 2)) for k in range(3))
     loud = quiet + 8.0 * np.max(np.abs(quiet), axis=1, keepdims=True) * struck
     alike = np.sum(quiet * loud, axis=1) / np.linalg.norm(quiet, axis=1) / np.linalg.norm(loud, axis=1)
     assert np.max(np.abs(alike)) < 0.7 * MIN_CORRELATION
-    assert align(passage, loud, signals, case.solver.rate)[2] > MIN_CORRELATION
-    light = case.passage_simulator(values, (), passage)(
+    assert align(passage, loud, signals, case.predictor.solver.rate)[2] > MIN_CORRELATION
+    light = case.predictor.passage_simulator(values, (), passage)(
         passage, case.aligned_passages["light 2"].passage.vehicle, passage.speed, sensors
     )
-    assert align(passage, loud, light, case.solver.rate)[2] < MIN_CORRELATION
+    assert align(passage, loud, light, case.predictor.solver.rate)[2] < MIN_CORRELATION
 
 
 def power(case, train):
@@ -236,13 +235,12 @@ def test_passages_roll_on_the_rail_that_the_fit_has(sound):
     all of them, are then those of a case that was made with that rail, and blows are as they were."""
     case, values = sound
     fit = fit_jointly(case, values=values, iterations=1)
-    bent = {name: at - 0.1 * (name == "rail_shear") for name, at in case.rail.items()}
+    bent = {name: at - 0.1 * (name == "rail_shear") for name, at in case.predictor.rail.items()}
     assert case.with_updated_errors(replace(fit, values={**fit.values, **bent})) is case
     bent["rail_shear"] -= 0.3
     softer = replace(fit, values={**fit.values, **bent})
-    new, made = case.with_updated_errors(softer), copy(case)
-    made.recentre(bent)
-    assert new.rail == bent and new.with_updated_errors(softer) is new and case.rail != bent
+    new, made = case.with_updated_errors(softer), case.predictor.recentred(bent)
+    assert new.predictor.rail == bent and new.with_updated_errors(softer) is new and case.predictor.rail != bent
     seen = next(o for o in case.observations if o.name == "heavy 2")
     (before,), (found,), (exact,) = (c.predict(softer.values, (), [seen]) for c in (case, new, made))
     assert np.array_equal(found, exact) and np.linalg.norm(found - before) > 0.01 * np.linalg.norm(before)
@@ -291,7 +289,7 @@ def test_a_wheel_whose_blows_are_nearly_as_loud_is_sized_as_well(plan, monkeypat
     """What blows cannot tell apart the band may: a wheel of three rough ones came before the one with the flat."""
     case = TrackCase(measured_campaign(plan, (), 7))
     (made, *_), radius = case.aligned_passages.values(), 0.46
-    train, phases = case.conditions_of(made)["train"], ((made.name, 0.5),)
+    train, phases = made.conditions["train"], ((made.name, 0.5),)
     nats = {2: 20.0, 0: 20.0 - behind, 5: 20.0 - behind}
     heard = [FlatEvidence(n, train, wheel, radius, phases) for wheel, n in nats.items()]
     monkeypatch.setattr("turnout.mismatch.turnout.candidates.wheel_flats.flat_evidence", lambda case: heard)

@@ -20,7 +20,7 @@ def lightly_damped():
     values = {n.name: case.start_values.get(n.name, n.mean) for n in case.nuisances}
     values |= {"ballast_damping": -1.6, "pad_damping": -0.7}
     (seen,) = (o for o in case.observations if o.name == "heavy 2")
-    return case, values, with_errors(case, values, case.aligned_passages[seen.name], seen)
+    return case, values, with_errors(case.predictor, values, case.aligned_passages[seen.name], seen)
 
 
 @pytest.mark.slow
@@ -31,7 +31,8 @@ def test_rough_rail_beyond_the_free_waves_is_an_error_that_the_passage_knows(lig
     """
     case, values, seen = lightly_damped
     allowed = np.sqrt(2.0) * 1e-6 * 10.0 ** (float(level(np.array([wavelength]), 0.0)[0]) / 20.0)
-    a, b = (case.waves.end + 0.5, case.waves.end + 4.5) if behind else (case.waves.start - 4.5, case.waves.start - 0.5)
+    waves = case.predictor.waves
+    a, b = (waves.end + 0.5, waves.end + 4.5) if behind else (waves.start - 4.5, waves.start - 0.5)
     rough = physics.RailCorrugation(a, b, allowed, 0.0, wavelength)
     plain, with_it = (case.predict(values, terms, [seen])[0] for terms in ((), (rough,)))
     squares = [o.whiten(with_it - plain) ** 2 for o in (replace(seen, modes=None), seen)]
@@ -44,7 +45,7 @@ def test_no_law_is_asked_more_than_a_bay_beyond_what_was_measured(lightly_damped
     case, _, _ = lightly_damped
     measured = case.campaign.positions()
     asked = [c.where["place"] for c in case.candidates if "sleeper" in c.where]
-    free = case.track().support[list(case.zone.supports)]
+    free = case.predictor.track().support[list(case.predictor.zone.supports)]
     assert min(asked) >= min(measured) - EFFECT_REACH and max(asked) <= max(measured) + EFFECT_REACH
     assert free.min() < min(asked) and free.max() > max(asked)
     assert {"local_pad", "local_ballast", "hanging_sleeper"} <= {c.family for c in case.candidates}

@@ -17,7 +17,6 @@ from turnout.mismatch.turnout.running_surface import MODEL_ERROR, SHAPE_SD, Runn
 from turnout.simulate.track_file import turnout_track
 from turnout.simulate.wheel_path import Dip, Kink, Sections
 from turnout.stages.accepted_effects import AcceptedEffect
-from turnout.stages.accepted_effects_case import AcceptedEffectsCase
 from turnout.stages.mismatch_rows import surface_estimates
 from turnout.stages.mismatch_text import surface_sentence
 
@@ -108,12 +107,13 @@ def test_what_is_told_of_a_number_is_not_drawn_to_the_file():
 def test_the_search_for_the_nose_hears_no_recording_that_is_kept_back(monkeypatch):
     heard = []
     monkeypatch.setattr(
-        passage_alignment, "_correlation", lambda case, values, passage: heard.append(passage.name) or 0.5
+        passage_alignment.PassageAligner, "correlation", lambda self, values, passage: heard.append(passage.name) or 0.5
     )
     passages = [SimpleNamespace(name=name, vehicle=SimpleNamespace(wheels=range(4))) for name in "abc"]
     campaign = SimpleNamespace(passages=passages, reserved=("a",), sensors_of=lambda p: ("A1",))
     surface = RunningSurface(FILED, WAVES, ("main",))
-    passage_alignment.fit_surface(SimpleNamespace(campaign=campaign, surface=surface), {})
+    aligner = passage_alignment.PassageAligner(campaign, SimpleNamespace(surface=surface))
+    passage_alignment.fit_surface(aligner, {})
     assert set(heard) == {"b", "c"}
 
 
@@ -147,16 +147,16 @@ def test_a_rough_search_finds_the_nose_from_where_no_straight_step_does(campaign
     """0.4 m further, 10 ms at 40 m/s: more than a period at 112 Hz. The search is to come within a tenth of the
     shortest wave of 30 Hz of the truth, and all trains look like themselves then."""
     case = TrackCase(campaign)
-    found = {u.name: u.value_at(case.start_values[u.name]) for u in case.surface.parameters}
+    found = {u.name: u.value_at(case.start_values[u.name]) for u in case.predictor.surface.parameters}
     assert abs(found["surface_0_place"] - TRUE.place) < 0.1
     assert found["surface_0_depth"] == pytest.approx(TRUE.depth, rel=0.3)
-    assert len(case.aligned_passages) == len(PLAN.trains) and not case.unmatched
+    assert len(case.aligned_passages) == len(PLAN.trains) and not case.data.unmatched
     certain = TrackCase(replace(campaign, turnout=replace(FILED, spreads={})))
     assert not set(found) & set(certain.start_values)
     standing = AcceptedEffect(
         "local_pad", {"sleeper": 24.0}, {"factor": (0.7, 0.05)}
     )  # what blows tell of it is no nose
-    beside = AcceptedEffectsCase(case, (standing,)).start_values
+    beside = TrackCase(campaign, accepted=(standing,)).start_values
     assert {n: beside[n] for n in found} == {n: case.start_values[n] for n in found} and beside != case.start_values
 
 

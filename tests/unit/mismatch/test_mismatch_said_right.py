@@ -17,10 +17,10 @@ from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.search import Findings, Search
 from turnout.mismatch.engine.two_effects import settle_pair
 from turnout.mismatch.turnout import TrackCase
-from turnout.mismatch.turnout.candidates.catalogue import _sensor_candidates
+from turnout.mismatch.turnout.candidates.catalogue import candidate_of, channel_sites
 from turnout.mismatch.turnout.passage_observation import AlignedPassage, observe_passage
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
-from turnout.mismatch.turnout.prediction import TrackPredictor
+from turnout.mismatch.turnout.prediction import Predictor
 from turnout.mismatch.turnout.receptance_model import ReceptanceModel
 from turnout.mismatch.turnout.residual_spaces import _force_space, source_spaces
 from turnout.mismatch.turnout.saturation import raw_peak
@@ -134,9 +134,9 @@ def shown(reference, term):
     time = np.arange(reference - 0.08, reference + 1.0, 1.0 / 360.0)
     sensor = SimpleNamespace(name="A", place=20.0)
     made = AlignedPassage("p", SimpleNamespace(), (sensor,), time, reference, 30.0)
-    case = SimpleNamespace(solver=SimpleNamespace(rate=1800.0))
+    predictor = SimpleNamespace(solver=SimpleNamespace(rate=1800.0))
     row = np.cos(2.0 * np.pi * 20.0 * np.arange(14400) / 7200.0)
-    return time, TrackPredictor.channel_output(case, {"time@p": 0.0, "gain_A": 0.0}, (term,), made, sensor, row), row
+    return time, Predictor.channel_output(predictor, {"time@p": 0.0, "gain_A": 0.0}, (term,), made, sensor, row), row
 
 
 @pytest.mark.parametrize("reference", [0.45, 0.457, 1.237])
@@ -168,7 +168,7 @@ class Topped(Case):
         sigma = 0.1 + 0.06 * np.abs(self.true)
         self.observations = tuple(Observation(f"o{k}", f"day {k}", d, sigma) for k, d in enumerate(data))
         self.sensor = SimpleNamespace(name="A", place=3.0, mounting="rail head")
-        self.candidates = tuple(c for c in _library_of(self.sensor, 6.2) if c.family == "clipping")
+        self.candidates = tuple(_limits_of(self.sensor, 6.2))
 
     def predict(self, values, terms, observations):
         found = self.true
@@ -177,8 +177,8 @@ class Topped(Case):
         return [found for _ in observations]
 
 
-def _library_of(sensor, peak, whole=None):
-    """The library's candidates of one channel that shows no more than ``peak`` in the band, and ``whole`` at all."""
+def _limits_of(sensor, peak, whole=None):
+    """The candidate limits of one channel that shows no more than ``peak`` in the band, and ``whole`` at all."""
     recording = SimpleNamespace(
         channels=(SimpleNamespace(name="B"), sensor), index=["B", "A"].index,
         samples=np.array([[0.0, 99.0, 1.0], [0.1, -0.3, -1.0]]) * np.array([[1.0], [whole or peak]]),
@@ -188,7 +188,8 @@ def _library_of(sensor, peak, whole=None):
         campaign=campaign, frf_pairs={}, aligned_passages={"p": None}, saturated={},
         settings=MismatchSettings(), band_peak=lambda name: peak, raw_peak=lambda name: raw_peak(campaign, name),
     )  # fmt: skip
-    return _sensor_candidates(made)
+    (site,) = channel_sites(made)
+    return [candidate_of(physics.Clipping, limit) for limit in physics.Clipping.hypotheses(site)]
 
 
 def test_a_limit_is_found_from_any_start_of_the_library():
@@ -207,7 +208,7 @@ def test_a_limit_is_found_from_any_start_of_the_library():
 @pytest.mark.parametrize("whole, asked", [(6.2, True), (13.0, True), (14.0, False), (586.6, False)])
 def test_a_channel_is_not_cut_off_below_what_it_has_shown(whole, asked):
     """12.4 in the band are never reached; 0.9 of 13 lie below that, of 14 not."""
-    found = [c for c in _library_of(SimpleNamespace(name="A", place=3.0), 6.2, whole) if c.family == "clipping"]
+    found = _limits_of(SimpleNamespace(name="A", place=3.0), 6.2, whole)
     assert bool(found) == asked
     assert all(0.9 * whole <= start[0] <= 12.4 for c in found for start in c.starts)
 

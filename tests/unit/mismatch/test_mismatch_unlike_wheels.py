@@ -85,8 +85,10 @@ def test_the_signal_of_a_wheel_that_falls_deeper_is_that_of_a_simulation():
     fit = fit_jointly(case, iterations=6)
     o, before = next((o, p) for o, p in zip(case.observations, fit.predictions) if o.name in case.aligned_passages)
     made = case.aligned_passages[o.name]
-    filed = fit.values | dict.fromkeys(case.surface.names, 0.0)
-    modes = profile_modes(case, filed, made, WaveTransfer(case, fit.values, made, beyond=ROUGHNESS_MARGIN))
+    filed = fit.values | dict.fromkeys(case.predictor.surface.names, 0.0)
+    modes = profile_modes(
+        case.predictor, filed, made, WaveTransfer(case.predictor, fit.values, made, beyond=ROUGHNESS_MARGIN)
+    )
     assert modes.shape == (o.data.size, 4 * len(made.passage.vehicle.wheels))
     change = case.predict(fit.values, (OneWheel(),), [o])[0] - before
     found = modes[:, 4]

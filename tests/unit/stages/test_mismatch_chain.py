@@ -14,7 +14,7 @@ from turnout.errors import SimulationError
 from turnout.mismatch.turnout import TrackCase
 from turnout.stages import mismatch, mismatch_groups
 from turnout.stages.accept_finding import accept
-from turnout.stages.accepted_effects_case import BudgetSpentError
+from turnout.stages.budget import BudgetSpentError
 from turnout.stages.mismatch_inputs import track_of
 from turnout.stages.mismatch_results import Results, diagnose_turnout
 

@@ -18,8 +18,8 @@ def latent_force(case, fit):
     spectra = []
     for o, residual in passages:
         aligned = case.aligned_passages[o.name]
-        frequency, g = green_functions(case, fit.values, fit.terms, aligned)
-        g = g * channel_responses(fit.values, fit.terms, aligned, frequency)[:, :, None, None]
+        frequency, g = green_functions(case.predictor, fit.values, case.all_terms(fit), aligned)
+        g = g * channel_responses(fit.values, case.all_terms(fit), aligned, frequency)[:, :, None, None]
         rows = residual.reshape(len(aligned.sensors), -1)
         size = 1 << int(np.ceil(np.log2(2 * rows.shape[1])))
         grid = np.fft.rfftfreq(size, 1.0 / aligned.clock)
@@ -27,7 +27,7 @@ def latent_force(case, fit):
         nearest = np.clip(np.searchsorted(frequency, grid[inside]), 0, frequency.size - 1)
         spectra.append((aligned, np.fft.rfft(rows, size)[:, inside].T, g[nearest, :, :, 1], inside, size))
     gains = []
-    for k in range(len(case.zone.supports)):
+    for k in range(len(case.predictor.zone.supports)):
         gains.append(sum(_explained_power(r, g[:, :, k]) for _, r, g, _, _ in spectra))
     best_support = int(np.argmax(gains))
     series = {name: [] for name in ("force", "displacement", "velocity", "position", "time", "temperature")}
@@ -38,7 +38,11 @@ def latent_force(case, fit):
     covariates = {name: np.concatenate(v) for name, v in series.items()}
     if not np.all(np.isfinite(covariates["temperature"])):
         del covariates["temperature"]
-    return {**covariates, "unit": "N", "sleeper": np.full(covariates["force"].size, case.zone.first + best_support)}
+    return {
+        **covariates,
+        "unit": "N",
+        "sleeper": np.full(covariates["force"].size, case.predictor.zone.first + best_support),
+    }
 
 
 def _power_and_ridge(g):
@@ -60,11 +64,11 @@ def _force(r, g, inside, size, n):
 
 
 def _append_series(case, fit, aligned, series, force, k):
-    _, sleeper = support_motion(case, fit.values, fit.terms, aligned)
-    rate = case.solver.rate
+    _, sleeper = support_motion(case.predictor, fit.values, case.all_terms(fit), aligned)
+    rate = case.predictor.solver.rate
     time = aligned.time - aligned.reference - fit.values[f"time@{aligned.name}"] + passage_model.LEAD_TIME
     y = passage_band.read_at(sleeper[k][None], rate, time)[0]
-    position = case.track().support[case.zone.first + k]
+    position = case.predictor.track().support[case.predictor.zone.first + k]
     wheels = aligned.positions() - position
     nearest = wheels[np.argmin(np.abs(wheels), axis=0), np.arange(time.size)]
     series["force"].append(force)

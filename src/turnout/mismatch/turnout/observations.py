@@ -1,14 +1,27 @@
 """Recordings of a campaign as observations of a case, with the reasons why some are rejected."""
 
+from __future__ import annotations
+
 from collections import Counter
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
+from turnout.mismatch.engine.case import Observation
 from turnout.mismatch.turnout import passage_alignment, passage_observation, receptance_observation
-from turnout.mismatch.turnout.disturbances import disturbances
-from turnout.mismatch.turnout.passage_alignment import align_with_simulation, fit_surface
+from turnout.mismatch.turnout.campaign import CampaignInput, HammerInput, PassageInput
+from turnout.mismatch.turnout.disturbances import Disturbance, disturbances
+from turnout.mismatch.turnout.hammer_case import HammerCase
+from turnout.mismatch.turnout.passage_alignment import PassageAligner, fit_surface
+from turnout.mismatch.turnout.passage_model import Track1D
+from turnout.mismatch.turnout.passage_observation import AlignedPassage
+from turnout.mismatch.turnout.prediction import Predictor, Values
+from turnout.mismatch.turnout.receptance_observation import FrfPair
+from turnout.mismatch.turnout.saturation import SaturationLimit, raw_peak, saturated_channels, without_saturated
+from turnout.mismatch.turnout.site import Site, site_of
 from turnout.mismatch.turnout.wheel_roughness import wheel_modes
 from turnout.simulate.sensor import Sensor
 
@@ -16,123 +29,304 @@ MAX_HAMMER_DISTANCE = 8.0  # m from impact to sensor: beyond, the model error le
 MIN_TIMED_CORRELATION = 0.25  # correlation above which the time of a train is certain; at wrong times: 0.10
 
 
-def hammer_observations(case):
-    """Yield (name of the test, Observation) of every response channel with accepted impacts.
+@dataclass(frozen=True)
+class CaseData:
+    """What a case is made of; nothing of it changes in a diagnosis.
 
-    Stores the pairs and notes in the case.
+    Attributes
+    ----------
+    campaign : CampaignInput
+        Without the saturated sensors.
+    settings : MismatchSettings
+    site : Site
+        The track about sensors and impacts as filed, with its nuisances.
+    frf_pairs : mapping
+        Response channels of the hammer tests, by name.
+    aligned_passages : mapping
+        Passages that are used, by name.
+    observations, reserved : tuple of Observation
+        Those that are fitted, and those that no fit uses.
+    start_values : mapping
+        Nuisances of track, sensors and running surface where fits start.
+    saturated : mapping
+        Sensor -> estimated limit of its channel, for sensors that are not used.
+    unmatched : tuple of PassageInput
+        Passages that do not correlate with the simulation of their train.
+    disturbed : tuple of Disturbance
+        Passages in which another source shakes the sensors.
+    notes : tuple of str
+        What is not used, and why.
     """
-    for test in case.campaign.hammer:
-        sensors = [*case.campaign.sensors, *_loose_sensors(test, case.campaign.sensors)]
+
+    campaign: CampaignInput
+    settings: MismatchSettings
+    site: Site
+    frf_pairs: Mapping[str, FrfPair]
+    aligned_passages: Mapping[str, AlignedPassage]
+    observations: tuple[Observation, ...]
+    reserved: tuple[Observation, ...] = ()
+    start_values: Mapping[str, float] = field(default_factory=dict)
+    saturated: Mapping[str, SaturationLimit] = field(default_factory=dict)
+    unmatched: tuple[PassageInput, ...] = ()
+    disturbed: tuple[Disturbance, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def mismatched_trains(self) -> tuple[str, ...]:
+        """Trains of which more passages contradict their vehicle file than match it, from two passages on.
+
+        Either another train came, or the trains of this type differ. Passages that were disturbed or could not be
+        simulated do not count.
+        """
+        unmatched = Counter(p.train for p in self.unmatched if p.train)
+        matched = Counter(aligned.conditions["train"] for aligned in self.aligned_passages.values())
+        disturbed_names = {d.name for d in self.disturbed}
+        disturbed_trains = {p.train for p in self.campaign.passages if p.name in disturbed_names}
+        return tuple(
+            t
+            for t, n in unmatched.items()
+            if matched and n + matched[t] > 1 and n > matched[t] and t not in disturbed_trains
+        )
+
+    @property
+    def measured_range(self) -> tuple[float, float]:
+        """First and last position of sensors and impacts [m]."""
+        positions = self.campaign.positions()
+        return min(positions), max(positions)
+
+    def band_peak(self, channel: str) -> float:
+        """Largest value of a channel in the fitted passages, within their band; 0 where it has none. [m/s²]"""
+        peaks = [0.0]
+        for o in self.observations:
+            aligned = self.aligned_passages.get(o.name)
+            names = [s.name for s in aligned.sensors] if aligned else []
+            if channel in names:
+                peaks.append(float(np.max(np.abs(o.data.reshape(len(names), -1)[names.index(channel)]))))
+        return max(peaks)
+
+    def raw_peak(self, channel: str) -> float:
+        """Largest value of a channel at its full sampling rate, reserved recordings included. [m/s²]
+
+        A planned campaign has no such signals: its ``band_peak``.
+        """
+        return raw_peak(self.campaign, channel) or self.band_peak(channel)
+
+
+def case_data(campaign: CampaignInput, settings: MismatchSettings, solver: Track1D) -> tuple[CaseData, Predictor]:
+    """Observations of a campaign, and the predictor of its recordings.
+
+    The rail is first fitted to the hammer tests. On that rail passages are simulated, to align the recorded ones and
+    to compute their errors.
+
+    Parameters
+    ----------
+    campaign : CampaignInput
+    settings : MismatchSettings
+    solver : Track1D
+        Settings of the simulation of passages.
+
+    Returns
+    -------
+    data : CaseData
+    predictor : Predictor
+        With the rail that the hammer tests give.
+
+    Raises
+    ------
+    SimulationError
+        No recording can be used, or all of them are reserved.
+    """
+    saturated = saturated_channels(campaign, settings.threshold)
+    campaign = without_saturated(campaign, saturated)
+    site = site_of(campaign)
+    tests = observe_tests(campaign, settings.pair_tolerance, saturated)
+    predictor = Predictor(site, solver).with_recordings(tests.frf_pairs, {})
+    fitted = [o for name, o in tests.observations if name not in campaign.reserved]
+    start_values = _fit_hammer_start(predictor, fitted)
+    predictor = predictor.recentred(start_values)
+    passages = _observe_passages(campaign, settings.materiality, predictor, start_values)
+    recordings = [*tests.observations, *passages.observations]
+    notes = (*tests.notes, *passages.notes)
+    if not recordings:
+        raise SimulationError("nothing to diagnose: " + "; ".join(notes))
+    data = CaseData(
+        campaign,
+        settings,
+        site,
+        tests.frf_pairs,
+        passages.aligned,
+        tuple(o for name, o in recordings if name not in campaign.reserved),
+        tuple(o for name, o in recordings if name in campaign.reserved),
+        {**start_values, **passages.surface_values},
+        saturated,
+        passages.unmatched,
+        passages.disturbed,
+        notes,
+    )
+    if not data.observations:
+        raise SimulationError("every recording is reserved for the verification: nothing is left to fit.")
+    return data, predictor.with_recordings(data.frf_pairs, data.aligned_passages)
+
+
+@dataclass(frozen=True)
+class ObservedTests:
+    """Hammer tests as ``observations`` (name of the test, Observation), with their pairs and notes."""
+
+    frf_pairs: Mapping[str, FrfPair]
+    observations: tuple[tuple[str, Observation], ...]
+    notes: tuple[str, ...]
+
+
+def observe_tests(
+    campaign: CampaignInput, tolerance: float, saturated: Mapping[str, SaturationLimit] | None = None
+) -> ObservedTests:
+    """Observation of every response channel of a hammer test with accepted impacts.
+
+    Parameters
+    ----------
+    campaign : CampaignInput
+    tolerance : float
+        Relative error of a receptance by hammer, calibration and mounting. [-]
+    saturated : mapping or None
+        Sensors that are not used.
+
+    Returns
+    -------
+    ObservedTests
+    """
+    pairs, observations, notes = {}, [], []
+    for test in campaign.hammer:
         sensors = [
-            s for s in sensors if s.name not in case.saturated and abs(s.place - test.place) <= MAX_HAMMER_DISTANCE
+            s
+            for s in (*campaign.sensors, *_loose_sensors(test, campaign.sensors))
+            if s.name not in (saturated or {}) and abs(s.place - test.place) <= MAX_HAMMER_DISTANCE
         ]
-        pairs = receptance_observation.pairs_of_test(test, sensors, case.settings.pair_tolerance)
-        if not pairs:
-            case.notes.append(
+        pairs_of_test = receptance_observation.pairs_of_test(test, sensors, tolerance)
+        if not pairs_of_test:
+            notes.append(
                 f"hammer test {test.name}: no channel within {MAX_HAMMER_DISTANCE:g} m with "
                 f"{receptance_observation.MIN_IMPACTS} sound blows"
             )
-        for pair, observation in pairs:
-            case.frf_pairs[pair.name] = pair
-            yield test.name, observation
+        for pair, observation in pairs_of_test:
+            pairs[pair.name] = pair
+            observations.append((test.name, observation))
+    return ObservedTests(pairs, tuple(observations), tuple(notes))
 
 
-def passage_observations(case):
-    """Yield (name, Observation) of every passage that correlates with the simulation of its train.
-
-    Stores the aligned passages and notes in the case.
-    """
-    if not case.campaign.passages:
-        return
-    values = {n.name: 0.0 for n in case.all_nuisances()} | case.start_values
-    surface_values = fit_surface(case, values)
-    case.start_values, values = {**case.start_values, **surface_values}, {**values, **surface_values}
-    for passage in case.campaign.passages:
-        sensors = case.campaign.sensors_of(passage)
-        if not sensors:
-            case.notes.append(f"passage {passage.name}: none of the sensors recorded it")
-            continue
-        try:
-            reference, speed, correlation = align_with_simulation(case, values, passage)
-        except SimulationError as error:
-            case.notes.append(f"passage {passage.name}: cannot be simulated: {error}")
-            continue
-        if correlation < passage_alignment.MIN_CORRELATION:
-            case.unmatched.append(passage)
-            case.notes.append(
-                f"passage {passage.name}: likeness {correlation:.2f} with the simulation of "
-                f"{passage.train or 'its train'}; wrong vehicle file, wrong sensor places or another turnout"
-            )
-            if correlation > MIN_TIMED_CORRELATION:
-                case.unmatched_aligned[passage.name] = passage_observation.AlignedPassage(
-                    passage.name, passage, sensors, np.zeros(0), reference, speed
-                )
-            continue
-        try:
-            aligned, observation = passage_observation.observe_passage(
-                passage, sensors, reference, speed, case.settings.materiality
-            )
-        except SimulationError as error:
-            case.notes.append(f"passage {passage.name}: {error}")
-            continue
-        case.aligned_passages[passage.name] = aligned
-        yield (
-            passage.name,
-            with_errors(case, {**values, **dict.fromkeys(_nuisance_names(passage), 0.0)}, aligned, observation),
-        )
-
-
-def with_errors(case, values, aligned, observation):
-    """The observation with the error modes of its passage: track and wheels as ``values`` give them."""
-    modes = (
-        passage_observation.coupling_modes(aligned, observation.data).astype(np.float32),
-        wheel_modes(case, values, aligned, observation.sigma),
-    )
-    return replace(observation, modes=np.column_stack(modes))
-
-
-def without_disturbed(case, recordings):
-    """Recordings without the passages in which another source shakes the sensors.
-
-    All of them where fewer than two would remain.
-    """
-    case.disturbed_recordings = tuple(disturbances(case.aligned_passages, case.unmatched_aligned))
-    disturbed = {d.name: d for d in case.disturbed_recordings if d.name in case.aligned_passages}
-    if len(recordings) - len(disturbed) < 2:
-        return recordings
-    for name, d in disturbed.items():
-        del case.aligned_passages[name]
-        case.notes.append(f"passage {name}: not used, {d.excess:.0f} dB louder {d.when} its train than the others")
-    return [(name, o) for name, o in recordings if name not in disturbed]
-
-
-def mismatched_trains(case):
-    """Trains of which more passages contradict their vehicle file than match it, from two passages on.
-
-    Either another train came, or the trains of this type differ. Passages that were disturbed or could not be simulated
-    do not count.
-    """
-    unmatched = Counter(p.train for p in case.unmatched if p.train)
-    matched = Counter(case.conditions_of(aligned)["train"] for aligned in case.aligned_passages.values())
-    disturbed_names = {d.name for d in case.disturbed_recordings}
-    disturbed_trains = {p.train for p in case.campaign.passages if p.name in disturbed_names}
-    return tuple(
-        t
-        for t, n in unmatched.items()
-        if matched and n + matched[t] > 1 and n > matched[t] and t not in disturbed_trains
-    )
-
-
-def _nuisance_names(passage):
-    """Names of the nuisances of a passage."""
-    return [n.name for n in passage_observation.passage_nuisances(passage)]
-
-
-def _loose_sensors(test, sensors):
+def _loose_sensors(test: HammerInput, sensors: Sequence[Sensor]) -> list[Sensor]:
     """Accelerometers of a hammer test that are no installed sensors."""
     installed, accelerometers = {s.name for s in sensors}, {}
     for recording in test.recordings[:1]:
         for channel in recording.channels:
             if channel.quantity == "acceleration" and channel.name not in installed and channel.position is not None:
                 accelerometers[channel.name] = Sensor(channel.name, channel.position, channel.mounting)
-    return accelerometers.values()
+    return list(accelerometers.values())
+
+
+def _fit_hammer_start(predictor: Predictor, observations: Sequence[Observation]) -> dict[str, float]:
+    """Nuisances of track and sensors from the hammer tests alone, the start of all fits; {} without a test."""
+    if not observations:
+        return {}
+    return HammerCase(predictor, observations, predictor.site.shared_nuisances()).fit_from_priors()
+
+
+@dataclass(frozen=True)
+class ObservedPassages:
+    """Passages as ``observations`` (name, Observation), with those that are not used, and notes.
+
+    ``surface_values`` are the nuisances of the running surface with which they were aligned.
+    """
+
+    aligned: Mapping[str, AlignedPassage]
+    observations: tuple[tuple[str, Observation], ...]
+    unmatched: tuple[PassageInput, ...]
+    disturbed: tuple[Disturbance, ...]
+    surface_values: Mapping[str, float]
+    notes: tuple[str, ...]
+
+
+def _observe_passages(
+    campaign: CampaignInput, tolerance: float, predictor: Predictor, start_values: Values
+) -> ObservedPassages:
+    """Observations of the passages that correlate with the simulation of their train and are not disturbed."""
+    if not campaign.passages:
+        return ObservedPassages({}, (), (), (), {}, ())
+    aligner = PassageAligner(campaign, predictor)
+    values = {**{n.name: 0.0 for n in predictor.site.nuisances()}, **start_values}
+    surface_values = fit_surface(aligner, values)
+    values |= surface_values
+    aligned, observations, unmatched, notes = {}, [], {}, []
+    for passage in campaign.passages:
+        outcome = _observe_passage(passage, aligner, values, tolerance)
+        if isinstance(outcome, _Unmatched):
+            unmatched[passage.name] = outcome
+        if isinstance(outcome, (str, _Unmatched)):
+            notes.append(f"passage {passage.name}: {outcome}")
+            continue
+        aligned[passage.name], observation = outcome
+        owned = dict.fromkeys((n.name for n in passage_observation.passage_nuisances(passage)), 0.0)
+        observations.append(
+            (passage.name, with_errors(predictor, {**values, **owned}, aligned[passage.name], observation))
+        )
+    timed = {name: u.aligned for name, u in unmatched.items() if u.aligned is not None}
+    disturbed = tuple(disturbances(aligned, timed))
+    rejected = {d.name: d for d in disturbed if d.name in aligned}
+    if len(observations) - len(rejected) < 2:  # too few would remain: all are used
+        rejected = {}
+    notes += [
+        f"passage {name}: not used, {d.excess:.0f} dB louder {d.when} its train than the others"
+        for name, d in rejected.items()
+    ]
+    return ObservedPassages(
+        {name: a for name, a in aligned.items() if name not in rejected},
+        tuple((name, o) for name, o in observations if name not in rejected),
+        tuple(u.passage for u in unmatched.values()),
+        disturbed,
+        surface_values,
+        tuple(notes),
+    )
+
+
+@dataclass(frozen=True)
+class _Unmatched:
+    """A passage that does not correlate with the simulation; ``aligned`` where its time is certain all the same."""
+
+    passage: PassageInput
+    correlation: float
+    aligned: AlignedPassage | None
+
+    def __str__(self) -> str:
+        return (
+            f"likeness {self.correlation:.2f} with the simulation of {self.passage.train or 'its train'}; "
+            "wrong vehicle file, wrong sensor places or another turnout"
+        )
+
+
+def _observe_passage(
+    passage: PassageInput, aligner: PassageAligner, values: Values, tolerance: float
+) -> tuple[AlignedPassage, Observation] | _Unmatched | str:
+    """The aligned passage and its observation without error modes, or the reason why it cannot be used."""
+    sensors = aligner.campaign.sensors_of(passage)
+    if not sensors:
+        return "none of the sensors recorded it"
+    try:
+        reference, speed, correlation = aligner.align(values, passage)
+    except SimulationError as error:
+        return f"cannot be simulated: {error}"
+    if correlation < passage_alignment.MIN_CORRELATION:
+        is_timed = correlation > MIN_TIMED_CORRELATION
+        timed = AlignedPassage(passage.name, passage, sensors, np.zeros(0), reference, speed) if is_timed else None
+        return _Unmatched(passage, correlation, timed)
+    try:
+        return passage_observation.observe_passage(passage, sensors, reference, speed, tolerance)
+    except SimulationError as error:
+        return str(error)
+
+
+def with_errors(predictor: Predictor, values: Values, aligned: AlignedPassage, observation: Observation) -> Observation:
+    """The observation with the error modes of its passage: track and wheels as ``values`` give them."""
+    modes = (
+        passage_observation.coupling_modes(aligned, observation.data).astype(np.float32),
+        wheel_modes(predictor, values, aligned, observation.sigma),
+    )
+    return replace(observation, modes=np.column_stack(modes))

@@ -5,11 +5,17 @@ later at 44 m/s: three quarters of a period at 112 Hz, but a fifth at 30 Hz. So 
 where a few passages correlate best with the simulation below 30 Hz.
 """
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+
 import numpy as np
 
 from turnout.errors import SimulationError
+from turnout.mismatch.turnout.campaign import CampaignInput, PassageInput
 from turnout.mismatch.turnout.passage_band import band_signals, limit_band, read_at
 from turnout.mismatch.turnout.passage_model import LEAD_TIME
+from turnout.mismatch.turnout.prediction import Predictor, Values
 from turnout.mismatch.turnout.running_surface import POSITION_FIELDS
 
 # Hz, end of the band of the rail's deflection under the axles; least correlation of a passage with its train.
@@ -80,29 +86,65 @@ EFFECTIVE_SAMPLES = 20.0  # independent samples of a passage below 30 Hz, approx
 MAX_CORRELATION = 0.999  # correlation is limited to this: beyond, it contains no information on the surface
 
 
-def fit_surface(case, values):
-    """Nuisances of the running surface as a few passages have it, dict name -> value.
+class PassageAligner:
+    """Aligns the passages of a campaign with their simulation by ``predictor``; filtered recordings are cached."""
 
-    {} where no number is uncertain.
+    def __init__(self, campaign: CampaignInput, predictor: Predictor):
+        self.campaign, self.predictor = campaign, predictor
+        self._low_passed: dict[str, np.ndarray] = {}
+
+    def align(self, values: Values, passage: PassageInput) -> tuple[float, float, float]:
+        """``align`` of a passage with its simulation at ``values``; SimulationError if it cannot be simulated."""
+        sensors = self.campaign.sensors_of(passage)
+        surfaces = self.predictor.surface.surfaces(passage.route, values)
+        simulator = self.predictor.passage_simulator(values, (), passage)
+        signals = simulator(passage, passage.vehicle, passage.speed, sensors, surfaces=surfaces)
+        if passage.name not in self._low_passed:
+            self._low_passed[passage.name] = low_pass(passage.recording, sensors)
+        return align(passage, self._low_passed[passage.name], signals, self.predictor.solver.rate)
+
+    def correlation(self, values: Values, passage: PassageInput) -> float:
+        """Correlation of a passage with its simulation, 0 if it cannot be simulated."""
+        try:
+            return self.align(values, passage)[2]
+        except SimulationError:
+            return 0.0
+
+
+def fit_surface(aligner: PassageAligner, values: Values) -> dict[str, float]:
+    """Nuisances of the running surface as a few passages have it.
+
+    Parameters
+    ----------
+    aligner : PassageAligner
+        Its campaign and simulation.
+    values : mapping
+        All other nuisances.
+
+    Returns
+    -------
+    dict
+        Name -> value; {} where no number is uncertain.
     """
-    recorded = [p for p in case.campaign.passages if case.campaign.sensors_of(p)]
-    recorded = [p for p in recorded if p.name not in case.campaign.reserved] or recorded
+    campaign, surface = aligner.campaign, aligner.predictor.surface
+    recorded = [p for p in campaign.passages if campaign.sensors_of(p)]
+    recorded = [p for p in recorded if p.name not in campaign.reserved] or recorded
     passages = sorted(recorded, key=lambda p: len(p.vehicle.wheels))[:MAX_TRIAL_PASSAGES]
-    priors = {n.name: n for n in case.surface.nuisances()}
+    priors = {n.name: n for n in surface.nuisances()}
     surface_values = dict.fromkeys(priors, 0.0)
-    best_score = _log_posterior(case, {**values, **surface_values}, passages) if priors else 0.0
+    best_score = _log_posterior(aligner, {**values, **surface_values}, passages) if priors else 0.0
     for refine in (False, True):
-        for u in sorted(case.surface.parameters, key=lambda u: u.field not in POSITION_FIELDS):
+        for u in sorted(surface.parameters, key=lambda u: u.field not in POSITION_FIELDS):
             centre, prior = surface_values[u.name], priors[u.name]
             for by in _trial_steps(u.field, prior.sd, refine):
                 trial = {**surface_values, u.name: float(np.clip(centre + by, *prior.bounds))}
-                score = _log_posterior(case, {**values, **trial}, passages)
+                score = _log_posterior(aligner, {**values, **trial}, passages)
                 if score > best_score:
                     best_score, surface_values = score, trial
     return surface_values
 
 
-def _trial_steps(field, sd, refine):
+def _trial_steps(field: str, sd: float, refine: bool) -> list[float]:
     if field not in POSITION_FIELDS:
         return [f * sd * (0.5 if refine else 1.0) for f in TRIAL_FACTORS]
     if refine:
@@ -112,30 +154,13 @@ def _trial_steps(field, sd, refine):
     return [step * k for k in range(-n, n + 1) if k]
 
 
-def _log_posterior(case, values, passages):
+def _log_posterior(aligner: PassageAligner, values: Values, passages: Sequence[PassageInput]) -> float:
     """Twice the logarithm of likelihood and prior of numbers of the surface.
 
     The simulation explains the square of the correlation of each of the ``passages``. The prior is that of the track
     file.
     """
-    penalty = sum((values[u.name] / u.nuisance.sd) ** 2 for u in case.surface.parameters)
+    penalty = sum((values[u.name] / u.nuisance.sd) ** 2 for u in aligner.predictor.surface.parameters)
     return -penalty - EFFECTIVE_SAMPLES * sum(
-        np.log(1.0 - min(_correlation(case, values, p), MAX_CORRELATION) ** 2) for p in passages
+        np.log(1.0 - min(aligner.correlation(values, p), MAX_CORRELATION) ** 2) for p in passages
     )
-
-
-def _correlation(case, values, passage):
-    try:
-        return align_with_simulation(case, values, passage)[2]
-    except SimulationError:
-        return 0.0
-
-
-def align_with_simulation(case, values, passage):
-    """``align`` of a passage with its simulation at ``values``; SimulationError if it cannot be simulated."""
-    sensors, surfaces = case.campaign.sensors_of(passage), case.surface.surfaces(passage.route, values)
-    roll = case.passage_simulator(values, (), passage)
-    signals = roll(passage, passage.vehicle, passage.speed, sensors, surfaces=surfaces)
-    if passage.name not in case.low_passed:
-        case.low_passed[passage.name] = low_pass(passage.recording, sensors)
-    return align(passage, case.low_passed[passage.name], signals, case.solver.rate)

@@ -201,5 +201,6 @@ def passage_nuisances(passage):
         ("load", "-", passage.load_sd, reach),
     )
     return [
-        Nuisance(f"{quantity}@{passage.name}", unit, 0.0, sd, passage.name, (-a, a)) for quantity, unit, sd, a in priors
+        Nuisance(f"{quantity}@{passage.name}", unit, 0.0, sd, passage.name, (-a, a), group=quantity)
+        for quantity, unit, sd, a in priors
     ]

@@ -3,16 +3,26 @@
 It serves to compute which effects a campaign can distinguish, and to make simulated campaigns for exercises and tests.
 """
 
+from __future__ import annotations
+
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.turnout import passage_band, passage_model, passage_observation, receptance_observation
-from turnout.mismatch.turnout.campaign import LOAD_SD, CampaignInput, HammerInput, PassageInput
+from turnout.mismatch.turnout.campaign import CampaignInput, HammerInput, PassageInput
 from turnout.mismatch.turnout.candidates.catalogue import list_candidates
 from turnout.mismatch.turnout.case import TrackCase
+from turnout.mismatch.turnout.observations import CaseData
+from turnout.mismatch.turnout.passage_model import Track1D
+from turnout.mismatch.turnout.passage_observation import AlignedPassage
+from turnout.mismatch.turnout.prediction import Predictor
+from turnout.mismatch.turnout.receptance_observation import FrfPair
+from turnout.mismatch.turnout.site import site_of
 from turnout.mismatch.turnout.wheel_roughness import wheel_modes
+from turnout.records import Recording
 from turnout.simulate.hammer import Hammer, simulate_hammer
 from turnout.simulate.passage import simulate_passage
 from turnout.simulate.sensor import Sensor
@@ -22,82 +32,112 @@ from turnout.simulate.turnout_track import TurnoutTrack
 from turnout.simulate.vehicle import car
 
 NOISE_SHARE = 0.02  # standard deviation of a sensor's noise over its own rms
+PLANNED_LEAD = 0.45  # s from the start of a planned or simulated recording to the first wheel at the first sensor
 
-
-@dataclass(frozen=True)
-class PlannedRecording:
-    """A planned passage or hammer test."""
-
-    name: str
-    vehicle: object = None
-    speed: float = 0.0
-    train: str = ""
-    direction: str = "facing"
-    route: str = "main"
-    conditions: object = None
-    place: float = 0.0
-    visit: str = ""
-    load_sd: float = LOAD_SD
+# What a planned passage has recorded so far.
+NO_RECORDING = Recording(np.zeros((0, 1)), 1.0, ())
 
 
 class PlannedCase(TrackCase):
-    """``TrackCase`` of a ``Plan``: nothing is measured and nothing is fitted."""
+    """``TrackCase`` of a ``Plan``: nothing is measured and nothing is fitted.
 
-    def __init__(self, plan, settings=None, families=None, solver=None):
-        self.plan = plan
-        self._prepare(_PlannedInput(plan), settings or MismatchSettings(), solver or passage_model.Track1D())
-        for k, (position, temperature) in enumerate(plan.hammer_points):
-            test = PlannedRecording(f"blows {k + 1}", place=position, visit=f"{temperature:.0f} °C")
-            for sensor in plan.sensors:
-                name, conditions = f"{test.name}:{sensor.name}", {"rail_temperature": temperature}
-                ones = np.ones(receptance_observation.LINES.size)
-                self.frf_pairs[name] = receptance_observation.FrfPair(
-                    name, test, sensor.name, sensor, receptance_observation.LINES, ones, conditions
-                )
-        for k, train in enumerate(plan.trains):
-            conditions = {} if train.temperature is None else {"rail_temperature": train.temperature}
-            passage = PlannedRecording(
-                f"{train.name} {k + 1}", train.vehicle, train.speed, train.name, conditions=conditions
-            )
-            stop = passage_observation.duration_of(passage, train.speed, plan.sensors) + 0.45 + passage_model.EDGE_TIME
-            time = np.arange(0.45 - passage_model.EDGE_TIME, stop, 1.0 / passage_band.sample_rate_of(train.speed))
-            self.aligned_passages[passage.name] = passage_observation.AlignedPassage(
-                passage.name, passage, plan.sensors, time, 0.45, train.speed
-            )
-        self.nuisances = tuple(self.all_nuisances())
-        self.observations = tuple(self._predicted_observations())
-        self.candidates, self.families = list_candidates(self, families), ()
+    Parameters
+    ----------
+    plan : Plan
+    settings : MismatchSettings or None
+        None: the defaults.
+    families : collection of str or None
+        Effects to which the candidates are restricted; None: all.
+    solver : Track1D or None
+        Settings of the simulation of passages.
+    """
 
-    def raw_peak(self, channel):
-        """Peak of a channel within the band; a planned campaign has no signals at the full rate. [m/s²]"""
-        return self.band_peak(channel)
-
-    def _predicted_observations(self):
-        values = {n.name: n.mean for n in self.nuisances}
-        for pair in list(self.frf_pairs.values()):
-            h = self._predict_receptance(values, (), pair, self.pair_sensitivity(values, (), pair))
-            h = h[: receptance_observation.LINES.size] + 1j * h[receptance_observation.LINES.size :]
-            self.frf_pairs[pair.name] = pair = receptance_observation.with_magnitude(pair, np.abs(h))
-            yield receptance_observation.observation_of(pair, h, NOISE_SHARE * np.abs(h), self.settings.pair_tolerance)
-        for aligned in self.aligned_passages.values():
-            data = self.predict_passage(values, (), aligned).reshape(len(aligned.sensors), -1)
-            observation = passage_observation.observation_of(
-                aligned, data, NOISE_SHARE * np.std(data, axis=1), self.settings.materiality
-            )
-            yield replace(observation, modes=wheel_modes(self, values, aligned, observation.sigma))
+    def __init__(
+        self,
+        plan: Plan,
+        settings: MismatchSettings | None = None,
+        families: Collection[str] | None = None,
+        solver: Track1D | None = None,
+    ):
+        data, predictor = planned_data(plan, settings or MismatchSettings(), solver or Track1D())
+        self._set_up(data, predictor, list_candidates(data, families), ())
 
 
-class _PlannedInput:
-    """The part of ``CampaignInput`` that ``TrackCase`` uses, for a plan."""
+def planned_data(plan: Plan, settings: MismatchSettings, solver: Track1D) -> tuple[CaseData, Predictor]:
+    """Predicted observations of a plan, and the predictor of its recordings.
 
-    def __init__(self, plan):
-        self.turnout, self.sensors, self.hammer, self.reserved = plan.turnout, plan.sensors, (), ()
-        self.passages = tuple(PlannedRecording(t.name, t.vehicle, t.speed, t.name) for t in plan.trains)
-        self._hammer_points = plan.hammer_points
+    Parameters
+    ----------
+    plan : Plan
+    settings : MismatchSettings
+    solver : Track1D
+        Settings of the simulation of passages.
 
-    def positions(self):
-        """Positions of sensors and impacts [m]."""
-        return [s.place for s in self.sensors] + [x for x, _ in self._hammer_points]
+    Returns
+    -------
+    data : CaseData
+    predictor : Predictor
+        With the rail of the track file.
+    """
+    campaign = _planned_campaign(plan)
+    site = site_of(campaign)
+    aligned = {p.name: _planned_passage(p, plan.sensors) for p in campaign.passages}
+    predictor = Predictor(site, solver).with_recordings(_planned_pairs(campaign), aligned)
+    values = {n.name: n.mean for n in site.nuisances(campaign.passages)}
+    pairs, observations = {}, []
+    for pair in predictor.frf_pairs.values():
+        h = predictor.predict_receptance(values, (), pair, predictor.pair_sensitivity(values, (), pair))
+        h = h[: receptance_observation.LINES.size] + 1j * h[receptance_observation.LINES.size :]
+        pairs[pair.name] = scaled = receptance_observation.with_magnitude(pair, np.abs(h))
+        error = NOISE_SHARE * np.abs(h)
+        observations.append(receptance_observation.observation_of(scaled, h, error, settings.pair_tolerance))
+    for a in aligned.values():
+        data = predictor.predict_passage(values, (), a).reshape(len(a.sensors), -1)
+        noise = NOISE_SHARE * np.std(data, axis=1)
+        observation = passage_observation.observation_of(a, data, noise, settings.materiality)
+        observations.append(replace(observation, modes=wheel_modes(predictor, values, a, observation.sigma)))
+    return CaseData(campaign, settings, site, pairs, aligned, tuple(observations)), predictor.with_recordings(
+        pairs, aligned
+    )
+
+
+def _planned_campaign(plan: Plan) -> CampaignInput:
+    """Hammer tests and passages of a plan without recordings."""
+    tests = tuple(
+        HammerInput(
+            f"blows {k + 1}", position, (), visit=f"{temperature:.0f} °C", conditions={"rail_temperature": temperature}
+        )
+        for k, (position, temperature) in enumerate(plan.hammer_points)
+    )
+    passages = tuple(
+        PassageInput(
+            f"{train.name} {k + 1}",
+            NO_RECORDING,
+            train.vehicle,
+            train.speed,
+            train.name,
+            conditions={} if train.temperature is None else {"rail_temperature": train.temperature},
+        )
+        for k, train in enumerate(plan.trains)
+    )
+    return CampaignInput(plan.turnout, plan.sensors, tests, passages)
+
+
+def _planned_pairs(campaign: CampaignInput) -> dict[str, FrfPair]:
+    """Pairs of every test and sensor, on all lines and of magnitude 1."""
+    lines, pairs = receptance_observation.LINES, {}
+    for test in campaign.hammer:
+        for sensor in campaign.sensors:
+            name = f"{test.name}:{sensor.name}"
+            pairs[name] = FrfPair(name, test, sensor.name, sensor, lines, np.ones(lines.size), dict(test.conditions))
+    return pairs
+
+
+def _planned_passage(passage: PassageInput, sensors: tuple[Sensor, ...]) -> AlignedPassage:
+    """A passage that reaches the first sensor after ``PLANNED_LEAD``."""
+    stop = passage_observation.duration_of(passage, passage.speed, sensors) + PLANNED_LEAD + passage_model.EDGE_TIME
+    time = np.arange(PLANNED_LEAD - passage_model.EDGE_TIME, stop, 1.0 / passage_band.sample_rate_of(passage.speed))
+    return AlignedPassage(passage.name, passage, sensors, time, PLANNED_LEAD, passage.speed)
 
 
 @dataclass(frozen=True)
@@ -216,7 +256,7 @@ def _simulated_passage(plan, true, sensors, terms, planned, name, seed, k, rng):
     speed = planned.speed * (1.0 + 0.003 * rng.normal())
     recording = simulate_passage(
         true, vehicle.with_(bodies=bodies), speed, sensors, terms=under, seed=seed, rate=plan.rate,
-        roughness=plan.roughness, lead=0.45, tail=0.25, **plan.options,
+        roughness=plan.roughness, lead=PLANNED_LEAD, tail=0.25, **plan.options,
     )  # fmt: skip
     recording = replace(recording, conditions={**recording.conditions, "record": k})
     return PassageInput(name, recording, planned.vehicle, planned.speed, planned.name, conditions=conditions)

@@ -1,66 +1,205 @@
-"""Predictions of the recordings of a track with caches: receptances of hammer tests and signals of passages."""
+"""Predictions of the recordings of a turnout with caches: receptances of hammer tests and signals of passages."""
+
+from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.turnout import passage_band, passage_model, receptance_model, receptance_observation
+from turnout.mismatch.engine.case import Nuisance, Observation
+from turnout.mismatch.turnout import passage_band, passage_model, receptance_model, receptance_observation, sensitivity
+from turnout.mismatch.turnout.campaign import PassageInput
+from turnout.mismatch.turnout.passage_model import PassageSimulator, Track1D
+from turnout.mismatch.turnout.passage_observation import AlignedPassage
 from turnout.mismatch.turnout.pseudo_forces import probes
+from turnout.mismatch.turnout.rail_roughness import Waves
 from turnout.mismatch.turnout.receptance_model import ReceptanceModel
+from turnout.mismatch.turnout.receptance_observation import FrfPair
 from turnout.mismatch.turnout.receptance_sensitivity import ReceptanceSensitivity
-from turnout.mismatch.turnout.track_parameters import rail_on_grid, track_value_key, track_with, vehicle_with, with_rail
+from turnout.mismatch.turnout.running_surface import RunningSurface
+from turnout.mismatch.turnout.site import Site
+from turnout.mismatch.turnout.track_parameters import (
+    rail_on_grid,
+    rail_sds,
+    track_value_key,
+    track_with,
+    vehicle_with,
+    with_rail,
+)
 from turnout.physics.term import PhysicsTerm
+from turnout.simulate.sensor import Sensor
+from turnout.simulate.track import Track
 
-PASSAGE_CACHE_SIZE = 150  # simulated passages in the cache
+Values: TypeAlias = Mapping[str, float]  # nuisance parameters by name
+Terms: TypeAlias = Sequence[PhysicsTerm]
+
+SIGNAL_CACHE_SIZE = 150  # simulated passages in the cache
 PROBE_CACHE_SPARE = 4  # cached passages with probes beyond the number of passages
+SENSITIVITY_CACHE_SIZE, RAIL_CACHE_SIZE, SIMULATOR_CACHE_SIZE = 8, 9, 12  # tracks in each cache
 
 
-class TrackPredictor:
-    """The part of ``TrackCase`` that predicts recordings.
+class Predictions(Protocol):
+    """What a case asks of a ``Predictor``, or of a cache around it."""
 
-    ``nominal`` is the zone as filed, ``zone`` the same with the rail fitted to the hammer tests. ``frf_pairs`` of
-    hammer tests and ``aligned_passages`` describe the measurements.
+    def predict(self, values: Values, terms: Terms, observations: Sequence[Observation]) -> list[np.ndarray]:
+        """Predictions of receptances and passages, (n,) per observation."""
+
+    def predict_near(
+        self,
+        values: Values,
+        terms: Terms,
+        new: Terms,
+        observations: Sequence[Observation],
+        predictions: Sequence[np.ndarray],
+    ) -> list[np.ndarray]:
+        """Predictions with ``new`` terms, a small step from ``terms`` with known ``predictions``."""
+
+    def nuisance_jacobian(
+        self,
+        nuisances: Sequence[Nuisance],
+        values: Values,
+        terms: Terms,
+        observations: Sequence[Observation],
+        base: Sequence[np.ndarray],
+    ) -> list[np.ndarray]:
+        """Derivatives by ``nuisances``, (n, n_nuisance) per observation."""
+
+
+class Predictor:
+    """Predicts receptances and passages of one site, for any values of its nuisances and any terms.
+
+    ``rail`` holds the logarithms of the rail values about which the track of passages is modelled, ``zone`` the track
+    with them. ``frf_pairs`` and ``aligned_passages`` describe by name what was measured. A predictor never changes but
+    for its caches: another rail or another solver makes another predictor.
     """
 
-    def _clear_caches(self):
-        """Clear all caches of simulations."""
-        self._signal_cache, self._probe_cache = OrderedDict(), OrderedDict()
-        self._simulators, self._sensitivities, self._file_rail_zones = OrderedDict(), OrderedDict(), {}
+    def __init__(self, site: Site, solver: Track1D, rail: Values | None = None):
+        self.site, self.solver = site, solver
+        self.frf_pairs: Mapping[str, FrfPair] = {}
+        self.aligned_passages: Mapping[str, AlignedPassage] = {}
+        self.rail = {name: (rail or {}).get(name, 0.0) for name in rail_sds(site.nominal)}
+        self.zone = with_rail(site.nominal, self.rail)
+        self._rail_tracks: OrderedDict[Hashable, Track] = OrderedDict()
+        self._signals: OrderedDict[Hashable, np.ndarray] = OrderedDict()
+        self._signals_with_probes: OrderedDict[Hashable, np.ndarray] = OrderedDict()
+        self._simulators: OrderedDict[Hashable, PassageSimulator] = OrderedDict()
+        self._sensitivities: OrderedDict[Hashable, ReceptanceSensitivity] = OrderedDict()
+        self._zones_with_file_values: dict[tuple[str, ...], Any] = {}
 
-    def track(self, route="main", terms=()):
+    def with_recordings(
+        self, frf_pairs: Mapping[str, FrfPair], aligned_passages: Mapping[str, AlignedPassage]
+    ) -> Predictor:
+        """The predictor of these recordings; it shares its caches with this one."""
+        other = copy(self)
+        other.frf_pairs, other.aligned_passages = dict(frf_pairs), dict(aligned_passages)
+        return other
+
+    def recentred(self, values: Values) -> Predictor:
+        """The predictor with the track of passages about the rail that ``values`` give.
+
+        Receptances are linear in deviations of the rail from a grid, so they hardly depend on it.
+        """
+        other = Predictor(self.site, self.solver, values)
+        other.frf_pairs, other.aligned_passages = self.frf_pairs, self.aligned_passages
+        other._rail_tracks = self._rail_tracks
+        return other
+
+    def with_solver(self, solver: Track1D) -> Predictor:
+        """The predictor with another simulation of passages, with empty caches."""
+        other = Predictor(self.site, solver, self.rail)
+        other.frf_pairs, other.aligned_passages = self.frf_pairs, self.aligned_passages
+        return other
+
+    @property
+    def waves(self) -> Waves:
+        """Free waves of the rail; SimulationError without passages."""
+        if self.site.waves is None:
+            raise SimulationError("no passage was given: the rail has no free waves.")
+        return self.site.waves
+
+    @property
+    def surface(self) -> RunningSurface:
+        """Running surface with its uncertain numbers; SimulationError without passages."""
+        if self.site.surface is None:
+            raise SimulationError("no passage was given: there is no running surface.")
+        return self.site.surface
+
+    def track(self, route: str = "main", terms: Iterable[PhysicsTerm] = ()) -> Track:
         """Base track of a route, cut to the zone.
 
         Rail values that ``terms`` set themselves are as in the track file.
         """
         file_names = tuple(sorted({t.name for t in terms} & set(self.rail)))
-        if file_names and file_names not in self._file_rail_zones:
-            self._file_rail_zones[file_names] = with_rail(
-                self.nominal, {n: 0.0 if n in file_names else v for n, v in self.rail.items()}
+        if file_names and file_names not in self._zones_with_file_values:
+            self._zones_with_file_values[file_names] = with_rail(
+                self.site.nominal, {n: 0.0 if n in file_names else v for n, v in self.rail.items()}
             )
-        return (self._file_rail_zones[file_names] if file_names else self.zone).turnout.track_of(route)
+        zone = self._zones_with_file_values[file_names] if file_names else self.zone
+        return zone.turnout.track_of(route)
 
-    def predict(self, values, terms, observations):
-        """Predictions of receptances and passages."""
+    def predict(self, values: Values, terms: Terms, observations: Sequence[Observation]) -> list[np.ndarray]:
+        """Predictions of receptances and passages.
+
+        Parameters
+        ----------
+        values : mapping
+            All nuisances of the site, by name.
+        terms : sequence of PhysicsTerm
+            Effects beside the base model.
+        observations : sequence of Observation
+            Of ``frf_pairs`` or ``aligned_passages``, by their names.
+
+        Returns
+        -------
+        list of (n,) array
+            One per observation, in its unit.
+
+        Raises
+        ------
+        SimulationError
+            A passage cannot be simulated at these values.
+        """
         predictions, sensitivity_of = [], self.pair_sensitivities(values, terms)
         for o in observations:
             if o.name in self.frf_pairs:
                 pair = self.frf_pairs[o.name]
-                predictions.append(self._predict_receptance(values, terms, pair, sensitivity_of(pair)))
+                predictions.append(self.predict_receptance(values, terms, pair, sensitivity_of(pair)))
             else:
                 predictions.append(self.predict_passage(values, terms, self.aligned_passages[o.name]))
         return predictions
 
-    def predict_near(self, values, terms, new, observations, predictions):
+    def predict_near(
+        self,
+        values: Values,
+        terms: Terms,
+        new: Terms,
+        observations: Sequence[Observation],
+        predictions: Sequence[np.ndarray],
+    ) -> list[np.ndarray]:
         """Predictions a small step away: receptances follow without solving the track again."""
         return receptance_model.predict_near(self, values, terms, new, observations, predictions)
 
-    def pair_sensitivities(self, values, terms):
-        """Function that gives ``pair_sensitivity`` of a pair at these values, computed once per conditions."""
-        sensitivities = {}
+    def nuisance_jacobian(
+        self,
+        nuisances: Sequence[Nuisance],
+        values: Values,
+        terms: Terms,
+        observations: Sequence[Observation],
+        base: Sequence[np.ndarray],
+    ) -> list[np.ndarray]:
+        """Derivatives by ``nuisances``, see ``sensitivity.nuisance_jacobian``."""
+        return sensitivity.nuisance_jacobian(self, nuisances, values, terms, observations, base)
 
-        def sensitivity_of(pair):
+    def pair_sensitivities(self, values: Values, terms: Terms) -> Callable[[FrfPair], ReceptanceSensitivity]:
+        """Function that gives ``pair_sensitivity`` of a pair at these values, computed once per conditions."""
+        sensitivities: dict[Hashable, ReceptanceSensitivity] = {}
+
+        def sensitivity_of(pair: FrfPair) -> ReceptanceSensitivity:
             conditions = tuple(sorted(pair.conditions.items()))
             if conditions not in sensitivities:
                 sensitivities[conditions] = self.pair_sensitivity(values, terms, pair)
@@ -68,7 +207,7 @@ class TrackPredictor:
 
         return sensitivity_of
 
-    def pair_sensitivity(self, values, terms, pair):
+    def pair_sensitivity(self, values: Values, terms: Terms, pair: FrfPair) -> ReceptanceSensitivity:
         """``ReceptanceSensitivity`` of all pairs under the conditions of ``pair``, cached."""
         track_terms = receptance_observation.track_terms(terms, pair.conditions)
         rail = rail_on_grid(values, self.rail)
@@ -85,56 +224,59 @@ class TrackPredictor:
             self._sensitivities[key] = ReceptanceSensitivity(model, pair_keys, seats, self.zone)
             # all positions at once: rounding depends on what is solved together
             model.solve((*(position for position, _ in pair_keys), *seats.values()))
-            while len(self._sensitivities) > 8:
-                self._sensitivities.popitem(last=False)
+            _shorten(self._sensitivities, SENSITIVITY_CACHE_SIZE)
         return self._sensitivities[key]
 
-    def _track_near(self, rail):
+    def _track_near(self, rail: Values) -> Track:
         """The main track with ``rail`` values on the grid of ``rail_on_grid``; cached."""
         key = tuple(rail.values())
         if key not in self._rail_tracks:
-            if len(self._rail_tracks) > 8:
-                self._rail_tracks.clear()
-            self._rail_tracks[key] = with_rail(self.nominal, rail).turnout.track_of("main")
+            self._rail_tracks[key] = with_rail(self.site.nominal, rail).turnout.track_of("main")
+            _shorten(self._rail_tracks, RAIL_CACHE_SIZE)
         return self._rail_tracks[key]
 
-    def _pairs_and_seats(self, values, terms, conditions):
+    def _pairs_and_seats(self, values: Values, terms: Terms, conditions: Mapping[str, Any]) -> tuple[tuple, dict]:
         """(position of the impact, ``FrfPair.seat``) of all pairs under these conditions; positions of these seats."""
         pairs = [p for p in self.frf_pairs.values() if p.conditions == conditions]
         sensors, track = {p.seat: p.sensor for p in pairs}, self.track()
         seats = {seat: self.seat(s, values, terms).probe(track).place for seat, s in sensors.items()}
         return tuple((p.test.place, p.seat) for p in pairs), seats
 
-    def seat(self, sensor, values, terms):
+    def seat(self, sensor: Sensor, values: Values, terms: Terms) -> Sensor:
         """The sensor at the position that ``values`` and ``terms`` give."""
         offset = values.get(f"seat_{sensor.name}", 0.0)
         return passage_model.place_sensor(replace(sensor, place=sensor.place + offset) if offset else sensor, terms)
 
-    def channel_response(self, values, terms, pair):
+    def channel_response(self, values: Values, terms: Terms, pair: FrfPair) -> np.ndarray:
         """(n_line,) complex factor of the channel of a pair."""
         factor = receptance_observation.channel_factor(terms, pair.sensor, receptance_observation.SHIFTED_LINES)
         return factor * (1.0 + values.get(f"gain_{pair.channel}", 0.0))
 
-    def receptance(self, values, pair, sensitivity):
+    def receptance(self, values: Values, pair: FrfPair, sensitivity: ReceptanceSensitivity) -> np.ndarray:
         """(n_line,) receptance of a pair [m/N], corrected to first order for the rail of ``values``."""
         deviation = [values[k] - at for k, at in rail_on_grid(values, self.rail).items()]
         return sensitivity.receptance(pair) + sensitivity.rail_gradient(pair) @ deviation
 
-    def _predict_receptance(self, values, terms, pair, sensitivity):
+    def predict_receptance(
+        self, values: Values, terms: Terms, pair: FrfPair, sensitivity: ReceptanceSensitivity
+    ) -> np.ndarray:
+        """(2n,) Re and Im of the receptance of a pair over its measured magnitude."""
         return receptance_observation.split_complex(
             receptance_observation.scale_lines(
                 pair, self.receptance(values, pair, sensitivity), self.channel_response(values, terms, pair)
             )
         )
 
-    def predict_passage(self, values, terms, aligned):
-        """(n_sensor * n_time,) predicted signals of a passage, one sensor after the other."""
+    def predict_passage(self, values: Values, terms: Terms, aligned: AlignedPassage) -> np.ndarray:
+        """(n_sensor * n_time,) predicted signals of a passage, one sensor after the other [m/s²]."""
         signals = self.sensor_signals(values, terms, aligned)
         return np.concatenate(
             [self.channel_output(values, terms, aligned, s, row) for s, row in zip(aligned.sensors, signals)]
         )
 
-    def channel_output(self, values, terms, aligned, sensor, signal):
+    def channel_output(
+        self, values: Values, terms: Terms, aligned: AlignedPassage, sensor: Sensor, signal: np.ndarray
+    ) -> np.ndarray:
         """Output of the channel of a sensor for the simulated signal ``signal``, at the times of the recording."""
         start = aligned.reference + values[f"time@{aligned.name}"] - passage_model.LEAD_TIME
         rate, time = 4.0 * self.solver.rate, aligned.time - start
@@ -145,50 +287,46 @@ class TrackPredictor:
             aligned.limit_band(signal, rate), rate, time
         )
 
-    def sensor_signals(self, values, terms, aligned):
+    def sensor_signals(self, values: Values, terms: Terms, aligned: AlignedPassage) -> np.ndarray:
         """Simulated signals of the sensors before their channels, at four times the rate of the simulation; cached."""
         passage_terms, key = self._terms_and_key(values, terms, aligned)
-        if key not in self._signal_cache:
+        if key not in self._signals:
             self._simulate(values, terms, aligned, passage_terms, key)
-        return passage_band.upsample(self._signal_cache[key])
+        return passage_band.upsample(self._signals[key])
 
-    def signals_with_probes(self, values, terms, aligned):
+    def signals_with_probes(self, values: Values, terms: Terms, aligned: AlignedPassage) -> np.ndarray:
         """Simulated signals of the sensors and of ``probes`` at the rate of the simulation; the latest are cached."""
         passage_terms, key = self._terms_and_key(values, terms, aligned)
-        if key not in self._probe_cache:
+        if key not in self._signals_with_probes:
             self._simulate(values, terms, aligned, passage_terms, key)
-        return self._probe_cache[key]
+        return self._signals_with_probes[key]
 
-    def _terms_and_key(self, values, terms, aligned):
+    def _terms_and_key(
+        self, values: Values, terms: Terms, aligned: AlignedPassage
+    ) -> tuple[tuple[PhysicsTerm, ...], Hashable]:
         """(terms under the conditions of a passage, cache key of its simulation)."""
         passage_terms = tuple(
-            t.under_conditions(self.conditions_of(aligned))
-            for t in terms
-            if t.effect_type != "channel" or _moves_sensor(t)
+            t.under_conditions(aligned.conditions) for t in terms if t.effect_type != "channel" or _moves_sensor(t)
         )
         path = self.waves.path(values)
         shape, surfaces = path[0].dip.tobytes() if path else b"", self.surface.surfaces(aligned.passage.route, values)
         seats = tuple(values.get(f"seat_{s.name}", 0.0) for s in aligned.sensors)
-        train_values = self._train_values(values, aligned)
         return passage_terms, (
             aligned.name,
             track_value_key(self.zone, values),
-            train_values,
+            _train_values(values, aligned),
             seats,
             shape,
             surfaces,
             repr(passage_terms),
         )
 
-    def _train_values(self, values, aligned):
-        """Unsprung mass, speed and load of a passage."""
-        train = aligned.passage.train or aligned.passage.name
-        return values[f"wheels_{train}"], values[f"speed@{aligned.name}"], values[f"load@{aligned.name}"]
-
-    def _simulate(self, values, terms, aligned, passage_terms, key):
+    def _simulate(
+        self, values: Values, terms: Terms, aligned: AlignedPassage, passage_terms: Terms, key: Hashable
+    ) -> None:
         """Simulate a passage and cache it. Probe signals are large: their cache is small."""
-        _, speed, load = self._train_values(values, aligned)
-        vehicle = vehicle_with(aligned.passage.vehicle, values, aligned.passage.train or aligned.passage.name, load)
+        _, speed, load = _train_values(values, aligned)
+        vehicle = vehicle_with(aligned.passage.vehicle, values, aligned.train, load)
         simulator, path = self.passage_simulator(values, passage_terms, aligned.passage), self.waves.path(values)
         sensors = [replace(s, place=s.place + values.get(f"seat_{s.name}", 0.0)) for s in aligned.sensors]
         surfaces = tuple((*surface, *path) for surface in self.surface.surfaces(aligned.passage.route, values))
@@ -196,61 +334,31 @@ class TrackPredictor:
         signals = simulator(
             aligned.passage, vehicle, aligned.speed * (1.0 + speed), sensors, probe_points, surfaces, aligned.sensors
         )
-        self._signal_cache[key], self._probe_cache[key] = signals[: len(sensors)].copy(), signals
-        for cache, size in (
-            (self._signal_cache, PASSAGE_CACHE_SIZE),
-            (self._probe_cache, len(self.aligned_passages) + PROBE_CACHE_SPARE),
-        ):
-            while len(cache) > size:
-                cache.popitem(last=False)
+        self._signals[key], self._signals_with_probes[key] = signals[: len(sensors)].copy(), signals
+        _shorten(self._signals, SIGNAL_CACHE_SIZE)
+        _shorten(self._signals_with_probes, len(self.aligned_passages) + PROBE_CACHE_SPARE)
 
-    def conditions_of(self, aligned):
-        """Conditions of a passage, as terms need them."""
-        passage = aligned.passage
-        loads = tuple(2.0 * load for load in passage.vehicle.static_loads)
-        return {"axle_loads": loads, "train": passage.train or passage.name, "name": aligned.name, **passage.conditions}
-
-    def passage_simulator(self, values, terms, passage):
+    def passage_simulator(self, values: Values, terms: Terms, passage: PassageInput) -> PassageSimulator:
         """``PassageSimulator`` of a passage's route with these terms, cached."""
         key = passage.route, track_value_key(self.zone, values), repr(terms)
         if key not in self._simulators:
             track = track_with(self.track(passage.route, terms), self.zone, values)
-            self._simulators[key] = passage_model.PassageSimulator(self.zone.turnout, track, terms, self.solver)
-            while len(self._simulators) > 12:
-                self._simulators.popitem(last=False)
+            self._simulators[key] = PassageSimulator(self.zone.turnout, track, terms, self.solver)
+            _shorten(self._simulators, SIMULATOR_CACHE_SIZE)
         return self._simulators[key]
 
-    def numerical_error(self, fit):
-        """Difference of each prediction to one with half the step and half the mesh; None without passages.
 
-        It is 0 for hammer tests and where the finer simulation fails. The mesh stays where pads are spread over nodes.
-        """
-        if not self.aligned_passages:
-            return None
-        fine_solver = passage_model.Track1D(2.0 * self.solver.rate, self.solver.scheme, 2 * (self.solver.elements or 4))
-        passages = [self.aligned_passages.get(o.name) for o in self.observations]
-        refined = [
-            aligned and self._predict_with(fit, aligned, fine_solver, p)
-            for aligned, p in zip(passages, fit.predictions)
-        ]
-        return [np.zeros(p.size) if new is None else new - p for new, p in zip(refined, fit.predictions)]
-
-    def _predict_with(self, fit, aligned, solver, predicted):
-        saved = self.solver, self._signal_cache, self._probe_cache, self._simulators
-        self.solver, self._signal_cache, self._probe_cache, self._simulators = (
-            solver,
-            OrderedDict(),
-            OrderedDict(),
-            OrderedDict(),
-        )
-        try:
-            return self.predict_passage(fit.values, fit.terms, aligned)
-        except SimulationError:
-            return predicted
-        finally:
-            self.solver, self._signal_cache, self._probe_cache, self._simulators = saved
+def _shorten(cache: OrderedDict[Hashable, Any], size: int) -> None:
+    """Drop the oldest entries beyond ``size``."""
+    while len(cache) > size:
+        cache.popitem(last=False)
 
 
-def _moves_sensor(term):
+def _train_values(values: Values, aligned: AlignedPassage) -> tuple[float, float, float]:
+    """Unsprung mass, speed and load of a passage."""
+    return values[f"wheels_{aligned.train}"], values[f"speed@{aligned.name}"], values[f"load@{aligned.name}"]
+
+
+def _moves_sensor(term: PhysicsTerm) -> bool:
     """Whether a channel term changes the simulation itself, by the position of the sensor."""
     return type(term).sensor is not PhysicsTerm.sensor

@@ -37,7 +37,7 @@ class Waves:
 
     def nuisances(self):
         """One amplitude per wave [m]."""
-        return [Nuisance(n, "m", 0.0, float(sd), can_mask=False) for n, sd in zip(self.names, self.sd)]
+        return [Nuisance(n, "m", 0.0, float(sd), can_mask=False, group="wave") for n, sd in zip(self.names, self.sd)]
 
     def fade(self, x):
         """(n,) 0 to 1: envelope that fades the waves at both ends."""
@@ -75,7 +75,7 @@ def amplitude_sd(wavelength, length, offset):
     return 1e-6 * 10.0 ** (level(wavelength, offset) / 20.0) * np.sqrt(1.0 / (length * width))
 
 
-def wave_columns(case, values, terms, aligned):
+def wave_columns(predictor, values, terms, aligned):
     """(n_sensor * n_time, n_wave) derivative of a passage by the amplitudes of the waves."""
-    transfer = WaveTransfer(case, values, aligned, terms)
-    return transfer.signals(case.waves.lengths, case.waves.fade(transfer.node), transfer.train())
+    transfer = WaveTransfer(predictor, values, aligned, terms)
+    return transfer.signals(predictor.waves.lengths, predictor.waves.fade(transfer.node), transfer.train())

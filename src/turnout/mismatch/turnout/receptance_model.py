@@ -137,13 +137,14 @@ class ReceptanceModel:
 
 
 class AddedLinks:
-    """Changes of receptances about a fit by each of ``chosen`` [(candidate, start)].
+    """Changes of receptances about ``values`` and ``terms`` by each of ``chosen`` [(candidate, start)].
 
     The response of the added links is computed once for all pairs under the same conditions.
     """
 
-    def __init__(self, case, fit, chosen):
-        self.case, self.fit, self.chosen, self.link_responses = case, fit, chosen, {}
+    def __init__(self, predictor, values, terms, chosen):
+        self.predictor, self.values, self.terms, self.chosen = predictor, values, terms, chosen
+        self.link_responses = {}
 
     def changes(self, pair):
         r"""(key, start) -> (n,) change of the observation of a pair.
@@ -152,10 +153,10 @@ class AddedLinks:
         motion of its ends under unit forces at impact and sensor, g that under unit forces at its own ends. Several
         links of one candidate are treated as independent.
         """
-        case, fit, chosen = self.case, self.fit, self.chosen
+        predictor, chosen = self.predictor, self.chosen
         if not chosen:
             return {}
-        sensitivity = case.pair_sensitivity(fit.values, fit.terms, pair)
+        sensitivity = predictor.pair_sensitivity(self.values, self.terms, pair)
         conditions = tuple(sorted(pair.conditions.items()))
         if conditions not in self.link_responses:
             self.link_responses[conditions] = _link_responses(sensitivity.model, pair.conditions, chosen)
@@ -164,7 +165,7 @@ class AddedLinks:
         change = np.zeros((receptance_observation.LINES.size, len(chosen)), dtype=complex)
         np.add.at(change.T, owner, -(response * (u * v)[:, index]).T)
         columns = receptance_observation.split_complex(
-            receptance_observation.scale_lines(pair, change, case.channel_response(fit.values, fit.terms, pair))
+            receptance_observation.scale_lines(pair, change, predictor.channel_response(self.values, self.terms, pair))
         )
         return {(c.key, k): column for (c, k), column in zip(chosen, columns.T)}
 
@@ -174,7 +175,7 @@ def _link_responses(model, conditions, chosen):
     omega, end_index, index, impedance, owner = 2.0 * np.pi * receptance_observation.SHIFTED_LINES, {}, [], [], []
     track = with_links(model.track, links_of(model.terms, model.track))
     for i, (c, k) in enumerate(chosen):
-        for ends, z in _impedances(track, c, c.term(c.starts[k]).under_conditions(conditions), omega):
+        for ends, z in _impedances(track, c.term(c.starts[k]).under_conditions(conditions), omega):
             index.append(end_index.setdefault(ends, len(end_index)))
             impedance.append(z)
             owner.append(i)
@@ -189,15 +190,11 @@ def _link_responses(model, conditions, chosen):
     return weights.tocsr(), index, z / (1.0 + z * end_receptance[:, index]), np.array(owner, dtype=int)
 
 
-def _impedances(track, candidate, term, omega):
+def _impedances(track, term, omega):
     """(ends, impedance (n_line,)) of every link that a term adds."""
-    if candidate.family == "attached_resonator":
-        return [
-            (
-                ((("rail", candidate.where["sleeper"]), 1.0),),
-                term.dynamic_stiffness(receptance_observation.SHIFTED_LINES),
-            )
-        ]
+    condensed = term.condensed_links(receptance_observation.SHIFTED_LINES)
+    if condensed is not None:
+        return condensed
     links = [*term.links(track), *tangent_links((term,), track)]
     return [(tuple(m.ends), m.stiffness + 1j * omega * m.damping - omega**2 * m.mass) for m in links]
 
@@ -205,16 +202,16 @@ def _impedances(track, candidate, term, omega):
 LINK_VALUES = ("stiffness", "damping", "mass")
 
 
-def predict_near(case, values, terms, new, observations, predictions):
-    """Predictions of a track case with ``new`` terms, a small step from ``terms``.
+def predict_near(predictor, values, terms, new, observations, predictions):
+    """Predictions of a ``Predictor`` with ``new`` terms, a small step from ``terms``.
 
     Passages are simulated. Receptances follow the links where these differ by their values alone.
     """
-    predicted, sensitivity_of, differences = [], case.pair_sensitivities(values, terms), {}
+    predicted, sensitivity_of, differences = [], predictor.pair_sensitivities(values, terms), {}
     channel_changed = any(a != b and b.effect_type == "channel" for a, b in zip(terms, new))
     for o, old in zip(observations, predictions):
-        if o.name in case.frf_pairs and not channel_changed:
-            pair = case.frf_pairs[o.name]
+        if o.name in predictor.frf_pairs and not channel_changed:
+            pair = predictor.frf_pairs[o.name]
             sensitivity, conditions = sensitivity_of(pair), tuple(sorted(pair.conditions.items()))
             if conditions not in differences:
                 differences[conditions] = changed_links(
@@ -225,11 +222,13 @@ def predict_near(case, values, terms, new, observations, predictions):
                 predicted.append(
                     old
                     + receptance_observation.split_complex(
-                        receptance_observation.scale_lines(pair, change, case.channel_response(values, terms, pair))
+                        receptance_observation.scale_lines(
+                            pair, change, predictor.channel_response(values, terms, pair)
+                        )
                     )
                 )
                 continue
-        predicted += case.predict(values, new, [o])
+        predicted += predictor.predict(values, new, [o])
     return predicted
 
 

@@ -40,11 +40,11 @@ def _force_space(case, fit, aligned):
     phase = 2.0 * np.pi * aligned.time[:, None] * lines
     harmonics = np.sqrt(2.0 / n) * np.stack([np.cos(phase), np.sin(phase)], axis=-1).reshape(n, -1)
     columns = np.kron(np.eye(n_sensor), harmonics)
-    frequency, g = green_functions(case, fit.values, fit.terms, aligned)
-    g = g * channel_responses(fit.values, fit.terms, aligned, frequency)[:, :, None, None]
+    frequency, g = green_functions(case.predictor, fit.values, case.all_terms(fit), aligned)
+    g = g * channel_responses(fit.values, case.all_terms(fit), aligned, frequency)[:, :, None, None]
     g = g[np.clip(np.searchsorted(frequency, lines), 0, frequency.size - 1), :, :, 0]
     subspaces, size = {("clock", aligned.name): None}, harmonics.shape[1]
-    for k, j in enumerate(case.zone.supports if n_sensor > 1 else ()):  # one sensor cannot locate a force
+    for k, j in enumerate(case.predictor.zone.supports if n_sensor > 1 else ()):  # one sensor cannot locate a force
         transfer = g[:, :, k] / np.sqrt(np.mean(np.abs(g[:, :, k]) ** 2, axis=1))[:, None]
         subspaces["place", _position_of(case, j)] = np.concatenate([_real_blocks(row) for row in transfer.T])
     for s, sensor in enumerate(aligned.sensors):
@@ -63,11 +63,11 @@ def _real_blocks(transfer):
 
 def _wheel_space(case, fit, aligned):
     """Waves of each wheel, which are errors of ordinary size in the model of the passage."""
-    waves, transfer = case.waves, WaveTransfer(case, fit.values, aligned, fit.terms)
+    waves, transfer = case.predictor.waves, WaveTransfer(case.predictor, fit.values, aligned, case.all_terms(fit))
     sd = np.repeat(amplitude_sd(waves.lengths, waves.length, WHEEL_LEVEL), 2)
     spectra = transfer.spectra(waves.lengths, np.ones(transfer.node.size))
     blocks = [transfer.signals_from(spectra, transfer.wheel(w)) * sd for w in range(transfer.wheel_delays.size)]
-    train, subspaces, first = aligned.passage.train or aligned.passage.name, {}, 0
+    train, subspaces, first = aligned.train, {}, 0
     identity = np.eye(sum(b.shape[1] for b in blocks))
     for w, block in enumerate(blocks):
         subspaces["wheel", (train, w + 1)] = identity[:, first : first + block.shape[1]]
@@ -78,11 +78,14 @@ def _wheel_space(case, fit, aligned):
 def _change_spaces(case, fit, pairs):
     """A change at each support, of each channel, of all supports; in all tests or in those of one visit."""
     names = tuple(o.name for o, _ in pairs)
-    sensitivity_of, supports = case.pair_sensitivities(fit.values, fit.terms), _extended_supports(case)
+    sensitivity_of, supports = (
+        case.predictor.pair_sensitivities(fit.values, case.all_terms(fit)),
+        _extended_supports(case),
+    )
     through = [_through_support(case, fit, pair, sensitivity_of(pair), supports) for _, pair in pairs]
     at = {j: [h[:, k] for h in through] for k, j in enumerate(supports)}
     track_change = [h.sum(axis=1) for h in through]
-    hypotheses = {("place", _position_of(case, j)): at[j] for j in case.zone.supports}
+    hypotheses = {("place", _position_of(case, j)): at[j] for j in case.predictor.zone.supports}
     hypotheses["frequency", "track"] = track_change
     order = {o.name: k for k, o in enumerate(case.observations)}
     receptances = [_receptance(pair, fit.predictions[order[o.name]]) for o, pair in pairs]
@@ -104,7 +107,7 @@ def _through_support(case, fit, pair, sensitivity, supports):
         sensitivity.model.displacement(position)[:, rows]
         for position in (pair.test.place, sensitivity.seats[pair.seat])
     )
-    return u * v * case.channel_response(fit.values, fit.terms, pair)[:, None]
+    return u * v * case.predictor.channel_response(fit.values, case.all_terms(fit), pair)[:, None]
 
 
 def _receptance(pair, predicted):
@@ -125,9 +128,11 @@ def _line_columns(pair, change):
 
 def _extended_supports(case):
     """Supports of the zone and some beyond."""
-    last = case.track().support.size
-    return range(max(0, case.zone.first - EXTRA_SUPPORTS), min(last, case.zone.last + 1 + EXTRA_SUPPORTS))
+    last = case.predictor.track().support.size
+    return range(
+        max(0, case.predictor.zone.first - EXTRA_SUPPORTS), min(last, case.predictor.zone.last + 1 + EXTRA_SUPPORTS)
+    )
 
 
 def _position_of(case, support):
-    return round(float(case.track().support[support]), 3)
+    return round(float(case.predictor.track().support[support]), 3)

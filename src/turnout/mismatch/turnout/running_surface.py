@@ -47,14 +47,23 @@ class SurfaceParameter:
             sd = self.spread * abs(getattr(self.component, self.field))
             trust = min(3.0, MAX_RELATIVE_STEP * _field_values(self.component, LENGTH_FIELDS)[0] / sd)
             return Nuisance(
-                self.name, "m", 0.0, sd, meaning=f"{description} less its file's", max_step_sd=trust, can_mask=False
+                self.name,
+                "m",
+                0.0,
+                sd,
+                meaning=f"{description} less its file's",
+                max_step_sd=trust,
+                can_mask=False,
+                group="surface",
             )
         value, bounds = getattr(self.component, self.field), (-6.0 * self.spread, 6.0 * self.spread)
         if self.field == "share":
             bounds = bounds[0], -0.05 - np.log(value)
         elif self.field == "power":
             bounds = 0.01 - np.log(value), bounds[1]
-        return Nuisance(self.name, "-", 0.0, self.spread, None, bounds, f"ln {description}", can_mask=False)
+        return Nuisance(
+            self.name, "-", 0.0, self.spread, None, bounds, f"ln {description}", can_mask=False, group="surface"
+        )
 
     def value_at(self, by):
         """Its value with deviation ``by``; of a profile all values."""

@@ -3,7 +3,6 @@
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.engine.case import Case
 from turnout.mismatch.turnout import passage_band, receptance_observation
 from turnout.mismatch.turnout.pseudo_forces import POSITION_STEP, support_columns, support_motion
 from turnout.mismatch.turnout.rail_roughness import wave_columns
@@ -12,49 +11,41 @@ from turnout.mismatch.turnout.running_surface import DERIVATIVE_STEP as SURFACE_
 LOG_STEP = 0.04  # difference of a logarithm
 
 
-def own_jacobian(case, values, terms, observation, predicted, names):
-    """Derivatives of a passage by its own time, speed and load."""
-    if observation.name in case.frf_pairs:
-        return Case.own_jacobian(case, values, terms, observation, predicted, names)
-    columns = dict(_own_columns(case, values, terms, case.aligned_passages[observation.name], predicted))
-    return np.column_stack([columns[name] for name in names])
-
-
-def nuisance_jacobian(case, values, terms, observations, base):
-    """Derivatives of ``observations`` by all nuisances.
+def nuisance_jacobian(predictor, nuisances, values, terms, observations, base):
+    """Derivatives of ``observations`` by all ``nuisances``.
 
     Exact for receptances, gains and times. Of passages, those by support values come from pseudo-forces, those by
     wheels and running surface from differences.
     """
-    index = {n.name: k for k, n in enumerate(case.nuisances)}
-    jacobians = [np.zeros((o.data.size, len(case.nuisances))) for o in observations]
-    sensitivity_of = case.pair_sensitivities(values, terms)
-    passages = [(o, p, j) for o, p, j in zip(observations, base, jacobians) if o.name in case.aligned_passages]
+    index = {n.name: k for k, n in enumerate(nuisances)}
+    jacobians = [np.zeros((o.data.size, len(nuisances))) for o in observations]
+    sensitivity_of = predictor.pair_sensitivities(values, terms)
+    passages = [(o, p, j) for o, p, j in zip(observations, base, jacobians) if o.name in predictor.aligned_passages]
     for o, predicted, jacobian in zip(observations, base, jacobians):
-        if o.name in case.frf_pairs:
-            pair = case.frf_pairs[o.name]
-            fill_pair_columns(case, values, terms, pair, sensitivity_of(pair), predicted, jacobian, index)
+        if o.name in predictor.frf_pairs:
+            pair = predictor.frf_pairs[o.name]
+            fill_pair_columns(predictor, values, terms, pair, sensitivity_of(pair), predicted, jacobian, index)
     if passages:
-        _fill_common_columns(case, values, terms, passages, index)
+        _fill_common_columns(predictor, values, terms, passages, index)
     for o, predicted, jacobian in passages:
-        aligned = case.aligned_passages[o.name]
-        for name, column in _passage_columns(case, values, terms, aligned, predicted):
+        aligned = predictor.aligned_passages[o.name]
+        for name, column in _passage_columns(predictor, values, terms, aligned, predicted):
             jacobian[:, index[name]] = column
-        first = index[case.waves.names[0]]
-        jacobian[:, first : first + len(case.waves.names)] = wave_columns(case, values, terms, aligned)
+        first = index[predictor.waves.names[0]]
+        jacobian[:, first : first + len(predictor.waves.names)] = wave_columns(predictor, values, terms, aligned)
     return jacobians
 
 
-def fill_pair_columns(case, values, terms, pair, sensitivity, predicted, jacobian, index):
+def fill_pair_columns(predictor, values, terms, pair, sensitivity, predicted, jacobian, index):
     """Fill the columns of a pair; the values of the track come first among the nuisances."""
-    channel_response = case.channel_response(values, terms, pair)
+    channel_response = predictor.channel_response(values, terms, pair)
     block = receptance_observation.scale_lines(pair, sensitivity.gradient(pair), channel_response)
     n, width = block.shape
     jacobian[:n, :width], jacobian[n:, :width] = block.real, block.imag
     rail = receptance_observation.split_complex(
         receptance_observation.scale_lines(pair, sensitivity.rail_gradient(pair), channel_response)
     )
-    for k, name in enumerate(case.rail):
+    for k, name in enumerate(predictor.rail):
         jacobian[:, index[name]] = rail[:, k]
     gain, seat = f"gain_{pair.channel}", f"seat_{pair.channel}"
     if gain in index:
@@ -65,55 +56,58 @@ def fill_pair_columns(case, values, terms, pair, sensitivity, predicted, jacobia
         )
 
 
-def _fill_common_columns(case, values, terms, passages, index):
-    shared = [f"wheels_{train}" for train in case.trains]
-    for name, step in (*((name, LOG_STEP) for name in shared), *((name, SURFACE_STEP) for name in case.surface.names)):
+def _fill_common_columns(predictor, values, terms, passages, index):
+    parameters = [(f"wheels_{train}", LOG_STEP, train) for train in predictor.site.trains]
+    parameters += [(name, SURFACE_STEP, None) for name in predictor.surface.names]
+    for name, step, train in parameters:
         for o, predicted, jacobian in passages:
-            aligned = case.aligned_passages[o.name]
-            if name.startswith("wheels_") and name != f"wheels_{aligned.passage.train or aligned.passage.name}":
-                continue
-            jacobian[:, index[name]] = _difference(case, values, terms, aligned, predicted, name, step)
+            aligned = predictor.aligned_passages[o.name]
+            if train in (None, aligned.train):
+                jacobian[:, index[name]] = _difference(predictor, values, terms, aligned, predicted, name, step)
 
 
-def _difference(case, values, terms, aligned, predicted, name, step):
+def _difference(predictor, values, terms, aligned, predicted, name, step):
     """Derivative of a passage by one value, to the side that can be simulated."""
     try:
-        return (case.predict_passage({**values, name: values[name] + step}, terms, aligned) - predicted) / step
+        return (predictor.predict_passage({**values, name: values[name] + step}, terms, aligned) - predicted) / step
     except SimulationError:
-        return (predicted - case.predict_passage({**values, name: values[name] - step}, terms, aligned)) / step
+        return (predicted - predictor.predict_passage({**values, name: values[name] - step}, terms, aligned)) / step
 
 
-def _own_columns(case, values, terms, aligned, predicted):
+def own_columns(predictor, values, terms, aligned, predicted):
+    """Yield (name, column) of the derivatives of a passage by its own time, speed and load."""
     n = aligned.time.size
     moment = f"time@{aligned.name}"
-    later = case.predict_passage(
+    later = predictor.predict_passage(
         {**values, moment: values[moment] + 1e-5}, terms, aligned
     )  # nothing is simulated again
     slope = -(later - predicted).reshape(-1, n) / 1e-5
     yield moment, -slope.ravel()
     yield f"speed@{aligned.name}", (slope * (aligned.time - aligned.reference)).ravel()
     load = f"load@{aligned.name}"
-    yield load, _difference(case, values, terms, aligned, predicted, load, 0.03)
+    yield load, _difference(predictor, values, terms, aligned, predicted, load, 0.03)
 
 
-def _seat_columns(case, values, terms, aligned, predicted):
-    shifted = case.signals_with_probes(values, terms, aligned)[len(aligned.sensors) + 2 * len(case.zone.supports) :]
+def _seat_columns(predictor, values, terms, aligned, predicted):
+    shifted = predictor.signals_with_probes(values, terms, aligned)[
+        len(aligned.sensors) + 2 * len(predictor.zone.supports) :
+    ]
     shifted = passage_band.upsample(shifted)
     rows = predicted.reshape(-1, aligned.time.size)
     for k, sensor in enumerate(aligned.sensors):
         if not sensor.mounting.startswith("sleeper"):
             column = np.zeros_like(rows)
-            column[k] = (case.channel_output(values, terms, aligned, sensor, shifted[k]) - rows[k]) / POSITION_STEP
+            column[k] = (predictor.channel_output(values, terms, aligned, sensor, shifted[k]) - rows[k]) / POSITION_STEP
             yield f"seat_{sensor.name}", column.ravel()
 
 
-def _passage_columns(case, values, terms, aligned, predicted):
-    yield from _own_columns(case, values, terms, aligned, predicted)
+def _passage_columns(predictor, values, terms, aligned, predicted):
+    yield from own_columns(predictor, values, terms, aligned, predicted)
     rows = predicted.reshape(-1, aligned.time.size)
     for k, sensor in enumerate(aligned.sensors):
         column = np.zeros_like(rows)
         column[k] = rows[k] / (1.0 + values[f"gain_{sensor.name}"])
         yield f"gain_{sensor.name}", column.ravel()
-    yield from _seat_columns(case, values, terms, aligned, predicted)
-    histories = support_motion(case, values, terms, aligned)
-    yield from support_columns(case, values, terms, aligned, histories).items()
+    yield from _seat_columns(predictor, values, terms, aligned, predicted)
+    histories = support_motion(predictor, values, terms, aligned)
+    yield from support_columns(predictor, values, terms, aligned, histories).items()

@@ -184,19 +184,25 @@ def rail_on_grid(values, names):
 def track_nuisances(zone, trains):
     """Nuisances of track and vehicles, all as logarithms of a factor on the value of the file."""
     nuisances = [
-        Nuisance(name, "-", 0.0, sd, bounds=(-2.0, 2.0), meaning=f"ln {name}") for name, _, _, sd in COMMON_PARAMETERS
+        Nuisance(name, "-", 0.0, sd, bounds=(-2.0, 2.0), meaning=f"ln {name}", group="track")
+        for name, _, _, sd in COMMON_PARAMETERS
     ]
     for parameter in SUPPORT_PARAMETERS:
         steps = steps_of(getattr(zone.turnout.track, parameter.field))
         for j in zone.supports:
             sd = float(np.hypot(parameter.sd, steps[j]))
             meaning, most = f"ln {parameter.field} of {j}", 6.0 * sd
-            nuisances.append(Nuisance(f"{parameter.tag}_{j}", "-", 0.0, sd, bounds=(-most, most), meaning=meaning))
+            name = f"{parameter.tag}_{j}"
+            nuisances.append(Nuisance(name, "-", 0.0, sd, None, (-most, most), meaning, group=parameter.tag, index=j))
     for name, sd in rail_sds(zone).items():
-        nuisances.append(Nuisance(name, "-", 0.0, sd, bounds=(-6.0 * sd, 6.0 * sd), meaning=f"ln {name} of the rail"))
+        nuisances.append(
+            Nuisance(name, "-", 0.0, sd, bounds=(-6.0 * sd, 6.0 * sd), meaning=f"ln {name} of the rail", group="rail")
+        )
     for train in trains:
         nuisances.append(
-            Nuisance(f"wheels_{train}", "-", 0.0, WHEELS_SD, bounds=(-0.5, 0.5), meaning="ln unsprung mass")
+            Nuisance(
+                f"wheels_{train}", "-", 0.0, WHEELS_SD, bounds=(-0.5, 0.5), meaning="ln unsprung mass", group="wheels"
+            )
         )
     return nuisances
 

@@ -30,16 +30,16 @@ class WaveTransfer:
     ``node`` (n,) are positions of the forces, up to ``beyond`` the ends of the free waves [m].
     """
 
-    def __init__(self, case, values, aligned, terms=(), beyond=0.0):
-        terms = [t.under_conditions(case.conditions_of(aligned)) for t in terms]
-        self.aligned, waves, vehicle = aligned, case.waves, _vehicle(values, aligned, terms)
-        lines, transfer, point, self.node = _transfers(case, values, aligned, terms, beyond)
+    def __init__(self, predictor, values, aligned, terms=(), beyond=0.0):
+        terms = [t.under_conditions(aligned.conditions) for t in terms]
+        self.aligned, waves, vehicle = aligned, predictor.waves, _vehicle(values, aligned, terms)
+        lines, transfer, point, self.node = _transfers(predictor, values, aligned, terms, beyond)
         self.speed = aligned.speed * (1.0 + values[f"speed@{aligned.name}"])
         self.sign = 1.0 if aligned.passage.direction == "facing" else -1.0
         self.first = self.sign * min(self.sign * s.place for s in aligned.sensors)
         self.wheel_delays = vehicle.wheel_positions / self.speed
         span = (waves.end - waves.start + 2.0 * beyond) / self.speed + self.wheel_delays[-1] + RING_TIME
-        self.rate, self.simulation_rate = aligned.clock, case.solver.rate
+        self.rate, self.simulation_rate = aligned.clock, predictor.solver.rate
         size = 1 << int(np.ceil(np.log2(self.rate * max(span, aligned.time[-1] - aligned.time[0] + RING_TIME))))
         self.size, self.period, self.start = size, waves.length, waves.start
         grid = np.fft.rfftfreq(size, 1.0 / self.rate)
@@ -163,7 +163,7 @@ class WaveTransfer:
 def _vehicle(values, aligned, terms):
     """The vehicle as ``values`` and ``terms`` have it."""
     passage = aligned.passage
-    vehicle = vehicle_with(passage.vehicle, values, passage.train or passage.name, values[f"load@{aligned.name}"])
+    vehicle = vehicle_with(passage.vehicle, values, aligned.train, values[f"load@{aligned.name}"])
     for term in terms:
         vehicle = term.vehicle(vehicle)
     return vehicle
@@ -175,17 +175,19 @@ def channel_responses(values, terms, aligned, frequency):
     return np.column_stack(factors)
 
 
-def _transfers(case, values, aligned, terms, beyond):
+def _transfers(predictor, values, aligned, terms, beyond):
     """Lines, acceleration of the sensors per force on rail nodes (m, n_sensor, n_node), receptance of the rail about
     each node (m, n_node), and nodes.
     """
-    track = track_with(case.track(aligned.passage.route, terms), case.zone, values)
+    track = track_with(predictor.track(aligned.passage.route, terms), predictor.zone, values)
     matrices = linear_matrices(track, terms)
     frequency = np.arange(4.0, 1.3 * passage_band.BAND_HIGH, 2.0)
     beyond += 0.3
-    near = np.flatnonzero((matrices.node >= case.waves.start - beyond) & (matrices.node <= case.waves.end + beyond))
+    near = np.flatnonzero(
+        (matrices.node >= predictor.waves.start - beyond) & (matrices.node <= predictor.waves.end + beyond)
+    )
     near = near[::NODE_STRIDE]
-    positions = [case.seat(s, values, terms).probe(track).place for s in aligned.sensors]
+    positions = [predictor.seat(s, values, terms).probe(track).place for s in aligned.sensors]
     h, mean_receptance = rail_receptances(matrices, frequency, near, positions)
     return frequency, -((2.0 * np.pi * frequency) ** 2)[:, None, None] * h, mean_receptance, matrices.node[near]
 

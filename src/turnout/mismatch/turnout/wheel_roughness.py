@@ -23,10 +23,10 @@ MAX_NOSE_LENGTH = 1.0  # m to either side of the deepest point
 MIN_DEPTH = 1e-6  # m; shallower components are ignored
 
 
-def profile_modes(case, values, aligned, transfer):
+def profile_modes(predictor, values, aligned, transfer):
     """(n_sensor * n_time, n_mode) signals of one standard deviation of each wheel's path over each component."""
     grid = transfer.fine_grid
-    paths = [path for component in _components(case, values, aligned) for path in _deviations(component, grid)]
+    paths = [path for component in _components(predictor, values, aligned) for path in _deviations(component, grid)]
     if not paths:
         return np.zeros((len(aligned.sensors) * aligned.time.size, 0))
     return np.concatenate(
@@ -34,10 +34,12 @@ def profile_modes(case, values, aligned, transfer):
     )
 
 
-def _components(case, values, aligned):
+def _components(predictor, values, aligned):
     """Components of a passage's route except waves, which are the same for all wheels."""
     components = [
-        component for components in case.surface.surfaces(aligned.passage.route, values) for component in components
+        component
+        for components in predictor.surface.surfaces(aligned.passage.route, values)
+        for component in components
     ]
     return [component for component in components if not hasattr(component, "wavelength")]
 
@@ -67,19 +69,19 @@ FAINT_SHARE = 0.1  # of that: single waves below this are left out before they a
 ROUGHNESS_MARGIN = 6.0  # m beyond the free waves; lightly damped track carries a wheel's noise that far
 
 
-def wheel_modes(case, values, aligned, sigma):
+def wheel_modes(predictor, values, aligned, sigma):
     """(n_sensor * n_time, n_mode) signals of one standard deviation of the roughness and profile of all wheels.
 
     ``sigma`` (n,) is the error of the observation. In single precision: a long train over many sensors has a thousand
     modes of ten thousand samples each.
     """
-    waves, scale = case.waves, sigma[:, None].astype(np.float32)
+    waves, scale = predictor.waves, sigma[:, None].astype(np.float32)
     radii, transfer = (
         aligned.passage.vehicle.wheel_values("radius"),
-        WaveTransfer(case, values, aligned, beyond=ROUGHNESS_MARGIN),
+        WaveTransfer(predictor, values, aligned, beyond=ROUGHNESS_MARGIN),
     )
     treads = {radius: _wave_sds(waves, radius) for radius in radii}
-    modes = [profile_modes(case, values, aligned, transfer).astype(np.float32)]
+    modes = [profile_modes(predictor, values, aligned, transfer).astype(np.float32)]
     for envelope, rail in zip(_envelopes(waves, transfer.node), (0.0, waves.sd[::2], waves.sd[::2])):
         spectra = transfer.spectra(waves.lengths, envelope)
         for w, radius in enumerate(radii):
@@ -116,17 +118,15 @@ def log_mass_ratios(case, fit):
 
     Where it is a nuisance, the value is that without its narrow prior in the base model.
     """
-    wheels = [
-        (c.where["train"], start) for _, c, start, _ in masked_candidates(case, fit) if c.family == "unsprung_mass"
-    ]
-    open_values = {train: float(np.log(start[0])) for train, start in wheels}
+    masked = {c.masking_parameter: start for _, c, start, _ in masked_candidates(case, fit)}
     log_ratios = {}
     for aligned in case.aligned_passages.values():
-        conditions = case.conditions_of(aligned)
+        conditions = aligned.conditions
         file = vehicle = aligned.passage.vehicle
-        for term in fit.terms:
+        for term in case.all_terms(fit):
             vehicle = term.under_conditions(conditions).vehicle(vehicle)
         wheel, train = file.wheels[0], conditions["train"]
-        nuisance_value = open_values.get(train, fit.values[f"wheels_{train}"])
+        name = f"wheels_{train}"
+        nuisance_value = float(np.log(masked[name][0])) if name in masked else fit.values[name]
         log_ratios[train] = nuisance_value + float(np.log(vehicle.bodies[wheel].mass / file.bodies[wheel].mass))
     return log_ratios

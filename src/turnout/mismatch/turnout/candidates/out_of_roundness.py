@@ -17,12 +17,16 @@ is near 0 for a round wheel: hum, resonances and corrugation are common to all w
 evidence compares the mean of z over sensors and passages for a polygonal wheel with that for a round one.
 """
 
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from turnout import physics
-from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.turnout.candidates.catalogue import candidate_of
 from turnout.mismatch.turnout.candidates.short_corrugation import (
     MAX_FREQUENCY_SHARE,
     MIN_WAVELENGTH,
@@ -31,14 +35,25 @@ from turnout.mismatch.turnout.candidates.short_corrugation import (
 )
 from turnout.mismatch.turnout.passage_band import SHORTEST_WAVE
 from turnout.mismatch.turnout.wave_response import WaveTransfer
+from turnout.physics.hypothesis import Hypothesis
+from turnout.physics.out_of_round import MIN_AMPLITUDE
 
+if TYPE_CHECKING:
+    from turnout.mismatch.engine.candidate import Candidate
+    from turnout.mismatch.engine.case import Observation
+    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.turnout.case import TrackCase
+    from turnout.mismatch.turnout.passage_observation import AlignedPassage
+
+# (nats, train, wheel, wavelength [m], [(recording, cosine, sine)])
+WheelEvidence: TypeAlias = tuple[float, str, int, float, list[tuple[str, float, float]]]
 WAVELENGTHS = np.geomspace(SHORTEST_WAVE, 1.0, 100)  # m; over 10 m neighbours differ by a third of a period
 FINE_FACTORS = np.linspace(0.985, 1.015, 13)  # of the wavelength, for its refinement
 AMPLITUDES = np.geomspace(1e-5, 4e-4, 5)  # m, prior sd of cosine and sine
 ANGLES_PER_PASSAGE = 12.0  # distinguishable angles per passage
 
 
-def polygon_candidates(case, fit):
+def polygon_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, ...]:
     """The likeliest polygonal wheel as a candidate, () where a round one is likelier."""
     wheel_fits = [s for train in case.trains for s in wheel_evidence(case, fit, train)]
     if not wheel_fits:
@@ -51,16 +66,19 @@ def polygon_candidates(case, fit):
     return (_candidate(case, train, wheel, wavelength, amplitudes, nats, len(wheel_fits)),)
 
 
-def wheel_evidence(case, fit, train, wavelengths=WAVELENGTHS):
+def wheel_evidence(
+    case: TrackCase, fit: Fit, train: str, wavelengths: np.ndarray = WAVELENGTHS
+) -> Iterator[WheelEvidence]:
     """(nats, train, wheel, wavelength, [(recording, cosine, sine)]) of each wheel, 0 first."""
     members = [(o, w) for o, w in zip(case.observations, fit.white) if o.name in case.aligned_passages]
-    members = [(o, w) for o, w in members if case.conditions_of(case.aligned_passages[o.name])["train"] == train]
+    members = [(o, w) for o, w in members if case.aligned_passages[o.name].conditions["train"] == train]
     if not members:
         return
     n_wheel = len(case.aligned_passages[members[0][0].name].passage.vehicle.wheels)
     statistics = [_slopes(case, fit, o, white, n_wheel, wavelengths) for o, white in members]
     for wheel in range(n_wheel):
-        nats = sum(_passage_evidence(slope[wheel], size) for slope, size in statistics)  # (n_amplitude, n_wavelength)
+        evidence = (_passage_evidence(slope[wheel], size) for slope, size in statistics)
+        nats = sum(evidence, np.zeros((AMPLITUDES.size, wavelengths.size)))
         a, k = np.unravel_index(int(np.argmax(nats)), nats.shape)
         prior = np.eye(2) / AMPLITUDES[a] ** 2
         amplitudes = [np.linalg.solve(size[k] + prior, slope[wheel][k]) for slope, size in statistics]
@@ -68,10 +86,12 @@ def wheel_evidence(case, fit, train, wavelengths=WAVELENGTHS):
         yield total_nats, train, wheel, float(wavelengths[k]), [(o.name, *b) for (o, _), b in zip(members, amplitudes)]
 
 
-def _slopes(case, fit, o, white, n_wheel, wavelengths):
+def _slopes(
+    case: TrackCase, fit: Fit, o: Observation, white: np.ndarray, n_wheel: int, wavelengths: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """(n_wheel, n_wavelength, 2) slopes and (n_wavelength, 2, 2) sizes of one passage."""
     aligned = case.aligned_passages[o.name]
-    transfer = WaveTransfer(case, fit.values, aligned, fit.terms)
+    transfer = WaveTransfer(case.predictor, fit.values, aligned, case.all_terms(fit))
     spectra = transfer.spectra(wavelengths, np.ones(transfer.node.size))
     weight = o.effective / fit.scale[o.data_type]
     rewhitened = o.whiten(np.asarray(white) * o.sigma) / o.sigma  # the whitening is symmetric: columns need not pass it
@@ -84,7 +104,7 @@ def _slopes(case, fit, o, white, n_wheel, wavelengths):
     return np.array(slopes), weight * np.einsum("nki,nkj->kij", whitened, whitened)
 
 
-def _passage_evidence(slope, size):
+def _passage_evidence(slope: np.ndarray, size: np.ndarray) -> np.ndarray:
     """(n_amplitude, n_wavelength) nats of one passage."""
     nats = []
     for a in AMPLITUDES:
@@ -94,28 +114,37 @@ def _passage_evidence(slope, size):
     return np.array(nats)
 
 
-def _log_mean(nats):
+def _log_mean(nats: np.ndarray) -> float:
     top = nats.max()
     return top + np.log(np.mean(np.exp(nats - top)))
 
 
-def _candidate(case, train, wheel, wavelength, amplitudes, nats, scanned):
+def _candidate(
+    case: TrackCase,
+    train: str,
+    wheel: int,
+    wavelength: float,
+    amplitudes: Sequence[tuple[str, float, float]],
+    nats: float,
+    scanned: float,
+) -> Candidate:
     passage = next(case.aligned_passages[name].passage for name, *_ in amplitudes)
     order = max(1, round(2.0 * np.pi * passage.vehicle.wheel_values("radius")[wheel] / wavelength))
     radius = order * wavelength / (2.0 * np.pi)
     middle = np.mean([s.place for s in case.campaign.sensors])  # a wave a little longer then fits there at least
-    phases = [(name, np.arctan2(s, c) * radius / order) for name, c, s in amplitudes]
-    phases = tuple((name, float(x + wavelength * np.round((middle - x) / wavelength))) for name, x in phases)
+    rolled = [(name, np.arctan2(s, c) * radius / order) for name, c, s in amplitudes]
+    phases = tuple((name, float(x + wavelength * np.round((middle - x) / wavelength))) for name, x in rolled)
     amplitude = float(np.clip(np.median([np.hypot(c, s) for _, c, s in amplitudes]), 0.0, 9e-4))
 
-    def make(p):
-        return physics.OutOfRound(wheel, order=order, radius=radius, train=train, phases=phases, **p)
-
-    return Candidate(
-        "out_of_round", physics.OutOfRound.parameters, make, ((amplitude, 0.0, 0.0),),
-        {"train": train, "axle": wheel + 1}, "wheel", scanned * ANGLES_PER_PASSAGE ** len(phases),
-        smallest_reportable=2e-5, promise=float(nats - np.log(scanned)),
-    )  # fmt: skip
+    hypothesis = Hypothesis(
+        starts=((amplitude, 0.0, 0.0),),
+        fixed={"wheel": wheel, "order": order, "radius": radius, "train": train, "phases": phases},
+        where={"train": train, "axle": wheel + 1},
+        n_scanned=scanned * ANGLES_PER_PASSAGE ** len(phases),
+        smallest_reportable=MIN_AMPLITUDE,
+        promise=float(nats - np.log(scanned)),
+    )
+    return candidate_of(physics.OutOfRound, hypothesis)
 
 
 WHEEL_REACH = 1.2  # m from wheel to sensor; axles of a bogie are at least 1.8 m apart
@@ -128,7 +157,6 @@ RESOLUTION = 0.16  # of ln wavelength: resolution of 2.4 m of rail at 0.2 m
 WHEEL_SD, SENSOR_SD = 0.5, 0.8  # sd of z: between wheels (twice that in another simulator), of one spectrum
 POLYGON_SD = 2.5  # prior sd of z of a polygonal wheel
 MIN_WHEELS = 3  # least wheels of a train, for a median
-MIN_AMPLITUDE = 2e-5  # m, smallest reported amplitude
 
 
 @dataclass(frozen=True)
@@ -139,14 +167,14 @@ class WheelSpectra:
     (n_bin,) lines per bin, ``size`` of the transform, ``window`` (n,) of the samples.
     """
 
-    aligned: object
+    aligned: AlignedPassage
     level: np.ndarray
     width: np.ndarray
     size: int
     window: np.ndarray
 
 
-def short_polygon_candidates(case, fit):
+def short_polygon_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, ...]:
     """The likeliest wheel with short waves as a candidate, () where all may be round."""
     passages = sorted(case.fitted_passages(), key=lambda m: m.speed)
     if not passages:
@@ -157,7 +185,7 @@ def short_polygon_candidates(case, fit):
         return ()
     wheel_fits, n = [], 0
     for train in case.trains:
-        spectra = [wheel_spectra(m, lengths) for m in passages if case.conditions_of(m)["train"] == train]
+        spectra = [wheel_spectra(m, lengths) for m in passages if m.conditions["train"] == train]
         if spectra and spectra[0].level.shape[1] >= MIN_WHEELS:
             z, n_slots = wheel_excess(spectra, bins, lengths)
             n += z.shape[0]
@@ -168,19 +196,19 @@ def short_polygon_candidates(case, fit):
                 wheel_fits.append((polygon_evidence(z[w, k], n_slots), train, int(w), int(bins[k]), spectra))
     if not wheel_fits:
         return ()
-    nats, train, wheel, k, spectra = max(wheel_fits, key=lambda f: f[0])
+    nats, train, wheel, chosen_bin, spectra = max(wheel_fits, key=lambda f: f[0])
     scanned = n * max(1.0, float(np.ptp(np.log(lengths[bins]))) / RESOLUTION)
     if nats < np.log(scanned):
         return ()
-    return (_short_candidate(case, fit, train, wheel, lengths, k, nats, scanned, spectra),)
+    return (_short_candidate(case, fit, train, wheel, lengths, chosen_bin, nats, scanned, spectra),)
 
 
-def _is_repeatable(levels):
+def _is_repeatable(levels: Sequence[float]) -> bool:
     """Whether either half of a train's passages shows at least half the level of the other."""
     return min(levels) > 0.5 * max(levels)
 
 
-def bin_wavelengths(passages):
+def bin_wavelengths(passages: Sequence[AlignedPassage]) -> np.ndarray:
     """(n,) centres of the bins, longest first; those at both ends serve as background. [m]"""
     shortest = max(
         [
@@ -192,7 +220,7 @@ def bin_wavelengths(passages):
     return longest * np.exp(-np.arange(0.0, np.log(longest / shortest), BIN_WIDTH))
 
 
-def wheel_spectra(aligned, lengths):
+def wheel_spectra(aligned: AlignedPassage, lengths: np.ndarray) -> WheelSpectra:
     """``WheelSpectra`` of a passage."""
     recording, speed = aligned.passage.recording, aligned.speed
     n = round(2.0 * WHEEL_REACH / speed * recording.rate)
@@ -218,14 +246,16 @@ def wheel_spectra(aligned, lengths):
     return WheelSpectra(aligned, level, np.diff(edges, axis=1)[:, 0], size, window)
 
 
-def _background(level, k, lengths):
+def _background(level: np.ndarray, k: int, lengths: np.ndarray) -> np.ndarray:
     """(n_sensor, n_wheel) background level of bin k from the bins around it, mean of both sides."""
     away = np.log(lengths[k] / lengths)
     sides = [(away > NEAR_OFFSET) & (away < FAR_OFFSET), (-away > NEAR_OFFSET) & (-away < FAR_OFFSET)]
     return np.mean([np.median(level[..., side], axis=-1) for side in sides], axis=0)
 
 
-def wheel_excess(spectra, bins, lengths):
+def wheel_excess(
+    spectra: Sequence[WheelSpectra], bins: Sequence[int] | np.ndarray, lengths: np.ndarray
+) -> tuple[np.ndarray, int]:
     """(n_wheel, n_tried) mean of z over sensors and passages, and the number of spectra per wheel."""
     excess = [np.stack([s.level[..., k] - _background(s.level, k, lengths) for k in bins], axis=-1) for s in spectra]
     centred = [a - np.nanmedian(a, axis=1, keepdims=True) for a in excess if not np.isnan(a).all()]
@@ -235,7 +265,7 @@ def wheel_excess(spectra, bins, lengths):
     return np.nan_to_num(np.nanmean(z, axis=0), nan=-np.inf), z.shape[0]
 
 
-def polygon_evidence(z, n_slots):
+def polygon_evidence(z: float, n_slots: int) -> float:
     """Nats for a polygonal wheel over a round one, from its mean z over so many spectra."""
     spread = WHEEL_SD**2 + SENSOR_SD**2 / n_slots
     wide = spread + POLYGON_SD**2
@@ -243,7 +273,17 @@ def polygon_evidence(z, n_slots):
     return 0.5 * np.log(spread / wide) + 0.5 * z**2 * (1.0 / spread - 1.0 / wide)
 
 
-def _short_candidate(case, fit, train, wheel, lengths, k, nats, scanned, spectra):
+def _short_candidate(
+    case: TrackCase,
+    fit: Fit,
+    train: str,
+    wheel: int,
+    lengths: np.ndarray,
+    k: int,
+    nats: float,
+    scanned: float,
+    spectra: Sequence[WheelSpectra],
+) -> Candidate:
     radius = spectra[0].aligned.passage.vehicle.wheel_values("radius")[wheel]
     order = round(2.0 * np.pi * radius / lengths[k])
     sizes = np.concatenate([_amplitudes(case, fit, s, wheel, lengths, k) for s in spectra])
@@ -252,17 +292,22 @@ def _short_candidate(case, fit, train, wheel, lengths, k, nats, scanned, spectra
     parameters = tuple(
         replace(p, prior=(amplitude, error)) for p in physics.OutOfRound.parameters if p.name == "cosine"
     )  # fmt: skip
+    hypothesis = Hypothesis(
+        starts=((amplitude,),),
+        fixed={"wheel": wheel, "order": order, "radius": radius, "train": train},
+        where={"train": train, "axle": wheel + 1},
+        n_scanned=scanned,
+        parameters=parameters,
+        smallest_reportable=MIN_AMPLITUDE,
+        promise=float(nats - np.log(scanned)),
+        external_evidence=float(nats),
+    )
+    return candidate_of(physics.OutOfRound, hypothesis)
 
-    def make(p):
-        return physics.OutOfRound(wheel, order=order, radius=radius, train=train, **p)
 
-    return Candidate(
-        "out_of_round", parameters, make, ((amplitude,),), {"train": train, "axle": wheel + 1}, "wheel", scanned,
-        promise=float(nats - np.log(scanned)), external_evidence=float(nats), smallest_reportable=MIN_AMPLITUDE,
-    )  # fmt: skip
-
-
-def _amplitudes(case, fit, spectra, wheel, lengths, k):
+def _amplitudes(
+    case: TrackCase, fit: Fit, spectra: WheelSpectra, wheel: int, lengths: np.ndarray, k: int
+) -> np.ndarray:
     r"""(n,) amplitude of the wheel's wave [m] from each sensor, by its energy over the background:
 
     .. math:: \sum_f |Y|^2 = \tfrac{N}{2} f_s \int y^2 h^2 dt, \quad

@@ -11,22 +11,33 @@ is the gain in chi-squared when the waves give way to the shape, without a simul
 ``scan_geometry`` collects these candidates and those of wheels and short corrugation, which no fixed grid could hold.
 """
 
+from __future__ import annotations
+
+from collections.abc import Collection
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout import physics
-from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.candidate_search import Projector
+from turnout.mismatch.turnout.candidates.catalogue import candidate_of
 from turnout.mismatch.turnout.candidates.out_of_roundness import polygon_candidates, short_polygon_candidates
 from turnout.mismatch.turnout.candidates.short_corrugation import short_corrugation_candidates
 from turnout.mismatch.turnout.candidates.wheel_flats import flat_candidates
 from turnout.mismatch.turnout.passage_band import SHORTEST_WAVE
+from turnout.physics.hypothesis import Hypothesis
+
+if TYPE_CHECKING:
+    from turnout.mismatch.engine.candidate import Candidate
+    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.turnout.case import TrackCase
 
 DIP_POSITION_STEP, SENSOR_MARGIN = 0.1, 1.0  # m, between trial positions of a dip; margin beyond the sensors
 LENGTHS, SHARPNESSES = (0.25, 0.4, 0.6, 0.9), (0.2, 0.9)  # m, -; trial values of a dip
 DIP_RESOLUTION = 0.3  # m; closer dips cannot be distinguished
 UNIT_DEPTH = 1e-3  # m, of a trial dip
+UNIT_WAVES = ((1e-5, 0.0), (0.0, 1e-5))  # m, (sine, cosine) of trial corrugation
 WAVELENGTHS = np.geomspace(1.02 * SHORTEST_WAVE, 0.75, 34)  # m; shorter ones are no free waves
 HALF_LENGTHS = (1.8, 3.2, 5.0)  # m, half the length of a corrugated stretch
 AMPLITUDE_SD = 3e-5  # m, prior sd of the amplitude: corrugation that is ground away
@@ -36,8 +47,8 @@ N_INDEPENDENT_WAVES = 12.0  # distinguishable wavelengths in that range for sens
 class RailScan:
     """Scores of shapes of the running surface, from the residual and the waves of ``fit``."""
 
-    def __init__(self, case, fit):
-        self.case, self.waves = case, case.waves
+    def __init__(self, case: TrackCase, fit: Fit):
+        self.case, self.waves = case, case.predictor.waves
         projector = Projector(case, fit)
         names = [n.name for n in case.nuisances]
         first = names.index(self.waves.names[0])
@@ -51,27 +62,28 @@ class RailScan:
         self.x = np.arange(self.waves.start, self.waves.end, 0.01)
         self.basis = 0.01 * 2.0 / self.waves.length * self.waves.shapes(self.x).T / self.sd
 
-    def score(self, shapes):
+    def score(self, shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(slope (m,), size (m, m)) of shapes (m, n) at ``x``, with the waves free."""
         c = shapes @ self.basis
         across = self.gram[:, self.wave_slice] @ c.T
         return c @ self.inner, c @ self.gram[self.wave_slice, self.wave_slice] @ c.T - across.T @ self.normal @ across
 
-    def waves_without(self, shape):
+    def waves_without(self, shape: np.ndarray) -> dict[str, float]:
         """Wave amplitudes without ``shape`` (n,), which is an effect of its own: start of a joint fit."""
         c = shape @ self.basis
         released = self.shift - (self.normal @ (self.gram[:, self.wave_slice] @ c))[self.wave_slice]
         return dict(zip(self.waves.names, (self.theta + self.sd * released).tolist()))
 
 
-def scan_rail(case, fit, families=None):
+def scan_rail(case: TrackCase, fit: Fit, families: Collection[str] | None = None) -> tuple[Candidate, ...]:
     """The likeliest dip and the likeliest corrugation as candidates."""
     scan = RailScan(case, fit)
-    makers = {"surface_dip": _dip, "rail_corrugation": _corrugation}
-    return tuple(make(case, scan) for name, make in makers.items() if families is None or name in families)
+    scans = ((physics.SurfaceDip, _dip), (physics.RailCorrugation, _corrugation))
+    chosen = [(effect, find) for effect, find in scans if families is None or effect.name in families]
+    return tuple(candidate_of(effect, find(case, scan)) for effect, find in chosen)
 
 
-def _dip(case, scan):
+def _dip(case: TrackCase, scan: RailScan) -> Hypothesis:
     positions = [s.place for s in case.campaign.sensors]
     grid = np.arange(min(positions) - SENSOR_MARGIN, max(positions) + SENSOR_MARGIN, DIP_POSITION_STEP)
     trials = [(x, length, sharp) for length in LENGTHS for sharp in SHARPNESSES for x in grid]
@@ -82,28 +94,31 @@ def _dip(case, scan):
     (x, length, sharp), depth = trials[best_index], UNIT_DEPTH * slope[best_index] / size[best_index]
     depth = float(np.clip(depth, -2.5e-3, 5e-3))
     scanned = np.ptp(grid) / DIP_RESOLUTION
-    return Candidate(
-        "surface_dip", _parameters_with(physics.SurfaceDip, shift=(0.0, DIP_RESOLUTION)),
-        lambda p: physics.SurfaceDip(float(x), **p),
-        ((depth, length, sharp, 0.0),), {"place": round(float(x), 3)}, "place", scanned, smallest_reportable=3e-5,
+    return Hypothesis(
+        starts=((depth, length, sharp, 0.0),),
+        fixed={"place": float(x)},
+        where={"place": round(float(x), 3)},
+        n_scanned=scanned,
+        parameters=_parameters_with(physics.SurfaceDip, shift=(0.0, DIP_RESOLUTION)),
         promise=float(0.5 * slope[best_index] ** 2 / size[best_index] - np.log(scanned)),
         start_nuisances=scan.waves_without(shapes[best_index] * depth / UNIT_DEPTH),
-    )  # fmt: skip
+    )
 
 
-def _corrugation(case, scan):
+def _corrugation(case: TrackCase, scan: RailScan) -> Hypothesis:
     positions = [s.place for s in case.campaign.sensors]
     middles = np.arange(min(positions), max(positions) + 0.1, 0.75)
     trials = [(m, r, w) for m in middles for r in HALF_LENGTHS for w in WAVELENGTHS]
-    best_fit = None
+    best_fit: tuple | None = None
     for middle, reach, wavelength in trials:
         a, b = middle - reach, middle + reach
-        pair = np.array([_path(physics.RailCorrugation(a, b, *q, wavelength), scan.x) for q in ((1e-5, 0), (0, 1e-5))])
+        pair = np.array([_path(physics.RailCorrugation(a, b, s, c, wavelength), scan.x) for s, c in UNIT_WAVES])
         slope, size = scan.score(pair)
         amount = np.linalg.solve(size + 1e-9 * np.trace(size) * np.eye(2), slope)
         gain = float(slope @ amount)
         if best_fit is None or gain > best_fit[0]:
             best_fit = gain, a, b, wavelength, amount, pair
+    assert best_fit is not None
     gain, a, b, wavelength, amount, pair = best_fit
     sine, cosine = (float(v) for v in np.clip(1e-5 * amount, -2.5e-4, 2.5e-4))
     scanned = N_INDEPENDENT_WAVES * len(middles)
@@ -112,31 +127,39 @@ def _corrugation(case, scan):
         "cosine": (0.0, AMPLITUDE_SD),
         "wavelength": (float(wavelength), 0.03 * float(wavelength)),
     }
-    return Candidate(
-        "rail_corrugation", _parameters_with(physics.RailCorrugation, **priors),
-        lambda p: physics.RailCorrugation(a, b, **p),
-        ((sine, cosine, float(wavelength)),), {"wavelength": round(float(wavelength), 3), "place": 0.5 * (a + b)},
-        "wavelength", scanned, promise=float(0.5 * gain - np.log(scanned)),
+    return Hypothesis(
+        starts=((sine, cosine, float(wavelength)),),
+        fixed={"start": a, "end": b},
+        where={"wavelength": round(float(wavelength), 3), "place": 0.5 * (a + b)},
+        n_scanned=scanned,
+        parameters=_parameters_with(physics.RailCorrugation, **priors),
+        promise=float(0.5 * gain - np.log(scanned)),
         start_nuisances=scan.waves_without(1e5 * np.array([sine, cosine]) @ pair),
-    )  # fmt: skip
+    )
 
 
-def _parameters_with(term, **priors):
+def _parameters_with(term: type[physics.PhysicsTerm], **priors: tuple[float, float]) -> tuple[physics.Parameter, ...]:
     """Parameters of a term with priors about the values of a scan, whose cost is already counted."""
     return tuple(replace(p, prior=priors[p.name]) if p.name in priors else p for p in term.parameters)
 
 
-def _path(term, x):
+def _path(term: physics.PhysicsTerm, x: np.ndarray) -> np.ndarray:
     return sum((component(x, 0) for component in term.paths(None, None)), np.zeros(x.size))
 
 
-def scan_geometry(case, fit, families=None):
+# Searches in the sound level and in the waves of single wheels: (effect, case and fit -> candidates), in this order.
+SCANS = (
+    (physics.RailCorrugation, short_corrugation_candidates),
+    (physics.WheelFlat, flat_candidates),
+    (physics.OutOfRound, polygon_candidates),
+    (physics.OutOfRound, short_polygon_candidates),
+)
+
+
+def scan_geometry(case: TrackCase, fit: Fit, families: Collection[str] | None = None) -> tuple[Candidate, ...]:
     """Candidates of ``families`` (None: all) for the residual of ``fit``."""
     candidates = list(scan_rail(case, fit, families))
-    if families is None or "rail_corrugation" in families:
-        candidates += short_corrugation_candidates(case, fit)
-    if families is None or "wheel_flat" in families:
-        candidates += flat_candidates(case, fit)
-    if families is None or "out_of_round" in families:
-        candidates += (*polygon_candidates(case, fit), *short_polygon_candidates(case, fit))
+    for effect, find in SCANS:
+        if families is None or effect.name in families:
+            candidates += find(case, fit)
     return tuple(candidates)

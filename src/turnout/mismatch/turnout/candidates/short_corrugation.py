@@ -11,17 +11,29 @@ of that length. A wave of a wheel shows in its train alone. A hum or a resonance
 differs between slow and fast passages.
 """
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.signal.windows import tukey
 
 from turnout import physics
-from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.turnout import passage_band, passage_model
+from turnout.mismatch.turnout.candidates.catalogue import candidate_of
 from turnout.mismatch.turnout.matrix_cache import matrices_of
 from turnout.mismatch.turnout.track_parameters import track_with
 from turnout.mismatch.turnout.wave_response import rail_receptances, wheel_and_contact_receptance
+from turnout.physics.hypothesis import Hypothesis
+from turnout.physics.rail_corrugation import MIN_AMPLITUDE
+
+if TYPE_CHECKING:
+    from turnout.mismatch.engine.candidate import Candidate
+    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.turnout.case import TrackCase
+    from turnout.mismatch.turnout.passage_observation import AlignedPassage
 
 MIN_WAVELENGTH, BIN_WIDTH = 0.05, 0.05  # m; bin width in ln wavelength, the resolution of 5 m of rail at 0.2 m
 LINE_BINS = 2  # bins to either side over which a line spreads
@@ -36,7 +48,6 @@ HALF_LENGTHS = (1.0, 1.8, 3.2, 5.0)  # m, half the length of the stretch
 AMPLITUDES = np.geomspace(2e-6, 3e-4, 60)  # m, tested
 RESPONSE_ERROR = 0.15  # relative error of the response at one frequency
 NODE_STRIDE = 2  # every second node is used
-MIN_AMPLITUDE = 1e-5  # m, smallest reported amplitude: EN 13231-3 allows it on a ground rail for waves up to 0.3 m
 
 
 @dataclass(frozen=True)
@@ -55,12 +66,12 @@ class BandPower:
     recorded: np.ndarray
 
     @property
-    def excess(self):
+    def excess(self) -> np.ndarray:
         """(n_recorded, n_bin) logarithm of the power over its background."""
         return np.log(self.power / self.background)
 
 
-def bin_wavelengths(passages):
+def bin_wavelengths(passages: Sequence[AlignedPassage]) -> np.ndarray:
     """(n,) wavelengths that every passage covers, longest first [m]."""
     shortest = max([MIN_WAVELENGTH, *(m.speed / (MAX_FREQUENCY_SHARE * m.passage.recording.rate) for m in passages)])
     longest = passage_band.SHORTEST_WAVE * np.exp(
@@ -69,7 +80,7 @@ def bin_wavelengths(passages):
     return longest * np.exp(-np.arange(0.0, np.log(longest / shortest), BIN_WIDTH))
 
 
-def band_power(case, aligned, wavelengths):
+def band_power(case: TrackCase, aligned: AlignedPassage, wavelengths: np.ndarray) -> BandPower:
     """``BandPower`` of a passage."""
     recording = aligned.passage.recording
     rows = [recording.index(s.name) for s in aligned.sensors]
@@ -92,7 +103,7 @@ def band_power(case, aligned, wavelengths):
     return BandPower(aligned.name, aligned.passage.train, aligned.speed, total, usual, alive)
 
 
-def passage_groups(passages):
+def passage_groups(passages: Sequence[BandPower]) -> list[list[BandPower]]:
     """Passages of each train, the slower and the faster ones: corrugation must show in all groups."""
     trains = sorted({p.train for p in passages})
     middle = np.sqrt(min(p.speed for p in passages) * max(p.speed for p in passages))
@@ -100,7 +111,7 @@ def passage_groups(passages):
     return [*by_train, [p for p in passages if p.speed < middle], [p for p in passages if p.speed >= middle]]
 
 
-def corrugation_evidence(passages, n_sensors):
+def corrugation_evidence(passages: Sequence[BandPower], n_sensors: float) -> np.ndarray:
     """(n_bin,) nats for a line that all trains show at all speeds, over roughness alone.
 
     ``n_sensors`` is the number of sensors on different rail.
@@ -111,10 +122,10 @@ def corrugation_evidence(passages, n_sensors):
     return 0.5 * np.log(spread / wide) + 0.5 * z**2 * (1.0 / spread - 1.0 / wide)
 
 
-def short_corrugation_candidates(case, fit):
+def short_corrugation_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, ...]:
     """The likeliest short corrugation as a candidate, () where intact rail is likelier or the data cannot tell."""
     passages = sorted((m for m in case.fitted_passages() if m.passage.train), key=lambda m: m.speed)
-    if any(c.family == "rail_corrugation" for c in fit.candidates) or not _can_distinguish(passages):
+    if any(c.family == physics.RailCorrugation.name for c in fit.candidates) or not _can_distinguish(passages):
         return ()
     wavelengths = bin_wavelengths(passages)
     if wavelengths.size <= 2 * BACKGROUND_REACH:
@@ -134,28 +145,31 @@ def short_corrugation_candidates(case, fit):
     return (_candidate(case, fit, wavelengths, k, float(nats[k]), band_powers),)
 
 
-def _can_distinguish(passages):
+def _can_distinguish(passages: Sequence[AlignedPassage]) -> bool:
     """Whether trains and speeds differ enough to distinguish the rail from wheels and from frequencies."""
     speeds = [m.speed for m in passages]
     return len({m.passage.train for m in passages}) >= MIN_TRAINS and max(speeds) > MIN_SPEED_RATIO * min(speeds)
 
 
-def _n_independent_sensors(case):
+def _n_independent_sensors(case: TrackCase) -> float:
     """Effective number of sensors on different rail."""
     positions = sorted(s.place for s in case.campaign.sensors)
     return 1.0 + float(np.sum(np.minimum(np.diff(positions) / INDEPENDENT_DISTANCE, 1.0)))
 
 
-def _is_in_file(case, wavelengths):
+def _is_in_file(case: TrackCase, wavelengths: np.ndarray) -> np.ndarray:
     """(n_bin,) whether the track's file has corrugation of about that length."""
     components = [
-        p for m in case.aligned_passages.values() for s in case.zone.turnout.surfaces(m.passage.route) for p in s
+        p
+        for m in case.aligned_passages.values()
+        for s in case.predictor.zone.turnout.surfaces(m.passage.route)
+        for p in s
     ]
     lengths = np.array([p.wavelength for p in components if hasattr(p, "wavelength")])
     return np.any(np.abs(np.log(wavelengths[:, None] / lengths)) < (LINE_BINS + 0.5) * BIN_WIDTH, axis=1)
 
 
-def _is_repeatable(band_powers, k):
+def _is_repeatable(band_powers: Sequence[BandPower], k: int) -> bool:
     """Whether the line repeats: passages in order of speed are split into two halves.
 
     Either half must show at least half the level of the other.
@@ -164,7 +178,9 @@ def _is_repeatable(band_powers, k):
     return min(levels) > 0.5 * max(levels)
 
 
-def _candidate(case, fit, wavelengths, k, nats, band_powers):
+def _candidate(
+    case: TrackCase, fit: Fit, wavelengths: np.ndarray, k: int, nats: float, band_powers: Sequence[BandPower]
+) -> Candidate:
     line = _line_bins(k)
     excess = np.mean([(p.power[:, line] / p.background[:, line]).mean(axis=0) - 1.0 for p in band_powers], axis=0)
     weight = np.maximum(excess, 0.0)
@@ -174,19 +190,27 @@ def _candidate(case, fit, wavelengths, k, nats, band_powers):
     priors = {"sine": (amplitude, error), "wavelength": (length, 0.5 * BIN_WIDTH * length)}
     parameters = tuple(replace(p, prior=priors[p.name]) for p in physics.RailCorrugation.parameters if p.name in priors)
     where = {"wavelength": round(length, 3), "place": round(float(middle), 2)}
-    return Candidate(
-        "rail_corrugation", parameters, lambda p: physics.RailCorrugation(a, b, **p), ((amplitude, length),), where,
-        "wavelength", int(np.count_nonzero(wavelengths < passage_band.SHORTEST_WAVE)),
-        promise=nats - float(np.log(wavelengths.size)), external_evidence=nats, smallest_reportable=MIN_AMPLITUDE,
-    )  # fmt: skip
+    hypothesis = Hypothesis(
+        starts=((amplitude, length),),
+        fixed={"start": a, "end": b},
+        where=where,
+        n_scanned=int(np.count_nonzero(wavelengths < passage_band.SHORTEST_WAVE)),
+        parameters=parameters,
+        smallest_reportable=MIN_AMPLITUDE,
+        promise=nats - float(np.log(wavelengths.size)),
+        external_evidence=nats,
+    )
+    return candidate_of(physics.RailCorrugation, hypothesis)
 
 
-def _line_bins(k):
+def _line_bins(k: int) -> slice:
     """Bins over which a line spreads: a stretch of 3 m is some 10 % wide at 0.3 m."""
     return slice(max(k - LINE_BINS, 0), k + LINE_BINS + 1)
 
 
-def _fit_stretch(case, fit, length, line, band_powers):
+def _fit_stretch(
+    case: TrackCase, fit: Fit, length: float, line: slice, band_powers: Sequence[BandPower]
+) -> tuple[float, float, float, float]:
     """(middle, half the stretch, amplitude, its standard error) [m] of waves of this length.
 
     These explain the power of each sensor in each passage best.
@@ -209,7 +233,9 @@ def _fit_stretch(case, fit, length, line, band_powers):
     return *shapes[best_shape], float(np.exp(mean)), error * float(np.exp(mean))
 
 
-def _unit_energy(case, fit, aligned, length, shapes):
+def _unit_energy(
+    case: TrackCase, fit: Fit, aligned: AlignedPassage, length: float, shapes: Sequence[tuple[float, float]]
+) -> np.ndarray:
     r"""(n_shape, n_sensor) power, as in ``BandPower``, of waves one metre high.
 
     The force of the wheel at v/λ is carried to the sensor from the position of the wheel:
@@ -227,14 +253,16 @@ def _unit_energy(case, fit, aligned, length, shapes):
     )  # Parseval, half at f < 0
 
 
-def response_energy(case, fit, aligned, length):
+def response_energy(case: TrackCase, fit: Fit, aligned: AlignedPassage, length: float) -> tuple[np.ndarray, np.ndarray]:
     """Nodes (n,) [m], and squared acceleration (n_sensor, n) [1/s^4] at each sensor for one wheel at the node.
 
     The wheel rolls over a wave of this length, one metre high.
     """
-    track = track_with(case.track(aligned.passage.route), case.zone, fit.values)
+    track = track_with(case.predictor.track(aligned.passage.route), case.predictor.zone, fit.values)
     matrices, frequency = matrices_of(track), np.array([aligned.speed / length])
-    near = np.flatnonzero((matrices.node >= case.waves.start) & (matrices.node <= case.waves.end))[::NODE_STRIDE]
+    near = np.flatnonzero((matrices.node >= case.predictor.waves.start) & (matrices.node <= case.predictor.waves.end))[
+        ::NODE_STRIDE
+    ]
     h, mean_receptance = rail_receptances(matrices, frequency, near, [s.probe(track).place for s in aligned.sensors])
     force = 1.0 / np.abs(wheel_and_contact_receptance(aligned.passage.vehicle, frequency)[:, None] + mean_receptance)[0]
     return matrices.node[near], ((2.0 * np.pi * frequency) ** 2 * force * np.abs(h[0])) ** 2

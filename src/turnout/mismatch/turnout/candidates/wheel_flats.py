@@ -16,16 +16,28 @@ passage has its own phase. The impacts give it to some centimetres; the simulati
 rest.
 """
 
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from turnout import physics
 from turnout.constants import MAD_TO_SD
 from turnout.errors import SimulationError
-from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.turnout.candidates.catalogue import candidate_of
 from turnout.mismatch.turnout.passage_band import limit_band
+from turnout.physics.hypothesis import Hypothesis
 
+if TYPE_CHECKING:
+    from turnout.mismatch.engine.candidate import Candidate
+    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.turnout.case import TrackCase
+    from turnout.mismatch.turnout.passage_observation import AlignedPassage
+
+Phases: TypeAlias = tuple[tuple[str, float], ...]  # (recording, rolling distance to the first impact [m])
 LOW_FREQUENCY, HIGH_FREQUENCY = 250.0, 900.0  # Hz, band of the level
 BIN_TIME, IMPACT_TIME, BACKGROUND_TIME = (
     0.002,
@@ -57,10 +69,10 @@ class FlatEvidence:
     train: str
     wheel: int
     radius: float
-    phases: tuple
+    phases: Phases
 
 
-def robust_band_level(samples, rate, start, stop):
+def robust_band_level(samples: np.ndarray, rate: float, start: float, stop: float) -> tuple[np.ndarray, np.ndarray]:
     """(time (n,) [s], (n_channel, n)) loudest moment around each time, in robust deviations from the background."""
     fold = max(1, round(BIN_TIME * rate))
     power = limit_band(samples, rate, low=LOW_FREQUENCY, high=min(HIGH_FREQUENCY, 0.35 * rate)) ** 2
@@ -82,13 +94,13 @@ def robust_band_level(samples, rate, start, stop):
     return time, excess / np.maximum(spread, 1e-6)
 
 
-def _shifted_copies(rows, steps):
+def _shifted_copies(rows: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """(n_step, n_row, n) copies of rows (n_row, n) shifted by steps, with constant ends."""
     index = np.clip(np.arange(rows.shape[1]) + np.asarray(steps)[:, None], 0, rows.shape[1] - 1)
     return np.moveaxis(rows[:, index], 1, 0)
 
 
-def log_likelihood_ratio(deviations, expected):
+def log_likelihood_ratio(deviations: np.ndarray, expected: np.ndarray | float) -> np.ndarray:
     """Log likelihood ratio of ``deviations`` for an impact of ``expected`` deviations against none. [nats]"""
     noise, blow = (_normal_density(deviations - m, 1.0 + IMPACT_SCATTER * m) for m in (0.0, expected))
     return np.log((1.0 - OUTLIER_SHARE) * blow + OUTLIER_SHARE * OUTLIER_DENSITY) - np.log(
@@ -96,11 +108,11 @@ def log_likelihood_ratio(deviations, expected):
     )
 
 
-def _normal_density(off, spread):
+def _normal_density(off: np.ndarray, spread: np.ndarray | float) -> np.ndarray:
     return np.exp(-0.5 * (off / spread) ** 2) / (np.sqrt(2.0 * np.pi) * spread)
 
 
-def band_excess(aligned):
+def band_excess(aligned: AlignedPassage) -> tuple[np.ndarray, np.ndarray]:
     """(time, band level) of the sensors of an ``AlignedPassage``, without the level that all wheels share."""
     recording = aligned.passage.recording
     rows = [recording.index(s.name) for s in aligned.sensors]
@@ -108,7 +120,7 @@ def band_excess(aligned):
     return time, excess - _common_excess(aligned, time, excess)
 
 
-def _common_excess(aligned, time, excess):
+def _common_excess(aligned: AlignedPassage, time: np.ndarray, excess: np.ndarray) -> np.ndarray:
     """(n_sensor, n) level that all wheels have at a position, for the position of any wheel at these times.
 
     It is the median over the wheels, 0 where that is noise. Where all of them cause impacts, at a nose or a joint, the
@@ -130,7 +142,9 @@ def _common_excess(aligned, time, excess):
     return np.array([np.max(np.interp(rolled, distance, row, 0.0, 0.0), axis=0) for row in common])
 
 
-def best_flat_on_wheel(passages, excesses, wheel):
+def best_flat_on_wheel(
+    passages: Sequence[AlignedPassage], excesses: Sequence[tuple[np.ndarray, np.ndarray]], wheel: int
+) -> tuple[float, float, Phases]:
     """(nats, radius, phases) of the flat on one wheel that explains the band levels of one train best."""
     radius, fits = passages[0].passage.vehicle.wheel_values("radius")[wheel], []
     for share in 1.0 + RADIUS_CHANGES:
@@ -145,13 +159,15 @@ def best_flat_on_wheel(passages, excesses, wheel):
     return float(nats), float(share * radius), phases
 
 
-def _log_mean(ratio, axis):
+def _log_mean(ratio: np.ndarray, axis: int) -> np.ndarray:
     """Logarithm of the mean of likelihoods, which integrates out the parameter of this axis."""
     top = np.max(ratio, axis=axis)
     return top + np.log(np.mean(np.exp(ratio - np.expand_dims(top, axis)), axis=axis))
 
 
-def _log_ratios(aligned, time, excess, wheel, circumference):
+def _log_ratios(
+    aligned: AlignedPassage, time: np.ndarray, excess: np.ndarray, wheel: int, circumference: float
+) -> np.ndarray:
     """(n_phase, n_strength * n_decay) log ratios of one passage."""
     phases = np.arange(0.0, circumference, PHASE_STEP)
     sign = 1.0 if aligned.passage.direction == "facing" else -1.0
@@ -176,7 +192,7 @@ def _log_ratios(aligned, time, excess, wheel, circumference):
     return np.array(ratios).T
 
 
-def flat_evidence(case):
+def flat_evidence(case: TrackCase) -> list[FlatEvidence]:
     """``FlatEvidence`` of every wheel of every train of a case, the likeliest first."""
     evidence = []
     for train in case.trains:
@@ -201,7 +217,7 @@ FINE_PHASE_OFFSETS = (-0.03, 0.0, 0.03)  # m, about the best of them
 MEDIUM_LENGTH, FLAT_LENGTHS = 0.05, (0.025, 0.035, 0.045, 0.055, 0.07, 0.09)  # m, first and trial lengths
 
 
-def flat_candidates(case, fit):
+def flat_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, ...]:
     """Candidates of the wheels that most likely have a flat."""
     evidence, explained_trains = (
         flat_evidence(case),
@@ -212,21 +228,21 @@ def flat_candidates(case, fit):
     return tuple(_candidate(case, fit, s, len(evidence)) for s in likely[:MAX_WHEELS])
 
 
-def _candidate(case, fit, flat, n_wheels):
+def _candidate(case: TrackCase, fit: Fit, flat: FlatEvidence, n_wheels: int) -> Candidate:
     length, phases, gain = _fit_flat(case, fit, flat)
-
-    def make(p):
-        return physics.WheelFlat(flat.wheel, radius=flat.radius, train=flat.train, phases=phases, **p)
-
-    where = {"train": flat.train, "axle": flat.wheel + 1}
     scanned = n_wheels * (1.0 + np.ptp(PHASE_OFFSETS) / PHASE_RESOLUTION) ** len(phases)
-    return Candidate(
-        "wheel_flat", physics.WheelFlat.parameters, make, ((length,),), where, "wheel", scanned,
-        promise=float(gain + flat.nats - np.log(scanned)), external_evidence=flat.nats, evidence_suffices=True,
-    )  # fmt: skip
+    hypothesis = Hypothesis(
+        starts=((length,),),
+        fixed={"wheel": flat.wheel, "radius": flat.radius, "train": flat.train, "phases": phases},
+        where={"train": flat.train, "axle": flat.wheel + 1},
+        n_scanned=scanned,
+        promise=float(gain + flat.nats - np.log(scanned)),
+        external_evidence=flat.nats,
+    )
+    return candidate_of(physics.WheelFlat, hypothesis)
 
 
-def _fit_flat(case, fit, flat):
+def _fit_flat(case: TrackCase, fit: Fit, flat: FlatEvidence) -> tuple[float, Phases, float]:
     """(length [m], phases, nats) at which the simulated flat explains most of the band, with loss of contact."""
     phases = _fit_phases(case, fit, flat, flat.phases, PHASE_OFFSETS, MEDIUM_LENGTH)
     length, gain = _fit_length(case, fit, flat, phases)
@@ -236,7 +252,9 @@ def _fit_flat(case, fit, flat):
     return length, phases, max(gain, 0.0)
 
 
-def _fit_phases(case, fit, flat, phases, offsets, length):
+def _fit_phases(
+    case: TrackCase, fit: Fit, flat: FlatEvidence, phases: Phases, offsets: Iterable[float], length: float
+) -> Phases:
     """The phases shifted to where a flat of this length explains most."""
     best_phases = []
     for name, phase in phases:
@@ -248,14 +266,14 @@ def _fit_phases(case, fit, flat, phases, offsets, length):
     return tuple(best_phases)
 
 
-def _fit_length(case, fit, flat, phases):
+def _fit_length(case: TrackCase, fit: Fit, flat: FlatEvidence, phases: Phases) -> tuple[float, float]:
     """(length, nats) of the length that explains most at these phases."""
     sizes = [(sum(_explained_nats(case, fit, flat, *at, length) for at in phases), length) for length in FLAT_LENGTHS]
     gain, length = max(sizes)
     return length, gain
 
 
-def _explained_nats(case, fit, flat, name, phase, length):
+def _explained_nats(case: TrackCase, fit: Fit, flat: FlatEvidence, name: str, phase: float, length: float) -> float:
     """Nats that a flat explains in one passage, all else as fitted."""
     k = next(i for i, o in enumerate(case.observations) if o.name == name)
     o = case.observations[k]
