@@ -26,7 +26,7 @@ def add_arguments(parser):
     add_track(parser)
     parser.add_argument("--section", required=True, help="section of the track file")
     add_turnout(parser, "id in config/turnouts.tsv, for the track and the channels of the files", required=False)
-    add_configuration(parser, help="configuration folder (default config)")
+    add_configuration(parser)
     parser.add_argument("--modes", nargs="+", metavar="BAND=HZ/ZETA", help="resonances to meet instead of files")
 
 

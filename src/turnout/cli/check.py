@@ -5,7 +5,7 @@ Every error is one line: file, line, column, what stands there, what to write in
 
 import argparse
 
-from turnout.cli.options import add_configuration, add_raw
+from turnout.cli.options import RAW_HELP, add_configuration, add_raw
 
 HELP = "check configuration and file names"
 
@@ -13,7 +13,7 @@ HELP = "check configuration and file names"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Folders of configuration and raw files."""
     add_configuration(parser)
-    add_raw(parser, help="raw root (raw, where it is there)", default=None)
+    add_raw(parser, help=f"{RAW_HELP} (raw, where it is there)", default=None)
     parser.add_argument("--formats", action="store_true", help="list the raw formats")
 
 

@@ -27,7 +27,7 @@ def add_arguments(parser):
         help="YYYY-MM-DD, YYYY-MM, or 'all' together (effects of temperature need several days): default the newest",
     )
     add_track(parser, help="file in config/tracks; default: the turnout's own, else its layout's")
-    add_configuration(parser, help="configuration folder (%(default)s)")
+    add_configuration(parser)
     add_raw(parser)
     add_work(parser, "where fits and results are kept (%(default)s)")
     add_registry(parser, help="what --accept looks in, too (%(default)s)")

@@ -16,7 +16,7 @@ HELP = "which effects a planned campaign can tell apart"
 def add_arguments(parser):
     """Options of the command."""
     add_track(parser, help="file in config/tracks (%(default)s)", default="tommerup")
-    add_configuration(parser, help="configuration folder (%(default)s)")
+    add_configuration(parser)
     parser.add_argument("--sensors", nargs="+", type=float, required=True, metavar="M", help="places on the rail [m]")
     parser.add_argument("--blows", nargs="*", type=float, default=(), metavar="M", help="places of the hammer [m]")
     parser.add_argument("--temperatures", nargs="+", type=float, default=(15.0,), metavar="C", help="of the rail [°C]")

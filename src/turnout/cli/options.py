@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+RAW_HELP = "raw root, the folder of all recordings"
 TRACK_HELP = "file in config/tracks, or its path (default: the turnout's own, else tommerup)"
 
 
@@ -67,7 +68,7 @@ def add_registry(parser: argparse.ArgumentParser, help: str = "folder of the reg
 
 
 def add_raw(
-    parser: argparse.ArgumentParser, help: str = "folder of raw files (%(default)s)", default: str | None = "raw"
+    parser: argparse.ArgumentParser, help: str = f"{RAW_HELP} (%(default)s)", default: str | None = "raw"
 ) -> None:
     """Add ``--raw``, the folder that holds the raw folders of all turnouts.
 

@@ -8,7 +8,7 @@ whether the next run will stop because of them.
 
 import argparse
 
-from turnout.cli.options import add_configuration, add_raw, add_work, at_least_one
+from turnout.cli.options import RAW_HELP, add_configuration, add_raw, add_work, at_least_one
 
 HELP = "say what is new, without computing"
 STAGES = {
@@ -20,7 +20,7 @@ STAGES = {
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Folders of configuration, raw files and results, the turnouts, and the number of shards."""
     add_configuration(parser)
-    add_raw(parser, help="raw root (raw)", default=None)
+    add_raw(parser, help=f"{RAW_HELP} (raw)", default=None)
     add_work(parser, "folder of the results of earlier runs (%(default)s)")
     parser.add_argument(
         "--shards", type=at_least_one, help="number of shards of those runs, instead of that in config.yaml"

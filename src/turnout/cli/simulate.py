@@ -38,8 +38,8 @@ def add_arguments(parser):
     for sub in (hammer, passage):
         add_track(sub)
         add_turnout(sub, "id in config/turnouts.tsv", required=False)
-        add_configuration(sub, help="its folder (default config)", dest="config")
-        add_raw(sub, help="folder of raw files (default raw)")
+        add_configuration(sub, dest="config")
+        add_raw(sub)
         sub.add_argument("--truth", help="folder for what is true; the pipeline does not read it")
         sub.add_argument("--out", help="file to write instead of a place below --raw")
         sub.add_argument("--format", help="format of the file (default: by the ending of --out, else hdf5)")

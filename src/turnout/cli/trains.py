@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The turnouts, and the folders of configuration, recordings and registry."""
     parser.add_argument("--turnout", nargs="*", help="only the loads of these turnouts")
     add_configuration(parser)
-    add_raw(parser, help="folder of the recordings (%(default)s)")
+    add_raw(parser)
     add_registry(parser)
 
 
