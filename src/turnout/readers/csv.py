@@ -56,7 +56,7 @@ def read_raw(source: Source) -> RawFile:
     """
     is_utf16 = source.head[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
     lazy = source.lazy and not is_utf16
-    data = source.mapped if lazy else _in_utf8(source) if is_utf16 else source.data
+    data = source.memory_map if lazy else _in_utf8(source) if is_utf16 else source.data
     if data[-1:] not in (b"\n", b"\r"):
         problem = "the last line has no line break: its last number may be cut"
         line = data[:].count(b"\n") + 1

@@ -74,7 +74,7 @@ class Source:
     """One raw file: path, name in messages, size and first bytes. ``data`` is read on first access.
 
     Readers whose library opens the path do not use ``data``: allocating a large block costs as much as reading it.
-    With ``lazy``, readers whose format allows it return ``LazyColumn`` in place of arrays and use ``mapped``.
+    With ``lazy``, readers whose format allows it return ``LazyColumn`` in place of arrays and use ``memory_map``.
     """
 
     path: Path
@@ -89,7 +89,7 @@ class Source:
         return self.path.read_bytes()
 
     @cached_property
-    def mapped(self) -> mmap.mmap:
+    def memory_map(self) -> mmap.mmap:
         """The bytes of the file, mapped into memory and loaded on access."""
         with self.path.open("rb") as file:
             return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)

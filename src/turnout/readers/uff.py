@@ -65,7 +65,7 @@ def read_raw(source: Source) -> RawFile:
     ReadError
         If the file holds no time response.
     """
-    data = source.mapped if source.lazy else source.data
+    data = source.memory_map if source.lazy else source.data
     all_sets = read_datasets(data)
     if source.lazy:
         all_sets = tuple(replace(s, data=_lazy_column(np.asarray(s.data), data, source.path)) for s in all_sets)

@@ -113,7 +113,7 @@ def register_job(register: Callable, generation: PathLike | str, log: Any, param
     Parameters
     ----------
     register : callable
-        ``turnout.registry.register.register``, or a function with its arguments.
+        ``turnout.registry.job.register``, or a function with its arguments.
     generation : path-like
         Generation file of the registry, the output of the rule.
     log : any

@@ -62,14 +62,14 @@ class NightReport:
             f"{self.quarantined} of these with rows in quarantine, "
             + (f"{self.rejected} hammer test{'s' * (self.rejected > 1)} rejected, " if self.rejected else "")
             + f"{self.vanished} vanished"
-            + (f"; nothing could be used yet of {self._unused()}" if self.unused else "")
+            + (f"; nothing could be used yet of {self._unused_text()}" if self.unused else "")
             + (f"; worst: {', '.join(f'{t} ({n})' for t, n in self.worst)}" if self.worst else "")
             + (f", see {QUERY_HINT}" if self.worst or self.unused else "")
             + ("" if self.published else "; the registry was not published")
             + (f"; why: {self.reason}" if self.reason else "")
         )
 
-    def _unused(self) -> str:
+    def _unused_text(self) -> str:
         more = len(self.unused) - MAX_TURNOUTS_SHOWN
         return ", ".join(self.unused[:MAX_TURNOUTS_SHOWN]) + (f" and {more} more" if more > 0 else "")
 
@@ -108,7 +108,7 @@ def nightly(options: Sequence[str], profile: str, limit: float | None = None, wo
         with lock.acquire(timeout=0), _signals_raise():
             _require_no_other_run()
             _clear(options, Path(profile).name)
-            before, planned, started = _batches(work), _planned(work), time.time_ns()
+            before, planned, started = _batches(work), _planned_units(work), time.time_ns()
             code = _run([*options, "--workflow-profile", profile, "--rerun-incomplete"], limit, work)
             return _report(
                 code, before, planned, failure_reason(started) if code not in (0, EXIT_TIME_LIMIT) else "", work
@@ -217,14 +217,14 @@ def _batches(work: Path) -> set[tuple[Path, str]]:
     return {(path, batch) for path in states_below(work) for batch in load_state(path).batches}
 
 
-def _planned(work: Path) -> set[str]:
+def _planned_units(work: Path) -> set[str]:
     """Units in the plans."""
     plans = [plan for plan in sorted((work / "plan").glob("*.json")) if not is_cut_plan(plan)]
     return {unit_id(p.unit) for plan in plans for p in read_plan(plan)}
 
 
 def _report(code: int, before: set, planned_before: set[str], reason: str, work: Path) -> NightReport:
-    missing = planned_before - _planned(work)
+    missing = planned_before - _planned_units(work)
     units: set[str] = set()  # states of an earlier number of shards may remain
     processed, quarantined = [], []
     for path in states_below(work):

@@ -236,7 +236,7 @@ class _Run:
         elif name not in self.suspects or (self.launched and self.suspects[name] == self.launched):
             self._keep(Postponed(name, PROCESS_DIED))
         else:
-            self._keep(computed := _provisional(self._guarded(task, death_rows)))
+            self._keep(computed := _provisional(self._compute_with_guard(task, death_rows)))
             self.ledger.checkpoint()  # before its mark is cleared
             if not isinstance(computed, Postponed):
                 clear_mark(self.path, name)
@@ -253,9 +253,9 @@ class _Run:
 
     def _compute(self, task: Task) -> Computed | Postponed:
         with mark_started(self.path, _name(task), self.launched):
-            return self._guarded(task, self.compute)
+            return self._compute_with_guard(task, self.compute)
 
-    def _guarded(self, task: Task, compute: Callable) -> Computed | Postponed:
+    def _compute_with_guard(self, task: Task, compute: Callable) -> Computed | Postponed:
         planned, unit = task.planned, task.planned.unit
         extra = {"context": task.context} if self.stage.context else {}
         try:

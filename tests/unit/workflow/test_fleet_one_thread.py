@@ -6,9 +6,9 @@ import sys
 
 CODE = """
 import sys
-from turnout.threads import one_thread
+from turnout.threads import use_one_thread
 assert "numpy" not in sys.modules, "too late: it has read the variables"
-one_thread()
+use_one_thread()
 import numpy
 from threadpoolctl import threadpool_info
 print(max([pool["num_threads"] for pool in threadpool_info()], default=1))
@@ -24,4 +24,4 @@ def test_one_thread_is_asked_for_before_numpy_comes(repository):
     calls = [
         line for line in (repository / "scripts/stage.py").read_text().splitlines() if "(" in line or "import" in line
     ]
-    assert calls[:2] == ["from turnout.threads import one_thread", "one_thread()"]
+    assert calls[:2] == ["from turnout.threads import use_one_thread", "use_one_thread()"]

@@ -1,4 +1,7 @@
-"""Conversion of SI samples to the numbers of a raw file: the inverse of ``turnout.readers.interpret``."""
+"""Conversion of SI samples to the numbers of a raw file: the inverse of ``turnout.readers.interpret``.
+
+``variables`` are the named variables of npz, MATLAB and Parquet files, as ``turnout.readers.named_arrays`` reads them.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -148,3 +151,30 @@ def attributes(values: Mapping[str, Any]) -> dict[str, Any]:
         The same, with texts of fixed length.
     """
     return {key: fixed_text(value) if isinstance(value, str) else value for key, value in values.items()}
+
+
+def variables(records: Sequence[RecordToWrite]) -> dict[str, Any]:
+    """All variables except the samples.
+
+    Parameters
+    ----------
+    records : sequence of RecordToWrite
+        Records with the same channels and rate.
+
+    Returns
+    -------
+    dict of str to any
+        ``rate``, ``channels``, ``units``, ``n_records``, conditions; ``started_at`` if all records have a start.
+    """
+    first = records[0]
+    values: dict[str, Any] = {
+        "rate": first.rate,
+        "n_records": float(len(records)),
+        "channels": list(first.names),
+        "units": list(first.units),
+    }
+    if all(record.started_at is not None for record in records):
+        values["started_at"] = [iso_text(record.started_at) for record in records]
+    for key in first.conditions:
+        values[key] = [plain_conditions(record.conditions).get(key) for record in records]
+    return values

@@ -7,8 +7,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from turnout.readers.writing.encode import RecordToWrite
-from turnout.readers.writing.named import variables
+from turnout.readers.writing.encode import RecordToWrite, variables
 
 HEADER = b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created on: Mon Jan 01 00:00:00 2024 HDF5 schema 1.00 ."
 

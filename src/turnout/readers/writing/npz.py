@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from turnout.readers.writing.encode import RecordToWrite
-from turnout.readers.writing.named import variables
+from turnout.readers.writing.encode import RecordToWrite, variables
 
 
 def write_raw(records: Sequence[RecordToWrite], path: Path) -> None:

@@ -8,8 +8,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from turnout.readers.writing.encode import RecordToWrite
-from turnout.readers.writing.named import variables
+from turnout.readers.writing.encode import RecordToWrite, variables
 
 
 def write_raw(records: Sequence[RecordToWrite], path: Path) -> None:
