@@ -117,31 +117,6 @@ class TestTerm:
                 assert start[0] != parameters[0].neutral
                 assert "{" not in made.sentence()
 
-    def test_its_pseudo_force_is_the_static_force_of_its_links_and_ports(self, term):
-        """Rail and sleeper pressed down and at rest: what its springs exert, with the signs of the track."""
-        if term.column_type != "support":
-            pytest.skip("no support effect")
-        example = term.example()
-        (j, *_), motion = example.supports, {"rail": 2e-4, "sleeper": 1e-4}
-        target, force = example.pseudo_force(
-            SupportMotion(
-                *(np.full(9, motion[name]) for name in ("rail", "sleeper")),
-                10e3,
-                TRACK.pad_stiffness[j],
-                TRACK.ballast_stiffness[j],
-            )
-        )
-        expected = 0.0
-        for link in example.links(TRACK):
-            if all(node[0] in motion for node, _ in link.ends):  # a node of its own follows the track at rest
-                expected -= link.stiffness * sum(weight * motion[node[0]] for node, weight in link.ends)
-        for port in example.ports(TRACK):
-            if port.ends[0][0][1] == j:
-                d = sum(weight * motion[node[0]] for node, weight in port.ends)
-                expected -= float(port.law.force(d - port.gap, 0.0))
-        assert target in FORCE_TARGETS
-        assert force == pytest.approx(np.full(9, expected), rel=1e-9, abs=1e-9)
-
     def test_it_vanishes_at_its_neutral_value(self, term, base):
         neutral = term.example().neutral()
         for found, expected in zip((passage(neutral), hammer(neutral)), base):
@@ -187,3 +162,28 @@ class TestTerm:
         except TypeError:
             pytest.skip("does not act on sleepers alone")
         assert np.all(force == 0.0)
+
+
+@pytest.mark.parametrize("term", [t for t in TERMS if t.column_type == "support"], ids=lambda t: t.name)
+def test_the_pseudo_force_is_the_static_force_of_its_links_and_ports(term):
+    """Rail and sleeper pressed down and at rest: what its springs exert, with the signs of the track."""
+    example = term.example()
+    (j, *_), motion = example.supports, {"rail": 2e-4, "sleeper": 1e-4}
+    target, force = example.pseudo_force(
+        SupportMotion(
+            *(np.full(9, motion[name]) for name in ("rail", "sleeper")),
+            10e3,
+            TRACK.pad_stiffness[j],
+            TRACK.ballast_stiffness[j],
+        )
+    )
+    expected = 0.0
+    for link in example.links(TRACK):
+        if all(node[0] in motion for node, _ in link.ends):  # a node of its own follows the track at rest
+            expected -= link.stiffness * sum(weight * motion[node[0]] for node, weight in link.ends)
+    for port in example.ports(TRACK):
+        if port.ends[0][0][1] == j:
+            d = sum(weight * motion[node[0]] for node, weight in port.ends)
+            expected -= float(port.law.force(d - port.gap, 0.0))
+    assert target in FORCE_TARGETS
+    assert force == pytest.approx(np.full(9, expected), rel=1e-9, abs=1e-9)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, Field, dataclass, fields
 from typing import Any
 
 from turnout import physics
@@ -12,9 +12,6 @@ from turnout.errors import SimulationError
 from turnout.simulate.links import SUPPORT_FIELDS
 
 SUPPORT_KEYS = SUPPORT_FIELDS  # a file gives the support's position [m] instead of its number
-# Effects of a wheelset do not belong in a track's file: the wheelset leaves with its train.
-WHEELSET_EFFECTS = ("wheel_flat", "out_of_round")
-TERM_CLASSES: dict[str, Any] = {term.name: term for term in physics.TERMS}
 ENTRY_METADATA = ("term", "accepted", "finding", "route")
 ROUTES = ("main", "diverging")
 MAX_SUPPORT_DISTANCE = 0.35  # m: positions closer than this are the same support
@@ -34,9 +31,13 @@ class AcceptedEffect:
     route: str = ""
 
     @property
+    def _effect(self) -> type[physics.PhysicsTerm]:
+        return physics.effects_by_name()[self.family]
+
+    @property
     def parameters(self):
         """Fitted parameters of its term, with units, neutral values and bounds."""
-        return tuple(p for p in TERM_CLASSES[self.family].parameters if p.name in self.values)
+        return tuple(p for p in self._effect.parameters if p.name in self.values)
 
     @property
     def place(self) -> float | None:
@@ -79,7 +80,7 @@ class AcceptedEffect:
             return None
         for name, value in self.fixed.items():
             fixed_values[name] = int(track.nearest_support(value)) if name in SUPPORT_KEYS else value
-        return TERM_CLASSES[self.family](**fixed_values, **chosen)
+        return self._effect(**fixed_values, **chosen)
 
     def _reaches(self, track):
         """Whether at least one support of the effect is on the track."""
@@ -96,11 +97,13 @@ def accepted_of(entries) -> tuple[AcceptedEffect, ...]:
 
 
 def _effect_of_entry(entry) -> AcceptedEffect:
-    family, where = str(entry["term"]), f"{entry.path}, {entry.place}"
-    if family not in TERM_CLASSES:
-        raise SimulationError(f"{where}: no effect {family!r}; there are {', '.join(sorted(TERM_CLASSES))}.")
-    parameters = {p.name: p for p in TERM_CLASSES[family].parameters}
-    names = {f.name for f in fields(TERM_CLASSES[family])}
+    family, where = str(entry["term"]), f"{entry.place.path}, {entry.place.entry}"
+    effects = physics.effects_by_name()
+    if family not in effects:
+        raise SimulationError(f"{where}: no effect {family!r}; there are {', '.join(sorted(effects))}.")
+    parameters = {p.name: p for p in effects[family].parameters}
+    effect_fields: tuple[Field, ...] = fields(effects[family])  # type: ignore[arg-type]  # every effect is a dataclass
+    names = {f.name for f in effect_fields}
     fixed: dict[str, Any] = {}
     values: dict[str, tuple[float, float | None]] = {}
     for name in entry:
@@ -117,9 +120,7 @@ def _effect_of_entry(entry) -> AcceptedEffect:
     route = str(entry["route"]) if "route" in entry else ""
     if route not in ("", *ROUTES):
         raise SimulationError(f"{where}: no route {route!r}; there are {', '.join(ROUTES)}.")
-    missing = (
-        names - set(fixed) - set(values) - {f.name for f in fields(TERM_CLASSES[family]) if f.default is not MISSING}
-    )
+    missing = names - set(fixed) - set(values) - {f.name for f in effect_fields if f.default is not MISSING}
     if missing:
         raise SimulationError(f"{where}: {family} needs {', '.join(sorted(missing))}.")
     if fixed.get("first", 0.0) > fixed.get("last", 0.0):
