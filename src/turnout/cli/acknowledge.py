@@ -7,9 +7,16 @@ An acknowledged alarm moves from "inspect this week" to "plan"; an alarm raised 
 chart is off the list until the date. Both are lines of config/acknowledgements.csv and count from the next run.
 """
 
+from __future__ import annotations
+
 import argparse
+from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_configuration, add_registry
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import Any
 
 OPEN_ALARMS_QUERY = """
     select 1 from alarms
@@ -20,7 +27,13 @@ HELP = "say that an alarm has been seen, or silence it until a date"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Place, person, reason and date of an acknowledgement."""
+    """Place, person, reason and date of an acknowledgement.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command.
+    """
     parser.add_argument("place", help="turnout, or turnout/section")
     parser.add_argument("--band", default="", help="ballast, railpad or amplitude (under trains); all if not given")
     parser.add_argument("--by", required=True, help="who says so")
@@ -32,7 +45,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Append the line to acknowledgements.csv; ConfigError for an invalid turnout, section or date."""
+    """Append the line to acknowledgements.csv; ConfigError for an invalid turnout, section or date.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
     from datetime import UTC, datetime
     from pathlib import Path
 
@@ -62,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _has_no_alarm(registry, row):
+def _has_no_alarm(registry: str, row: Mapping[str, Any]) -> bool:
     """Whether there is a registry without an open alarm that the row of ``acknowledgements`` refers to."""
     from pathlib import Path
 

@@ -11,7 +11,13 @@ HELP = "add a turnout"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """One option per column of turnouts.tsv."""
+    """One option per column of turnouts.tsv.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command.
+    """
     from turnout.config.turnouts_table import ROW
 
     parser.add_argument("turnout", help=ROW["turnout"].meaning)
@@ -23,7 +29,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Append the row and check the whole configuration; an invalid row is removed again."""
+    """Append the row and check the whole configuration; an invalid row is removed again.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
     from pathlib import Path
 
     from turnout.config import load_configuration

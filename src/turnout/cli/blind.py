@@ -10,13 +10,28 @@ effects of your own, one file each; --panel crossing puts all cases into crossin
 does) and publish it before anybody diagnoses.
 """
 
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
 from turnout.cli.options import at_least_one
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from typing import Any
 
 HELP = "prove the diagnosis on concealed effects: make, diagnose, reveal, score"
 
 
-def add_arguments(parser):
-    """Options of the command."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command.
+    """
     steps = parser.add_subparsers(dest="step", metavar="step", required=True)
     make = steps.add_parser("make", help="make a set and seal its truth")
     make.add_argument(
@@ -58,12 +73,18 @@ def add_arguments(parser):
             sub.add_argument("--truth", help="folder of the truth (default: --out with -truth behind it)")
 
 
-def run(args):
-    """Run the step."""
-    return {"make": _make, "diagnose": _diagnose, "reveal": _reveal, "score": _score, "keep": _keep}[args.step](args)
+def run(args: argparse.Namespace) -> None:
+    """Run the step.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+    """
+    {"make": _make, "diagnose": _diagnose, "reveal": _reveal, "score": _score, "keep": _keep}[args.step](args)
 
 
-def _seed(text):
+def _seed(text: str) -> str | int:
     from argparse import ArgumentTypeError
 
     if text != "tool" and not text.isdecimal():
@@ -71,11 +92,11 @@ def _seed(text):
     return text if text == "tool" else int(text)
 
 
-def _truth(args):
+def _truth(args: argparse.Namespace) -> str:
     return args.truth or args.out.rstrip("/") + "-truth"
 
 
-def _make(args):
+def _make(args: argparse.Namespace) -> None:
     from turnout_blind.make import make_set
 
     only = args.only.split(",") if args.only else None
@@ -85,13 +106,13 @@ def _make(args):
     print(f"sealed: SHA-256 of commit.json is {sha}; the truth lies in {_truth(args)}")
 
 
-def _bar(results, total):
+def _bar(results: Iterable[Any], total: int) -> Iterable[Any]:
     from tqdm import tqdm
 
     return tqdm(results, desc="cases", unit="case", total=total, disable=None)
 
 
-def _diagnose(args):
+def _diagnose(args: argparse.Namespace) -> None:
     from turnout_blind.diagnose import COMMAND, diagnose_set
 
     only = args.cases.split(",") if args.cases else None
@@ -103,14 +124,14 @@ def _diagnose(args):
     print(f"{len(record['cases'])} cases diagnosed, {failed} without an answer; truth hidden by {record['isolation']}")
 
 
-def _reveal(args):
+def _reveal(args: argparse.Namespace) -> None:
     from turnout_blind.reveal import reveal
 
     truths = reveal(args.out, _truth(args))
     print(f"{len(truths)} envelopes opened, every hash verified: {args.out}/revealed")
 
 
-def _score(args):
+def _score(args: argparse.Namespace) -> None:
     import json
     from pathlib import Path
 
@@ -127,7 +148,7 @@ def _score(args):
     print(text)
 
 
-def _keep(args):
+def _keep(args: argparse.Namespace) -> None:
     from turnout_blind.archive import write_archive
 
     path = write_archive(args.out, args.folder, _truth(args))

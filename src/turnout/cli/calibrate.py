@@ -8,7 +8,15 @@ parameters whose simulated test has these resonances [Hz] and damping ratios. No
 are printed as they stand in the track's file. Without --track it is that of the turnout.
 """
 
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
 from turnout.cli.options import add_configuration, add_track, add_turnout
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
 
 HELP = "fit a simulated section to measured receptances"
 PRINTED_UNITS = {
@@ -20,8 +28,14 @@ PRINTED_UNITS = {
 }
 
 
-def add_arguments(parser):
-    """Options of the command."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command.
+    """
     parser.add_argument("files", nargs="*", help="hammer tests of the section")
     add_track(parser)
     parser.add_argument("--section", required=True, help="section of the track file")
@@ -30,8 +44,19 @@ def add_arguments(parser):
     parser.add_argument("--modes", nargs="+", metavar="BAND=HZ/ZETA", help="resonances to meet instead of files")
 
 
-def run(args):
-    """Fit and print."""
+def run(args: argparse.Namespace) -> int:
+    """Fit and print.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
     from turnout.errors import SimulationError
     from turnout.stages.calibrate import calibrate_to_files, calibrate_to_modes, resolve_track
 
@@ -62,7 +87,7 @@ def run(args):
     return 0
 
 
-def _track_entry(section, values, sd, missed) -> str:
+def _track_entry(section: str, values: Mapping[str, float], sd: Mapping[str, float], missed: str) -> str:
     """The values as lines of the track file, or as comments if the fit ``missed`` the tests."""
     from turnout.units import PARAMETER_UNITS
 
@@ -82,7 +107,7 @@ def _track_entry(section, values, sd, missed) -> str:
     return "\n".join(lines)
 
 
-def _target_modes(modes):
+def _target_modes(modes: Iterable[str]) -> dict[str, tuple[float, float]]:
     from turnout.errors import SimulationError
 
     targets = {}

@@ -3,22 +3,49 @@
 Every error is one line: file, line, column, what stands there, what to write instead.
 """
 
+from __future__ import annotations
+
 import argparse
+from typing import TYPE_CHECKING
 
 from turnout.cli.options import RAW_HELP, add_configuration, add_raw
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterable, Iterator
+    from pathlib import Path
+
+    from turnout.config import Configuration, Event
+    from turnout.units import Conversion
 
 HELP = "check configuration and file names"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Folders of configuration and raw files."""
+    """Folders of configuration and raw files.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command.
+    """
     add_configuration(parser)
     add_raw(parser, help=f"{RAW_HELP} (raw, where it is there)", default=None)
     parser.add_argument("--formats", action="store_true", help="list the raw formats")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the counts and each problem; exit code 1 if there is one, even if no turnout is affected yet."""
+    """Print the counts and each problem; exit code 1 if there is one, even if no turnout is affected yet.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
     from pathlib import Path
 
     from turnout.config import load_configuration
@@ -49,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
     return 1 if _report_left_out(configuration, raw) or faults else 0
 
 
-def _faults(configuration, formats, to_si):
+def _faults(configuration: Configuration, formats: Collection[str], to_si: Callable[..., Conversion]) -> Iterator[str]:
     """Each fault that stops no turnout, with its consequence."""
     from turnout.config.load import errors_of_unused_layouts
     from turnout.stages.layout_checks import faults_of_tracks
@@ -61,7 +88,7 @@ def _faults(configuration, formats, to_si):
     yield from faults_of_tracks(configuration)
 
 
-def _planned_events(events):
+def _planned_events(events: Iterable[Event]) -> Iterator[str]:
     """Each event of the next year, which may be a typing error; later ones are warnings already."""
     from datetime import timedelta
 
@@ -73,7 +100,7 @@ def _planned_events(events):
             yield f"planned, counts from its day: {e.kind} at {where}, {e.at:%Y-%m-%d} (events.csv)"
 
 
-def _report_left_out(configuration, raw) -> int:
+def _report_left_out(configuration: Configuration, raw: Path) -> int:
     """Print the number of raw files and each problem with them; returns the number of problems."""
     from turnout.config.load import read_notes
     from turnout.workflow.notes_check import note_contradictions

@@ -15,7 +15,13 @@ HELP = "show or generate configuration"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The actions ``show`` and ``generate`` with their options."""
+    """The actions ``show`` and ``generate`` with their options.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command.
+    """
     actions = parser.add_subparsers(dest="action", metavar="show|generate", required=True)
     show = actions.add_parser("show", help="every value of a turnout and the file it comes from")
     show.add_argument("turnout")
@@ -29,11 +35,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Show values with their sources, or write (with --check compare) the generated files."""
+    """Show values with their sources, or write (with --check compare) the generated files.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
     return _show(args) if args.action == "show" else _generate(args)
 
 
-def _show(args) -> int:
+def _show(args: argparse.Namespace) -> int:
     from turnout.config import load_configuration
     from turnout.config.load import sources
 
@@ -47,7 +64,7 @@ def _show(args) -> int:
     return 0 if entries else 1
 
 
-def _generate(args) -> int:
+def _generate(args: argparse.Namespace) -> int:
     from pathlib import Path
 
     from turnout.config.generate import generate_files

@@ -7,13 +7,21 @@ The same seed gives the same samples. The configuration that comes with the prog
 turnouts.
 """
 
+import argparse
+
 from turnout.cli.options import add_cores
 
 HELP = "make a demonstration fleet and run everything on it"
 
 
-def add_arguments(parser):
-    """Options of the command."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command.
+    """
     parser.add_argument("--seed", type=int, default=1, help="another seed makes another fleet (default 1)")
     parser.add_argument("--campaigns", type=int, default=24, help="campaigns per turnout (default 24)")
     parser.add_argument("--passages", type=int, default=12, help="train passages per turnout (default 12)")
@@ -21,8 +29,19 @@ def add_arguments(parser):
     parser.add_argument("--only-raw", action="store_true", help="make the raw files and stop")
 
 
-def run(args):
-    """Make the fleet, run the pipeline, print the results."""
+def run(args: argparse.Namespace) -> int:
+    """Make the fleet, run the pipeline, print the results.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
     import os
 
     from turnout.demo.fleet import make_fleet, run_pipeline

@@ -10,16 +10,33 @@ the term that was named into the turnout's track file, from then on the simulati
 again for that.
 """
 
+from __future__ import annotations
+
+import argparse
 import sys
 import time
+from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_configuration, add_pages, add_raw, add_registry, add_track, add_turnout, add_work
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+    from typing import Any, Literal, TextIO
+
+    from turnout.stages.mismatch_groups import Group
+    from turnout.stages.mismatch_results import Results
 
 HELP = "say what the simulation of a turnout leaves out"
 
 
-def add_arguments(parser):
-    """Options of the command."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command.
+    """
     add_turnout(parser, "id in config/turnouts.tsv")
     parser.add_argument("--sections", nargs="+", default=(), help="only these sections")
     parser.add_argument(
@@ -39,8 +56,19 @@ def add_arguments(parser):
     parser.add_argument("--json", action="store_true", help="print the registry rows instead of words")
 
 
-def run(args):
-    """Diagnose and print, or accept a finding."""
+def run(args: argparse.Namespace) -> int:
+    """Diagnose and print, or accept a finding.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
     from turnout.stages.mismatch_results import Results
 
     results = Results(args.work, args.turnout, args.registry)
@@ -57,7 +85,7 @@ def run(args):
     return 0
 
 
-def _save_and_print(args, results, rows):
+def _save_and_print(args: argparse.Namespace, results: Results, rows: dict[str, list[dict]]) -> None:
     """Save, draw and print the rows."""
     import json
 
@@ -69,7 +97,7 @@ def _save_and_print(args, results, rows):
     print(f"page: {page}")
 
 
-def _diagnose(args):
+def _diagnose(args: argparse.Namespace) -> dict[str, list[dict]]:
     """Rows by table of the requested visit."""
     from turnout.stages.mismatch_results import diagnose_turnout
 
@@ -80,7 +108,7 @@ def _diagnose(args):
         )  # fmt: skip
 
 
-def _accept(args, results):
+def _accept(args: argparse.Namespace, results: Results) -> int:
     """Write the finding into the track file and print the change."""
     from turnout.stages.accept_finding import accept
 
@@ -90,7 +118,7 @@ def _accept(args, results):
     return 0
 
 
-def _findings_text(rows):
+def _findings_text(rows: dict[str, list[dict]]) -> str:
     """Findings, quarantine and notes in words."""
     lines = []
     for row in rows["mismatch_findings"]:
@@ -103,7 +131,7 @@ def _findings_text(rows):
     return "\n".join([*lines, *(f"note: {note}" for note in notes)])
 
 
-def _details(row):
+def _details(row: Mapping[str, Any]) -> Iterator[str]:
     if row["n_held_out"]:
         names = ("before", "after", "rival", "decoy")
         fits_text = ", ".join(f"{n} {row[f'fit_{n}_pct']:.1f} %" for n in names if row[f"fit_{n}_pct"] is not None)
@@ -120,26 +148,39 @@ TIME_HINT = "neighbouring sections together; a group takes a minute to ten, more
 class DiagnoseBar:
     """Progress of a diagnosis: joint fits of a group, and simulations so far, which move during a long fit."""
 
-    def __init__(self, stream=None):
+    def __init__(self, stream: TextIO | None = None) -> None:
         self.stream = stream or sys.stderr
         self.bar = None
         self.group_text, self.next_line, self.stage_text = "", time.monotonic() + LOG_INTERVAL, ""
-        self.started_at = None
+        self.started_at: float | None = None
 
-    def __enter__(self):
+    def __enter__(self) -> DiagnoseBar:
         if self.stream.isatty():
             from tqdm import tqdm
 
             self.bar = tqdm(total=None, unit="fit", file=self.stream)
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> Literal[False]:
         if self.bar is not None:
             self.bar.close()
         return False
 
-    def group(self, group, number, count):
-        """Begin a group; returns the callable that reports its joint fits."""
+    def group(self, group: Group, number: int, count: int) -> Callable[[int, int, str], None]:
+        """Begin a group; returns the callable that reports its joint fits.
+
+        Parameters
+        ----------
+        group : Group
+            Neighbouring sections that are diagnosed together.
+        number, count : int
+            Its number, from 0, and the number of groups.
+
+        Returns
+        -------
+        callable
+            Called with (number of joint fits done, total, candidate).
+        """
         self._print_extent(number, count)
         self.group_text = f"{'+'.join(group.labels)} ({number + 1} of {count})"
         self.stage_text = "base fit"
@@ -147,7 +188,7 @@ class DiagnoseBar:
             self.bar.reset()
         self.simulations(0)
 
-        def fits(n_done, n_total, what):
+        def fits(n_done: int, n_total: int, what: str) -> None:
             self.stage_text = f"{n_done} of {n_total} joint fits, {what}"
             if self.bar is not None:
                 self.bar.total = n_total
@@ -155,7 +196,7 @@ class DiagnoseBar:
 
         return fits
 
-    def _print_extent(self, number, count):
+    def _print_extent(self, number: int, count: int) -> None:
         """Print the number of groups at the start, and the finished ones later."""
         if self.started_at is None:
             self.started_at = time.monotonic()
@@ -167,8 +208,14 @@ class DiagnoseBar:
         else:
             print(text, file=self.stream, flush=True)
 
-    def simulations(self, count):
-        """Called at every prediction."""
+    def simulations(self, count: int) -> None:
+        """Called at every prediction.
+
+        Parameters
+        ----------
+        count : int
+            Simulations of the group so far.
+        """
         text = f"{self.group_text}: {self.stage_text[:60]}, {count} simulations"
         if self.bar is not None:
             self.bar.set_description(text, refresh=count % 10 == 0)

@@ -8,13 +8,21 @@ column's best strength and with all nuisances free; "none" is the base model. Be
 a name needs 12 in the column "none" and 6 against each rival: plan for that.
 """
 
+import argparse
+
 from turnout.cli.options import add_configuration, add_track
 
 HELP = "which effects a planned campaign can tell apart"
 
 
-def add_arguments(parser):
-    """Options of the command."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command.
+    """
     add_track(parser, help="file in config/tracks (%(default)s)", default="tommerup")
     add_configuration(parser)
     parser.add_argument("--sensors", nargs="+", type=float, required=True, metavar="M", help="places on the rail [m]")
@@ -25,8 +33,19 @@ def add_arguments(parser):
     parser.add_argument("--families", nargs="+", help="only these effects")
 
 
-def run(args):
-    """Print the matrix, the confused effects, and the addition that would resolve most."""
+def run(args: argparse.Namespace) -> int:
+    """Print the matrix, the confused effects, and the addition that would resolve most.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
     from turnout.stages.distinguish import planned_matrix
 
     matrix, advice = planned_matrix(

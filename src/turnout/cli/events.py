@@ -16,7 +16,13 @@ HELP = "list maintenance, or enter it"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The event to enter, or the options of the list."""
+    """The event to enter, or the options of the list.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command.
+    """
     parser.add_argument("place", nargs="?", help="turnout, or turnout/section")
     parser.add_argument("kind", nargs="?", help="tamping, pad_exchange, sensor_change ...")
     parser.add_argument("date", nargs="?", help="YYYY-MM-DD or YYYY-MM-DDTHH:MM, UTC")
@@ -28,7 +34,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """List events, enter one, or print the effect of maintenance; ConfigError for an incomplete event."""
+    """List events, enter one, or print the effect of maintenance; ConfigError for an incomplete event.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
     from turnout.config import load_configuration
     from turnout.errors import ConfigError
 
@@ -45,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
     return _enter(args)
 
 
-def _enter(args) -> int:
+def _enter(args: argparse.Namespace) -> int:
     """Append the line and read the configuration again; an invalid line is removed."""
     from pathlib import Path
 
@@ -66,7 +83,7 @@ def _enter(args) -> int:
     return 0
 
 
-def _effect(registry) -> int:
+def _effect(registry: str) -> int:
     from turnout.registry.database import open_registry
 
     with open_registry(registry) as con:

@@ -7,9 +7,17 @@ turnout export lake --format delta --only modes_current charts
 Delta Lake needs the extra: pip install -e '.[lakehouse]'
 """
 
+from __future__ import annotations
+
 import argparse
+from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_registry
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import duckdb
 
 HELP = "write tables and views as Parquet, CSV or Delta Lake"
 DEFAULT_TABLES = ("turnouts", "sections", "events", "campaigns", "modes_current", "charts", "baselines", "alarms",
@@ -17,7 +25,13 @@ DEFAULT_TABLES = ("turnouts", "sections", "events", "campaigns", "modes_current"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Folder, names and format."""
+    """Folder, names and format.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command.
+    """
     parser.add_argument("folder", help="where to write; made where it does not exist")
     parser.add_argument(
         "--only", nargs="+", metavar="NAME", help=f"tables and views; usually {', '.join(DEFAULT_TABLES)}"
@@ -27,7 +41,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write each table or view and print its number of rows; RegistryError if it is unknown or cannot be written."""
+    """Write each table or view and print its number of rows; RegistryError if it is unknown or cannot be written.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
     from pathlib import Path
 
     import duckdb
@@ -53,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _write(con, name, folder, form):
+def _write(con: duckdb.DuckDBPyConnection, name: str, folder: Path, form: str) -> tuple[Path, int]:
     """(path, number of rows) of one written table or view; an existing one is replaced."""
     quoted = '"' + name.replace('"', '""') + '"'
     if form == "delta":
@@ -64,7 +89,7 @@ def _write(con, name, folder, form):
     return path, con.execute(f"copy (select * from {quoted}) to '{written}' ({options})").fetchall()[0][0]
 
 
-def _delta(con, quoted, path) -> int:
+def _delta(con: duckdb.DuckDBPyConnection, quoted: str, path: Path) -> int:
     from turnout.errors import RegistryError
 
     try:

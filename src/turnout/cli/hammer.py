@@ -12,15 +12,30 @@ files of a section: blows are judged against each other. Files that do not lie i
 Exit code 1 where a test gives no resonance, 2 where the command cannot be followed.
 """
 
+from __future__ import annotations
+
 import argparse
+from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_configuration, add_raw, add_turnout
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from turnout.stages.hammer_adhoc import RequestedUnit
 
 HELP = "analyse one hammer test and say what is in it"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The files, the turnout, and options for what the file names do not give."""
+    """The files, the turnout, and options for what the file names do not give.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command.
+    """
     parser.add_argument("file", nargs="+", help="files of the test, in any format that is read")
     add_turnout(parser, "id of the turnout, for its sections and channels")
     parser.add_argument("--section", help="label of the section, where the file's name does not say it")
@@ -33,7 +48,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the results of each section's test; exit code 1 if one gives no resonance."""
+    """Print the results of each section's test; exit code 1 if one gives no resonance.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
     from pathlib import Path
 
     from turnout.config import load_configuration
@@ -61,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
     return 0 if usable else 1
 
 
-def _check_figure(path, tests):
+def _check_figure(path: Path, tests: Sequence[RequestedUnit]) -> None:
     """ConfigError for a figure that cannot be written, before anything is computed."""
     from turnout.errors import ConfigError
 
@@ -77,7 +103,7 @@ def _check_figure(path, tests):
         raise ConfigError(path, "--figure", f"one figure for {labels}", "Name the files of one section and campaign")
 
 
-def _draw(path, rows, test):
+def _draw(path: Path, rows: dict[str, list[dict]], test: RequestedUnit) -> None:
     from turnout.report.hammer_figure import hammer_figure
     from turnout.report.site import replace_page
 

@@ -1,16 +1,28 @@
 """The command line: ``turnout <command>``."""
 
+from __future__ import annotations
+
 import argparse
 import sys
 from importlib import import_module
+from typing import TYPE_CHECKING
 
 from turnout import __version__
 from turnout.cli import COMMANDS
 from turnout.errors import TurnoutError
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
 
 def build_parser() -> argparse.ArgumentParser:
-    """Parser with one subcommand per module of ``turnout.cli``."""
+    """Parser with one subcommand per module of ``turnout.cli``.
+
+    Returns
+    -------
+    argparse.ArgumentParser
+        Its values include ``run``, the function of the command.
+    """
     parser = argparse.ArgumentParser(
         prog="turnout",
         description="Watch railway switches and crossings from hammer tests and train passages.",
@@ -30,8 +42,19 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def main(argv=None) -> int:
-    """Run one command; an error of the input or of a file is one message and exit code 2."""
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command; an error of the input or of a file is one message and exit code 2.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Arguments of the command line; by default those of this process.
+
+    Returns
+    -------
+    int
+        Exit code: 0, 1 where the command found a problem, 2 where it could not be followed.
+    """
     args = build_parser().parse_args(argv)
     try:
         return args.run(args) or 0

@@ -17,14 +17,31 @@ INTERRUPTED = 130
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Profile, time limit [h] and options of Snakemake."""
+    """Profile, time limit [h] and options of Snakemake.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command.
+    """
     parser.add_argument("--profile", default="profiles/default", help="folder of the profile (%(default)s)")
     parser.add_argument("--limit-hours", type=float, default=None, help="end a run that takes longer")
     parser.add_argument("options", nargs="*", help="handed on to Snakemake, after --")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the workflow once, print its one line, and return its exit code."""
+    """Run the workflow once, print its one line, and return its exit code.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
     from turnout.workflow.nightly import nightly
 
     limit = None if args.limit_hours is None else 3600.0 * args.limit_hours

@@ -6,16 +6,32 @@ the train is described.
 Exit code 1 where no train is found, 2 where the command cannot be followed.
 """
 
+from __future__ import annotations
+
 import argparse
+from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_configuration, add_turnout, add_work
 from turnout.constants import KMH
+
+if TYPE_CHECKING:
+    from turnout.config import TurnoutConfig
+    from turnout.config.settings.passage import PassageSettings
+    from turnout.passage.result import Passage
+    from turnout.records import Recording
+    from turnout.stages.passage import PassageContext
 
 HELP = "analyse one passage file and say what is in it"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The recording, its turnout, and the folder of its models."""
+    """The recording, its turnout, and the folder of its models.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command.
+    """
     parser.add_argument("file", help="passage recording, in any format that is read")
     add_turnout(parser, "id of the turnout, for its sensors and models")
     add_configuration(parser)
@@ -24,7 +40,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the train of each record and, unless --no-fit, the fit at each sensor; exit code 1 without a train."""
+    """Print the train of each record and, unless --no-fit, the fit at each sensor; exit code 1 without a train.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
     from pathlib import Path
 
     from turnout.config import load_configuration
@@ -49,7 +76,14 @@ def run(args: argparse.Namespace) -> int:
     return 0 if has_train else 1
 
 
-def _show(recording, offset, turnout, context, settings, no_fit) -> bool:
+def _show(
+    recording: Recording,
+    offset: float | None,
+    turnout: TurnoutConfig,
+    context: PassageContext,
+    settings: PassageSettings,
+    no_fit: bool,
+) -> bool:
     """Print one train and its fits; returns whether there is a train."""
     from turnout.passage.analysis import analyse
     from turnout.stages.passage import sensors_of
@@ -63,11 +97,11 @@ def _show(recording, offset, turnout, context, settings, no_fit) -> bool:
     return bool(passage.n_axle)
 
 
-def _train_lines(recording, passage) -> list[str]:
+def _train_lines(recording: Recording, passage: Passage) -> list[str]:
     """The train in words."""
     lines = [f"{recording.source}, record {recording.record + 1}: {recording.duration:.1f} s, {passage.status}"]
     lines += [f"  {f.reason}: {f.detail}" for f in passage.findings]
-    if not passage.n_axle:
+    if passage.speed is None or passage.type is None:
         return lines
     speed, type_ = passage.speed, passage.type
     lines.append(f"  axles      {passage.n_axle}, the clearest cut between them and the rest is {passage.contrast:.1f}")
@@ -85,7 +119,9 @@ def _train_lines(recording, passage) -> list[str]:
     return lines
 
 
-def _fit_lines(recording, passage, turnout, context, settings) -> list[str]:
+def _fit_lines(
+    recording: Recording, passage: Passage, turnout: TurnoutConfig, context: PassageContext, settings: PassageSettings
+) -> list[str]:
     """A line per sensor: each score with that of its null models."""
     from datetime import datetime
 
@@ -102,7 +138,7 @@ def _fit_lines(recording, passage, turnout, context, settings) -> list[str]:
             continue
         samples, times = recording.signal(sensor.name), passage.at_sensor[sensor.name]
         fit = fit_channel(samples, recording.rate, times, passage.train_motion.speed, model.model, settings)
-        if fit.scores is None:
+        if fit.scores is None or fit.null is None or fit.test is None:
             lines.append(f"  {sensor.name:<10}{fit.detail}")
             continue
         s, null = fit.scores, fit.null
@@ -115,8 +151,19 @@ def _fit_lines(recording, passage, turnout, context, settings) -> list[str]:
     return lines
 
 
-def score_basis(settings) -> str:
-    """The settings behind the scores, in words."""
+def score_basis(settings: PassageSettings) -> str:
+    """The settings behind the scores, in words.
+
+    Parameters
+    ----------
+    settings : PassageSettings
+        Section ``passage`` of the configuration.
+
+    Returns
+    -------
+    str
+        Band, number of values per wheel and null models.
+    """
     return (
         f"band {settings.band_low:g}-{settings.band_high:g} Hz, two numbers per wheel, "
         f"null: {settings.null_models} random models, 95 % quantile"

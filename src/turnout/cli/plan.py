@@ -6,9 +6,21 @@ then compares its content and computes nothing. Files that the last run knew and
 whether the next run will stop because of them.
 """
 
+from __future__ import annotations
+
 import argparse
+from typing import TYPE_CHECKING
 
 from turnout.cli.options import RAW_HELP, add_configuration, add_raw, add_work, at_least_one
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+    from typing import Any
+
+    from turnout.config import Configuration, TurnoutConfig
+    from turnout.records import Unit
+    from turnout.workflow.plan import PlannedUnit
 
 HELP = "say what is new, without computing"
 STAGES = {
@@ -18,7 +30,13 @@ STAGES = {
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Folders of configuration, raw files and results, the turnouts, and the number of shards."""
+    """Folders of configuration, raw files and results, the turnouts, and the number of shards.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command.
+    """
     add_configuration(parser)
     add_raw(parser, help=f"{RAW_HELP} (raw)", default=None)
     add_work(parser, "folder of the results of earlier runs (%(default)s)")
@@ -29,7 +47,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the new and changed units and the files left out, with the count of units."""
+    """Print the new and changed units and the files left out, with the count of units.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
     from pathlib import Path
 
     from turnout.config import load_configuration
@@ -50,7 +79,9 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _print_gone(configuration, raw, plans, shards, turnouts) -> None:
+def _print_gone(
+    configuration: Configuration, raw: Path, plans: Path, shards: int, turnouts: Sequence[str] | None
+) -> None:
     """Print which files of the last run are missing, and the error of the next run, if any."""
     from turnout.workflow.plan import missing_files
 
@@ -63,7 +94,7 @@ def _print_gone(configuration, raw, plans, shards, turnouts) -> None:
         print(f"{gone}, first {gone.files[0]}: what they gave stays in the registry.")
 
 
-def _print_changes(turnout, raw, earlier, counts) -> None:
+def _print_changes(turnout: TurnoutConfig, raw: Path, earlier: _EarlierResults, counts: dict[str, int]) -> None:
     """Print and count the new and changed units of one turnout, and print the files left out."""
     from turnout.config.load import read_notes
     from turnout.workflow.notes import notes_of
@@ -85,13 +116,13 @@ def _print_changes(turnout, raw, earlier, counts) -> None:
 class _EarlierResults:
     """Results of earlier runs, read when a shard is first needed."""
 
-    def __init__(self, work, shards) -> None:
+    def __init__(self, work: Path, shards: int) -> None:
         self.work, self.shards = work, shards
         self.states: dict = {}
         self.tokens: dict = {}
         self.algo: dict[str, str] = {}
 
-    def change_of(self, planned, settings) -> str:
+    def change_of(self, planned: PlannedUnit, settings: Mapping[str, Any]) -> str:
         """ "new", "changed", or "" if its result is current."""
         from turnout.fingerprint import fingerprint
         from turnout.workflow.plan import shard_of
@@ -112,7 +143,7 @@ class _EarlierResults:
         planned = with_token(planned, self._token(unit, settings))
         return "" if (before.stamp, before.algo) == (stamp_of(planned), self.algo[unit.kind]) else "changed"
 
-    def _token(self, unit, settings):
+    def _token(self, unit: Unit, settings: Mapping[str, Any]) -> str:
         """Token of what a stage takes from another one, such as the models that passages are fitted with."""
         from turnout.workflow.tasks import load_function
 

@@ -7,18 +7,33 @@
 docs/registry.md lists every table, view and macro with its columns and units.
 """
 
+from __future__ import annotations
+
 import argparse
 import csv
 import sys
 from decimal import Decimal
+from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_csv, add_registry, at_least_one
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from typing import Literal, TextIO
+
+    import duckdb
 
 HELP = "ask the registry in SQL"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The query, the folder of the registry and the output."""
+    """The query, the folder of the registry and the output.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command.
+    """
     parser.add_argument("sql", nargs="?", help="a query; '-' reads it from standard input")
     add_registry(parser)
     add_csv(parser)
@@ -27,7 +42,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print or write the rows of a query; RegistryError with the message of DuckDB if it fails."""
+    """Print or write the rows of a query; RegistryError with the message of DuckDB if it fails.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
     import duckdb
 
     from turnout.errors import RegistryError
@@ -52,15 +78,31 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _write_csv(result, path):
+def _write_csv(result: duckdb.DuckDBPyRelation, path: str) -> None:
     with open_output(path) as stream:
         writer = csv.writer(stream)
         writer.writerow(result.columns)
         writer.writerows(result.fetchall())
 
 
-def open_output(path):
-    """The file at ``path`` open for writing, standard output for "-"; RegistryError if it cannot be written."""
+def open_output(path: str) -> TextIO | _StandardOutput:
+    """The file at ``path`` open for writing, standard output for "-".
+
+    Parameters
+    ----------
+    path : str
+        File to write, or "-".
+
+    Returns
+    -------
+    text file
+        A context manager; standard output stays open behind it.
+
+    Raises
+    ------
+    RegistryError
+        If the file cannot be written.
+    """
     from turnout.errors import RegistryError
 
     if path == "-":
@@ -75,15 +117,28 @@ def open_output(path):
 class _StandardOutput:
     """Standard output as a context that does not close it."""
 
-    def __enter__(self):
+    def __enter__(self) -> TextIO:
         return sys.stdout
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> Literal[False]:
         return False
 
 
-def format_table(result, limit: int = 60) -> str:
-    """Text table of a result: numbers right aligned, NULL empty, and the number of rows."""
+def format_table(result: duckdb.DuckDBPyRelation, limit: int = 60) -> str:
+    """Text table of a result: numbers right aligned, NULL empty, and the number of rows.
+
+    Parameters
+    ----------
+    result : duckdb.DuckDBPyRelation
+        Rows of a query.
+    limit : int
+        Most rows that are shown.
+
+    Returns
+    -------
+    str
+        Head, rows and the number of rows.
+    """
     rows = result.limit(limit + 1).fetchall()
     is_longer, rows = len(rows) > limit, rows[:limit]
     text = [[_cell(value) for value in row] for row in rows]
@@ -92,7 +147,7 @@ def format_table(result, limit: int = 60) -> str:
         all(isinstance(row[i], (int, float, Decimal)) or row[i] is None for row in rows) for i in range(len(widths))
     ]
 
-    def line(cells):
+    def line(cells: Sequence[str]) -> str:
         return "  ".join(c.rjust(w) if r else c.ljust(w) for c, w, r in zip(cells, widths, right)).rstrip()
 
     total = result.count("*").fetchall()[0][0] if is_longer else len(rows)
@@ -100,7 +155,7 @@ def format_table(result, limit: int = 60) -> str:
     return "\n".join([line(result.columns), line(["-" * w for w in widths]), *map(line, text), count])
 
 
-def _cell(value) -> str:
+def _cell(value: object) -> str:
     if value is None:
         return ""
     if isinstance(value, float):

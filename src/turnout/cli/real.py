@@ -5,19 +5,47 @@ a five-hit hammer test (hit 0 overloaded, hit 2 double, by its authors' word), t
 beams with published modes, and vendors' UFF files. Everything lies below real/.
 """
 
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
 from turnout.cli.options import add_cores
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+    from turnout.demo.published_modes import Beam
 
 HELP = "run everything on recordings made by others"
 
 
-def add_arguments(parser):
-    """Options of the command."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command.
+    """
     parser.add_argument("--folder", default="real", help="where everything goes (default real)")
     add_cores(parser, "processors to use (default 2)", default=2)
 
 
-def run(args):
-    """Fetch, run, compare."""
+def run(args: argparse.Namespace) -> int:
+    """Fetch, run, compare.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
     from pathlib import Path
 
     from turnout.demo.fleet import run_pipeline
@@ -41,7 +69,7 @@ def run(args):
     return 0
 
 
-def _print_impacts(folder):
+def _print_impacts(folder: Path) -> None:
     from turnout.demo.published_modes import HITS
     from turnout.registry.database import open_registry
 
@@ -53,7 +81,7 @@ def _print_impacts(folder):
         print(f"{record:>4}  {HITS[record]:<24} {status:<10} {detail or ''}")
 
 
-def _print_modes(beams):
+def _print_modes(beams: Iterable[Beam]) -> None:
     for beam in beams:
         print(f"\nModes of the {beam.name} ({beam.origin}): found without being told how many, nor where")
         print(f"{'published [Hz]':>15} {'found [Hz]':>22} {'published damping':>19} {'found damping [%]':>20} {'n':>4}")
@@ -70,7 +98,7 @@ def _print_modes(beams):
     print("± is the 95 % t interval of the mean over n responses, as if independent; those of one sensor are not.")
 
 
-def _print_uff(folder):
+def _print_uff(folder: Path) -> None:
     from turnout.demo.published_modes import uff_contents
 
     print("\nVendors' UFF files")

@@ -8,16 +8,29 @@ rebuild    write all files under the present columns, after an update that chang
 describe   tables, views and macros with their columns, units and meanings
 """
 
+from __future__ import annotations
+
 import argparse
+from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_registry, at_least_one
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
 
 HELP = "check, compact, move or describe the registry"
 ACTIONS = ("check", "compact", "vacuum", "relocate", "rebuild", "describe")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The action, the folder and the options of single actions."""
+    """The action, the folder and the options of single actions.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command.
+    """
     parser.add_argument("action", choices=ACTIONS)
     parser.add_argument("name", nargs="?", help="describe: only this table, view or macro")
     add_registry(parser)
@@ -28,13 +41,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the action; exit code 1 if the check finds a problem."""
+    """Run the action; exit code 1 if the check finds a problem.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
     return {"check": _check, "compact": _compact, "vacuum": _vacuum, "relocate": _relocate}.get(
         args.action, _describe if args.action == "describe" else _rebuild
     )(args)
 
 
-def _check(args) -> int:
+def _check(args: argparse.Namespace) -> int:
     from turnout.registry.integrity import check
 
     problems = check(_registry_folder(args), hashes=not args.quick)
@@ -42,19 +66,19 @@ def _check(args) -> int:
     return 1 if problems else 0
 
 
-def _compact(args) -> int:
+def _compact(args: argparse.Namespace) -> int:
     from turnout.registry.compaction import compact
 
     return _print_changes(compact(_registry_folder(args), args.at_least), "merged")
 
 
-def _rebuild(args) -> int:
+def _rebuild(args: argparse.Namespace) -> int:
     from turnout.registry.compaction import rebuild
 
     return _print_changes(rebuild(_registry_folder(args)), "written anew")
 
 
-def _print_changes(changes, verb) -> int:
+def _print_changes(changes: Mapping[str, tuple[int, int]], verb: str) -> int:
     for folder, (files, rows) in sorted(changes.items()):
         print(f"{folder}: {files} files with {rows} rows {verb}")
     if not changes:
@@ -62,7 +86,7 @@ def _print_changes(changes, verb) -> int:
     return 0
 
 
-def _vacuum(args) -> int:
+def _vacuum(args: argparse.Namespace) -> int:
     from turnout.registry.integrity import vacuum
 
     deleted = vacuum(_registry_folder(args))
@@ -70,7 +94,7 @@ def _vacuum(args) -> int:
     return 0
 
 
-def _relocate(args) -> int:
+def _relocate(args: argparse.Namespace) -> int:
     from turnout.registry.database import rebuild_database
 
     folder = _registry_folder(args)
@@ -79,14 +103,14 @@ def _relocate(args) -> int:
     return 0
 
 
-def _describe(args) -> int:
+def _describe(args: argparse.Namespace) -> int:
     from turnout.registry.documentation import describe
 
     print(describe(args.name))
     return 0
 
 
-def _registry_folder(args):
+def _registry_folder(args: argparse.Namespace) -> Path:
     from pathlib import Path
 
     from turnout.errors import RegistryError

@@ -5,13 +5,21 @@ turnout report --day 2026-03-01      list and states as of that day, as far as t
 turnout report --turnouts tommerup_s1 tommerup_s2
 """
 
+import argparse
+
 from turnout.cli.options import add_cores, add_pages, add_registry
 
 HELP = "write the pages of fleet and turnouts"
 
 
-def add_arguments(parser):
-    """Options of the command."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command.
+    """
     add_registry(parser)
     add_pages(parser, "where the pages go (%(default)s)")
     parser.add_argument(
@@ -21,8 +29,19 @@ def add_arguments(parser):
     add_cores(parser, "processes that draw pages (%(default)s)", default=1)
 
 
-def run(args):
-    """Write the pages and print their folder."""
+def run(args: argparse.Namespace) -> int:
+    """Write the pages and print their folder.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
     from turnout.report.job import report_job
 
     day = _day(args.day)
@@ -30,9 +49,10 @@ def run(args):
     print(f"{n} pages written, the others had not changed: {args.pages}/index.html")
     if note := f"As of {day}." if day else _older_day_hint(args.registry):
         print(note)
+    return 0
 
 
-def _day(text):
+def _day(text: str | None) -> str | None:
     """The requested day, None without one; ConfigError if it is invalid."""
     from datetime import date
 
@@ -44,7 +64,7 @@ def _day(text):
         raise ConfigError("--day", "date", repr(text), "Write YYYY-MM-DD") from None
 
 
-def _older_day_hint(registry):
+def _older_day_hint(registry: str) -> str:
     """A hint to an earlier day if charts of today's pages are too old, else ""."""
     from turnout.registry.as_of import counts_of, list_day, past_day_hint
     from turnout.registry.database import open_registry

@@ -9,13 +9,21 @@ pipeline finds it; what is true of it goes to a file of the same name below --tr
 each blow fell and how hard, or the wheels' forces.
 """
 
+import argparse
+
 from turnout.cli.options import add_configuration, add_raw, add_track, add_turnout
 
 HELP = "simulate a hammer test or a train passage"
 
 
-def add_arguments(parser):
-    """Options of the command."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command.
+    """
     subcommands = parser.add_subparsers(dest="kind", metavar="kind", required=True)
     hammer = subcommands.add_parser("hammer", help="blows of a hammer at one section")
     hammer.add_argument(
@@ -55,8 +63,19 @@ def add_arguments(parser):
     figures.add_argument("--out", default="docs/gallery", help="folder (default docs/gallery)")
 
 
-def run(args):
-    """Simulate and write."""
+def run(args: argparse.Namespace) -> int:
+    """Simulate and write.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
     if args.kind == "figures":
         from turnout.report.simulation_figures import draw_all
 

@@ -7,17 +7,34 @@ Loads need trains of known weight (axle_load_t in raw/<id>/trains.csv). Both are
 setting passage.assets names; the next run uses them, and computes the passages that depend on them again.
 """
 
+from __future__ import annotations
+
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_configuration, add_raw, add_registry
 from turnout.constants import KMH
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from typing import Any
+
+    from turnout.config.settings.passage import PassageSettings
+    from turnout.passage.axle_load import LoadCalibration
+    from turnout.passage.clusters import Clusters
 
 HELP = "learn axle loads and clusters from the trains so far"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The turnouts, and the folders of configuration, recordings and registry."""
+    """The turnouts, and the folders of configuration, recordings and registry.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command.
+    """
     parser.add_argument("--turnout", nargs="*", help="only the loads of these turnouts")
     add_configuration(parser)
     add_raw(parser)
@@ -25,7 +42,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print each calibration and each cluster."""
+    """Print each calibration and each cluster.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
     from turnout.config import load_configuration, with_raw
     from turnout.errors import ConfigError
     from turnout.registry.database import open_registry
@@ -51,7 +79,12 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _load_lines(name, trains, calibrations, settings) -> list[str]:
+def _load_lines(
+    name: str,
+    trains: Sequence[Mapping[str, Any]],
+    calibrations: Mapping[str, LoadCalibration],
+    settings: PassageSettings,
+) -> list[str]:
     """The calibrations of one turnout in words."""
     if not calibrations:
         n_required = settings.load_trains_minimum
@@ -66,7 +99,7 @@ def _load_lines(name, trains, calibrations, settings) -> list[str]:
     return lines
 
 
-def _cluster_lines(clusters) -> list[str]:
+def _cluster_lines(clusters: Clusters) -> list[str]:
     """The clusters in words."""
     import numpy as np
 

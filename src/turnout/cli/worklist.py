@@ -6,18 +6,34 @@ turnout worklist --all                everything, not only what a person can act
 turnout worklist --csv list.csv
 """
 
+from __future__ import annotations
+
 import argparse
 import csv
+from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_csv, add_registry
 from turnout.cli.query import open_output
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+    from datetime import datetime
+    from typing import Any, TextIO
+
+    import duckdb
 
 FIRST_MEASUREMENT_QUERY = "select min(measured_at_utc) from charts where state <> 'wrong_time'"
 HELP = "tomorrow's list: what to inspect, what to plan, where nothing can be said"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Folder of the registry, date of the list and output file."""
+    """Folder of the registry, date of the list and output file.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command.
+    """
     add_registry(parser)
     parser.add_argument("--asof", metavar="DATE", help="as it was then: YYYY-MM-DD, UTC")
     parser.add_argument("--all", action="store_true", help="every row; open alarms are never left out anyway")
@@ -25,7 +41,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the list, or write it as comma-separated values."""
+    """Print the list, or write it as comma-separated values.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
     from turnout.registry.as_of import counts_of, list_day, whole_list
     from turnout.registry.database import open_registry
 
@@ -47,8 +74,29 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def as_text(rows, n_charts=0, n_silenced=0, n_unmeasured=0, newest=None) -> str:
-    """The list for a terminal: one paragraph per row, then the number of rows left out and of charts."""
+def as_text(
+    rows: Sequence[Mapping[str, Any]],
+    n_charts: int = 0,
+    n_silenced: int = 0,
+    n_unmeasured: int = 0,
+    newest: datetime | None = None,
+) -> str:
+    """The list for a terminal: one paragraph per row, then the number of rows left out and of charts.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Rows of the view ``worklist``, in their order.
+    n_charts, n_silenced, n_unmeasured : int
+        Number of charts, of those that somebody silenced, and of those not measured for too long.
+    newest : datetime, optional
+        Time of the newest campaign; None for the list of another day.
+
+    Returns
+    -------
+    str
+        Several lines.
+    """
     text = [_paragraph(row) for row in rows]
     if not rows and n_charts:
         text = ["Nothing to do: no chart in alarm, none that drifts, none that cannot tell."]
@@ -72,7 +120,7 @@ def as_text(rows, n_charts=0, n_silenced=0, n_unmeasured=0, newest=None) -> str:
     return "\n".join(text)
 
 
-def _paragraph(row) -> str:
+def _paragraph(row: Mapping[str, Any]) -> str:
     where = row["turnout_id"] + (f" ({row['name']})" if row["name"] else "")
     lines = [
         f"{row['rank']:>2}. {row['state'].upper()}: {where}, {row['sections']}, {row['band']}",
@@ -84,13 +132,13 @@ def _paragraph(row) -> str:
     return "\n".join(lines)
 
 
-def _write(stream, names, rows):
+def _write(stream: TextIO, names: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(names)
     writer.writerows(rows)
 
 
-def _day(text, con):
+def _day(text: str, con: duckdb.DuckDBPyConnection) -> datetime:
     """The time of ``--asof``; ConfigError if it is invalid or before the first measurement."""
     from datetime import datetime
 
