@@ -104,7 +104,8 @@ class Nuisance:
 
     ``mean`` and ``sd`` of the prior in ``unit``. ``owner`` is the observation that it belongs to, None if shared.
     ``max_step_sd`` is the largest step of a fit in prior standard deviations. ``can_mask``: the base fit may have
-    changed it to hide an effect.
+    changed it to hide an effect. ``group`` is the property that it describes, for example the stiffness of single
+    railpads. ``index`` is the number of its component among those of the group that are alike, else None.
     """
 
     name: str
@@ -116,6 +117,8 @@ class Nuisance:
     meaning: str = ""
     max_step_sd: float = 3.0
     can_mask: bool = True
+    group: str = ""
+    index: int | None = None
 
 
 class Case:

@@ -115,15 +115,18 @@ def _is_opposed(case, fit, refit, candidate):
 def is_within_spread(case, refit, candidate):
     r"""Whether a component differs by no more than ``max_ordinary_spreads`` from similar ones, the effect included.
 
-    .. math:: |\ln \psi| < 3 s, \quad s^2 = \overline{(v_j - ar v)^2} + \overline{\sigma_j^2}
+    .. math:: |\ln \psi| < 3 s, \quad s^2 = \overline{(v_j - \bar v)^2} + \overline{\sigma_j^2}
 
     with :math:`v_j` the fitted logarithms of the other components and :math:`\sigma_j` their standard errors.
     """
     if not candidate.masking_parameter or candidate.from_masking:
         return False
-    stem = candidate.masking_parameter.rsplit("_", 1)[0]  # of pad_31; pad_stiffness is the common value
-    siblings = [k for k, n in enumerate(case.nuisances) if n.name.removeprefix(f"{stem}_").isdigit()]
-    siblings = [k for k in siblings if case.nuisances[k].name != candidate.masking_parameter]
+    masking = next((n for n in case.nuisances if n.name == candidate.masking_parameter), None)
+    if masking is None or masking.index is None:  # the common value of all components, or of one without its like
+        return False
+    siblings = [
+        k for k, n in enumerate(case.nuisances) if n.group == masking.group and n.index not in (None, masking.index)
+    ]
     first = refit.psi[refit.part(candidate).start]
     if len(siblings) < THRESHOLDS.min_siblings or first <= 0.0:
         return False
