@@ -26,7 +26,7 @@ class Candidate:
         The site: position, sensor, train, axle.
     frame : str
         What the effect is fixed to.
-    n_scanned : int
+    n_scanned : float
         Number of sites at which this effect is tested.
     start_from_base : bool
         False: refits start with the nuisance parameters at their priors, not at the base fit.
@@ -80,7 +80,7 @@ class Candidate:
     starts: tuple[tuple[float, ...], ...]
     where: Mapping[str, object] = field(default_factory=dict)
     frame: str = ""
-    n_scanned: int = 1
+    n_scanned: float = 1
     start_from_base: bool = True
     prescreen_group: str = ""
     smallest_reportable: float = 0.0
