@@ -1,13 +1,22 @@
 """Write a page and a table that compare published modes of beams with those identified here."""
 
+from __future__ import annotations
+
 import csv
 import io
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.report.site import page_environment, replace_page, shared_by_pages
 from turnout.report.svg import Axis, Chart
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from typing import Any
+
+    from turnout.modal.frf import FrfMode
 
 NAME = "beams_of_others"
 COLUMNS = (
@@ -16,7 +25,7 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def write_beams(beams, folder):
+def write_beams(beams: Sequence[Any], folder: str | Path) -> Path:
     """Write ``folder``/beams_of_others.html and .csv beside it.
 
     Parameters
@@ -24,6 +33,8 @@ def write_beams(beams, folder):
     beams : sequence
         Each with ``name``, ``origin``, ``frequency`` (n_line,) [Hz], ``responses`` (n_frf, n_line) complex,
         ``highest`` [Hz] and ``rows`` of (published frequency [Hz], published damping [%], identified mode or None).
+    folder : str or Path
+        Folder of the page and table.
 
     Returns
     -------
@@ -45,8 +56,19 @@ def write_beams(beams, folder):
     return page
 
 
-def beam_panel(beam):
-    """SVG of the magnitude of every response, published modes as vertical lines, identified modes as dots."""
+def beam_panel(beam: Any) -> str:
+    """SVG of the magnitude of every response, published modes as vertical lines, identified modes as dots.
+
+    Parameters
+    ----------
+    beam : object
+        Beam as in ``write_beams``.
+
+    Returns
+    -------
+    str
+        SVG.
+    """
     inside = (beam.frequency > 0.0) & (beam.frequency <= beam.highest)
     frequency, size = beam.frequency[inside], np.abs(beam.responses[:, inside])
     valid = size[np.isfinite(size) & (size > 0.0)]
@@ -69,7 +91,7 @@ def beam_panel(beam):
     return chart.svg()
 
 
-def _csv_row(published, damping, mode):
+def _csv_row(published: float | None, damping: float | None, mode: FrfMode | None) -> list:
     row = [published, None if damping is None else f"{damping / 100:.4f}"]
     if mode is None:
         return [*row, *[None] * 7]
@@ -77,7 +99,7 @@ def _csv_row(published, damping, mode):
     return [*row, *(f"{v:.3f}" for v in (f.mean, f.low, f.high)), *(f"{v:.6f}" for v in (d.mean, d.low, d.high)), f.n]
 
 
-def _table_row(published, damping, mode):
+def _table_row(published: float | None, damping: float | None, mode: FrfMode | None) -> dict[str, Any]:
     """One row of the page's table in words; ± is the half width of the 95 % interval."""
     words = {
         "published": "not published" if published is None else f"{published:.1f}",

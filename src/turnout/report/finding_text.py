@@ -1,9 +1,16 @@
 """Describe a finding in words for the check on site: the missing effect, position, time and certainty."""
 
+from __future__ import annotations
+
 import json
+from typing import TYPE_CHECKING
 
 from turnout.constants import Z95_EXACT
 from turnout.stages.mismatch_text import interval, number_in_words, parameter_in_words, title
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+    from typing import Any
 
 __all__ = ["accepted_parameters", "answer", "check", "facts", "parameters", "rivals", "title"]
 ANSWERS = {
@@ -15,8 +22,19 @@ ANSWERS = {
 }
 
 
-def parameters(finding) -> list[dict]:
-    """Name, value with its 95 % interval, and unit of every fitted parameter."""
+def parameters(finding: Mapping[str, Any]) -> list[dict]:
+    """Name, value with its 95 % interval, and unit of every fitted parameter.
+
+    Parameters
+    ----------
+    finding : mapping
+        Row of ``mismatch_findings``.
+
+    Returns
+    -------
+    list of dict
+        ``effect``, ``name``, ``value`` and ``interval`` in words.
+    """
     rows = []
     for term in json.loads(finding["term_json"] or "[]"):
         for name, p in term["parameters"].items():
@@ -25,13 +43,26 @@ def parameters(finding) -> list[dict]:
     return rows
 
 
-def accepted_parameters(rows) -> list[dict]:
-    """The same for effects accepted in the track file and estimated again; ``rows`` of ``mismatch_parameters``."""
+def accepted_parameters(rows: Iterable[Mapping[str, Any]]) -> list[dict]:
+    """The same for effects accepted in the track file and estimated again.
+
+    Parameters
+    ----------
+    rows : iterable of mapping
+        Rows of ``mismatch_parameters``.
+
+    Returns
+    -------
+    list of dict
+        ``effect``, ``name``, ``value`` and ``interval`` in words.
+    """
     names = ("term", "position_m", "parameter", "value", "value_low", "value_high", "unit")
     return [_parameter(*(row[name] for name in names)) for row in rows if row["accepted"]]
 
 
-def _parameter(term, position, name, value, low, high, unit):
+def _parameter(
+    term: str, position: float | None, name: str, value: float, low: float | None, high: float | None, unit: str
+) -> dict[str, str]:
     digits = 4 if unit == "m" and abs(value) >= 10.0 else 3  # position along the turnout, to a centimetre
     effect = term.replace("_", " ") + (f" at {position:.1f} m" if position is not None else "")
     ends = [number_in_words(end, unit, digits) for end in (low, high) if end is not None]
@@ -43,8 +74,19 @@ def _parameter(term, position, name, value, low, high, unit):
     }
 
 
-def facts(finding) -> list[tuple[str, str]]:
-    """(question, answer) pairs: position, frame that it is fixed to, band, time, amount of data, certainty."""
+def facts(finding: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """What is known of a finding: position, frame that it is fixed to, band, time, amount of data, certainty.
+
+    Parameters
+    ----------
+    finding : mapping
+        Row of ``mismatch_findings``.
+
+    Returns
+    -------
+    list of (str, str)
+        Question and answer.
+    """
     evidence = json.loads(finding["evidence_json"] or "{}")
     pairs = [("Where", _where(finding)), ("It is fixed to", _frame_words(finding, evidence))]
     if finding["band_low_hz"] is not None and finding["verdict"] not in ("none", "numerics"):
@@ -60,7 +102,7 @@ def facts(finding) -> list[tuple[str, str]]:
     return [(question, answer) for question, answer in pairs if answer]
 
 
-def _where(finding):
+def _where(finding: Mapping[str, Any]) -> str:
     if finding["position_m"] is not None:
         error = finding["position_se_m"]
         return (
@@ -76,7 +118,7 @@ def _where(finding):
     return f"somewhere in {low:.1f} to {high:.1f} m" if high - low > 0.1 else f"about {low:.1f} m"
 
 
-def _frame_words(finding, evidence):
+def _frame_words(finding: Mapping[str, Any], evidence: Mapping[str, Any]) -> str:
     """What the residual is fixed to: the significant frames, strongest first."""
     if finding["train"]:
         return f"the train: {finding['train']}"
@@ -90,7 +132,7 @@ def _frame_words(finding, evidence):
     return "; ".join(words) or "nothing in particular"
 
 
-def _owner(finding):
+def _owner(finding: Mapping[str, Any]) -> str:
     """What a named effect belongs to, in words."""
     if finding["locked_to"] in ("sensor", "clock") and finding["channel"]:
         return f"sensor {finding['channel']}"
@@ -99,12 +141,12 @@ def _owner(finding):
     )
 
 
-def _conditions(evidence):
+def _conditions(evidence: Mapping[str, Any]) -> str:
     gains = sorted(((v or 0.0, k) for k, v in evidence.get("by_condition", {}).items()), reverse=True)
     return ", ".join(f"{k} ({v:+.0f} nats)" for v, k in gains[:3] if v > 0.0)
 
 
-def _amount(finding):
+def _amount(finding: Mapping[str, Any]) -> str:
     counts = [
         (finding["n_hammer_tests"], "hammer test"),
         (finding["n_passages"], "passage"),
@@ -113,7 +155,7 @@ def _amount(finding):
     return ", ".join(f"{n} {what}{'s' if n != 1 else ''}" for n, what in counts)
 
 
-def _certainty(finding, evidence):
+def _certainty(finding: Mapping[str, Any], evidence: Mapping[str, Any]) -> str:
     words = f"probability {finding['probability']:.2f}" if finding["probability"] is not None else ""
     if finding["grade"] == "A":
         words += "; with it the recordings are predicted as well as a sound turnout's"
@@ -126,20 +168,42 @@ def _certainty(finding, evidence):
     return f"{words}; each by itself: {each}" if each else words
 
 
-def _single_effect(effect, further):
+def _single_effect(effect: Mapping[str, Any], further: bool) -> str:
     """Name and probability of one of several effects; for a ``further`` one also its reason, given only here."""
     why = f" ({effect['reason']})" if further and effect.get("reason") else ""
     return f"{effect['term'].replace('_', ' ')} {effect['probability']:.2f}{why}"
 
 
-def answer(finding) -> str:
-    """The verdict in a few words."""
+def answer(finding: Mapping[str, Any]) -> str:
+    """The verdict in a few words.
+
+    Parameters
+    ----------
+    finding : mapping
+        Row of ``mismatch_findings``.
+
+    Returns
+    -------
+    str
+        Verdict and grade.
+    """
     words = ANSWERS[finding["verdict"]]
     return f"{words}, grade {finding['grade']}" if finding["grade"] else words
 
 
-def check(finding) -> str:
-    """What to do on site, a sentence."""
+def check(finding: Mapping[str, Any]) -> str:
+    """What to do on site, a sentence.
+
+    Parameters
+    ----------
+    finding : mapping
+        Row of ``mismatch_findings``.
+
+    Returns
+    -------
+    str
+        The sentence.
+    """
     if finding["verdict"] == "none":
         return "Nothing to check."
     if finding["verdict"] == "numerics":
@@ -148,8 +212,19 @@ def check(finding) -> str:
     return action.rstrip(".") + "."
 
 
-def rivals(finding) -> list[dict]:
-    """Rivals: name, evidence over the base model [nats], share of the excess explained."""
+def rivals(finding: Mapping[str, Any]) -> list[dict]:
+    """Rivals: name, evidence over the base model [nats], share of the excess explained.
+
+    Parameters
+    ----------
+    finding : mapping
+        Row of ``mismatch_findings``.
+
+    Returns
+    -------
+    list of dict
+        ``name``, ``nats`` and ``explained`` in words, the best first.
+    """
     evidence = json.loads(finding["evidence_json"] or "{}")
     return [
         {

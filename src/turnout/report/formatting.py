@@ -1,9 +1,15 @@
 """Format numbers with their 95 % interval, days, and states for pages."""
 
+from __future__ import annotations
+
 import math
 from functools import cache
+from typing import TYPE_CHECKING
 
 from scipy.stats import t as student
+
+if TYPE_CHECKING:
+    from datetime import datetime
 
 BADGES = {
     "inspect this week": "inspect",
@@ -17,18 +23,48 @@ BADGES = {
 
 
 @cache
-def student_quantile(n):
+def student_quantile(n: int) -> float:
     """97.5 % quantile of Student's t with n - 1 degrees of freedom.
 
+    Parameters
+    ----------
+    n : int
+        Number of values, at least 2.
+
+    Returns
+    -------
+    float
+        Quantile.
+
+    Examples
+    --------
     >>> round(student_quantile(30), 3)
     2.045
     """
     return float(student.ppf(0.975, n - 1))
 
 
-def with_interval(value, standard_error, n, digits=1):
+def with_interval(value: float | None, standard_error: float | None, n: int, digits: int = 1) -> str:
     """A value with the half width of its 95 % t interval, which gets at least one significant digit.
 
+    Parameters
+    ----------
+    value : float or None
+        The value.
+    standard_error : float or None
+        Its standard error.
+    n : int
+        Number of values that the error comes from.
+    digits : int
+        Least number of decimals.
+
+    Returns
+    -------
+    str
+        Text; "none" without a value, "?" for an unknown error.
+
+    Examples
+    --------
     >>> with_interval(154.55, 0.4, 30)
     '154.6 ± 0.8'
     >>> with_interval(154.55, 0.004, 30)
@@ -48,11 +84,33 @@ def with_interval(value, standard_error, n, digits=1):
     return f"{value:.{digits}f} ± {half:.{digits}f}"
 
 
-def day(when):
-    """The day of a time stamp, or a dash."""
+def day(when: datetime | None) -> str:
+    """The day of a time stamp, or a dash.
+
+    Parameters
+    ----------
+    when : datetime or None
+        Time.
+
+    Returns
+    -------
+    str
+        YYYY-MM-DD.
+    """
     return "–" if when is None else f"{when:%Y-%m-%d}"
 
 
-def badge(state):
-    """Style of the badge that shows ``state``."""
+def badge(state: str) -> str:
+    """Style of the badge that shows ``state``.
+
+    Parameters
+    ----------
+    state : str
+        State of a chart.
+
+    Returns
+    -------
+    str
+        Name of the style.
+    """
     return BADGES.get(state, "unknown")

@@ -1,21 +1,43 @@
 """Draw one hammer test as an SVG file with the panels of the turnout's page."""
 
+from __future__ import annotations
+
 import re
 from html import escape
 from importlib.resources import files
+from typing import TYPE_CHECKING
 
 from turnout.errors import REASONS
 from turnout.report.hammer_text import heading, resonances, verdict
 from turnout.report.panels.hammer import coherence_panel, decay_panel, impacts_panel, receptance_panel
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from typing import Any
+
+    from turnout.config.turnout import TurnoutConfig
+    from turnout.records import Unit
+
 WIDTH, HEADER_HEIGHT, GAP = 462, 52, 12  # px: width of a panel, height of the header, space between panels
 HEIGHT_PATTERN = re.compile(r' height="(\d+)"')
 
 
-def hammer_figure(rows, unit, turnout) -> str:
+def hammer_figure(rows: Mapping[str, Sequence[Mapping[str, Any]]], unit: Unit, turnout: TurnoutConfig) -> str:
     """SVG: receptance between H1 and H2, coherence with its limits, measured and modelled decay, and the impacts.
 
-    ``rows`` by table are those of ``hammer_unit``; "" without an impact.
+    Parameters
+    ----------
+    rows : mapping
+        Rows of ``hammer_unit`` by table.
+    unit : Unit
+        Section and campaign.
+    turnout : TurnoutConfig
+        The turnout.
+
+    Returns
+    -------
+    str
+        SVG, "" without an impact.
     """
     panels = _panels(rows)
     if not panels:
@@ -36,13 +58,13 @@ def hammer_figure(rows, unit, turnout) -> str:
     )
 
 
-def _resonance_words(rows) -> list[str]:
+def _resonance_words(rows: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[str]:
     """The resonances and the reason why the model was rejected."""
     reasons = [REASONS[model["reason"]] for model in rows.get("models", ()) if model["reason"]]
     return ["; ".join([*resonances(rows), *reasons])] if rows.get("models") else []
 
 
-def _panels(rows) -> list[str]:
+def _panels(rows: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[str]:
     modes, panels = rows.get("modes", ()), []
     if rows.get("receptances"):
         receptance, model = rows["receptances"][0], rows["models"][0]

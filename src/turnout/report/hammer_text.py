@@ -1,7 +1,10 @@
 """Describe one hammer test in words, from the rows that the hammer stage makes for the registry."""
 
+from __future__ import annotations
+
 from collections import Counter
 from math import floor
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +13,14 @@ from turnout.hammer_test.dynamic_stiffness import dynamic_stiffness
 from turnout.report.formatting import with_interval
 from turnout.report.pages.turnout import BANDS, PANELS
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+    from typing import Any
+
+    from turnout.config.settings.receptance import ReceptanceSettings
+    from turnout.config.turnout import HammerConfig, TurnoutConfig
+    from turnout.records import Unit
+
 VERDICTS = {
     "accepted": "both resonances found",
     "second_order_only": "one of the two resonances found",
@@ -17,9 +28,21 @@ VERDICTS = {
 }
 
 
-def verdict(rows) -> str:
+def verdict(rows: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
     """Result of a test in a few words.
 
+    Parameters
+    ----------
+    rows : mapping
+        Rows of ``hammer_unit`` by table.
+
+    Returns
+    -------
+    str
+        The words.
+
+    Examples
+    --------
     >>> verdict({"recordings": [], "quarantine": [{}]})
     'nothing could be used'
     """
@@ -27,29 +50,69 @@ def verdict(rows) -> str:
     return VERDICTS[models[0]["status"]] if models else "nothing could be used"
 
 
-def is_usable(rows) -> bool:
-    """Whether at least one resonance is accepted."""
+def is_usable(rows: Mapping[str, Sequence[Mapping[str, Any]]]) -> bool:
+    """Whether at least one resonance is accepted.
+
+    Parameters
+    ----------
+    rows : mapping
+        Rows of ``hammer_unit`` by table.
+
+    Returns
+    -------
+    bool
+        False also without a model.
+    """
     return any(model["status"] != "rejected" for model in rows.get("models", ()))
 
 
-def heading(unit, turnout) -> str:
-    """Turnout, section with its position, and campaign."""
-    section = turnout.section(unit.section)
+def heading(unit: Unit, turnout: TurnoutConfig) -> str:
+    """Turnout, section with its position, and campaign.
+
+    Parameters
+    ----------
+    unit : Unit
+        Section and campaign.
+    turnout : TurnoutConfig
+        The turnout.
+
+    Returns
+    -------
+    str
+        The words.
+    """
+    section = turnout.section(str(unit.section))
     track = "both tracks" if section.track == "both" else f"{section.track} track" if section.track else ""
     details = [PANELS.get(section.panel), track, f"{section.position:g} m"]
     return f"{turnout.id}, section {section.label} ({', '.join(p for p in details if p)}), campaign {unit.campaign}"
 
 
-def hammer_words(rows, unit, turnout, remarks=()) -> list[str]:
+def hammer_words(
+    rows: Mapping[str, Sequence[Mapping[str, Any]]], unit: Unit, turnout: TurnoutConfig, remarks: Iterable[str] = ()
+) -> list[str]:
     """Lines of text: files read, impacts accepted, coherence, resonances or why there is none.
 
-    ``rows`` by table are those of ``hammer_unit``; ``remarks`` are added at the end.
+    Parameters
+    ----------
+    rows : mapping
+        Rows of ``hammer_unit`` by table.
+    unit : Unit
+        Section and campaign.
+    turnout : TurnoutConfig
+        The turnout.
+    remarks : iterable of str
+        Notes that are added at the end.
+
+    Returns
+    -------
+    list of str
+        The lines.
     """
     lines = [f"{heading(unit, turnout)}: {verdict(rows)}"]
     names = _names(rows.get("recordings", ()))
     lines += [_line("read", _file(row, names[row["recording_id"]])) for row in rows.get("recordings", ())]
-    if rows.get("recordings"):
-        lines.append(_line("channels", _channels(turnout.hammer, unit.section)))
+    if rows.get("recordings") and turnout.hammer is not None:
+        lines.append(_line("channels", _channels(turnout.hammer, str(unit.section))))
     lines += _quarantine_lines(rows.get("quarantine", ()))
     if rows.get("models"):
         lines += _impact_lines(rows, turnout.settings["receptance"])
@@ -60,16 +123,27 @@ def hammer_words(rows, unit, turnout, remarks=()) -> list[str]:
     return lines + [_line("note", remark) for remark in remarks]
 
 
-def resonances(rows) -> list[str]:
-    """A few words for each mode: band, frequency and damping with their 95 % intervals."""
+def resonances(rows: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[str]:
+    """A few words for each mode: band, frequency and damping with their 95 % intervals.
+
+    Parameters
+    ----------
+    rows : mapping
+        Rows of ``hammer_unit`` by table.
+
+    Returns
+    -------
+    list of str
+        One text for each mode.
+    """
     return [f"{mode['band']} {_mode(mode)}" for mode in rows.get("modes", ())]
 
 
-def _line(what, words) -> str:
+def _line(what: str, words: str) -> str:
     return f"  {what:<10} {words}"
 
 
-def _names(recordings) -> dict[str, str]:
+def _names(recordings: Sequence[Mapping[str, Any]]) -> dict[str, str]:
     """File names by recording id; with their folders where two have the same name."""
     short = {row["recording_id"]: row["path"].rsplit("/", 1)[-1] for row in recordings}
     count = Counter(short.values())
@@ -79,13 +153,13 @@ def _names(recordings) -> dict[str, str]:
     }
 
 
-def _file(row, name) -> str:
+def _file(row: Mapping[str, Any], name: str) -> str:
     one = "1 record" if row["n_records"] == 1 else f"{row['n_records']} records"
     length = row["n_samples"] / row["sampling_rate_hz"]
     return f"{name}: {one} of {length:.3g} s at {row['sampling_rate_hz']:g} Hz, {row['file_format']}"
 
 
-def _channels(hammer, section) -> str:
+def _channels(hammer: HammerConfig, section: str) -> str:
     channels = {channel.name: channel for channel in hammer.descriptions[section].channels}
     descriptions = []
     for what, name in (("force", hammer.force[section]), ("response", hammer.response[section])):
@@ -97,7 +171,7 @@ def _channels(hammer, section) -> str:
     return "; ".join(descriptions)
 
 
-def _quarantine_lines(rows) -> list[str]:
+def _quarantine_lines(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """A line for each file or record that is not used; records of a file with the same problem share one.
 
     A file with another time in its name than inside is used, and has a line, too.
@@ -113,7 +187,7 @@ def _quarantine_lines(rows) -> list[str]:
     return lines
 
 
-def _impact_lines(rows, settings) -> list[str]:
+def _impact_lines(rows: Mapping[str, Sequence[Mapping[str, Any]]], settings: ReceptanceSettings) -> list[str]:
     """A line for each impact with its verdict; they are counted from 1."""
     names = _names(rows["recordings"])
     impacts = rows["impacts"]
@@ -127,20 +201,20 @@ def _impact_lines(rows, settings) -> list[str]:
     return lines
 
 
-def _number(value, divisor) -> str:
+def _number(value: float | None, divisor: float) -> str:
     if value is None or not np.isfinite(value):
         return "–"
     size = value / divisor
     return f"{size:.2f}" if abs(size) >= 0.1 else f"{size:.2g}"
 
 
-def _impact_verdict(impact) -> str:
+def _impact_verdict(impact: Mapping[str, Any]) -> str:
     if impact["status"] == "accepted":
         return "accepted" + (f", {impact['detail']}" if impact["detail"] else "")
     return f"refused, {impact['reason']}: {impact['detail']}"
 
 
-def _gate_lines(rows, settings) -> list[str]:
+def _gate_lines(rows: Mapping[str, Sequence[Mapping[str, Any]]], settings: Mapping[str, Any]) -> list[str]:
     """Lines about the coherence and the share of lines that pass the gate; none without a receptance."""
     if not rows.get("receptances"):
         return []
@@ -164,25 +238,25 @@ def _gate_lines(rows, settings) -> list[str]:
     return [*lines, _line("gate", f"lets pass {', '.join(shares)}; the hammer reaches to {row['valid_to_hz']:.0f} Hz")]
 
 
-def _bands(rows) -> list[str]:
+def _bands(rows: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[str]:
     """The two main bands, and others with a resonance."""
     return [*BANDS, *(mode["band"] for mode in rows.get("modes", ()) if mode["band"] not in BANDS)]
 
 
-def _resonance_lines(band, rows) -> list[str]:
+def _resonance_lines(band: str, rows: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[str]:
     mode = next((mode for mode in rows.get("modes", ()) if mode["band"] == band), None)
     if mode is None:
         return [_line(band, "none")]
     return [_line(band, _mode(mode)), *_stiffness_lines(mode, rows)]
 
 
-def _mode(mode) -> str:
+def _mode(mode: Mapping[str, Any]) -> str:
     n = mode["n_impacts"]
     frequency = with_interval(mode["frequency_hz"], mode["frequency_se_hz"], n)
     return f"{frequency} Hz, damping {with_interval(mode['damping_ratio'], mode['damping_se'], n, 4)}, n = {n}"
 
 
-def _stiffness_lines(mode, rows) -> list[str]:
+def _stiffness_lines(mode: Mapping[str, Any], rows: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[str]:
     """Dynamic stiffness at the line nearest to the resonance; not with an exponential window, which changes it."""
     row = rows["receptances"][0]
     if row["window_decay_per_s"]:
@@ -199,15 +273,15 @@ def _stiffness_lines(mode, rows) -> list[str]:
     return [_line("", f"dynamic stiffness at {nearest:.0f} Hz {value} MN/m ({low} to {high}, 95 %)")]
 
 
-def _reason_lines(model) -> list[str]:
+def _reason_lines(model: Mapping[str, Any]) -> list[str]:
     """Why the model was rejected or has one resonance only, or else its detail."""
     if not model["reason"]:
         return [_line("detail", model["detail"])] if model["detail"] else []
     return [_line("why", f"{REASONS[model['reason']]}: {model['detail']}")]
 
 
-def _temperature(rows, unit, turnout) -> str:
-    from_notes = turnout.campaigns[unit.campaign].rail_temperature
+def _temperature(rows: Mapping[str, Sequence[Mapping[str, Any]]], unit: Unit, turnout: TurnoutConfig) -> str:
+    from_notes = turnout.campaigns[str(unit.campaign)].rail_temperature
     from_file = next((mode["rail_temperature_c"] for mode in rows.get("modes", ())), None)
     if from_notes is not None:
         return f"{from_notes:g} °C, noted in campaigns.csv"

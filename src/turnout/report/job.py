@@ -1,18 +1,57 @@
 """Run the report step of the workflow and of ``turnout report``."""
 
+from __future__ import annotations
+
 import multiprocessing
 from concurrent.futures import ProcessPoolExecutor
+from typing import TYPE_CHECKING
 
 from turnout.errors import RegistryError
 from turnout.registry.database import open_registry
 from turnout.report.finding_pages import write_finding_pages
 from turnout.report.site import AT_ONCE, write_pages, write_turnouts
 
+if TYPE_CHECKING:
+    from collections.abc import Collection, Mapping
+    from pathlib import Path
 
-def report_job(registry, pages, turnouts=None, log=None, threads=1, day=None) -> int:
-    """Write the changed pages of the registry in folder ``registry`` into ``pages``; returns their number.
+    import duckdb
 
-    They show the state on ``day`` (YYYY-MM-DD), by default today.
+
+def report_job(
+    registry: str | Path,
+    pages: str | Path,
+    turnouts: Collection[str] | None = None,
+    log: str | Path | None = None,
+    threads: int = 1,
+    day: str | None = None,
+) -> int:
+    """Write the changed pages of a registry.
+
+    Parameters
+    ----------
+    registry : str or Path
+        Folder of the registry.
+    pages : str or Path
+        Folder of the pages.
+    turnouts : collection of str or None
+        Ids of turnouts; None: all.
+    log : str, Path or None
+        File that states the number of pages; None: show the progress.
+    threads : int
+        Number of processes.
+    day : str or None
+        Day whose state is shown, YYYY-MM-DD; None: today.
+
+    Returns
+    -------
+    int
+        Number of pages that were written.
+
+    Raises
+    ------
+    RegistryError
+        For a turnout that the registry does not have.
     """
     with open_registry(registry) as connection:
         _check_turnouts(connection, turnouts)
@@ -20,7 +59,7 @@ def report_job(registry, pages, turnouts=None, log=None, threads=1, day=None) ->
             "select (select generation from registry_info), (select count(*) from turnouts)"
         ).fetchall()[0]
 
-        def write_parallel(content):
+        def write_parallel(content: Mapping[str, str]) -> None:
             _in_processes(registry, pages, content, generation, threads, day)
 
         writer = write_parallel if threads > 1 and n_turnouts > AT_ONCE else None
@@ -32,7 +71,9 @@ def report_job(registry, pages, turnouts=None, log=None, threads=1, day=None) ->
     return n
 
 
-def _in_processes(registry, pages, content, generation, threads, day):
+def _in_processes(
+    registry: str | Path, pages: str | Path, content: Mapping[str, str], generation: int, threads: int, day: str | None
+) -> None:
     """Write the pages in new processes, AT_ONCE turnouts each.
 
     Every process opens its own connection, because DuckDB connections cannot be forked.
@@ -44,13 +85,15 @@ def _in_processes(registry, pages, content, generation, threads, day):
             future.result()
 
 
-def _write_share(registry, pages, content, generation, day):
+def _write_share(
+    registry: str | Path, pages: str | Path, content: Mapping[str, str], generation: int, day: str | None
+) -> None:
     with open_registry(registry) as connection:
         connection.execute("set threads = 1")
         write_turnouts(connection, pages, content, generation, day=day)
 
 
-def _check_turnouts(connection, turnouts):
+def _check_turnouts(connection: duckdb.DuckDBPyConnection, turnouts: Collection[str] | None) -> None:
     turnout_ids = {row[0] for row in connection.execute("select turnout_id from turnouts").fetchall()}
     if unknown := sorted(set(turnouts or ()) - turnout_ids):
         raise RegistryError(

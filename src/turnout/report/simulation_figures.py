@@ -1,18 +1,40 @@
 """Draw the figures of the simulation: receptances, a passage, two sensors in two bands, decay rates."""
 
+from __future__ import annotations
+
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.constants import KMH
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from matplotlib.figure import Figure
+
+    from turnout.records import Recording
+    from turnout.simulate.passage import PassageTruth
 
 SPEED = 160.0 / KMH
 SENSORS = (("A1", 0.6), ("A4", 9.0), ("A7", 24.6), ("nose", 26.7), ("A11", 36.0))
 LOW_BAND, HIGH_BAND = (0.0, 40.0), (40.0, 1000.0)
 
 
-def draw_all(folder):
-    """Draw every figure into ``folder``; yields the paths, SVG."""
+def draw_all(folder: str | Path) -> Iterator[Path]:
+    """Draw every figure as SVG.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Folder of the figures, created where it does not exist.
+
+    Yields
+    ------
+    Path
+        File of each figure.
+    """
     import matplotlib
 
     matplotlib.use("svg")
@@ -26,7 +48,7 @@ def draw_all(folder):
     yield _save(_closed_form(), folder / "simulation_closed_form.svg")
 
 
-def _save(figure, path):
+def _save(figure: Figure, path: Path) -> Path:
     import matplotlib.pyplot as plt
 
     figure.savefig(path, metadata={"Date": None})
@@ -34,14 +56,14 @@ def _save(figure, path):
     return path
 
 
-def _passage():
+def _passage() -> tuple[Recording, PassageTruth]:
     from turnout.simulate import Sensor, load_track, load_vehicle, simulate_passage
 
     sensors = [Sensor(name, position, "rail web", noise=0.05) for name, position in SENSORS]
     return simulate_passage(load_track("tommerup"), load_vehicle("ic3", 0.5), SPEED, sensors, seed=1, truth=True)
 
 
-def _receptances():
+def _receptances() -> Figure:
     """Receptance of the track, and its estimate from ten simulated impacts, at four sections."""
     import matplotlib.pyplot as plt
 
@@ -78,7 +100,7 @@ def _receptances():
     return figure
 
 
-def _passage_forces(recording, truth):
+def _passage_forces(recording: Recording, truth: PassageTruth) -> Figure:
     """Acceleration at the crossing, and the contact force of every wheel over its position."""
     import matplotlib.pyplot as plt
 
@@ -97,7 +119,7 @@ def _passage_forces(recording, truth):
     return figure
 
 
-def _two_sensors(recording):
+def _two_sensors(recording: Recording) -> Figure:
     """Sensors A1 and A4 in 0-40 and 40-1000 Hz, time series and power spectral density, as in the paper."""
     import matplotlib.pyplot as plt
     from scipy.signal import butter, sosfiltfilt, welch
@@ -119,7 +141,7 @@ def _two_sensors(recording):
     return figure
 
 
-def _closed_form():
+def _closed_form() -> Figure:
     """Receptance of the meshed track and of Floquet's solution, and the wave that propagates from an impact."""
     import matplotlib.pyplot as plt
 

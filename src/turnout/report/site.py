@@ -1,8 +1,11 @@
 """Write the pages of a registry: one for the fleet, and one for each turnout with a change."""
 
+from __future__ import annotations
+
 import os
 from importlib.resources import files
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from jinja2 import Environment, PackageLoader
 from tqdm import tqdm
@@ -14,10 +17,24 @@ from turnout.report.pages.turnout import turnout_page
 from turnout.report.source import ROWS, FleetSource
 from turnout.report.stale_pages import HASH_MARK, page_hash, page_hashes
 
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Mapping
+    from typing import Any
+
+    import duckdb
+
 AT_ONCE = 100  # turnouts whose rows are read by one set of queries
 
 
-def write_pages(connection, folder, generation="", turnouts=None, progress=True, writer=None, day=None):
+def write_pages(
+    connection: duckdb.DuckDBPyConnection,
+    folder: str | Path,
+    generation: str | int = "",
+    turnouts: Collection[str] | None = None,
+    progress: bool = True,
+    writer: Callable[[dict[str, str]], None] | None = None,
+    day: str | None = None,
+) -> int:
     """Write ``folder``/index.html, and ``folder``/turnouts/<id>.html where its content has changed.
 
     Pages of turnouts that are no longer in the registry are removed.
@@ -32,6 +49,8 @@ def write_pages(connection, folder, generation="", turnouts=None, progress=True,
         Shown at the foot of every page.
     turnouts : iterable of str, optional
         Only these turnouts' pages; the fleet's page is always written.
+    progress : bool
+        Whether a progress bar is shown.
     writer : callable, optional
         Called with {turnout id: content hash} of the pages to write, instead of writing them in this process.
     day : str, optional
@@ -58,8 +77,31 @@ def write_pages(connection, folder, generation="", turnouts=None, progress=True,
     return 1 + len(stale)
 
 
-def write_turnouts(connection, folder, content, generation="", progress=False, day=None):
-    """Write the pages of the turnouts in ``content``, which maps each turnout to the hash stored in its page."""
+def write_turnouts(
+    connection: duckdb.DuckDBPyConnection,
+    folder: str | Path,
+    content: Mapping[str, str],
+    generation: str | int = "",
+    progress: bool = False,
+    day: str | None = None,
+) -> None:
+    """Write the pages of turnouts.
+
+    Parameters
+    ----------
+    connection : DuckDB connection
+        An open registry.
+    folder : str or Path
+        Folder of the pages.
+    content : mapping
+        Hash that is stored in the page, by turnout id.
+    generation : str or int
+        Generation of the registry, shown at the foot of the page.
+    progress : bool
+        Whether a progress bar is shown.
+    day : str or None
+        Day whose state is shown, YYYY-MM-DD; None: today.
+    """
     source, shared = FleetSource(connection, day), shared_by_pages(generation)
     template = page_environment().get_template("turnout.html")
     names = list(content)
@@ -75,26 +117,45 @@ def write_turnouts(connection, folder, content, generation="", progress=False, d
                 bar.update()
 
 
-def page_environment():
+def page_environment() -> Environment:
     """Jinja environment with the templates of the package."""
     return Environment(loader=PackageLoader("turnout.report", "templates"), trim_blocks=True, autoescape=True)
 
 
-def shared_by_pages(generation=""):
-    """Template variables of every page: style, program version and generation."""
+def shared_by_pages(generation: str | int = "") -> dict[str, Any]:
+    """Template variables of every page: style, program version and generation.
+
+    Parameters
+    ----------
+    generation : str or int
+        Generation of the registry.
+
+    Returns
+    -------
+    dict
+        ``css``, ``version`` and ``generation``.
+    """
     css = (files("turnout.report") / "templates" / "page.css").read_text()
     return {"css": css, "version": __version__, "generation": generation}
 
 
-def _remove_stale(folder, turnout_ids):
+def _remove_stale(folder: Path, turnout_ids: Collection[str]) -> None:
     """Remove pages of this program for turnouts that are not in ``turnout_ids``; other files stay."""
     for path in folder.glob("*.html"):
         if path.stem not in turnout_ids and page_hash(path):
             path.unlink()
 
 
-def replace_page(path, text):
-    """Write a page in one step, so that no reader sees an incomplete one."""
+def replace_page(path: Path, text: str) -> None:
+    """Write a page in one step, so that no reader sees an incomplete one.
+
+    Parameters
+    ----------
+    path : Path
+        File of the page.
+    text : str
+        Its whole text.
+    """
     temporary = temporary_path(path)
     try:
         temporary.write_text(text, encoding="utf-8")

@@ -1,9 +1,18 @@
 """Query the registry for the pages: sums for the fleet, whole rows for some turnouts at a time."""
 
+from __future__ import annotations
+
 from collections import defaultdict
+from typing import TYPE_CHECKING
 
 from turnout.registry.as_of import list_day, whole_list
 from turnout.report.trains import train_rows
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Mapping
+    from typing import Any
+
+    import duckdb
 
 # One row per section: that of the newest model, accepted or not.
 NEWEST_MODEL = "qualify row_number() over (partition by section_id order by measured_at_utc desc, model_id) = 1"
@@ -82,57 +91,79 @@ class FleetSource:
     States and worklist are those of ``day`` (YYYY-MM-DD), by default of today.
     """
 
-    def __init__(self, connection, day=None):
+    def __init__(self, connection: duckdb.DuckDBPyConnection, day: str | None = None) -> None:
         self.connection, self.day = connection, list_day(connection, day)
         rows = connection.execute("select view_name from duckdb_views() where database_name = current_database()")
         self.views = {row[0] for row in rows.fetchall()}
 
-    def turnouts(self):
+    def turnouts(self) -> list[dict[str, Any]]:
         """One row per turnout with its counts."""
         return self._fetch(TURNOUTS)
 
-    def reasons(self):
+    def reasons(self) -> list[dict[str, Any]]:
         """Number of impacts and quarantine rows by reason."""
         return self._fetch(REASONS)
 
-    def states(self):
+    def states(self) -> list[dict[str, Any]]:
         """Number of charts by turnout and state; empty before the first trend."""
         sql = "select turnout_id, state, count(*) as n from chart_states_on(:today) group by all order by all"
         return self._fetch(sql) if self.has("chart_states") else []
 
-    def worklist(self):
+    def worklist(self) -> list[dict[str, Any]]:
         """Tomorrow's worklist; empty before the first trend."""
         return self._fetch("select * from worklist(:today) order by rank") if self.has("worklist") else []
 
-    def listed(self):
+    def listed(self) -> dict[str, int]:
         """Number of rows of the whole worklist by state."""
         sql = f"select state, count(*) as n from {whole_list(':today')} group by state"
         return {row["state"]: row["n"] for row in self._fetch(sql)} if self.has("worklist") else {}
 
-    def has(self, table):
-        """Whether the registry has ``table``; those of the trend exist after its first run."""
+    def has(self, table: str) -> bool:
+        """Whether the registry has ``table``; those of the trend exist after its first run.
+
+        Parameters
+        ----------
+        table : str
+            Key of ``ROWS``, or table of the registry.
+
+        Returns
+        -------
+        bool
+            Whether the query of this kind can run.
+        """
         return table not in TREND_VIEWS or table in self.views
 
-    def rows_of(self, turnout_ids):
-        """Rows of the given turnouts from all queries: {table: {turnout_id: [row, ...]}}."""
+    def rows_of(self, turnout_ids: Collection[str]) -> dict[str, Mapping[str, list[dict[str, Any]]]]:
+        """Rows of the given turnouts from all queries.
+
+        Parameters
+        ----------
+        turnout_ids : collection of str
+            Ids of turnouts.
+
+        Returns
+        -------
+        dict
+            Rows by kind and turnout id: {table: {turnout_id: [row, ...]}}.
+        """
         chosen = {"turnouts": list(turnout_ids)}
         tables = [table for table in ROWS if self.has(table)]
         rows = {table: _by_turnout(self._fetch(ROWS[table], chosen)) for table in tables if table != "receptances"}
         rows |= train_rows(self._fetch, turnout_ids)
         return rows | {"receptances": _by_turnout(self._arrays(ROWS["receptances"], chosen))}
 
-    def _arrays(self, sql, parameters):
+    def _arrays(self, sql: str, parameters: Mapping[str, Any]) -> list[dict[str, Any]]:
         """Rows with lists as numpy arrays, which is many times faster than Python lists."""
         frame = self.connection.execute(sql, parameters).df()
         return frame.astype(object).where(frame.notna(), None).to_dict("records")
 
-    def _fetch(self, sql, parameters=None):
+    def _fetch(self, sql: str, parameters: Mapping[str, Any] | None = None) -> list[dict[str, Any]]:
         cursor = self.connection.execute(sql.replace(":today", self.day), parameters or {})
         names = [d[0] for d in cursor.description]
         return [dict(zip(names, row)) for row in cursor.fetchall()]
 
 
-def _by_turnout(rows):
+def _by_turnout(rows: Iterable[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
     grouped = defaultdict(list)
     for row in rows:
         grouped[row["turnout_id"]].append(row)

@@ -1,9 +1,17 @@
 """Find pages that are out of date, by one hash per turnout of everything that its page shows."""
 
+from __future__ import annotations
+
 import re
+from typing import TYPE_CHECKING
 
 from turnout.fingerprint import fingerprint
 from turnout.registry.as_of import whole_list
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from turnout.report.source import FleetSource
 
 # Rows that a page shows. The id of a result represents its models, modes, impacts, receptances and passages: it is a
 # hash of the raw files, the configuration and the code that they were computed from.
@@ -24,7 +32,7 @@ HASH_PATTERN = re.compile(re.escape(HASH_MARK).replace(r"\{\}", "([0-9a-f]+)"))
 HEAD_LENGTH = 2000  # characters of a page that contain its hash
 
 
-def page_hashes(source):
+def page_hashes(source: FleetSource) -> dict[str, str]:
     """Hash of what the page of each turnout shows, including the code that draws it.
 
     Parameters
@@ -51,8 +59,19 @@ def page_hashes(source):
     return dict(rows)
 
 
-def page_hash(path):
-    """Hash stored in the page ``path``; None if there is no page, or it is not from this program."""
+def page_hash(path: str | Path) -> str | None:
+    """Hash stored in a page.
+
+    Parameters
+    ----------
+    path : str or Path
+        File of the page.
+
+    Returns
+    -------
+    str or None
+        Hash; None if there is no page, or it is not from this program.
+    """
     try:
         with open(path, encoding="utf-8", errors="replace") as file:
             match = HASH_PATTERN.search(file.read(HEAD_LENGTH))

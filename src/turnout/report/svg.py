@@ -3,19 +3,43 @@
 Long curves are reduced to the points that are visible.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from html import escape
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
 
 SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
-def linear_ticks(low, high, n_target=5):
+def linear_ticks(low: float, high: float, n_target: int = 5) -> list[float]:
     """Round numbers between ``low`` and ``high``, steps of 1, 2 or 5 times a power of ten.
 
+    Parameters
+    ----------
+    low : float
+        Lowest value.
+    high : float
+        Highest value.
+    n_target : int
+        Number of ticks that is aimed at.
+
+    Returns
+    -------
+    list of float
+        Values.
+
+    Examples
+    --------
     >>> linear_ticks(0.0, 1.0)
     [0.0, 0.2, 0.4, 0.6, 0.8, 1.0]
     >>> linear_ticks(98.2, 103.9)
@@ -32,9 +56,23 @@ def linear_ticks(low, high, n_target=5):
     return [round(k * step, decimals) for k in range(first, last + 1)]
 
 
-def log_ticks(low, high):
+def log_ticks(low: float, high: float) -> list[float]:
     """Powers of ten between ``low`` and ``high``, with 2 and 5 where there are few.
 
+    Parameters
+    ----------
+    low : float
+        Lowest value, above 0.
+    high : float
+        Highest value.
+
+    Returns
+    -------
+    list of float
+        Values.
+
+    Examples
+    --------
     >>> log_ticks(30.0, 2000.0)
     [50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0]
     """
@@ -45,9 +83,25 @@ def log_ticks(low, high):
     return [m * 10.0**k for k in exponents for m in (1, 2, 5) if low <= m * 10.0**k <= high]
 
 
-def time_ticks(low, high, n_target=6):
-    """Starts of months or years between two POSIX times [s], about ``n_target`` of them.
+def time_ticks(low: float, high: float, n_target: int = 6) -> list[float]:
+    """Starts of months or years between two POSIX times.
 
+    Parameters
+    ----------
+    low : float
+        Earliest time. [s]
+    high : float
+        Latest time. [s]
+    n_target : int
+        Number of ticks that is aimed at.
+
+    Returns
+    -------
+    list of float
+        POSIX times. [s]
+
+    Examples
+    --------
     >>> from datetime import UTC
     >>> start = datetime(2024, 1, 10, tzinfo=UTC).timestamp()
     >>> [format_day(t) for t in time_ticks(start, start + 3 * 365.25 * 86400)]
@@ -65,9 +119,23 @@ def time_ticks(low, high, n_target=6):
     return ticks
 
 
-def format_number(value, step=None):
-    """Short text of a tick's number, with enough digits to differ from the next tick, ``step`` away.
+def format_number(value: float, step: float | None = None) -> str:
+    """Short text of a tick's number, with enough digits to differ from the next tick.
 
+    Parameters
+    ----------
+    value : float
+        The number.
+    step : float or None
+        Distance to the next tick.
+
+    Returns
+    -------
+    str
+        Text.
+
+    Examples
+    --------
     >>> format_number(0.2), format_number(1500.0), format_number(1e-9), format_number(0.0)
     ('0.2', '1500', '10⁻⁹', '0')
     >>> format_number(530.00002, step=1e-5)
@@ -84,14 +152,37 @@ def format_number(value, step=None):
     return power if abs(mantissa - 1) < 1e-9 and n_digits <= 3 else f"{mantissa:.{max(3, n_digits)}g}·{power}"
 
 
-def format_day(seconds):
-    """Month and year of a POSIX time."""
+def format_day(seconds: float) -> str:
+    """Month and year of a POSIX time.
+
+    Parameters
+    ----------
+    seconds : float
+        POSIX time. [s]
+
+    Returns
+    -------
+    str
+        For example "Jul 2024".
+    """
     return (datetime(1970, 1, 1) + timedelta(seconds=seconds)).strftime("%b %Y")
 
 
-def runs(good):
+def runs(good: np.ndarray | bool) -> list[slice]:
     """Slices of the contiguous runs of True.
 
+    Parameters
+    ----------
+    good : (n,) array of bool
+        Values.
+
+    Returns
+    -------
+    list of slice
+        One for each run.
+
+    Examples
+    --------
     >>> runs(np.array([True, True, False, True]))
     [slice(0, 2, None), slice(3, 4, None)]
     """
@@ -99,7 +190,7 @@ def runs(good):
     return [slice(first, last) for first, last in zip(edges[::2].tolist(), edges[1::2].tolist())]
 
 
-def reduce_points(px, py):
+def reduce_points(px: np.ndarray, py: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Fewer points that draw the same curve: the first, last, lowest and highest of every pixel column.
 
     Parameters
@@ -144,20 +235,31 @@ class Axis:
     scale: str = "linear"
     names: tuple = ()
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not self.high > self.low:
             pad = abs(self.low) * 0.05 or 1.0
             self.low, self.high = self.low - pad, self.high + pad
 
-    def share(self, values):
-        """Relative position of ``values`` along the axis, 0 to 1."""
+    def share(self, values: ArrayLike) -> np.ndarray:
+        """Relative position of values along the axis, 0 to 1.
+
+        Parameters
+        ----------
+        values : float or array
+            Values.
+
+        Returns
+        -------
+        array
+            Position; outside 0 to 1 for values beyond the ends.
+        """
         values = np.asarray(values, dtype=float)
         if self.scale == "log":
             with np.errstate(divide="ignore", invalid="ignore"):
                 return (np.log10(values) - np.log10(self.low)) / (np.log10(self.high) - np.log10(self.low))
         return (values - self.low) / (self.high - self.low)
 
-    def ticks(self):
+    def ticks(self) -> list[tuple[float, str]]:
         """Pairs of value and text of the ticks."""
         if self.scale == "names":
             return [(k, escape(name)) for k, name in enumerate(self.names, start=1)]
@@ -181,31 +283,106 @@ class Chart:
     height: int = 240
     elements: list = field(default_factory=list)
 
-    def px(self, values):
-        """Horizontal pixels of data values."""
+    def px(self, values: ArrayLike) -> np.ndarray:
+        """Horizontal pixels of data values.
+
+        Parameters
+        ----------
+        values : float or array
+            Horizontal values.
+
+        Returns
+        -------
+        array
+            Pixels from the left.
+        """
         return LEFT + self.x.share(values) * (self.width - LEFT - RIGHT)
 
-    def py(self, values):
-        """Vertical pixels of data values."""
+    def py(self, values: ArrayLike) -> np.ndarray:
+        """Vertical pixels of data values.
+
+        Parameters
+        ----------
+        values : float or array
+            Vertical values.
+
+        Returns
+        -------
+        array
+            Pixels from the top.
+        """
         return self.height - BOTTOM - self.y.share(values) * (self.height - TOP - BOTTOM)
 
-    def line(self, x, y, style, label=""):
-        """Draw a polyline with gaps at missing values."""
+    def line(self, x: ArrayLike, y: ArrayLike, style: str, label: str = "") -> None:
+        """Draw a polyline with gaps at missing values.
+
+        Parameters
+        ----------
+        x : array of float
+            Horizontal values.
+        y : array of float
+            Vertical values; not finite: a gap.
+        style : str
+            Class of the style sheet.
+        label : str
+            Text on hovering.
+        """
         px, py = self.px(x), self.py(y)
         pieces = (reduce_points(px[piece], py[piece]) for piece in runs(np.isfinite(px) & np.isfinite(py)))
         path = "".join("M" + _path_points(*piece) for piece in pieces)
         self.elements.append(f'<path class="{style}" d="{path}">{_title(label)}</path>')
 
-    def band(self, x, low, high, style, label=""):
-        """Draw the area between two lines, with gaps at missing values."""
+    def band(self, x: ArrayLike, low: ArrayLike, high: ArrayLike, style: str, label: str = "") -> None:
+        """Draw the area between two lines, with gaps at missing values.
+
+        Parameters
+        ----------
+        x : array of float
+            Horizontal values.
+        low : array of float
+            Values of the lower line.
+        high : array of float
+            Values of the upper line.
+        style : str
+            Class of the style sheet.
+        label : str
+            Text on hovering.
+        """
         px, low, high = self.px(x), self.py(low), self.py(high)
         for piece in runs(np.isfinite(px) & np.isfinite(low) & np.isfinite(high)):
             forward, (x_back, y_back) = reduce_points(px[piece], high[piece]), reduce_points(px[piece], low[piece])
             path = f"M{_path_points(*forward)}L{_path_points(x_back[::-1], y_back[::-1])}Z"
             self.elements.append(f'<path class="{style}" d="{path}">{_title(label)}</path>')
 
-    def points(self, x, y, style, radius=3.0, low=None, high=None, labels=None):
-        """Draw dots, with bars from ``low`` to ``high`` if given, and ``labels`` as text on hovering."""
+    def points(
+        self,
+        x: ArrayLike,
+        y: ArrayLike,
+        style: str,
+        radius: float = 3.0,
+        low: ArrayLike | None = None,
+        high: ArrayLike | None = None,
+        labels: Sequence[str] | None = None,
+    ) -> None:
+        """Draw dots, with bars if their ends are given.
+
+        Parameters
+        ----------
+        x : array of float
+            Horizontal values.
+        y : array of float
+            Vertical values; not finite: a gap.
+        style : str
+            Class of the style sheet.
+        radius : float
+            Radius of the dots. [px]
+        low : array of float or None
+            Lower ends of the bars.
+        high : array of float or None
+            Upper ends of the bars.
+        labels : sequence of str or None
+            Text of each dot on hovering.
+        """
         px, py = np.atleast_1d(self.px(x)), np.atleast_1d(self.py(y))
         is_finite = np.isfinite(px) & np.isfinite(py)
         if low is not None and high is not None:
@@ -219,8 +396,20 @@ class Chart:
         dot = f'<circle class="{style}" r="{radius:g}" cx="%.1f" cy="%.1f">%s</circle>'
         self.elements += [dot % (px[i], py[i], texts[i]) for i in np.flatnonzero(is_finite).tolist()]
 
-    def vertical(self, x, style, label="", row=0):
-        """Draw a vertical line at ``x`` with a label at its top."""
+    def vertical(self, x: float, style: str, label: str = "", row: int = 0) -> None:
+        """Draw a vertical line with a label at its top.
+
+        Parameters
+        ----------
+        x : float
+            Horizontal value.
+        style : str
+            Class of the style sheet.
+        label : str
+            Text beside the line.
+        row : int
+            Number of the line of text, counted from the top.
+        """
         px = float(self.px(x))
         if LEFT - 1 <= px <= self.width - RIGHT + 1:
             self.elements.append(f'<path class="{style}" d="M{px:.1f} {TOP}V{self.height - BOTTOM}"/>')
@@ -230,8 +419,20 @@ class Chart:
                 anchor = "start" if room else "end"
                 self.elements.append(f'<text class="{style}" {position} text-anchor="{anchor}">{escape(label)}</text>')
 
-    def span(self, x_low, x_high, style, label=""):
-        """Shade an interval of the horizontal axis."""
+    def span(self, x_low: float, x_high: float, style: str, label: str = "") -> None:
+        """Shade an interval of the horizontal axis.
+
+        Parameters
+        ----------
+        x_low : float
+            Start of the interval.
+        x_high : float
+            End of the interval.
+        style : str
+            Class of the style sheet.
+        label : str
+            Text on hovering.
+        """
         x_left, x_right = (float(np.clip(self.px(v), LEFT, self.width - RIGHT)) for v in (x_low, x_high))
         if x_right > x_left:
             self.elements.append(
@@ -239,15 +440,29 @@ class Chart:
                 f'height="{self.height - TOP - BOTTOM}">{_title(label)}</rect>'
             )
 
-    def text(self, x_share, y_share, words, style="note", anchor="start"):
-        """Draw words at a position given in shares of the width and height of the panel."""
+    def text(self, x_share: float, y_share: float, words: str, style: str = "note", anchor: str = "start") -> None:
+        """Draw words in the panel.
+
+        Parameters
+        ----------
+        x_share : float
+            Position as a share of the width of the plot area.
+        y_share : float
+            Position as a share of its height, from the top.
+        words : str
+            The text.
+        style : str
+            Class of the style sheet.
+        anchor : str
+            End of the text that is at the position: "start", "middle" or "end".
+        """
         px = LEFT + x_share * (self.width - LEFT - RIGHT)
         py = TOP + y_share * (self.height - TOP - BOTTOM)
         self.elements.append(
             f'<text class="{style}" x="{px:.1f}" y="{py:.1f}" text-anchor="{anchor}">{escape(words)}</text>'
         )
 
-    def svg(self):
+    def svg(self) -> str:
         """Text of the complete SVG element."""
         frame = (
             f'<svg class="chart" viewBox="0 0 {self.width} {self.height}" width="{self.width}" '
@@ -259,7 +474,7 @@ class Chart:
         body = f"<svg {window}>" + "".join(self.elements) + "</svg>"
         return frame + title + self._axes() + body + "</svg>"
 
-    def _axes(self):
+    def _axes(self) -> str:
         bottom, right = self.height - BOTTOM, self.width - RIGHT
         x_ticks, y_ticks = self.x.ticks(), self.y.ticks()
         px, py = self.px([v for v, _ in x_ticks]).tolist(), self.py([v for v, _ in y_ticks]).tolist()
@@ -282,11 +497,11 @@ class Chart:
         return "".join(elements)
 
 
-def _path_points(px, py):
+def _path_points(px: np.ndarray, py: np.ndarray) -> str:
     """Path data of the points: ``x y`` of each, with the letter L of a straight line between them."""
     numbers = np.column_stack([px, py]).ravel().tolist()
     return ("%.1f %.1fL" * len(px) % tuple(numbers))[:-1]
 
 
-def _title(words):
+def _title(words: str) -> str:
     return f"<title>{escape(words)}</title>" if words else ""

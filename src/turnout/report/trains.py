@@ -1,10 +1,17 @@
 """Prepare the trains section of a turnout's page: passages, scores by section, effects of type, speed and load."""
 
+from __future__ import annotations
+
 from collections import defaultdict
+from typing import TYPE_CHECKING
 
 from turnout.constants import Z95
 from turnout.registry.schema import literal
 from turnout.report.panels.train_bars import train_bars
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from typing import Any
 
 # DuckDB pushes a condition on a constant list down to the files, below window functions of the views; not a subquery.
 ROWS = {
@@ -25,9 +32,25 @@ FACTORS = ("train type", "speed", "axle load")
 SCORES = ("fit", "forecast")
 
 
-def train_rows(fetch, turnout_ids):
-    """Rows that ``trains_part`` needs, {table: {turnout_id: [row, ...]}}; ``fetch`` runs SQL and returns dicts."""
-    ids, rows_by_table = ", ".join(literal(t) for t in turnout_ids), {}
+def train_rows(
+    fetch: Callable[[str], list[dict[str, Any]]], turnout_ids: Iterable[str]
+) -> dict[str, dict[str, list[dict[str, Any]]]]:
+    """Rows that ``trains_part`` needs.
+
+    Parameters
+    ----------
+    fetch : callable
+        Runs SQL and returns its rows.
+    turnout_ids : iterable of str
+        Ids of turnouts.
+
+    Returns
+    -------
+    dict
+        Rows by table and turnout id: {table: {turnout_id: [row, ...]}}.
+    """
+    ids = ", ".join(literal(t) for t in turnout_ids)
+    rows_by_table: dict[str, dict[str, list[dict[str, Any]]]] = {}
     for table, sql in ROWS.items():
         grouped = defaultdict(list)
         for row in fetch(sql.format(own=ids)) if ids else ():
@@ -36,10 +59,22 @@ def train_rows(fetch, turnout_ids):
     return rows_by_table
 
 
-def trains_part(rows, sections):
-    """Variables of the template for the trains of one turnout; None without a recorded passage.
+def trains_part(
+    rows: Mapping[str, Sequence[Mapping[str, Any]]], sections: Sequence[Mapping[str, Any]]
+) -> dict[str, Any] | None:
+    """Variables of the template for the trains of one turnout.
 
-    ``rows`` are those of ``train_rows`` of this turnout, ``sections`` its rows of ``sections`` in order.
+    Parameters
+    ----------
+    rows : mapping
+        Rows of ``train_rows`` of this turnout, by table.
+    sections : sequence of mapping
+        Rows of ``sections``, in the order along the track.
+
+    Returns
+    -------
+    dict or None
+        Variables of the template; None without a recorded passage.
     """
     if not rows["passages"]:
         return None
@@ -56,8 +91,19 @@ def trains_part(rows, sections):
     }
 
 
-def score_words(scores):
-    """Sentences on how many scores are better than those of random models and of other sections."""
+def score_words(scores: Sequence[Mapping[str, Any]]) -> str:
+    """Sentences on how many scores are better than those of random models and of other sections.
+
+    Parameters
+    ----------
+    scores : sequence of mapping
+        Number of scores by section and status.
+
+    Returns
+    -------
+    str
+        Sentences, "" without a score.
+    """
     if not scores:
         return ""
     n = sum(s["n"] for s in scores)
@@ -82,7 +128,7 @@ def score_words(scores):
     return " ".join(sentences)
 
 
-def _passage(passage):
+def _passage(passage: Mapping[str, Any]) -> dict[str, Any]:
     """One passage in words."""
     load, load_error = passage["axle_load_t"], passage["axle_load_se_t"]
     timetable = {"speed": passage["speed_listed_kmh"], "type": passage["train_type_listed"]}
@@ -98,11 +144,11 @@ def _passage(passage):
     }
 
 
-def _with_error(value, standard_error):
+def _with_error(value: float, standard_error: float | None) -> str:
     return f"{value:.1f} ± {'?' if standard_error is None else f'{Z95 * standard_error:.1f}'}"
 
 
-def _effect(effect):
+def _effect(effect: Mapping[str, Any]) -> dict[str, Any]:
     """One effect in words, and whether its interval contains zero."""
     clear = effect["low_pct"] > 0 or effect["high_pct"] < 0
     return {

@@ -1,18 +1,47 @@
 """Render the page of a turnout's findings: the answer first, the evidence below."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from turnout.report.finding_text import accepted_parameters, answer, check, facts, parameters, rivals, title
 from turnout.report.formatting import day
 from turnout.report.panels.finding import curve_panel, fit_panel, history_of_parameter, position_panel
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+    from typing import Any
+
+    from jinja2 import Template
 
 SEVERITY_ORDER = ("named", "a_or_b", "unknown", "numerics", "none")
 BADGES = {"named": "inspect", "a_or_b": "plan", "unknown": "plan", "numerics": "learning", "none": "ok"}
 
 
-def finding_page(turnout, rows, template, shared):
+def finding_page(
+    turnout: Mapping[str, Any],
+    rows: Mapping[str, Sequence[Mapping[str, Any]]],
+    template: Template,
+    shared: Mapping[str, Any],
+) -> str:
     """HTML of one turnout's diagnosis.
 
-    ``turnout`` is its row of ``turnouts``; ``rows`` maps "sections", "mismatch_findings" (of one visit),
-    "mismatch_curves", "mismatch_parameters" (of all visits) and "quarantine" to its rows.
+    Parameters
+    ----------
+    turnout : mapping
+        Row of ``turnouts``.
+    rows : mapping
+        Rows of "sections", "mismatch_findings" (of one visit), "mismatch_curves", "mismatch_parameters" (of all visits)
+        and "quarantine".
+    template : Template
+        Compiled page.
+    shared : mapping
+        Variables that every page shows.
+
+    Returns
+    -------
+    str
+        HTML.
     """
     findings = sorted(rows["mismatch_findings"], key=_order)
     first = findings[0] if findings else None
@@ -28,11 +57,13 @@ def finding_page(turnout, rows, template, shared):
     )
 
 
-def _order(finding):
+def _order(finding: Mapping[str, Any]) -> tuple[int, float, float]:
     return SEVERITY_ORDER.index(finding["verdict"]), -(finding["probability"] or 0.0), finding["place_low_m"] or 0.0
 
 
-def _finding(finding, rows, number):
+def _finding(
+    finding: Mapping[str, Any], rows: Mapping[str, Sequence[Mapping[str, Any]]], number: int
+) -> dict[str, Any]:
     curves = [c for c in rows["mismatch_curves"] if c["finding_id"] == finding["finding_id"]]
     named = finding["verdict"] in ("named", "a_or_b")
     changed = ("what was left out" if named else "what was refused") if finding["term_json"] is not None else ""
@@ -58,18 +89,20 @@ def _finding(finding, rows, number):
     }
 
 
-def _parameters_of(rows, finding):
+def _parameters_of(
+    rows: Mapping[str, Sequence[Mapping[str, Any]]], finding: Mapping[str, Any]
+) -> list[Mapping[str, Any]]:
     return [p for p in rows["mismatch_parameters"] if p["finding_id"] == finding["finding_id"]]
 
 
-def _histories(rows, finding):
+def _histories(rows: Mapping[str, Sequence[Mapping[str, Any]]], finding: Mapping[str, Any]) -> Iterator[str]:
     """A chart for each parameter of this finding that earlier visits have estimated, too."""
     for parameter in _parameters_of(rows, finding):
         same = [p for p in rows["mismatch_parameters"] if _is_same_parameter(p, parameter)]
         yield history_of_parameter(sorted(same, key=lambda p: p["found_at_utc"]))
 
 
-def _is_same_parameter(a, b):
+def _is_same_parameter(a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
     near = a["position_m"] == b["position_m"] or (
         None not in (a["position_m"], b["position_m"]) and abs(a["position_m"] - b["position_m"]) < 0.35
     )

@@ -1,9 +1,20 @@
 """Render the first page: tomorrow's worklist, one line per turnout, and what was not used."""
 
+from __future__ import annotations
+
 from collections import Counter
+from typing import TYPE_CHECKING
 
 from turnout.errors import REASONS
 from turnout.report.formatting import badge, day
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import Any
+
+    from jinja2 import Template
+
+    from turnout.report.source import FleetSource
 
 STATES = {
     "inspect this week": "inspect",
@@ -17,8 +28,23 @@ STATES = {
 LISTED_STATES = ("inspect this week", "plan", "learning", "cannot tell")
 
 
-def fleet_page(source, template, shared):
-    """HTML of the fleet's page from a FleetSource."""
+def fleet_page(source: FleetSource, template: Template, shared: Mapping[str, Any]) -> str:
+    """HTML of the fleet's page.
+
+    Parameters
+    ----------
+    source : FleetSource
+        Rows of the fleet.
+    template : Template
+        Compiled page.
+    shared : mapping
+        Variables that every page shows.
+
+    Returns
+    -------
+    str
+        HTML.
+    """
     turnouts, worklist, reasons = source.turnouts(), source.worklist(), source.reasons()
     states: dict[str, dict[str, int]] = {}
     counts: Counter[str] = Counter()
@@ -43,7 +69,7 @@ def fleet_page(source, template, shared):
     )
 
 
-def _work(row):
+def _work(row: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "turnout_id": row["turnout_id"],
         "label": row["sections"],
@@ -58,7 +84,7 @@ def _work(row):
     }
 
 
-def _line(turnout, states):
+def _line(turnout: dict[str, Any], states: Mapping[str, int]) -> dict[str, Any]:
     position = (turnout["line"], None if turnout["km"] is None else f"{turnout['km']:.3f}")
     return turnout | {
         "name": turnout["name"] or "",

@@ -1,6 +1,9 @@
 """Render the page of one turnout: its state, the history of its resonances, and the latest measurements."""
 
+from __future__ import annotations
+
 from collections import Counter
+from typing import TYPE_CHECKING
 
 from turnout.report.formatting import badge, day, with_interval
 from turnout.report.panels.diagram import diagram
@@ -14,6 +17,12 @@ from turnout.report.panels.hammer import (
 from turnout.report.panels.history import history_panel
 from turnout.report.trains import trains_part
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from typing import Any
+
+    from jinja2 import Template
+
 BANDS = ("ballast", "railpad")
 MAX_UNUSED_SHOWN = 5  # earlier unused tests that are listed per section
 TRACKS = {"main": "main track", "diverging": "diverging track", "both": "both tracks"}
@@ -26,11 +35,29 @@ PANELS = {
 }
 
 
-def turnout_page(rows, turnout, template, shared):
+def turnout_page(
+    rows: Mapping[str, Sequence[Mapping[str, Any]]],
+    turnout: Mapping[str, Any],
+    template: Template,
+    shared: Mapping[str, Any],
+) -> str:
     """HTML of one turnout.
 
-    ``rows`` maps each kind of ``source.ROWS`` to this turnout's rows, ``turnout`` is its row of ``turnouts``,
-    ``template`` the compiled page, ``shared`` what every page shows.
+    Parameters
+    ----------
+    rows : mapping
+        Rows of this turnout for each kind of ``source.ROWS``.
+    turnout : mapping
+        Row of ``turnouts``.
+    template : Template
+        Compiled page.
+    shared : mapping
+        Variables that every page shows.
+
+    Returns
+    -------
+    str
+        HTML.
     """
     models = {m["section_id"]: m for m in rows["models"]}
     states = _worst_states(rows["chart_states"])
@@ -51,18 +78,31 @@ def turnout_page(rows, turnout, template, shared):
     )
 
 
-def _rows_of(rows, table, section):
+def _rows_of(
+    rows: Mapping[str, Sequence[Mapping[str, Any]]], table: str, section: Mapping[str, Any]
+) -> list[Mapping[str, Any]]:
     """Rows of one table that belong to one section."""
     return [r for r in rows[table] if r["section_id"] == section["section_id"]]
 
 
-def line_of(work):
-    """A row of the worklist as a line of the page; a sentence without a change gets the section and band in front."""
+def line_of(work: Mapping[str, Any]) -> dict[str, str]:
+    """A row of the worklist as a line of the page; a sentence without a change gets the section and band in front.
+
+    Parameters
+    ----------
+    work : mapping
+        Row of the worklist.
+
+    Returns
+    -------
+    dict
+        ``state``, ``badge`` and ``words``.
+    """
     of = "" if work["change_pct"] is not None else f"{work['sections']}, {work['band']}: "
     return {"state": work["state"], "badge": badge(work["state"]), "words": of + work["sentence"]}
 
 
-def _position_words(turnout):
+def _position_words(turnout: Mapping[str, Any]) -> str:
     words = [
         f"line {turnout['line']}," if turnout["line"] else "",
         "" if turnout["km"] is None else f"km {turnout['km']:.3f};",
@@ -70,12 +110,14 @@ def _position_words(turnout):
     return " ".join(p for p in words if p)
 
 
-def _latest(modes, band, model):
+def _latest(modes: Sequence[Mapping[str, Any]], band: str, model: Mapping[str, Any] | None) -> Mapping[str, Any] | None:
     """The mode of ``band`` that belongs to the latest model, or None."""
     return next((m for m in modes if m["band"] == band and model and m["model_id"] == model["model_id"]), None)
 
 
-def _summary(section, model, modes):
+def _summary(
+    section: Mapping[str, Any], model: Mapping[str, Any] | None, modes: Sequence[Mapping[str, Any]]
+) -> dict[str, Any]:
     row = {"label": section["label"], "panel": section["panel"] or "–", "n": 0, "when": "–", "status": "not measured"}
     if model:
         row |= {"n": model["n_impacts_used"], "when": day(model["measured_at_utc"])}
@@ -88,7 +130,12 @@ def _summary(section, model, modes):
     return row
 
 
-def _section(rows, section, models, states):
+def _section(
+    rows: Mapping[str, Sequence[Mapping[str, Any]]],
+    section: Mapping[str, Any],
+    models: Mapping[str, Any],
+    states: Mapping[str, str],
+) -> dict[str, Any]:
     key = section["section_id"]
     model, modes = models.get(key), _rows_of(rows, "modes", section)
     receptances = (r for r in _rows_of(rows, "receptances", section) if model and r["model_id"] == model["model_id"])
@@ -111,13 +158,13 @@ def _section(rows, section, models, states):
         "open": states.get(key) in ("inspect this week", "plan"),
         "when": day(model["measured_at_utc"]) if model else "none",
         "history": history or f"<p>{'No model yet' if model else 'Not measured yet, or nothing could be read'}.</p>",
-        "panels": _panels(rows, section, model, receptance, modes) if receptance else "",
+        "panels": _panels(rows, section, model, receptance, modes) if model and receptance else "",
         "detail": model["detail"] if model else "",
         "unused": _unused_tests(_rows_of(rows, "unused", section)),
     }
 
 
-def _hidden_counts(quarantine):
+def _hidden_counts(quarantine: Sequence[Mapping[str, Any]]) -> list[tuple[str, int]]:
     """(reason, number of its rows that are not shown), for reasons with more rows than are shown."""
     n_shown = Counter((q["kind"], q["reason_code"]) for q in quarantine)
     more = {(q["kind"], q["reason_code"]): q["n_alike"] for q in quarantine}
@@ -128,19 +175,25 @@ def _hidden_counts(quarantine):
     ]
 
 
-def _unused_tests(tests):
+def _unused_tests(tests: Sequence[Mapping[str, Any]]) -> str:
     """Earlier tests of a section that gave no model, the newest first; they are not in its history."""
     entries = [f"{day(t['measured_at_utc'])} ({_reason(t)})" for t in tests[:MAX_UNUSED_SHOWN]]
     more = len(tests) - MAX_UNUSED_SHOWN
     return ", ".join(entries) + (f" and {more} before" if more > 0 else "")
 
 
-def _reason(test):
+def _reason(test: Mapping[str, Any]) -> str:
     words = (test["reason"] or "no reason").replace("_", " ")
     return f"{words}: {test['detail']}" if test["detail"] else words
 
 
-def _panels(rows, section, model, receptance, modes):
+def _panels(
+    rows: Mapping[str, Sequence[Mapping[str, Any]]],
+    section: Mapping[str, Any],
+    model: Mapping[str, Any],
+    receptance: Mapping[str, Any],
+    modes: Sequence[Mapping[str, Any]],
+) -> str:
     current = [m for m in modes if m["model_id"] == model["model_id"]]
     return "".join(
         [
@@ -153,7 +206,7 @@ def _panels(rows, section, model, receptance, modes):
     )
 
 
-def _worst_states(charts):
+def _worst_states(charts: Sequence[Mapping[str, Any]]) -> dict[str, str]:
     order = ["inspect this week", "plan", "cannot tell", "learning", "not measured", "suppressed", "ok"]
     worst: dict[str, str] = {}
     for chart in charts:
@@ -163,7 +216,7 @@ def _worst_states(charts):
     return worst
 
 
-def _event(event):
+def _event(event: Mapping[str, Any]) -> dict[str, str]:
     resets = [band for band in BANDS if event[f"resets_{band}"]]
     return {
         "day": day(event["event_at_utc"]),

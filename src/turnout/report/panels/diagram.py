@@ -1,6 +1,13 @@
 """Draw the turnout as a diagram with its measured sections, coloured by state; hatched means unknown."""
 
+from __future__ import annotations
+
 from html import escape
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from typing import Any
 
 STYLE = {
     "inspect this week": "state-inspect",
@@ -13,18 +20,37 @@ STYLE = {
 }
 
 
-def diagram(sections, states, width=920, height=200):
-    """SVG of the turnout; ``sections`` are its rows, ``states`` maps section_id to a state of the worklist."""
+def diagram(
+    sections: Sequence[Mapping[str, Any]], states: Mapping[str, str], width: int = 920, height: int = 200
+) -> str:
+    """SVG of the turnout with its measured sections.
+
+    Parameters
+    ----------
+    sections : sequence of mapping
+        Rows of ``sections`` of the turnout.
+    states : mapping
+        State of the worklist by section id.
+    width : int
+        Width. [px]
+    height : int
+        Height. [px]
+
+    Returns
+    -------
+    str
+        SVG.
+    """
     positions = [s["position_m"] or 0.0 for s in sections]
     toe = 0.0  # origin of positions
     low, high = min([toe, *positions]) - 4.0, max([toe, *positions]) + 4.0
 
-    def px(metres):
+    def px(metres: float) -> float:
         return 20 + (width - 40) * (metres - low) / (high - low)
 
     main, spread = height * 0.36, height * 0.30
 
-    def py(metres, diverging):
+    def py(metres: float, diverging: bool) -> float:
         share = max(0.0, (metres - toe) / (high - toe)) if diverging else 0.0
         return main + spread * share**1.6
 
@@ -45,7 +71,13 @@ def diagram(sections, states, width=920, height=200):
     return "".join(elements) + "</svg>"
 
 
-def _section_marker(section, states, px, py, lift):
+def _section_marker(
+    section: Mapping[str, Any],
+    states: Mapping[str, str],
+    px: Callable[[float], float],
+    py: Callable[[float, bool], float],
+    lift: int,
+) -> str:
     diverging = section["track"] == "diverging"
     x, y = px(section["position_m"] or 0.0), py(section["position_m"] or 0.0, diverging)
     state = states.get(section["section_id"], "not measured")
@@ -60,11 +92,13 @@ def _section_marker(section, states, px, py, lift):
     )
 
 
-def _metres(section):
+def _metres(section: Mapping[str, Any]) -> str:
     return "" if section["position_m"] is None else f"{section['position_m']:.0f} m"
 
 
-def _lifts(sections, px, min_distance=42, height=26):
+def _lifts(
+    sections: Sequence[Mapping[str, Any]], px: Callable[[float], float], min_distance: float = 42, height: int = 26
+) -> list[int]:
     """Vertical shift of each label [px]: where labels are closer than ``min_distance``, every second one is shifted."""
     lifts: list[int] = []
     last: dict[bool, tuple[float, int]] = {}
@@ -77,5 +111,5 @@ def _lifts(sections, px, min_distance=42, height=26):
     return lifts
 
 
-def _steps(low, high, n=24):
+def _steps(low: float, high: float, n: int = 24) -> list[float]:
     return [low + (high - low) * k / n for k in range(n + 1)]

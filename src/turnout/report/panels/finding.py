@@ -1,10 +1,17 @@
 """Draw the panels of a finding: measured and simulated curves, fit, history, and its position on the turnout."""
 
+from __future__ import annotations
+
 from html import escape
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.report.svg import Axis, Chart
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from typing import Any
 
 TITLES = {
     "waveform": "Waveform",
@@ -15,8 +22,21 @@ TITLES = {
 WIDE_WIDTH = 944  # px, width of a waveform panel
 
 
-def curve_panel(row, changed="what was left out"):
-    """SVG of one row of ``mismatch_curves``; ``changed`` names the effect added in "after", "" without one."""
+def curve_panel(row: Mapping[str, Any], changed: str = "what was left out") -> str:
+    """SVG of one row of ``mismatch_curves``.
+
+    Parameters
+    ----------
+    row : mapping
+        The row.
+    changed : str
+        Name of the effect added in "after", "" without one.
+
+    Returns
+    -------
+    str
+        SVG.
+    """
     if row["curve"] == "latent":
         return _latent(row)
     x = np.asarray(row["x"], dtype=float)
@@ -32,16 +52,16 @@ def curve_panel(row, changed="what was left out"):
     return chart.svg()
 
 
-def _title(row):
+def _title(row: Mapping[str, Any]) -> str:
     label = row["label"] if row["curve"] == "waveform" else row["label"].partition(",")[0]
     return f"{TITLES[row['curve']]}: {label}"
 
 
-def _x_axis(row, x, log):
+def _x_axis(row: Mapping[str, Any], x: np.ndarray, log: bool) -> Axis:
     return Axis(float(x.min()), float(x.max()), _x_label(row), "log" if log else "linear")
 
 
-def _y_axis(row, values, log):
+def _y_axis(row: Mapping[str, Any], values: Mapping[str, np.ndarray], log: bool) -> Axis:
     """Vertical axis that contains the measured values, and the simulated ones within a limit."""
     finite = np.concatenate([v[np.isfinite(v)] for v in values.values()])
     label = {"waveform": "acceleration", "spectrum": "PSD", "receptance": "receptance"}[row["curve"]]
@@ -54,7 +74,7 @@ def _y_axis(row, values, log):
     return Axis(-reach, reach, f"{label} [{row['y_unit']}]")
 
 
-def _key(chart, names, words):
+def _key(chart: Chart, names: Sequence[str], words: Mapping[str, str]) -> None:
     """Legend of the lines at the top of the panel."""
     x = 0.01
     for name in names:
@@ -62,12 +82,12 @@ def _key(chart, names, words):
         x += (6.2 * len(words[name]) + 16) / (chart.width - 76)
 
 
-def _x_label(row):
+def _x_label(row: Mapping[str, Any]) -> str:
     """Quantity and unit of the horizontal axis."""
     return f"{row['x_label']} [{row['x_unit']}]" if row["x_unit"] else row["x_label"]
 
 
-def _latent(row):
+def _latent(row: Mapping[str, Any]) -> str:
     """SVG of the mean missing force with its 95 % limits over the covariate that explains most."""
     x, mean = np.asarray(row["x"], dtype=float), np.asarray(row["measured"], dtype=float)
     low, high = np.asarray(row["before"], dtype=float), np.asarray(row["after"], dtype=float)
@@ -83,8 +103,19 @@ def _latent(row):
     return chart.svg()
 
 
-def fit_panel(finding):
-    """Bars of the fit on held-out recordings: before, with the term, best rival, decoy; "" without any."""
+def fit_panel(finding: Mapping[str, Any]) -> str:
+    """Bars of the fit on held-out recordings: before, with the term, best rival, decoy.
+
+    Parameters
+    ----------
+    finding : mapping
+        Row of ``mismatch_findings``.
+
+    Returns
+    -------
+    str
+        SVG, "" without a fit.
+    """
     entries = [
         ("before", finding["fit_before_pct"], "bar-before"),
         ("with it", finding["fit_after_pct"], "bar-after"),
@@ -112,14 +143,27 @@ def fit_panel(finding):
     return chart.svg()
 
 
-def _gain(finding):
+def _gain(finding: Mapping[str, Any]) -> str:
     """Gain of the term with its standard error, in words; "" if unknown."""
     before, after, error = (finding.get(k) for k in ("fit_before_pct", "fit_after_pct", "fit_gain_se_pct"))
-    return "" if None in (before, after, error) else f": {after - before:+.1f} ± {error:.1f} points"
+    if before is None or after is None or error is None:
+        return ""
+    return f": {after - before:+.1f} ± {error:.1f} points"
 
 
-def history_of_parameter(rows):
-    """SVG of a parameter over the visits with 95 % intervals; rows of ``mismatch_parameters``, oldest first."""
+def history_of_parameter(rows: Sequence[Mapping[str, Any]]) -> str:
+    """SVG of a parameter over the visits with 95 % intervals.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Rows of ``mismatch_parameters``, the oldest first.
+
+    Returns
+    -------
+    str
+        SVG, "" with less than two visits.
+    """
     if len(rows) < 2:
         return ""
     seconds = [r["found_at_utc"].timestamp() for r in rows]
@@ -153,22 +197,46 @@ class TurnoutDrawing:
 
     toe = 0.0  # origin of positions
 
-    def __init__(self, sections):
+    def __init__(self, sections: Sequence[Mapping[str, Any]]) -> None:
         self.branches = any(s["track"] == "diverging" for s in sections)
         positions = [s["position_m"] or 0.0 for s in sections] + [self.toe] * self.branches
         self.low, self.high = min(positions) - 4.0, max(positions) + 4.0
         self.elements: list[str] = []
 
-    def px(self, metres):
-        """Horizontal pixel of a position."""
+    def px(self, metres: float) -> float:
+        """Horizontal pixel of a position.
+
+        Parameters
+        ----------
+        metres : float
+            Position. [m]
+
+        Returns
+        -------
+        float
+            Pixel.
+        """
         return 20 + (WIDTH - 40) * (metres - self.low) / (self.high - self.low)
 
-    def py(self, metres, diverging):
-        """Vertical pixel of a position on the main or the diverging track."""
+    def py(self, metres: float, diverging: bool) -> float:
+        """Vertical pixel of a position on the main or the diverging track.
+
+        Parameters
+        ----------
+        metres : float
+            Position. [m]
+        diverging : bool
+            Whether it is on the diverging track.
+
+        Returns
+        -------
+        float
+            Pixel.
+        """
         share = max(0.0, (metres - self.toe) / (self.high - self.toe)) if diverging else 0.0
         return MAIN + SPREAD * share**1.6
 
-    def rails(self):
+    def rails(self) -> None:
         """Draw the main track, and the diverging one where it is measured."""
         steps = [self.toe + (self.high - self.toe) * k / 24 for k in range(25)]
         curve = " ".join(f"L{self.px(m):.1f} {self.py(m, True):.1f}" for m in steps)
@@ -176,8 +244,14 @@ class TurnoutDrawing:
         if self.branches:
             self.elements.append(f'<path class="rail" d="M{self.px(self.toe):.1f} {MAIN} {curve}"/>')
 
-    def stretch(self, finding):
-        """Draw the part of the track that a group covers, in the colour of its verdict."""
+    def stretch(self, finding: Mapping[str, Any]) -> None:
+        """Draw the part of the track that a group covers, in the colour of its verdict.
+
+        Parameters
+        ----------
+        finding : mapping
+            Row of ``mismatch_findings``.
+        """
         diverging = finding["route"] == "diverging"
         low, high = finding["place_low_m"] - 1.3, finding["place_high_m"] + 1.3
         steps = [low + (high - low) * k / 12 for k in range(13)]
@@ -186,8 +260,18 @@ class TurnoutDrawing:
         style = STYLES[finding["verdict"]]
         self.elements.append(f'<path class="stretch {style}" d="M{path}"><title>{words}</title></path>')
 
-    def sensor(self, section, row, unnamed=False):
-        """Draw a measured section with its label, or ``unnamed``; labels alternate between two rows."""
+    def sensor(self, section: Mapping[str, Any], row: int, unnamed: bool = False) -> None:
+        """Draw a measured section with its label; labels alternate between two rows.
+
+        Parameters
+        ----------
+        section : mapping
+            Row of ``sections``.
+        row : int
+            Number of the section, which decides the row of its label.
+        unnamed : bool
+            Whether its label is left out.
+        """
         diverging = section["track"] == "diverging"
         x, y = self.px(section["position_m"] or 0.0), self.py(section["position_m"] or 0.0, diverging)
         side = 24 + 13 * (row % 2) if diverging else -16 - 13 * (row % 2)
@@ -197,8 +281,18 @@ class TurnoutDrawing:
             text = f'<text class="tick" x="{x:.1f}" y="{y + side:.1f}" text-anchor="middle">{label}</text>'
             self.elements.append(text)
 
-    def mark(self, position, diverging, words):
-        """Draw an arrow to a position, with words at its tail."""
+    def mark(self, position: float, diverging: bool, words: str) -> None:
+        """Draw an arrow to a position, with words at its tail.
+
+        Parameters
+        ----------
+        position : float
+            Position. [m]
+        diverging : bool
+            Whether it is on the diverging track.
+        words : str
+            Text at the tail.
+        """
         x, y = self.px(position), self.py(position, diverging)
         anchor = "end" if x > WIDTH - 260 else "start"
         beside = x - 10 if anchor == "end" else x + 10
@@ -208,7 +302,7 @@ class TurnoutDrawing:
             f'<text class="mark" x="{beside:.1f}" y="{y - 56:.1f}" text-anchor="{anchor}">{escape(words)}</text>'
         )
 
-    def svg(self):
+    def svg(self) -> str:
         """The whole drawing."""
         legend = f'<text class="label" x="24" y="{HEIGHT - 6}">facing direction →, metres from the switch toe</text>'
         return (
@@ -217,8 +311,27 @@ class TurnoutDrawing:
         )
 
 
-def position_panel(sections, findings, marked=None):
-    """SVG of ``sections`` (rows) with the verdicts of ``findings``; ``marked`` is the finding that gets the arrow."""
+def position_panel(
+    sections: Sequence[Mapping[str, Any]],
+    findings: Sequence[Mapping[str, Any]],
+    marked: Mapping[str, Any] | None = None,
+) -> str:
+    """SVG of the sections with the verdicts of the findings.
+
+    Parameters
+    ----------
+    sections : sequence of mapping
+        Rows of ``sections`` of the turnout.
+    findings : sequence of mapping
+        Rows of ``mismatch_findings``.
+    marked : mapping or None
+        Finding that gets the arrow.
+
+    Returns
+    -------
+    str
+        SVG.
+    """
     drawing = TurnoutDrawing(sections)
     drawing.rails()
     for finding in findings:
@@ -234,14 +347,27 @@ def position_panel(sections, findings, marked=None):
     return drawing.svg()
 
 
-def _is_under_arrow(section, position, route):
+def _is_under_arrow(section: Mapping[str, Any], position: float, route: str) -> bool:
     """Whether the arrow would lie on the section's label."""
     same = (section["track"] == "diverging") == (route == "diverging")
     return same and abs((section["position_m"] or 0.0) - position) < 0.5
 
 
-def marked_position(finding, sections):
-    """(position [m] or None, words) of the arrow: that of the effect, or of its sensor."""
+def marked_position(finding: Mapping[str, Any], sections: Sequence[Mapping[str, Any]]) -> tuple[float | None, str]:
+    """Position and words of the arrow: that of the effect, or of its sensor.
+
+    Parameters
+    ----------
+    finding : mapping
+        Row of ``mismatch_findings``.
+    sections : sequence of mapping
+        Rows of ``sections`` of the turnout.
+
+    Returns
+    -------
+    (float or None, str)
+        Position [m], None without one, and words.
+    """
     if finding["position_m"] is not None:
         return finding["position_m"], f"{finding['position_m']:.1f} m"
     if finding["channel"]:

@@ -1,18 +1,35 @@
 """Draw the panels of a hammer test: receptance, coherence, free decay, stabilisation diagram and impacts."""
 
+from __future__ import annotations
+
 import json
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.report.svg import Axis, Chart
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from typing import Any
+
 FREQUENCY_RANGE = (30.0, 1600.0)  # Hz, frequency axis of the panels
 
 
-def receptance_panel(row, modes):
+def receptance_panel(row: Mapping[str, Any], modes: Sequence[Mapping[str, Any]]) -> str:
     """Magnitude of the receptance over frequency; lines that fail the gate are grey.
 
-    ``row`` is one row of ``receptances``, ``modes`` the rows of ``modes`` of the same model.
+    Parameters
+    ----------
+    row : mapping
+        Row of ``receptances``.
+    modes : sequence of mapping
+        Rows of ``modes`` of the same model.
+
+    Returns
+    -------
+    str
+        SVG, "" without a value above 0.
     """
     frequency = np.asarray(row["frequency_hz"], dtype=float)
     inside = (frequency >= FREQUENCY_RANGE[0]) & (frequency <= FREQUENCY_RANGE[1])
@@ -37,8 +54,19 @@ def receptance_panel(row, modes):
     return chart.svg()
 
 
-def coherence_panel(row):
-    """Coherence with its 95 % limits and the required level of the gate."""
+def coherence_panel(row: Mapping[str, Any]) -> str:
+    """Coherence with its 95 % limits and the required level of the gate.
+
+    Parameters
+    ----------
+    row : mapping
+        Row of ``receptances``.
+
+    Returns
+    -------
+    str
+        SVG.
+    """
     frequency = np.asarray(row["frequency_hz"], dtype=float)
     chart = Chart(
         Axis(*FREQUENCY_RANGE, "frequency [Hz]", "log"),
@@ -54,13 +82,13 @@ def coherence_panel(row):
     return chart.svg()
 
 
-def _window(row):
+def _window(row: Mapping[str, Any]) -> str:
     """Note on the damping added by an exponential window; "" without one."""
     decay = row.get("window_decay_per_s")
     return f"; a window exp(-{decay:g}/s t) adds to its damping, not to the model's" if decay else ""
 
 
-def _grey_out(chart, frequency, passed, row):
+def _grey_out(chart: Chart, frequency: np.ndarray, passed: np.ndarray, row: Mapping[str, Any]) -> None:
     """Shade the lines that fail the gate, and mark the band edge of the hammer."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], (~passed).astype(int), [0]])))
     for first, last in zip(edges[::2], edges[1::2] - 1):
@@ -74,10 +102,20 @@ def _grey_out(chart, frequency, passed, row):
 MAX_DECAY_POINTS = 300
 
 
-def decay_panel(row, model):
+def decay_panel(row: Mapping[str, Any], model: Mapping[str, Any]) -> str:
     """Measured and modelled free decay of one impact, 30 ms.
 
-    ``row`` is one row of ``receptances``, ``model`` one of ``models``.
+    Parameters
+    ----------
+    row : mapping
+        Row of ``receptances``.
+    model : mapping
+        Row of ``models``.
+
+    Returns
+    -------
+    str
+        SVG, "" without a decay.
     """
     if row["decay_ms2"] is None or row["decay_model_ms2"] is None:
         return ""
@@ -102,12 +140,25 @@ def decay_panel(row, model):
     return chart.svg()
 
 
-def _is_number(value):
+def _is_number(value: float | None) -> bool:
     return value is not None and np.isfinite(value)
 
 
-def stabilisation_panel(row, modes):
-    """Stabilisation diagram: poles over model order, from one row of ``receptances``; ``modes`` are marked."""
+def stabilisation_panel(row: Mapping[str, Any], modes: Sequence[Mapping[str, Any]]) -> str:
+    """Stabilisation diagram: poles over model order.
+
+    Parameters
+    ----------
+    row : mapping
+        Row of ``receptances``.
+    modes : sequence of mapping
+        Rows of ``modes`` of the same model.
+
+    Returns
+    -------
+    str
+        SVG, "" without a pole.
+    """
     poles = json.loads(row["stabilisation_json"] or "[]")
     if not poles:
         return ""
@@ -131,10 +182,18 @@ def stabilisation_panel(row, modes):
     return chart.svg()
 
 
-def impacts_panel(rows):
+def impacts_panel(rows: Sequence[Mapping[str, Any]]) -> str:
     """Peak force of the impacts, used and rejected.
 
-    ``rows`` of ``impacts`` are those of one section and campaign, in order of test and record.
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Rows of ``impacts`` of one section and campaign, in order of test and record.
+
+    Returns
+    -------
+    str
+        SVG, "" without an impact.
     """
     if not rows:
         return ""
@@ -153,6 +212,6 @@ def impacts_panel(rows):
     return chart.svg()
 
 
-def _words(row, peak):
+def _words(row: Mapping[str, Any], peak: float) -> str:
     result = "used" if row["status"] == "accepted" else f"rejected: {row['reason']}. {row['detail'] or ''}"
     return f"test {row['test']}, record {row['record'] + 1}: {peak:.1f} kN, {result}"

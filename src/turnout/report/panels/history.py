@@ -1,20 +1,48 @@
 """Draw the history of one resonance: campaign values with intervals, expected band and events."""
 
+from __future__ import annotations
+
 from datetime import datetime
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.report.formatting import student_quantile
 from turnout.report.svg import Axis, Chart
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from typing import Any
+
 EPOCH = datetime(1970, 1, 1)
 
 
-def history_panel(band, modes, charts, events, width=462):
+def history_panel(
+    band: str,
+    modes: Sequence[Mapping[str, Any]],
+    charts: Sequence[Mapping[str, Any]],
+    events: Sequence[Mapping[str, Any]],
+    width: int = 462,
+) -> str:
     """Frequency over time.
 
-    ``modes`` are rows of ``modes_current`` of one section and band, ``charts`` the rows of its control chart (may be
-    empty), ``events`` rows of ``events`` that affect the section.
+    Parameters
+    ----------
+    band : str
+        Band of the resonance.
+    modes : sequence of mapping
+        Rows of ``modes_current`` of one section and band.
+    charts : sequence of mapping
+        Rows of its control chart, may be empty.
+    events : sequence of mapping
+        Rows of ``events`` that affect the section.
+    width : int
+        Width. [px]
+
+    Returns
+    -------
+    str
+        SVG, "" without a value.
     """
     if not modes:
         return ""
@@ -51,7 +79,7 @@ def history_panel(band, modes, charts, events, width=462):
     return chart.svg()
 
 
-def _is_in_alarm(modes, charts):
+def _is_in_alarm(modes: Sequence[Mapping[str, Any]], charts: Sequence[Mapping[str, Any]]) -> np.ndarray:
     """Whether the campaign of each value is in alarm: the last one that began before it, for one may last two days."""
     rows = sorted(charts, key=lambda c: c["measured_at_utc"])
     began = np.array([_seconds(c["measured_at_utc"]) for c in rows])
@@ -59,20 +87,20 @@ def _is_in_alarm(modes, charts):
     return np.array([k >= 0 and rows[k]["state"].startswith("alarm") for k in of], dtype=bool)
 
 
-def _seconds(when):
+def _seconds(when: datetime) -> float:
     return (when - EPOCH).total_seconds()
 
 
-def _half_width(mode):
+def _half_width(mode: Mapping[str, Any]) -> float:
     """Half of the 95 % t interval, nan where the campaign has no standard error."""
     if mode["frequency_se_hz"] is None or mode["n_impacts"] < 2:
         return np.nan
     return student_quantile(mode["n_impacts"]) * mode["frequency_se_hz"]
 
 
-def _interval(half):
+def _interval(half: float) -> str:
     return f"± {half:.2g} (95 %)" if np.isfinite(half) else "± unknown"
 
 
-def _temperature(value):
+def _temperature(value: float | None) -> str:
     return "no temperature" if value is None else f"{value:.0f} °C"

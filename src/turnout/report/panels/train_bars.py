@@ -1,12 +1,19 @@
 """Draw bar charts of the mean and spread of a score by train type, speed or axle load, for each section."""
 
+from __future__ import annotations
+
 from collections import Counter
 from html import escape
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.constants import Z95
 from turnout.report.svg import LEFT, TOP, Axis, Chart
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from typing import Any
 
 WIDTH = 952
 # Light to dark, distinct in print and for colour-blind readers.
@@ -14,7 +21,7 @@ LEGEND = "○ others held fixed, 95 %, magenta: random models"
 COLOURS = ("#c6dbef", "#6baed6", "#2171b5", "#08306b", "#fdd0a2", "#fd8d3c", "#d94801", "#7f2704")
 
 
-def train_bars(factor, rows, sections):
+def train_bars(factor: str, rows: Sequence[Mapping[str, Any]], sections: Sequence[Mapping[str, Any]]) -> str:
     """SVG of one factor, "" without a class of it.
 
     Parameters
@@ -24,8 +31,13 @@ def train_bars(factor, rows, sections):
     rows : list of dict
         Rows of ``fit_adjusted``: one score of one turnout. Bars are ``score_pct`` with its standard deviation, dots are
         ``adjusted_pct`` with 95 % intervals; magenta lines are the null.
-    sections : list of dict
-        In the order along the track.
+    sections : sequence of mapping
+        Rows of ``sections``, in the order along the track.
+
+    Returns
+    -------
+    str
+        SVG.
     """
     rows = [r for r in rows if r["factor"] == factor]
     if not rows:
@@ -59,30 +71,30 @@ def train_bars(factor, rows, sections):
     width = 0.8 / len(names)
     for k, section in enumerate(sections_shown, start=1):
         for j, name in enumerate(names):
-            if row := at.get((section["section_id"], name)):
-                _bar(chart, k - 0.4 + (j + 0.5) * width, width, COLOURS[j], row)
+            if drawn := at.get((section["section_id"], name)):
+                _bar(chart, k - 0.4 + (j + 0.5) * width, width, COLOURS[j], drawn)
     _key(chart, names)
     return chart.svg()
 
 
-def _undrawn(n):
+def _undrawn(n: int) -> str:
     """Number of classes that are not drawn, in words."""
     return f"; {n} class{'es' * (n > 1)} with fewer passages {'are' if n > 1 else 'is'} not drawn" if n else ""
 
 
-def _labels(sections):
+def _labels(sections: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
     return tuple(s["label"] for s in sections)
 
 
-def _low(row):
+def _low(row: Mapping[str, Any]) -> float:
     return row["score_pct"] - (row["score_sd_pct"] or 0.0)
 
 
-def _high(row):
+def _high(row: Mapping[str, Any]) -> float:
     return max(row["score_pct"] + (row["score_sd_pct"] or 0.0), row["null_pct"] or 0.0)
 
 
-def _bar(chart, x, width, colour, row):
+def _bar(chart: Chart, x: float, width: float, colour: str, row: Mapping[str, Any]) -> None:
     """Draw one bar with its spread, its null, and the mean with the other factors held fixed."""
     x_0, x_1 = (float(chart.px(x + side * 0.45 * width)) for side in (-1, 1))
     top, zero = float(chart.py(row["score_pct"])), float(chart.py(0.0))
@@ -105,7 +117,7 @@ def _bar(chart, x, width, colour, row):
     chart.points(np.array([x + 0.2 * width]), mean, "measured", 2.5, mean - half, mean + half)
 
 
-def _key(chart, names):
+def _key(chart: Chart, names: Sequence[str]) -> None:
     """Draw the legend: the colours of the classes."""
     x, y = float(LEFT + 8), TOP + 6
     for colour, name in zip(COLOURS, names):
