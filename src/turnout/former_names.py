@@ -35,7 +35,7 @@ class FormerNames:
         if any(name.startswith(f"{fullname}.") for name in names):
             from importlib.machinery import ModuleSpec
 
-            return ModuleSpec(fullname, _EmptyPackage(now), is_package=True)
+            return ModuleSpec(fullname, _EmptyPackage(now), is_package=True)  # type: ignore[arg-type]
         _forget_empty_packages(fullname)
         message = f"{fullname} was renamed in Turnout 0.2. Import {now} instead"
         raise ModuleNotFoundError(message, name=fullname)

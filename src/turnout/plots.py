@@ -5,7 +5,7 @@ No result depends on this module, so fingerprints of code do not count it.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -63,7 +63,7 @@ def plot_receptance(receptance: Receptance, figure: Figure | SubFigure | None = 
 
 def plot_model(model: ModalModel, figure: Figure | SubFigure | None = None) -> np.ndarray:
     """Draw the modes of a modal model with their errors; see ``ModalModel.plot``."""
-    rows = [["receptance"] * max(len(model.modes), 1)] if model.receptance is not None else []
+    rows: list[Any] = [["receptance"] * max(len(model.modes), 1)] if model.receptance is not None else []
     rows += [[mode.band for mode in model.modes]] if model.modes else []
     if not rows:
         axes = _figure(figure, 2.0).subplots()

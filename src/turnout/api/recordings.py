@@ -111,7 +111,7 @@ def _description_of_layout(
     """What a layout states about the files of a section, or about those of passages."""
     if channels is not None:
         raise ValueError("give either a layout or channels: both say what the channels are")
-    turnout = layout if isinstance(layout, TurnoutConfig) else load_layout(layout)
+    turnout = layout if isinstance(layout, TurnoutConfig) else load_layout(Path(layout))
     if section is None:
         if turnout.passages is None:
             remedy = "Give a section, for a file of a hammer test"

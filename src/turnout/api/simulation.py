@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from datetime import datetime
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from turnout import simulate
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 WEB_NOISE, WEB_LIMIT = 0.05, 5000.0  # m/s², noise and range of an accelerometer on the rail web
 
 
-def load_track(name: str | os.PathLike, seed: int = 0, folder: str | os.PathLike | None = None) -> TurnoutTrack:
+def load_track(name: str | os.PathLike, seed: int = 0, folder: str | Path | None = None) -> TurnoutTrack:
     """Load the track of a turnout: rails, supports, crossing, accepted effects.
 
     Parameters
@@ -54,7 +55,7 @@ def load_track(name: str | os.PathLike, seed: int = 0, folder: str | os.PathLike
 
 
 def load_vehicle(
-    name: str | os.PathLike, load: float = 0.5, units: int = 1, folder: str | os.PathLike | None = None
+    name: str | os.PathLike, load: float = 0.5, units: int = 1, folder: str | Path | None = None
 ) -> Vehicle:
     """Load a vehicle or train: car bodies, bogies, wheels and suspensions.
 

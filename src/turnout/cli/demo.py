@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
         if getattr(args, option) < minimum:
             observation = f"{getattr(args, option)}, and the fewest are {minimum}"
             raise ConfigError(f"--{option}", "number", observation, f"Write {minimum} or more")
-    cores = args.cores or os.cpu_count()
+    cores = args.cores or os.cpu_count() or 1
     print("1. Raw files of the demonstration fleet", flush=True)
     n = make_fleet("raw", "truth", seed=args.seed, n_campaign=args.campaigns, n_passage=args.passages, workers=cores)
     print(f"   {n} files below raw/. What is true of them lies below truth/, which the pipeline does not read.")

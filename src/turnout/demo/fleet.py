@@ -1,5 +1,7 @@
 """Write the raw files and the truth of the demonstration fleet, and run the workflow as a user would."""
 
+from __future__ import annotations
+
 import csv
 import json
 import os
@@ -9,6 +11,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 from datetime import datetime, time
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
 from zlib import crc32
 
 import numpy as np
@@ -21,6 +24,12 @@ from turnout.demo.passages import make_passage, make_passages
 from turnout.demo.scenario import FLEET, SECTIONS, campaign_days, gap_under, rail_temperature, stiffness_factors
 from turnout.readers.writing import write
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+    from datetime import date
+
+    from turnout.demo.scenario import TurnoutScenario
+
 EXTENSION = {"uff58b": "uff", "tdms": "tdms", "hdf5": "h5", "mat": "mat", "csv": "csv"}
 MISSING_TEMPERATURE = ("tommerup_s1", 7)
 # (turnout, campaign, section, test) -> fault of the file, a function of ``scenario``.
@@ -32,7 +41,20 @@ FILE_FAULTS = {
 }
 
 
-def make_fleet(raw, truth, seed=1, n_campaign=24, n_passage=12, turnouts=None, workers=None, progress=True):
+# raw folder, truth folder, scenario, seed, number of the campaign, section, day, rail temperature [°C]
+Job: TypeAlias = "tuple[str, str, TurnoutScenario, int, int, str, date, float]"
+
+
+def make_fleet(
+    raw: Path | str,
+    truth: Path | str,
+    seed: int = 1,
+    n_campaign: int = 24,
+    n_passage: int = 12,
+    turnouts: Iterable[str] | None = None,
+    workers: int | None = None,
+    progress: bool = True,
+) -> int:
     """Write raw files below ``raw`` and one truth file per turnout below ``truth``.
 
     Parameters
@@ -49,6 +71,8 @@ def make_fleet(raw, truth, seed=1, n_campaign=24, n_passage=12, turnouts=None, w
         Only these; all by default.
     workers : int, optional
         Processes; as many as there are processors by default.
+    progress : bool
+        Show progress bars.
 
     Returns
     -------
@@ -82,7 +106,7 @@ def make_fleet(raw, truth, seed=1, n_campaign=24, n_passage=12, turnouts=None, w
     return total + len(passage_truths)
 
 
-def _make_tests(job):
+def _make_tests(job: Job) -> int:
     """Write three test files of one section and campaign; returns their number."""
     raw, truth, scenario, seed, number, section, day, temperature = job
     rng = np.random.default_rng([seed, crc32(f"{scenario.turnout}/{section}".encode()), number])
@@ -90,8 +114,8 @@ def _make_tests(job):
     hangs = gap_under(scenario, section, day) > 0.0
     response = simulated_response(section, ballast * scenario.stiffness, railpad * scenario.stiffness, hangs)
     noted_temperature = None if (scenario.turnout, number) == MISSING_TEMPERATURE else temperature
-    is_odd = scenario.odd_campaign and scenario.odd_campaign[0] == number
-    file_format = scenario.odd_campaign[1] if is_odd else scenario.format
+    odd = scenario.odd_campaign
+    file_format = odd[1] if odd is not None and odd[0] == number else scenario.format
     folder = Path(raw) / scenario.turnout / "hammer" / day.isoformat()
     folder.mkdir(parents=True, exist_ok=True)
     impacts = []
@@ -112,7 +136,7 @@ def _make_tests(job):
     return 3
 
 
-def _write_campaigns(raw, scenario, days, temperatures):
+def _write_campaigns(raw: Path, scenario: TurnoutScenario, days: Sequence[date], temperatures: Sequence[float]) -> None:
     folder = raw / scenario.turnout
     folder.mkdir(parents=True, exist_ok=True)
     with open(folder / "campaigns.csv", "w", newline="") as file:
@@ -125,7 +149,9 @@ def _write_campaigns(raw, scenario, days, temperatures):
             writer.writerow([day.isoformat(), start, temperature_text, "086D50-1", "plastic", "survey crew"])
 
 
-def _write_truth(truth, scenario, days, temperatures, seed):
+def _write_truth(
+    truth: Path, scenario: TurnoutScenario, days: Sequence[date], temperatures: Sequence[float], seed: int
+) -> None:
     truth.mkdir(parents=True, exist_ok=True)
     sections = {
         section: [stiffness_factors(scenario, section, day, t) for day, t in zip(days, temperatures)]
@@ -144,7 +170,20 @@ def _write_truth(truth, scenario, days, temperatures, seed):
     (truth / f"{scenario.turnout}.json").write_text(json.dumps(content, indent=1))
 
 
-def run_pipeline(cores, *options) -> int:
-    """Run Snakemake on ``cores`` processors with further ``options``; returns its exit code."""
+def run_pipeline(cores: int, *options: str) -> int:
+    """Run Snakemake as a user would.
+
+    Parameters
+    ----------
+    cores : int
+        Number of processors.
+    *options : str
+        Further options of its command line.
+
+    Returns
+    -------
+    int
+        Its exit code.
+    """
     command = [sys.executable, "-m", "snakemake", "--cores", str(cores), *options]
     return subprocess.run(command).returncode

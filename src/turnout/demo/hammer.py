@@ -3,9 +3,12 @@
 The impulse response of a section is that of the simulated track, with its stiffness changed by given factors.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, time, timedelta
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +19,12 @@ from turnout.simulate.hammer import resolve_location
 from turnout.simulate.matrices import assemble
 from turnout.simulate.parameters import load_track
 from turnout.simulate.turnout_track import stretch_of_track
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from datetime import date
+
+    from turnout.simulate.turnout_track import TurnoutTrack
 
 RATE = 20_000.0  # Hz
 N_SAMPLES = 3_000  # of a record
@@ -36,23 +45,55 @@ class ImpactTruth:
     fault: str = ""
 
 
-def pulse(peak, contact, start):
-    """Half-sine force of a soft tip [N], (N_SAMPLE,); ``contact`` and ``start`` in s, any sub-sample start."""
+def pulse(peak: float, contact: float, start: float) -> np.ndarray:
+    """Half-sine force of a soft tip.
+
+    Parameters
+    ----------
+    peak : float
+        Largest force. [N]
+    contact, start : float
+        Duration and beginning, which may lie between two samples. [s]
+
+    Returns
+    -------
+    (N_SAMPLES,) array of float
+        Force at ``RATE``. [N]
+    """
     t = np.arange(N_SAMPLES) / RATE - start
     return np.where((t > 0) & (t < contact), peak * np.sin(np.pi * t / contact), 0.0)
 
 
-def response_to(force, impulse_response):
-    """Acceleration [m/s²], (N_SAMPLE,), of a ``force`` [N] by a response of ``N_SAMPLE`` samples [m/s² per N s].
+def response_to(force: np.ndarray, impulse_response: np.ndarray) -> np.ndarray:
+    """Acceleration that a force excites.
 
     The convolution is circular over one record: a band-limited response begins a little before the impact, and that
     part is at the end of the record. Without it the mass-like jump at the impact is halved, and the receptance at all
     lower frequencies is wrong.
+
+    Parameters
+    ----------
+    force : (N_SAMPLES,) array of float
+        Force of the hammer. [N]
+    impulse_response : (N_SAMPLES,) array of float
+        Acceleration after a unit impulse. [m/s² per N s]
+
+    Returns
+    -------
+    (N_SAMPLES,) array of float
+        Acceleration. [m/s²]
     """
     return np.fft.irfft(np.fft.rfft(force) * np.fft.rfft(impulse_response, N_SAMPLES), N_SAMPLES) / RATE
 
 
-def hammer_test(impulse_response, temperature, day, test, rng, n_impacts=10):
+def hammer_test(
+    impulse_response: Callable[[np.random.Generator], np.ndarray],
+    temperature: float | None,
+    day: date,
+    test: int,
+    rng: np.random.Generator,
+    n_impacts: int = 10,
+) -> tuple[list[Recording], list[ImpactTruth]]:
     """Recordings of one test and the truth of each impact.
 
     Parameters
@@ -62,6 +103,19 @@ def hammer_test(impulse_response, temperature, day, test, rng, n_impacts=10):
         once per impact, since no two impacts meet quite the same track.
     temperature : float or None
         Rail temperature written into the recording. [°C]
+    day : date
+        Day of the campaign.
+    test : int
+        Number of the test, from 1.
+    rng : numpy.random.Generator
+        Source of faults, scatter and noise.
+    n_impacts : int
+        Number of impacts.
+
+    Returns
+    -------
+    list of Recording, list of ImpactTruth
+        One of each per impact.
     """
     recordings, truth = [], []
     conditions = {} if temperature is None else {"rail_temperature": round(temperature, 1)}
@@ -84,12 +138,12 @@ def hammer_test(impulse_response, temperature, day, test, rng, n_impacts=10):
     return recordings, truth
 
 
-def _noise(peak, acceleration, rng):
+def _noise(peak: float, acceleration: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     levels = [[1e-3 * peak], [1e-2 * np.max(np.abs(acceleration))]]
     return rng.normal(size=(2, N_SAMPLES)) * np.array(levels)
 
 
-def _convert(recording):
+def _convert(recording: Recording) -> Recording:
     """The recording after a 16-bit converter: quantised, and clipped at the range."""
     limits = np.array([[c.limit] for c in recording.channels])
     step = limits / 2**15
@@ -102,17 +156,31 @@ HALF_LENGTH = 18.0  # m of track on each side of the impact
 PASS_FREQUENCY, STOP_FREQUENCY = 2_500.0, 4_000.0
 
 
-def simulated_response(section, ballast, railpad, hangs=False):
-    """Function of a random generator giving (N_SAMPLE,) acceleration per unit impulse [m/s² per N s].
+def simulated_response(
+    section: str, ballast: float, railpad: float, hangs: bool = False
+) -> Callable[[np.random.Generator], np.ndarray]:
+    """Response of the rail at a section to an impact there, which scatters from impact to impact.
 
-    Impact and response are on the rail head at the section's position, on the track of config/tracks/tommerup.yaml.
-    Its ballast and pads are ``ballast`` and ``railpad`` times as stiff as there. From impact to impact the frequencies
-    scatter by 0.6 %: hammer and sensor are never in quite the same position. ``hangs``: the sleeper under the sensor
-    hangs above its ballast, without contact on the unloaded track.
+    Impact and response are on the rail head. From impact to impact the frequencies scatter by 0.6 %: hammer and sensor
+    are never in quite the same position.
+
+    Parameters
+    ----------
+    section : str
+        Location of the track of config/tracks/tommerup.yaml.
+    ballast, railpad : float
+        Stiffness of ballast and pads over that of the track file. [-]
+    hangs : bool
+        The sleeper under the sensor hangs above its ballast, without contact on the unloaded track.
+
+    Returns
+    -------
+    callable
+        From a random generator to (N_SAMPLES,) acceleration per unit impulse [m/s² per N s].
     """
     frequency, accelerance = _accelerance(section, round(ballast, 6), round(railpad, 6), hangs)
 
-    def response(rng):
+    def response(rng: np.random.Generator) -> np.ndarray:
         scaled = np.interp(frequency * (1.0 + FREQUENCY_SPREAD * rng.standard_normal()), frequency, accelerance)
         return np.fft.irfft(scaled, N_SAMPLES) * RATE
 
@@ -120,7 +188,7 @@ def simulated_response(section, ballast, railpad, hangs=False):
 
 
 @lru_cache(maxsize=8)
-def _accelerance(section, ballast, railpad, hangs):
+def _accelerance(section: str, ballast: float, railpad: float, hangs: bool) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies [Hz] and accelerance [m/s²/N] up to the Nyquist frequency."""
     position, track = resolve_location(_turnout(), section)
     stretch = stretch_of_track(track, position, HALF_LENGTH)
@@ -146,5 +214,5 @@ def _accelerance(section, ballast, railpad, hangs):
 
 
 @lru_cache(maxsize=1)
-def _turnout():
+def _turnout() -> TurnoutTrack:
     return load_track("tommerup")

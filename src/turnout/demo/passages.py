@@ -1,21 +1,34 @@
 """Simulate the train passages of the demonstration fleet: several trains, speeds and loads."""
 
+from __future__ import annotations
+
 import csv
 from dataclasses import replace
 from datetime import datetime, timedelta
 from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
 from zlib import crc32
 
 import numpy as np
 
-from turnout.constants import KMH
+from turnout.constants import GRAVITY, KMH
 from turnout.demo.scenario import gap_under, rail_temperature, stiffness_factors
 from turnout.physics.hanging_sleeper import HangingSleeper
 from turnout.readers.writing import write
 from turnout.simulate.parameters import load_track, load_vehicle
 from turnout.simulate.passage import simulate_passage
 from turnout.simulate.sensor import Sensor
+
+if TYPE_CHECKING:
+    from datetime import date
+    from typing import Any
+
+    from turnout.config import TurnoutConfig
+    from turnout.demo.scenario import TurnoutScenario
+    from turnout.simulate.track import Track
+    from turnout.simulate.turnout_track import TurnoutTrack
+    from turnout.simulate.vehicle import Vehicle
 
 # (vehicle, name in the train data, lowest and highest speed [km/h], share of the traffic)
 TRAFFIC = (
@@ -29,9 +42,35 @@ DIVERGING_SHARE, DIVERGING_SPEED = 0.2, 60.0
 NEIGHBOUR_GAIN = 0.02
 NOISE, LIMIT = 0.3, 5_000.0
 
+# raw folder, scenario, section -> (position [m], track), vehicle, truth, seed
+PassageJob: TypeAlias = "tuple[str, TurnoutScenario, dict[str, tuple[float, str]], str, dict[str, Any], list[int]]"
 
-def make_passages(raw, scenario, turnout, seed, n_passage, last_day):
-    """Jobs for ``make_passage``, one per train of the weeks before ``last_day``; writes trains.csv of the turnout."""
+
+def make_passages(
+    raw: Path | str, scenario: TurnoutScenario, turnout: TurnoutConfig, seed: int, n_passage: int, last_day: date
+) -> list[PassageJob]:
+    """Choose the trains of the weeks before a day, and write trains.csv of the turnout.
+
+    Parameters
+    ----------
+    raw : path
+        Raw root.
+    scenario : TurnoutScenario
+        Changes of the turnout over time.
+    turnout : TurnoutConfig
+        Its sections and sensors.
+    seed : int
+        The same seed gives the same trains.
+    n_passage : int
+        Number of trains.
+    last_day : date
+        Day of the last train.
+
+    Returns
+    -------
+    list of tuple
+        A job for ``make_passage`` per train.
+    """
     rng = np.random.default_rng([seed, 77, crc32(scenario.turnout.encode())])
     positions = {s.label: (s.position, s.track) for s in turnout.sections}
     jobs, listed = [], []
@@ -62,8 +101,19 @@ def make_passages(raw, scenario, turnout, seed, n_passage, last_day):
     return jobs
 
 
-def make_passage(job):
-    """Simulate one passage and write its file; returns its truth."""
+def make_passage(job: PassageJob) -> dict[str, Any]:
+    """Simulate one passage and write its file.
+
+    Parameters
+    ----------
+    job : tuple
+        From ``make_passages``.
+
+    Returns
+    -------
+    dict
+        Truth of the passage: train, speed, load, route, direction, temperature, file.
+    """
     raw, scenario, positions, vehicle, truth, seed = job
     moment = datetime.fromisoformat(truth["started_at_utc"])
     track = _track_of(scenario, moment.date(), round(truth["rail_temperature_c"]))
@@ -90,15 +140,15 @@ def make_passage(job):
         single=True,
     )
     loads = recording.conditions["axle_loads"]
-    return truth | {"file": name, "n_axles": len(loads), "axle_load_t": float(np.mean(loads)) / 9.81e3}
+    return truth | {"file": name, "n_axles": len(loads), "axle_load_t": float(np.mean(loads)) / (1e3 * GRAVITY)}
 
 
-def _sensor(label, position, side, route):
+def _sensor(label: str, position: float, side: str, route: str) -> Sensor:
     gain = 1.0 if side in ("both", route) else NEIGHBOUR_GAIN
     return Sensor(label, position, "rail web", gain=gain, noise=NOISE, limit=LIMIT, resolution=LIMIT / 2**15)
 
 
-def _terms_of(scenario, turnout, route, day):
+def _terms_of(scenario: TurnoutScenario, turnout: TurnoutTrack, route: str, day: date) -> tuple[HangingSleeper, ...]:
     """Terms of the hanging sleepers of that day on ``route``."""
     track, terms = turnout.track_of(route), []
     for section in sorted({g.section for g in scenario.gaps}):
@@ -110,16 +160,16 @@ def _terms_of(scenario, turnout, route, day):
 
 
 @lru_cache(maxsize=32)
-def _vehicle(name, load):
+def _vehicle(name: str, load: float) -> Vehicle:
     return load_vehicle(name, load)
 
 
 @lru_cache(maxsize=4)
-def _track_of(scenario, day, temperature):
+def _track_of(scenario: TurnoutScenario, day: date, temperature: float) -> TurnoutTrack:
     """The turnout with the stiffness of every section on that day, on both routes."""
     turnout = load_track("tommerup")
 
-    def scale_stiffness(track):
+    def scale_stiffness(track: Track) -> Track:
         factors = np.array([stiffness_factors(scenario, section, day, temperature) for section in track.section])
         ballast, pad = factors.T * scenario.stiffness
         return track.with_(ballast_stiffness=ballast * track.ballast_stiffness, pad_stiffness=pad * track.pad_stiffness)

@@ -1,8 +1,11 @@
 """Compare the published modes of recordings by others with the modes identified here."""
 
+from __future__ import annotations
+
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -13,6 +16,11 @@ from turnout.modal.frf import modes_of_frf
 from turnout.readers.uff import read_frf
 from turnout.readers.uff_datasets import read_datasets
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from turnout.modal.frf import FrfMode
+
 # (frequency [Hz], damping [%]) of the seven modes in the makers' own showcase.
 SDYPY_BEAM = (
     (177.0, 0.86), (477.4, 0.20), (933.1, 0.15), (1535.5, 0.20), (2286.9, 0.28), (3162.4, 0.18), (4181.2, 0.15),
@@ -21,6 +29,10 @@ SDYPY_BEAM = (
 UFF_BEAM = tuple((f, None) for f in (52.6, 144.6, 283.1, 468.3, 698.5, 973.0, 1293.0))
 FUNCTIONS = {0: "general functions", 1: "time responses", 2: "auto-spectra", 4: "frequency responses", 6: "coherences"}
 HITS = {0: "overloaded on purpose", 1: "good", 2: "double impact", 3: "good", 4: "good"}
+
+
+PublishedMode: TypeAlias = tuple[float, float | None]  # frequency [Hz], damping [%]
+ModeRow: TypeAlias = "tuple[float | None, float | None, FrfMode | None]"
 
 
 @dataclass(frozen=True)
@@ -35,11 +47,27 @@ class Beam:
     frequency: np.ndarray
     responses: np.ndarray
     highest: float
-    rows: tuple
+    rows: tuple[ModeRow, ...]
 
 
-def beam_modes(raw):
-    """The beams of the two files of frequency responses below ``raw``, with published and identified modes."""
+def beam_modes(raw: Path | str) -> Iterator[Beam]:
+    """Modes of the two beams whose frequency responses lie below ``raw``, published and identified.
+
+    Parameters
+    ----------
+    raw : path
+        Raw root with the files of ``turnout.demo.others``.
+
+    Returns
+    -------
+    iterator of Beam
+        One per file.
+
+    Raises
+    ------
+    TurnoutError
+        If a file is not the published one.
+    """
     path = Path(raw) / SDYPY_FILE
     if sha256_of(path) != SDYPY_SHA256:
         # it is a pickle, and a pickle of unknown origin can run any code
@@ -51,12 +79,21 @@ def beam_modes(raw):
     yield _beam("beam.uff of pyuff 2.4.2", "peaks read off its curves", uff.frequency, uff.frf, UFF_BEAM, 1400.0)
 
 
-def _beam(name, origin, frequency, responses, published, highest):
+def _beam(
+    name: str,
+    origin: str,
+    frequency: np.ndarray,
+    responses: np.ndarray,
+    published: Iterable[PublishedMode],
+    highest: float,
+) -> Beam:
     rows = _rows(frequency, responses, published, highest)
     return Beam(name, origin, frequency, np.atleast_2d(responses), highest, tuple(rows))
 
 
-def _rows(frequency, responses, published, highest):
+def _rows(
+    frequency: np.ndarray, responses: np.ndarray, published: Iterable[PublishedMode], highest: float
+) -> list[ModeRow]:
     """Every published mode with the nearest identified mode, then the identified modes that are not published."""
     modes = list(modes_of_frf(frequency, responses, highest=highest).modes)
     rows = []
@@ -70,8 +107,19 @@ def _rows(frequency, responses, published, highest):
     return rows + [(None, None, mode) for mode in modes]
 
 
-def uff_contents(path):
-    """Content of a vendor's UFF file in words: sets by type, lengths, damage."""
+def uff_contents(path: Path | str) -> str:
+    """Content of a vendor's UFF file in words.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+
+    Returns
+    -------
+    str
+        Data sets by type, their lengths, damage.
+    """
     sets = [s for s in read_datasets(Path(path).read_bytes()) if s.dataset_type in ("58", "58b")]
     damaged = [s.damage for s in sets if s.damage]
     set_names = [

@@ -3,10 +3,18 @@
 Each fault is a function that puts it into a recording or a file.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from datetime import date, timedelta
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from turnout.records import Recording
 
 MILLIMETRE = 1e-3
 SECTIONS = ("OT", "SP", "CLP", "A7", "A8", "A9", "ASM", "ASD")
@@ -29,8 +37,19 @@ class Change:
     event: str = ""
     until: date | None = None
 
-    def factor(self, day):
-        """Factor of the stiffness on ``day``."""
+    def factor(self, day: date) -> float:
+        """Factor of the stiffness on a day.
+
+        Parameters
+        ----------
+        day : date
+            The day.
+
+        Returns
+        -------
+        float
+            1 before ``since`` and from ``until`` on. [-]
+        """
         if day < self.since or (self.until is not None and day >= self.until):
             return 1.0
         years = (day - self.since).days / 365.25
@@ -46,9 +65,21 @@ class Gap:
     gap: float
     per_year: float
 
-    def size_on(self, day):
-        """Gap [m] on ``day``.
+    def size_on(self, day: date) -> float:
+        """Gap on a day.
 
+        Parameters
+        ----------
+        day : date
+            The day.
+
+        Returns
+        -------
+        float
+            0 before ``since``. [m]
+
+        Examples
+        --------
         >>> Gap("A7", date(2025, 1, 1), 0.4e-3, 1.0e-3).size_on(date(2024, 1, 1))
         0.0
         """
@@ -90,9 +121,23 @@ FLEET = (
 )
 
 
-def campaign_days(n_campaign, weeks_between=6.5):
+def campaign_days(n_campaign: int, weeks_between: float = 6.5) -> list[date]:
     """Days of the campaigns: every few weeks with random shifts, the same for the same number.
 
+    Parameters
+    ----------
+    n_campaign : int
+        Number of campaigns.
+    weeks_between : float
+        Mean distance of two campaigns. [weeks]
+
+    Returns
+    -------
+    list of date
+        In order.
+
+    Examples
+    --------
     >>> campaign_days(3, weeks_between=6)[0].isoformat()
     '2023-09-12'
     """
@@ -101,22 +146,66 @@ def campaign_days(n_campaign, weeks_between=6.5):
     return [FIRST_CAMPAIGN + timedelta(weeks=weeks_between * k) + timedelta(days=int(s)) for k, s in enumerate(shifts)]
 
 
-def rail_temperature(day, rng):
-    """Rail temperature [°C] at the time of the test: season in Denmark and random weather."""
+def rail_temperature(day: date, rng: np.random.Generator) -> float:
+    """Rail temperature at the time of the test: season in Denmark and random weather.
+
+    Parameters
+    ----------
+    day : date
+        Day of the test.
+    rng : numpy.random.Generator
+        Source of the weather.
+
+    Returns
+    -------
+    float
+        Temperature. [°C]
+    """
     season = np.sin(2 * np.pi * (day.timetuple().tm_yday - 110) / 365.25)
     return float(11.0 + 11.0 * season + rng.normal(0.0, 4.0))
 
 
-def gap_under(scenario, section, day):
-    """Gap [m] under the sleeper of a section's sensor, 0 if it lies on its ballast."""
+def gap_under(scenario: TurnoutScenario, section: str, day: date) -> float:
+    """Gap under the sleeper of a section's sensor.
+
+    Parameters
+    ----------
+    scenario : TurnoutScenario
+        The turnout.
+    section : str
+        Label of the section.
+    day : date
+        The day.
+
+    Returns
+    -------
+    float
+        0 if the sleeper lies on its ballast. [m]
+    """
     return max((g.size_on(day) for g in scenario.gaps if g.section == section), default=0.0)
 
 
-def stiffness_factors(scenario, section, day, temperature):
-    """(ballast, railpad) stiffness relative to the reference section at 15 °C.
+def stiffness_factors(scenario: TurnoutScenario, section: str, day: date, temperature: float) -> tuple[float, float]:
+    """Stiffness of ballast and railpad relative to the reference section at 15 °C.
 
     The pad softens by 0.3 % per kelvin (static stiffness of EPDM pads falls by up to half between -20 and
     60 °C, Othman et al. 2022); frozen ballast stiffens by up to 6 % below 0 °C.
+
+    Parameters
+    ----------
+    scenario : TurnoutScenario
+        The turnout.
+    section : str
+        Label of the section.
+    day : date
+        The day.
+    temperature : float
+        Rail temperature. [°C]
+
+    Returns
+    -------
+    (float, float)
+        Factors of ballast and railpad. [-]
     """
     ballast, railpad = 1.0 - 0.004 * min(0.0, max(temperature, -15.0)), 1.0 - 0.003 * (temperature - 15.0)
     for change in scenario.changes:
@@ -128,37 +217,91 @@ def stiffness_factors(scenario, section, day, temperature):
     return ballast, railpad
 
 
-def dead_channel(recording):
-    """The accelerometer's cable is off: zeros."""
+def dead_channel(recording: Recording) -> Recording:
+    """The accelerometer's cable is off.
+
+    Parameters
+    ----------
+    recording : Recording
+        Channel 0 is the force, channel 1 the acceleration.
+
+    Returns
+    -------
+    Recording
+        The same with zeros in channel 1.
+    """
     samples = recording.samples.copy()
     samples[1] = 0.0
     return replace(recording, samples=samples)
 
 
-def swapped_sign(recording):
-    """The hammer's charge amplifier is connected the wrong way round."""
+def swapped_sign(recording: Recording) -> Recording:
+    """The hammer's charge amplifier is connected the wrong way round.
+
+    Parameters
+    ----------
+    recording : Recording
+        Channel 0 is the force, channel 1 the acceleration.
+
+    Returns
+    -------
+    Recording
+        The same with the force reversed.
+    """
     samples = recording.samples.copy()
     samples[0] = -samples[0]
     return replace(recording, samples=samples)
 
 
-def overload(recording, share=0.6):
-    """Range set too low: the acceleration is clipped at ``share`` of its peak."""
+def overload(recording: Recording, share: float = 0.6) -> Recording:
+    """The range was set too low: the acceleration is clipped.
+
+    Parameters
+    ----------
+    recording : Recording
+        Channel 0 is the force, channel 1 the acceleration.
+    share : float
+        Limit over the peak. [-]
+
+    Returns
+    -------
+    Recording
+        The same with channel 1 clipped.
+    """
     samples = recording.samples.copy()
     limit = share * np.max(np.abs(samples[1]))
     samples[1] = np.clip(samples[1], -limit, limit)
     return replace(recording, samples=samples)
 
 
-def not_a_number(recording):
-    """A logger that lost its converter for a moment."""
+def not_a_number(recording: Recording) -> Recording:
+    """A logger that lost its converter for a moment.
+
+    Parameters
+    ----------
+    recording : Recording
+        Channel 0 is the force, channel 1 the acceleration.
+
+    Returns
+    -------
+    Recording
+        The same with five samples of channel 1 that are no numbers.
+    """
     samples = recording.samples.copy()
     samples[1, samples.shape[1] // 3 : samples.shape[1] // 3 + 5] = np.nan
     return replace(recording, samples=samples)
 
 
-def cut_off(path, share=0.55):
-    """An interrupted copy: only the first ``share`` of the file's bytes."""
+def cut_off(path: Path, share: float = 0.55) -> None:
+    """An interrupted copy: only the first part of the file is left.
+
+    Parameters
+    ----------
+    path : Path
+        The file, which is changed.
+    share : float
+        Share of its bytes that stays. [-]
+    """
     size = path.stat().st_size
     with open(path, "r+b") as file:
         file.truncate(int(share * size))

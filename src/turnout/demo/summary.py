@@ -1,10 +1,16 @@
 """Print the results of a run in a few lines, and queries to try next."""
 
+from __future__ import annotations
+
 import os
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from turnout.registry.database import open_registry
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 QUESTIONS = (
     (
@@ -31,8 +37,18 @@ QUARANTINE_QUERY = """
 WORKLIST_QUERY = "select coalesce(section_id, turnout_id), band, state, sentence from worklist order by rank limit 5"
 
 
-def print_summary(registry, pages, say=print):
-    """Print counts, quarantine, tomorrow's list, the folder of the pages, and three queries to try."""
+def print_summary(registry: Path | str, pages: Path | str, say: Callable[[str], object] = print) -> None:
+    """Print counts, quarantine, tomorrow's list, the folder of the pages, and three queries to try.
+
+    Parameters
+    ----------
+    registry : path
+        Folder of the registry.
+    pages : path
+        Folder of the pages.
+    say : callable
+        Called with each line of text.
+    """
     with open_registry(registry) as connection:
         counts = dict(zip((d[0] for d in connection.execute(COUNTS_QUERY).description), connection.fetchall()[0]))
         say(
@@ -52,7 +68,7 @@ def print_summary(registry, pages, say=print):
         say(f'\n   {question}\n      {_command()} query "{sql}"')
 
 
-def _command():
+def _command() -> str:
     """Command of this program: its name if it is on the path, else its file."""
     program = Path(sys.executable).parent / "turnout"
     on_path = str(program.parent) in os.environ.get("PATH", "").split(os.pathsep)
