@@ -27,7 +27,7 @@ class TableError(Exception):
         What to write instead.
     """
 
-    def __init__(self, place: Place, problem: str, remedy: str):
+    def __init__(self, place: Place, problem: str, remedy: str) -> None:
         super().__init__(problem)
         self.place, self.problem, self.remedy = place, problem, remedy
         self.error = place.error(problem, remedy)

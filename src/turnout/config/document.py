@@ -141,7 +141,7 @@ class Branch(dict):
         Where the mapping starts.
     """
 
-    def __init__(self, place: Place):
+    def __init__(self, place: Place) -> None:
         super().__init__()
         self.place = place
         self.key_places: dict[str | int | None, Place] = {}
@@ -187,7 +187,7 @@ def compose(path: Path) -> tuple[AnyNode | None, BaseConstructor]:
 
     Returns
     -------
-    tuple of (AnyNode or None, BaseConstructor)
+    tuple of (Node or None, BaseConstructor)
         Root node, None for an empty file; constructor of values from nodes.
 
     Raises
@@ -237,7 +237,7 @@ def place_of_node(node: AnyNode, path: str) -> Place:
 
     Parameters
     ----------
-    node : AnyNode
+    node : Node
         Node of the file.
     path : str
         What errors call the file.
@@ -361,7 +361,7 @@ class Frozen(Mapping):
 
     __slots__ = ("_values",)
 
-    def __init__(self, values: Mapping | Iterable[tuple[Any, Any]] = ()):
+    def __init__(self, values: Mapping | Iterable[tuple[Any, Any]] = ()) -> None:
         self._values = dict(values)
 
     def __getitem__(self, name: Any) -> Any:

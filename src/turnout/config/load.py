@@ -257,7 +257,7 @@ def errors_of_unused_layouts(
 class _ConfigurationReader:
     """Reads the files of the configuration and collects all errors."""
 
-    def __init__(self, folder: Path, formats: Collection[str] | None, to_si: ToSi | None):
+    def __init__(self, folder: Path, formats: Collection[str] | None, to_si: ToSi | None) -> None:
         self.folder, self.formats, self.to_si = folder, formats, to_si
         self.errors: list[ConfigError] = []
         self.layouts: dict[str, Branch | None] = {}

@@ -56,7 +56,7 @@ class ParameterSet(Branch):
     (1500.0, 2.5)
     """
 
-    def __init__(self, place: Place, values: Mapping | None = None, key_places: Mapping | None = None):
+    def __init__(self, place: Place, values: Mapping | None = None, key_places: Mapping | None = None) -> None:
         super().__init__(place)
         self.update(values or {})
         self.key_places.update(key_places or {})
@@ -306,7 +306,7 @@ class Entries(list):
         Where each entry stands.
     """
 
-    def __init__(self, values: Iterable = (), places: Iterable[Place] = ()):
+    def __init__(self, values: Iterable = (), places: Iterable[Place] = ()) -> None:
         super().__init__(values)
         self.places = tuple(places)
 
@@ -371,7 +371,7 @@ def read_content(path: Path) -> tuple[Any, AnyNode | None]:
 
     Returns
     -------
-    tuple of (any, AnyNode or None)
+    tuple of (any, Node or None)
         Dictionaries, lists and values; root node. Merge keys are resolved in both.
 
     Raises

@@ -95,7 +95,7 @@ class LazyMatrix:
 
         Returns
         -------
-        Take
+        callable
             Reads the samples of this row from one index up to another.
         """
         return lambda start, stop: self.block(start, stop)[k]
@@ -126,7 +126,7 @@ class LazyColumn:
 
     Parameters
     ----------
-    take : Take
+    take : callable
         ``take(start, stop)`` reads the samples from ``start`` up to ``stop``.
     n : int
         Number of samples.

@@ -190,7 +190,7 @@ class Metadata:
         Names and values of the group; upper and lower case count as equal, except for "t".
     source : Source
         The raw file.
-    parent : 'Metadata or None'
+    parent : Metadata or None
         Metadata of the group above.
     """
 

@@ -71,7 +71,7 @@ def binary_numbers(data: bytes | mmap, at: int, header: Header) -> tuple[np.ndar
         Bytes of the file.
     at : int
         Byte at which the numbers begin.
-    header : Header
+    header : dict
         Fields of the header, as ``read_datasets`` reads them.
 
     Returns
@@ -110,7 +110,7 @@ def ascii_numbers(data: bytes | mmap, at: int, header: Header) -> tuple[np.ndarr
         Bytes of the file.
     at : int
         Byte at which the numbers begin.
-    header : Header
+    header : dict
         Fields of the header, as ``read_datasets`` reads them.
 
     Returns
@@ -165,7 +165,7 @@ def split_columns(values: np.ndarray, header: Header) -> tuple[np.ndarray, np.nd
     ----------
     values : (n,) array of float
         Numbers as they are stored.
-    header : Header
+    header : dict
         Fields of the header, as ``read_datasets`` reads them.
 
     Returns

@@ -20,7 +20,7 @@ class DamagedBatch(TurnoutError):
         Why it cannot be read.
     """
 
-    def __init__(self, batch: Path, error: Exception):
+    def __init__(self, batch: Path, error: Exception) -> None:
         super().__init__(f"{batch} cannot be read ({error}). The next run computes its units again.")
         self.batch = batch
 

@@ -224,7 +224,7 @@ def moved_units(units: Units, wanted: Collection[str]) -> list[str]:
 
     Parameters
     ----------
-    units : Units
+    units : mapping of str to UnitState
         Unit -> state, of one shard.
     wanted : collection of str
         Units that are planned now.

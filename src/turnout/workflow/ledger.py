@@ -24,7 +24,7 @@ class Ledger:
         Settings of the checkpoints.
     """
 
-    def __init__(self, path: Path, limits: FleetSettings):
+    def __init__(self, path: Path, limits: FleetSettings) -> None:
         self.path, self.folder, self.limits = path, batch_folder(path), limits
         self.state = load_state(path)
         self._drop_damaged()

@@ -33,7 +33,7 @@ class RawFolder:
         Folder of the turnout below it.
     """
 
-    def __init__(self, raw_root: Path, raw: str):
+    def __init__(self, raw_root: Path, raw: str) -> None:
         self.root, self.raw = os.path.realpath(raw_root), raw
         self.files: list[tuple[str, os.DirEntry]] = []
         self.problems: list[ReadError] = []

@@ -49,7 +49,7 @@ class Progress:
         Where to write; None: standard error.
     """
 
-    def __init__(self, name: str, total: int, stream: TextIO | None = None):
+    def __init__(self, name: str, total: int, stream: TextIO | None = None) -> None:
         self.name, self.total, self.n_done, self.quarantined = name, total, 0, 0
         self.stream = stream or sys.stderr
         self.next_line = time.monotonic() + LOG_INTERVAL
@@ -163,7 +163,7 @@ class _Run:
         threads: int,
         strict: bool,
         launched: datetime | None,
-    ):
+    ) -> None:
         self.path, self.name = path, f"{stage.kind} {path.stem}"
         self.stage, self.raw_root = stage, raw_root
         self.threads, self.strict, self.launched = threads, strict, launched.isoformat() if launched else ""

@@ -168,7 +168,7 @@ def with_token(planned: PlannedUnit, token: Token) -> PlannedUnit:
     ----------
     planned : PlannedUnit
         The unit with its notes.
-    token : Token
+    token : str or callable
         Text, or function of the unit that returns text.
 
     Returns
@@ -205,7 +205,7 @@ class Tasks:
         The raw root.
     """
 
-    def __init__(self, state: State, stage: Stage, configuration: Configuration, raw_root: Path):
+    def __init__(self, state: State, stage: Stage, configuration: Configuration, raw_root: Path) -> None:
         self.state, self.stage, self.configuration, self.raw_root = state, stage, configuration, raw_root
         self._contexts: dict[str, tuple[Token, Any]] = {}
         self._turnouts: dict[str, TurnoutConfig | None] = {}
