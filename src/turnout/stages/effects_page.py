@@ -3,6 +3,8 @@
 Run ``python -m turnout.stages.effects_page docs`` to update it; a test compares.
 """
 
+from __future__ import annotations
+
 import sys
 from importlib import import_module
 from pathlib import Path
@@ -34,7 +36,7 @@ def page() -> str:
     return PAGE_HEAD + rows + PAGE_FOOT.format(", ".join(name[0].lower() + name[1:] for name in names))
 
 
-def _row(effect) -> str:
+def _row(effect: type[physics.PhysicsTerm]) -> str:
     numbers = "; ".join(f"{p.meaning} [{p.unit}]" for p in effect.parameters)
     size = effect.smallest_reportable
     smallest = number_in_words(size, effect.parameters[0].unit) if size else "–"
@@ -42,7 +44,7 @@ def _row(effect) -> str:
     return "| " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |\n"
 
 
-def _effect_name(effect) -> str:
+def _effect_name(effect: type[physics.PhysicsTerm]) -> str:
     """First sentence of the module docstring of the effect."""
     return (import_module(effect.__module__).__doc__ or "").strip().splitlines()[0].split(": ")[0].removesuffix(".")
 

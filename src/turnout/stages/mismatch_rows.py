@@ -1,7 +1,11 @@
 """Registry rows of a diagnosis: the finding with its sentence and recommendation, its parameters and curves."""
 
+from __future__ import annotations
+
 import json
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +22,16 @@ from turnout.stages.mismatch_curves import (
 )
 from turnout.stages.mismatch_text import headline, interval, surface_sentence
 
+if TYPE_CHECKING:
+    from turnout.mismatch.engine.candidate import Candidate
+    from turnout.mismatch.engine.diagnose import Diagnosis
+    from turnout.mismatch.engine.localization import Location
+    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.verdict import Verdict
+    from turnout.mismatch.turnout.campaign import CampaignInput
+    from turnout.mismatch.turnout.case import TrackCase
+    from turnout.stages.mismatch_groups import Group
+
 MAX_CELL_DISTANCE = 0.3  # m: a cell of the residual closer than this is at the finding
 FALSE_DISCOVERY_RATE = 0.05  # expected share of false ones among the frames reported
 SUPPORT_SPACING = 0.6  # m between supports
@@ -25,7 +39,7 @@ GENERAL_CHECK = "Look at the place; repeat the measurement after the work"
 GENERAL_TEST = "hammer tests at the points between, and a train of another load and speed"
 
 
-def sentence(diagnosis):
+def sentence(diagnosis: Diagnosis) -> str:
     """The verdict as sentences for a track engineer."""
     verdict = diagnosis.verdict
     if verdict.answer == "none":
@@ -44,7 +58,7 @@ def sentence(diagnosis):
     )
 
 
-def location_text(diagnosis):
+def location_text(diagnosis: Diagnosis) -> str:
     """Location of the missing effect in words, else the frames in which the residual is concentrated."""
     if diagnosis.where is not None:
         return str(diagnosis.where)
@@ -54,7 +68,7 @@ def location_text(diagnosis):
     return ", ".join(f"at {f.frame} {f.level} ({f.effect:+.1f} dB, q = {f.q:.3f})" for f in frames[:2])
 
 
-def recommendation(diagnosis):
+def recommendation(diagnosis: Diagnosis) -> str:
     """What to check on site, or which measurement would decide."""
     verdict, effects = diagnosis.verdict, physics.effects_by_name()
     if verdict.answer == "named":
@@ -65,7 +79,7 @@ def recommendation(diagnosis):
     return f"Measure {GENERAL_TEST}" if verdict.answer == "unknown" else ""
 
 
-def finding_row(diagnosis, identity):
+def finding_row(diagnosis: Diagnosis, identity: Mapping[str, Any]) -> dict[str, Any]:
     """Row of ``mismatch_findings``; ``identity`` holds finding_id, turnout_id, section_id, found_at_utc, result_id."""
     verdict, check = diagnosis.verdict, diagnosis.verification
     term = next(iter(diagnosis.fit.candidates), None) if verdict.answer in ("named", "a_or_b") else None
@@ -98,24 +112,26 @@ def finding_row(diagnosis, identity):
     }
 
 
-def train_text(where):
+def train_text(where: Mapping[str, Any]) -> str | None:
     """Train and axle of a location in words, None without a train."""
     if not where.get("train"):
         return None
     return f"{where['train']}, axle {where['axle']}" if where.get("axle") else where["train"]
 
 
-def location_fields(location):
+def location_fields(location: Location | None) -> dict[str, Any]:
     """Frame, position with standard error, sensor, train and axle of the location of a residual, {} of None."""
     if location is None:
         return {}
-    columns = {"frame": location.frame, "sensor": location.sensor, "train": location.train, "axle": location.axle}
+    columns: dict[str, Any] = {"frame": location.frame, "sensor": location.sensor}
+    columns |= {"train": location.train, "axle": location.axle}
     if location.place is not None:  # an interval of 95 %, not below half a bay
+        assert location.low is not None and location.high is not None
         columns |= {"place": location.place, "place_se": max(location.high - location.low, SUPPORT_SPACING) / 4.0}
     return columns
 
 
-def fitted_parameters(diagnosis):
+def fitted_parameters(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """Name, value, standard error and unit of each fitted parameter."""
     fitted = [(c, p) for c in diagnosis.fit.candidates for p in c.parameters]
     values = zip(fitted, diagnosis.fit.psi, diagnosis.fit.psi_se)
@@ -125,17 +141,17 @@ def fitted_parameters(diagnosis):
     ]
 
 
-def _position(diagnosis, term, where):
+def _position(diagnosis: Diagnosis, term: Candidate | None, where: Mapping[str, Any]) -> dict[str, Any]:
     """Position [m] and its standard error; a fitted ``shift`` from the scanned position is added."""
     position, se = where.get("place"), where.get("place_se")
     names = [p.name for p in term.parameters] if term else []
-    if position is not None and "shift" in names:
+    if term is not None and position is not None and "shift" in names:
         k = diagnosis.fit.part(term).start + names.index("shift")
         position, se = round(float(position + diagnosis.fit.psi[k]), 3), float(f"{diagnosis.fit.psi_se[k]:.3g}")
     return {"position_m": position, "position_se_m": se}
 
 
-def _is_at_finding(level, where):
+def _is_at_finding(level: Any, where: Mapping[str, Any]) -> bool:
     """Whether the level of a frame is at the finding; True for a finding without position, sensor and train.
 
     >>> [_is_at_finding("12.0", {"place": position}) for position in (12.2, 18.0)]
@@ -152,14 +168,16 @@ def _is_at_finding(level, where):
     return str(level) in names or not any(names)
 
 
-def _finite(value):
+def _finite(value: float | None) -> float | None:
     return None if value is None or value != value else round(float(value), 2)
 
 
 MAX_NOTES = 12
 
 
-def finding_tables(diagnosis, case, group, about) -> dict[str, list[dict]]:
+def finding_tables(
+    diagnosis: Diagnosis, case: TrackCase, group: Group, about: Mapping[str, Any]
+) -> dict[str, list[dict]]:
     """Rows by table of one group's diagnosis; ``about`` holds turnout, visit, identity (content id), notes."""
     identity = _identity(group, about, case)
     comparison = (
@@ -183,7 +201,7 @@ def finding_tables(diagnosis, case, group, about) -> dict[str, list[dict]]:
     }
 
 
-def _identity(group, about, case):
+def _identity(group: Group, about: Mapping[str, Any], case: TrackCase) -> dict[str, Any]:
     turnout = about["turnout"]
     section_id = turnout.section_id(group.labels[0]) if len(group.labels) == 1 else None
     return {
@@ -194,7 +212,7 @@ def _identity(group, about, case):
     }
 
 
-def _newest(campaign, about) -> datetime:
+def _newest(campaign: CampaignInput, about: Mapping[str, Any]) -> datetime:
     """Time of the newest recording, else of the visit."""
     recordings = [r for t in campaign.hammer for r in t.recordings] + [p.recording for p in campaign.passages]
     times = [r.started_at for r in recordings if r.started_at]
@@ -204,7 +222,7 @@ def _newest(campaign, about) -> datetime:
     return datetime.fromisoformat(visit if len(visit) > 7 else f"{visit}-01")
 
 
-def _summary_columns(diagnosis, case, group, about) -> dict:
+def _summary_columns(diagnosis: Diagnosis, case: TrackCase, group: Group, about: Mapping[str, Any]) -> dict:
     campaign, fit = group.campaign, diagnosis.fit
     positions = [s.place for s in campaign.sensors] + [t.place for t in campaign.hammer]
     terms = [
@@ -228,19 +246,19 @@ def _summary_columns(diagnosis, case, group, about) -> dict:
     }
 
 
-def _first_notes(notes):
+def _first_notes(notes: Sequence[str]) -> list[str]:
     """The first ``MAX_NOTES`` notes and the number of others."""
     more = len(notes) - MAX_NOTES
     return [*notes[:MAX_NOTES], *([f"and {more} more"] if more > 0 else [])]
 
 
-def _visit_notes(about, campaign):
+def _visit_notes(about: Mapping[str, Any], campaign: CampaignInput) -> list[str]:
     """Notes of the visit as texts, those on passages of other groups last."""
     names = {None, *(p.name for p in campaign.passages)}
     return [str(note) for note in sorted(about["notes"], key=lambda note: note.passage not in names)]
 
 
-def _errors_by_candidate(fit):
+def _errors_by_candidate(fit: Fit) -> Iterator[np.ndarray]:
     """Standard errors of each candidate's parameters."""
     first, se = 0, fit.psi_se
     for candidate in fit.candidates:
@@ -248,13 +266,13 @@ def _errors_by_candidate(fit):
         first += len(candidate.parameters)
 
 
-def _term_evidence(verdict) -> dict:
+def _term_evidence(verdict: Verdict) -> dict:
     """Probability of a term, and the other effect of an "a_or_b" verdict."""
     alternative = {"or": verdict.names[1]} if len(verdict.names) > 1 else {}
     return {"probability": _plain(verdict.probability), **alternative}
 
 
-def _evidence(diagnosis) -> dict:
+def _evidence(diagnosis: Diagnosis) -> dict:
     """Frames, and the evidence of each verdict: of the first effect, and of further ones under ``beside``."""
     frames = [
         {"frame": f.frame, "level": str(f.level), "effect_db": _plain(f.effect), "q": _plain(f.q), "n": f.n}
@@ -264,7 +282,7 @@ def _evidence(diagnosis) -> dict:
     return {"frames": frames, **first, "beside": further}
 
 
-def _verdict_evidence(verdict) -> dict:
+def _verdict_evidence(verdict: Verdict) -> dict:
     """Probabilities, ranking of rivals, and evidence [nats] by condition."""
     top_scores = verdict.scores[:4]
     return {
@@ -277,15 +295,15 @@ def _verdict_evidence(verdict) -> dict:
     }
 
 
-def _largest(posterior):
+def _largest(posterior: Mapping[str, float]) -> list[tuple[str, float]]:
     return sorted(posterior.items(), key=lambda item: -item[1])[:6]
 
 
-def _plain(value):
+def _plain(value: float) -> float | None:
     return float(f"{value:.5g}") if np.isfinite(value) else None
 
 
-def parameter_rows(diagnosis, case, row) -> list[dict]:
+def parameter_rows(diagnosis: Diagnosis, case: TrackCase, row: Mapping[str, Any]) -> list[dict]:
     """Rows of ``mismatch_parameters``.
 
     They hold the new terms, and the present estimates of the track file: accepted effects and uncertain numbers of the
@@ -307,27 +325,36 @@ def parameter_rows(diagnosis, case, row) -> list[dict]:
     return [{**base, "parameter_no": k, **r} for k, r in enumerate(rows)]
 
 
-def surface_estimates(case, fit) -> list[dict]:
+def surface_estimates(case: TrackCase, fit: Fit) -> list[dict]:
     """Estimates of uncertain numbers of the running surface in the track's file."""
     surface = case.predictor.site.surface
     return list(surface.estimate(case, fit)) if surface else []
 
 
-def _mean_position(fixed):
+def _mean_position(fixed: Mapping[str, Any]) -> float | None:
     positions = [fixed[k] for k in ("sleeper", "support", "first", "last", "place") if k in fixed]
     return float(np.mean(positions)) if positions else None
 
 
-def _parameter_row(term, position, channel, name, value, se, unit, accepted):
-    has_error = se is not None and np.isfinite(se)
-    low, high = interval(term, name, float(value), se) if has_error else (None, None)
+def _parameter_row(
+    term: str,
+    position: float | None,
+    channel: str | None,
+    name: str,
+    value: float,
+    se: float | None,
+    unit: str,
+    accepted: bool,
+) -> dict[str, Any]:
+    error = float(se) if se is not None and np.isfinite(se) else None
+    low, high = (None, None) if error is None else interval(term, name, float(value), error)
     return {
         "term": term,
         "position_m": position,
         "channel": channel,
         "parameter": name,
         "value": float(value),
-        "value_se": float(se) if has_error else None,
+        "value_se": error,
         "value_low": low,
         "value_high": high,
         "unit": unit,

@@ -1,6 +1,8 @@
 """Sentences that describe a finding to the person who inspects the track."""
 
 import json
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +15,7 @@ MILLI_UNITS = {"m": "mm", "s": "ms"}
 PERCENT_UNITS = {"1/K": "% per kelvin"}
 
 
-def number_in_words(value, unit, digits=2):
+def number_in_words(value: float, unit: str, digits: int = 2) -> str:
     """A value with its unit, small ones in mm or ms.
 
     >>> number_in_words(0.00112, "m"), number_in_words(1.31, "-"), number_in_words(0.012, "1/K")
@@ -27,7 +29,7 @@ def number_in_words(value, unit, digits=2):
     return text if unit in ("-", "") else f"{text} {unit}"
 
 
-def interval(term, name, value, se) -> tuple[float, float]:
+def interval(term: str, name: str, value: float, se: float) -> tuple[float, float]:
     """95 % interval of a term's parameter; not below 0 if the parameter cannot be negative.
 
     >>> [round(interval(*what, 0.1, 0.1)[0], 3) for what in (("hanging_sleeper", "seated"), ("kink", "depth"))]
@@ -38,7 +40,7 @@ def interval(term, name, value, se) -> tuple[float, float]:
     return float(max(value - Z95_EXACT * se, min(lower_limit, value))), float(value + Z95_EXACT * se)
 
 
-def parameter_in_words(term, name) -> str:
+def parameter_in_words(term: str, name: str) -> str:
     """Name and meaning of a term's parameter; the name only for a term outside the library.
 
     >>> parameter_in_words("hanging_sleeper", "gap"), parameter_in_words("kink", "depth")
@@ -47,7 +49,7 @@ def parameter_in_words(term, name) -> str:
     return ": ".join([name, *(p.meaning for p in _parameters_of(term) if p.name == name)])
 
 
-def _parameters_of(term):
+def _parameters_of(term: str) -> tuple[physics.Parameter, ...]:
     """Parameters of an effect by its name, () for one outside the library."""
     effect = physics.effects_by_name().get(term)
     return effect.parameters if effect else ()
@@ -56,7 +58,7 @@ def _parameters_of(term):
 PARAMETER_NAMES = {"power": "power of the flanks (1 straight, 2 parabolas)", "share": "share before the deepest point"}
 
 
-def headline(finding) -> str:
+def headline(finding: Mapping[str, Any]) -> str:
     """The ``title``, followed by the reason of a named verdict."""
     text, reason = title(finding), json.loads(finding["evidence_json"] or "{}").get("reason")
     if finding["verdict"] != "named" or not reason or not json.loads(finding["term_json"] or "[]"):
@@ -64,7 +66,7 @@ def headline(finding) -> str:
     return f"{text} {reason[:1].upper()}{reason[1:]}."
 
 
-def title(finding) -> str:
+def title(finding: Mapping[str, Any]) -> str:
     """One sentence: the effect that the simulation left out, or the verdict instead."""
     terms = json.loads(finding["term_json"] or "[]")
     if finding["verdict"] in ("named", "a_or_b") and terms:
@@ -78,7 +80,7 @@ def title(finding) -> str:
     return finding["sentence"] or ""
 
 
-def surface_sentence(estimate) -> str:
+def surface_sentence(estimate: Mapping[str, Any]) -> str:
     """A sentence on a number of the running surface that differs from the track's file, "" if it agrees.
 
     >>> depth = {"term": "running_surface_kink", "place": 26.7, "name": "depth", "unit": "m", "filed": 1e-3}
@@ -100,12 +102,12 @@ def surface_sentence(estimate) -> str:
     return f"The {subject} is {value} ({low.removesuffix(' mm')} to {high}), the track file has {filed}."
 
 
-def _rival_text(rival) -> str:
+def _rival_text(rival: str | None) -> str:
     name = (rival or "").replace("_", " ")
     return f", or what was left out is “{name}”: these recordings cannot tell the two apart" if rival else ""
 
 
-def _location_text(finding, low, high):
+def _location_text(finding: Mapping[str, Any], low: float, high: float) -> str:
     """Location of the effect in words, else the range of the measurements."""
     if finding["position_m"] is not None:
         return f"at {finding['position_m']:.1f} m"
@@ -118,7 +120,7 @@ def _location_text(finding, low, high):
     return f"{between} that comes and goes without a wheel" if finding["locked_to"] == "clock" else between
 
 
-def _train_and_axle(finding):
+def _train_and_axle(finding: Mapping[str, Any]) -> tuple[str, int | None]:
     """Name of the train that a finding is fixed to, without the axle that follows in its column, and the axle or None.
 
     >>> _train_and_axle({"train": "IC 2000, axle 3", "axle": 3}), _train_and_axle({"train": "IC 2000", "axle": None})
@@ -128,7 +130,7 @@ def _train_and_axle(finding):
     return (train.removesuffix(f", axle {axle}") if axle else train), axle
 
 
-def _wheel_text(train, axle):
+def _wheel_text(train: str, axle: int | None) -> str:
     """Axle of a train in words.
 
     >>> _wheel_text("IC 2000", 3), _wheel_text("a train", None)
@@ -137,7 +139,7 @@ def _wheel_text(train, axle):
     return f"axle {axle} of {train}" if axle else f"an axle of {train}"
 
 
-def _sentence(term, finding) -> str:
+def _sentence(term: Mapping[str, Any], finding: Mapping[str, Any]) -> str:
     fixed = term["fixed"]
     train, axle = _train_and_axle(finding) if finding["train"] else (fixed.get("train") or "a train", None)
     positions = [fixed[k] for k in ("sleeper", "support", "first", "last", "place") if k in fixed]
@@ -156,7 +158,7 @@ def _sentence(term, finding) -> str:
         return f"{term['term'].replace('_', ' ').capitalize()} at {words['place']}"
 
 
-def _sentence_template(term) -> str:
+def _sentence_template(term: Mapping[str, Any]) -> str:
     effect = physics.effects_by_name()[term["term"]]
     size = term["parameters"].get(effect.parameters[0].name)
     if effect.message_negative and size and size["value"] < 0.0:

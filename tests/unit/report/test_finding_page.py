@@ -45,9 +45,9 @@ def finding(verdict="named", **more):
         "band_high_hz": 88.0, "probability": 0.97, "p_value": None, "fit_before_pct": 41.0, "fit_after_pct": None,
         "fit_rival_pct": None, "fit_decoy_pct": None, "n_held_out": 2, "sentence": "As the engine says it.",
         "next_measurement": "Look under this sleeper", "visit": "2026-07-25", "sections": "A7", "route": "main",
-        "place_low_m": 24.6, "place_high_m": 24.6, "train": None, "axle": None, "wheel_within_m": 0.9, "n_hammer_tests": 1,
-        "n_passages": 6, "n_sensors": 1, "level_before": 3.0, "level_after": 1.1, "term_json": None,
-        "evidence_json": json.dumps(EVIDENCE), "notes": None,
+        "place_low_m": 24.6, "place_high_m": 24.6, "train": None, "axle": None, "wheel_within_m": 0.9,
+        "n_hammer_tests": 1, "n_passages": 6, "n_sensors": 1, "level_before": 3.0, "level_after": 1.1,
+        "term_json": None, "evidence_json": json.dumps(EVIDENCE), "notes": None,
     }  # fmt: skip
     return row | more
 

@@ -170,7 +170,7 @@ def distant_starts(case: TrackCase, fit: Fit) -> list[tuple[Candidate, tuple[flo
     """(candidate, start) of sizes to simulate, for trains whose residual exceeds the control level."""
     level, effects = case.control_level["passage"], physics.effects_by_name()
     sizes = [(c, effects[c.family].distant_starts) for c in case.candidates if c.family in effects]
-    excessive = [(c, s) for c, s in sizes if s and residual_of_train(case, fit, c.where["train"]) > level]
+    excessive = [(c, s) for c, s in sizes if s and residual_of_train(case, fit, str(c.where["train"])) > level]
     return [(c, (size,)) for c, s in excessive for size in s]
 
 

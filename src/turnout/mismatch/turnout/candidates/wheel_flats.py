@@ -102,8 +102,8 @@ def _shifted_copies(rows: np.ndarray, steps: np.ndarray) -> np.ndarray:
 
 def log_likelihood_ratio(deviations: np.ndarray, expected: np.ndarray | float) -> np.ndarray:
     """Log likelihood ratio of ``deviations`` for an impact of ``expected`` deviations against none. [nats]"""
-    noise, blow = (_normal_density(deviations - m, 1.0 + IMPACT_SCATTER * m) for m in (0.0, expected))
-    return np.log((1.0 - OUTLIER_SHARE) * blow + OUTLIER_SHARE * OUTLIER_DENSITY) - np.log(
+    noise, impact = (_normal_density(deviations - m, 1.0 + IMPACT_SCATTER * m) for m in (0.0, expected))
+    return np.log((1.0 - OUTLIER_SHARE) * impact + OUTLIER_SHARE * OUTLIER_DENSITY) - np.log(
         (1.0 - OUTLIER_SHARE) * noise + OUTLIER_SHARE * OUTLIER_DENSITY
     )
 
