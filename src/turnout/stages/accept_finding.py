@@ -1,10 +1,14 @@
 """Write an accepted finding into the turnout's track file, readable, with source, date and interval."""
 
+from __future__ import annotations
+
 import json
 import re
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 from turnout.config import load_configuration
 from turnout.constants import Z95
@@ -12,6 +16,7 @@ from turnout.errors import SimulationError
 from turnout.files import write_text
 from turnout.physics import TERMS, effects_by_name
 from turnout.simulate import load_track
+from turnout.simulate.turnout_track import TurnoutTrack
 from turnout.stages.accepted_effects import SUPPORT_KEYS, accepted_of
 from turnout.stages.mismatch_inputs import track_file
 
@@ -26,11 +31,31 @@ extends: {layout}
 ENTRY_START = re.compile(r"^ *- term:", re.MULTILINE)
 
 
-def accept(finding, config, turnout_id, track=None, anyway=False) -> tuple[Path, str]:
-    """Write the terms of ``finding`` (row of ``mismatch_findings``) into the turnout's own track file.
+def accept(
+    finding: Mapping[str, Any], config: str | Path, turnout_id: str, track: str | None = None, anyway: bool = False
+) -> tuple[Path, str]:
+    """Write the terms of a finding into the turnout's own track file.
 
-    A turnout that shares its layout's file gets a file of its own that extends it. A term that is already there, at
-    the same position, is replaced. Returns the file and a sentence on the change.
+    A turnout that shares its layout's file gets a file of its own that extends it. A term that is already there, at the
+    same position, is replaced.
+
+    Parameters
+    ----------
+    finding : mapping of str to any
+        Row of ``mismatch_findings``.
+    config : str or Path
+        Folder of the configuration.
+    turnout_id : str
+        Turnout of the finding.
+    track : str or None
+        Name or file of the track; None: the turnout's own, else its layout's.
+    anyway : bool
+        Accept a finding of any verdict and grade, as long as it has a term of the track.
+
+    Returns
+    -------
+    tuple of (Path, str)
+        The file and a sentence on the change.
 
     Raises
     ------
@@ -53,7 +78,7 @@ def accept(finding, config, turnout_id, track=None, anyway=False) -> tuple[Path,
     return path, "; ".join(f"{t['term']} ({_values_text(t)})" for t in terms) + " accepted"
 
 
-def _check_acceptable(finding, turnout_id, anyway):
+def _check_acceptable(finding: Mapping[str, Any], turnout_id: str, anyway: bool) -> None:
     prefix = f"{turnout_id}, {finding['sections']}: the verdict is {finding['verdict'].replace('_', ' ')}"
     if not finding["term_json"]:
         raise SimulationError(f"{prefix}; it carries no term that could be accepted.")
@@ -70,13 +95,13 @@ def _check_acceptable(finding, turnout_id, anyway):
         raise SimulationError(f"{prefix}; {ambiguous['term']} may as well be {ambiguous['or']}; --anyway accepts it.")
 
 
-def _is_significant(term):
+def _is_significant(term: Mapping[str, Any]) -> bool:
     """Whether a parameter differs from its neutral value by more than half its 95 % interval."""
     neutral = {p.name: p.neutral for p in effects_by_name()[term["term"]].parameters}
     return any(abs(p["value"] - neutral[name]) > Z95 * p["se"] for name, p in term["parameters"].items())
 
 
-def _write(path, text):
+def _write(path: Path, text: str) -> None:
     """Write the file if a trial copy can be read and all its terms are valid."""
     trial = path.with_name(f".{path.stem}.trial.yaml")
     try:
@@ -95,10 +120,22 @@ def _write(path, text):
     write_text(path, text)
 
 
-def entry_text(term, finding, track) -> str:
+def entry_text(term: Mapping[str, Any], finding: Mapping[str, Any], track: TurnoutTrack) -> str:
     """YAML text of one entry of ``terms``, one number per line.
 
-    The route is included if a route of ``track``, a TurnoutTrack, has its own supports at that position.
+    Parameters
+    ----------
+    term : mapping of str to any
+        One of the terms in ``term_json`` of the finding.
+    finding : mapping of str to any
+        Row of ``mismatch_findings``.
+    track : TurnoutTrack
+        Track of the turnout. The route is included if one of its routes has its own supports at that position.
+
+    Returns
+    -------
+    str
+        The entry, with a line break at its end.
     """
     day = f"{_time(finding['found_at_utc']):%Y-%m-%d}"
     source = f"turnout diagnose, recordings up to {day}, finding {finding['finding_id'][:12]}"
@@ -117,17 +154,17 @@ def entry_text(term, finding, track) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _time(value) -> datetime:
+def _time(value: Any) -> datetime:
     return value if isinstance(value, datetime) else datetime.fromisoformat(str(value))
 
 
-def _fixed_text(name, value, source):
+def _fixed_text(name: str, value: Any, source: str) -> str:
     if name in FIELDS_IN_METRES and isinstance(value, (int, float)):
         return f'{{value: {value:g}, unit: m, source: "{source}"}}'
     return json.dumps(value, ensure_ascii=False)
 
 
-def _parameter_text(p, source, finding):
+def _parameter_text(p: Mapping[str, Any], source: str, finding: Mapping[str, Any]) -> str:
     unit, size = DISPLAY_UNITS.get(p["unit"], ("", 1.0)) if abs(p["value"]) < 0.1 else ("", 1.0)
     unit, value, se = unit or p["unit"], p["value"] / size, p["se"] / size
     text = f'{{value: {value:.4g}, unit: "{unit}", source: "{source}"'
@@ -139,10 +176,24 @@ def _parameter_text(p, source, finding):
 
 
 def with_entry(text: str, entry: str) -> str:
-    """Track file ``text`` with ``entry`` at the end of its ``terms``; it replaces an entry of the same effect.
+    r"""Track file with one more entry in its ``terms``; it replaces an entry of the same effect.
 
-    >>> text = "name: a\\nterms:\\n  - term: hum\\n    sine: 1\\nspacing: 2\\n"
-    >>> print(with_entry(text, "  - term: hum\\n    sine: 3\\n"))
+    Parameters
+    ----------
+    text : str
+        Text of the track file.
+    entry : str
+        Text of the entry, as ``entry_text`` writes it.
+
+    Returns
+    -------
+    str
+        Text of the track file with ``entry`` at the end of its ``terms``.
+
+    Examples
+    --------
+    >>> text = "name: a\nterms:\n  - term: hum\n    sine: 1\nspacing: 2\n"
+    >>> print(with_entry(text, "  - term: hum\n    sine: 3\n"))
     name: a
     terms:
       - term: hum
@@ -163,7 +214,7 @@ def with_entry(text: str, entry: str) -> str:
     return text[: section.start(1)] + block + text[section.end(1) :]
 
 
-def _is_same_effect(first, second) -> bool:
+def _is_same_effect(first: tuple[str, ...], second: tuple[str, ...]) -> bool:
     """Whether two identities are the same effect; an identity without route applies to all routes."""
     return first[1:] == second[1:] and (first[0] == second[0] or not (first[0] and second[0]))
 
@@ -179,7 +230,7 @@ def _identity(entry: str) -> tuple[str, ...]:
     return tuple(values)
 
 
-def _values_text(term):
+def _values_text(term: Mapping[str, Any]) -> str:
     return ", ".join(
         f"{name} {p['value']:.4g} ± {Z95 * p['se']:.2g} {p['unit']}" for name, p in term["parameters"].items()
     )

@@ -1,6 +1,9 @@
 """Calibrate a section of a simulated turnout to hammer tests, or to resonances and dampings."""
 
+from __future__ import annotations
+
 import logging
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +15,11 @@ from turnout.errors import ConfigError, ReadError, SimulationError
 from turnout.hammer_test import find_impacts, receptance_of
 from turnout.modal import identify
 from turnout.readers import read
-from turnout.records import RawChannel, RawDescription, Recording
+from turnout.records import RawChannel, RawDescription, Receptance, Recording
 from turnout.simulate import load_track
-from turnout.simulate.calibration import MeasuredReceptance, calibrate
+from turnout.simulate.calibration import Calibration, MeasuredReceptance, calibrate
 from turnout.simulate.hammer import resolve_location
-from turnout.simulate.modal_calibration import fit_modes
+from turnout.simulate.modal_calibration import ModeFit, fit_modes
 from turnout.simulate.parameters import track_path
 from turnout.stages.mismatch_inputs import track_file
 
@@ -31,18 +34,72 @@ DEFAULT_CHANNELS = RawDescription(
 )
 
 
-def resolve_track(track, turnout_id=None, config="config"):
-    """Track file: of ``track`` if given, else the turnout's own, else Tommerup's; SimulationError if there is none."""
+def resolve_track(track: str | None, turnout_id: str | None = None, config: str | Path = "config") -> Path:
+    """Track file: the one asked for, else the turnout's own, else Tommerup's.
+
+    Parameters
+    ----------
+    track : str or None
+        Name or path of a track file, if one was asked for.
+    turnout_id : str or None
+        Turnout whose configuration applies, if any.
+    config : str or Path
+        Folder of the configuration.
+
+    Returns
+    -------
+    Path
+        Path of the file.
+
+    Raises
+    ------
+    SimulationError
+        There is no such file.
+    """
     if turnout_id is not None:
         return track_file(load_configuration(config).turnout(turnout_id), track)
     return track_path(track or "tommerup")
 
 
-def calibrate_to_files(track_name, section, files, turnout_id=None, config="config", seed=0):
-    """``Calibration`` of ``section`` of a track, by name or file, to the hammer tests in ``files``.
+def calibrate_to_files(
+    track_name: str | Path,
+    section: str,
+    files: Iterable[str | Path],
+    turnout_id: str | None = None,
+    config: str | Path = "config",
+    seed: int = 0,
+) -> Calibration:
+    r"""Calibrate a section of a track to hammer tests.
 
-    The receptance is H1 of all accepted impacts; its random error is that of its coherence,
-    :math:`\\sigma = |H| \\sqrt{(1-\\gamma^2) / 2n\\gamma^2}` (Bendat and Piersol, eq. 9.90), lines 60-800 Hz.
+    The receptance is H1 of all accepted impacts; its random error is that of its coherence, :math:`\sigma = |H|
+    \sqrt{(1-\gamma^2) / 2n\gamma^2}` (Bendat and Piersol, eq. 9.90), lines 60-800 Hz.
+
+    Parameters
+    ----------
+    track_name : str or Path
+        Name of the track, or path of its file.
+    section : str
+        Label of the section.
+    files : iterable of str or Path
+        Raw files of hammer tests at the section.
+    turnout_id : str or None
+        Turnout whose configuration applies, if any.
+    config : str or Path
+        Folder of the configuration.
+    seed : int
+        Seed of the scatter of the track's support values.
+
+    Returns
+    -------
+    Calibration
+        Parameters of the section, with their errors.
+
+    Raises
+    ------
+    SimulationError
+        None of the files can be used, or a channel has too few accepted impacts.
+    ConfigError
+        The turnout has no hammer tests in its layout.
     """
     track = load_track(str(track_name), seed=seed)
     position, _ = resolve_location(track, section)
@@ -65,7 +122,7 @@ def calibrate_to_files(track_name, section, files, turnout_id=None, config="conf
     return calibrate(track, section, measured)
 
 
-def _recordings(files, description):
+def _recordings(files: Iterable[str | Path], description: RawDescription) -> tuple[list[Recording], list[str]]:
     """(recordings of all files, errors of those that cannot be read)."""
     recordings: list[Recording] = []
     rejected: list[str] = []
@@ -80,13 +137,55 @@ def _recordings(files, description):
     return recordings, rejected
 
 
-def calibrate_to_modes(track_name, section, wanted, seed=0, evaluations=14):
-    """``ModeFit`` of ``section`` to the modes ``wanted``: {band: (frequency [Hz], damping ratio)}."""
+def calibrate_to_modes(
+    track_name: str | Path,
+    section: str,
+    wanted: Mapping[str, tuple[float, float]],
+    seed: int = 0,
+    evaluations: int = 14,
+) -> ModeFit:
+    """Calibrate a section of a track to natural frequencies and dampings.
+
+    Parameters
+    ----------
+    track_name : str or Path
+        Name of the track, or path of its file.
+    section : str
+        Label of the section.
+    wanted : mapping of str to tuple of (float, float)
+        Natural frequency [Hz] and damping ratio by band.
+    seed : int
+        Seed of the scatter of the track's support values.
+    evaluations : int
+        Largest number of simulated tests.
+
+    Returns
+    -------
+    ModeFit
+        Parameters of the section, and the modes reached with them.
+    """
     return fit_modes(load_track(str(track_name), seed=seed), section, wanted, identified_modes, evaluations=evaluations)
 
 
-def identified_modes(recordings, force="hammer", response="acc_1"):
-    """Band -> (frequency [Hz], damping ratio) of a hammer test, as the hammer stage identifies them."""
+def identified_modes(
+    recordings: Sequence[Recording], force: str = "hammer", response: str = "acc_1"
+) -> dict[str, tuple[float, float]]:
+    """Modes of a hammer test, as the hammer stage identifies them.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        One recording per impact.
+    force : str
+        Name of the force channel.
+    response : str
+        Name of the acceleration channel.
+
+    Returns
+    -------
+    dict of str to tuple of (float, float)
+        Natural frequency [Hz] and damping ratio by band; empty without accepted impacts.
+    """
     impacts = [i for i in find_impacts(recordings, force, response, ReceptanceSettings()) if i.accepted]
     if not impacts:
         return {}
@@ -94,7 +193,9 @@ def identified_modes(recordings, force="hammer", response="acc_1"):
     return {mode.band: (mode.frequency, mode.damping) for mode in model.modes if mode.band in ("ballast", "railpad")}
 
 
-def _channels(section, turnout_id, config):
+def _channels(
+    section: str, turnout_id: str | None, config: str | Path
+) -> tuple[RawDescription, str, tuple[str, ...], ReceptanceSettings]:
     if turnout_id is None:
         return DEFAULT_CHANNELS, "hammer", ("acc_1", "acc_2"), ReceptanceSettings()
     turnout = load_configuration(config).turnout(turnout_id)
@@ -105,7 +206,7 @@ def _channels(section, turnout_id, config):
     return hammer.descriptions[section], hammer.force[section], names, turnout.settings["receptance"]
 
 
-def _receptance_data(receptance, impact_position, response_position):
+def _receptance_data(receptance: Receptance, impact_position: float, response_position: float) -> MeasuredReceptance:
     inside = (receptance.frequency >= CALIBRATION_BAND[0]) & (receptance.frequency <= CALIBRATION_BAND[1])
     h, coherence = receptance.h1[inside], np.clip(receptance.coherence[inside], 1e-3, 1.0 - 1e-6)
     sd = np.abs(h) * np.sqrt((1.0 - coherence) / (2.0 * receptance.n * coherence))

@@ -3,22 +3,56 @@
 Also reads the numbers that people note in recordings.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Mapping
 from datetime import datetime, timedelta
 from math import isfinite
+from pathlib import Path
 from statistics import median
-from typing import cast
+from typing import Any, cast
 
 from turnout.errors import ReadError
 from turnout.readers import read
+from turnout.records import LongRecording, RawDescription, ReadResult, Recording
 from turnout.registry.ids import content_id
 
 
-def read_or_quarantine(path, raw_root, description, base, quarantine, unit_kind, ids_by_path=None, longest=None):
-    """ReadResult of one file, or None; a quarantine row for the file or for each damaged record.
+def read_or_quarantine(
+    path: str,
+    raw_root: str | Path,
+    description: RawDescription,
+    base: Mapping[str, Any],
+    quarantine: list[dict[str, Any]],
+    unit_kind: str,
+    ids_by_path: Mapping[str, str] | None = None,
+    longest: float | None = None,
+) -> ReadResult | None:
+    """Read one file; a file or record that cannot be read becomes a row of ``quarantine``.
 
-    Records longer than ``longest`` seconds of a large file are not loaded. ``ids_by_path`` maps the files read before
-    to their ids: the same bytes are not used twice.
+    Parameters
+    ----------
+    path : str
+        Path of the file from ``raw_root``.
+    raw_root : str or Path
+        Raw folder.
+    description : RawDescription
+        Channels and format of the raw files.
+    base : mapping of str to any
+        Columns turnout_id and, where known, section_id and campaign_id.
+    quarantine : list of dict of str to any
+        Rows of ``quarantine``, to which the new ones are added.
+    unit_kind : str
+        "hammer" or "passage".
+    ids_by_path : mapping of str to str or None
+        Ids of the files read before, by path: the same bytes are not used twice.
+    longest : float or None
+        Longer records of a large file are not loaded. [s]
+
+    Returns
+    -------
+    ReadResult or None
+        None if nothing of the file can be used.
     """
     try:
         result = read(path, raw_root, description, longest)
@@ -39,11 +73,31 @@ def read_or_quarantine(path, raw_root, description, base, quarantine, unit_kind,
 
 
 def time_contradiction(
-    path: str, recordings: Iterable, filed_at: datetime | None, tolerance: timedelta, remedy: str
+    path: str,
+    recordings: Iterable[Recording | LongRecording],
+    filed_at: datetime | None,
+    tolerance: timedelta,
+    remedy: str,
 ) -> ReadError | None:
-    """Error if the first time noted in a file differs from ``filed_at``, the time it is filed under.
+    """Error if the first time noted in a file differs from the time that it is filed under.
 
-    ``tolerance`` is the largest accepted difference. None if both agree or one is not known.
+    Parameters
+    ----------
+    path : str
+        Path of the file.
+    recordings : iterable of Recording or LongRecording
+        Records of the file.
+    filed_at : datetime or None
+        Time that the file is filed under, naive UTC.
+    tolerance : timedelta
+        Largest accepted difference.
+    remedy : str
+        What to do, a sentence without its full stop.
+
+    Returns
+    -------
+    ReadError or None
+        None if both times agree or one is not known; it is returned, not raised.
     """
     recorded_at = min((r.started_at for r in recordings if r.started_at is not None), default=None)
     if filed_at is None or recorded_at is None or abs(recorded_at - filed_at) <= tolerance:
@@ -52,8 +106,36 @@ def time_contradiction(
     return ReadError(path, "the file", observation, remedy, "wrong_time")
 
 
-def quarantine_row(error: ReadError, base, unit_kind, stage, record=None, recording_id=None) -> dict:
-    """Row of ``quarantine``: the error in columns."""
+def quarantine_row(
+    error: ReadError,
+    base: Mapping[str, Any],
+    unit_kind: str,
+    stage: str,
+    record: int | None = None,
+    recording_id: str | None = None,
+) -> dict[str, Any]:
+    """Row of ``quarantine``: the error in columns.
+
+    Parameters
+    ----------
+    error : ReadError
+        What is wrong, and where.
+    base : mapping of str to any
+        Columns turnout_id and, where known, section_id and campaign_id.
+    unit_kind : str
+        "hammer" or "passage".
+    stage : str
+        Stage that noticed it.
+    record : int or None
+        Number of the record in the file, from 0; None for the whole file.
+    recording_id : str or None
+        Id of the file's content, if it was read.
+
+    Returns
+    -------
+    dict of str to any
+        The row.
+    """
     return {
         "quarantine_id": content_id("quarantine", error.path, str(record), stage, error.reason, error.problem),
         "turnout_id": base["turnout_id"],
@@ -70,9 +152,40 @@ def quarantine_row(error: ReadError, base, unit_kind, stage, record=None, record
     }
 
 
-def recording_row(result, path, size, description, base, unit_kind, **more) -> dict:
-    """Row of ``recordings``."""
-    records = (*result.recordings, *result.long_recordings)
+def recording_row(
+    result: ReadResult,
+    path: str,
+    size: int,
+    description: RawDescription,
+    base: Mapping[str, Any],
+    unit_kind: str,
+    **more: Any,
+) -> dict[str, Any]:
+    """Row of ``recordings``.
+
+    Parameters
+    ----------
+    result : ReadResult
+        Content of the file, with at least one record.
+    path : str
+        Path of the file from the raw folder.
+    size : int
+        Size of the file. [byte]
+    description : RawDescription
+        Channels and format of the raw files.
+    base : mapping of str to any
+        Columns turnout_id and, where known, section_id and campaign_id.
+    unit_kind : str
+        "hammer" or "passage".
+    **more : any
+        Further columns.
+
+    Returns
+    -------
+    dict of str to any
+        The row.
+    """
+    records: tuple[Recording | LongRecording, ...] = (*result.recordings, *result.long_recordings)
     first = records[0]
     return {
         "recording_id": result.sha256[:32],
@@ -95,9 +208,23 @@ def recording_row(result, path, size, description, base, unit_kind, **more) -> d
 MIN_RAIL_TEMPERATURE, MAX_RAIL_TEMPERATURE = -50.0, 80.0  # °C: a noted rail temperature outside is a broken thermometer
 
 
-def number(notes: Mapping, name: str) -> float | None:
-    """The value that a file notes under ``name`` as a number, None if it cannot be read.
+def number(notes: Mapping[str, Any], name: str) -> float | None:
+    """The value that a file notes under a name, as a number.
 
+    Parameters
+    ----------
+    notes : mapping of str to any
+        Notes of a record by name.
+    name : str
+        Name of the note.
+
+    Returns
+    -------
+    float or None
+        None if it is missing, no number or not finite.
+
+    Examples
+    --------
     >>> number({"speed": "27,8"}, "speed"), number({"speed": "fast"}, "speed")
     (27.8, None)
     """
@@ -108,11 +235,23 @@ def number(notes: Mapping, name: str) -> float | None:
     return value if isfinite(value) else None
 
 
-def temperature(notes: Mapping) -> float | None:
-    """The rail temperature that a file notes [°C], None without one or outside the plausible range.
+def temperature(notes: Mapping[str, Any]) -> float | None:
+    """The rail temperature that a file notes. [°C]
 
     A broken thermometer notes 85 or 999.
 
+    Parameters
+    ----------
+    notes : mapping of str to any
+        Notes of a record by name.
+
+    Returns
+    -------
+    float or None
+        None without one, or outside the plausible range.
+
+    Examples
+    --------
     >>> temperature({"rail_temperature": "21,5"}), temperature({"rail_temperature": 999.0})
     (21.5, None)
     """
@@ -120,7 +259,18 @@ def temperature(notes: Mapping) -> float | None:
     return value if value is not None and MIN_RAIL_TEMPERATURE <= value <= MAX_RAIL_TEMPERATURE else None
 
 
-def rail_temperature(recordings: Iterable) -> float | None:
-    """Median of the rail temperatures noted in recordings [°C], None without any."""
+def rail_temperature(recordings: Iterable[Recording]) -> float | None:
+    """Median of the rail temperatures noted in recordings. [°C]
+
+    Parameters
+    ----------
+    recordings : iterable of Recording
+        Recordings of one section and campaign.
+
+    Returns
+    -------
+    float or None
+        None if no recording notes one.
+    """
     temperatures = [t for r in recordings if (t := temperature(r.conditions)) is not None]
     return median(temperatures) if temperatures else None

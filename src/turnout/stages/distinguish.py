@@ -1,11 +1,14 @@
 """Distinguishability of effects in a planned campaign, and the addition that gains most for its effort."""
 
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from turnout.constants import KMH
 from turnout.errors import SimulationError
-from turnout.mismatch.engine.distinguishability import cheapest_addition, distinguishability
+from turnout.mismatch.engine.distinguishability import Distinguishability, cheapest_addition, distinguishability
 from turnout.mismatch.turnout.candidates.catalogue import list_candidates
 from turnout.mismatch.turnout.planned_case import Plan, PlannedCase, Train
 from turnout.simulate import Sensor, load_track, load_vehicle
@@ -14,11 +17,46 @@ from turnout.simulate import Sensor, load_track, load_vehicle
 EFFORT_HOURS = {"a second rail temperature": 8.0, "hammer tests at the sensors": 4.0, "a second speed": 1.0}
 
 
-def planned_matrix(track, sensors, impact_positions, temperatures, trains, speeds, effects=None, config=None):
-    """(Distinguishability, advice) of a plan: positions [m], temperatures [°C], vehicle files, speeds [km/h].
+def planned_matrix(
+    track: str,
+    sensors: Sequence[float],
+    impact_positions: Sequence[float],
+    temperatures: Sequence[float],
+    trains: Sequence[str],
+    speeds: Sequence[float],
+    effects: Collection[str] | None = None,
+    config: str | Path | None = None,
+) -> tuple[Distinguishability, str]:
+    """Which effects a planned campaign tells apart, and what to add to it.
 
-    ``config`` is the configuration folder with tracks and vehicles, by default "config". SimulationError if nothing is
-    planned, or if one of ``effects`` is not a candidate in such a plan.
+    Parameters
+    ----------
+    track : str
+        Name of the track, or path of its file.
+    sensors : sequence of float
+        Positions of the accelerometers. [m]
+    impact_positions : sequence of float
+        Positions of the hammer impacts. [m]
+    temperatures : sequence of float
+        Rail temperatures at which hammer tests and passages are recorded. [°C]
+    trains : sequence of str
+        Names of the vehicles that pass, or paths of their files.
+    speeds : sequence of float
+        Speeds of every train. [km/h]
+    effects : collection of str or None
+        Effects to which the comparison is restricted; None: all that the plan can concern.
+    config : str, Path or None
+        Folder of the configuration with tracks and vehicles; None: "config".
+
+    Returns
+    -------
+    tuple of (Distinguishability, str)
+        The comparison of each pair of effects, and a sentence on the addition that gains most for its effort.
+
+    Raises
+    ------
+    SimulationError
+        Nothing is planned, or one of ``effects`` is no candidate in such a plan.
     """
     if not impact_positions and not trains:
         raise SimulationError("nothing is planned: give --blows, --trains or both.")
@@ -37,13 +75,13 @@ def planned_matrix(track, sensors, impact_positions, temperatures, trains, speed
     return matrix, f"Most would be added by {name}: {resolved} more pairs told apart."
 
 
-def _folder(config, subfolder):
+def _folder(config: str | Path | None, subfolder: str) -> Path | None:
     """A folder of the configuration, None if it does not exist: the program's own files are then used."""
     folder = Path(config or "config") / subfolder
     return folder if folder.is_dir() else None
 
 
-def _matrix(plan, effects):
+def _matrix(plan: Plan, effects: Collection[str] | None) -> Distinguishability:
     case = PlannedCase(plan, families=effects)
     if effects and (unknown := sorted({*effects} - {c.family for c in case.candidates})):
         names = ", ".join(sorted({c.family for c in list_candidates(case.data)}))
@@ -51,7 +89,7 @@ def _matrix(plan, effects):
     return distinguishability(case)
 
 
-def _additions(plan, sensors, temperatures):
+def _additions(plan: Plan, sensors: Sequence[float], temperatures: Sequence[float]) -> Iterator[tuple[str, Plan]]:
     second_temperature = max(temperatures) + 15.0
     repeated_impacts = tuple((x, second_temperature) for x, t in plan.hammer_points if t == temperatures[0])
     warmer_trains = tuple(

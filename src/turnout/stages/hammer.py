@@ -1,10 +1,12 @@
 """Stage hammer: registry rows of the hammer tests of one section and campaign."""
 
+from __future__ import annotations
+
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import timedelta
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -12,11 +14,11 @@ import numpy as np
 from turnout.config.filename_pattern import compile_pattern
 from turnout.config.settings.identify import IdentifySettings
 from turnout.config.settings.receptance import ReceptanceSettings
-from turnout.config.turnout import TurnoutConfig
+from turnout.config.turnout import HammerConfig, TurnoutConfig
 from turnout.errors import ReadError
 from turnout.hammer_test import find_impacts, receptance_of
 from turnout.modal import identify
-from turnout.records import Impact, ModalModel, Receptance, Rejection, Unit
+from turnout.records import Impact, ModalModel, Receptance, Recording, Rejection, Unit
 from turnout.registry.ids import content_id
 from turnout.stages.common import (
     quarantine_row,
@@ -36,7 +38,7 @@ MISFILED_REMEDY = (
 )
 
 
-def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root, algo: str = "") -> dict[str, list[dict]]:
+def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root: str | Path, algo: str = "") -> dict[str, list[dict]]:
     """Rows by table for one section and campaign.
 
     An unreadable file or a damaged record becomes a quarantine row; the other records are used. A file whose time is
@@ -82,9 +84,9 @@ def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root, algo: str = "") ->
         return rows
     recordings = _with_common_rate(recordings, base, rows["quarantine"], ids)
     # all impacts of the campaign at once: a fault of a whole file shows in comparison with the others
-    impacts = find_impacts(recordings, force, response, turnout.settings["receptance"])
+    found = find_impacts(recordings, force, response, turnout.settings["receptance"])
     settings = turnout.settings
-    impacts, receptance, model = identify_accepted(impacts, settings["receptance"], settings["identify"])
+    impacts, receptance, model = identify_accepted(found, settings["receptance"], settings["identify"])
     tests = {path: _test_number(turnout, unit, path) for path in ids}
     rows["impacts"] = [impact_row(i, base, tests[i.source], ids[i.source]) for i in impacts]
     temperature = campaign.rail_temperature
@@ -113,7 +115,32 @@ def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root, algo: str = "") ->
     }
 
 
-def _with_common_rate(recordings, base, quarantine, ids):
+def hammer_config(turnout: TurnoutConfig) -> HammerConfig:
+    """The hammer configuration of a turnout.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+        Configuration of the turnout.
+
+    Returns
+    -------
+    HammerConfig
+        Files and channels of its hammer tests.
+
+    Raises
+    ------
+    ValueError
+        It has no hammer tests.
+    """
+    if turnout.hammer is None:
+        raise ValueError(f"{turnout.id} has no hammer tests in its configuration")
+    return turnout.hammer
+
+
+def _with_common_rate(
+    recordings: Sequence[Recording], base: Mapping[str, Any], quarantine: list[dict[str, Any]], ids: Mapping[str, str]
+) -> list[Recording]:
     """Recordings of the most common sampling rate; a quarantine row for each file of another rate."""
     rates = Counter(_round_rate(r.rate) for r in recordings)
     common_rate = max(rates, key=lambda rate: (rates[rate], rate))
@@ -130,7 +157,7 @@ def _with_common_rate(recordings, base, quarantine, ids):
     return [r if r.rate == rate else replace(r, rate=rate) for r in selected]
 
 
-def _round_rate(rate):
+def _round_rate(rate: float) -> float:
     """Sampling rate rounded to six digits: times printed in a file are no more exact."""
     return float(f"{rate:.6g}")
 
@@ -174,16 +201,16 @@ def identify_accepted(
         impacts = [replace(i, rejections=(rejected[id(i)],)) if id(i) in rejected else i for i in impacts]
 
 
-def _test_number(turnout, unit, path):
+def _test_number(turnout: TurnoutConfig, unit: Unit, path: str) -> int:
     """Number of the test from the file's name; 0 if the name has no number there."""
     inside = str(PurePosixPath(path).relative_to(turnout.raw))
     labels = tuple(s.label for s in turnout.sections)
-    match = compile_pattern(turnout.hammer.files, "hammer", labels).fullmatch(inside)
+    match = compile_pattern(hammer_config(turnout).files, "hammer", labels).fullmatch(inside)
     number = (match.groupdict().get("test") or "0") if match else "0"
     return int(number) if number.isdigit() and int(number) <= MAX_TEST_NUMBER else 0
 
 
-def _rejected_model(n, n_required, impacts):
+def _rejected_model(n: int, n_required: int, impacts: Sequence[Impact]) -> ModalModel:
     """A rejected model without modes, with the number of accepted impacts and the reasons of the others."""
     reasons = sorted({r.reason for i in impacts for r in i.rejections})
     detail = f"{n} of {len(impacts)} impacts accepted, {n_required} needed"
@@ -197,7 +224,7 @@ def _rejected_model(n, n_required, impacts):
     )  # fmt: skip
 
 
-def _lowest_gate_level(receptance, model):
+def _lowest_gate_level(receptance: Receptance, model: ModalModel) -> float | None:
     """Lowest gate level within the half-power bandwidths of the modes, None without modes."""
     lowest = []
     for mode in model.modes:

@@ -3,8 +3,10 @@
 Section and day of a file come from the options, its name, or the time noted in it.
 """
 
+from __future__ import annotations
+
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
@@ -15,14 +17,29 @@ from turnout.config.load import read_notes
 from turnout.config.schema import suggestion
 from turnout.errors import ConfigError, ReadError
 from turnout.readers import read
-from turnout.records import EMPTY_MAPPING, Unit
-from turnout.stages.hammer import hammer_unit
+from turnout.records import EMPTY_MAPPING, RawDescription, Unit
+from turnout.stages.hammer import hammer_config, hammer_unit
 from turnout.workflow.guard import compute_guarded
 from turnout.workflow.scan import scan
 
 
-def check_request(turnout, section, campaign):
-    """ConfigError for a turnout without hammer tests, an unknown section, or an invalid day."""
+def check_request(turnout: TurnoutConfig, section: str | None, campaign: str | None) -> None:
+    """Check that a turnout has hammer tests and that section and day are valid.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+        Configuration of the turnout.
+    section : str or None
+        Label of the section, if the option gives one.
+    campaign : str or None
+        Day of the campaign, YYYY-MM-DD, if the option gives one.
+
+    Raises
+    ------
+    ConfigError
+        A turnout without hammer tests, an unknown section, or an invalid day.
+    """
     if turnout.hammer is None:
         raise ConfigError(turnout.layout, "hammer", "nothing about hammer tests", "Add them to the layout")
     if section is not None and section not in (labels := turnout.hammer.descriptions):
@@ -34,15 +51,36 @@ def check_request(turnout, section, campaign):
         raise ConfigError("turnout hammer", "--campaign", f"{campaign!r} is no day of the calendar", remedy)
 
 
-def _is_day(text) -> bool:
+def _is_day(text: str) -> bool:
     try:
         return datetime.strptime(text, "%Y-%m-%d").date().isoformat() == text
     except ValueError:
         return False
 
 
-def check_agreement(path, section_in_name, day_in_name, section, campaign):
-    """ConfigError if an option contradicts the section or day in the file's name."""
+def check_agreement(
+    path: str | Path, section_in_name: str | None, day_in_name: str | None, section: str | None, campaign: str | None
+) -> None:
+    """Check that the options do not contradict the file's name.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file, for the message.
+    section_in_name : str or None
+        Section that the name gives, if any.
+    day_in_name : str or None
+        Day that the name gives, if any.
+    section : str or None
+        Label of the section, if the option gives one.
+    campaign : str or None
+        Day of the campaign, YYYY-MM-DD, if the option gives one.
+
+    Raises
+    ------
+    ConfigError
+        An option differs from the section or day in the name.
+    """
     pairs = (("--section", section, section_in_name, "section"), ("--campaign", campaign, day_in_name, "campaign"))
     for option, option_value, name_value, quantity in pairs:
         if option_value is not None and name_value is not None and option_value != name_value:
@@ -50,9 +88,9 @@ def check_agreement(path, section_in_name, day_in_name, section, campaign):
             raise ConfigError(path, option, f"is {option_value!r}, and the file's name says {name_value!r}", remedy)
 
 
-def _section_and_day(path, turnout) -> tuple[str | None, str | None]:
+def _section_and_day(path: Path, turnout: TurnoutConfig) -> tuple[str | None, str | None]:
     """(section, day) from the end of a path that matches the layout's pattern, None where not given."""
-    labels, pattern = tuple(s.label for s in turnout.sections), turnout.hammer.files.split("/")
+    labels, pattern = tuple(s.label for s in turnout.sections), hammer_config(turnout).files.split("/")
     for n in range(min(len(pattern), len(path.parts) - 1), 0, -1):
         tail, name = "/".join(pattern[-n:]), "/".join(path.parts[-n:])
         if "{section}" not in tail:
@@ -66,31 +104,79 @@ def _section_and_day(path, turnout) -> tuple[str | None, str | None]:
     return None, None
 
 
-def section_of(path, turnout, section, campaign) -> str:
-    """Label of a file's section, from the option or its name; ConfigError if unknown or contradictory."""
+def section_of(path: Path, turnout: TurnoutConfig, section: str | None, campaign: str | None) -> str:
+    """Label of a file's section, from the option or its name.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    turnout : TurnoutConfig
+        Configuration of the turnout.
+    section : str or None
+        Label of the section, if the option gives one.
+    campaign : str or None
+        Day of the campaign, YYYY-MM-DD, if the option gives one.
+
+    Returns
+    -------
+    str
+        The label.
+
+    Raises
+    ------
+    ConfigError
+        The section is not known, or the name contradicts an option.
+    """
     section_in_name, day_in_name = _section_and_day(path, turnout)
     check_agreement(path, section_in_name, day_in_name, section, campaign)
     label = section or section_in_name
     if label is None:
-        remedy = f"Write --section with one of {', '.join(turnout.hammer.descriptions)}"
+        remedy = f"Write --section with one of {', '.join(hammer_config(turnout).descriptions)}"
         observation = f"its name does not say at which section of {turnout.id} it was recorded"
         raise ConfigError(path, "--section", observation, remedy)
     return label
 
 
-def files_by_day(paths, turnout, label, campaign) -> dict[str, list[Path]]:
-    """Files of one section by the day of their campaign: from the option, their names, or the first time noted."""
+def files_by_day(
+    paths: Iterable[Path], turnout: TurnoutConfig, label: str, campaign: str | None
+) -> dict[str, list[Path]]:
+    """Files of one section by the day of their campaign: from the option, their names, or the first time noted.
+
+    Parameters
+    ----------
+    paths : iterable of Path
+        Files of the section.
+    turnout : TurnoutConfig
+        Configuration of the turnout.
+    label : str
+        Label of the section.
+    campaign : str or None
+        Day of the campaign, YYYY-MM-DD, if the option gives one.
+
+    Returns
+    -------
+    dict of str to list of Path
+        Files by day, YYYY-MM-DD.
+
+    Raises
+    ------
+    ConfigError
+        Neither a name nor a file says the day.
+    ReadError
+        The day is only in the files, and none of them can be read.
+    """
     days: dict[str, list[Path]] = {}
     unknown = []
     for path in paths:
         day = campaign or _section_and_day(path, turnout)[1]
         days.setdefault(day, []).append(path) if day else unknown.append(path)
     if unknown:
-        days.setdefault(_noted_day(unknown, turnout.hammer.descriptions[label]), []).extend(unknown)
+        days.setdefault(_noted_day(unknown, hammer_config(turnout).descriptions[label]), []).extend(unknown)
     return days
 
 
-def _noted_day(paths, description) -> str:
+def _noted_day(paths: Sequence[Path], description: RawDescription) -> str:
     """Day of the first time noted in files; ReadError if none of them holds a usable record."""
     faults: list[ReadError] = []
     times, n_usable = [], 0
@@ -112,7 +198,7 @@ def _noted_day(paths, description) -> str:
     raise ConfigError(paths[0], "--campaign", observation, "Write --campaign YYYY-MM-DD")
 
 
-def _with_path(path, error: ReadError) -> ReadError:
+def _with_path(path: str | Path, error: ReadError) -> ReadError:
     """The same error, with the path as the user gave it."""
     return ReadError(path, error.where, error.problem, error.remedy, error.reason)
 
@@ -135,7 +221,7 @@ class RequestedUnit:
 
 
 def requested_units(
-    files,
+    files: Iterable[str | Path],
     turnout: TurnoutConfig,
     raw_root: Path,
     section: str | None = None,
@@ -192,7 +278,7 @@ def requested_units(
 class _NightlyScan:
     """Scan of the turnout's raw folder, as in the nightly run: (unit, path) and problems by real path."""
 
-    def __init__(self, turnout, raw_root, note_errors):
+    def __init__(self, turnout: TurnoutConfig, raw_root: Path, note_errors: Sequence[ReadError]) -> None:
         self.turnout, self.raw_root, self.note_errors = turnout, raw_root, note_errors
         self.folder = os.path.realpath(raw_root / turnout.raw)
         scanned = scan(turnout, raw_root)
@@ -201,30 +287,74 @@ class _NightlyScan:
         }
         self.problems = {os.path.realpath(raw_root / p.path): p for p in scanned.problems}
 
-    def check_turnout(self, path, folders):
+    def check_turnout(self, path: Path, folders: Mapping[str, str]) -> None:
         """ConfigError for a file in the raw folder of another turnout."""
         for turnout, raw in folders.items():
             if raw != self.turnout.raw and _within(path, self.raw_root / raw) and not _within(path, self.folder):
                 observation = f"is {self.turnout.id}, and the file lies in the raw folder of {turnout}"
                 raise ConfigError(path, "--turnout", observation, f"Write --turnout {turnout}")
 
-    def notes(self, day) -> tuple[str, ...]:
-        """Errors of campaigns.csv, if none of its valid rows is of this day."""
+    def notes(self, day: str) -> tuple[str, ...]:
+        """Errors of campaigns.csv, if none of its valid rows is of this day.
+
+        Parameters
+        ----------
+        day : str
+            Day of a campaign, YYYY-MM-DD.
+
+        Returns
+        -------
+        tuple of str
+            The errors as text.
+        """
         return () if self.turnout.campaigns[day].listed else tuple(str(error) for error in self.note_errors)
 
-    def select(self, unit, names) -> RequestedUnit:
-        """The requested files of a unit, with a remark on the others that the nightly run includes."""
+    def select(self, unit: Unit, names: set[str]) -> RequestedUnit:
+        """The requested files of a unit, with a remark on the others that the nightly run includes.
+
+        Parameters
+        ----------
+        unit : Unit
+            A unit of the nightly run.
+        names : set of str
+            Paths of the files asked for, as in ``unit.files``.
+
+        Returns
+        -------
+        RequestedUnit
+            The unit with these files only.
+
+        Raises
+        ------
+        ConfigError
+            The unit is a passage.
+        """
         if unit.kind != "hammer":
             command = f"Use turnout passage {names.pop()} --turnout {unit.turnout}"
             raise ConfigError(unit.files[0][0], "file name", "is that of a passage, not of a hammer test", command)
         further = [path.rsplit("/", 1)[-1] for path, *_ in unit.files if path not in names]
         selection = replace(unit, files=tuple(file for file in unit.files if file[0] in names))
         remark = f"the nightly run takes {', '.join(further)} with it; name all of them to hear what it will say"
-        remarks = self.notes(unit.campaign) + ((remark,) if further else ())
+        remarks = self.notes(unit.campaign or "") + ((remark,) if further else ())
         return RequestedUnit(selection, self.turnout, self.raw_root, remarks)
 
-    def explain_missing(self, paths, label, day) -> tuple[str, ...]:
-        """Why the nightly run does not use these files, and what to change."""
+    def explain_missing(self, paths: Iterable[Path], label: str, day: str) -> tuple[str, ...]:
+        """Why the nightly run does not use these files, and what to change.
+
+        Parameters
+        ----------
+        paths : iterable of Path
+            Files that the nightly run does not use.
+        label : str
+            Label of the section.
+        day : str
+            Day of the campaign, YYYY-MM-DD.
+
+        Returns
+        -------
+        tuple of str
+            One sentence each.
+        """
         remarks, unseen = [], []
         for path in paths:
             problem = self.problems.get(os.path.realpath(path))
@@ -235,13 +365,14 @@ class _NightlyScan:
             else:
                 unseen.append(path)
         if unseen:
-            expected = self.raw_root / self.turnout.raw / _fill_pattern(self.turnout.hammer.files, unseen, label, day)
+            pattern = hammer_config(self.turnout).files
+            expected = self.raw_root / self.turnout.raw / _fill_pattern(pattern, unseen, label, day)
             names = ", ".join(path.name for path in unseen)
             remarks.append(f"the nightly run does not see {names} there: it looks for {expected}")
         return tuple(remarks)
 
 
-def _fill_pattern(pattern, paths, label, day) -> str:
+def _fill_pattern(pattern: str, paths: Iterable[Path], label: str, day: str) -> str:
     """The layout's file pattern with day, section and file extension filled in."""
     endings = {path.suffix.lstrip(".") for path in paths}
     ending = endings.pop() if len(endings) == 1 else ""
@@ -250,11 +381,11 @@ def _fill_pattern(pattern, paths, label, day) -> str:
     return pattern
 
 
-def _within(path, folder) -> bool:
+def _within(path: str | Path, folder: str | Path) -> bool:
     return os.path.realpath(path).startswith(os.path.realpath(folder) + os.sep)
 
 
-def _real_path(path) -> str:
+def _real_path(path: Path) -> str:
     """Real path of a file, links resolved; ReadError if it is none."""
     if os.path.isdir(path):
         remedy = f"Name the files in it, such as {path.name}/*"
@@ -264,7 +395,9 @@ def _real_path(path) -> str:
     return os.path.realpath(path)
 
 
-def _unit_elsewhere(paths, turnout, label, day, scan_result) -> RequestedUnit:
+def _unit_elsewhere(
+    paths: Sequence[Path], turnout: TurnoutConfig, label: str, day: str, scan_result: _NightlyScan
+) -> RequestedUnit:
     """Unit of files that the nightly run does not see; its root is their common folder."""
     real_paths = [os.path.realpath(path) for path in paths]
     root = os.path.commonpath([os.path.dirname(path) for path in real_paths])

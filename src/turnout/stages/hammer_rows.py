@@ -1,6 +1,8 @@
 """Impacts, receptance and model of one section and campaign as rows of the registry."""
 
 import json
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -13,8 +15,25 @@ PLOT_DECAY_TIME = 0.04  # s of a decay in the registry
 REPORTED_POLE_BAND = (30.0, 1000.0)
 
 
-def impact_row(impact: Impact, base: dict, test: int, recording_id: str) -> dict:
-    """Row of ``impacts``; ``base`` holds turnout_id, section_id, campaign_id."""
+def impact_row(impact: Impact, base: dict[str, Any], test: int, recording_id: str) -> dict[str, Any]:
+    """Row of ``impacts``.
+
+    Parameters
+    ----------
+    impact : Impact
+        An impact, accepted or rejected.
+    base : dict of str to any
+        Columns turnout_id, section_id and campaign_id.
+    test : int
+        Number of the test.
+    recording_id : str
+        Id of the file.
+
+    Returns
+    -------
+    dict of str to any
+        The row.
+    """
     first = impact.rejections[0] if impact.rejections else None
     detail = "; ".join(r.detail or r.reason for r in (*impact.rejections, *impact.notes))
     return {
@@ -36,10 +55,32 @@ def impact_row(impact: Impact, base: dict, test: int, recording_id: str) -> dict
     }
 
 
-def model_row(model: ModalModel, base: dict, identity: dict, counts: tuple[int, int], coherence_minimum) -> dict:
-    """Row of ``models``; ``identity`` holds model_id, measured_at_utc, code_version and config_hash.
+def model_row(
+    model: ModalModel,
+    base: dict[str, Any],
+    identity: dict[str, Any],
+    counts: tuple[int, int],
+    coherence_minimum: float | None,
+) -> dict[str, Any]:
+    """Row of ``models``.
 
-    ``counts`` are the accepted and the rejected impacts.
+    Parameters
+    ----------
+    model : ModalModel
+        Model of the section.
+    base : dict of str to any
+        Columns turnout_id, section_id and campaign_id.
+    identity : dict of str to any
+        Columns model_id, measured_at_utc, code_version and config_hash.
+    counts : tuple of (int, int)
+        Numbers of accepted and of rejected impacts.
+    coherence_minimum : float or None
+        Lowest gate level within the bandwidths of the modes, None without modes.
+
+    Returns
+    -------
+    dict of str to any
+        The row.
     """
     first = model.rejections[0] if model.rejections else None
     return {
@@ -64,8 +105,25 @@ def model_row(model: ModalModel, base: dict, identity: dict, counts: tuple[int, 
     }
 
 
-def mode_row(mode: Mode, base: dict, identity: dict, temperature) -> dict:
-    """Row of ``modes``."""
+def mode_row(mode: Mode, base: dict[str, Any], identity: dict[str, Any], temperature: float | None) -> dict[str, Any]:
+    """Row of ``modes``.
+
+    Parameters
+    ----------
+    mode : Mode
+        A mode of the model.
+    base : dict of str to any
+        Columns turnout_id, section_id and campaign_id.
+    identity : dict of str to any
+        Columns model_id, measured_at_utc, code_version and config_hash.
+    temperature : float or None
+        Rail temperature. [°C]
+
+    Returns
+    -------
+    dict of str to any
+        The row.
+    """
     return {
         "model_id": identity["model_id"],
         "band": mode.band,
@@ -83,8 +141,27 @@ def mode_row(mode: Mode, base: dict, identity: dict, temperature) -> dict:
     }
 
 
-def impact_mode_row(entry, base: dict, identity: dict, impact_id: str) -> dict:
-    """Row of ``impact_modes``: one entry of ``ModalModel.per_impact``."""
+def impact_mode_row(
+    entry: Mapping[str, Any], base: dict[str, Any], identity: dict[str, Any], impact_id: str
+) -> dict[str, Any]:
+    """Row of ``impact_modes``.
+
+    Parameters
+    ----------
+    entry : mapping of str to any
+        One entry of ``ModalModel.per_impact``.
+    base : dict of str to any
+        Columns turnout_id, section_id and campaign_id.
+    identity : dict of str to any
+        Columns model_id, measured_at_utc, code_version and config_hash.
+    impact_id : str
+        Id of the impact.
+
+    Returns
+    -------
+    dict of str to any
+        The row.
+    """
     return {
         "model_id": identity["model_id"],
         "impact_id": impact_id,
@@ -99,11 +176,34 @@ def impact_mode_row(entry, base: dict, identity: dict, impact_id: str) -> dict:
 
 
 def receptance_row(
-    receptance: Receptance, required: float, model: ModalModel, decay, base: dict, identity: dict
-) -> dict:
+    receptance: Receptance,
+    required: float,
+    model: ModalModel,
+    decay: np.ndarray | None,
+    base: dict[str, Any],
+    identity: dict[str, Any],
+) -> dict[str, Any]:
     """Row of ``receptances``, at the resolution of a figure.
 
-    ``required`` is the level that the gate requires.
+    Parameters
+    ----------
+    receptance : Receptance
+        Receptance of the accepted impacts.
+    required : float
+        Level that the gate requires.
+    model : ModalModel
+        Model of the section.
+    decay : (n_sample,) array of float or None
+        Decay of one impact. [m/s²]
+    base : dict of str to any
+        Columns turnout_id, section_id and campaign_id.
+    identity : dict of str to any
+        Columns model_id, measured_at_utc, code_version and config_hash.
+
+    Returns
+    -------
+    dict of str to any
+        The row.
     """
     lines = plot_lines(receptance.frequency)
     measured, predicted = plot_decay(model, decay)
@@ -132,9 +232,21 @@ def receptance_row(
     }
 
 
-def plot_lines(frequency):
-    """Indices of at most ``MAX_PLOT_LINES`` lines, evenly spaced over the logarithm of ``PLOT_BAND``.
+def plot_lines(frequency: np.ndarray) -> np.ndarray:
+    """Lines of a figure: at most ``MAX_PLOT_LINES``, evenly spaced over the logarithm of ``PLOT_BAND``.
 
+    Parameters
+    ----------
+    frequency : (n_line,) array of float
+        Frequencies of the receptance, ascending. [Hz]
+
+    Returns
+    -------
+    (n,) array of int
+        Indices into ``frequency``, ascending.
+
+    Examples
+    --------
     >>> frequency = np.arange(1.0, 4000.0)
     >>> lines = plot_lines(frequency)
     >>> frequency[lines[0]], frequency[lines[-1]], len(lines) <= MAX_PLOT_LINES
@@ -145,8 +257,21 @@ def plot_lines(frequency):
     return np.unique(nearest)
 
 
-def plot_decay(model: ModalModel, decay):
-    """The first part of a decay and the model's decay fitted to it by its initial state (float32 arrays)."""
+def plot_decay(model: ModalModel, decay: np.ndarray | None) -> tuple[np.ndarray, np.ndarray] | tuple[None, None]:
+    """The first part of a decay, and the model's decay fitted to it by its initial state.
+
+    Parameters
+    ----------
+    model : ModalModel
+        Model of the section.
+    decay : (n_sample,) array of float or None
+        Decay of one impact. [m/s²]
+
+    Returns
+    -------
+    two (n,) arrays of float32
+        Measured and fitted [m/s²]; None, None without a decay or a model.
+    """
     if decay is None or not model.order:
         return None, None
     n = min(len(decay), int(PLOT_DECAY_TIME * model.rate))
@@ -159,7 +284,7 @@ def plot_decay(model: ModalModel, decay):
     return decay[:n].astype(np.float32), (basis @ state).astype(np.float32)
 
 
-def _pole_row(pole):
+def _pole_row(pole: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "order": int(pole["order"]),
         "frequency": round(float(pole["frequency"]), 2),
@@ -168,7 +293,7 @@ def _pole_row(pole):
     }
 
 
-def _model_detail(model):
+def _model_detail(model: ModalModel) -> str | None:
     in_band = [m for m in model.rejected_modes if REPORTED_POLE_BAND[0] <= m["frequency"] <= REPORTED_POLE_BAND[1]]
     rejected = [f"{m['frequency']:.0f} Hz not used: {m['reason']}" for m in in_band]
     reasons = [r.detail or r.reason for r in model.rejections]

@@ -1,5 +1,7 @@
 """Check the positions of a layout against the track that simulates it."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,14 +11,30 @@ from turnout.errors import ConfigError, TurnoutError
 from turnout.simulate import load_track
 from turnout.simulate.parameters import off_track_errors
 from turnout.simulate.run import Drive
+from turnout.simulate.turnout_track import TurnoutTrack
 
 MAX_POSITION_DIFFERENCE = 0.5  # m: a larger difference between layout and track file is an error
 END_MARGIN = Drive.entry + Drive.margin  # m: closer to an end of the track a train is not completely on it
 QUANTITIES_WITHOUT_POSITION = ("force", "temperature", "ignored")  # channels that need no position
 
 
-def position_fault(label, x, track) -> str:
-    """Why a position in the layout contradicts the track, "" if it does not."""
+def position_fault(label: str, x: float, track: TurnoutTrack) -> str:
+    """Why a position in the layout contradicts the track.
+
+    Parameters
+    ----------
+    label : str
+        Label of the section.
+    x : float
+        Position of the section in the layout. [m]
+    track : TurnoutTrack
+        Track of the turnout.
+
+    Returns
+    -------
+    str
+        "" if it does not.
+    """
     base = track.track
     if not base.start < x < base.end:
         return f"section {label}: {x:.1f} m in the layout, the track goes from {base.start:.0f} to {base.end:.0f} m"
@@ -27,7 +45,18 @@ def position_fault(label, x, track) -> str:
 
 
 def faults_of_tracks(configuration: Configuration) -> Iterator[str]:
-    """Faults of each track file: unreadable, positions off the track, and contradictions with its layout."""
+    """Faults of each track file: unreadable, positions off the track, and contradictions with its layout.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Configuration with its folder of tracks.
+
+    Yields
+    ------
+    str
+        One fault, as a sentence.
+    """
     tracks = {}
     for path in sorted((configuration.folder / "tracks").glob("*.yaml")):
         try:
@@ -48,7 +77,7 @@ def faults_of_tracks(configuration: Configuration) -> Iterator[str]:
             yield from (f"not on the track: {error}" for error in _position_errors(tree, tracks[file], file))
 
 
-def _position_errors(tree: Branch, track, path: Path) -> Iterator[ConfigError]:
+def _position_errors(tree: Branch, track: TurnoutTrack, path: Path) -> Iterator[ConfigError]:
     """An error for each section that contradicts the track, and for each sensor too close to its ends."""
     faults = {
         label: position_fault(label, section["position"].value, track) for label, section in tree["sections"].items()

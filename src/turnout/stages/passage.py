@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any, cast
 
+from turnout.config.settings.passage import PassageSettings
 from turnout.config.turnout import PassageConfig, TurnoutConfig
 from turnout.errors import PartlyComputed, ReadError
 from turnout.passage.analysis import analyse
-from turnout.passage.axle_load import axle_load
+from turnout.passage.axle_load import LoadCalibration, axle_load
+from turnout.passage.axle_patterns import Pattern
 from turnout.passage.channel_checks import without_pulses
 from turnout.passage.channel_fit import fit_channel
-from turnout.passage.result import PassageSensor
+from turnout.passage.clusters import Clusters
+from turnout.passage.result import Passage, PassageSensor
 from turnout.passage.segmentation import cut_passages
 from turnout.passage.timetable import listed_for, listed_trains
-from turnout.records import ModalModel, Recording, Unit
+from turnout.records import LongRecording, ModalModel, Recording, Unit
 from turnout.registry.ids import content_id
 from turnout.stages.common import quarantine_row, read_or_quarantine, recording_row, time_contradiction
 from turnout.stages.passage_rows import finding_rows, fit_row, passage_row
@@ -42,13 +48,13 @@ class PassageContext:
     """
 
     models: dict[str, tuple[SectionModel, ...]] = field(default_factory=dict)
-    patterns: tuple = ()
-    clusters: object = None
-    loads: dict = field(default_factory=dict)
+    patterns: tuple[Pattern, ...] = ()
+    clusters: Clusters | None = None
+    loads: dict[str, LoadCalibration] = field(default_factory=dict)
 
 
 def passage_unit(
-    unit: Unit, turnout: TurnoutConfig, raw_root, context: PassageContext | None = None, algo: str = ""
+    unit: Unit, turnout: TurnoutConfig, raw_root: str | Path, context: PassageContext | None = None, algo: str = ""
 ) -> dict[str, list[dict]]:
     """Rows by table (recordings, passages, passage_fits, quarantine) for one passage file.
 
@@ -77,14 +83,15 @@ def passage_unit(
     faults: list[tuple] = []
     base = {"turnout_id": unit.turnout}
     rows: dict[str, list[dict]] = {"recordings": [], "passages": [], "passage_fits": [], "quarantine": []}
-    description = _passage_config(turnout).description
+    description = passage_config(turnout).description
     for path, size, _ in unit.files:
         longest = turnout.settings["passage"].longest
         result = read_or_quarantine(path, raw_root, description, base, rows["quarantine"], "passage", longest=longest)
         if result is None:
             continue
         recording_id = result.sha256[:32]
-        records = sorted((*result.recordings, *result.long_recordings), key=lambda r: r.record)
+        both: list[Recording | LongRecording] = [*result.recordings, *result.long_recordings]
+        records = sorted(both, key=lambda r: r.record)
         contradiction = time_contradiction(path, records, _time_of_label(unit.label), MAX_NAME_OFFSET, TIME_REMEDY)
         if contradiction is not None:
             rows["quarantine"].append(quarantine_row(contradiction, base, "passage", "passage", None, recording_id))
@@ -118,8 +125,24 @@ def passage_unit(
 
 
 def sensors_of(turnout: TurnoutConfig) -> tuple[PassageSensor, ...]:
-    """The acceleration sensors of a turnout's passages."""
-    sensors, passages = [], _passage_config(turnout)
+    """The acceleration sensors of a turnout's passages.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+        Configuration with passages.
+
+    Returns
+    -------
+    tuple of PassageSensor
+        In the order of the layout's channels.
+
+    Raises
+    ------
+    ValueError
+        The turnout has no passages in its configuration.
+    """
+    sensors, passages = [], passage_config(turnout)
     for channel in passages.description.channels:
         if channel.quantity == "acceleration":
             section = turnout.section(passages.sections[channel.name])
@@ -128,27 +151,75 @@ def sensors_of(turnout: TurnoutConfig) -> tuple[PassageSensor, ...]:
     return tuple(sensors)
 
 
-def model_at(models, moment: datetime) -> SectionModel | None:
-    """The latest model identified at or before ``moment``, else the first one, None without any."""
+def model_at(models: Sequence[SectionModel], moment: datetime) -> SectionModel | None:
+    """The latest model identified at or before a moment, else the first one.
+
+    Parameters
+    ----------
+    models : sequence of SectionModel
+        Models of one section, in order of time.
+    moment : datetime
+        Naive UTC.
+
+    Returns
+    -------
+    SectionModel or None
+        None without any model.
+    """
     before = [m for m in models if m.measured_at <= moment]
     return before[-1] if before else models[0] if models else None
 
 
-def _passage_config(turnout: TurnoutConfig) -> PassageConfig:
-    """The passage configuration of a turnout; ValueError if it has none."""
+def passage_config(turnout: TurnoutConfig) -> PassageConfig:
+    """The passage configuration of a turnout.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+        Configuration of the turnout.
+
+    Returns
+    -------
+    PassageConfig
+        Files and channels of its passages.
+
+    Raises
+    ------
+    ValueError
+        It has no passages.
+    """
     if turnout.passages is None:
         raise ValueError(f"{turnout.id} has no passages in its configuration")
     return turnout.passages
 
 
-def trains_in(recording, settings):
-    """(recording, seconds after the start, name) of every passage in a record.
+def trains_in(
+    recording: Recording | LongRecording, settings: PassageSettings
+) -> Iterator[tuple[Recording, float, tuple[str, ...]]]:
+    """Every passage in a record.
 
     A record longer than ``settings.longest`` is continuous and is cut at the quiet times. A ``LongRecording`` is read
-    in pieces, with a ReadError if its file is damaged.
+    in pieces.
+
+    Parameters
+    ----------
+    recording : Recording or LongRecording
+        One record of a file.
+    settings : PassageSettings
+        Settings of the passages.
+
+    Yields
+    ------
+    tuple of (Recording, float, tuple of str)
+        The passage, its start after that of the record [s], and what distinguishes it from others in the record.
+
+    Raises
+    ------
+    ReadError
+        The file of a ``LongRecording`` is damaged.
     """
     if recording.duration <= settings.longest:
-        yield recording, 0.0, ()
+        yield cast("Recording", recording), 0.0, ()  # a LongRecording is longer
         return
     rows = list(recording.of_quantity("acceleration"))
     attributes = {
@@ -161,7 +232,16 @@ def trains_in(recording, settings):
         yield train_recording, piece.start / recording.rate, (str(piece.start),)
 
 
-def _add_train(recording, started_at, recording_id, path, turnout, context, rows, name=()):
+def _add_train(
+    recording: Recording,
+    started_at: datetime,
+    recording_id: str,
+    path: str,
+    turnout: TurnoutConfig,
+    context: PassageContext,
+    rows: dict[str, list[dict]],
+    name: tuple[str, ...] = (),
+) -> None:
     """Add the rows of one train; ``name`` distinguishes it from others in the same record."""
     settings = turnout.settings["passage"]
     sensors = sensors_of(turnout)
@@ -181,8 +261,7 @@ def _add_train(recording, started_at, recording_id, path, turnout, context, rows
     identity = {**base, "recording_id": recording_id, "passed_at_utc": passed_at}
     row = passage_row(passage, identity, listed_train, load, recording.conditions)
     if context.clusters is not None and passage.n_axle:
-        features = (row.get(name) for name in ("train_type", "speed_kmh", "axle_load_t"))
-        row["cluster_id"] = context.clusters.assign(*features)
+        row["cluster_id"] = context.clusters.assign(row.get("train_type"), row.get("speed_kmh"), row.get("axle_load_t"))
     fits = _fit_rows(recording, passage, sensors, turnout, context, identity, settings) if passage.n_axle else []
     # The id depends on the whole row: train data, models, clusters and loads change it as well as the file does.
     # It depends on the path too, so that the row of a copy stays when that of its original is withdrawn.
@@ -192,7 +271,15 @@ def _add_train(recording, started_at, recording_id, path, turnout, context, rows
     rows["passage_fits"] += [passage_id | fit for fit in fits]
 
 
-def _fit_rows(recording, passage, sensors, turnout, context, identity, settings):
+def _fit_rows(
+    recording: Recording,
+    passage: Passage,
+    sensors: Sequence[PassageSensor],
+    turnout: TurnoutConfig,
+    context: PassageContext,
+    identity: Mapping[str, Any],
+    settings: PassageSettings,
+) -> list[dict[str, Any]]:
     """One row per sensor that recorded the train and whose section has a model."""
     clipped = {f.channel for f in passage.findings if f.reason == "clipped"}
     lost_from = {f.channel: f.time for f in passage.findings if f.reason == "sensor_lost"}
@@ -212,7 +299,7 @@ def _fit_rows(recording, passage, sensors, turnout, context, identity, settings)
             samples = recording.signal(sensor.name)
             other_models = {label: m.model for label, m in latest.items() if m is not None and label != sensor.section}
             fit = fit_channel(
-                samples, recording.rate, times, passage.motion.speed, section_model.model, settings, other_models
+                samples, recording.rate, times, passage.train_motion.speed, section_model.model, settings, other_models
             )
         rows.append(fit_row(fit, sensor, section_model.model_id, turnout, identity))
     return rows

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from datetime import datetime
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from ruamel.yaml import YAML
@@ -19,7 +20,7 @@ from turnout.config.settings.passage import PassageSettings
 from turnout.content import sha256_of
 from turnout.errors import ConfigError
 from turnout.passage.axle_load import LoadCalibration
-from turnout.passage.axle_patterns import read_patterns
+from turnout.passage.axle_patterns import Pattern, read_patterns
 from turnout.passage.clusters import Clusters
 from turnout.records import ModalModel, Unit
 from turnout.stages.passage import PassageContext, SectionModel
@@ -28,13 +29,32 @@ from turnout.workflow.notes import MAX_FILE_DURATION, start_of
 
 
 def passage_context(
-    turnout: str, settings: Mapping | None = None, work="work"
+    turnout: str, settings: Mapping[str, Any] | None = None, work: str | Path = "work"
 ) -> tuple[Callable[[Unit], str], PassageContext]:
-    """(token, context) of one turnout; ``settings`` are by section of the configuration.
+    """Everything that the passages of one turnout are analysed with, and a token that changes with it.
 
-    ``token(unit)`` changes with the models that may be fitted to the passage, the patterns, clusters and calibrations.
     Models are read from the results of the hammer stage in ``work``. A passage is fitted with the latest model before
     it, so a new campaign changes the scores of later passages only.
+
+    Parameters
+    ----------
+    turnout : str
+        Id of the turnout.
+    settings : mapping of str to any or None
+        Settings by section of the configuration; None: the defaults.
+    work : str or Path
+        Folder of the nightly run's results.
+
+    Returns
+    -------
+    tuple of (callable, PassageContext)
+        ``token(unit)`` and the context. The token changes with the models that may be fitted to the passage, the
+        patterns, clusters and calibrations.
+
+    Raises
+    ------
+    ConfigError
+        The file of the axle patterns cannot be used.
     """
     passage_settings = settings["passage"] if settings else PassageSettings()
     models, clusters_file = section_models(turnout, work), Path(passage_settings.assets) / "clusters.json"
@@ -52,9 +72,19 @@ def passage_context(
 
 
 def applicable_models(models: tuple[SectionModel, ...], label: str) -> tuple[SectionModel, ...]:
-    """Those of ``models``, in order of time, that may be fitted to a file's passages, by the time in its name.
+    """Models that may be fitted to the passages of a file, by the time in its name.
 
-    All models if the name has no time.
+    Parameters
+    ----------
+    models : tuple of SectionModel
+        Models of one section, in order of time.
+    label : str
+        Label of the file's unit.
+
+    Returns
+    -------
+    tuple of SectionModel
+        All models if the name has no time.
     """
     start = start_of(label)
     if start is None:
@@ -63,8 +93,21 @@ def applicable_models(models: tuple[SectionModel, ...], label: str) -> tuple[Sec
     return (*(models[now - 1 : now] if now else models[:1]), *models[now:end])
 
 
-def section_models(turnout: str, work="work") -> dict[str, tuple[SectionModel, ...]]:
-    """Accepted models of each section, by label, in order of time."""
+def section_models(turnout: str, work: str | Path = "work") -> dict[str, tuple[SectionModel, ...]]:
+    """Accepted models of each section, by label, in order of time.
+
+    Parameters
+    ----------
+    turnout : str
+        Id of the turnout.
+    work : str or Path
+        Folder of the nightly run's results.
+
+    Returns
+    -------
+    dict of str to tuple of SectionModel
+        Models by label of the section.
+    """
     by_section: dict[str, list[SectionModel]] = {}
     for result in current_results(work, "hammer", turnout):
         for row in result.tables.get("models", []):
@@ -74,7 +117,7 @@ def section_models(turnout: str, work="work") -> dict[str, tuple[SectionModel, .
     return {label: tuple(sorted(ms, key=lambda m: (m.measured_at, m.model_id))) for label, ms in by_section.items()}
 
 
-def _section_model(row) -> SectionModel:
+def _section_model(row: Mapping[str, Any]) -> SectionModel:
     n = int(row["model_order"])
     a = np.asarray(row["a_matrix"], float).reshape(n, n)
     b, c = np.asarray(row["b_vector"], float), np.asarray(row["c_vector"], float)
@@ -84,10 +127,23 @@ def _section_model(row) -> SectionModel:
     return SectionModel(row["model_id"], moment, model)
 
 
-def known_patterns(path: str):
-    """Axle patterns of a YAML file, () if the default file does not exist.
+def known_patterns(path: str) -> tuple[Pattern, ...]:
+    """Axle patterns of known trains.
 
-    ConfigError if the file cannot be used, or if another file named in the settings does not exist.
+    Parameters
+    ----------
+    path : str
+        YAML file.
+
+    Returns
+    -------
+    tuple of Pattern
+        Empty if the default file does not exist.
+
+    Raises
+    ------
+    ConfigError
+        The file cannot be used, or is not the default one and does not exist.
     """
     if Path(path).is_file():
         return _read_patterns(path, sha256_of(path))
@@ -97,7 +153,7 @@ def known_patterns(path: str):
 
 
 @lru_cache(maxsize=4)
-def _read_patterns(path: str, content: str):
+def _read_patterns(path: str, content: str) -> tuple[Pattern, ...]:
     """Axle patterns of a file; ``content`` is its hash, since the same name may be another file."""
     try:
         with as_config_errors(path, "the file"):
@@ -108,12 +164,34 @@ def _read_patterns(path: str, content: str):
 
 
 def read_clusters(path: Path) -> Clusters | None:
-    """The current clusters, None if none were fitted."""
+    """The current clusters, None if none were fitted.
+
+    Parameters
+    ----------
+    path : Path
+        JSON file, which may be missing.
+
+    Returns
+    -------
+    Clusters or None
+        None without a file.
+    """
     return Clusters.of(json.loads(path.read_text(encoding="utf-8"))) if path.is_file() else None
 
 
 def read_loads(path: Path) -> dict[str, dict[str, LoadCalibration]]:
-    """Turnout -> channel -> calibration; empty without a file."""
+    """Axle load calibrations of all turnouts.
+
+    Parameters
+    ----------
+    path : Path
+        JSON file, which may be missing.
+
+    Returns
+    -------
+    dict of str to dict of str to LoadCalibration
+        Calibrations by turnout and channel; empty without a file.
+    """
     if not path.is_file():
         return {}
     document = json.loads(path.read_text(encoding="utf-8"))
@@ -126,5 +204,5 @@ def read_loads(path: Path) -> dict[str, dict[str, LoadCalibration]]:
     }
 
 
-def _digest(path) -> str:
+def _digest(path: str | Path) -> str:
     return sha256_of(path) if Path(path).is_file() else ""

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
+from turnout.config import TurnoutConfig
 from turnout.constants import KMH
 from turnout.errors import ReadError
+from turnout.passage.axle_load import LoadFinding
+from turnout.passage.channel_fit import ChannelFit
+from turnout.passage.result import Passage, PassageSensor
+from turnout.passage.timetable import ListedTrain
 from turnout.passage.train_type import UNKNOWN
+from turnout.records import Rejection
 from turnout.stages.common import number, quarantine_row, temperature
 
 REMEDIES = {
@@ -23,8 +32,29 @@ REMEDIES = {
 }
 
 
-def finding_rows(passage, base, path, record, recording_id) -> list[dict]:
-    """Rows of ``quarantine`` for unused data: the whole record, or single channels."""
+def finding_rows(
+    passage: Passage, base: Mapping[str, Any], path: str, record: int, recording_id: str
+) -> list[dict[str, Any]]:
+    """Rows of ``quarantine`` for unused data: the whole record, or single channels.
+
+    Parameters
+    ----------
+    passage : Passage
+        One passage.
+    base : mapping of str to any
+        Column turnout_id.
+    path : str
+        Path of the file.
+    record : int
+        Number of the record, from 0.
+    recording_id : str
+        Id of the file's content.
+
+    Returns
+    -------
+    list of dict
+        One row per finding.
+    """
     rows: list[dict] = []
     for finding in passage.findings:
         is_whole_record = finding.reason in ("no_train", "two_trains", "train_cut_off")
@@ -41,15 +71,40 @@ def finding_rows(passage, base, path, record, recording_id) -> list[dict]:
     return rows
 
 
-def _subject(finding) -> str:
+def _subject(finding: Rejection) -> str:
     """The part of a record that a finding concerns: its channels, all channels, or what is uncertain, in words."""
     if finding.channels:
         return " and ".join(finding.channels)
     return "all channels" if finding.reason == "interference" else finding.detail
 
 
-def passage_row(passage, identity, listed, load, conditions) -> dict:
-    """Row of ``passages``: values from the recording and the train data, and their differences."""
+def passage_row(
+    passage: Passage,
+    identity: Mapping[str, Any],
+    listed: ListedTrain | None,
+    load: LoadFinding | None,
+    conditions: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Row of ``passages``: values from the recording and the train data, and their differences.
+
+    Parameters
+    ----------
+    passage : Passage
+        One passage.
+    identity : mapping of str to any
+        Columns turnout_id, recording_id and passed_at_utc.
+    listed : ListedTrain or None
+        The train in the train data.
+    load : LoadFinding or None
+        Axle load measured by the sensors.
+    conditions : mapping of str to any
+        Notes of the recording.
+
+    Returns
+    -------
+    dict of str to any
+        The row, without passage_id.
+    """
     speed, type_ = passage.speed, passage.type
     row = {
         **identity,
@@ -65,7 +120,7 @@ def passage_row(passage, identity, listed, load, conditions) -> dict:
     noted_temperature = number(conditions, "rail_temperature")
     if noted_temperature is not None and temperature(conditions) is None:
         remarks.append(f"rail temperature {noted_temperature:g} °C noted, not used")
-    if speed is not None:
+    if speed is not None and type_ is not None:
         row |= {
             "speed_kmh": KMH * float(speed.speed),
             "speed_se_kmh": KMH * float(speed.se),
@@ -84,7 +139,7 @@ def passage_row(passage, identity, listed, load, conditions) -> dict:
     return row
 
 
-def _enter_listed(row, listed) -> list[str]:
+def _enter_listed(row: dict[str, Any], listed: ListedTrain) -> list[str]:
     """Enter the values of the train data, and return their differences from the recording in words."""
     remarks = []
     if listed.speed is not None:
@@ -116,8 +171,29 @@ def _enter_listed(row, listed) -> list[str]:
     return remarks
 
 
-def fit_row(fit, sensor, model_id, turnout, identity) -> dict:
-    """Row of ``passage_fits``; ``fit`` is None if the channel cannot be fitted."""
+def fit_row(
+    fit: ChannelFit | None, sensor: PassageSensor, model_id: str, turnout: TurnoutConfig, identity: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Row of ``passage_fits``.
+
+    Parameters
+    ----------
+    fit : ChannelFit or None
+        Fit of the channel, None if it cannot be fitted.
+    sensor : PassageSensor
+        The channel.
+    model_id : str
+        Id of the section's model.
+    turnout : TurnoutConfig
+        Configuration of the turnout.
+    identity : mapping of str to any
+        Column passed_at_utc.
+
+    Returns
+    -------
+    dict of str to any
+        The row, without passage_id.
+    """
     row = {
         "section_id": turnout.section_id(sensor.section),
         "channel": sensor.name,
@@ -127,7 +203,7 @@ def fit_row(fit, sensor, model_id, turnout, identity) -> dict:
         "status": fit.status if fit else "rejected",
         "n_wheels": len(fit.times) if fit else 0,
     }
-    if fit is None or fit.scores is None:
+    if fit is None or fit.scores is None or fit.test is None:
         return row
     null = fit.null
     row |= {
@@ -150,6 +226,6 @@ def fit_row(fit, sensor, model_id, turnout, identity) -> dict:
     return row
 
 
-def _plain(value):
+def _plain(value: float | None) -> float | None:
     """A float, None if it is not finite."""
     return float(value) if value is not None and np.isfinite(value) else None

@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from datetime import timedelta
+from datetime import datetime, timedelta
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from turnout.config.settings.passage import PassageSettings
 from turnout.config.turnout import TurnoutConfig
 from turnout.errors import ReadError
 from turnout.files import write_if_changed
 from turnout.passage.analysis import analyse
 from turnout.passage.axle_load import LoadCalibration, calibrate, quasi_static, train_amplitude, with_error_correlation
+from turnout.passage.axle_patterns import Pattern
 from turnout.passage.clusters import Clusters, fit_clusters
-from turnout.passage.timetable import listed_for, listed_trains
+from turnout.passage.result import Passage, PassageSensor
+from turnout.passage.timetable import ListedTrain, listed_for, listed_trains
 from turnout.readers import read
-from turnout.records import LongRecording, Recording
-from turnout.stages.passage import _time_of_label, sensors_of, trains_in
+from turnout.records import LongRecording, Recording, Unit
+from turnout.stages.passage import _time_of_label, passage_config, sensors_of, trains_in
 from turnout.stages.passage_context import read_clusters, read_loads
 from turnout.workflow.scan import scan
+
+if TYPE_CHECKING:
+    import duckdb
 
 MAX_PASSAGES = 20_000  # for the clusters: more do not change them, and a mixture fit takes time
 RECENT_QUERY = """
@@ -28,7 +36,7 @@ RECENT_QUERY = """
 """
 
 
-def learn_clusters(connection, settings) -> Clusters:
+def learn_clusters(connection: duckdb.DuckDBPyConnection, settings: PassageSettings) -> Clusters:
     """Clusters of the latest passages of a registry, written to a file; existing clusters keep their ids.
 
     Parameters
@@ -46,12 +54,35 @@ def learn_clusters(connection, settings) -> Clusters:
     return clusters
 
 
-def weighed_trains(turnout: TurnoutConfig, raw_root, patterns, settings, max_trains: int = 60) -> list[dict]:
-    """The latest ``max_trains`` trains of known axle load in a turnout's raw folder, with each sensor's amplitude.
+def weighed_trains(
+    turnout: TurnoutConfig,
+    raw_root: str | Path,
+    patterns: Sequence[Pattern],
+    settings: PassageSettings,
+    max_trains: int = 60,
+) -> list[dict]:
+    """The latest trains of known axle load in a turnout's raw folder, with each sensor's amplitude.
 
-    Each is {"file", "load" [t], "speed" [m/s], "amplitudes": {channel: (mean, standard error) [m/s²]}}. A train counts
-    if trains.csv gives its axle load, its time and number of axles match one passage only, and the recording is
-    accepted.
+    A train counts if trains.csv gives its axle load, its time and number of axles match one passage only, and the
+    recording is accepted.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+        Configuration of the turnout.
+    raw_root : str or Path
+        Folder that holds those of the turnouts.
+    patterns : sequence of Pattern
+        Axle patterns of known trains.
+    settings : PassageSettings
+        Settings of the passages.
+    max_trains : int
+        Files are read until this number is reached.
+
+    Returns
+    -------
+    list of dict
+        Each has "file", "load" [t], "speed" [m/s] and "amplitudes": mean and standard error [m/s²] by channel.
     """
     listed, _ = listed_trains([row for row in turnout.trains if row.get("axle_load_t")])
     trains: list[dict] = []
@@ -66,11 +97,18 @@ def weighed_trains(turnout: TurnoutConfig, raw_root, patterns, settings, max_tra
     return trains
 
 
-def _weighed_in_unit(unit, turnout, raw_root, patterns, settings, listed):
+def _weighed_in_unit(
+    unit: Unit,
+    turnout: TurnoutConfig,
+    raw_root: str | Path,
+    patterns: Sequence[Pattern],
+    settings: PassageSettings,
+    listed: Sequence[ListedTrain],
+) -> list[dict[str, Any]]:
     trains = []
     for path, *_ in unit.files:
         try:
-            result = read(path, raw_root, turnout.passages.description, settings.longest)
+            result = read(path, raw_root, passage_config(turnout).description, settings.longest)
             records: list[Recording | LongRecording] = [*result.recordings, *result.long_recordings]
             for recording in records:
                 started = recording.started_at or _time_of_label(unit.label)
@@ -84,7 +122,15 @@ def _weighed_in_unit(unit, turnout, raw_root, patterns, settings, listed):
     return trains
 
 
-def _weighed_train(recording, started, path, turnout, patterns, settings, listed):
+def _weighed_train(
+    recording: Recording,
+    started: datetime,
+    path: str,
+    turnout: TurnoutConfig,
+    patterns: Sequence[Pattern],
+    settings: PassageSettings,
+    listed: Sequence[ListedTrain],
+) -> list[dict[str, Any]]:
     """Amplitudes of one passage as a list of one, [] if it is rejected or its load is not known."""
     passage = analyse(recording, sensors_of(turnout), patterns, settings)
     if passage.status != "accepted":
@@ -94,17 +140,36 @@ def _weighed_train(recording, started, path, turnout, patterns, settings, listed
     return [] if train is None else [_sensor_amplitudes(path, recording, passage, sensors_of(turnout), train)]
 
 
-def _sensor_amplitudes(path, recording, passage, sensors, train):
+def _sensor_amplitudes(
+    path: str, recording: Recording, passage: Passage, sensors: Sequence[PassageSensor], train: ListedTrain
+) -> dict[str, Any]:
     amplitudes = {
         s.name: train_amplitude(quasi_static(recording.signal(s.name), recording.rate, passage, s.position))
         for s in sensors
         if s.name in passage.at_sensor
     }
-    return {"file": path, "load": train.axle_load, "speed": passage.motion.speed, "amplitudes": amplitudes}
+    return {"file": path, "load": train.axle_load, "speed": passage.train_motion.speed, "amplitudes": amplitudes}
 
 
-def learn_loads(turnout: TurnoutConfig, trains, settings) -> dict[str, LoadCalibration]:
-    """Calibration of every sensor that recorded enough of ``trains``, written to the file of all turnouts."""
+def learn_loads(
+    turnout: TurnoutConfig, trains: Sequence[Mapping[str, Any]], settings: PassageSettings
+) -> dict[str, LoadCalibration]:
+    """Calibrate every sensor that recorded enough weighed trains, and write the file of all turnouts.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+        Configuration of the turnout.
+    trains : sequence of mapping
+        Result of ``weighed_trains``.
+    settings : PassageSettings
+        Settings of the passages.
+
+    Returns
+    -------
+    dict of str to LoadCalibration
+        Calibrations by channel.
+    """
     calibrations = {}
     for name in sorted({name for t in trains for name in t["amplitudes"]}):
         recorded = [t for t in trains if name in t["amplitudes"]]
@@ -122,7 +187,7 @@ def learn_loads(turnout: TurnoutConfig, trains, settings) -> dict[str, LoadCalib
     return calibrations
 
 
-def _document(by_turnout):
+def _document(by_turnout: Mapping[str, Mapping[str, LoadCalibration]]) -> dict[str, Any]:
     return {
         turnout: {name: asdict(c) | {"covariance": c.covariance.tolist()} for name, c in sorted(channels.items())}
         for turnout, channels in sorted(by_turnout.items())

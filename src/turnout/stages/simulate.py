@@ -3,14 +3,19 @@
 A request is checked before anything is simulated.
 """
 
+from __future__ import annotations
+
 import json
 import math
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, replace
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from turnout.config import TurnoutConfig
 from turnout.config.events import time_problem
 from turnout.config.load import load_configuration
 from turnout.config.schema import suggestion
@@ -18,8 +23,11 @@ from turnout.config.settings.simulate import SimulateSettings
 from turnout.constants import KMH
 from turnout.errors import ConfigError, SimulationError
 from turnout.readers.writing import WRITERS, write
+from turnout.records import RawChannel, RawDescription, Recording
 from turnout.simulate import Hammer, Sensor, load_track, load_vehicle, simulate_hammer, simulate_passage
-from turnout.simulate.hammer import hammer_sensors, resolve_location
+from turnout.simulate.hammer import ImpactTruth, hammer_sensors, resolve_location
+from turnout.simulate.turnout_track import TurnoutTrack
+from turnout.simulate.vehicle import Vehicle
 from turnout.stages.accepted_effects import accepted_of, terms_on
 from turnout.stages.mismatch_inputs import track_file
 
@@ -27,9 +35,21 @@ ENDINGS = {"uff58": "uff", "uff58b": "uff", "hdf5": "h5", "mat73": "mat", "rcmdx
 MIN_COUNTS = {"tests": 1, "blows": 1, "units": 1, "seed": 0}
 
 
-def check_request(request) -> None:
-    """ConfigError for options that are invalid or contradict each other.
+def check_request(request: Mapping[str, Any]) -> None:
+    """Check the options of a request.
 
+    Parameters
+    ----------
+    request : mapping of str to any
+        Options of the command by name.
+
+    Raises
+    ------
+    ConfigError
+        An option is invalid, or two contradict each other.
+
+    Examples
+    --------
     >>> check_request({"format": "hdf5", "at": "2024-05-13", "seed": 0, "tests": 2, "out": "a.h5"})
     Traceback (most recent call last):
     turnout.errors.ConfigError: simulate, --out: one file for 2 tests. Write --tests 1, or leave out --out.
@@ -45,9 +65,26 @@ def check_request(request) -> None:
         raise _option_error("at", f"{request['at']!r} is not a time in UTC{fault[0]}", fault[1])
 
 
-def with_format(request) -> dict:
+def with_format(request: Mapping[str, Any]) -> dict[str, Any]:
     """The request with its format: as given, else by the file's extension, else HDF5.
 
+    Parameters
+    ----------
+    request : mapping of str to any
+        Options of the command by name.
+
+    Returns
+    -------
+    dict of str to any
+        The request, with an entry "format".
+
+    Raises
+    ------
+    ConfigError
+        The extension of the file is that of no format.
+
+    Examples
+    --------
     >>> with_format({"format": None, "out": "a.npz"})["format"], with_format({"format": None, "out": None})["format"]
     ('npz', 'hdf5')
     """
@@ -64,23 +101,64 @@ def with_format(request) -> dict:
 def ending_of(format_name: str) -> str:
     """File extension of a format.
 
+    Parameters
+    ----------
+    format_name : str
+        A key of ``turnout.readers.writing.WRITERS``.
+
+    Returns
+    -------
+    str
+        Without its dot.
+
+    Examples
+    --------
     >>> ending_of("hdf5")
     'h5'
     """
     return ENDINGS.get(format_name, format_name)
 
 
-def time_of(request) -> datetime:
-    """UTC time of the first sample."""
+def time_of(request: Mapping[str, Any]) -> datetime:
+    """UTC time of the first sample.
+
+    Parameters
+    ----------
+    request : mapping of str to any
+        Options of the command by name.
+
+    Returns
+    -------
+    datetime
+        Naive UTC.
+    """
     return datetime.fromisoformat(request["at"].removesuffix("Z"))
 
 
-def section_channels(turnout, section: float | str):
-    """Description of a section's hammer files; ConfigError if the turnout has no tests of ``section``."""
+def section_channels(turnout: TurnoutConfig, section: float | str) -> RawDescription:
+    """Description of a section's hammer files.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+        Configuration of the turnout.
+    section : float or str
+        Label of the section.
+
+    Returns
+    -------
+    RawDescription
+        Channels and format of the files.
+
+    Raises
+    ------
+    ConfigError
+        The turnout has no tests of ``section``.
+    """
     if turnout.hammer is None:
         raise _option_error("turnout", f"{turnout.id} has no hammer tests in its layout", "Name another one, or none")
     descriptions = turnout.hammer.descriptions
-    if section not in descriptions:
+    if not isinstance(section, str) or section not in descriptions:
         observation = f"{section!r} is no section of {turnout.id}, whose raw files are sought by section"
         remedy = f"Write one of {', '.join(descriptions)}; places in metres go without --turnout"
         raise _option_error("section", observation, remedy)
@@ -94,11 +172,26 @@ def _option_error(option: str, observation: str, remedy: str) -> ConfigError:
 NOISE = {"acceleration": 0.05, "force": 2.0, "velocity": 1e-6, "displacement": 1e-9}
 
 
-def write_hammer(request):
-    """Simulate the tests of a request and write them; yields (path, summary).
+def write_hammer(request: Mapping[str, Any]) -> Iterator[tuple[Path, str]]:
+    """Simulate the tests of a request and write them.
 
-    ``request`` holds the options of `turnout simulate hammer`: track, section, tests, blows, turnout, config, raw,
-    out, format, at, temperature, truth, seed.
+    Parameters
+    ----------
+    request : mapping of str to any
+        Options of `turnout simulate hammer`: track, section, tests, blows, turnout, config, raw, out, format, at,
+        temperature, truth, seed.
+
+    Yields
+    ------
+    tuple of (Path, str)
+        Path and summary of one test.
+
+    Raises
+    ------
+    ConfigError
+        An option is invalid.
+    SimulationError
+        A file is there already or cannot be written.
     """
     request = with_format(request)
     check_request(request)
@@ -106,7 +199,7 @@ def write_hammer(request):
     track = _track(request, turnout)
     section = _label_or_position(request["section"])
     position, base = resolve_location(track, section)
-    _, route = track.locations.get(section, (position, "main"))
+    route = track.locations[section][1] if isinstance(section, str) and section in track.locations else "main"
     description = None if turnout is None else section_channels(turnout, section)
     hammer, sensors = _hammer_channels(description, position)
     rate = description.rate if description and description.rate else settings.rate
@@ -139,8 +232,26 @@ def write_hammer(request):
         yield path, f"{len(recordings)} blows at {position:.2f} m, highest force {peak / 1e3:.1f} kN"
 
 
-def write_passage(request):
-    """Simulate the passage of a request and write it; yields (path, summary)."""
+def write_passage(request: Mapping[str, Any]) -> Iterator[tuple[Path, str]]:
+    """Simulate the passage of a request and write it.
+
+    Parameters
+    ----------
+    request : mapping of str to any
+        Options of `turnout simulate passage`.
+
+    Yields
+    ------
+    tuple of (Path, str)
+        Path and summary of the passage.
+
+    Raises
+    ------
+    ConfigError
+        An option is invalid.
+    SimulationError
+        The file is there already or cannot be written.
+    """
     request = with_format(request)
     check_request(request)
     turnout, settings = _turnout(request)
@@ -189,8 +300,23 @@ REQUEST_DEFAULTS = {
 }
 
 
-def hammer_request(track, out, wildcards):
-    """The request of rule simulate_hammer."""
+def hammer_request(track: str, out: str, wildcards: Any) -> dict[str, Any]:
+    """The request of rule simulate_hammer.
+
+    Parameters
+    ----------
+    track : str
+        Track file.
+    out : str
+        File to write.
+    wildcards : any
+        Wildcards of the rule: ``location`` and ``seed``.
+
+    Returns
+    -------
+    dict of str to any
+        Options for ``write_hammer``.
+    """
     request = REQUEST_DEFAULTS | {
         "track": track,
         "out": out,
@@ -200,8 +326,23 @@ def hammer_request(track, out, wildcards):
     return request | {"tests": 1, "blows": 10, "at": "2024-05-13T09:00:00"}
 
 
-def passage_request(files, out, wildcards):
-    """The request of rule simulate_passage."""
+def passage_request(files: Any, out: Any, wildcards: Any) -> dict[str, Any]:
+    """The request of rule simulate_passage.
+
+    Parameters
+    ----------
+    files : any
+        Input of the rule: ``track`` and ``vehicle``.
+    out : any
+        Output of the rule: ``recording`` and ``truth``.
+    wildcards : any
+        Wildcards of the rule: ``speed``, ``route``, ``direction`` and ``seed``.
+
+    Returns
+    -------
+    dict of str to any
+        Options for ``write_passage``.
+    """
     request = REQUEST_DEFAULTS | {
         "track": files.track,
         "vehicle": files.vehicle,
@@ -212,14 +353,14 @@ def passage_request(files, out, wildcards):
     return request | {"load": 0.5, "units": 1, "seed": int(wildcards.seed), "at": "2024-05-13T09:00:00"}
 
 
-def _turnout(request):
+def _turnout(request: Mapping[str, Any]) -> tuple[TurnoutConfig | None, SimulateSettings]:
     if not request.get("turnout"):
         return None, SimulateSettings()
     turnout = load_configuration(request["config"]).turnout(request["turnout"])
     return turnout, turnout.settings.get("simulate", SimulateSettings())
 
 
-def _track(request, turnout):
+def _track(request: Mapping[str, Any], turnout: TurnoutConfig | None) -> TurnoutTrack:
     """The track of the request, else the turnout's own, else that of Tommerup."""
     if request["track"] is None and turnout is not None:
         path = track_file(turnout)
@@ -227,7 +368,7 @@ def _track(request, turnout):
     return load_track(request["track"] or "tommerup", request["seed"])
 
 
-def _label_or_position(section):
+def _label_or_position(section: str) -> float | str:
     try:
         position = float(section)
     except ValueError:
@@ -235,18 +376,18 @@ def _label_or_position(section):
     return position if math.isfinite(position) else section
 
 
-def _noted_conditions(request):
+def _noted_conditions(request: Mapping[str, Any]) -> dict[str, Any]:
     temperature = request.get("temperature")
     return {} if temperature is None else {"rail_temperature": temperature}
 
 
-def _term_conditions(vehicle, request):
+def _term_conditions(vehicle: Vehicle, request: Mapping[str, Any]) -> dict[str, Any]:
     """Conditions that accepted terms depend on: temperature, axle loads, train."""
     loads = tuple(2.0 * float(load) for load in vehicle.static_loads)
     return {"axle_loads": loads, "train": vehicle.name.lower(), **_noted_conditions(request)}
 
 
-def _sensor(channel, position):
+def _sensor(channel: RawChannel, position: float) -> Sensor:
     """Sensor of a configured channel, at ``position`` if the configuration gives none."""
     return Sensor(
         channel.name,
@@ -260,7 +401,7 @@ def _sensor(channel, position):
     )
 
 
-def _hammer_channels(description, position):
+def _hammer_channels(description: RawDescription | None, position: float) -> tuple[Hammer, tuple[Sensor, ...]]:
     if description is None:
         return Hammer(), hammer_sensors(position)
     force = next((c for c in description.channels if c.quantity == "force"), None)
@@ -274,14 +415,22 @@ def _hammer_channels(description, position):
     return Hammer(force=_sensor(force, position)), tuple(sensors)
 
 
-def _passage_sensors(description, track):
+def _passage_sensors(description: RawDescription | None, track: TurnoutTrack) -> tuple[Sensor, ...]:
     if description is None:
         positions = sorted({(position, name) for name, (position, _) in track.locations.items()})
         return tuple(Sensor(name, position, "rail web", noise=0.05, limit=5000.0) for position, name in positions)
-    return tuple(_sensor(c, c.position) for c in description.channels if c.quantity != "temperature")
+    return tuple(
+        _sensor(c, 0.0) for c in description.channels if c.quantity != "temperature"
+    )  # a force has no position
 
 
-def _write(request, turnout, name, recordings, description):
+def _write(
+    request: Mapping[str, Any],
+    turnout: TurnoutConfig | None,
+    name: str,
+    recordings: Iterable[Recording],
+    description: RawDescription | None,
+) -> Path:
     folder = Path(request["raw"]) / (turnout.raw if turnout is not None else "simulated")
     path = Path(request["out"]) if request.get("out") else folder / name
     if turnout is not None and not request.get("out") and path.exists():
@@ -294,7 +443,7 @@ def _write(request, turnout, name, recordings, description):
         raise SimulationError(f"{path} cannot be written as {request['format']}: {error}.") from None
 
 
-def _impact_truth(impact):
+def _impact_truth(impact: ImpactTruth) -> dict[str, float]:
     return {
         "place_m": round(impact.place, 4),
         "speed_m_s": round(impact.speed, 4),
@@ -302,7 +451,14 @@ def _impact_truth(impact):
     }
 
 
-def _write_truth(request, path, track, route, recording, extra):
+def _write_truth(
+    request: Mapping[str, Any],
+    path: Path,
+    track: TurnoutTrack,
+    route: str,
+    recording: Recording,
+    extra: Mapping[str, Any],
+) -> None:
     """Write the truth of the file at ``path`` to the targets of the request, if any."""
     targets = [Path(request["truth"]) / Path(path).with_suffix(".json").name] if request.get("truth") else []
     targets += [Path(request["truth_file"])] if request.get("truth_file") else []

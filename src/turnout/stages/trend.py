@@ -3,6 +3,7 @@
 import json
 import logging
 from pathlib import Path
+from typing import Any
 
 from turnout.config import load_configuration
 from turnout.files import read_json, write_text
@@ -11,7 +12,9 @@ from turnout.registry.database import open_registry
 from turnout.trend.update import update
 
 
-def trend_job(generation, state, worklist, configuration, day=None) -> dict:
+def trend_job(
+    generation: str | Path, state: str | Path, worklist: str | Path, configuration: str | Path, day: str | None = None
+) -> dict[str, Any]:
     """Bring the derived tables of a registry up to date and write the worklist.
 
     Parameters
