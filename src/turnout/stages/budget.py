@@ -17,7 +17,7 @@ from turnout.mismatch.turnout.prediction import Predictions, Predictor, Terms, V
 class BudgetSpentError(TurnoutError):
     """The time of a diagnosis is spent; ``rows`` are those of the ``n_done`` finished groups, by table."""
 
-    def __init__(self, n_done: int = 0, n_groups: int = 1, rows: dict[str, list[dict[str, Any]]] | None = None):
+    def __init__(self, n_done: int = 0, n_groups: int = 1, rows: dict[str, list[dict[str, Any]]] | None = None) -> None:
         super().__init__(
             f"the time given is up, {n_done} of {n_groups} groups done; the same command goes on from there."
         )
@@ -77,7 +77,22 @@ class CountedPredictions:
     watch: Watch
 
     def predict(self, values: Values, terms: Terms, observations: Sequence[Observation]) -> list[np.ndarray]:
-        """Predictions, (n,) per observation."""
+        """Predictions, (n,) per observation.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Nuisance parameters by name.
+        terms : sequence of PhysicsTerm
+            Terms of the track, the vehicles and the sensors.
+        observations : sequence of Observation
+            Receptances and passages to predict.
+
+        Returns
+        -------
+        list of (n,) array
+            One per observation.
+        """
         self.watch.tick()
         return self.predictor.predict(values, terms, observations)
 
@@ -89,7 +104,26 @@ class CountedPredictions:
         observations: Sequence[Observation],
         predictions: Sequence[np.ndarray],
     ) -> list[np.ndarray]:
-        """Predictions a small step from ``terms``."""
+        """Predictions a small step from ``terms``.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Nuisance parameters by name.
+        terms : sequence of PhysicsTerm
+            Terms whose predictions are known.
+        new : sequence of PhysicsTerm
+            Terms a small step from them.
+        observations : sequence of Observation
+            Receptances and passages to predict.
+        predictions : sequence of (n,) array
+            Predictions with ``terms``, one per observation.
+
+        Returns
+        -------
+        list of (n,) array
+            Predictions with ``new``, one per observation.
+        """
         self.watch.tick()
         return self.predictor.predict_near(values, terms, new, observations, predictions)
 
@@ -101,7 +135,26 @@ class CountedPredictions:
         observations: Sequence[Observation],
         base: Sequence[np.ndarray],
     ) -> list[np.ndarray]:
-        """Derivatives by ``nuisances``."""
+        """Derivatives by ``nuisances``.
+
+        Parameters
+        ----------
+        nuisances : sequence of Nuisance
+            Nuisance parameters of the derivatives.
+        values : mapping of str to float
+            Nuisance parameters by name.
+        terms : sequence of PhysicsTerm
+            Terms of the track, the vehicles and the sensors.
+        observations : sequence of Observation
+            Receptances and passages to predict.
+        base : sequence of (n,) array
+            Predictions with ``terms``, one per observation.
+
+        Returns
+        -------
+        list of (n, n_nuisance) array
+            One per observation.
+        """
         self.watch.tick()
         return self.predictor.nuisance_jacobian(nuisances, values, terms, observations, base)
 
@@ -109,12 +162,32 @@ class CountedPredictions:
 class ReplayedPredictions:
     """Predictions of a ``predictor`` within a ``Budget``: computed once, then replayed."""
 
-    def __init__(self, predictor: Predictor, budget: Budget):
+    def __init__(self, predictor: Predictor, budget: Budget) -> None:
         self.predictor, self.budget = predictor, budget
         self._rail = repr(sorted(predictor.rail.items()))  # passages depend on it
 
     def predict(self, values: Values, terms: Terms, observations: Sequence[Observation]) -> list[np.ndarray]:
-        """Predictions, (n,) per observation."""
+        """Predictions, (n,) per observation.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Nuisance parameters by name.
+        terms : sequence of PhysicsTerm
+            Terms of the track, the vehicles and the sensors.
+        observations : sequence of Observation
+            Receptances and passages to predict.
+
+        Returns
+        -------
+        list of (n,) array
+            One per observation.
+
+        Raises
+        ------
+        BudgetSpentError
+            The time is spent and the predictions are not stored.
+        """
         key = self._key("p", values, terms, observations)
         return self._compute_once(key, lambda: self.predictor.predict(values, terms, observations))
 
@@ -126,7 +199,31 @@ class ReplayedPredictions:
         observations: Sequence[Observation],
         predictions: Sequence[np.ndarray],
     ) -> list[np.ndarray]:
-        """Predictions a small step from ``terms``."""
+        """Predictions a small step from ``terms``.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Nuisance parameters by name.
+        terms : sequence of PhysicsTerm
+            Terms whose predictions are known.
+        new : sequence of PhysicsTerm
+            Terms a small step from them.
+        observations : sequence of Observation
+            Receptances and passages to predict.
+        predictions : sequence of (n,) array
+            Predictions with ``terms``, one per observation.
+
+        Returns
+        -------
+        list of (n,) array
+            Predictions with ``new``, one per observation.
+
+        Raises
+        ------
+        BudgetSpentError
+            The time is spent and the predictions are not stored.
+        """
         key = self._key(f"m:{new!r}", values, terms, observations)
         return self._compute_once(
             key, lambda: self.predictor.predict_near(values, terms, new, observations, predictions)
@@ -140,7 +237,31 @@ class ReplayedPredictions:
         observations: Sequence[Observation],
         base: Sequence[np.ndarray],
     ) -> list[np.ndarray]:
-        """Derivatives by ``nuisances``."""
+        """Derivatives by ``nuisances``.
+
+        Parameters
+        ----------
+        nuisances : sequence of Nuisance
+            Nuisance parameters of the derivatives.
+        values : mapping of str to float
+            Nuisance parameters by name.
+        terms : sequence of PhysicsTerm
+            Terms of the track, the vehicles and the sensors.
+        observations : sequence of Observation
+            Receptances and passages to predict.
+        base : sequence of (n,) array
+            Predictions with ``terms``, one per observation.
+
+        Returns
+        -------
+        list of (n, n_nuisance) array
+            One per observation.
+
+        Raises
+        ------
+        BudgetSpentError
+            The time is spent and the derivatives are not stored.
+        """
         key = self._key("j", values, terms, observations)
         return self._compute_once(
             key, lambda: self.predictor.nuisance_jacobian(nuisances, values, terms, observations, base)

@@ -38,7 +38,7 @@ class Checkpoint(MutableMapping[str, Any]):
         Whatever the values depend on.
     """
 
-    def __init__(self, folder: Path, name: str, version: Sequence[object] = ()):
+    def __init__(self, folder: Path, name: str, version: Sequence[object] = ()) -> None:
         digest = hashlib.sha256(repr((FORMAT, VERSION, *version)).encode()).hexdigest()[:12]
         self.folder = folder / f"{name}-{digest}"
         self.cache: dict[str, Any] = {}
@@ -119,6 +119,7 @@ def read_value(path: Path) -> Any:
     Parameters
     ----------
     path : Path
+        File of the value.
 
     Returns
     -------
