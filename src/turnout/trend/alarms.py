@@ -4,8 +4,11 @@ Flagged are charts with an open alarm and sections with a significant drift. All
 open alarm that is not raised again is not removed: it stays in the table, closed by ``recomputed``.
 """
 
+from __future__ import annotations
+
 import logging
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -15,6 +18,13 @@ from turnout.trend.drift import adjusted_p_values
 from turnout.trend.forecast import N_RECENT, forecast
 from turnout.trend.panel import WHOLE_TURNOUT, timestamps
 from turnout.trend.residuals import first_epoch
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import Any
+
+    from turnout.config.settings.trend import TrendSettings
+    from turnout.trend.cusum import Charts
 
 COLUMNS = {
     "direction": object,
@@ -49,12 +59,27 @@ class Flag:
     autocorrelation: float
     temperature: np.ndarray | None
     slope_weight: float
-    ratio: dict
-    opening_campaign: dict
+    ratio: dict[str, float]
+    opening_campaign: dict[str, int]
 
 
-def candidates(charts, status, settings) -> dict[int, Flag]:
-    """Charts that may be flagged, by row of ``status``: an open alarm, or a drift with p below the rate."""
+def candidates(charts: Charts, status: pd.DataFrame, settings: TrendSettings) -> dict[int, Flag]:
+    """Charts that may be flagged, by row of ``status``: an open alarm, or a drift with p below the rate.
+
+    Parameters
+    ----------
+    charts : Charts
+        Finished charts of a panel.
+    status : DataFrame
+        Table of ``chart_status``.
+    settings : TrendSettings
+        Settings of the charts.
+
+    Returns
+    -------
+    dict
+        Flag by row of ``status``.
+    """
     p = charts.prepared
     whole = status["section_id"].to_numpy() == WHOLE_TURNOUT
     drifting = p.baseline.complete & ~whole & (status["drift_p"].to_numpy() <= settings.false_discovery)
@@ -66,7 +91,7 @@ def candidates(charts, status, settings) -> dict[int, Flag]:
         opening_campaign = {d: _opening_campaign(alarm) for d, alarm in alarms.items() if alarm[-1]}
         if len(opening_campaign) == 2:  # describe the later alarm, relative to the level after the earlier one
             column = column[column >= min(opening_campaign.values())]
-        temperature, slope_weight = _temperatures(charts, i, column)
+        temperature, slope_weight = _temperatures(charts, int(i), column)
         flags[int(i)] = Flag(
             p.time[i, column],
             charts.residual[i, column],
@@ -79,7 +104,7 @@ def candidates(charts, status, settings) -> dict[int, Flag]:
     return flags
 
 
-def _opening_campaign(alarm) -> int:
+def _opening_campaign(alarm: np.ndarray) -> int:
     """Campaign that raised an alarm that is open at the newest.
 
     >>> _opening_campaign(np.array([True, False, True, True]))
@@ -88,7 +113,7 @@ def _opening_campaign(alarm) -> int:
     return int(np.max(np.flatnonzero(~alarm), initial=-1)) + 1
 
 
-def _temperatures(charts, i, column):
+def _temperatures(charts: Charts, i: int, column: np.ndarray) -> tuple[np.ndarray | None, float]:
     """Temperatures of a section's values [°C], and the weight of the slope that other values give (0: none do)."""
     p = charts.prepared
     if i >= len(p.panel.charts):
@@ -98,11 +123,25 @@ def _temperatures(charts, i, column):
     return p.panel.temperature[i, column], float((p.spread[i] / error) ** 2) if later and error > 0.0 else 0.0
 
 
-def describe_flagged(status, flags, settings) -> pd.DataFrame:
+def describe_flagged(status: pd.DataFrame, flags: Mapping[int, Flag], settings: TrendSettings) -> pd.DataFrame:
     """Add to ``chart_status`` the adjusted p value of the drift, and the description of each flagged chart.
 
-    ``flags`` are the ``candidates`` by row of ``status``. Flagged are charts with an open alarm, and sections whose
-    adjusted p value of the drift is at most ``settings.false_discovery``. The costly steps run on them alone.
+    Flagged are charts with an open alarm, and sections whose adjusted p value of the drift is at most
+    ``settings.false_discovery``. The costly steps run on them alone.
+
+    Parameters
+    ----------
+    status : DataFrame
+        Table of ``chart_status``, of the whole fleet.
+    flags : mapping
+        Result of ``candidates``, by row of ``status``.
+    settings : TrendSettings
+        Settings of the charts.
+
+    Returns
+    -------
+    DataFrame
+        A copy of ``status`` with the columns ``drift_q`` and ``COLUMNS``.
     """
     status = status.copy()
     is_tested = status["complete"].to_numpy() & (status["section_id"].to_numpy() != WHOLE_TURNOUT)
@@ -119,13 +158,13 @@ def describe_flagged(status, flags, settings) -> pd.DataFrame:
     return status
 
 
-def _describe_chart(flag, settings):
+def _describe_chart(flag: Flag, settings: TrendSettings) -> dict[str, Any]:
     """Columns that describe one flagged chart. The change point is sought in its present epoch only."""
     time, values = flag.time, flag.values
     change = find_change(time, values, flag.autocorrelation, flag.temperature, flag.slope_weight)
     at = int(np.searchsorted(time, change.since)) if np.isfinite(change.since) else 0
     if flag.opening_campaign:
-        direction = max(flag.opening_campaign, key=flag.opening_campaign.get)
+        direction = max(flag.opening_campaign, key=lambda name: flag.opening_campaign[name])
     else:
         direction = "down" if values[-N_RECENT:].mean() < values.mean() else "up"
     outlook = forecast(time[at:], values[at:], flag.autocorrelation, settings)
@@ -154,7 +193,7 @@ ALARM_KEYS = ["turnout_id", "section_id", "band", "source", "direction"]
 PREVIOUS_ALARMS = "select * from alarms where closed_at_utc is null or closed_by = 'recomputed' order by alarm_id"
 
 
-def with_withdrawn(alarms, before, newest) -> pd.DataFrame:
+def with_withdrawn(alarms: pd.DataFrame, before: pd.DataFrame, newest: float) -> pd.DataFrame:
     """Rows of ``alarms``, and those open ones of ``before`` without a counterpart there, closed by ``recomputed``.
 
     Every alarm is recomputed each night. A corrected value, an event entered late or another autocorrelation of the
@@ -169,6 +208,11 @@ def with_withdrawn(alarms, before, newest) -> pd.DataFrame:
         Published rows that are open, or already closed by ``recomputed``: these stay.
     newest : float
         Time of the newest campaign of the fleet, at which they are closed. [d]
+
+    Returns
+    -------
+    DataFrame
+        Rows of both.
     """
     if before.empty:
         return alarms

@@ -1,10 +1,16 @@
 """Baseline of each chart: its campaigns, frequency, temperature slope, spread and autocorrelation."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.trend.epochs import by_epoch, expand_epochs
+
+if TYPE_CHECKING:
+    from turnout.config.settings.trend import TrendSettings
 
 # Prior standard deviation of the temperature slope about 0. [%/°C] Resonances fall by 0.15 to 0.4 %/°C
 # (docs/measuring.md), so all slopes lie within one sd. A choice; a year of temperatures outweighs it.
@@ -32,12 +38,31 @@ class Baseline:
     inside: np.ndarray
 
 
-def baseline_window(usable, time, least_days, least_campaigns) -> tuple[np.ndarray, np.ndarray]:
+def baseline_window(
+    usable: np.ndarray, time: np.ndarray, least_days: float, least_campaigns: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Campaigns of the baseline: from the first usable one until both minimum length and minimum number are reached.
 
-    Returns the (n_chart, n_campaign) mask and the (n_chart,) flag of a complete baseline. An incomplete baseline
-    holds all usable campaigns.
+    An incomplete baseline holds all usable campaigns.
 
+    Parameters
+    ----------
+    usable : (n_chart, n_campaign) array of bool
+        Campaigns with frequency and temperature.
+    time : (n_chart, n_campaign) array of float
+        Time of each campaign. [d]
+    least_days : float
+        Minimum length. [d]
+    least_campaigns : int
+        Minimum number of campaigns.
+
+    Returns
+    -------
+    (n_chart, n_campaign) and (n_chart,) arrays of bool
+        Campaigns of the baseline, and whether it is complete.
+
+    Examples
+    --------
     >>> time = np.array([[0.0, 10.0, 20.0, 30.0]])
     >>> baseline_window(np.array([[True, False, True, True]]), time, 15.0, 2)
     (array([[ True, False,  True, False]]), array([ True]))
@@ -49,16 +74,34 @@ def baseline_window(usable, time, least_days, least_campaigns) -> tuple[np.ndarr
     return usable & before, is_complete.any(axis=1)
 
 
-def fit_baseline(frequency, temperature, time, epoch, settings) -> tuple[Baseline, np.ndarray]:
-    r"""Fit level and temperature slope by least squares on the baseline, with one level per epoch in it.
+def fit_baseline(
+    frequency: np.ndarray, temperature: np.ndarray, time: np.ndarray, epoch: np.ndarray, settings: TrendSettings
+) -> tuple[Baseline, np.ndarray]:
+    """Fit level and temperature slope by least squares on the baseline, with one level per epoch in it.
 
     .. math:: 100 (f_i / f_0 - 1) = l_{e(i)} + b (T_i - T_0) + r_i
 
     The prior of b is 0 ± ``SLOPE_PRIOR_SD``. A year of temperatures outweighs it a thousand times. Where the
-    temperature hardly varied, it keeps b bounded.
+    temperature hardly varied, it keeps b bounded. f0 and T0 are means over the first epoch of the baseline.
 
-    Returns the baseline and the (n_chart, n_campaign) frequencies in percent of f0, corrected for temperature; nan
-    without frequency or temperature. f0 and T0 are means over the first epoch of the baseline.
+    Parameters
+    ----------
+    frequency : (n_chart, n_campaign) array of float
+        Natural frequencies, nan without one. [Hz]
+    temperature : (n_chart, n_campaign) array of float
+        Rail temperatures, nan without one. [°C]
+    time : (n_chart, n_campaign) array of float
+        Time of each campaign. [d]
+    epoch : (n_chart, n_campaign) array of int
+        Number of the epoch of each campaign.
+    settings : TrendSettings
+        Minimum length and number of campaigns of a baseline.
+
+    Returns
+    -------
+    (Baseline, (n_chart, n_campaign) array of float)
+        The baselines, and the frequencies in percent of f0, corrected for temperature; nan without frequency or
+        temperature.
     """
     usable = np.isfinite(frequency) & np.isfinite(temperature)
     inside, complete = baseline_window(usable, time, settings.baseline_days, settings.baseline_campaigns)
@@ -87,7 +130,9 @@ def fit_baseline(frequency, temperature, time, epoch, settings) -> tuple[Baselin
     return fitted, corrected
 
 
-def spread_and_autocorrelation(residual, inside, epoch, freedom, time) -> tuple[np.ndarray, np.ndarray]:
+def spread_and_autocorrelation(
+    residual: np.ndarray, inside: np.ndarray, epoch: np.ndarray, freedom: np.ndarray, time: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     r"""Spread s and lag-one autocorrelation of a residual over the baseline, about the mean of each epoch.
 
     .. math:: s^2 = \sum_B r_i^2 / \nu, \qquad
@@ -98,12 +143,29 @@ def spread_and_autocorrelation(residual, inside, epoch, freedom, time) -> tuple[
     that of Marriott and Pope (Biometrika 41, 1954). A temperature slope, smooth over the year, counts as another
     mean. rho is clipped to 0 ... 0.9. Neighbours more than 1.5 usual intervals apart are no pair.
 
+    Parameters
+    ----------
+    residual : (n_chart, n_campaign) array of float
+        Residuals; nan does not count.
+    inside : (n_chart, n_campaign) array of bool
+        Campaigns of the baseline.
+    epoch : (n_chart, n_campaign) array of int
+        Number of the epoch of each campaign.
+    freedom : (n_chart,) array of int
+        Degrees of freedom of the spread.
+    time : (n_chart, n_campaign) array of float
+        Time of each campaign. [d]
+
     Returns
     -------
     spread : (n_chart,) array of float
         nan without degrees of freedom. [unit of residual]
-    memory : (n_chart,) array of float
+    autocorrelation : (n_chart,) array of float
         rho; nan with fewer than 6 pairs.
+
+    References
+    ----------
+    Marriott and Pope, Bias in the estimation of autocorrelations, Biometrika 41, 1954.
     """
     inside = inside & np.isfinite(residual)
     n_epoch = int(epoch.max(initial=0)) + 1
@@ -125,9 +187,21 @@ def spread_and_autocorrelation(residual, inside, epoch, freedom, time) -> tuple[
     return spread, np.where(pairs >= 6, np.clip(rho, 0.0, 0.9), np.nan)
 
 
-def previous(inside) -> np.ndarray:
+def previous(inside: np.ndarray) -> np.ndarray:
     """Column of the last campaign of the mask before each column, -1 where there is none.
 
+    Parameters
+    ----------
+    inside : (n_chart, n_campaign) array of bool
+        The mask.
+
+    Returns
+    -------
+    (n_chart, n_campaign) array of int
+        Number of the column.
+
+    Examples
+    --------
     >>> previous(np.array([[True, False, True, True]]))
     array([[-1,  0,  0,  2]])
     """
@@ -135,9 +209,23 @@ def previous(inside) -> np.ndarray:
     return np.concatenate([np.full((len(inside), 1), -1), column], axis=1)[:, :-1]
 
 
-def usual_interval(time, inside) -> np.ndarray:
-    """Median time between neighbouring campaigns of the mask, nan where there are none. [unit of time]
+def usual_interval(time: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    """Median time between neighbouring campaigns of the mask, nan where there are none.
 
+    Parameters
+    ----------
+    time : (n_chart, n_campaign) array of float
+        Time of each campaign. [d]
+    inside : (n_chart, n_campaign) array of bool
+        The mask.
+
+    Returns
+    -------
+    (n_chart,) array of float
+        Median interval, in the unit of ``time``.
+
+    Examples
+    --------
     >>> usual_interval(np.array([[0.0, 7.0, 10.0, 14.0, 60.0]]), np.array([[True, True, False, True, True]]))
     array([7.])
     """
@@ -152,12 +240,26 @@ def usual_interval(time, inside) -> np.ndarray:
     return np.where(count > 0, step[np.arange(len(step)), np.maximum(count - 1, 0) // 2], np.nan)
 
 
-def pooled_autocorrelation(autocorrelation, classes) -> np.ndarray:
+def pooled_autocorrelation(autocorrelation: np.ndarray, classes: np.ndarray) -> np.ndarray:
     """Autocorrelation of each chart: the mean over the charts of its class; 0 where none is known.
 
     The estimate of one chart from 52 campaigns scatters by 0.13, which would cause false alarms. The mean scatters
     far less.
 
+    Parameters
+    ----------
+    autocorrelation : (n_chart,) array of float
+        Estimate of each chart, nan where there is none.
+    classes : (n_chart,) array of int
+        Class of each chart.
+
+    Returns
+    -------
+    (n_chart,) array of float
+        Mean of the class of each chart.
+
+    Examples
+    --------
     >>> pooled_autocorrelation(np.array([0.2, 0.4, np.nan, 0.1]), np.array([0, 0, 0, 1]))
     array([0.3, 0.3, 0.3, 0.1])
     """

@@ -1,12 +1,20 @@
 """Estimate when a flagged chart changed and by how much, as a step or as a drift."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import brentq
 from scipy.special import stdtr
 
 from turnout.trend.forecast import DAYS_PER_YEAR, step_autocorrelation
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
 
 MIN_VALUES = 4  # values, fewer give no change point: level, size, onset and scatter are estimated
 
@@ -46,7 +54,14 @@ class Fits:
     rss: np.ndarray
 
 
-def fit_onsets(time, values, autocorrelation, pieces=4, temperature=None, slope_weight=0.0) -> dict[str, Fits]:
+def fit_onsets(
+    time: np.ndarray,
+    values: np.ndarray,
+    autocorrelation: float,
+    pieces: int = 4,
+    temperature: np.ndarray | None = None,
+    slope_weight: float = 0.0,
+) -> dict[str, Fits]:
     r"""Fit a level and a change for every onset, by generalised least squares with AR(1) errors.
 
     .. math:: y_i = l + b\,T_i + c\, x_i,\quad x_i = [t_i \ge \tau]\ \text{(step)},\quad
@@ -61,26 +76,33 @@ def fit_onsets(time, values, autocorrelation, pieces=4, temperature=None, slope_
     ----------
     time, values : (n,) arrays of float
         Ascending [d], [%]; n >= 4.
-    memory : float
+    autocorrelation : float
         phi at the usual spacing.
+    pieces : int
+        Number of onsets in each gap between two values.
     temperature : (n,) array of float, optional
         [°C]; without it b = 0.
     slope_weight : float
         Squared ratio of the scatter to the error of the slope, if the slope was fitted to other values; 0 if it was
         fitted to these.
 
+    Returns
+    -------
+    dict
+        Fits of "step" and of "drift".
+
     Examples
     --------
     >>> t, y = np.arange(6.0), np.array([0.0, 0.0, 0.0, -2.0, -2.0, -2.0])
     >>> step = fit_onsets(t, y, 0.0, pieces=1)["step"]
     >>> best = np.argmin(step.rss)
-    >>> print(f"{YEAR * step.onset[best]:.1f} {step.size[best]:.1f} {abs(step.rss[best]):.1f}")
+    >>> print(f"{DAYS_PER_YEAR * step.onset[best]:.1f} {step.size[best]:.1f} {abs(step.rss[best]):.1f}")
     -2.5 -2.0 0.0
     """
     t = (time - time[-1]) / DAYS_PER_YEAR
     diagonal, off_diagonal = _precision(time, autocorrelation)
 
-    def times_precision(v):
+    def times_precision(v: np.ndarray) -> np.ndarray:
         product = diagonal * v + off_diagonal * np.append(v[1:], 0.0)
         product[1:] += off_diagonal[:-1] * v[:-1]
         return product
@@ -107,7 +129,7 @@ def fit_onsets(time, values, autocorrelation, pieces=4, temperature=None, slope_
     )
     rss_total = max(rss_total - temperature_y**2 * per_degree, 0.0)
 
-    def solve(square, level, product, temperature_sum):
+    def solve(square: np.ndarray, level: np.ndarray, product: np.ndarray, temperature_sum: np.ndarray) -> Fits:
         weight = np.maximum(square - level**2 / total - temperature_sum**2 * per_degree, 1e-300)
         moment = product - level * total_y / total - temperature_sum * temperature_y * per_degree
         rss = np.maximum(rss_total - moment**2 / weight, 1e-12 * max(rss_total, 1e-300))
@@ -126,7 +148,7 @@ def fit_onsets(time, values, autocorrelation, pieces=4, temperature=None, slope_
     }
 
 
-def _precision(time, autocorrelation):
+def _precision(time: np.ndarray, autocorrelation: float) -> tuple[np.ndarray, np.ndarray]:
     """Diagonal and off-diagonal of the precision matrix of an AR(1) process: (n,) arrays, the last off-diagonal 0."""
     phi = step_autocorrelation(time, autocorrelation)
     share = 1.0 / (1.0 - phi**2)
@@ -135,7 +157,14 @@ def _precision(time, autocorrelation):
     return diagonal, off_diagonal
 
 
-def find_change(time, values, autocorrelation, temperature=None, slope_weight=0.0, level=0.95) -> Change:
+def find_change(
+    time: ArrayLike,
+    values: ArrayLike,
+    autocorrelation: float,
+    temperature: np.ndarray | None = None,
+    slope_weight: float = 0.0,
+    level: float = 0.95,
+) -> Change:
     r"""Onset and size of one change, averaged over its shape and its onset.
 
     The prior is uniform over step and drift, over the onset and over the size; the scatter is unknown. Then an onset
@@ -145,7 +174,27 @@ def find_change(time, values, autocorrelation, temperature=None, slope_weight=0.
 
     with :math:`\nu` = number of values less level, size and temperature slope. Given the onset, the size has a Student
     t distribution about its least-squares value with :math:`\nu - 1` degrees of freedom (one for the onset). Intervals
-    are the central ones of the mixture. ``temperature`` and ``slope_weight`` are those of ``fit_onsets``.
+    are the central ones of the mixture.
+
+    Parameters
+    ----------
+    time : (n,) array of float
+        Ascending times. [d]
+    values : (n,) array of float
+        Residuals. [%]
+    autocorrelation : float
+        AR(1) coefficient at the usual spacing.
+    temperature : (n,) array of float or None
+        Rail temperatures; None: no temperature slope. [°C]
+    slope_weight : float
+        Weight of the temperature slope, see ``fit_onsets``.
+    level : float
+        Probability of the intervals.
+
+    Returns
+    -------
+    Change
+        Onset, size and shape; nan with fewer than ``MIN_VALUES`` values or constant ones.
 
     References
     ----------
@@ -182,22 +231,22 @@ def find_change(time, values, autocorrelation, temperature=None, slope_weight=0.
     return Change(shape, since, first, last, middle, low, high, float(p[1].sum()))
 
 
-def _quantiles(fit, weight, levels):
+def _quantiles(fit: Fits, weight: np.ndarray, levels: Sequence[float]) -> list[float]:
     """Quantiles of the onset, its probability uniform over the width of each interval."""
     running = np.append(0.0, np.cumsum(weight) / weight.sum())
     edges = np.append(fit.onset[0] - 0.5 * fit.width[0], fit.onset + 0.5 * fit.width)
     return [float(np.interp(q, running, edges)) for q in levels]
 
 
-def _sizes(fit, p, freedom, levels):
+def _sizes(fit: Fits, p: np.ndarray, freedom: int, levels: Sequence[float]) -> list[float]:
     """Quantiles of a mixture of Student t distributions; components below 1e-6 of the largest weight are left out."""
     use = p > 1e-6 * p.max()
     p, size = p[use] / p[use].sum(), fit.size[use]
     scale = np.sqrt(fit.rss[use] / freedom / fit.weight[use])
     half_range = 1e3 * scale.max() + np.ptp(size)
 
-    def quantile(q):
-        def shortfall(x):
+    def quantile(q: float) -> float:
+        def shortfall(x: float) -> float:
             return float(np.sum(p * stdtr(freedom, (x - size) / scale))) - q
 
         return float(

@@ -3,7 +3,10 @@
 Residuals are corrected for temperature and for the median of the sibling sections, then standardised and summed.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,8 +21,14 @@ from turnout.trend.residuals import (
 )
 from turnout.trend.threshold import run_lengths, threshold_for
 
+if TYPE_CHECKING:
+    from turnout.config.settings.trend import TrendSettings
+    from turnout.trend.residuals import Residuals
 
-def cusum(z, allowance, threshold, active, fresh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+
+def cusum(
+    z: np.ndarray, allowance: np.ndarray, threshold: np.ndarray, active: np.ndarray, fresh: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     r"""One-sided CUSUM for a falling mean.
 
     .. math:: S_i = \max(0, S_{i-1} - z_i - k)
@@ -35,6 +44,7 @@ def cusum(z, allowance, threshold, active, fresh) -> tuple[np.ndarray, np.ndarra
     allowance : (n_chart, n_campaign) array of float
         k, in the same unit.
     threshold : (n_chart,) array of float
+        H, in the same unit.
     active, fresh : (n_chart, n_campaign) arrays of bool
         Campaigns that count; campaigns that start an epoch.
 
@@ -114,9 +124,25 @@ class Charts:
     up_began: np.ndarray
 
 
-def guard_factor(count, small, settings) -> np.ndarray:
-    """Factor on sigma for the error of a baseline of ``count`` campaigns; see docs/decisions/guard-factor.md.
+def guard_factor(count: np.ndarray, small: np.ndarray, settings: TrendSettings) -> np.ndarray:
+    """Factor on sigma for the error of a baseline; see docs/decisions/guard-factor.md.
 
+    Parameters
+    ----------
+    count : (n_chart,) array of int
+        Campaigns of the baseline.
+    small : (n_chart,) array of bool
+        Charts with the small allowance.
+    settings : TrendSettings
+        The factors at 52 campaigns.
+
+    Returns
+    -------
+    (n_chart,) array of float
+        Factor, above 1.
+
+    Examples
+    --------
     >>> from turnout.config.settings.trend import TrendSettings
     >>> guard_factor(np.array([52, 13]), np.array([False, False]), TrendSettings()).round(2)
     array([1.12, 1.63])
@@ -125,8 +151,23 @@ def guard_factor(count, small, settings) -> np.ndarray:
     return 1.0 + excess * (52.0 / np.maximum(count, 1)) ** np.where(small, 1.0, 1.2)
 
 
-def finish(p: Prepared, phi, settings) -> Charts:
-    """Residuals, CUSUM and alarms of prepared charts; ``phi`` is the pooled autocorrelation of each chart."""
+def finish(p: Prepared, phi: np.ndarray, settings: TrendSettings) -> Charts:
+    """Residuals, CUSUM and alarms of prepared charts.
+
+    Parameters
+    ----------
+    p : Prepared
+        Prepared charts.
+    phi : (n_chart,) array of float
+        Pooled autocorrelation of each chart.
+    settings : TrendSettings
+        Settings of the charts.
+
+    Returns
+    -------
+    Charts
+        Finished charts of the sections and turnouts.
+    """
     n = len(p.panel.charts)
     widening = np.sqrt((1.0 + phi) / (1.0 - phi))
     with np.errstate(invalid="ignore"):
@@ -150,7 +191,9 @@ def finish(p: Prepared, phi, settings) -> Charts:
     )  # fmt: skip
 
 
-def _siblings_without_alarm(p, window, settled, chart_sums, settings):
+def _siblings_without_alarm(
+    p: Prepared, window: np.ndarray, settled: np.ndarray, chart_sums: _ChartSums, settings: TrendSettings
+) -> tuple[Residuals, dict[str, np.ndarray], np.ndarray]:
     """Residuals and sums of the sections, and which of their campaigns serve as siblings: none that is in alarm.
 
     Sections with a large change may first raise a false alarm in an unchanged one. Without them its alarm closes, and
@@ -158,6 +201,8 @@ def _siblings_without_alarm(p, window, settled, chart_sums, settings):
     """
     n = len(p.panel.charts)
     is_sibling = settled[:n]
+    sections: Any = None
+    sums: Any = None
     for _ in range(MAX_SIBLING_ROUNDS):
         sections = sums = None  # free the arrays of the last round before the next: they set the peak of memory
         sections = section_residuals(p, window, settled, is_sibling, settings)
@@ -168,7 +213,7 @@ def _siblings_without_alarm(p, window, settled, chart_sums, settings):
     return sections, sums, before
 
 
-def _thresholds(length, allowance):
+def _thresholds(length: np.ndarray, allowance: np.ndarray) -> np.ndarray:
     """(n_chart,) thresholds for the mean run ``length`` and the ``allowance`` of each chart."""
     pairs, where = np.unique(np.column_stack([length, allowance]), axis=0, return_inverse=True)
     return np.array([threshold_for(float(n), float(k)) for n, k in pairs] or [0.0])[where.ravel()]
@@ -177,10 +222,12 @@ def _thresholds(length, allowance):
 class _ChartSums:
     """Standardise residuals and sum them, for the sections first and then for the turnouts."""
 
-    def __init__(self, p, allowance, window, factor, settings):
+    def __init__(
+        self, p: Prepared, allowance: np.ndarray, window: np.ndarray, factor: np.ndarray, settings: TrendSettings
+    ) -> None:
         self.p, self.allowance, self.window, self.factor, self.settings = p, allowance, window, factor, settings
 
-    def __call__(self, rows, residuals):
+    def __call__(self, rows: slice, residuals: Residuals) -> dict[str, np.ndarray]:
         p, settings, window = self.p, self.settings, self.window[rows]
         epoch = p.epoch[rows]
         usable = window & np.isfinite(residuals.values)

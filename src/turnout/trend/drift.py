@@ -4,7 +4,9 @@ import numpy as np
 from scipy import stats
 
 
-def slopes(residual, time, mask, autocorrelation):
+def slopes(
+    residual: np.ndarray, time: np.ndarray, mask: np.ndarray, autocorrelation: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     r"""Least-squares slope of each chart against time, its standard error widened for AR(1) errors.
 
     .. math:: s_b^2 = \frac{\sum r^2}{\nu \sum (t - \bar t)^2}, \quad \nu = n \frac{1 - \phi}{1 + \phi} - 2
@@ -48,19 +50,49 @@ def slopes(residual, time, mask, autocorrelation):
         error = np.sqrt(rss / (count * shrink - 2.0) / sxx)
         is_valid = (freedom >= 3.0) & (sxx > 0.0)
         p_value = 2.0 * stats.t.sf(np.abs(slope / error), np.maximum(freedom, 1.0))
-    return tuple(np.where(is_valid, value, np.nan) for value in (slope, error, p_value))
+    slope, error, p_value = (np.where(is_valid, value, np.nan) for value in (slope, error, p_value))
+    return slope, error, p_value
 
 
-def span(time, mask) -> np.ndarray:
-    """Time from the first to the last campaign of the mask; 0 where there is none. [d]"""
+def span(time: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """Time from the first to the last campaign of the mask; 0 where there is none.
+
+    Parameters
+    ----------
+    time : (n_chart, n_campaign) array of float
+        Time of each campaign. [d]
+    mask : (n_chart, n_campaign) array of bool
+        Campaigns that count.
+
+    Returns
+    -------
+    (n_chart,) array of float
+        Length of time. [d]
+    """
     last = np.max(np.where(mask, time, -np.inf), axis=1, initial=-np.inf)
     first = np.min(np.where(mask, time, np.inf), axis=1, initial=np.inf)
     return np.where(mask.any(axis=1), last - first, 0.0)
 
 
-def adjusted_p_values(p_value) -> np.ndarray:
+def adjusted_p_values(p_value: np.ndarray) -> np.ndarray:
     """Benjamini and Hochberg's adjusted p values over the charts that have one, nan elsewhere.
 
+    Parameters
+    ----------
+    p_value : (n_chart,) array of float
+        P values, nan where there is none.
+
+    Returns
+    -------
+    (n_chart,) array of float
+        Adjusted p values.
+
+    References
+    ----------
+    Benjamini and Hochberg, Controlling the false discovery rate, J. Royal Stat. Soc. B 57, 1995.
+
+    Examples
+    --------
     >>> adjusted_p_values(np.array([0.01, np.nan, 0.04])).round(3)
     array([0.02,  nan, 0.04])
     """

@@ -1,11 +1,20 @@
 """Number the epochs of each chart: the campaigns between two maintenance events that reset it."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from turnout.trend.panel import days, is_true
 
+if TYPE_CHECKING:
+    import pandas as pd
 
-def epochs_of(charts, time, events) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+
+def epochs_of(
+    charts: pd.DataFrame, time: np.ndarray, events: pd.DataFrame | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Number the epochs of every chart from the maintenance events.
 
     An event resets the charts of its band (``resets_ballast``, ``resets_railpad``) in its section, or in the whole
@@ -45,7 +54,7 @@ def epochs_of(charts, time, events) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     return epoch, np.isfinite(reset[:, n_campaign]), started
 
 
-def _mark(reset, charts, time, events):
+def _mark(reset: np.ndarray, charts: pd.DataFrame, time: np.ndarray, events: pd.DataFrame) -> None:
     """Enter each event in ``reset`` at the first campaign at or after it; column n_campaign means none yet."""
     filled = np.where(np.isnan(time), np.inf, time)
     members = charts.groupby("turnout_id", sort=False, observed=True).indices
@@ -69,11 +78,27 @@ def _mark(reset, charts, time, events):
         reset[rows, column] = np.maximum(reset[rows, column], at)
 
 
-def by_epoch(values, mask, epoch, n_epoch) -> tuple[np.ndarray, np.ndarray]:
+def by_epoch(values: np.ndarray, mask: np.ndarray, epoch: np.ndarray, n_epoch: int) -> tuple[np.ndarray, np.ndarray]:
     """Mean of ``values`` over the masked campaigns of each epoch, and how many there are.
 
-    Returns two (n_chart, n_epoch) arrays; the mean is nan where the epoch has none.
+    Parameters
+    ----------
+    values : (n_chart, n_campaign) array of float
+        Values of which the masked ones are finite.
+    mask : (n_chart, n_campaign) array of bool
+        Campaigns that count.
+    epoch : (n_chart, n_campaign) array of int
+        Number of the epoch of each campaign.
+    n_epoch : int
+        Number of epochs.
 
+    Returns
+    -------
+    two (n_chart, n_epoch) arrays
+        Mean, nan where the epoch has none, and number.
+
+    Examples
+    --------
     >>> mean, n = by_epoch(np.array([[1.0, 3.0, 8.0]]), np.array([[True, True, True]]), np.array([[0, 0, 1]]), 2)
     >>> mean, n
     (array([[2., 8.]]), array([[2, 1]]))
@@ -86,6 +111,19 @@ def by_epoch(values, mask, epoch, n_epoch) -> tuple[np.ndarray, np.ndarray]:
         return np.where(count > 0, total / np.maximum(count, 1), np.nan), count
 
 
-def expand_epochs(per_epoch, epoch) -> np.ndarray:
-    """Expand (n_chart, n_epoch) values to the campaigns of each epoch, (n_chart, n_campaign)."""
+def expand_epochs(per_epoch: np.ndarray, epoch: np.ndarray) -> np.ndarray:
+    """Expand values of epochs to their campaigns.
+
+    Parameters
+    ----------
+    per_epoch : (n_chart, n_epoch) array of float
+        Value of each epoch.
+    epoch : (n_chart, n_campaign) array of int
+        Number of the epoch of each campaign.
+
+    Returns
+    -------
+    (n_chart, n_campaign) array of float
+        Value of the epoch of each campaign.
+    """
     return np.take_along_axis(per_epoch, epoch.astype(np.intp), axis=1)

@@ -1,9 +1,15 @@
 """Forecast when a resonance reaches its limit, as an interval of dates or none."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import stats
+
+if TYPE_CHECKING:
+    from turnout.config.settings.trend import TrendSettings
 
 DAYS_PER_YEAR = 365.25
 N_RECENT = 8  # newest values, whose mean is the present level of a chart
@@ -42,9 +48,23 @@ class Forecast:
         return f"not before {self.not_before:.1f} years, no latest date"
 
 
-def step_autocorrelation(time, autocorrelation) -> np.ndarray:
-    """AR(1) coefficient from each value to the next; ``autocorrelation`` is that at the median spacing.
+def step_autocorrelation(time: np.ndarray, autocorrelation: float) -> np.ndarray:
+    """AR(1) coefficient from each value to the next.
 
+    Parameters
+    ----------
+    time : (n,) array of float
+        Ascending times. [d]
+    autocorrelation : float
+        Coefficient at the median spacing.
+
+    Returns
+    -------
+    (n - 1,) array of float
+        Coefficient of each step, 0 for a step of no length.
+
+    Examples
+    --------
     >>> step_autocorrelation(np.array([0.0, 1.0, 2.0, 4.0]), 0.5)
     array([0.5 , 0.5 , 0.25])
     """
@@ -54,13 +74,35 @@ def step_autocorrelation(time, autocorrelation) -> np.ndarray:
     return np.where(step <= 0.0, 0.0, phi)
 
 
-def whiten(design, values, time, autocorrelation):
+def whiten(
+    design: np.ndarray, values: np.ndarray, time: np.ndarray, autocorrelation: float
+) -> tuple[np.ndarray, np.ndarray]:
     r"""Whiten a regression with AR(1) errors and unequal spacing.
 
     .. math:: y_i' = \frac{y_i - \phi_i y_{i-1}}{\sqrt{1 - \phi_i^2}}, \quad
               \phi_i = \phi^{(t_i - t_{i-1}) / \tilde{\Delta t}}
 
     with the median spacing :math:`\tilde{\Delta t}`; the first value stays as it is (Prais and Winsten 1954).
+
+    Parameters
+    ----------
+    design : (n, n_column) array of float
+        Design matrix.
+    values : (n,) array of float
+        Values. [%]
+    time : (n,) array of float
+        Ascending times. [d]
+    autocorrelation : float
+        AR(1) coefficient at the usual spacing.
+
+    Returns
+    -------
+    (n, n_column) and (n,) arrays of float
+        Whitened design and values.
+
+    References
+    ----------
+    Prais and Winsten 1954 for the first value.
     """
     phi = step_autocorrelation(time, autocorrelation)
     scale = 1.0 / np.sqrt(1.0 - phi**2)
@@ -68,11 +110,25 @@ def whiten(design, values, time, autocorrelation):
     return rows, np.append(values[:1], (values[1:] - phi * values[:-1]) * scale)
 
 
-def fit_line(time, values, autocorrelation):
+def fit_line(time: np.ndarray, values: np.ndarray, autocorrelation: float) -> tuple[np.ndarray, np.ndarray, float, int]:
     """Fit a line by generalised least squares.
 
-    Returns (level at the last value, slope [1/a]), their covariance, residual sum of squares and degrees of freedom.
+    Parameters
+    ----------
+    time : (n,) array of float
+        Ascending times. [d]
+    values : (n,) array of float
+        Values. [%]
+    autocorrelation : float
+        AR(1) coefficient at the usual spacing.
 
+    Returns
+    -------
+    ((2,) array, (2, 2) array, float, int)
+        Level at the last value [%] and slope [%/a], their covariance, residual sum of squares, degrees of freedom.
+
+    Examples
+    --------
     >>> fit = fit_line(np.arange(5.0) * 365.25, np.array([1.0, 0.0, -1.0, -2.0, -3.0]), 0.3)
     >>> fit[0].round(6)
     array([-3., -1.])
@@ -86,8 +142,23 @@ def fit_line(time, values, autocorrelation):
     return coefficient, covariance, rss, freedom
 
 
-def settling_rss(time, values, autocorrelation) -> float:
-    """Smallest residual sum of squares of a settling curve, a + c exp(-t / tau), over a grid of tau."""
+def settling_rss(time: np.ndarray, values: np.ndarray, autocorrelation: float) -> float:
+    """Smallest residual sum of squares of a settling curve, a + c exp(-t / tau), over a grid of tau.
+
+    Parameters
+    ----------
+    time : (n,) array of float
+        Ascending times. [d]
+    values : (n,) array of float
+        Values. [%]
+    autocorrelation : float
+        AR(1) coefficient at the usual spacing.
+
+    Returns
+    -------
+    float
+        Residual sum of squares of the whitened values. [%²]
+    """
     years = (time - time[0]) / DAYS_PER_YEAR
     lowest = np.inf
     for tau in SETTLING_YEARS:
@@ -97,11 +168,31 @@ def settling_rss(time, values, autocorrelation) -> float:
     return lowest
 
 
-def crossing_interval(coefficient, covariance, freedom, limit, level) -> tuple[float, float]:
+def crossing_interval(
+    coefficient: np.ndarray, covariance: np.ndarray, freedom: int, limit: float, level: float
+) -> tuple[float, float]:
     r"""Interval of the time at which a line reaches ``limit`` (Fieller).
 
-    All t >= 0 with :math:`|a + b t - L| \le q\, \mathrm{se}(a + b t)`, with q a quantile of Student's t. Returns
-    (earliest, latest) [a]: (nan, nan) where the line never reaches the limit, (t, nan) where there is no latest time.
+    All t >= 0 with :math:`|a + b t - L| \le q\, \mathrm{se}(a + b t)`, with q a quantile of Student's t.
+
+    Parameters
+    ----------
+    coefficient : (2,) array of float
+        Level a at time 0 [%] and slope b [%/a].
+    covariance : (2, 2) array of float
+        Their covariance.
+    freedom : int
+        Degrees of freedom.
+    limit : float
+        Limit L, below the level. [%]
+    level : float
+        Probability of the interval.
+
+    Returns
+    -------
+    (float, float)
+        Earliest and latest time [a]: (nan, nan) where the line never reaches the limit, (t, nan) where there is no
+        latest time.
 
     References
     ----------
@@ -129,7 +220,7 @@ def crossing_interval(coefficient, covariance, freedom, limit, level) -> tuple[f
     return (first, float((root - half) / square)) if square > 0.0 else (first, never[1])
 
 
-def forecast(time, values, autocorrelation, settings) -> Forecast:
+def forecast(time: np.ndarray, values: np.ndarray, autocorrelation: float, settings: TrendSettings) -> Forecast:
     """When the values reach ``settings.limit_percent``, with the interval of ``settings.interval_level``.
 
     If the mean of the last ``N_RECENT`` values is beyond the limit, it is reached. Otherwise a line is compared with a
@@ -142,6 +233,13 @@ def forecast(time, values, autocorrelation, settings) -> Forecast:
         Ascending [d] and [%] relative to the level before the change.
     autocorrelation : float
         AR(1) coefficient at the usual spacing.
+    settings : TrendSettings
+        Limit, probability of the interval, horizon and shortest time.
+
+    Returns
+    -------
+    Forecast
+        Verdict with slope and interval.
     """
     nan = float("nan")
     if time.size and values[-N_RECENT:].mean() <= settings.limit_percent:

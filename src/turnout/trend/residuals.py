@@ -3,7 +3,10 @@
 The residual of a section is its value less the level of the epoch and less the median of its sibling sections.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -12,6 +15,9 @@ from turnout.trend.baseline import Baseline, fit_baseline, spread_and_autocorrel
 from turnout.trend.epochs import by_epoch, epochs_of, expand_epochs
 from turnout.trend.panel import WHOLE_TURNOUT, Panel
 from turnout.trend.siblings import median_of_group, median_of_siblings
+
+if TYPE_CHECKING:
+    from turnout.config.settings.trend import TrendSettings
 
 
 @dataclass
@@ -39,8 +45,23 @@ class Prepared:
     with_siblings: np.ndarray
 
 
-def prepare(panel: Panel, events, settings) -> Prepared:
-    """Baselines of all charts of a panel, with and without siblings, and of the turnouts' medians."""
+def prepare(panel: Panel, events: pd.DataFrame | None, settings: TrendSettings) -> Prepared:
+    """Baselines of all charts of a panel, with and without siblings, and of the turnouts' medians.
+
+    Parameters
+    ----------
+    panel : Panel
+        Values of charts x campaigns.
+    events : DataFrame or None
+        Rows of the table ``events``.
+    settings : TrendSettings
+        Settings of the charts.
+
+    Returns
+    -------
+    Prepared
+        Charts of the sections, then those of the turnouts.
+    """
     time = panel.chart_time
     epoch, pending, started = epochs_of(panel.charts, time, events)
     base, values = fit_baseline(panel.frequency, panel.temperature, time, epoch, settings)
@@ -66,7 +87,7 @@ def prepare(panel: Panel, events, settings) -> Prepared:
     return _with_turnout_charts(section, centred, inside, baseline_span, events, settings)
 
 
-def _has_sibling_gain(spread_siblings, spread_alone, group):
+def _has_sibling_gain(spread_siblings: np.ndarray, spread_alone: np.ndarray, group: np.ndarray) -> np.ndarray:
     """Whether a turnout's sections scatter less about their median than alone; one answer for all of them."""
     with np.errstate(invalid="ignore", divide="ignore"):
         gain = np.log(spread_alone / spread_siblings)
@@ -75,7 +96,14 @@ def _has_sibling_gain(spread_siblings, spread_alone, group):
     return (total > 0.0)[group]
 
 
-def _with_turnout_charts(p: Prepared, centred, inside, baseline_span, events, settings) -> Prepared:
+def _with_turnout_charts(
+    p: Prepared,
+    centred: np.ndarray,
+    inside: np.ndarray,
+    baseline_span: slice,
+    events: pd.DataFrame | None,
+    settings: TrendSettings,
+) -> Prepared:
     """Append one chart per turnout, band and source: the median of its sections, to detect a change common to all."""
     group = p.charts["group"].to_numpy()
     median, count = median_of_group(centred, inside, group)
@@ -107,14 +135,38 @@ def _with_turnout_charts(p: Prepared, centred, inside, baseline_span, events, se
     )  # fmt: skip
 
 
-def stack_padded(a, b):
-    """Stack two arrays vertically; the narrower one is filled with nan on the right."""
+def stack_padded(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Stack two arrays vertically; the narrower one is filled with nan on the right.
+
+    Parameters
+    ----------
+    a : (n, m) array of float
+        First array.
+    b : (k, l) array of float
+        Second array.
+
+    Returns
+    -------
+    array
+        Rows of ``a``, then those of ``b``.
+    """
     width = max(a.shape[1], b.shape[1])
     return np.vstack([np.pad(x, ((0, 0), (0, width - x.shape[1])), constant_values=np.nan) for x in (a, b)])
 
 
-def first_epoch(p):
-    """Epoch in which each chart's baseline begins. Its level needs no extra allowance: the guard factor covers it."""
+def first_epoch(p: Prepared) -> np.ndarray:
+    """Epoch in which each chart's baseline begins. Its level needs no extra allowance: the guard factor covers it.
+
+    Parameters
+    ----------
+    p : Prepared
+        Prepared charts.
+
+    Returns
+    -------
+    (n_chart,) array of int
+        Number of the epoch.
+    """
     column = np.argmax(p.baseline.inside, axis=1)
     return p.epoch[np.arange(len(p.epoch)), column]
 
@@ -138,17 +190,33 @@ class Residuals:
     centred: np.ndarray
 
 
-def _usable(p, n_section):
+def _usable(p: Prepared, n_section: int) -> np.ndarray:
     usable = np.isfinite(p.values)
     return np.vstack([usable, np.zeros((len(p.epoch) - n_section, usable.shape[1]), dtype=bool)])
 
 
-def learning_campaigns(p, n_learning, n_section, need):
+def learning_campaigns(p: Prepared, n_learning: np.ndarray, n_section: int, need: int) -> tuple[np.ndarray, np.ndarray]:
     """Masks of campaigns from which a level is learned, and of settled campaigns.
 
     A level is learned from the baseline and from the first ``n_learning`` campaigns of every later epoch. A settled
     campaign has a complete baseline and is not one from which a later level is learned. Only settled campaigns serve
     as siblings of settled ones.
+
+    Parameters
+    ----------
+    p : Prepared
+        Prepared charts.
+    n_learning : (n_chart,) array of int
+        Campaigns from which the level of a later epoch is learned.
+    n_section : int
+        Number of charts of sections; those of turnouts follow.
+    need : int
+        Sections that the median of a turnout needs.
+
+    Returns
+    -------
+    two (n_chart, n_campaign) arrays of bool
+        Campaigns from which a level is learned, and settled campaigns.
     """
     usable = _usable(p, n_section)
     group = p.panel.charts["group"].to_numpy()
@@ -164,11 +232,31 @@ def learning_campaigns(p, n_learning, n_section, need):
     return window, settled
 
 
-def section_residuals(p: Prepared, window, settled, is_sibling, settings) -> Residuals:
-    """Residuals of the sections. ``window`` and ``settled`` are those of ``learning_campaigns``.
+def section_residuals(
+    p: Prepared, window: np.ndarray, settled: np.ndarray, is_sibling: np.ndarray, settings: TrendSettings
+) -> Residuals:
+    """Residuals of the sections.
 
-    (n_chart, n_campaign) ``is_sibling`` marks the settled campaigns that serve as siblings of others. Those in alarm do
-    not: a large change of one section would shift the median of a few and raise false alarms in the others.
+    Sections in alarm do not serve as siblings: a large change of one section would shift the median of a few and raise
+    false alarms in the others.
+
+    Parameters
+    ----------
+    p : Prepared
+        Prepared charts.
+    window : (n_chart, n_campaign) array of bool
+        Campaigns from which a level is learned, from ``learning_campaigns``.
+    settled : (n_chart, n_campaign) array of bool
+        Settled campaigns, from ``learning_campaigns``.
+    is_sibling : (n_section, n_campaign) array of bool
+        Settled campaigns that serve as siblings of others.
+    settings : TrendSettings
+        Settings of the charts.
+
+    Returns
+    -------
+    Residuals
+        Residuals of the sections alone.
     """
     n = len(p.panel.charts)
     group, epoch = p.panel.charts["group"].to_numpy(), p.epoch[:n]
@@ -187,7 +275,9 @@ def section_residuals(p: Prepared, window, settled, is_sibling, settings) -> Res
     return Residuals(p.values, np.where(enough, residual_siblings, e), sigma, level, shift, e)
 
 
-def _has_sibling_level(window, with_siblings, epoch, first, share) -> np.ndarray:
+def _has_sibling_level(
+    window: np.ndarray, with_siblings: np.ndarray, epoch: np.ndarray, first: np.ndarray, share: float
+) -> np.ndarray:
     """Campaigns of epochs in which the usual difference to the siblings is known, (n_chart, n_campaign).
 
     In a later epoch it is known if a ``share`` of the campaigns that learned the level were ``with_siblings``. A
@@ -199,11 +289,38 @@ def _has_sibling_level(window, with_siblings, epoch, first, share) -> np.ndarray
     return expand_epochs((n_with_siblings > 0) & (n_with_siblings >= share * n_learned * later), epoch)
 
 
-def turnout_residuals(p: Prepared, sections: Residuals, window, settled, alarmed, settings) -> Residuals:
+def turnout_residuals(
+    p: Prepared,
+    sections: Residuals,
+    window: np.ndarray,
+    settled: np.ndarray,
+    alarmed: np.ndarray,
+    settings: TrendSettings,
+) -> Residuals:
     """Residuals of the medians of the turnouts, which show a change common to all sections.
 
     Sections in ``alarmed``, whose own alarm is open, do not count: a large change of one section would shift the median
     of a few.
+
+    Parameters
+    ----------
+    p : Prepared
+        Prepared charts.
+    sections : Residuals
+        Residuals of the sections.
+    window : (n_chart, n_campaign) array of bool
+        Campaigns from which a level is learned, from ``learning_campaigns``.
+    settled : (n_chart, n_campaign) array of bool
+        Settled campaigns, from ``learning_campaigns``.
+    alarmed : (n_section, n_campaign) array of bool
+        Campaigns of sections whose own alarm is open.
+    settings : TrendSettings
+        Settings of the charts.
+
+    Returns
+    -------
+    Residuals
+        Residuals of the turnouts alone.
     """
     n, need = len(p.panel.charts), settings.siblings_minimum + 1
     group, epoch = p.panel.charts["group"].to_numpy(), p.epoch[n:]
@@ -216,18 +333,30 @@ def turnout_residuals(p: Prepared, sections: Residuals, window, settled, alarmed
     return Residuals(whole, residual, np.where(sigma > 0.0, sigma, np.nan), level, np.zeros_like(level), residual)
 
 
-def _centre(values, window, epoch):
+def _centre(values: np.ndarray, window: np.ndarray, epoch: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Level of each epoch, learned from the campaigns of ``window``, and the values less that level."""
     n_epoch = int(epoch.max(initial=0)) + 1
     level, _ = by_epoch(np.where(window, values, 0.0), window, epoch, n_epoch)
     return level, values - expand_epochs(level, epoch)
 
 
-def slope_variance(p, window):
-    """Variance that the error of the temperature slope adds to each value, (n_section, n_campaign). [%²]
+def slope_variance(p: Prepared, window: np.ndarray) -> np.ndarray:
+    """Variance that the error of the temperature slope adds to each value.
 
     Only temperatures outside the range of the baseline add to it; within that range the guard factor covers the error.
     It matters, for instance, in the first summer after a baseline with nearly constant temperature.
+
+    Parameters
+    ----------
+    p : Prepared
+        Prepared charts.
+    window : (n_section, n_campaign) array of bool
+        Campaigns from which a level is learned.
+
+    Returns
+    -------
+    (n_section, n_campaign) array of float
+        Variance. [%²]
     """
     n, base = len(window), p.baseline
     _, deviation = _centre(p.panel.temperature, window & np.isfinite(p.panel.temperature), p.epoch[:n])
@@ -237,7 +366,7 @@ def slope_variance(p, window):
     return np.nan_to_num(base.slope_se[:n, None]) ** 2 * excess
 
 
-def _sigma(p, enough, slope_variance_excess):
+def _sigma(p: Prepared, enough: np.ndarray, slope_variance_excess: np.ndarray) -> np.ndarray:
     """Spread of each value [%]: that of the baseline, with or without siblings, and more where its own error is larger.
 
     ``slope_variance_excess`` is the (n_section, n_campaign) variance from ``slope_variance``. [%²]

@@ -1,12 +1,29 @@
 """Median of the other sections of a turnout, campaign by campaign."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
-def blocks(group):
-    """Yield (n_group, size) arrays of chart numbers, one for all groups of equal size.
 
-    ``group`` is sorted. Equal sizes are stacked so that numpy computes many turnouts at once.
+def blocks(group: np.ndarray) -> Iterator[np.ndarray]:
+    """Yield the chart numbers of all groups of equal size, one array for each size.
+
+    Equal sizes are stacked so that numpy computes many turnouts at once.
+
+    Parameters
+    ----------
+    group : (n_chart,) array of int
+        Number of the group of each chart, sorted.
+
+    Yields
+    ------
+    (n_group, size) array of int
+        Charts of the groups of one size.
     """
     start = np.flatnonzero(np.diff(group, prepend=-1))
     size = np.diff(np.append(start, len(group)))
@@ -14,12 +31,13 @@ def blocks(group):
         yield start[size == n][:, None] + np.arange(n)
 
 
-def median_of_siblings(values, mask, group) -> tuple[np.ndarray, np.ndarray]:
+def median_of_siblings(values: np.ndarray, mask: np.ndarray, group: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Median over the siblings of each chart, that is the other charts of its group, and their number.
 
     Parameters
     ----------
     values : (n_chart, n_campaign) array of float
+        Values; those outside the mask may be nan.
     mask : (n_chart, n_campaign) array of bool
         Values that may serve as sibling of others.
     group : (n_chart,) array of int
@@ -58,8 +76,23 @@ def median_of_siblings(values, mask, group) -> tuple[np.ndarray, np.ndarray]:
     return median, n_siblings
 
 
-def median_of_group(values, mask, group) -> tuple[np.ndarray, np.ndarray]:
-    """Median of each group, and the number of charts it is computed from, (n_group, n_campaign) each."""
+def median_of_group(values: np.ndarray, mask: np.ndarray, group: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Median of each group, and the number of charts it is computed from.
+
+    Parameters
+    ----------
+    values : (n_chart, n_campaign) array of float
+        Values; those outside the mask may be nan.
+    mask : (n_chart, n_campaign) array of bool
+        Values that count.
+    group : (n_chart,) array of int
+        Number of the group of each chart, sorted.
+
+    Returns
+    -------
+    two (n_group, n_campaign) arrays
+        Median, nan without a chart, and number of charts.
+    """
     n_group = int(group[-1]) + 1 if len(group) else 0
     median = np.full((n_group, values.shape[1]), np.nan)
     count = np.zeros((n_group, values.shape[1]), dtype=np.int16)

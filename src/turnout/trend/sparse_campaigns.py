@@ -5,12 +5,18 @@ section has one level per quantity and at most one step between two campaigns. A
 per quantity.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import stats
 from scipy.special import logsumexp
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 
 @dataclass(frozen=True)
@@ -42,7 +48,7 @@ class SplitVerdict:
     p_value: float
 
 
-def design(splits, temperature, common="temperature") -> np.ndarray:
+def design(splits: Sequence[int], temperature: np.ndarray, common: str = "temperature") -> np.ndarray:
     """Design matrix: a level per section, a step per section that has a split, and the terms common to all sections.
 
     Parameters
@@ -50,6 +56,7 @@ def design(splits, temperature, common="temperature") -> np.ndarray:
     splits : sequence of int
         One per section: 0 for no step, else the campaign from which on the level differs.
     temperature : (n_section, n_campaign) array of float
+        Temperatures. [°C]
     common : str
         "temperature", a slope; "campaign", a shift of every campaign but the first; "" for nothing.
 
@@ -77,14 +84,14 @@ def design(splits, temperature, common="temperature") -> np.ndarray:
     return np.column_stack(columns).astype(float)
 
 
-def _projector(matrix):
+def _projector(matrix: np.ndarray) -> np.ndarray:
     """Projector on the residual space, I - H, of a regression, from an orthonormal basis of its columns."""
     basis = np.linalg.svd(matrix, full_matrices=False)
     columns = basis.U[:, basis.S > 1e-10 * basis.S[0]]
     return np.eye(len(matrix)) - columns @ columns.T
 
 
-def deviance(blocks, splits, common="temperature") -> float:
+def deviance(blocks: Sequence[Block], splits: Sequence[int], common: str = "temperature") -> float:
     r"""Minus twice the logarithm of the marginal likelihood of all quantities together, up to a constant.
 
     .. math:: \ln B = \tfrac12 (n - p) \ln(1 + g) - \tfrac12 n \ln(1 + g (1 - R^2))
@@ -93,6 +100,20 @@ def deviance(blocks, splits, common="temperature") -> float:
     per section, p the number of further columns, R² the share that they explain, g = n (unit information). A change
     need not show in every quantity: all choices have equal weight. 2 ln(number of splits) is added for every section
     that changes, for it might have changed at any of them.
+
+    Parameters
+    ----------
+    blocks : sequence of Block
+        Quantities by their temperatures, with the same sections and campaigns.
+    splits : sequence of int
+        First campaign after the step of each section, 0 for none.
+    common : str
+        Terms common to all sections, see ``design``.
+
+    Returns
+    -------
+    float
+        Deviance; only differences have a meaning.
 
     References
     ----------
@@ -111,7 +132,7 @@ def deviance(blocks, splits, common="temperature") -> float:
     return total
 
 
-def _log_factor(cells, matrix, n_section) -> np.ndarray:
+def _log_factor(cells: np.ndarray, matrix: np.ndarray, n_section: int) -> np.ndarray:
     """Logarithm of the Bayes factor of a design against levels alone, one per quantity."""
     n, p = cells.shape[1] - n_section, np.linalg.matrix_rank(matrix) - n_section
     rss = np.sum((cells @ _projector(matrix)) ** 2, axis=1)
@@ -119,11 +140,21 @@ def _log_factor(cells, matrix, n_section) -> np.ndarray:
     return 0.5 * (n - p) * np.log1p(n) - 0.5 * n * np.log1p(n * rss / base)
 
 
-def find_splits(blocks) -> tuple[int, ...]:
+def find_splits(blocks: Sequence[Block]) -> tuple[int, ...]:
     """Splits of all sections with the smallest deviance, by coordinate descent over the sections.
 
     It starts from no change and from each change common to all: one section at a time would not find a change that
     most sections share.
+
+    Parameters
+    ----------
+    blocks : sequence of Block
+        Quantities by their temperatures, with the same sections and campaigns.
+
+    Returns
+    -------
+    tuple of int
+        First campaign after the step of each section, 0 for none.
     """
     n_section, n_campaign = blocks[0].shape
     best_splits, lowest = (0,) * n_section, np.inf
@@ -142,10 +173,22 @@ def find_splits(blocks) -> tuple[int, ...]:
     return best_splits
 
 
-def independent_quantities(blocks, splits) -> float:
+def independent_quantities(blocks: Sequence[Block], splits: Sequence[int]) -> float:
     r"""Effective number of independent quantities, :math:`(\sum \lambda)^2 / \sum \lambda^2` of their correlation.
 
     Errors of neighbouring frequency bands are correlated; to count each band fully would overstate the evidence.
+
+    Parameters
+    ----------
+    blocks : sequence of Block
+        Quantities by their temperatures, with the same sections and campaigns.
+    splits : sequence of int
+        First campaign after the step of each section, 0 for none.
+
+    Returns
+    -------
+    float
+        Number, between 1 and that of all quantities.
     """
     residuals = []
     for block in blocks:
@@ -157,13 +200,27 @@ def independent_quantities(blocks, splits) -> float:
     return float(np.trace(correlation) ** 2 / np.sum(correlation**2))
 
 
-def verdicts(blocks, n_permutation=2000, seed=0) -> list[SplitVerdict]:
+def verdicts(blocks: Sequence[Block], n_permutation: int = 2000, seed: int = 0) -> list[SplitVerdict]:
     """For every section: when it changed, with what probability, and the p value of a change.
 
     The probability follows from the deviances of the section's splits, with the other sections at their best splits and
     each block scaled to its number of independent quantities. The p value is that of Freedman and Lane (J. Business
     Econ. Stat. 1, 1983): residuals of the model without the section's step are permuted among cells, all quantities of
     a cell together, and the largest gain over all splits is compared.
+
+    Parameters
+    ----------
+    blocks : sequence of Block
+        Quantities by their temperatures, with the same sections and campaigns.
+    n_permutation : int
+        Number of permutations for the p value.
+    seed : int
+        Seed of the permutations.
+
+    Returns
+    -------
+    list of SplitVerdict
+        One for each section.
     """
     best_splits = find_splits(blocks)
     shares = [independent_quantities([b], best_splits) / len(b.values) for b in blocks]
@@ -179,7 +236,9 @@ def verdicts(blocks, n_permutation=2000, seed=0) -> list[SplitVerdict]:
     return results
 
 
-def _permutation_p_value(blocks, options, n_permutation, rng) -> float:
+def _permutation_p_value(
+    blocks: Sequence[Block], options: Sequence[Sequence[int]], n_permutation: int, rng: np.random.Generator
+) -> float:
     prepared = []
     for block in blocks:
         cells = block.values.reshape(len(block.values), -1)
@@ -187,7 +246,7 @@ def _permutation_p_value(blocks, options, n_permutation, rng) -> float:
         projectors = [_projector(design(o, block.temperature)) for o in options[1:]]
         prepared.append((cells @ null_projector, cells - cells @ null_projector, null_projector, projectors))
 
-    def gain(order):
+    def gain(order: np.ndarray) -> float:
         gains = np.zeros(len(options) - 1)
         for residual, fitted, null_projector, projectors in prepared:
             cells = fitted + residual[:, order]
@@ -201,8 +260,15 @@ def _permutation_p_value(blocks, options, n_permutation, rng) -> float:
     return (1 + larger) / (1 + n_permutation)
 
 
-def steps(block, splits):
+def steps(block: Block, splits: Sequence[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Step of every changed section in every quantity, with standard error and p value, and the temperature slopes.
+
+    Parameters
+    ----------
+    block : Block
+        Quantities at the same temperatures.
+    splits : sequence of int
+        First campaign after the step of each section, 0 for none.
 
     Returns
     -------
@@ -227,10 +293,24 @@ def steps(block, splits):
     return table[0], table[1], table[2], coefficient[:, -1], error[:, -1]
 
 
-def left_out_error(block, splits, common="temperature") -> np.ndarray:
+def left_out_error(block: Block, splits: Sequence[int], common: str = "temperature") -> np.ndarray:
     """Root mean square prediction error of each quantity, leaving out one campaign after the other.
 
     A section with a level that only the left-out campaign determines cannot be predicted and is not counted.
+
+    Parameters
+    ----------
+    block : Block
+        Quantities at the same temperatures.
+    splits : sequence of int
+        First campaign after the step of each section, 0 for none.
+    common : str
+        Terms common to all sections, see ``design``.
+
+    Returns
+    -------
+    (n_quantity,) array of float
+        Error of the logarithms.
     """
     matrix = design(splits, block.temperature, common)
     cells = block.values.reshape(len(block.values), -1)

@@ -1,5 +1,9 @@
 """Decide the state of each chart today: ok, alarm, learning, cannot tell or not measured, and the reason."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pandas as pd
 
@@ -9,14 +13,31 @@ from turnout.trend.panel import WHOLE_TURNOUT, timestamps
 from turnout.trend.residuals import FREQUENCY_RESOLUTION, first_epoch, slope_variance
 from turnout.trend.threshold import detectable_shift, run_lengths
 
+if TYPE_CHECKING:
+    from turnout.config.settings.trend import TrendSettings
+    from turnout.trend.cusum import Charts
+    from turnout.trend.residuals import Prepared
+
 DAYS_PER_YEAR = 365.25
 
 
-def detectable_change(charts, settings) -> tuple[np.ndarray, np.ndarray]:
-    """Smallest change [%] that each chart detects within a year with the set probability, and its campaigns a year.
+def detectable_change(charts: Charts, settings: TrendSettings) -> tuple[np.ndarray, np.ndarray]:
+    """Smallest change that each chart detects within a year with the set probability, and its campaigns a year.
 
     It depends on the spread of the baseline, the unknown part of the temperature slope, the guard factor, the pooled
     autocorrelation and the allowance of the present epoch.
+
+    Parameters
+    ----------
+    charts : Charts
+        Finished charts of a panel.
+    settings : TrendSettings
+        Settings of the charts.
+
+    Returns
+    -------
+    (n_chart,) arrays of float and int
+        Detectable change [%] and campaigns a year.
     """
     campaigns = campaigns_a_year(charts.prepared)
     extra = charts.extra[:, -1] if charts.extra.shape[1] else np.zeros(len(charts.allowance))
@@ -26,20 +47,74 @@ def detectable_change(charts, settings) -> tuple[np.ndarray, np.ndarray]:
     ), campaigns
 
 
-def campaigns_a_year(p) -> np.ndarray:
-    """Usual number of campaigns a year of each chart."""
+def campaigns_a_year(p: Prepared) -> np.ndarray:
+    """Usual number of campaigns a year of each chart.
+
+    Parameters
+    ----------
+    p : Prepared
+        Prepared charts.
+
+    Returns
+    -------
+    (n_chart,) array of int
+        Number, 0 to 366.
+    """
     with np.errstate(invalid="ignore"):
         return np.clip(np.nan_to_num(np.round(DAYS_PER_YEAR / p.interval)), 0, 366).astype(int)
 
 
-def spread_in(charts, chart, epoch) -> np.ndarray:
-    """Spread [%] of the charts numbered ``chart`` in an ``epoch``: that without siblings where none was known."""
+def spread_in(charts: Charts, chart: np.ndarray, epoch: np.ndarray) -> np.ndarray:
+    """Spread of charts in an epoch: that without siblings where none was known.
+
+    Parameters
+    ----------
+    charts : Charts
+        Finished charts of a panel.
+    chart : (n,) array of int
+        Numbers of charts.
+    epoch : (n,) array of int
+        Epoch of each of these charts.
+
+    Returns
+    -------
+    (n,) array of float
+        Spread. [%]
+    """
     alone = (charts.n_learned[chart, epoch] > 0) & ~np.isfinite(charts.shift[chart, epoch])
     return np.where(alone, charts.prepared.spread_alone[chart], charts.prepared.spread[chart])
 
 
-def detectable_in_epoch(charts, chart, epoch, allowance, campaigns, settings) -> np.ndarray:
-    """Detectable change [%] of charts in an ``epoch`` with their ``allowance`` and ``campaigns`` a year."""
+def detectable_in_epoch(
+    charts: Charts,
+    chart: np.ndarray,
+    epoch: np.ndarray,
+    allowance: np.ndarray,
+    campaigns: np.ndarray,
+    settings: TrendSettings,
+) -> np.ndarray:
+    """Detectable change of charts in an epoch.
+
+    Parameters
+    ----------
+    charts : Charts
+        Finished charts of a panel.
+    chart : (n,) array of int
+        Numbers of charts.
+    epoch : (n,) array of int
+        Epoch of each of these charts.
+    allowance : (n,) array of float
+        Allowance of each. [sd]
+    campaigns : (n,) array of int
+        Campaigns a year of each.
+    settings : TrendSettings
+        Settings of the charts.
+
+    Returns
+    -------
+    (n,) array of float
+        Detectable change. [%]
+    """
     harmful = np.minimum(charts.threshold_down, charts.threshold_up)[chart]
     keys = np.column_stack([harmful, np.round(allowance, 2), campaigns])
     unique, where = np.unique(keys, axis=0, return_inverse=True)
@@ -48,11 +123,21 @@ def detectable_in_epoch(charts, chart, epoch, allowance, campaigns, settings) ->
     return np.array(shift)[where.ravel()] * spread * (charts.guard * charts.widening)[chart]
 
 
-def temperature_spread(charts) -> np.ndarray:
-    """Spread that the unknown temperature slope adds in each epoch, (n_chart, n_epoch). [%]
+def temperature_spread(charts: Charts) -> np.ndarray:
+    """Spread that the unknown temperature slope adds in each epoch.
 
     It is the root mean square over the campaigns of the epoch. Only campaigns where this part exceeds the spread add to
     it.
+
+    Parameters
+    ----------
+    charts : Charts
+        Finished charts of a panel.
+
+    Returns
+    -------
+    (n_chart, n_epoch) array of float
+        Spread. [%]
     """
     p = charts.prepared
     variance, n_epoch = _slope_variances(charts), int(p.epoch.max(initial=0)) + 1
@@ -65,12 +150,24 @@ def temperature_spread(charts) -> np.ndarray:
     return spread
 
 
-def chart_status(charts, settings) -> pd.DataFrame:
+def chart_status(charts: Charts, settings: TrendSettings) -> pd.DataFrame:
     """One row per chart: its state today, the reason, the detectable change and the slope.
 
     States in the order of decision: ``alarm``, also if no longer measured; ``not_measured`` (too long ago);
     ``cannot_tell`` (constant values, no temperature for as long, or too few temperatures); ``learning`` (baseline or
     level after an event not complete); ``cannot_tell`` (detectable change above the target); ``ok``.
+
+    Parameters
+    ----------
+    charts : Charts
+        Finished charts of a panel.
+    settings : TrendSettings
+        Settings of the charts.
+
+    Returns
+    -------
+    DataFrame
+        Table of that name.
     """
     p = charts.prepared
     n_section = len(p.panel.charts)
@@ -104,30 +201,65 @@ def chart_status(charts, settings) -> pd.DataFrame:
     return status
 
 
-def is_temperature_known(charts) -> np.ndarray:
-    """Campaigns at which the error of the temperature slope is less than the spread, (n_chart, n_campaign).
+def is_temperature_known(charts: Charts) -> np.ndarray:
+    """Campaigns at which the error of the temperature slope is less than the spread.
 
     A drift of the other campaigns may be seasonal.
+
+    Parameters
+    ----------
+    charts : Charts
+        Finished charts of a panel.
+
+    Returns
+    -------
+    (n_chart, n_campaign) array of bool
+        True where the error is smaller.
     """
     return _slope_variances(charts) <= charts.prepared.spread[:, None] ** 2
 
 
-def _slope_variances(charts) -> np.ndarray:
+def _slope_variances(charts: Charts) -> np.ndarray:
     """Variance that the error of the temperature slope adds to each value, (n_chart, n_campaign). [%²]"""
     p, n = charts.prepared, len(charts.prepared.panel.charts)
     return np.vstack([slope_variance(p, charts.learning[:n]), charts.sigma[n:] ** 2 - p.spread[n:, None] ** 2])
 
 
-def count_learned(charts, present) -> np.ndarray:
-    """Number of campaigns from which the level of the present epoch is learned."""
+def count_learned(charts: Charts, present: np.ndarray) -> np.ndarray:
+    """Number of campaigns from which the level of the present epoch is learned.
+
+    Parameters
+    ----------
+    charts : Charts
+        Finished charts of a panel.
+    present : (n_chart, n_campaign) array of bool
+        Campaigns of the present epoch.
+
+    Returns
+    -------
+    (n_chart,) array of int
+        Number, 0 where an event is pending.
+    """
     n_learned = np.sum(charts.learning & present & np.isfinite(charts.residual), axis=1)
     return np.where(charts.prepared.pending, 0, n_learned)
 
 
-def baseline_until(p, settings) -> np.ndarray:
-    """Time of the campaign that completed each baseline, nan where incomplete. [d]
+def baseline_until(p: Prepared, settings: TrendSettings) -> np.ndarray:
+    """Time of the campaign that completed each baseline, nan where incomplete.
 
     That of a whole turnout is complete when those of enough sections are.
+
+    Parameters
+    ----------
+    p : Prepared
+        Prepared charts.
+    settings : TrendSettings
+        Settings of the charts.
+
+    Returns
+    -------
+    (n_chart,) array of float
+        Time. [d]
     """
     n_section = len(p.panel.charts)
     until = np.max(np.where(p.baseline.inside, p.time, -np.inf), axis=1, initial=-np.inf)
@@ -138,17 +270,30 @@ def baseline_until(p, settings) -> np.ndarray:
     return np.where(np.isfinite(until), until, np.nan)
 
 
-def _members(group):
+def _members(group: np.ndarray) -> list[np.ndarray]:
     """Arrays of the chart numbers of each group."""
     return np.split(np.arange(len(group)), np.flatnonzero(np.diff(group)) + 1) if len(group) else []
 
 
-def stale_after(p, settings) -> np.ndarray:
-    """Age at which a chart counts as not measured: the setting, or three of its own intervals. [d]"""
+def stale_after(p: Prepared, settings: TrendSettings) -> np.ndarray:
+    """Age at which a chart counts as not measured: the setting, or three of its own intervals.
+
+    Parameters
+    ----------
+    p : Prepared
+        Prepared charts.
+    settings : TrendSettings
+        Settings of the charts.
+
+    Returns
+    -------
+    (n_chart,) array of float
+        Age. [d]
+    """
     return np.maximum(settings.not_measured_days, 3.0 * np.nan_to_num(p.interval))
 
 
-def _newest_of_sections(p, last) -> np.ndarray:
+def _newest_of_sections(p: Prepared, last: np.ndarray) -> np.ndarray:
     """Time of the last measurement; for the chart of a whole turnout that of any of its sections. [d]"""
     newest = last.copy()
     for whole, members in enumerate(_members(p.panel.charts["group"].to_numpy()), start=len(p.panel.charts)):
@@ -156,7 +301,9 @@ def _newest_of_sections(p, last) -> np.ndarray:
     return newest
 
 
-def _states(charts, settings, status, last, present):
+def _states(
+    charts: Charts, settings: TrendSettings, status: pd.DataFrame, last: np.ndarray, present: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """The state and the reason of every chart: the first rule that applies."""
     p = charts.prepared
     as_of = np.nan_to_num(p.panel.as_of, neginf=0.0)  # without any usable campaign in the fleet no chart is old
@@ -194,9 +341,23 @@ def _states(charts, settings, status, last, present):
     return state, reason
 
 
-def is_constant(frequency, least=8) -> np.ndarray:
+def is_constant(frequency: np.ndarray, least: int = 8) -> np.ndarray:
     """Whether the last ``least`` values of a chart are all equal; False with fewer values.
 
+    Parameters
+    ----------
+    frequency : (n_chart, n_campaign) array of float
+        Frequencies, nan without one. [Hz]
+    least : int
+        Number of values that are compared.
+
+    Returns
+    -------
+    (n_chart,) array of bool
+        Whether they are equal, to the resolution of the registry.
+
+    Examples
+    --------
     >>> is_constant(np.array([[1.0] * 8 + [np.nan], [1.0] * 8 + [2.0]]))
     array([ True, False])
     """
@@ -208,5 +369,5 @@ def is_constant(frequency, least=8) -> np.ndarray:
     return (last.sum(axis=1) >= least) & (high - low < FREQUENCY_RESOLUTION)
 
 
-def _last(values):
+def _last(values: np.ndarray) -> np.ndarray:
     return values[:, -1] if values.shape[1] else np.zeros(len(values), dtype=values.dtype)

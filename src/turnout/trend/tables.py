@@ -3,6 +3,10 @@
 ``arrow_rows`` makes Arrow tables of the registry from them: unknown values are NULL, numbers are rounded.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pandas as pd
 import pyarrow as pa
@@ -15,6 +19,12 @@ from turnout.trend.residuals import first_epoch
 from turnout.trend.states import campaigns_a_year, detectable_in_epoch, spread_in
 from turnout.trend.threshold import run_lengths
 
+if TYPE_CHECKING:
+    from turnout.config.settings.trend import TrendSettings
+    from turnout.registry.schema import Column
+    from turnout.trend.cusum import Charts
+    from turnout.trend.residuals import Prepared
+
 TABLE_KEYS = ["turnout_id", "section_id", "band", "source"]
 CELL_STATES = np.array(
     ["ok", "baseline", "learning", "alarm_down", "alarm_up", "no_temperature", "not_judged", "wrong_time"]
@@ -22,8 +32,19 @@ CELL_STATES = np.array(
 NORMAL_QUANTILE = float(stats.norm.isf(0.025))
 
 
-def cell_states(charts) -> np.ndarray:
-    """(n_chart, n_campaign) index in ``CELL_STATES`` of every campaign of every chart."""
+def cell_states(charts: Charts) -> np.ndarray:
+    """State of every campaign of every chart.
+
+    Parameters
+    ----------
+    charts : Charts
+        Finished charts of a panel.
+
+    Returns
+    -------
+    (n_chart, n_campaign) array of int
+        Index in ``CELL_STATES``.
+    """
     p = charts.prepared
     n_section = len(p.panel.charts)
     no_temperature = np.zeros(charts.z.shape, dtype=bool)
@@ -37,16 +58,37 @@ def cell_states(charts) -> np.ndarray:
     ).astype(np.int8)
 
 
-def is_measured(charts) -> np.ndarray:
-    """Cells with a row: a frequency was measured, or the median of the turnout exists."""
+def is_measured(charts: Charts) -> np.ndarray:
+    """Cells with a row: a frequency was measured, or the median of the turnout exists.
+
+    Parameters
+    ----------
+    charts : Charts
+        Finished charts of a panel.
+
+    Returns
+    -------
+    (n_chart, n_campaign) array of bool
+        True for cells with a row.
+    """
     n_section = len(charts.prepared.panel.charts)
     return np.isfinite(np.vstack([charts.prepared.panel.frequency, charts.residual[n_section:]]))
 
 
-def chart_rows(charts) -> pd.DataFrame:
+def chart_rows(charts: Charts) -> pd.DataFrame:
     """Table ``charts``: one row per chart and campaign, in the order of the charts, keys as categories.
 
     The expected band is the 95 % interval of one campaign at its temperature, from the guarded spread of the baseline.
+
+    Parameters
+    ----------
+    charts : Charts
+        Finished charts of a panel.
+
+    Returns
+    -------
+    DataFrame
+        Rows of the table.
     """
     p = charts.prepared
     n_section = len(p.panel.charts)
@@ -57,7 +99,7 @@ def chart_rows(charts) -> pd.DataFrame:
     section = chart < n_section
     f0 = reference_frequency(p)[chart]
 
-    def section_values(values):
+    def section_values(values: np.ndarray) -> np.ndarray:
         """Values of the sections' cells; nan for the whole turnout, whose charts come last."""
         cell_values = np.take(values.ravel(), np.where(section, cell, 0))
         return np.where(section, cell_values, np.nan)
@@ -86,12 +128,23 @@ def chart_rows(charts) -> pd.DataFrame:
     return _with_wrong_times(rows, p.panel.left_out)
 
 
-def reference_frequency(p) -> np.ndarray:
-    """f0 of each chart [Hz]; nan for a whole turnout and for amplitudes, which are no frequencies."""
+def reference_frequency(p: Prepared) -> np.ndarray:
+    """f0 of each chart; nan for a whole turnout and for amplitudes, which are no frequencies.
+
+    Parameters
+    ----------
+    p : Prepared
+        Prepared charts.
+
+    Returns
+    -------
+    (n_chart,) array of float
+        Frequency. [Hz]
+    """
     return np.where(p.charts["band"] == "amplitude", np.nan, p.baseline.frequency)
 
 
-def _with_wrong_times(rows, left_out):
+def _with_wrong_times(rows: pd.DataFrame, left_out: pd.DataFrame) -> pd.DataFrame:
     """Add campaigns with an implausible time, without values; keys remain categories."""
     wrong = left_out[(left_out["reason"] == "wrong_time") & left_out["measured_at_utc"].notna()]
     if wrong.empty:
@@ -112,13 +165,26 @@ def _with_wrong_times(rows, left_out):
     return combined.loc[order].reset_index(drop=True)
 
 
-def _codes(column, chart):
+def _codes(column: pd.Series, chart: np.ndarray) -> tuple[np.ndarray, pd.Index]:
     code, unique = pd.factorize(column)
     return code[chart], pd.Index(unique)
 
 
-def baseline_rows(charts, settings) -> pd.DataFrame:
-    """Table ``baselines``: one row per chart and epoch that has a campaign."""
+def baseline_rows(charts: Charts, settings: TrendSettings) -> pd.DataFrame:
+    """Table ``baselines``: one row per chart and epoch that has a campaign.
+
+    Parameters
+    ----------
+    charts : Charts
+        Finished charts of a panel.
+    settings : TrendSettings
+        Settings of the charts.
+
+    Returns
+    -------
+    DataFrame
+        Rows of the table.
+    """
     p = charts.prepared
     _, count = by_epoch(np.zeros(p.time.shape), is_measured(charts), p.epoch, charts.level.shape[1])
     chart, epoch = np.nonzero(count)
@@ -151,11 +217,23 @@ def baseline_rows(charts, settings) -> pd.DataFrame:
     )
 
 
-def alarm_rows(charts, settings) -> pd.DataFrame:
+def alarm_rows(charts: Charts, settings: TrendSettings) -> pd.DataFrame:
     """Table ``alarms``: one row per alarm, open or closed.
 
     ``began_at_utc`` is the last campaign at which the sum was 0: the change came after it. An alarm closes when its sum
     is back at 0 or an event starts a new epoch.
+
+    Parameters
+    ----------
+    charts : Charts
+        Finished charts of a panel.
+    settings : TrendSettings
+        Settings of the charts.
+
+    Returns
+    -------
+    DataFrame
+        Rows of the table, by time.
     """
     frames = [
         _alarms(charts, direction, run_lengths(charts.prepared.charts["band"], direction, settings))
@@ -165,7 +243,7 @@ def alarm_rows(charts, settings) -> pd.DataFrame:
     return rows.sort_values(["raised_at_utc", *TABLE_KEYS, "direction"], kind="stable", ignore_index=True)
 
 
-def _alarms(charts, direction, run_length):
+def _alarms(charts: Charts, direction: str, run_length: np.ndarray) -> pd.DataFrame:
     p = charts.prepared
     is_open = getattr(charts, f"{direction}_open")
     edge = np.diff(is_open.astype(np.int8), axis=1, prepend=0)
@@ -194,18 +272,34 @@ def _alarms(charts, direction, run_length):
     )
 
 
-def arrow_rows(table, frame, rounded=True, single=False) -> pa.Table:
-    """``frame`` with the columns and types of ``table``; NaN, infinity and NaT become NULL.
+def arrow_rows(table: str, frame: pd.DataFrame, rounded: bool = True, single: bool = False) -> pa.Table:
+    """``frame`` with the columns and types of a table; NaN, infinity and NaT become NULL.
 
-    A column that the frame lacks is NULL. ``rounded=False`` keeps full precision, for tests of the views. ``single``
-    stores numbers with a stated resolution in single precision, which has enough digits and halves the memory.
+    A column that the frame lacks is NULL.
+
+    Parameters
+    ----------
+    table : str
+        Name of the table.
+    frame : DataFrame
+        Its rows.
+    rounded : bool
+        Whether numbers are rounded to the stated decimals; False is for tests of the views.
+    single : bool
+        Whether numbers with stated decimals are stored in single precision, which has enough digits and halves the
+        memory.
+
+    Returns
+    -------
+    Table
+        Arrow table of the registry.
     """
     schema, columns = arrow_schema(table), tables()[table]
     arrays = [_array(frame, c, field.type, rounded, single) for c, field in zip(columns, schema)]
     return pa.table(arrays, names=[c.name for c in columns])
 
 
-def _array(frame, column, arrow_type, rounded, single):
+def _array(frame: pd.DataFrame, column: Column, arrow_type: pa.DataType, rounded: bool, single: bool) -> pa.Array:
     if column.name not in frame:
         return pa.nulls(len(frame), arrow_type)
     values = frame[column.name]

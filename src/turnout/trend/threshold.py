@@ -1,16 +1,27 @@
 """Compute CUSUM thresholds from the allowed false-alarm rate, and the shift that a chart detects."""
 
+from __future__ import annotations
+
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import brentq
 from scipy.special import ndtr
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+    from numpy.typing import ArrayLike
+
+    from turnout.config.settings.trend import TrendSettings
+
 OVERSHOOT = 1.166  # sd; twice Siegmund's correction of 0.583 for the excess over the threshold
 N_CELLS = 80  # cells of the Markov chain that approximates the statistic
 
 
-def run_length(threshold, allowance, shift=0.0):
+def run_length(threshold: ArrayLike, allowance: ArrayLike, shift: ArrayLike = 0.0) -> np.ndarray:
     r"""Mean campaigns to an alarm of a one-sided CUSUM of standard normal values.
 
     .. math:: ARL = \frac{e^{-2DH} - 1 + 2DH}{2D^2},\quad D = \delta - k,\\ H = h + 1.166
@@ -19,6 +30,11 @@ def run_length(threshold, allowance, shift=0.0):
     ----------
     threshold, allowance, shift : float or arrays
         h, k and the shift delta, all in standard deviations; H² where D = 0.
+
+    Returns
+    -------
+    array
+        Mean number of campaigns.
 
     References
     ----------
@@ -39,9 +55,23 @@ def run_length(threshold, allowance, shift=0.0):
     return np.where(flat, height**2, curved)[()]
 
 
-def threshold_for(campaigns, allowance) -> float:
+def threshold_for(campaigns: float, allowance: float) -> float:
     """Threshold h that gives one false alarm in ``campaigns`` on average (inverse of ``run_length``).
 
+    Parameters
+    ----------
+    campaigns : float
+        Mean number of campaigns to a false alarm.
+    allowance : float
+        Allowance k. [sd]
+
+    Returns
+    -------
+    float
+        Threshold h. [sd]
+
+    Examples
+    --------
     >>> print(f"{threshold_for(5600, 1.0):.2f} {threshold_for(56000, 0.5):.2f}")
     3.50 9.07
     """
@@ -50,11 +80,27 @@ def threshold_for(campaigns, allowance) -> float:
     )
 
 
-def alarm_probability(shift, threshold, allowance, campaigns) -> float:
+def alarm_probability(shift: float, threshold: float, allowance: float, campaigns: int) -> float:
     r"""Probability that a CUSUM starting at 0 raises an alarm within ``campaigns`` after a ``shift`` of the mean.
 
     The statistic is a Markov chain of ``N_CELLS`` cells of width w, cell 0 half as wide:
     :math:`P_{ij} = \Phi(d_{ij} + w/2) - \Phi(d_{ij} - w/2)`, :math:`d_{ij} = (j - i) w + k - \delta`.
+
+    Parameters
+    ----------
+    shift : float
+        Shift of the mean. [sd]
+    threshold : float
+        Threshold h. [sd]
+    allowance : float
+        Allowance k. [sd]
+    campaigns : int
+        Number of campaigns after the shift.
+
+    Returns
+    -------
+    float
+        Probability.
 
     References
     ----------
@@ -80,26 +126,60 @@ def alarm_probability(shift, threshold, allowance, campaigns) -> float:
 
 
 @lru_cache(maxsize=4096)
-def detectable_shift(threshold, allowance, campaigns, probability=0.9) -> float:
+def detectable_shift(threshold: float, allowance: float, campaigns: int, probability: float = 0.9) -> float:
     """Smallest shift, in standard deviations, that alarms within ``campaigns`` with ``probability``.
 
+    Parameters
+    ----------
+    threshold : float
+        Threshold h. [sd]
+    allowance : float
+        Allowance k. [sd]
+    campaigns : int
+        Number of campaigns.
+    probability : float
+        Probability of an alarm.
+
+    Returns
+    -------
+    float
+        Shift [sd], infinite without a campaign.
+
+    Examples
+    --------
     >>> 1.1 < detectable_shift(3.5, 1.0, 26) < 1.25
     True
     """
     if campaigns < 1:
         return float("inf")
 
-    def shortfall(shift):
+    def shortfall(shift: float) -> float:
         return alarm_probability(shift, threshold, allowance, campaigns) - probability
 
     return float(brentq(shortfall, 0.0, 2.0 * (threshold + allowance) + 4.0, xtol=1e-4))
 
 
-def run_lengths(bands, direction, settings) -> np.ndarray:
-    """(n_chart,) mean campaigns between false alarms: fewer for the harmful direction.
+def run_lengths(bands: Sequence[str] | np.ndarray | pd.Series, direction: str, settings: TrendSettings) -> np.ndarray:
+    """Mean campaigns between false alarms: fewer for the harmful direction.
 
     Harmful is down for stiffness, up for acceleration.
 
+    Parameters
+    ----------
+    bands : (n_chart,) sequence of str
+        Band of each chart.
+    direction : str
+        "down" or "up".
+    settings : TrendSettings
+        Settings of the charts.
+
+    Returns
+    -------
+    (n_chart,) array of float
+        Mean number of campaigns.
+
+    Examples
+    --------
     >>> from turnout.config.settings.trend import TrendSettings
     >>> run_lengths(np.array(["ballast", "amplitude"], dtype=object), "down", TrendSettings())
     array([ 5600., 56000.])

@@ -3,12 +3,15 @@
 Rows of ``charts`` are stored by year, so only years with a change are written again.
 """
 
+from __future__ import annotations
+
 import hashlib
 import logging
 import zlib
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -27,10 +30,34 @@ from turnout.trend.residuals import prepare
 from turnout.trend.states import chart_status
 from turnout.trend.tables import alarm_rows, arrow_rows, baseline_rows, chart_rows
 
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from datetime import date
+    from typing import Any
+
+    import duckdb
+
+    from turnout.config.settings.trend import TrendSettings
+    from turnout.registry.generation import Generation
+    from turnout.trend.panel import Panel
+    from turnout.trend.residuals import Prepared
+
 
 def split_by_year(rows: pa.Table) -> dict[int, pa.Table]:
     """The rows of each year of ``measured_at_utc``, in their order.
 
+    Parameters
+    ----------
+    rows : pa.Table
+        Arrow table with this column.
+
+    Returns
+    -------
+    dict
+        Rows by year.
+
+    Examples
+    --------
     >>> when = pa.array([0, 40_000_000_000_000], pa.timestamp("us"))
     >>> {year: part.num_rows for year, part in split_by_year(pa.table({"measured_at_utc": when})).items()}
     {1970: 1, 1971: 1}
@@ -39,9 +66,23 @@ def split_by_year(rows: pa.Table) -> dict[int, pa.Table]:
     return {int(y.as_py()): rows.filter(pc.equal(year, y)) for y in sorted(pc.unique(year), key=lambda y: y.as_py())}
 
 
-def digest(tables, *settings) -> str:
+def digest(tables: Sequence[pa.Table], *settings: Any) -> str:
     """Hash of the content of concatenated Arrow tables, however they are split, and of the ``settings``.
 
+    Parameters
+    ----------
+    tables : sequence of Table
+        Tables of one schema.
+    *settings : object
+        Anything whose ``repr`` shall count.
+
+    Returns
+    -------
+    str
+        32 hexadecimal characters.
+
+    Examples
+    --------
     >>> whole, other = pa.table({"z": [1.0, 2.0]}), pa.table({"z": [1.0, 3.0]})
     >>> digest([whole]) == digest([whole.slice(0, 1), whole.slice(1)]), digest([whole]) == digest([other])
     (True, False)
@@ -57,7 +98,7 @@ def digest(tables, *settings) -> str:
     return whole.hexdigest()
 
 
-def _plain(chunk) -> memoryview:
+def _plain(chunk: pa.Array) -> memoryview:
     """Bytes of the values: NULL as NaN or 0, text as its CRC-32."""
     if pa.types.is_string(chunk.type) or pa.types.is_large_string(chunk.type):
         chunk = chunk.dictionary_encode()
@@ -91,13 +132,22 @@ class TrendUpdate:
     digests: dict[str, str]
 
 
-def update(registry_dir, settings, digests=None, as_of=None, acknowledgements=None, day=None) -> TrendUpdate:
+def update(
+    registry_dir: str | Path,
+    settings: TrendSettings,
+    digests: Mapping[str, str] | None = None,
+    as_of: Any = None,
+    acknowledgements: Sequence[Mapping[str, Any]] | None = None,
+    day: date | str | None = None,
+) -> TrendUpdate:
     """Compute every chart of a registry and replace the tables of charts, baselines, alarms and states.
 
     Parameters
     ----------
-    registry_dir : path
+    registry_dir : str or Path
+        Folder of the registry.
     settings : TrendSettings
+        Settings of the charts.
     digests : dict, optional
         Those of the last update: an unchanged year of ``charts``, in the same file, is not written again.
     as_of : time, optional
@@ -105,9 +155,14 @@ def update(registry_dir, settings, digests=None, as_of=None, acknowledgements=No
         newest campaign of the fleet with a plausible time.
     acknowledgements : list of dict, optional
         All rows of the table of that name; None leaves it alone.
-    day : date, optional
+    day : date or str, optional
         The present day, by default that of this machine in UTC. Events planned for later do not reset charts yet, and
         later campaigns are implausible.
+
+    Returns
+    -------
+    TrendUpdate
+        What was written.
     """
     day_end = np.floor(days([datetime.now(UTC).replace(tzinfo=None) if day is None else day])[0]) + 1.0
     with open_registry(registry_dir) as con:
@@ -136,7 +191,7 @@ def update(registry_dir, settings, digests=None, as_of=None, acknowledgements=No
         tables["acknowledgements"] = arrow_rows("acknowledgements", pd.DataFrame(acknowledgements))
     years.clear()
     changed.clear()
-    published = publish(registry_dir, tables, keep={"charts": {int(year) for year in same}})
+    published = publish(Path(registry_dir), tables, keep={"charts": {int(year) for year in same}})
     stamp = None if not np.isfinite(newest) else timestamps([newest])[0].item()
     digests_now = {
         year: f"{content_hash} {_chart_files(published)[year]}" for year, content_hash in digests_now.items()
@@ -146,12 +201,14 @@ def update(registry_dir, settings, digests=None, as_of=None, acknowledgements=No
     return result
 
 
-def _chart_files(generation) -> dict[str, str]:
+def _chart_files(generation: Generation) -> dict[str, str]:
     """Path of the file of each year of ``charts``; it ends with the hash of the content."""
     return {str(f.year): f.path for f in generation.of("charts")}
 
 
-def _tables(prepared, settings, account):
+def _tables(
+    prepared: list[Prepared], settings: TrendSettings, account: Callable[[pd.DataFrame], pd.DataFrame]
+) -> tuple[dict[int, list[pa.Table]], dict[str, pa.Table]]:
     """Arrow tables of ``charts`` by year, and those of the other derived tables; ``account`` completes the alarms.
 
     ``prepared`` is emptied meanwhile, to free the arrays of each finished group.
@@ -180,7 +237,9 @@ def _tables(prepared, settings, account):
     return years, {name: arrow_rows(name, frame) for name, frame in joined.items()}
 
 
-def _chart_groups(con, settings, as_of, end):
+def _chart_groups(
+    con: duckdb.DuckDBPyConnection, settings: TrendSettings, as_of: Any, end: float
+) -> tuple[list[pd.DataFrame], float]:
     """Charts in groups of whole turnouts, and the newest time that counts; ``end`` is that of the present day. [d]"""
     # values from passages are aggregated once; values from hammer tests are read group by group
     con.execute("create temp table by_trains as select * from passage_values")
@@ -210,7 +269,7 @@ def _chart_groups(con, settings, as_of, end):
     return [group.reset_index(drop=True) for _, group in charts.groupby(number, sort=True)], newest
 
 
-def _last_believable(charts, last, until):
+def _last_believable(charts: pd.DataFrame, last: np.ndarray, until: float) -> float:
     """Time [d] after which campaigns are implausible: ``until``, or infinity if most charts have a later campaign.
 
     Then the clock of this machine is late, or the fleet is simulated. ``last`` are the newest campaigns of the charts.
@@ -228,7 +287,9 @@ def _last_believable(charts, last, until):
     return until
 
 
-def _panel(con, charts, newest, events, settings):
+def _panel(
+    con: duckdb.DuckDBPyConnection, charts: pd.DataFrame, newest: float, events: pd.DataFrame, settings: TrendSettings
+) -> Panel:
     """Panel of the turnouts of one group."""
     con.register("_part", charts.assign(chart=np.arange(len(charts), dtype=np.int32)))
     names = ("frequency_hz", "frequency_se_hz", "rail_temperature_c")
