@@ -1,17 +1,35 @@
 """SQL of the day for which a worklist or page is made; the views themselves use no clock."""
 
+from __future__ import annotations
+
 from datetime import UTC, datetime, timedelta
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import duckdb
 
 CHART_COUNTS_SQL = """
     select count(*), count(*) filter (state = 'suppressed'), count(*) filter (state = 'not measured'), newest_charted()
     from chart_states_on({})"""
 
 
-def list_day(connection, day: str | None = None) -> str:
+def list_day(connection: duckdb.DuckDBPyConnection, day: str | None = None) -> str:
     """SQL of the time for a list of ``day`` (YYYY-MM-DD, by default today), including all measurements of that day.
 
     A newer campaign in a chart moves the time on: then the clock of this machine is late. A single campaign dated ahead
     does not: on a list of 2099 all other charts would count as not measured for long.
+
+    Parameters
+    ----------
+    connection : DuckDB connection
+        An open registry.
+    day : str or None
+        Day, YYYY-MM-DD; None: today in UTC.
+
+    Returns
+    -------
+    str
+        SQL expression of a timestamp.
     """
     begin = f"timestamp '{day or f'{datetime.now(UTC):%Y-%m-%d}'}'"
     asked = f"greatest({begin}, newest_charted(), least(newest_measurement(), {begin} + interval 1 day))"
@@ -19,17 +37,56 @@ def list_day(connection, day: str | None = None) -> str:
 
 
 def whole_list(day: str) -> str:
-    """SQL of the worklist of ``day`` with all rows."""
+    """SQL of the worklist of ``day`` with all rows.
+
+    Parameters
+    ----------
+    day : str
+        Result of ``list_day``.
+
+    Returns
+    -------
+    str
+        SQL of a table function.
+    """
     return f"worklist({day}, most := {2**62})"
 
 
-def counts_of(connection, day: str) -> tuple:
-    """(number of charts, suppressed ones, those not measured for too long, newest campaign or None) on ``day``, SQL."""
+def counts_of(connection: duckdb.DuckDBPyConnection, day: str) -> tuple[int, int, int, datetime | None]:
+    """Numbers of charts on a day.
+
+    Parameters
+    ----------
+    connection : DuckDB connection
+        An open registry.
+    day : str
+        Result of ``list_day``.
+
+    Returns
+    -------
+    (int, int, int, datetime or None)
+        Number of charts, of suppressed ones, of those not measured for too long, and the newest campaign.
+    """
     return connection.execute(CHART_COUNTS_SQL.format(day)).fetchall()[0]
 
 
 def past_day_hint(newest: datetime, option: str, what: str) -> str:
-    """Sentence for a list of today with charts not measured lately: how to get the list of the last data."""
+    """Sentence for a list of today with charts not measured lately: how to get the list of the last data.
+
+    Parameters
+    ----------
+    newest : datetime
+        Time of the newest campaign.
+    option : str
+        Option of the command line that sets the day.
+    what : str
+        What is shown, for example "list".
+
+    Returns
+    -------
+    str
+        The sentence.
+    """
     then = (newest + timedelta(days=1)).date()  # the day after, because a day begins at midnight
     today = f"As of {datetime.now(UTC):%Y-%m-%d}; the last data are of {newest:%Y-%m-%d}"
     return f"{today}: {option} {then} shows the {what} of then."

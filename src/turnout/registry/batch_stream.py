@@ -1,27 +1,57 @@
 """Merge the results of many work batches into one stream sorted by unit."""
 
+from __future__ import annotations
+
 import heapq
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
 from os import PathLike, fspath
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
 from turnout.registry.ids import content_id
 from turnout.registry.intake import Arrival
 
+if TYPE_CHECKING:
+    from typing import Any
+
 CHUNK_SIZE = 1024  # units per chunk that is in memory at once
 
 
-def token(path) -> str:
-    """Name of a consumed batch in the generation file; batches are named by their content and never change."""
+def token(path: str | PathLike) -> str:
+    """Name of a consumed batch in the generation file; batches are named by their content and never change.
+
+    Parameters
+    ----------
+    path : str or PathLike
+        Path of a batch.
+
+    Returns
+    -------
+    str
+        Name and size of the file.
+    """
     path = Path(path)
     return f"{path.name}:{path.stat().st_size}"
 
 
 def existing_batches(paths: Sequence[PathLike], faults: dict[str, str]) -> tuple[list[PathLike], list[str]]:
-    """(paths, tokens) of the batches that exist; the others are entered in ``faults`` under their path."""
+    """Find the batches that exist.
+
+    Parameters
+    ----------
+    paths : sequence of PathLike
+        Paths of batches.
+    faults : dict
+        Filled with the reason for each other batch, by its path.
+
+    Returns
+    -------
+    (list of path, list of str)
+        Paths and tokens of the batches that exist.
+    """
     existing, tokens = [], []
     for path in paths:
         try:
@@ -38,6 +68,20 @@ def unread_positions(tokens: Sequence[str], consumed: Sequence[str]) -> list[int
     Batches are in the order of writing, and the last result of a unit counts. A configuration that is changed back
     gives an old batch again, at the end of the list.
 
+    Parameters
+    ----------
+    tokens : sequence of str
+        Tokens of the offered batches, in the order of writing.
+    consumed : sequence of str
+        Tokens of the batches that were registered already.
+
+    Returns
+    -------
+    list of int
+        Positions in ``tokens``, ascending.
+
+    Examples
+    --------
     >>> unread_positions(["a", "b", "c"], ["a", "c"]), unread_positions(["b", "a"], ["a", "b"])
     ([1], [1])
     """
@@ -54,8 +98,21 @@ def unread_positions(tokens: Sequence[str], consumed: Sequence[str]) -> list[int
 def merge_units(paths: Sequence[PathLike], read: Callable, faults: dict[str, str]) -> Iterator[Arrival]:
     """Units of all batches sorted by name; of a unit in several batches the result in the last one.
 
-    ``read(path)`` yields objects with unit, turnout, kind, key, algo and tables, sorted by unit. A batch that cannot be
-    read is entered in ``faults`` under its path, and the others are read.
+    A batch that cannot be read does not stop the others.
+
+    Parameters
+    ----------
+    paths : sequence of PathLike
+        Batches in the order of writing.
+    read : Callable
+        ``read(path)`` yields objects with unit, turnout, kind, key, algo and tables, sorted by unit.
+    faults : dict
+        Filled with the reason for each batch that cannot be read, by its path.
+
+    Yields
+    ------
+    Arrival
+        Units, numbered in their order.
     """
     streams = [_read_guarded(path, read, -i, faults) for i, path in enumerate(paths)]
     in_order = heapq.merge(*streams, key=lambda entry: entry[:2])
@@ -68,7 +125,20 @@ def merge_units(paths: Sequence[PathLike], read: Callable, faults: dict[str, str
 
 
 def table_arrivals(tables: Mapping[str, list[dict]], first_index: int) -> list[Arrival]:
-    """Rows that come from no recording, one unit per table: configuration, alarms, findings."""
+    """Rows that come from no recording, one unit per table: configuration, alarms, findings.
+
+    Parameters
+    ----------
+    tables : mapping
+        Rows by table.
+    first_index : int
+        Number of the first of these units.
+
+    Returns
+    -------
+    list of Arrival
+        One unit for each table.
+    """
     return [
         Arrival(
             index=first_index + i, unit=f"registry/{'configuration'}/{table}", turnout="registry",
@@ -79,7 +149,20 @@ def table_arrivals(tables: Mapping[str, list[dict]], first_index: int) -> list[A
 
 
 def chunks(arrivals: Iterable[Arrival], size: int = CHUNK_SIZE) -> Iterator[list[Arrival]]:
-    """Lists of at most ``size`` units, which limits the memory."""
+    """Lists of at most ``size`` units, which limits the memory.
+
+    Parameters
+    ----------
+    arrivals : iterable of Arrival
+        Units.
+    size : int
+        Largest number of units in a list.
+
+    Yields
+    ------
+    list[Arrival]
+        Units, in their order.
+    """
     chunk: list[Arrival] = []
     for arrival in arrivals:
         chunk.append(arrival)
@@ -90,7 +173,7 @@ def chunks(arrivals: Iterable[Arrival], size: int = CHUNK_SIZE) -> Iterator[list
         yield chunk
 
 
-def _read_guarded(path, read, rank, faults):
+def _read_guarded(path: PathLike, read: Callable, rank: int, faults: dict[str, str]) -> Iterator[tuple[str, int, Any]]:
     try:
         for result in read(path):
             yield result.unit, rank, result
@@ -102,7 +185,7 @@ def _describe(error: Exception) -> str:
     return f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
 
 
-def _with_method(tables):
+def _with_method(tables: dict[str, list[dict]]) -> dict[str, list[dict]]:
     """Copy the method of each model to its modes, so that charts need no join."""
     methods = {m.get("model_id"): m.get("method") for m in tables.get("models", ())}
     for mode in tables.get("modes", ()):

@@ -1,8 +1,11 @@
 """Merge many small files into one sorted file per table and year; the rows stay the same."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from turnout.errors import RegistryError
 from turnout.registry.database import build_database
@@ -21,12 +24,35 @@ from turnout.registry.schema import WHOLE_TABLES, file_literal, tables
 from turnout.registry.staging import connect
 from turnout.registry.supersede import LARGE_TABLES, count_superseded, latest_supersession, split_superseded
 
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    import duckdb
+
 
 def compact(registry_dir: PathLike, at_least: int = 2, patience: float = 600.0) -> dict[str, tuple[int, int]]:
-    """Merge the files of every table and year that has ``at_least`` files; (files, rows) merged by folder.
+    """Merge the files of every table and year that has many.
 
-    Readers may continue meanwhile: the old files stay for two more generations. RegistryError when the disk is full;
-    then nothing is changed.
+    Readers may continue meanwhile: the old files stay for two more generations.
+
+    Parameters
+    ----------
+    registry_dir : PathLike
+        Folder of the registry.
+    at_least : int
+        Number of files from which they are merged, 2 or more.
+    patience : float
+        How long to wait for another run that holds the lock. [s]
+
+    Returns
+    -------
+    dict
+        Number of files and rows that were merged, by folder.
+
+    Raises
+    ------
+    RegistryError
+        When the disk is full or the registry is locked; then nothing is changed.
     """
     root = Path(registry_dir)
     with registry_lock(root, patience):
@@ -38,7 +64,22 @@ def compact(registry_dir: PathLike, at_least: int = 2, patience: float = 600.0) 
 def rebuild(registry_dir: PathLike, patience: float = 600.0) -> dict[str, tuple[int, int]]:
     """Rewrite all files with the present ``columns.csv``: values are cast, new columns NULL, old columns removed.
 
-    RegistryError when a value cannot be cast; then nothing is changed.
+    Parameters
+    ----------
+    registry_dir : PathLike
+        Folder of the registry.
+    patience : float
+        How long to wait for another run that holds the lock. [s]
+
+    Returns
+    -------
+    dict
+        Number of files and rows that were rewritten, by folder.
+
+    Raises
+    ------
+    RegistryError
+        When a value cannot be cast; then nothing is changed.
     """
     root = Path(registry_dir)
     with registry_lock(root, patience):
@@ -60,7 +101,12 @@ def _is_worth_merging(files: list[DataFile], at_least: int) -> bool:
     return sum(f.dead < f.rows for f in files) >= at_least or any(0 < f.dead < f.rows for f in files)
 
 
-def _rewrite(root, before, groups, select) -> dict[str, tuple[int, int]]:
+def _rewrite(
+    root: Path,
+    before: Generation,
+    groups: Mapping[tuple[str, int | None], list[DataFile]],
+    select: Callable[[str, list[DataFile]], str],
+) -> dict[str, tuple[int, int]]:
     """Write each group as one file, check that no row was lost, and publish."""
     if not groups:
         build_database(root, before)
@@ -86,7 +132,9 @@ def _rewrite(root, before, groups, select) -> dict[str, tuple[int, int]]:
     return summary
 
 
-def _write(con, root, table, year, merged: list[DataFile], sql: str) -> list[DataFile]:
+def _write(
+    con: duckdb.DuckDBPyConnection, root: Path, table: str, year: int | None, merged: list[DataFile], sql: str
+) -> list[DataFile]:
     """Write the rows of ``sql`` as one file, or as two if some are superseded; RegistryError if a row was lost."""
     prefix = "all" if table in WHOLE_TABLES else "compact"
     selects = [(prefix, sql)]

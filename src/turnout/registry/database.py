@@ -3,6 +3,8 @@
 Views and macros are in one SQL file per question and are created in the order of their dependencies.
 """
 
+from __future__ import annotations
+
 import csv
 import os
 import re
@@ -11,6 +13,7 @@ from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from importlib.resources import files
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import duckdb
 
@@ -22,6 +25,9 @@ from turnout.registry.parquet import MEASUREMENT_IDS, read_live
 from turnout.registry.schema import file_literal, literal, tables, time_column
 from turnout.registry.staging import connect
 from turnout.registry.supersede import LARGE_TABLES, create_split_views, latest_supersession
+
+if TYPE_CHECKING:
+    from os import PathLike
 
 _NEEDS = re.compile(r"^--\s*needs:\s*(.+)$", re.MULTILINE)
 
@@ -42,6 +48,23 @@ def view_files() -> dict[str, str]:
 def sort_by_needs(texts: dict[str, str]) -> dict[str, str]:
     """Files sorted by dependency: each follows those in its line ``-- needs: a, b``.
 
+    Parameters
+    ----------
+    texts : dict
+        SQL text by name.
+
+    Returns
+    -------
+    dict
+        The same texts, sorted.
+
+    Raises
+    ------
+    RegistryError
+        If a file needs one that does not exist, or files need each other in a circle.
+
+    Examples
+    --------
     >>> list(sort_by_needs({"a": "-- needs: c", "b": "", "c": ""}))
     ['b', 'c', 'a']
     """
@@ -70,9 +93,23 @@ def reasons_sql() -> str:
 
 
 def newest_valid(con: duckdb.DuckDBPyConnection, root: Path, generation: Generation) -> str | None:
-    """ISO time of the newest measurement that is not superseded, None without any.
+    """ISO time of the newest measurement that is not superseded.
 
     Files are read in the order of their newest time, until no other can hold a later time.
+
+    Parameters
+    ----------
+    con : DuckDB connection
+        Connection with the views of the registry.
+    root : Path
+        Folder of the registry.
+    generation : Generation
+        List of the live files.
+
+    Returns
+    -------
+    str or None
+        Time, None without a measurement.
     """
     con.execute(f"create or replace temp table no_longer as {latest_supersession('supersedes')}")
     newest = None
@@ -112,11 +149,27 @@ LAST_POSSIBLE_SQL = """
     )::varchar"""
 
 
-def open_registry(path, read_only: bool = True) -> duckdb.DuckDBPyConnection:
-    """DuckDB connection to a registry, given its folder or its ``registry.duckdb``. Loads no extension.
+def open_registry(path: str | PathLike, read_only: bool = True) -> duckdb.DuckDBPyConnection:
+    """Open a registry.
 
-    It is read-only by default: the next registration replaces the file with all that was written into it. RegistryError
-    when there is none, when it cannot be opened, or when it was moved and not relocated.
+    It is read-only by default: the next registration replaces the file with all that was written into it.
+
+    Parameters
+    ----------
+    path : str or PathLike
+        Folder of the registry, or its ``registry.duckdb``.
+    read_only : bool
+        Whether nothing can be written.
+
+    Returns
+    -------
+    DuckDB connection
+        Connection that loads no extension.
+
+    Raises
+    ------
+    RegistryError
+        When there is none, when it cannot be opened, or when it was moved and not relocated.
     """
     path = Path(path)
     file = path / DATABASE if path.is_dir() else path
@@ -141,6 +194,18 @@ def build_database(registry_dir: Path, generation: Generation) -> None:
     """Make ``registry.duckdb`` for a generation as a temporary file, then replace the old one in one step.
 
     The views hold absolute paths, so that it can be opened from any folder.
+
+    Parameters
+    ----------
+    registry_dir : Path
+        Folder of the registry.
+    generation : Generation
+        List of the live files.
+
+    Raises
+    ------
+    RegistryError
+        When the file cannot be written, or a view is not valid.
     """
     root = Path(registry_dir).resolve()
     unfinished = temporary_path(root / "registry")
@@ -165,7 +230,20 @@ def build_database(registry_dir: Path, generation: Generation) -> None:
 
 
 def is_behind(registry_dir: Path, generation: Generation) -> bool:
-    """Whether ``registry.duckdb`` is missing, of another generation, for another folder, or has other views."""
+    """Whether ``registry.duckdb`` is missing, of another generation, for another folder, or has other views.
+
+    Parameters
+    ----------
+    registry_dir : Path
+        Folder of the registry.
+    generation : Generation
+        List of the live files.
+
+    Returns
+    -------
+    bool
+        Whether it must be built again.
+    """
     file = Path(registry_dir) / DATABASE
     if not file.exists():
         return True
@@ -185,13 +263,29 @@ def views_version() -> str:
 
 
 def rebuild_database(registry_dir: Path) -> Generation:
-    """Make ``registry.duckdb`` again from the generation file, for instance after the folder was moved."""
+    """Make ``registry.duckdb`` again from the generation file, for instance after the folder was moved.
+
+    Parameters
+    ----------
+    registry_dir : Path
+        Folder of the registry.
+
+    Returns
+    -------
+    Generation
+        The list of live files.
+
+    Raises
+    ------
+    RegistryError
+        When the generation file or the folder cannot be used.
+    """
     generation = load(Path(registry_dir))
     build_database(Path(registry_dir), generation)
     return generation
 
 
-def _create_views(con, root: Path, generation: Generation) -> None:
+def _create_views(con: duckdb.DuckDBPyConnection, root: Path, generation: Generation) -> None:
     for table in tables():
         con.execute(f'create view "{table}" as {read_live(con, root, table, generation.of(table))}')
     for table in LARGE_TABLES:
@@ -217,7 +311,7 @@ def _create_views(con, root: Path, generation: Generation) -> None:
     _comment(con)
 
 
-def _comment(con) -> None:
+def _comment(con: duckdb.DuckDBPyConnection) -> None:
     """Add comments with the unit to columns, for tools that show them; macros are described in the documentation."""
     present = {
         (view, column)

@@ -44,6 +44,8 @@ def publish(
         An existing registry, or a folder to make one in.
     frames : mapping of table to DataFrame or Arrow table
         All rows of each table, except the years in ``keep``.
+    patience : float
+        How long to wait for another run that holds the lock. [s]
     keep : mapping of table to years, optional
         Years of a table stored by year whose live files stay as they are.
 
@@ -78,7 +80,7 @@ def publish(
         return now
 
 
-def _create_view(con: duckdb.DuckDBPyConnection, table: str, frame) -> None:
+def _create_view(con: duckdb.DuckDBPyConnection, table: str, frame: pd.DataFrame | pa.Table) -> None:
     """Create view ``new_<table>`` of the rows, typed and rounded; RegistryError at the first bad row."""
     if table not in WHOLE_TABLES:
         raise RegistryError(f"{table} is not a table that is replaced whole; those are {', '.join(WHOLE_TABLES)}.")
@@ -97,7 +99,7 @@ def _create_view(con: duckdb.DuckDBPyConnection, table: str, frame) -> None:
     _reject_bad_rows(con, table)
 
 
-def _reject_bad_rows(con, table) -> None:
+def _reject_bad_rows(con: duckdb.DuckDBPyConnection, table: str) -> None:
     rules = [(c, f'"{c.name}" is not null') for c in tables()[table] if c.required or c.key]
     rules += [(c, f"coalesce({c.check}, true)") for c in tables()[table] if c.check]
     counted = ", ".join(f"count(*) filter (not ({rule}))" for _, rule in rules)
@@ -117,7 +119,7 @@ def _reject_bad_rows(con, table) -> None:
             )
 
 
-def _write_table(con, root: Path, table: str) -> list[DataFile]:
+def _write_table(con: duckdb.DuckDBPyConnection, root: Path, table: str) -> list[DataFile]:
     if table not in TABLES_BY_YEAR:
         written = write_sorted(con, root, table, None, f"select * from new_{table}", "all", True)
         return [written] if written else []

@@ -28,7 +28,18 @@ def views() -> dict[str, tuple[str, tuple[dict[str, str], ...]]]:
 
 
 def row_meaning(name: str) -> str:
-    """Meaning of a row of the view: the SQL comment above the statement that creates it."""
+    """Meaning of a row of the view: the SQL comment above the statement that creates it.
+
+    Parameters
+    ----------
+    name : str
+        Name of the view or macro.
+
+    Returns
+    -------
+    str
+        The meaning, "" without a comment.
+    """
     for sql in view_files().values():
         for keyword in ("view", "macro"):
             head, statement, _ = sql.partition(f"create or replace {keyword} {name}")
@@ -49,7 +60,23 @@ def listing() -> str:
 
 
 def describe(name: str | None = None) -> str:
-    """Columns of one table, view or macro, or of all, with type, unit and meaning."""
+    """Columns of one table, view or macro, or of all, with type, unit and meaning.
+
+    Parameters
+    ----------
+    name : str or None
+        Name of a table, view or macro; None: all.
+
+    Returns
+    -------
+    str
+        Text of several lines.
+
+    Raises
+    ------
+    RegistryError
+        For a name that does not exist; the message suggests a similar one.
+    """
     described = {t: [(c.name, c.type, c.unit, c.meaning) for c in cs] for t, cs in tables().items()}
     for call, (_, rows) in views().items():
         described[call] = [(r["column"], r["type"], r["unit"], r["meaning"]) for r in rows]
@@ -111,7 +138,25 @@ def reasons_page() -> str:
 
 
 def with_sections(page: str, sections: dict[str, str]) -> str:
-    """``page`` with every generated section replaced; KeyError where the page lacks one."""
+    """``page`` with every generated section replaced.
+
+    Parameters
+    ----------
+    page : str
+        Markdown text with the marks of the sections.
+    sections : dict
+        Text by name of the section.
+
+    Returns
+    -------
+    str
+        The new page.
+
+    Raises
+    ------
+    KeyError
+        Where the page lacks a section.
+    """
     for name, body in sections.items():
         pattern = re.compile(rf"<!-- {name}: generated, do not edit -->\n.*?\n?<!-- end of {name} -->", re.DOTALL)
         if not pattern.search(page):
@@ -121,7 +166,13 @@ def with_sections(page: str, sections: dict[str, str]) -> str:
 
 
 def write(folder: Path) -> None:
-    """Write the generated sections into the pages of ``folder``."""
+    """Write the generated sections into the pages of ``folder``.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder ``docs``.
+    """
     page = folder / "registry.md"
     sections = {"tables": table_tables(), "views": view_tables()}
     page.write_text(with_sections(page.read_text(encoding="utf-8"), sections), encoding="utf-8")

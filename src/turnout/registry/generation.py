@@ -1,14 +1,20 @@
 """Read, check and commit the generation file, the list of live files; files that it does not name do not count."""
 
+from __future__ import annotations
+
 import hashlib
 import json
 import os
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from turnout.errors import RegistryError
 from turnout.files import write_atomic
 from turnout.registry.schema import tables
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
 
 GENERATION_FILE = "_generation.json"
 FORMAT_VERSION = 1
@@ -49,8 +55,21 @@ class Generation:
     schemas: dict[str, dict[str, str]] = field(default_factory=dict)
     consumed: list[str] = field(default_factory=list)
 
-    def of(self, table: str, years=None) -> list[DataFile]:
-        """Live files of one table, all years or those given, sorted by path."""
+    def of(self, table: str, years: Collection[int | None] | None = None) -> list[DataFile]:
+        """Live files of one table.
+
+        Parameters
+        ----------
+        table : str
+            Name of the table.
+        years : collection of int or None or None
+            Years; None: all.
+
+        Returns
+        -------
+        list of DataFile
+            Files, sorted like ``files``.
+        """
         return [f for f in self.files if f.table == table and (years is None or f.year in years)]
 
     def to_json(self) -> str:
@@ -61,8 +80,21 @@ class Generation:
 def load(registry_dir: Path) -> Generation:
     """The generation file, or generation 0 where there is none yet.
 
-    RegistryError when it is not readable, which means that something else changed it, for it is written in one step.
-    RegistryError also for a folder in which DuckDB can make no database.
+    Parameters
+    ----------
+    registry_dir : Path
+        Folder of the registry.
+
+    Returns
+    -------
+    Generation
+        The list of live files.
+
+    Raises
+    ------
+    RegistryError
+        When the file is not readable, which means that something else changed it, for it is written in one step. Also
+        for a folder in which DuckDB can make no database.
     """
     path = Path(registry_dir) / GENERATION_FILE
     if forbidden := FORBIDDEN_CHARACTERS.intersection(path.resolve().as_posix()):
@@ -87,20 +119,52 @@ def load(registry_dir: Path) -> Generation:
 
 
 def schema_hash(table: str) -> str:
-    """Hash of the columns and types of a table, the name of its present schema."""
+    """Hash of the columns and types of a table, the name of its present schema.
+
+    Parameters
+    ----------
+    table : str
+        Name of the table.
+
+    Returns
+    -------
+    str
+        12 hexadecimal digits.
+    """
     text = json.dumps([[c.name, c.type] for c in tables()[table]])
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
 def schema_of(table: str) -> dict[str, str]:
-    """Types of the present columns of a table by their names, in order."""
+    """Types of the present columns of a table by their names, in order.
+
+    Parameters
+    ----------
+    table : str
+        Name of the table.
+
+    Returns
+    -------
+    dict
+        SQL type by name.
+    """
     return {c.name: c.type for c in tables()[table]}
 
 
 def check_schemas(generation: Generation) -> None:
-    """RegistryError if files hold another type of a column than ``columns.csv``.
+    """Check that all files hold the types of ``columns.csv``.
 
     DuckDB would silently convert both to text. A new column is allowed: it is NULL in old rows.
+
+    Parameters
+    ----------
+    generation : Generation
+        List of the live files.
+
+    Raises
+    ------
+    RegistryError
+        If files hold another type of a column.
     """
     for name, column_types in sorted(generation.schemas.items()):
         table, _, _ = name.partition(":")
@@ -114,18 +178,40 @@ def check_schemas(generation: Generation) -> None:
 
 
 def commit(registry_dir: Path, generation: Generation) -> None:
-    """Publish the generation by replacing one file; from then on the new files count and the retired ones do not."""
+    """Publish the generation by replacing one file; from then on the new files count and the retired ones do not.
+
+    Parameters
+    ----------
+    registry_dir : Path
+        Folder of the registry.
+    generation : Generation
+        List of the live files.
+    """
     write_durably(Path(registry_dir) / GENERATION_FILE, generation.to_json().encode())
 
 
 def write_durably(path: Path, content: bytes) -> None:
-    """Write a temporary file, fsync, replace, fsync the folder: complete or not at all, also after a power cut."""
+    """Write a temporary file, fsync, replace, fsync the folder: complete or not at all, also after a power cut.
+
+    Parameters
+    ----------
+    path : Path
+        File to write.
+    content : bytes
+        Its whole content.
+    """
     write_atomic(path, lambda stream: stream.write(content))
     sync_folder(path.parent)
 
 
 def sync_folder(folder: Path) -> None:
-    """Wait until the names in ``folder`` are on the disk, so that they survive a power cut."""
+    """Wait until the names in ``folder`` are on the disk, so that they survive a power cut.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder with new names.
+    """
     handle = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -134,7 +220,18 @@ def sync_folder(folder: Path) -> None:
 
 
 def due_for_deletion(generation: Generation) -> list[str]:
-    """Remove from ``retired``, and return, the files that no reader of the last two generations can need."""
+    """Remove from ``retired``, and return, the files that no reader of the last two generations can need.
+
+    Parameters
+    ----------
+    generation : Generation
+        List of the live and retired files; changed.
+
+    Returns
+    -------
+    list of str
+        Paths in the registry.
+    """
     live = {f.path for f in generation.files}
     # a small table that was changed back has its old path again, which may be live or retired a second time
     dropped = dict(sorted(generation.retired, key=lambda entry: entry[1]))
@@ -145,6 +242,14 @@ def due_for_deletion(generation: Generation) -> list[str]:
 
 
 def delete_files(registry_dir: Path, paths: list[str]) -> None:
-    """Delete files of the registry; one that is gone already is no error."""
+    """Delete files of the registry; one that is gone already is no error.
+
+    Parameters
+    ----------
+    registry_dir : Path
+        Folder of the registry.
+    paths : list of str
+        Paths in the registry.
+    """
     for path in paths:
         (Path(registry_dir) / path).unlink(missing_ok=True)

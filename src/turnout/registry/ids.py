@@ -1,14 +1,34 @@
 """Make ids from content: the same inputs give the same id, so no row is appended twice."""
 
+from __future__ import annotations
+
 import hashlib
 import json
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from typing import Any
 
 
-def content_id(*values) -> str:
+def content_id(*values: Any) -> str:
     """First 128 bits of the sha256 of the values, as 32 hexadecimal digits.
 
-    Each value is text, bytes, a number, None, or a list or dictionary of these; ("ab", "c") and ("a", "bc")
-    differ. Bytes alone give the plain sha256 of the file's content. [-]
+    ("ab", "c") and ("a", "bc") differ. Bytes alone give the plain sha256 of the file's content.
+
+    Parameters
+    ----------
+    *values : object
+        Text, bytes, numbers, None, times, or lists and dictionaries of these.
+
+    Returns
+    -------
+    str
+        The id.
+
+    Raises
+    ------
+    TypeError
+        For a value of another type.
 
     References
     ----------
@@ -27,7 +47,7 @@ def content_id(*values) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
-def _plain(value):
+def _plain(value: Any) -> Any:
     """Convert types unknown to JSON: bytes to their hash, times to ISO text, numpy scalars and arrays to numbers."""
     if isinstance(value, bytes):
         return {"sha256": hashlib.sha256(value).hexdigest()}

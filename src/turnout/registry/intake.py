@@ -1,11 +1,13 @@
 """Collect rows of many units as typed columns; a row with a value of another type is rejected, never guessed."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from operator import itemgetter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -13,6 +15,9 @@ import pyarrow as pa
 
 from turnout.registry.ids import content_id
 from turnout.registry.schema import FILLED_BY_REGISTER, Column, names, tables
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
 
 UNDATED = 0  # year of units without a time
 _DATE = re.compile(r"(?<!\d)(\d{4})(?:-\d\d-\d\d|\d{4}T?)")
@@ -30,7 +35,7 @@ class Refusal:
     requirement: str
     number: float | None = None
 
-    def __str__(self):
+    def __str__(self) -> str:
         return f"{self.table}, row {self.row + 1}, column {self.column}: {self.value}, must be {self.requirement}"
 
 
@@ -48,7 +53,7 @@ class Arrival:
     result_id: str = field(init=False)
     year: int = field(init=False)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         self.result_id = content_id("result", self.unit, self.key, self.algo)
         self.year = unit_year(self.unit, self.tables)
 
@@ -61,6 +66,20 @@ class Arrival:
 def unit_year(unit: str, rows: Mapping[str, list[dict]]) -> int:
     """Year under which all rows of a unit are stored: that in its name, else of its first time, else ``UNDATED``.
 
+    Parameters
+    ----------
+    unit : str
+        Name of the unit.
+    rows : mapping
+        Rows of the unit by table.
+
+    Returns
+    -------
+    int
+        The year.
+
+    Examples
+    --------
     >>> unit_year("t1/hammer/A7/2024-05-13", {}), unit_year("t1/passage/20260105T101112Z", {}), unit_year("t1/x/y", {})
     (2024, 2026, 0)
     """
@@ -73,8 +92,18 @@ def unit_year(unit: str, rows: Mapping[str, list[dict]]) -> int:
 def gather(table: str, arrivals: Iterable[Arrival]) -> tuple[pa.Table, list[Refusal]]:
     """Typed columns of one table over all units, with additional columns ``_unit``, ``_row`` and ``_year``.
 
-    Returns the table of all rows whose values fit their types, and a refusal for every other row: one with a column
-    that is not in ``columns.csv``, or with a value of another type.
+    Parameters
+    ----------
+    table : str
+        Name of the table.
+    arrivals : iterable of Arrival
+        Units with their rows.
+
+    Returns
+    -------
+    (Table, list of Refusal)
+        All rows whose values fit their types; a refusal for every other row: one with a column that is not in
+        ``columns.csv``, or with a value of another type.
     """
     column_names = frozenset(names(table))
     units, row_numbers, years, rows, refusals = [], [], [], [], []
@@ -102,7 +131,7 @@ def gather(table: str, arrivals: Iterable[Arrival]) -> tuple[pa.Table, list[Refu
     return gathered, refusals + [bad[i] for i in sorted(bad)]
 
 
-def _rejected_row(arrival, table, row_number, row, column_names) -> Refusal:
+def _rejected_row(arrival: Arrival, table: str, row_number: int, row: Any, column_names: Collection[str]) -> Refusal:
     if not isinstance(row, dict):
         return Refusal(arrival.index, table, row_number, "all", repr(row)[:200], "a row")
     name = min(map(str, row.keys() - column_names))
@@ -124,8 +153,22 @@ def _by_column(rows: list[dict], wanted: list[str]) -> list[Sequence]:
 
 
 def to_arrow(column: Column, values: Sequence) -> tuple[pa.Array, list[int]]:
-    """Arrow array of ``values``, None where one does not fit the type, and the indices of those.
+    """Arrow array of the values of a column.
 
+    Parameters
+    ----------
+    column : Column
+        Column with its type.
+    values : Sequence
+        Values of any type.
+
+    Returns
+    -------
+    (Array, list of int)
+        Array with NULL for the values that do not fit, and their indices.
+
+    Examples
+    --------
     >>> from turnout.registry.schema import column
     >>> to_arrow(column("modes", "n_impacts"), [30, None, "many"])[1]
     [2]

@@ -17,10 +17,21 @@ _SCHEMA = re.compile(r"_schema-[0-9a-f]{12}\.parquet")
 
 
 def check(registry_dir: PathLike, hashes: bool = True) -> list[str]:
-    """Problems of a registry, one sentence each; empty without any.
+    """Problems of a registry, one sentence each.
 
-    Compares every live file with the list: size, hash, row count, types. ``hashes=False`` skips the hash, for which the
-    whole file must be read.
+    Compares every live file with the list: size, hash, row count, types.
+
+    Parameters
+    ----------
+    registry_dir : PathLike
+        Folder of the registry.
+    hashes : bool
+        Whether hashes are compared, for which every file must be read as a whole.
+
+    Returns
+    -------
+    list of str
+        Sentences, empty without a problem.
     """
     root = Path(registry_dir)
     generation = load(root)
@@ -35,7 +46,25 @@ def check(registry_dir: PathLike, hashes: bool = True) -> list[str]:
 
 
 def vacuum(registry_dir: PathLike, patience: float = 600.0) -> list[str]:
-    """Delete files on no list, which killed runs leave. Returns their paths."""
+    """Delete files on no list, which killed runs leave.
+
+    Parameters
+    ----------
+    registry_dir : PathLike
+        Folder of the registry.
+    patience : float
+        How long to wait for another run that holds the lock. [s]
+
+    Returns
+    -------
+    list of str
+        Paths of the deleted files.
+
+    Raises
+    ------
+    RegistryError
+        When the registry is locked.
+    """
     root = Path(registry_dir)
     with registry_lock(root, patience):
         lost = orphans(root, load(root))
@@ -45,7 +74,20 @@ def vacuum(registry_dir: PathLike, patience: float = 600.0) -> list[str]:
 
 
 def orphans(root: Path, generation: Generation) -> list[str]:
-    """Files below the tables' folders, and temporary ones, that are neither live nor retired."""
+    """Files below the tables' folders, and temporary ones, that are neither live nor retired.
+
+    Parameters
+    ----------
+    root : Path
+        Folder of the registry.
+    generation : Generation
+        List of the live files.
+
+    Returns
+    -------
+    list of str
+        Paths in the registry, sorted.
+    """
     listed = {f.path for f in generation.files} | {path for path, _ in generation.retired}
     candidates = [p for table in tables() for p in (root / table).rglob("*") if p.is_file()]
     candidates += list(root.glob(".*.tmp"))

@@ -1,16 +1,22 @@
 """Register work batches: one sorted Parquet file per table, year and run, then one atomic commit."""
 
+from __future__ import annotations
+
 import gc
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from os import PathLike, fspath
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from turnout.registry.batch_stream import chunks, existing_batches, merge_units, table_arrivals, unread_positions
 from turnout.registry.generation import check_schemas, load
 from turnout.registry.lock import registry_lock
 from turnout.registry.registration import Registration, RegistrationResult
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 
 def register(
@@ -70,7 +76,7 @@ def register(
 
 
 @contextmanager
-def _without_collection():
+def _without_collection() -> Iterator[None]:
     """Disable garbage collection: rows form no cycles, and searching them takes a quarter of the time."""
     was_on = gc.isenabled()
     gc.disable()

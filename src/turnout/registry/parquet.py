@@ -22,6 +22,20 @@ MEASUREMENT_IDS = {"models": "model_id", "modes": "model_id", "passages": "passa
 def folder_of(table: str, year: int | None) -> str:
     """Folder of the files of a table: by year, ``undated`` without one; small tables are not divided.
 
+    Parameters
+    ----------
+    table : str
+        Name of the table.
+    year : int or None
+        Year; 0: rows without a time; None: the table is not divided.
+
+    Returns
+    -------
+    str
+        Path in the registry.
+
+    Examples
+    --------
     >>> folder_of("modes", 2026), folder_of("quarantine", 0), folder_of("turnouts", None)
     ('modes/year=2026', 'quarantine/undated', 'turnouts')
     """
@@ -39,11 +53,37 @@ def write_sorted(
     prefix: str,
     same_source: bool = False,
 ) -> DataFile | None:
-    """Write the rows of ``select`` (all columns of ``table``) as one sorted file; None where there are none.
+    """Write rows as one sorted file.
 
     The file's name ends with the hash of its content. The rows are first copied into a temporary table, because the
-    bytes depend on properties of the source, such as a column without NULL. ``same_source`` skips that copy; use it if
-    the rows always come from the same type of source. RegistryError when the disk is full; then nothing is changed.
+    bytes depend on properties of the source, such as a column without NULL.
+
+    Parameters
+    ----------
+    con : DuckDB connection
+        Connection with the views of the registry.
+    registry_dir : Path
+        Folder of the registry.
+    table : str
+        Name of the table.
+    year : int or None
+        Year of the rows; None: the table is not divided.
+    select : str
+        SQL of the rows with all columns of the table.
+    prefix : str
+        First part of the file's name.
+    same_source : bool
+        Skip that copy; only if the rows always come from the same type of source.
+
+    Returns
+    -------
+    DataFile or None
+        The file, None where there are no rows.
+
+    Raises
+    ------
+    RegistryError
+        When the disk is full; then nothing is changed.
     """
     folder = Path(registry_dir) / folder_of(table, year)
     unfinished = temporary_path(folder / prefix)
@@ -69,7 +109,7 @@ def write_sorted(
     return DataFile(path, table, year, rows, size, digest, f"{table}:{schema_hash(table)}", _newest(con, table, final))
 
 
-def _copy(con, table: str, select: str, path: Path, small: bool, same_source: bool) -> int:
+def _copy(con: duckdb.DuckDBPyConnection, table: str, select: str, path: Path, small: bool, same_source: bool) -> int:
     """Copy the rows, sorted, and return their number. ``small`` row groups are used in small files only."""
     columns = ", ".join(f'"{n}"' for n in names(table))
     source = f"({select})"
@@ -84,7 +124,27 @@ def _copy(con, table: str, select: str, path: Path, small: bool, same_source: bo
 
 
 def write_empty(con: duckdb.DuckDBPyConnection, registry_dir: Path, table: str) -> str:
-    """Write a file of zero rows with the types of ``columns.csv``, for an empty table. Returns its path."""
+    """Write a file of zero rows with the types of ``columns.csv``, for an empty table.
+
+    Parameters
+    ----------
+    con : DuckDB connection
+        Connection with the views of the registry.
+    registry_dir : Path
+        Folder of the registry.
+    table : str
+        Name of the table.
+
+    Returns
+    -------
+    str
+        Path in the registry.
+
+    Raises
+    ------
+    RegistryError
+        When the file cannot be written.
+    """
     path = Path(registry_dir) / table / f"_schema-{schema_hash(table)}.parquet"
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -103,7 +163,21 @@ def write_empty(con: duckdb.DuckDBPyConnection, registry_dir: Path, table: str) 
 def read_list(registry_dir: Path, table: str, paths: list[str], same_schema: bool = False) -> str:
     """SQL that reads the files of one table, its columns by name; a column that a file lacks is NULL.
 
-    With ``same_schema`` all files have the present columns, and DuckDB opens only the first to get them.
+    Parameters
+    ----------
+    registry_dir : Path
+        Folder of the registry.
+    table : str
+        Name of the table.
+    paths : list of str
+        Paths in the registry.
+    same_schema : bool
+        Whether all files have the present columns; then DuckDB opens only the first to get them.
+
+    Returns
+    -------
+    str
+        A SELECT statement.
     """
     listed = ", ".join(file_literal(Path(registry_dir) / p) for p in paths)
     columns = ", ".join(f'"{n}"' for n in names(table))
@@ -116,6 +190,22 @@ def read_live(con: duckdb.DuckDBPyConnection, registry_dir: Path, table: str, fi
 
     An empty file that defines the types comes last, and only if needed: DuckDB plans joins by the number of rows that
     it estimates from the first file.
+
+    Parameters
+    ----------
+    con : DuckDB connection
+        Connection with the views of the registry.
+    registry_dir : Path
+        Folder of the registry.
+    table : str
+        Name of the table.
+    files : list of DataFile
+        Live files of the table.
+
+    Returns
+    -------
+    str
+        A SELECT statement.
     """
     present = f"{table}:{schema_hash(table)}"
     same_schema = all(f.schema == present for f in files)
@@ -129,7 +219,7 @@ def _sync_and_hash(path: Path) -> str:
     return sha256_of(path)
 
 
-def _newest(con, table, path) -> str | None:
+def _newest(con: duckdb.DuckDBPyConnection, table: str, path: Path) -> str | None:
     """Time of the newest measurement in the file; None for tables without measurements."""
     time = time_column(table)
     if time is None or table not in MEASUREMENT_IDS:

@@ -1,10 +1,13 @@
 """Carry out one registration: staging tables in memory, then Parquet files, then one commit."""
 
+from __future__ import annotations
+
 import platform
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
@@ -30,6 +33,12 @@ from turnout.registry.supersede import (
     remove_known_rows,
     supersede,
 )
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from typing import Any
+
+    from turnout.registry.generation import DataFile
 
 ONE_FILE_TABLES = (*WHOLE_TABLES, "runs", "supersedes")
 INTERNAL_TABLES = ("quarantine", "results", "runs", "supersedes")
@@ -66,7 +75,7 @@ class RegistrationResult:
 class Registration:
     """Takes units in chunks, rejects rows that break a rule, and publishes all at once."""
 
-    def __init__(self, root: Path, before: Generation):
+    def __init__(self, root: Path, before: Generation) -> None:
         self.root, self.before = root, before
         self.con = connect(temp_directory=str(root / ".spill"))
         self.result_ids: list[str] = []
@@ -79,7 +88,13 @@ class Registration:
         note_superseded(self.con)
 
     def take(self, arrivals: list[Arrival]) -> None:
-        """Admit those units of a chunk whose result is not live already."""
+        """Admit those units of a chunk whose result is not live already.
+
+        Parameters
+        ----------
+        arrivals : list of Arrival
+            Units of a chunk.
+        """
         arrivals = self._select_changed(arrivals)
         # a whole table without a change is not in the staging tables and stays as it is
         self.replaced |= self.whole & {table for a in arrivals for table in a.tables}
@@ -106,12 +121,38 @@ class Registration:
         self.n_bad += sum(bool(rows) for rows in quarantine.values())
         self.result_ids += [a.result_id for a in arrivals]
 
-    def replace_whole(self, names) -> None:
-        """Name the small tables of which all rows are replaced."""
+    def replace_whole(self, names: Iterable[str]) -> None:
+        """Name the small tables of which all rows are replaced.
+
+        Parameters
+        ----------
+        names : iterable of str
+            Names of tables; those that are not replaced as a whole are ignored.
+        """
         self.whole |= set(names) & set(WHOLE_TABLES)
 
     def finish(self, consumed: list[str], faults: dict[str, str], run_info: dict) -> RegistrationResult:
-        """Write the files and publish them; without new results, only complete what a killed run left unfinished."""
+        """Write the files and publish them; without new results, only complete what a killed run left unfinished.
+
+        Parameters
+        ----------
+        consumed : list of str
+            Tokens of all batches that are registered now.
+        faults : dict
+            Reasons of the batches that could not be read, by path.
+        run_info : dict
+            Columns ``code_version``, ``config_hash`` and ``started_at_utc`` of the run.
+
+        Returns
+        -------
+        RegistrationResult
+            Numbers of units, rows and refusals.
+
+        Raises
+        ------
+        RegistryError
+            When a file cannot be written; then nothing is changed.
+        """
         before = self.before
         if not self.result_ids:
             if consumed != before.consumed or not (self.root / GENERATION_FILE).exists():
@@ -144,7 +185,7 @@ class Registration:
         live_ids = {r for (r,) in live}
         return [a for a in arrivals if a.result_id not in live_ids]
 
-    def _admit_quarantine(self, arrivals, quarantine) -> None:
+    def _admit_quarantine(self, arrivals: list[Arrival], quarantine: Mapping[int, list[dict]]) -> None:
         """Admit quarantine rows with their ids; a rejected one is replaced by a row about its rejection."""
         by_index = {a.index: a for a in arrivals}
         for arrival in arrivals:
@@ -166,7 +207,7 @@ class Registration:
             return content_id(run_id, number)
         return run_id
 
-    def _note_run(self, run_id, run_info) -> None:
+    def _note_run(self, run_id: str, run_info: dict[str, Any]) -> None:
         """Enter the run in ``runs``, the only table with the time of day."""
         row = run_info | {
             "run_id": run_id, "ended_at_utc": datetime.now(UTC).replace(tzinfo=None), "host": platform.node(),
@@ -196,11 +237,11 @@ class Registration:
         files.sort(key=lambda f: f.path)
         return Generation(number, files, retired, schemas), rows
 
-    def _count_superseded(self, files):
+    def _count_superseded(self, files: list[DataFile]) -> list[DataFile]:
         self.con.execute(f"create temp table superseded as {latest_supersession('old_supersedes', 'new_supersedes')}")
         return count_superseded(self.con, self.root, files)
 
-    def _selects(self, table):
+    def _selects(self, table: str) -> list[tuple[int | None, str]]:
         """(year, SELECT) of every file to be written for a table."""
         if table == "sections":
             return [(None, SECTIONS_SQL)]
@@ -218,7 +259,7 @@ class Registration:
         return [(year, f"select * from new_{table} where _year = {year}") for (year,) in years]
 
 
-def _with_run_id(table, select, run_id):
+def _with_run_id(table: str, select: str, run_id: str) -> str:
     if not any(c.name == "run_id" for c in tables()[table]):
         return select
     return f"select * replace ({literal(run_id)} as run_id) from ({select})"

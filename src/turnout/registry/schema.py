@@ -1,13 +1,19 @@
 """Tables and columns of the registry from ``columns.csv``, with their DDL, checks and Arrow types."""
 
+from __future__ import annotations
+
 import csv
 from dataclasses import dataclass
 from functools import cache
 from glob import escape
 from importlib.resources import files
 from os import PathLike, fspath
+from typing import TYPE_CHECKING
 
 import pyarrow as pa
+
+if TYPE_CHECKING:
+    from typing import NoReturn
 
 ARROW_TYPES = {
     "varchar": pa.string(),
@@ -108,6 +114,18 @@ class Column:
 def literal(text: str) -> str:
     """SQL string literal.
 
+    Parameters
+    ----------
+    text : str
+        Any text.
+
+    Returns
+    -------
+    str
+        Text in quotes.
+
+    Examples
+    --------
     >>> literal("o'clock")
     "'o''clock'"
     """
@@ -117,6 +135,18 @@ def literal(text: str) -> str:
 def file_literal(path: PathLike | str) -> str:
     """SQL string literal of a file to read; characters that DuckDB would take for a pattern are escaped.
 
+    Parameters
+    ----------
+    path : PathLike or str
+        Path of the file.
+
+    Returns
+    -------
+    str
+        Text in quotes.
+
+    Examples
+    --------
     >>> file_literal("line [1]/modes.parquet")
     "'line [[]1]/modes.parquet'"
     """
@@ -149,29 +179,80 @@ def tables() -> dict[str, tuple[Column, ...]]:
 
 
 def column(table: str, name: str) -> Column:
-    """The column ``name`` of ``table``; KeyError where there is none."""
+    """The column of a table.
+
+    Parameters
+    ----------
+    table : str
+        Name of the table.
+    name : str
+        Name of the column.
+
+    Returns
+    -------
+    Column
+        The column.
+
+    Raises
+    ------
+    KeyError
+        Where there is none.
+    """
     return next((c for c in tables()[table] if c.name == name), None) or _no_column(table, name)
 
 
-def _no_column(table, name):
+def _no_column(table: str, name: str) -> NoReturn:
     raise KeyError(f"{table} has no column {name!r}; it has {', '.join(c.name for c in tables()[table])}")
 
 
 @cache
 def names(table: str) -> tuple[str, ...]:
-    """Names of the columns of ``table``."""
+    """Names of the columns of ``table``.
+
+    Parameters
+    ----------
+    table : str
+        Name of the table.
+
+    Returns
+    -------
+    tuple of str
+        Names, in the order of ``columns.csv``.
+    """
     return tuple(c.name for c in tables()[table])
 
 
 @cache
 def key(table: str) -> tuple[str, ...]:
-    """The columns that identify a row."""
+    """The columns that identify a row.
+
+    Parameters
+    ----------
+    table : str
+        Name of the table.
+
+    Returns
+    -------
+    tuple of str
+        Names of the key columns.
+    """
     return tuple(c.name for c in tables()[table] if c.key)
 
 
 @cache
 def time_column(table: str) -> str | None:
-    """The time of a row: its first column that is a required timestamp."""
+    """The time of a row: its first column that is a required timestamp.
+
+    Parameters
+    ----------
+    table : str
+        Name of the table.
+
+    Returns
+    -------
+    str or None
+        Name of the column, None without one.
+    """
     return next((c.name for c in tables()[table] if c.type == "timestamp" and c.required), None)
 
 
@@ -179,6 +260,18 @@ def time_column(table: str) -> str | None:
 def sort_order(table: str) -> tuple[str, ...]:
     """Columns by which the rows of a file are sorted; the order is total, because it ends with the key.
 
+    Parameters
+    ----------
+    table : str
+        Name of the table.
+
+    Returns
+    -------
+    tuple of str
+        Names in SQL quotes.
+
+    Examples
+    --------
     >>> sort_order("modes")
     ('"turnout_id"', '"section_id"', '"band"', '"method"', '"measured_at_utc"', '"model_id"')
     """
@@ -191,14 +284,40 @@ def sort_order(table: str) -> tuple[str, ...]:
 
 @cache
 def arrow_schema(table: str) -> pa.Schema:
-    """Arrow types of the table, with unit and meaning as field metadata."""
+    """Arrow types of the table, with unit and meaning as field metadata.
+
+    Parameters
+    ----------
+    table : str
+        Name of the table.
+
+    Returns
+    -------
+    Schema
+        The schema.
+    """
     return pa.schema(
         [pa.field(c.name, c.arrow, metadata={"unit": c.unit, "meaning": c.meaning}) for c in tables()[table]]
     )
 
 
 def create_table(table: str, name: str, extra: str = "") -> str:
-    """CREATE TABLE with NOT NULL, CHECK and PRIMARY KEY; ``extra`` are further columns, as in ", x integer"."""
+    """CREATE TABLE with NOT NULL, CHECK and PRIMARY KEY.
+
+    Parameters
+    ----------
+    table : str
+        Name of the table.
+    name : str
+        Name under which it is created.
+    extra : str
+        Further columns, as in ", x integer".
+
+    Returns
+    -------
+    str
+        The SQL statement.
+    """
     body = ", ".join(c.ddl for c in tables()[table])
     keys = ", ".join(f'"{k}"' for k in key(table))
     return f"create table {name} ({body}{extra}, primary key ({keys}))"

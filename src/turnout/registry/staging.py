@@ -3,9 +3,12 @@
 A rejected row becomes a quarantine row, so it is not lost and does not stop the others.
 """
 
+from __future__ import annotations
+
 import json
 import math
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import duckdb
 import pyarrow as pa
@@ -13,6 +16,9 @@ import pyarrow as pa
 from turnout.registry.ids import content_id
 from turnout.registry.intake import Arrival, Refusal
 from turnout.registry.schema import create_table, key, names, tables
+
+if TYPE_CHECKING:
+    from typing import Any
 
 UNIQUE = "unique, and another row has it already"
 MARK_COLUMNS = ", _unit integer, _row integer, _year integer"
@@ -24,8 +30,19 @@ CHILDREN = {
 }
 
 
-def connect(**config) -> duckdb.DuckDBPyConnection:
-    """DuckDB connection in memory that downloads no extension."""
+def connect(**config: Any) -> duckdb.DuckDBPyConnection:
+    """DuckDB connection in memory that downloads no extension.
+
+    Parameters
+    ----------
+    **config : str
+        Further settings of DuckDB.
+
+    Returns
+    -------
+    DuckDB connection
+        The connection.
+    """
     settings = {"autoinstall_known_extensions": False, "autoload_known_extensions": False}
     con = duckdb.connect(":memory:", config=settings | {"memory_limit": "2GB"} | config)
     con.execute("set enable_progress_bar = false")  # it would mix with the output of a command
@@ -33,14 +50,28 @@ def connect(**config) -> duckdb.DuckDBPyConnection:
 
 
 def create_staging(con: duckdb.DuckDBPyConnection) -> None:
-    """Create the table ``came`` of incoming units, and an empty staging table for each table of the registry."""
+    """Create the table ``came`` of incoming units, and an empty staging table for each table of the registry.
+
+    Parameters
+    ----------
+    con : DuckDB connection
+        Connection in memory.
+    """
     con.execute("create table came (_unit integer, unit_id varchar, result_id varchar, algo varchar)")
     for table in tables():
         con.execute(create_table(table, f"new_{table}", MARK_COLUMNS))
 
 
 def note_arrivals(con: duckdb.DuckDBPyConnection, arrivals: list[Arrival]) -> None:
-    """Enter the units of a chunk in ``came``, before their rows."""
+    """Enter the units of a chunk in ``came``, before their rows.
+
+    Parameters
+    ----------
+    con : DuckDB connection
+        Connection with the staging tables.
+    arrivals : list of Arrival
+        Units of a chunk.
+    """
     columns = {"_unit": "index", "unit_id": "unit", "result_id": "result_id", "algo": "algo"}
     unit_rows = pa.table({name: pa.array([getattr(a, of) for a in arrivals]) for name, of in columns.items()})
     con.register("_arrivals", unit_rows)
@@ -49,9 +80,25 @@ def note_arrivals(con: duckdb.DuckDBPyConnection, arrivals: list[Arrival]) -> No
 
 
 def admit(con: duckdb.DuckDBPyConnection, table: str, gathered: pa.Table, run_id: str) -> list[Refusal]:
-    """Insert the valid rows into ``new_<table>`` and return a refusal for each of the others.
+    """Insert the valid rows into ``new_<table>``.
 
     All rows are inserted at once; only if a constraint fails are the bad rows searched.
+
+    Parameters
+    ----------
+    con : DuckDB connection
+        Connection with the staging tables.
+    table : str
+        Name of the table.
+    gathered : pa.Table
+        Rows from ``gather``.
+    run_id : str
+        Id of the run, entered in every row.
+
+    Returns
+    -------
+    list of Refusal
+        Refusals of the rows that break a rule.
     """
     if gathered.num_rows == 0:
         return []
@@ -70,7 +117,22 @@ def admit(con: duckdb.DuckDBPyConnection, table: str, gathered: pa.Table, run_id
 
 
 def reject_orphans(con: duckdb.DuckDBPyConnection, refusals: list[Refusal], arrivals: Mapping[int, Arrival]) -> int:
-    """Remove the rows that belong to a rejected model or passage, and their refusals; returns the number of rows."""
+    """Remove the rows that belong to a rejected model or passage, and their refusals.
+
+    Parameters
+    ----------
+    con : DuckDB connection
+        Connection with the staging tables.
+    refusals : list of Refusal
+        All refusals of the chunk; changed.
+    arrivals : mapping
+        Units of the chunk by their number.
+
+    Returns
+    -------
+    int
+        Number of rows that were removed.
+    """
     n_removed = 0
     for refusal in list(refusals):
         if refusal.table not in CHILDREN:
@@ -98,7 +160,7 @@ def _select(table: str, run_id: str) -> str:
     return f"select {', '.join(expressions)}, _unit, _row, _year from _gathered join {came} using (_unit)"
 
 
-def _bad_values(con, table) -> list[Refusal]:
+def _bad_values(con: duckdb.DuckDBPyConnection, table: str) -> list[Refusal]:
     """Refusals of rows that break a CHECK or lack a value; these rows are deleted from ``arriving``."""
     refusals = []
     for column in tables()[table]:
@@ -122,7 +184,7 @@ def _bad_values(con, table) -> list[Refusal]:
     return refusals
 
 
-def _duplicate_keys(con, table) -> list[Refusal]:
+def _duplicate_keys(con: duckdb.DuckDBPyConnection, table: str) -> list[Refusal]:
     """Refusals of all rows but the first of each key, in the order of the units, including earlier chunks."""
     keys = key(table)
     quoted = ", ".join(f'"{k}"' for k in keys)
@@ -142,7 +204,20 @@ _MAX_LENGTH = 2000  # characters of the column ``found``
 
 
 def quarantine_of(refusal: Refusal, arrival: Arrival) -> dict:
-    """Quarantine row that names table, row, column and value, with the whole row in ``found``."""
+    """Quarantine row that names table, row, column and value, with the whole row in ``found``.
+
+    Parameters
+    ----------
+    refusal : Refusal
+        The rejected row.
+    arrival : Arrival
+        Its unit.
+
+    Returns
+    -------
+    dict
+        Row of the table ``quarantine``, without its id.
+    """
     source_row = arrival.tables[refusal.table][refusal.row]
     row = source_row if isinstance(source_row, dict) else {}
     recordings = [r for r in arrival.tables.get("recordings", ()) if isinstance(r, dict)] or [{}]
@@ -170,11 +245,23 @@ def with_quarantine_id(row: dict, unit: str) -> dict:
     """The quarantine row with its id, the hash of the unit and of its content.
 
     The channels do not count: they stand in the place as well, and rows of earlier versions have none.
+
+    Parameters
+    ----------
+    row : dict
+        Row of the table ``quarantine``.
+    unit : str
+        Name of its unit.
+
+    Returns
+    -------
+    dict
+        A copy with ``quarantine_id``.
     """
     without = ("quarantine_id", "channels", "run_id", "result_id")
     content = {k: row.get(k) for k in names("quarantine") if k not in without}
     return row | {"quarantine_id": content_id("quarantine", unit, content)}
 
 
-def _text(value):
+def _text(value: Any) -> str | None:
     return value if isinstance(value, str) else None

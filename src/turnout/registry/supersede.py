@@ -25,18 +25,50 @@ KINDS = {
 
 
 def note_superseded(con: duckdb.DuckDBPyConnection) -> None:
-    """Create table ``dead``: ids of the registry that are superseded."""
+    """Create table ``dead``: ids of the registry that are superseded.
+
+    Parameters
+    ----------
+    con : DuckDB connection
+        Connection with the view ``old_supersedes``.
+    """
     con.execute(f"create temp table dead as {latest_supersession('old_supersedes')}")
 
 
 def latest_supersession(*relations: str) -> str:
-    """SELECT of the superseded ids, by the last statement about each in the ``relations``."""
+    """SELECT of the superseded ids, by the last statement about each in the ``relations``.
+
+    Parameters
+    ----------
+    *relations : str
+        Tables or views with the columns of ``supersedes``.
+
+    Returns
+    -------
+    str
+        A SELECT statement.
+    """
     statements = " union all ".join(f"select old_id, generation, reason from {r}" for r in relations)
     return f"select old_id from ({statements}) group by old_id having arg_max(reason, generation) <> 'reinstated'"
 
 
 def supersede(con: duckdb.DuckDBPyConnection, generation: int, run_id: str) -> int:
-    """Fill ``new_supersedes`` by comparing new and earlier results of the same units; returns the number of rows."""
+    """Fill ``new_supersedes`` by comparing new and earlier results of the same units.
+
+    Parameters
+    ----------
+    con : DuckDB connection
+        Connection with the staging tables.
+    generation : int
+        Number of the new generation.
+    run_id : str
+        Id of the run.
+
+    Returns
+    -------
+    int
+        Number of rows of ``supersedes``.
+    """
     _note_new_ids(con)
     _note_prior(con)
     _note_causes(con)
@@ -60,7 +92,13 @@ def supersede(con: duckdb.DuckDBPyConnection, generation: int, run_id: str) -> i
 
 
 def remove_known_rows(con: duckdb.DuckDBPyConnection) -> None:
-    """Delete from the staging tables the rows that the registry already has: same id, same content."""
+    """Delete from the staging tables the rows that the registry already has: same id, same content.
+
+    Parameters
+    ----------
+    con : DuckDB connection
+        Connection with the staging tables.
+    """
     con.execute(
         "create or replace temp table known_results as "
         "select result_id from new_results semi join old_results using (result_id)"
@@ -86,7 +124,7 @@ def _known_child_condition(child: str, id_column: str) -> str:
     return f"({keys}) in (select ({keys}) from old_passage_fits where passage_id in (from known))"
 
 
-def _note_new_ids(con) -> None:
+def _note_new_ids(con: duckdb.DuckDBPyConnection) -> None:
     """Create table ``new_ids``: ids of all incoming rows, before known rows are deleted."""
     selects = [
         f"select '{row_type}' as kind, t.{id_column} as id, c.unit_id, {counterpart} as place "
@@ -96,7 +134,7 @@ def _note_new_ids(con) -> None:
     con.execute(f"create temp table new_ids as {' union all '.join(selects)}")
 
 
-def _note_prior(con) -> None:
+def _note_prior(con: duckdb.DuckDBPyConnection) -> None:
     """Create table ``prior``: ids of earlier results of the same units, and whether they are superseded."""
     con.execute(
         "create temp table prior_results as select result_id, unit_id, code_version from old_results "
@@ -132,12 +170,40 @@ LARGE_TABLES = {"modes": ("model_id",), "impact_modes": ("model_id",), "passage_
 
 
 def superseded_condition(table: str, alias: str = "t") -> str:
-    """SQL condition: the row is superseded, by the ids in the table or view ``superseded``."""
+    """SQL condition: the row is superseded, by the ids in the table or view ``superseded``.
+
+    Parameters
+    ----------
+    table : str
+        One of ``LARGE_TABLES``.
+    alias : str
+        Name of the table in the query.
+
+    Returns
+    -------
+    str
+        SQL expression.
+    """
     return " or ".join(f"{alias}.{i} in (select old_id from superseded)" for i in LARGE_TABLES[table])
 
 
 def count_superseded(con: duckdb.DuckDBPyConnection, root: Path, files: list[DataFile]) -> list[DataFile]:
-    """The files with their number of superseded rows, from the table ``superseded`` of ``con``."""
+    """The files with their number of superseded rows, from the table ``superseded`` of ``con``.
+
+    Parameters
+    ----------
+    con : DuckDB connection
+        Connection with the table ``superseded``.
+    root : Path
+        Folder of the registry.
+    files : list of DataFile
+        Live files.
+
+    Returns
+    -------
+    list of DataFile
+        Copies with ``dead``; files of small tables are unchanged.
+    """
     counted: dict[str, int] = {}
     for table in LARGE_TABLES:
         paths = {str(root / f.path): f.path for f in files if f.table == table}
@@ -153,7 +219,19 @@ def count_superseded(con: duckdb.DuckDBPyConnection, root: Path, files: list[Dat
 
 
 def create_split_views(con: duckdb.DuckDBPyConnection, root: Path, table: str, files: list[DataFile]) -> None:
-    """Create view ``<table>_settled`` of files without superseded rows, ``<table>_touched`` of files with some."""
+    """Create view ``<table>_settled`` of files without superseded rows, ``<table>_touched`` of files with some.
+
+    Parameters
+    ----------
+    con : DuckDB connection
+        Connection with the views of the registry.
+    root : Path
+        Folder of the registry.
+    table : str
+        One of ``LARGE_TABLES``.
+    files : list of DataFile
+        Live files of the table.
+    """
     settled = [f for f in files if f.dead == 0]
     touched = [f for f in files if 0 < f.dead < f.rows]
     for suffix, chosen in (("settled", settled), ("touched", touched)):
@@ -161,7 +239,20 @@ def create_split_views(con: duckdb.DuckDBPyConnection, root: Path, table: str, f
 
 
 def split_superseded(table: str, select: str) -> tuple[str, str]:
-    """SELECTs of the valid and of the superseded rows."""
+    """SELECTs of the valid and of the superseded rows.
+
+    Parameters
+    ----------
+    table : str
+        One of ``LARGE_TABLES``.
+    select : str
+        SQL of the rows.
+
+    Returns
+    -------
+    (str, str)
+        SELECT of the valid and of the superseded rows.
+    """
     columns = ", ".join(f't."{n}"' for n in names(table))
     return tuple(
         f"select {columns} from ({select}) t where {sign} ({superseded_condition(table)})" for sign in ("not", "")
