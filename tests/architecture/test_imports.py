@@ -31,6 +31,7 @@ ALLOWED["cli"] = set(ALLOWED) | {"cli"}
 ALLOWED["api"] = set(ALLOWED) | {"api"}
 OPENS_FILES = LOWEST | {
     "former_names",
+    "api",
     "config",
     "readers",
     "registry",

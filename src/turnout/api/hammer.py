@@ -19,7 +19,7 @@ class Impacts(tuple[Impact, ...]):
     __slots__ = ()
 
     @property
-    def accepted(self) -> tuple[Impact, ...]:
+    def usable(self) -> tuple[Impact, ...]:
         """The impacts without rejection."""
         return tuple(impact for impact in self if impact.accepted)
 

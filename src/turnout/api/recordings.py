@@ -136,12 +136,14 @@ def _described_channels(file: Path, channels: ChannelMap, format: str) -> tuple[
             problem = f"there is no channel {name!r}; there are {available}"
             raise ReadError(file, "the channels", problem, remedy, "channel_missing")
     return tuple(
-        _described(name, index, unit, channels[name]) if name in channels else _self_described(name, index, unit, file)
+        _channel_as_described(name, index, unit, channels[name])
+        if name in channels
+        else _channel_by_unit(name, index, unit, file)
         for index, (name, unit) in enumerate(stated)
     )
 
 
-def _described(name: str, index: int, unit: str, entry: str | Mapping[str, Any] | RawChannel) -> RawChannel:
+def _channel_as_described(name: str, index: int, unit: str, entry: str | Mapping[str, Any] | RawChannel) -> RawChannel:
     """The channel of row ``index`` as the caller describes it."""
     if isinstance(entry, RawChannel):
         return entry
@@ -150,7 +152,7 @@ def _described(name: str, index: int, unit: str, entry: str | Mapping[str, Any] 
     return RawChannel(**{"name": name, "source": index, **entry})
 
 
-def _self_described(name: str, index: int, unit: str, file: Path) -> RawChannel:
+def _channel_by_unit(name: str, index: int, unit: str, file: Path) -> RawChannel:
     """The channel of row ``index`` by its unit; ReadError for a unit that is not that of one quantity."""
     try:
         quantity = conversion(unit).dimension if unit else ""

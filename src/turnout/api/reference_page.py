@@ -151,9 +151,6 @@ def write_example_file(path: Path, impacts: int = 10, seed: int = 1) -> Path:
 
 def draw_figure(path: Path) -> None:
     """Draw the figure of the page into ``path``."""
-    import matplotlib
-
-    matplotlib.use("Agg")
     with TemporaryDirectory() as folder:
         recordings = turnout.read(write_example_file(Path(folder) / "OT_1.uff"))
     model = turnout.identify_modes(turnout.find_impacts(recordings))

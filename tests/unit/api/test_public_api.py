@@ -118,7 +118,7 @@ def test_five_lines_lead_from_a_file_to_modes_with_errors_and_a_figure(example, 
     assert model.status == "accepted" and [mode.band for mode in model.modes] == ["ballast", "railpad"]
     assert all(mode.frequency_low < mode.frequency < mode.frequency_high for mode in model.modes)
     assert all(0.0 < mode.frequency_se < 0.02 * mode.frequency for mode in model.modes)
-    assert len(impacts.accepted) == len(impacts) == 10
+    assert len(impacts.usable) == len(impacts) == 10
     assert (folder / "modes.png").read_bytes()[:4] == b"\x89PNG"
     readme = (repository / "README.md").read_text(encoding="utf-8")
     assert f">>> impacts\n{impacts!r}\n" in readme
@@ -199,7 +199,7 @@ def test_every_result_prints_in_one_line(example, repository):
 
 def test_a_rejected_impact_says_why():
     impacts = turnout.find_impacts([pair(), pair()])
-    assert isinstance(impacts, Impacts) and impacts.accepted == ()
+    assert isinstance(impacts, Impacts) and impacts.usable == ()
     assert repr(impacts) == "Impacts(2: 0 accepted, 2 rejected: impact 1 no_impact, 2 no_impact)"
     assert repr(impacts[0]) == "Impact(record 1, rejected: no_impact)"
 
