@@ -42,6 +42,7 @@ EXCEPTIONS: dict[str, str] = {
     "identify": "a section of config.yaml, and the module of its settings",
     "softest_blow": "a key of config.yaml",
     "weakest_blow": "a key of config.yaml",
+    "n_blows": "the former keyword of simulate_hammer, accepted for one release",
 }
 
 
@@ -60,10 +61,16 @@ def stored_names(tree):
             yield node.lineno, node.arg
 
 
+def is_property(node):
+    """Whether a method is read like a field, as ``impact.accepted``: then it is no verb and may be an adjective."""
+    names = {getattr(d, "id", getattr(d, "attr", "")) for d in node.decorator_list}
+    return bool(names & {"property", "cached_property"})
+
+
 def functions(tree):
-    """(line, name) of every function and method."""
+    """(line, name) of every function and method, properties excluded."""
     for node in ast.walk(tree):
-        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)) and not is_property(node):
             yield node.lineno, node.name
 
 

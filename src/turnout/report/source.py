@@ -113,7 +113,7 @@ class FleetSource:
         """Tomorrow's worklist; empty before the first trend."""
         return self._fetch("select * from worklist(:today) order by rank") if self.has("worklist") else []
 
-    def listed(self) -> dict[str, int]:
+    def worklist_counts(self) -> dict[str, int]:
         """Number of rows of the whole worklist by state."""
         sql = f"select state, count(*) as n from {whole_list(':today')} group by state"
         return {row["state"]: row["n"] for row in self._fetch(sql)} if self.has("worklist") else {}

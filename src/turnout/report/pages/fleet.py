@@ -51,7 +51,7 @@ def fleet_page(source: FleetSource, template: Template, shared: Mapping[str, Any
     for row in source.states():
         states.setdefault(row["turnout_id"], {})[row["state"]] = row["n"]
         counts[row["state"]] += row["n"]
-    listed = source.listed()
+    listed = source.worklist_counts()
     totals = counts | {state: listed.get(state, 0) for state in LISTED_STATES}
     return template.render(
         n_turnouts=len(turnouts),
