@@ -55,5 +55,6 @@ def test_a_record_is_long_enough_for_its_rail(seed):
     """
     site = draw_site(np.random.default_rng(seed))
     places, frequency = sensor_positions(site, site.world), np.array([36.0, 50.0, 80.0])
-    short, long = (lines(site.world, places, site.hammer_positions[0], frequency, t, 15.0) for t in (HAMMER_DURATION, 1.0))
+    hammer = site.hammer_positions[0]
+    short, long = (lines(site.world, places, hammer, frequency, t, 15.0) for t in (HAMMER_DURATION, 1.0))
     assert np.abs(short) == pytest.approx(np.abs(long), rel=0.05)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from turnout.config import TurnoutConfig
     from turnout.config.settings.passage import PassageSettings
     from turnout.passage.result import Passage
-    from turnout.records import Recording
+    from turnout.records import LongRecording, Recording
     from turnout.stages.passage import PassageContext
 
 HELP = "analyse one passage file and say what is in it"
@@ -70,7 +70,8 @@ def run(args: argparse.Namespace) -> int:
         print(f"Not used: {error}")
     _, context = passage_context(turnout.id, turnout.settings, args.work)
     has_train = False
-    for record in (*result.recordings, *result.long_recordings):
+    records: list[Recording | LongRecording] = [*result.recordings, *result.long_recordings]
+    for record in records:
         for recording, offset, name in trains_in(record, settings):
             has_train |= _show(recording, offset if name else None, turnout, context, settings, args.no_fit)
     return 0 if has_train else 1

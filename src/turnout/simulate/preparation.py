@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.simulate.banded import all_diagonals, factorise, inverse_windows, upper_rows
+from turnout.simulate.band_matrix import all_diagonals, factorise, inverse_windows, upper_rows
 from turnout.simulate.integrator import scheme as scheme_called
 from turnout.simulate.matrices import TrackMatrices, assemble
 from turnout.simulate.state import SchemeArrays, TrackArrays
@@ -61,7 +61,7 @@ class Prepared:
         lower, upper, inverse_pivot = self.static
         x = np.zeros(self.matrices.n)
         np.add.at(x, rows, weights)
-        from turnout.simulate.banded import solve
+        from turnout.simulate.band_matrix import solve
 
         solve(lower, upper, inverse_pivot, x, 0, x.size)
         return x

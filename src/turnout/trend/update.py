@@ -19,7 +19,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from turnout.registry.database import open_registry
-from turnout.registry.derived import publish
+from turnout.registry.derived_tables import publish
 from turnout.registry.generation import load
 from turnout.registry.schema import names
 from turnout.trend.alarms import PREVIOUS_ALARMS, Flag, candidates, describe_flagged, with_withdrawn

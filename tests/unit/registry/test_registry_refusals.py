@@ -11,7 +11,7 @@ from registry_rows import hammer_result
 from turnout.errors import RegistryError
 from turnout.registry.batch_stream import chunks
 from turnout.registry.database import open_registry
-from turnout.registry.derived import publish
+from turnout.registry.derived_tables import publish
 from turnout.registry.job import register
 from turnout.registry.schema import arrow_schema, create_table, tables
 from turnout.registry.staging import connect

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from turnout.fingerprint import closure
-from turnout.simulate import compiled
+from turnout.simulate import kernel_cache
 
-HERE = Path(compiled.__file__).parent
+HERE = Path(kernel_cache.__file__).parent
 RUN = "from turnout.simulate.wheel_path import uniform_pieces; print(uniform_pieces([0.0, 1.0, 4.0]).sum())"
 
 
@@ -24,10 +24,10 @@ def test_every_kernel_that_another_one_calls_is_behind_the_name_of_the_folder():
     with_kernels = {p.stem for p in HERE.glob("*.py") if "compiled import" in p.read_text()}
     assert len(with_kernels) >= 6
     called = {f"turnout.simulate.{name}" for name in with_kernels}
-    behind = closure(compiled.FINGERPRINTED_MODULE)
+    behind = closure(kernel_cache.FINGERPRINTED_MODULE)
     for name in with_kernels:
         assert called & imported_here(name) <= behind, f"{name} calls kernels that the folder does not depend on"
-    assert {"turnout.simulate.force_laws", "turnout.simulate.compiled"} <= behind
+    assert {"turnout.simulate.force_laws", "turnout.simulate.kernel_cache"} <= behind
 
 
 def test_no_kernel_goes_round_the_folder():
@@ -56,18 +56,18 @@ def test_the_users_own_setting_comes_first_and_is_used_again(tmp_path):
 def nowhere(monkeypatch, tmp_path):
     """Nothing beside the source and no user's cache can be written: both would lie below a file."""
     (tmp_path / "file").write_text("")
-    monkeypatch.setattr(compiled, "__file__", str(tmp_path / "file" / "compiled.py"))
+    monkeypatch.setattr(kernel_cache, "__file__", str(tmp_path / "file" / "compiled.py"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    monkeypatch.setattr(compiled.config, "CACHE_DIR", "")
-    compiled.cache_folder.cache_clear()
+    monkeypatch.setattr(kernel_cache.config, "CACHE_DIR", "")
+    kernel_cache.cache_folder.cache_clear()
     yield tmp_path
-    compiled.cache_folder.cache_clear()
+    kernel_cache.cache_folder.cache_clear()
 
 
 def test_without_any_folder_to_write_kernels_still_compile(nowhere):
-    assert compiled.cache_folder() is None
+    assert kernel_cache.cache_folder() is None
 
-    @compiled.kernel
+    @kernel_cache.kernel
     def twice(x):
         return 2 * x
 
@@ -76,14 +76,14 @@ def test_without_any_folder_to_write_kernels_still_compile(nowhere):
 
 def test_the_users_cache_serves_an_installation_that_cannot_be_written(nowhere, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(nowhere / "home"))
-    folder = compiled.cache_folder()
+    folder = kernel_cache.cache_folder()
     assert folder.parent == nowhere / "home" / "turnout" and folder.is_dir()
 
 
 def test_other_code_has_another_folder_and_the_old_one_goes(nowhere, monkeypatch):
     package = nowhere / "package"
     (package / "__pycache__" / "kernels-0123456789abcdef").mkdir(parents=True)
-    monkeypatch.setattr(compiled, "__file__", str(package / "compiled.py"))
-    monkeypatch.setattr(compiled, "fingerprint", lambda *_: "feedfeedfeedfeed")
-    assert compiled.cache_folder().name == "kernels-feedfeedfeedfeed"
+    monkeypatch.setattr(kernel_cache, "__file__", str(package / "compiled.py"))
+    monkeypatch.setattr(kernel_cache, "fingerprint", lambda *_: "feedfeedfeedfeed")
+    assert kernel_cache.cache_folder().name == "kernels-feedfeedfeedfeed"
     assert [p.name for p in (package / "__pycache__").iterdir()] == ["kernels-feedfeedfeedfeed"]

@@ -12,7 +12,7 @@ from turnout.cli.main import main
 from turnout.config import load_configuration
 from turnout.config.acknowledgements import acknowledgement_row, read_acknowledgements
 from turnout.registry.database import open_registry
-from turnout.registry.derived import publish
+from turnout.registry.derived_tables import publish
 from turnout.registry.job import register
 from turnout.trend.tables import arrow_rows
 

@@ -11,7 +11,7 @@ from benchmarks.trend_registry import small_registry
 from tests.oracles.trend_views import connect_views
 
 from turnout.registry.database import open_registry
-from turnout.registry.derived import publish
+from turnout.registry.derived_tables import publish
 from turnout.report.panels.history import history_panel
 from turnout.trend import candidates, chart_rows, chart_status, describe_flagged, evaluate, panel_of
 from turnout.trend.forecast import forecast

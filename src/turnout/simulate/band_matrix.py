@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from turnout.simulate.compiled import kernel
+from turnout.simulate.kernel_cache import kernel
 
 
 @kernel
