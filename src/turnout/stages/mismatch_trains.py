@@ -8,7 +8,7 @@ import numpy as np
 
 from turnout.constants import KMH, NEWTON_PER_TONNE
 from turnout.errors import ConfigError, SimulationError
-from turnout.mismatch.turnout.campaign import LOAD_SD
+from turnout.mismatch.turnout.priors import TRACK
 from turnout.simulate import load_vehicle
 from turnout.stages.common import number
 
@@ -31,7 +31,7 @@ class IdentifiedTrain:
     direction: str
     route: str
     doubts: tuple[str, ...] = ()
-    load_sd: float = LOAD_SD
+    load_sd: float = TRACK.load_sd
     route_doubts: tuple[str, ...] = ()
 
 
@@ -150,17 +150,17 @@ def _load_share(name, row, notes, folder, units):
     vehicles = [load_vehicle(name, s, folder, units) for s in (0.0, 1.0)]
     empty, full = (float(np.mean(v.static_loads)) for v in vehicles)
     if full <= empty:
-        return 0.0, LOAD_SD, ()
+        return 0.0, TRACK.load_sd, ()
     if row.get("axle_load_t") is None:
         noted_share = number(notes, "load_share")
         if noted_share is not None:
-            return noted_share, LOAD_SD, ()
+            return noted_share, TRACK.load_sd, ()
         light, heavy = (_sprung_mass(v) for v in vehicles)
         return 0.5, (heavy - light) / (heavy + light) / np.sqrt(3.0), ("load not known, half of the payload assumed",)
     share = (0.5 * row["axle_load_t"] * NEWTON_PER_TONNE - empty) / (full - empty)
     is_plausible = -0.3 <= share <= 1.5
     doubts = () if is_plausible else (f"axle load {row['axle_load_t']:.1f} t lies outside the vehicle's",)
-    return float(np.clip(share, 0.0, 1.5)), LOAD_SD, doubts
+    return float(np.clip(share, 0.0, 1.5)), TRACK.load_sd, doubts
 
 
 def _sprung_mass(vehicle):

@@ -7,7 +7,8 @@ import pytest
 from scipy.signal import fftconvolve
 
 from turnout.mismatch.turnout.campaign import HammerInput
-from turnout.mismatch.turnout.saturation import SCATTER_FLOOR, common_limit, limit_under_impacts, saturated_channels
+from turnout.mismatch.turnout.priors import SATURATION
+from turnout.mismatch.turnout.saturation import common_limit, limit_under_impacts, saturated_channels
 from turnout.records import Channel, Recording
 from turnout.signal.filters import force_pulse
 from turnout.simulate.sensor import Sensor
@@ -44,7 +45,7 @@ def test_peaks_that_hold_gain_the_logarithm_of_the_growth_they_lack():
     x = np.log(FORCES)
     limit, gain = common_limit([(x, np.full(6, np.log(50.0)))])
     assert limit == pytest.approx(50.0)
-    assert gain == pytest.approx(3.0 * np.log(1.0 + np.var(x) / SCATTER_FLOOR**2) - 0.5 * np.log(6.0))
+    assert gain == pytest.approx(3.0 * np.log(1.0 + np.var(x) / SATURATION.scatter_floor**2) - 0.5 * np.log(6.0))
 
 
 @pytest.mark.parametrize("slope", [1.0, 1.4])

@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from turnout.mismatch.turnout.saturation import SCATTER_FLOOR, saturated_channels, saturation_gain
+from turnout.mismatch.turnout.priors import SATURATION
+from turnout.mismatch.turnout.saturation import saturated_channels, saturation_gain
 from turnout.records import Channel, Recording
 
 LOUD = np.log([40.0, 55.0, 70.0, 100.0, 140.0, 200.0])
@@ -15,7 +16,7 @@ SCATTER = 0.1 * np.array([1.0, -1.0, 0.5, -0.5, 1.0, -1.0])
 def test_peaks_that_stay_gain_the_logarithm_of_the_scatter_they_lack():
     gain = saturation_gain(np.full(6, np.log(8.0)), LOUD)
     assert np.isclose(
-        gain, 3.0 * np.log(1.0 + np.var(LOUD) / SCATTER_FLOOR**2) - 0.5 * np.log(6.0), atol=0.0, rtol=1e-12
+        gain, 3.0 * np.log(1.0 + np.var(LOUD) / SATURATION.scatter_floor**2) - 0.5 * np.log(6.0), atol=0.0, rtol=1e-12
     )
 
 

@@ -11,12 +11,11 @@ from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.turnout.candidates.out_of_roundness import AMPLITUDES, _passage_evidence
 from turnout.mismatch.turnout.candidates.rail_defects import RailScan
 from turnout.mismatch.turnout.candidates.wheel_flats import (
-    OUTLIER_DENSITY,
-    OUTLIER_SHARE,
     band_excess,
     best_flat_on_wheel,
     log_likelihood_ratio,
 )
+from turnout.mismatch.turnout.priors import FLATS
 from turnout.mismatch.turnout.rail_roughness import Waves
 from turnout.simulate.vehicle import lone_wheels
 
@@ -108,14 +107,18 @@ def test_a_flat_of_one_of_two_wheels_is_no_bang_of_the_rail():
 def test_no_single_bang_says_more_than_its_bound():
     """ln of ((1-e) / sqrt(2 pi) + e U) / (e U), the density of noise at its middle over that of the odd."""
     bound = np.log(
-        ((1.0 - OUTLIER_SHARE) / np.sqrt(2.0 * np.pi) + OUTLIER_SHARE * OUTLIER_DENSITY)
-        / (OUTLIER_SHARE * OUTLIER_DENSITY)
+        ((1.0 - FLATS.outlier_share) / np.sqrt(2.0 * np.pi) + FLATS.outlier_share * FLATS.outlier_density)
+        / (FLATS.outlier_share * FLATS.outlier_density)
     )
     z, m = np.meshgrid(np.linspace(-5.0, 100.0, 200), np.linspace(0.0, 30.0, 50))
     assert np.all(np.abs(log_likelihood_ratio(z, m)) <= bound)
     assert log_likelihood_ratio(-1e3, 0.0) == 0.0 == log_likelihood_ratio(0.7, 0.0)
-    bell = (1.0 - OUTLIER_SHARE) * np.exp(-0.5 * (30.0 / 8.5) ** 2) / (np.sqrt(2.0 * np.pi) * 8.5)  # spread 1 + 30 / 4
-    assert log_likelihood_ratio(0.0, 30.0) == pytest.approx(np.log1p(bell / (OUTLIER_SHARE * OUTLIER_DENSITY)) - bound)
+    bell = (
+        (1.0 - FLATS.outlier_share) * np.exp(-0.5 * (30.0 / 8.5) ** 2) / (np.sqrt(2.0 * np.pi) * 8.5)
+    )  # spread 1 + 30 / 4
+    assert log_likelihood_ratio(0.0, 30.0) == pytest.approx(
+        np.log1p(bell / (FLATS.outlier_share * FLATS.outlier_density)) - bound
+    )
 
 
 def test_the_evidence_of_a_wave_is_that_of_two_normal_amplitudes_integrated_out():

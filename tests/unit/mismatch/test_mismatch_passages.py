@@ -15,9 +15,10 @@ from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.turnout import TrackCase, passage_observation
 from turnout.mismatch.turnout.candidates.wheel_flats import FlatEvidence, flat_candidates
-from turnout.mismatch.turnout.passage_alignment import MIN_CORRELATION, align, low_pass
+from turnout.mismatch.turnout.passage_alignment import align, low_pass
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
+from turnout.mismatch.turnout.priors import ALIGNMENT
 
 
 @pytest.fixture(scope="module")
@@ -171,13 +172,18 @@ def test_one_sensor_that_disagrees_does_not_cost_the_passage_but_a_wrong_train_d
         return align(turned, low_pass(turned.recording, sensors), signals, case.predictor.solver.rate)
 
     found = reversed_(wrong)
-    assert found[2] > MIN_CORRELATION and found[0] == pytest.approx(reference, abs=2.6e-3)  # two steps of the search
+    assert found[2] > ALIGNMENT.min_correlation and found[0] == pytest.approx(
+        reference, abs=2.6e-3
+    )  # two steps of the search
     assert found[1] == pytest.approx(speed, rel=0.003)
-    assert reversed_(wrong, wrong + 2)[2] < MIN_CORRELATION
+    assert reversed_(wrong, wrong + 2)[2] < ALIGNMENT.min_correlation
     light = case.predictor.passage_simulator(values, (), passage)(
         passage, case.aligned_passages["light 2"].passage.vehicle, passage.speed, sensors
     )
-    assert align(passage, low_pass(passage.recording, sensors), light, case.predictor.solver.rate)[2] < MIN_CORRELATION
+    assert (
+        align(passage, low_pass(passage.recording, sensors), light, case.predictor.solver.rate)[2]
+        < ALIGNMENT.min_correlation
+    )
 
 
 def test_blows_many_times_as_strong_as_any_axle_do_not_hide_which_train_it_is(sound):
@@ -193,12 +199,12 @@ def test_blows_many_times_as_strong_as_any_axle_do_not_hide_which_train_it_is(so
     struck = sum(np.exp(-(((time - reference - 0.02 - 0.16 * k) / 0.01) ** 2)) for k in range(3))
     loud = quiet + 8.0 * np.max(np.abs(quiet), axis=1, keepdims=True) * struck
     alike = np.sum(quiet * loud, axis=1) / np.linalg.norm(quiet, axis=1) / np.linalg.norm(loud, axis=1)
-    assert np.max(np.abs(alike)) < 0.7 * MIN_CORRELATION
-    assert align(passage, loud, signals, case.predictor.solver.rate)[2] > MIN_CORRELATION
+    assert np.max(np.abs(alike)) < 0.7 * ALIGNMENT.min_correlation
+    assert align(passage, loud, signals, case.predictor.solver.rate)[2] > ALIGNMENT.min_correlation
     light = case.predictor.passage_simulator(values, (), passage)(
         passage, case.aligned_passages["light 2"].passage.vehicle, passage.speed, sensors
     )
-    assert align(passage, loud, light, case.predictor.solver.rate)[2] < MIN_CORRELATION
+    assert align(passage, loud, light, case.predictor.solver.rate)[2] < ALIGNMENT.min_correlation
 
 
 def power(case, train):

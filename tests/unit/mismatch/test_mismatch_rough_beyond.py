@@ -9,7 +9,7 @@ from turnout import physics
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.observations import with_errors
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
-from turnout.mismatch.turnout.track_parameters import EFFECT_REACH
+from turnout.mismatch.turnout.priors import TRACK
 from turnout.simulate.roughness import level
 
 
@@ -46,6 +46,6 @@ def test_no_law_is_asked_more_than_a_bay_beyond_what_was_measured(lightly_damped
     measured = case.campaign.positions()
     asked = [c.where["place"] for c in case.candidates if "sleeper" in c.where]
     free = case.predictor.track().support[list(case.predictor.zone.supports)]
-    assert min(asked) >= min(measured) - EFFECT_REACH and max(asked) <= max(measured) + EFFECT_REACH
+    assert min(asked) >= min(measured) - TRACK.effect_reach and max(asked) <= max(measured) + TRACK.effect_reach
     assert free.min() < min(asked) and free.max() > max(asked)
     assert {"local_pad", "local_ballast", "hanging_sleeper"} <= {c.family for c in case.candidates}

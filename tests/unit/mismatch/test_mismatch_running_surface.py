@@ -12,8 +12,9 @@ from turnout.config.parameters import read_parameters
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.turnout import TrackCase, passage_alignment
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
+from turnout.mismatch.turnout.priors import SURFACE
 from turnout.mismatch.turnout.rail_roughness import Waves
-from turnout.mismatch.turnout.running_surface import MODEL_ERROR, SHAPE_SD, RunningSurface
+from turnout.mismatch.turnout.running_surface import RunningSurface
 from turnout.simulate.track_file import turnout_track
 from turnout.simulate.wheel_path import Dip, Kink, Sections
 from turnout.stages.accepted_effects import AcceptedEffect
@@ -49,7 +50,7 @@ def test_numbers_with_a_prior_may_be_off_where_they_can_be_heard():
 
 def test_the_shape_of_a_nose_is_unsure_where_its_depth_is():
     for spread, more in (
-        ({"depth": 0.5}, {"power": SHAPE_SD}),
+        ({"depth": 0.5}, {"power": SURFACE.shape_sd}),
         ({"place": 0.02}, {}),
         ({"depth": 0.5, "power": 0.1}, {}),
     ):
@@ -101,7 +102,7 @@ def test_what_is_told_of_a_number_is_not_drawn_to_the_file():
     fit = SimpleNamespace(values=values, covariance=np.array([[1.0 / weights.sum()]]), jacobian=[])
     (told,) = surface.estimate(SimpleNamespace(nuisances=surface.nuisances()), fit)
     assert told["value"] == pytest.approx(NOSE.length * np.exp(0.3))
-    assert told["se"] == pytest.approx(told["value"] * np.hypot(0.2, MODEL_ERROR))
+    assert told["se"] == pytest.approx(told["value"] * np.hypot(0.2, SURFACE.model_error))
 
 
 def test_the_search_for_the_nose_hears_no_recording_that_is_kept_back(monkeypatch):

@@ -9,13 +9,11 @@ import pytest
 from turnout import physics
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.candidates.out_of_roundness import (
-    POLYGON_SD,
-    SENSOR_SD,
-    WHEEL_SD,
     polygon_evidence,
     short_polygon_candidates,
 )
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
+from turnout.mismatch.turnout.priors import SHORT_POLYGONS
 
 
 def found_in(*terms, seed=7, changed=lambda campaign: campaign):
@@ -65,7 +63,7 @@ def test_what_one_half_of_the_passages_does_not_show_is_no_finding():
 
 def test_the_evidence_is_that_of_a_loudness_integrated_out():
     """By quadrature over what a polygon adds, N(0, LOUD²)."""
-    sd, added = np.sqrt(WHEEL_SD**2 + SENSOR_SD**2 / 8), np.linspace(-40.0, 40.0, 200001)
-    prior = np.exp(-0.5 * (added / POLYGON_SD) ** 2) / (POLYGON_SD * np.sqrt(2.0 * np.pi))
+    sd, added = np.sqrt(SHORT_POLYGONS.wheel_sd**2 + SHORT_POLYGONS.sensor_sd**2 / 8), np.linspace(-40.0, 40.0, 200001)
+    prior = np.exp(-0.5 * (added / SHORT_POLYGONS.polygon_sd) ** 2) / (SHORT_POLYGONS.polygon_sd * np.sqrt(2.0 * np.pi))
     ratio = np.exp(-0.5 * ((2.3 - added) / sd) ** 2 + 0.5 * (2.3 / sd) ** 2)
     assert polygon_evidence(2.3, 8) == pytest.approx(np.log(np.trapezoid(prior * ratio, added)), abs=1e-6)

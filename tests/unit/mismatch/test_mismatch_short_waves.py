@@ -9,14 +9,13 @@ import pytest
 from turnout import physics
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.candidates.short_corrugation import (
-    CORRUGATION_SD,
-    SENSOR_SD,
     BandPower,
     _is_repeatable,
     corrugation_evidence,
     short_corrugation_candidates,
 )
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
+from turnout.mismatch.turnout.priors import CORRUGATION
 from turnout.simulate.wheel_path import Corrugation
 
 
@@ -102,8 +101,10 @@ def test_the_evidence_is_that_of_a_loudness_integrated_out():
     louder = [
         BandPower(n, n, v, np.exp(level + more), sound, all_) for n, v, more in (("x", 20.0, 0.0), ("y", 30.0, 1.0))
     ]
-    sd, added = SENSOR_SD / np.sqrt(3.0), np.linspace(-40.0, 40.0, 200001)
-    prior = np.exp(-0.5 * (added / CORRUGATION_SD) ** 2) / (CORRUGATION_SD * np.sqrt(2.0 * np.pi))
+    sd, added = CORRUGATION.sensor_sd / np.sqrt(3.0), np.linspace(-40.0, 40.0, 200001)
+    prior = np.exp(-0.5 * (added / CORRUGATION.corrugation_sd) ** 2) / (
+        CORRUGATION.corrugation_sd * np.sqrt(2.0 * np.pi)
+    )
     for z, nats in zip((1.5, 0.0), corrugation_evidence(louder, 3.0)):
         ratio = np.exp(-0.5 * ((z - added) / sd) ** 2 + 0.5 * (z / sd) ** 2)
         assert nats == pytest.approx(np.log(np.trapezoid(prior * ratio, added)), abs=1e-6)

@@ -9,12 +9,9 @@ import pytest
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
+from turnout.mismatch.turnout.priors import WHEELS
 from turnout.mismatch.turnout.wave_response import WaveTransfer
 from turnout.mismatch.turnout.wheel_roughness import (
-    DEPTH_SD,
-    LENGTH_SD,
-    POSITION_SD,
-    ROUGHNESS_MARGIN,
     _components,
     _deviations,
     profile_modes,
@@ -33,11 +30,11 @@ def test_ways_of_wheels_are_those_of_noses_that_differ_by_a_standard_deviation()
     way = np.linspace(24.0, 26.5, 25001)
     deeper, further, longer, sharper = _deviations(NOSE, way)
     others = (
-        (deeper, replace(NOSE, depth=NOSE.depth * (1.0 + 0.1 * DEPTH_SD)), 0.1),
-        (further, replace(NOSE, place=NOSE.place - 0.1 * POSITION_SD), 0.1),
-        (longer, replace(NOSE, length=NOSE.length * (1.0 - 0.1 * LENGTH_SD)), 0.1),
+        (deeper, replace(NOSE, depth=NOSE.depth * (1.0 + 0.1 * WHEELS.depth_sd)), 0.1),
+        (further, replace(NOSE, place=NOSE.place - 0.1 * WHEELS.position_sd), 0.1),
+        (longer, replace(NOSE, length=NOSE.length * (1.0 - 0.1 * WHEELS.length_sd)), 0.1),
     )
-    smooth = np.abs(way - NOSE.place) > 0.1 * POSITION_SD + 1e-3  # the kink itself moves
+    smooth = np.abs(way - NOSE.place) > 0.1 * WHEELS.position_sd + 1e-3  # the kink itself moves
     for found, nose, share in others:
         change = (nose(way) - NOSE(way)) / share
         assert found[smooth] == pytest.approx(change[smooth], abs=0.03 * np.abs(found).max())
@@ -58,7 +55,7 @@ def test_a_measured_surface_that_ends_lower_makes_no_step_and_a_corrugation_is_a
     outside = (way < 24.59) | (way > 25.81)
     assert all(np.all(w[outside] == 0.0) for w in (deeper, sharper))
     assert all(np.abs(w[outside]).max() < 1e-12 for w in (further, longer))
-    assert deeper[np.argmin(np.abs(way - 25.2))] == pytest.approx(DEPTH_SD * (2.0e-3 - 0.8e-3))
+    assert deeper[np.argmin(np.abs(way - 25.2))] == pytest.approx(WHEELS.depth_sd * (2.0e-3 - 0.8e-3))
     assert max(np.abs(w).max() for w in (deeper, further, longer, sharper)) < 0.5e-3
     waves = Corrugation(20.0, 28.0, 5e-5, 0.35)
     case = SimpleNamespace(surface=SimpleNamespace(surfaces=lambda route, values: ((waves, NOSE),)))
@@ -72,7 +69,7 @@ class OneWheel(PhysicsTerm):
     name, kind = "one_wheel", "path"
 
     def paths(self, track, vehicle):
-        part = lambda x, wheel=0: DEPTH_SD * NOSE(x)  # noqa: E731
+        part = lambda x, wheel=0: WHEELS.depth_sd * NOSE(x)  # noqa: E731
         deeper = type("Deeper", (), {"wheel": 1, "__call__": lambda self, x, wheel=0: part(x)})()
         return (deeper,)
 
@@ -87,7 +84,7 @@ def test_the_signal_of_a_wheel_that_falls_deeper_is_that_of_a_simulation():
     made = case.aligned_passages[o.name]
     filed = fit.values | dict.fromkeys(case.predictor.surface.names, 0.0)
     modes = profile_modes(
-        case.predictor, filed, made, WaveTransfer(case.predictor, fit.values, made, beyond=ROUGHNESS_MARGIN)
+        case.predictor, filed, made, WaveTransfer(case.predictor, fit.values, made, beyond=WHEELS.roughness_margin)
     )
     assert modes.shape == (o.data.size, 4 * len(made.passage.vehicle.wheels))
     change = case.predict(fit.values, (OneWheel(),), [o])[0] - before

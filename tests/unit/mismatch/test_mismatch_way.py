@@ -12,7 +12,8 @@ from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.thresholds import THRESHOLDS
-from turnout.mismatch.turnout.passage_observation import CLIPPING_BLUR, AlignedPassage, _clipped_samples, observation_of
+from turnout.mismatch.turnout.passage_observation import AlignedPassage, _clipped_samples, observation_of
+from turnout.mismatch.turnout.priors import PASSAGE
 from turnout.records import Channel, Recording
 
 
@@ -169,7 +170,7 @@ def test_where_a_channel_was_at_its_range_the_passage_says_no_more_than_its_size
     sensors = [SimpleNamespace(name=name, place=x) for name, x in (("A1", 0.0), ("A2", 2.0))]
     time = np.arange(0.1, 0.9, 0.005) + 0.0013
     topped = _clipped_samples(recording, sensors, time)
-    assert np.array_equal(topped[0], np.abs(time - 0.5) < CLIPPING_BLUR)
+    assert np.array_equal(topped[0], np.abs(time - 0.5) < PASSAGE.clipping_blur)
     assert not topped[1].any()
     vehicle = SimpleNamespace(wheel_positions=np.array([0.0]), static_loads=np.array([5e4]))
     passage = SimpleNamespace(

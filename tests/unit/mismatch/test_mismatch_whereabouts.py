@@ -21,6 +21,7 @@ from turnout.mismatch.engine.localization import (
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.reserved_data import is_significantly_worse
 from turnout.mismatch.turnout import disturbances
+from turnout.mismatch.turnout.priors import DISTURBANCE
 
 N, K = 60, 6
 
@@ -124,11 +125,11 @@ def test_another_train_shakes_all_sensors_and_a_noisy_channel_is_alone():
     others = [levels_of(rng) for _ in range(5)]
     louder, p = disturbances.excess_over(levels_of(rng, scale=2.0), others)  # twice the amplitude: 6 dB
     assert louder == pytest.approx(6.0, abs=1.0)
-    assert p < disturbances.MAX_CHANCE
+    assert p < DISTURBANCE.max_chance
     power, freedom = levels_of(rng)
     louder, p = disturbances.excess_over((power * np.array([100.0, 1.0, 1.0, 1.0]), freedom), others)
-    assert louder < disturbances.MIN_EXCESS
-    assert p > disturbances.MAX_CHANCE
+    assert louder < DISTURBANCE.min_excess
+    assert p > DISTURBANCE.max_chance
 
 
 def test_a_fall_of_the_held_out_fit_counts_beyond_two_standard_errors():

@@ -15,13 +15,13 @@ from turnout.hammer_test import find_impacts
 from turnout.mismatch.engine.case import Nuisance
 from turnout.mismatch.turnout import HammerInput, PassageInput, TrackCase
 from turnout.mismatch.turnout.passage_observation import (
-    MIN_SAMPLES,
     AlignedPassage,
     observation_of,
     observe_passage,
     passage_nuisances,
 )
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
+from turnout.mismatch.turnout.priors import PASSAGE
 from turnout.mismatch.turnout.receptance_observation import pairs_of_test
 from turnout.mismatch.turnout.track_parameters import vehicle_with
 from turnout.readers import MAX_WHOLE_FILE_SIZE, read
@@ -281,13 +281,13 @@ def test_notes_that_are_cut_off_are_counted():
 
 def test_a_passage_of_the_fewest_samples_is_an_observation():
     """Fewer than those over which its amplitude is taken: then it is taken over all of them."""
-    rng, time = np.random.default_rng(0), np.arange(MIN_SAMPLES) / 300.0
+    rng, time = np.random.default_rng(0), np.arange(PASSAGE.min_samples) / 300.0
     vehicle = SimpleNamespace(wheel_positions=np.zeros(1), static_loads=[1e5])
     passage = PassageInput("p", None, vehicle, 30.0, "x")
     sensors = tuple(SimpleNamespace(name=f"S{k}", place=0.6 * k) for k in range(2))
-    data = rng.normal(size=(2, MIN_SAMPLES))
+    data = rng.normal(size=(2, PASSAGE.min_samples))
     found = observation_of(AlignedPassage("p", passage, sensors, time, 0.04, 30.0), data, np.zeros(2), 0.06)
-    assert found.data.size == 2 * MIN_SAMPLES and np.all(found.sigma > 0.02 * np.std(data, axis=1).min())
+    assert found.data.size == 2 * PASSAGE.min_samples and np.all(found.sigma > 0.02 * np.std(data, axis=1).min())
 
 
 def test_sections_that_are_asked_for_are_diagnosed_together():

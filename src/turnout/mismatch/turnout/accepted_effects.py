@@ -15,14 +15,9 @@ from turnout.errors import SimulationError
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Nuisance
 from turnout.mismatch.engine.map_fit import Fit
+from turnout.mismatch.turnout.priors import ACCEPTED
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.track import Track
-
-PRIOR_SD_SHARE = 0.5  # prior sd of an accepted value, as a share of its distance from neutral: it may grow
-MAX_NEUTRAL_RATIO = 100.0  # a neutral value above this multiple of the accepted one means "no limit"
-MIN_PRIOR_ERRORS = 3.0  # least prior sd, in standard errors of the accepted value
-MIN_PRIOR_SD_SHARE = 1e-3  # least prior sd, as a share of the bounds
-DERIVATIVE_STEP = 0.02  # step of a difference quotient, as a share of the prior sd
 
 
 class AcceptedEffect(Protocol):
@@ -143,15 +138,15 @@ def _name(effect: AcceptedEffect, parameter: Parameter) -> str:
 def _nuisances(effect: AcceptedEffect) -> Iterator[Nuisance]:
     for p in effect.parameters:
         value, error = effect.values[p.name]
-        sd = max(_prior_sd(p, value), MIN_PRIOR_ERRORS * (error or 0.0))
+        sd = max(_prior_sd(p, value), ACCEPTED.min_errors * (error or 0.0))
         yield Nuisance(_name(effect, p), p.unit, value, sd, bounds=p.bounds, meaning=p.meaning)
 
 
 def _prior_sd(p: Parameter, value: float) -> float:
     """Prior sd of an accepted value: a share of its distance from neutral, or of itself if neutral means no limit."""
-    if abs(p.neutral) > MAX_NEUTRAL_RATIO * abs(value):
-        return PRIOR_SD_SHARE * abs(value)
-    return max(PRIOR_SD_SHARE * abs(value - p.neutral), MIN_PRIOR_SD_SHARE * (p.bounds[1] - p.bounds[0]))
+    if abs(p.neutral) > ACCEPTED.max_neutral_ratio * abs(value):
+        return ACCEPTED.sd_share * abs(value)
+    return max(ACCEPTED.sd_share * abs(value - p.neutral), ACCEPTED.min_sd_share * (p.bounds[1] - p.bounds[0]))
 
 
 def _difference_column(
@@ -161,7 +156,7 @@ def _difference_column(
     nuisance: Nuisance,
 ) -> list[np.ndarray]:
     """Difference quotient by one nuisance, to the side that can be simulated."""
-    step = DERIVATIVE_STEP * nuisance.sd
+    step = ACCEPTED.derivative_step * nuisance.sd
     if values[nuisance.name] + step > nuisance.bounds[1]:
         step = -step
     try:

@@ -5,10 +5,9 @@ from dataclasses import dataclass, field
 
 from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.errors import SimulationError
+from turnout.mismatch.turnout.priors import TRACK
 from turnout.records import Recording
 from turnout.simulate.sensor import Sensor
-
-LOAD_SD = 0.05  # standard deviation of the sprung mass, as a share, where its load was measured or noted
 
 
 @dataclass(frozen=True)
@@ -45,7 +44,7 @@ class PassageInput:
     direction: str = "facing"
     route: str = "main"
     conditions: Mapping = field(default_factory=dict)
-    load_sd: float = LOAD_SD
+    load_sd: float = TRACK.load_sd
 
 
 @dataclass(frozen=True)

@@ -20,15 +20,12 @@ from turnout.mismatch.turnout.campaign import CampaignInput
 from turnout.mismatch.turnout.candidates.catalogue import distant_starts, has_required_range, list_candidates
 from turnout.mismatch.turnout.hammer_case import HammerCase
 from turnout.mismatch.turnout.observations import CaseData, case_data, with_errors
-from turnout.mismatch.turnout.passage_model import ELEMENTS_PER_BAY, Track1D
+from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.passage_observation import AlignedPassage
 from turnout.mismatch.turnout.predicted_case import PredictedCase
 from turnout.mismatch.turnout.prediction import Predictions, Predictor, Terms, Values
+from turnout.mismatch.turnout.priors import CASE, SIMULATION
 from turnout.mismatch.turnout.wheel_roughness import log_mass_ratios
-
-# Change of ln unsprung mass, or of a rail value, above which errors are computed again. The response to
-# roughness near the P2 resonance then changes by a fifth of its amplitude.
-UPDATE_THRESHOLD = 0.15
 
 # (predictor, whether a prediction is cheap) -> a cache around the predictor, or the predictor itself
 PredictionCache: TypeAlias = Callable[[Predictor, bool], Predictions]
@@ -152,16 +149,18 @@ class TrackCase(PredictedCase):
     def with_updated_errors(self, fit: Fit) -> TrackCase:
         """The case with the rail under the passages and the roughness errors of the wheels as ``fit`` has them.
 
-        Returns the case itself where all changes are within ``UPDATE_THRESHOLD``. The rail was first fitted to the
+        Returns the case itself where all changes are within ``CASE.update_threshold``. The rail was first fitted to the
         hammer tests alone, where it may have absorbed part of the effect that ``fit`` explains now.
         """
         if not self.aligned_passages:
             return self
         ratios = log_mass_ratios(*self.with_fixed_effects(fit))
         changed = {
-            train: m for train, m in ratios.items() if abs(m - self.log_mass_ratios.get(train, 0.0)) > UPDATE_THRESHOLD
+            train: m
+            for train, m in ratios.items()
+            if abs(m - self.log_mass_ratios.get(train, 0.0)) > CASE.update_threshold
         }
-        rail_changed = any(abs(fit.values[n] - at) > UPDATE_THRESHOLD for n, at in self.predictor.rail.items())
+        rail_changed = any(abs(fit.values[n] - at) > CASE.update_threshold for n, at in self.predictor.rail.items())
         if not changed and not rail_changed:
             return self
         updated = copy(self)
@@ -222,7 +221,9 @@ class TrackCase(PredictedCase):
     def _refined_prediction(self, fit: Fit, aligned: AlignedPassage, predicted: np.ndarray) -> np.ndarray:
         """Prediction of a passage with half the step and half the mesh; ``predicted`` if that fails."""
         solver = self.predictor.solver
-        fine_solver = Track1D(2.0 * solver.rate, solver.scheme, 2 * (solver.elements or 2 * ELEMENTS_PER_BAY))
+        fine_solver = Track1D(
+            2.0 * solver.rate, solver.scheme, 2 * (solver.elements or 2 * SIMULATION.elements_per_bay)
+        )
         try:
             return self.predictor.with_solver(fine_solver).predict_passage(fit.values, self.all_terms(fit), aligned)
         except SimulationError:

@@ -10,13 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import binom, f
 
-MIN_WHEEL_DISTANCE = 12.0  # m from a wheel to the nearest sensor: vibration of the train has decayed there
-CAR_LENGTH = 26.0  # m, length of a car
-MIN_QUIET_TIME = 0.15  # s, shortest segment that is tested
-BAND = (5.0, 100.0)  # Hz, of the level
-MIN_EXCESS = 3.0  # dB over the other passages; undisturbed ones differ by 1 dB
-HANN_CORRELATION = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0)  # variance factor of correlated lines of a Hann window
-MAX_CHANCE = 1e-4  # probability by chance, over all segments
+from turnout.mismatch.turnout.priors import DISTURBANCE
 
 
 @dataclass(frozen=True)
@@ -41,14 +35,14 @@ def disturbances(passages, unmatched=None):
     for aligned in (*passages.values(), *(unmatched or {}).values()):
         for when, (start, stop) in _quiet_segments(aligned).items():
             if when == "after" and aligned.name in (unmatched or {}):
-                start += CAR_LENGTH / aligned.speed
-            if stop - start >= MIN_QUIET_TIME:
+                start += DISTURBANCE.car_length / aligned.speed
+            if stop - start >= DISTURBANCE.min_quiet_time:
                 segments[when][aligned.name] = _level(aligned, start, stop)
     n_segments = sum(len(s) for s in segments.values() if len(s) > 2)
     for when, levels in segments.items():
         for name in levels if len(levels) > 2 else ():
             excess, p = excess_over(*_shared_levels(levels, name))
-            if excess > MIN_EXCESS and p * n_segments < MAX_CHANCE:
+            if excess > DISTURBANCE.min_excess and p * n_segments < DISTURBANCE.max_chance:
                 events.append(Disturbance(name, when, excess, min(1.0, p * n_segments)))
     return events
 
@@ -56,11 +50,11 @@ def disturbances(passages, unmatched=None):
 def _quiet_segments(aligned):
     """(start, stop) of the segments with every wheel far from every sensor [s]."""
     train = np.ptp([s.place for s in aligned.sensors]) + aligned.passage.vehicle.wheel_positions[-1]
-    clear_time = MIN_WHEEL_DISTANCE / aligned.speed
+    clear_time = DISTURBANCE.min_wheel_distance / aligned.speed
     end = aligned.passage.recording.duration
     return {
-        "before": (0.02, aligned.reference - clear_time),
-        "after": (aligned.reference + train / aligned.speed + clear_time, end - 0.02),
+        "before": (DISTURBANCE.record_margin, aligned.reference - clear_time),
+        "after": (aligned.reference + train / aligned.speed + clear_time, end - DISTURBANCE.record_margin),
     }
 
 
@@ -83,7 +77,7 @@ def _level(aligned, start, stop):
 
 
 def band_level(samples, rate):
-    """Mean square of rows of ``samples`` within ``BAND`` per line (n,), and its degrees of freedom.
+    """Mean square of rows of ``samples`` within ``DISTURBANCE.band`` per line (n,), and its degrees of freedom.
 
     A Hann window keeps the strong low frequencies at the end of the segment out. It correlates neighbouring lines by
     2/3 and 1/6, so that two degrees per line become 2 / (1 + 2 (4/9 + 1/36)) (Welch 1967).
@@ -92,9 +86,9 @@ def band_level(samples, rate):
     window = np.hanning(n)
     spectrum = np.fft.rfft((samples - samples.mean(axis=1, keepdims=True)) * window, axis=1)
     grid = np.fft.rfftfreq(n, 1.0 / rate)
-    inside = (grid >= BAND[0]) & (grid <= BAND[1])
+    inside = (grid >= DISTURBANCE.band[0]) & (grid <= DISTURBANCE.band[1])
     level = np.mean(np.abs(spectrum[:, inside]) ** 2, axis=1) / np.sum(window**2)
-    return level, 2.0 * inside.sum() / HANN_CORRELATION
+    return level, 2.0 * inside.sum() / DISTURBANCE.hann_correlation
 
 
 def excess_over(level, reference):

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from turnout.mismatch.turnout import passage_band, passage_model
+from turnout.mismatch.turnout import passage_band
+from turnout.mismatch.turnout.priors import PASSAGE, SIMULATION
 from turnout.mismatch.turnout.pseudo_forces import green_functions, support_motion
 from turnout.mismatch.turnout.wave_response import channel_responses
 
@@ -23,7 +24,7 @@ def latent_force(case, fit):
         rows = residual.reshape(len(aligned.sensors), -1)
         size = 1 << int(np.ceil(np.log2(2 * rows.shape[1])))
         grid = np.fft.rfftfreq(size, 1.0 / aligned.clock)
-        inside = np.flatnonzero((grid >= passage_band.BAND_LOW) & (grid <= aligned.high))
+        inside = np.flatnonzero((grid >= PASSAGE.band_low) & (grid <= aligned.high))
         nearest = np.clip(np.searchsorted(frequency, grid[inside]), 0, frequency.size - 1)
         spectra.append((aligned, np.fft.rfft(rows, size)[:, inside].T, g[nearest, :, :, 1], inside, size))
     gains = []
@@ -47,7 +48,7 @@ def latent_force(case, fit):
 
 def _power_and_ridge(g):
     power = np.sum(np.abs(g) ** 2, axis=1)
-    return power, 0.02 * float(np.max(power))
+    return power, PASSAGE.ridge_share * float(np.max(power))
 
 
 def _explained_power(r, g):
@@ -66,7 +67,7 @@ def _force(r, g, inside, size, n):
 def _append_series(case, fit, aligned, series, force, k):
     _, sleeper = support_motion(case.predictor, fit.values, case.all_terms(fit), aligned)
     rate = case.predictor.solver.rate
-    time = aligned.time - aligned.reference - fit.values[f"time@{aligned.name}"] + passage_model.LEAD_TIME
+    time = aligned.time - aligned.reference - fit.values[f"time@{aligned.name}"] + SIMULATION.lead_time
     y = passage_band.read_at(sleeper[k][None], rate, time)[0]
     position = case.predictor.track().support[case.predictor.zone.first + k]
     wheels = aligned.positions() - position
@@ -74,7 +75,7 @@ def _append_series(case, fit, aligned, series, force, k):
     series["force"].append(force)
     series["displacement"].append(y)
     series["velocity"].append(np.gradient(y, 1.0 / aligned.clock))
-    series["position"].append(np.clip(nearest, -6.0, 6.0))
+    series["position"].append(np.clip(nearest, -PASSAGE.max_wheel_distance, PASSAGE.max_wheel_distance))
     series["time"].append(aligned.time)
     temperature = aligned.passage.conditions.get("rail_temperature", np.nan)
     series["temperature"].append(np.full(time.size, float(temperature)))

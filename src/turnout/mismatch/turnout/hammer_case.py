@@ -10,8 +10,7 @@ import numpy as np
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.mismatch.turnout.predicted_case import PredictedCase
-
-BROAD_ERROR = 0.1  # relative error of a receptance in the first, broad fit
+from turnout.mismatch.turnout.priors import RECEPTANCE
 
 
 class HammerCase(PredictedCase):
@@ -24,7 +23,7 @@ class HammerCase(PredictedCase):
         """
         broad = copy(self)
         broad.observations = tuple(
-            replace(o, sigma=np.hypot(o.sigma, BROAD_ERROR), modes=None) for o in self.observations
+            replace(o, sigma=np.hypot(o.sigma, RECEPTANCE.broad_error), modes=None) for o in self.observations
         )
         return broad
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from turnout.mismatch.turnout.priors import SIMULATION
 from turnout.physics.term import PhysicsTerm
 from turnout.simulate.links import links_of
 from turnout.simulate.matrices import TrackMatrices, add_rails, assemble, link_matrices, link_vector
 
-CACHE_SIZE = 24  # templates, and rails and link sets per template
 SUPPORT_FIELDS = (  # field of a Track, quantity of the link, tag
     ("pad_stiffness", "stiffness", "pad"),
     ("pad_damping", "damping", "pad"),
@@ -37,10 +37,10 @@ def matrices_of(track, terms=()):
 
 
 def _cached(cache, key, compute):
-    """``compute()``, cached under ``key`` among the last ``CACHE_SIZE``."""
+    """``compute()``, cached under ``key`` among the last ``SIMULATION.template_cache_size``."""
     if key not in cache:
         cache[key] = compute()
-        while len(cache) > CACHE_SIZE:
+        while len(cache) > SIMULATION.template_cache_size:
             cache.popitem(last=False)
     return cache[key]
 

@@ -11,7 +11,7 @@ import numpy as np
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.case import Observation
-from turnout.mismatch.turnout import passage_alignment, passage_observation, receptance_observation
+from turnout.mismatch.turnout import passage_observation, receptance_observation
 from turnout.mismatch.turnout.campaign import CampaignInput, HammerInput, PassageInput
 from turnout.mismatch.turnout.disturbances import Disturbance, disturbances
 from turnout.mismatch.turnout.hammer_case import HammerCase
@@ -19,14 +19,12 @@ from turnout.mismatch.turnout.passage_alignment import PassageAligner, fit_surfa
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.passage_observation import AlignedPassage
 from turnout.mismatch.turnout.prediction import Predictor, Values
+from turnout.mismatch.turnout.priors import ALIGNMENT, CASE, RECEPTANCE
 from turnout.mismatch.turnout.receptance_observation import FrfPair
 from turnout.mismatch.turnout.saturation import SaturationLimit, raw_peak, saturated_channels, without_saturated
 from turnout.mismatch.turnout.site import Site, site_of
 from turnout.mismatch.turnout.wheel_roughness import wheel_modes
 from turnout.simulate.sensor import Sensor
-
-MAX_HAMMER_DISTANCE = 8.0  # m from impact to sensor: beyond, the model error leaves 1/30 of the information
-MIN_TIMED_CORRELATION = 0.25  # correlation above which the time of a train is certain; at wrong times: 0.10
 
 
 @dataclass(frozen=True)
@@ -199,13 +197,13 @@ def observe_tests(
         sensors = [
             s
             for s in (*campaign.sensors, *_loose_sensors(test, campaign.sensors))
-            if s.name not in (saturated or {}) and abs(s.place - test.place) <= MAX_HAMMER_DISTANCE
+            if s.name not in (saturated or {}) and abs(s.place - test.place) <= CASE.max_hammer_distance
         ]
         pairs_of_test = receptance_observation.pairs_of_test(test, sensors, tolerance)
         if not pairs_of_test:
             notes.append(
-                f"hammer test {test.name}: no channel within {MAX_HAMMER_DISTANCE:g} m with "
-                f"{receptance_observation.MIN_IMPACTS} sound blows"
+                f"hammer test {test.name}: no channel within {CASE.max_hammer_distance:g} m with "
+                f"{RECEPTANCE.min_impacts} sound blows"
             )
         for pair, observation in pairs_of_test:
             pairs[pair.name] = pair
@@ -313,8 +311,8 @@ def _observe_passage(
         reference, speed, correlation = aligner.align(values, passage)
     except SimulationError as error:
         return f"cannot be simulated: {error}"
-    if correlation < passage_alignment.MIN_CORRELATION:
-        is_timed = correlation > MIN_TIMED_CORRELATION
+    if correlation < ALIGNMENT.min_correlation:
+        is_timed = correlation > CASE.min_timed_correlation
         timed = AlignedPassage(passage.name, passage, sensors, np.zeros(0), reference, speed) if is_timed else None
         return _Unmatched(passage, correlation, timed)
     try:

@@ -14,20 +14,15 @@ import numpy as np
 from turnout.errors import SimulationError
 from turnout.mismatch.turnout.campaign import CampaignInput, PassageInput
 from turnout.mismatch.turnout.passage_band import band_signals, limit_band, read_at
-from turnout.mismatch.turnout.passage_model import LEAD_TIME
 from turnout.mismatch.turnout.prediction import Predictor, Values
+from turnout.mismatch.turnout.priors import ALIGNMENT, SIMULATION
 from turnout.mismatch.turnout.running_surface import POSITION_FIELDS
-
-# Hz, end of the band of the rail's deflection under the axles; least correlation of a passage with its train.
-# The right train correlates by 0.8 with a dip of 1.5 mm, by 0.6 to 0.7 with a flat of 80 mm, a wrong one at most 0.6.
-ALIGNMENT_BAND_END, MIN_CORRELATION = 30.0, 0.65  # [Hz], -
-SAMPLE_STEP = 1.0 / 800.0  # s, sampling step of signals that are correlated
 
 
 def low_pass(recording, sensors):
-    """(n_sensor, n) signals of the sensors below ``ALIGNMENT_BAND_END``, every ``SAMPLE_STEP``."""
-    grid = np.arange(0.0, recording.duration, SAMPLE_STEP)
-    return read_at(band_signals(recording, sensors, ALIGNMENT_BAND_END), recording.rate, grid)
+    """(n_sensor, n) signals of the sensors below ``ALIGNMENT.band_end``, every ``ALIGNMENT.sample_step``."""
+    grid = np.arange(0.0, recording.duration, ALIGNMENT.sample_step)
+    return read_at(band_signals(recording, sensors, ALIGNMENT.band_end), recording.rate, grid)
 
 
 def align(passage, data, simulated, rate):
@@ -37,28 +32,28 @@ def align(passage, data, simulated, rate):
     simulation is stretched in time about the arrival of the first wheel. Roughness and dips have no influence in this
     band.
 
-    If no alignment reaches ``MIN_CORRELATION`` with all sensors, the one that correlates least is left out, where three
-    or more are there: its fault is left to the fit. Failing that, samples are clipped at the largest value of the
+    If no alignment reaches the least correlation with all sensors, the one that correlates least is left out, where
+    three or more are there: its fault is left to the fit. Failing that, samples are clipped at the largest value of the
     simulation. The impacts of a long flat are many times larger than any axle's response.
     """
-    low = limit_band(simulated, rate, high=ALIGNMENT_BAND_END)
+    low = limit_band(simulated, rate, high=ALIGNMENT.band_end)
     best_fit = _best_alignment(data, low, rate)
-    if best_fit[0] < MIN_CORRELATION:
+    if best_fit[0] < ALIGNMENT.min_correlation:
         top = np.max(np.abs(low), axis=1, keepdims=True)
         best_fit = max(best_fit, _best_alignment(np.clip(data, -top, top), low, rate))
     correlation, lag, stretch = best_fit
-    return lag * SAMPLE_STEP + LEAD_TIME, passage.speed * (1.0 + stretch), correlation
+    return lag * ALIGNMENT.sample_step + SIMULATION.lead_time, passage.speed * (1.0 + stretch), correlation
 
 
 def _best_alignment(data, low, rate):
     """(correlation, lag in steps, stretch) of the best alignment of the simulation ``low`` with ``data``."""
-    n_sensor, model_time = len(data), np.arange(0.0, low.shape[-1] / rate, SAMPLE_STEP)
+    n_sensor, model_time = len(data), np.arange(0.0, low.shape[-1] / rate, ALIGNMENT.sample_step)
     size = 1 << int(np.ceil(np.log2(data.shape[1] + model_time.size)))
     spectrum = np.fft.rfft(data, size)
     weight = 1.0 / np.maximum(np.sqrt(np.sum(data**2, axis=1)), 1e-12)
     all_sensors, without_worst = [], []
-    for stretch in np.linspace(-0.015, 0.015, 13):
-        model = read_at(low, rate, LEAD_TIME + (model_time - LEAD_TIME) * (1.0 + stretch))
+    for stretch in np.linspace(-ALIGNMENT.max_stretch, ALIGNMENT.max_stretch, ALIGNMENT.n_stretches):
+        model = read_at(low, rate, SIMULATION.lead_time + (model_time - SIMULATION.lead_time) * (1.0 + stretch))
         norm = np.maximum(np.sqrt(np.sum(model**2, axis=1)), 1e-12)
         product = np.fft.irfft(spectrum * np.fft.rfft(model, size).conj(), size)
         correlations = (weight / norm)[:, None] * product
@@ -66,7 +61,7 @@ def _best_alignment(data, low, rate):
         all_sensors.append(_peak_alignment(total / n_sensor, stretch))
         without_worst.append(_peak_alignment((total - worst) / max(n_sensor - 1, 1), stretch))
     best_fit = max(all_sensors)
-    if best_fit[0] < MIN_CORRELATION and n_sensor >= 3:
+    if best_fit[0] < ALIGNMENT.min_correlation and n_sensor >= 3:
         best_fit = max(without_worst)
     correlation, k, stretch = best_fit
     return correlation, k if k < size - model_time.size else k - size, stretch
@@ -76,14 +71,6 @@ def _peak_alignment(score, stretch):
     """(correlation, lag in steps, stretch) at the largest score."""
     k = int(np.argmax(score))
     return float(score[k]), k, float(stretch)
-
-
-MAX_TRIAL_PASSAGES = 3  # passages used, those of the shortest trains; each is simulated 20 times a number, or more
-POSITION_STEP, MAX_DEVIATION = 0.15, 2.0  # m between trial positions; largest deviation in prior standard deviations
-TRIAL_FACTORS = (-1.0, -0.5, 0.5, 1.0)  # trial changes of other numbers, in prior standard deviations
-REFINEMENT, N_FINE_STEPS = 4, 3  # subdivision of the position step in the second round; steps to each side
-EFFECTIVE_SAMPLES = 20.0  # independent samples of a passage below 30 Hz, approximately; its weight against the prior
-MAX_CORRELATION = 0.999  # correlation is limited to this: beyond, it contains no information on the surface
 
 
 class PassageAligner:
@@ -129,7 +116,7 @@ def fit_surface(aligner: PassageAligner, values: Values) -> dict[str, float]:
     campaign, surface = aligner.campaign, aligner.predictor.surface
     recorded = [p for p in campaign.passages if campaign.sensors_of(p)]
     recorded = [p for p in recorded if p.name not in campaign.reserved] or recorded
-    passages = sorted(recorded, key=lambda p: len(p.vehicle.wheels))[:MAX_TRIAL_PASSAGES]
+    passages = sorted(recorded, key=lambda p: len(p.vehicle.wheels))[: ALIGNMENT.max_trial_passages]
     priors = {n.name: n for n in surface.nuisances()}
     surface_values = dict.fromkeys(priors, 0.0)
     best_score = _log_posterior(aligner, {**values, **surface_values}, passages) if priors else 0.0
@@ -146,11 +133,15 @@ def fit_surface(aligner: PassageAligner, values: Values) -> dict[str, float]:
 
 def _trial_steps(field: str, sd: float, refine: bool) -> list[float]:
     if field not in POSITION_FIELDS:
-        return [f * sd * (0.5 if refine else 1.0) for f in TRIAL_FACTORS]
+        return [f * sd * (0.5 if refine else 1.0) for f in ALIGNMENT.trial_factors]
     if refine:
-        return [POSITION_STEP * k / REFINEMENT for k in range(-N_FINE_STEPS, N_FINE_STEPS + 1) if k]
-    step = min(POSITION_STEP, sd)
-    n = int(MAX_DEVIATION * sd / step)
+        return [
+            ALIGNMENT.position_step * k / ALIGNMENT.refinement
+            for k in range(-ALIGNMENT.n_fine_steps, ALIGNMENT.n_fine_steps + 1)
+            if k
+        ]
+    step = min(ALIGNMENT.position_step, sd)
+    n = int(ALIGNMENT.max_deviation * sd / step)
     return [step * k for k in range(-n, n + 1) if k]
 
 
@@ -161,6 +152,6 @@ def _log_posterior(aligner: PassageAligner, values: Values, passages: Sequence[P
     file.
     """
     penalty = sum((values[u.name] / u.nuisance.sd) ** 2 for u in aligner.predictor.surface.parameters)
-    return -penalty - EFFECTIVE_SAMPLES * sum(
-        np.log(1.0 - min(aligner.correlation(values, p), MAX_CORRELATION) ** 2) for p in passages
+    return -penalty - ALIGNMENT.effective_samples * sum(
+        np.log(1.0 - min(aligner.correlation(values, p), ALIGNMENT.max_correlation) ** 2) for p in passages
     )

@@ -3,13 +3,10 @@
 import numpy as np
 from scipy.fft import next_fast_len
 
-SHORTEST_WAVE = 0.3  # m, shortest modelled wave of the rail's roughness
-BAND_LOW, BAND_HIGH = 5.0, 112.0  # Hz, band in which the deterministic part dominates the roughness
-SIMULATION_RATE = 1800.0  # Hz, of the simulation; errors 1 to 2 % of the waveform with Radau IIA
-RATE_DIVISORS = (9, 6, 5)  # simulation steps per sample of an observation; the first that suffices is used
+from turnout.mismatch.turnout.priors import PASSAGE, SIMULATION
 
 
-def limit_band(samples, rate, low=BAND_LOW, high=BAND_HIGH):
+def limit_band(samples, rate, low=PASSAGE.band_low, high=PASSAGE.band_high):
     """Rows of ``samples`` between ``low`` and ``high`` [Hz], zero phase, cosine edges of a third."""
     n = samples.shape[-1]
     size = next_fast_len(n + round(rate * 0.75), real=True)  # the lower edge rings for half a second
@@ -48,13 +45,22 @@ def upsample(samples, factor=4):
 
 def band_end(speed):
     """Upper end of the band of a passage [Hz]: its edge is 1.25 times this, at the shortest wave."""
-    return min(BAND_HIGH, speed / SHORTEST_WAVE / 1.25)
+    return min(PASSAGE.band_high, speed / PASSAGE.shortest_wave / 1.25)
 
 
 def sample_rate_of(speed):
-    """Sampling rate for the band of a passage at this speed, an integer fraction of ``SIMULATION_RATE`` [Hz]."""
-    enough = [SIMULATION_RATE / fold for fold in RATE_DIVISORS if SIMULATION_RATE / fold > 2.4 * 1.25 * band_end(speed)]
-    return enough[0] if enough else SIMULATION_RATE / RATE_DIVISORS[-1]
+    """Sampling rate for the band of a passage at this speed, an integer fraction of ``SIMULATION.rate`` [Hz]."""
+    enough = [
+        SIMULATION.rate / fold
+        for fold in PASSAGE.rate_divisors
+        if SIMULATION.rate / fold > 2.4 * 1.25 * band_end(speed)
+    ]
+    return enough[0] if enough else SIMULATION.rate / PASSAGE.rate_divisors[-1]
+
+
+def transfer_lines():
+    """(n_line,) lines of the transfer functions of a passage [Hz]."""
+    return np.arange(SIMULATION.lowest_line, SIMULATION.band_margin * PASSAGE.band_high, SIMULATION.line_step)
 
 
 def band_signals(recording, sensors, high):

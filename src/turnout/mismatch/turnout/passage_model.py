@@ -5,23 +5,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from turnout.mismatch.turnout.matrix_cache import matrices_of
-from turnout.mismatch.turnout.passage_band import SIMULATION_RATE
+from turnout.mismatch.turnout.priors import SIMULATION
 from turnout.simulate.preparation import prepare
 from turnout.simulate.run import Drive, run
-
-ELEMENTS_PER_BAY = 2  # per bay; differs by 0.2 to 0.5 % of the waveform below 112 Hz from 4 elements
-DECAY_EXPONENT = 8.0  # exponent at which a force's effect along the rail is cut off in a step; error 3e-6
-LEAD_TIME = 0.25  # s before the first wheel reaches the first sensor
-EDGE_TIME = 0.08  # s of signal before the first and after the last wheel
 
 
 @dataclass(frozen=True)
 class Track1D:
     """Settings of the simulation used in fits; ``elements`` per bay, None: as in the track file."""
 
-    rate: float = SIMULATION_RATE
+    rate: float = SIMULATION.rate
     scheme: str = "radau"
-    elements: int | None = ELEMENTS_PER_BAY
+    elements: int | None = SIMULATION.elements_per_bay
 
 
 class PassageSimulator:
@@ -33,19 +28,25 @@ class PassageSimulator:
             track = track.with_(elements_per_bay=settings.elements)
         self.track = track
         matrices = matrices_of(track, self.terms)
-        self.prepared = prepare(track, 1.0 / settings.rate, settings.scheme, self.terms, DECAY_EXPONENT, matrices)
+        self.prepared = prepare(
+            track, 1.0 / settings.rate, settings.scheme, self.terms, SIMULATION.decay_exponent, matrices
+        )
 
     def __call__(self, passage, vehicle, speed, sensors, probes=(), surfaces=None, described=None):
         """(n_sensor + n_probe, n) signals over ``surfaces``, by default those of the file.
 
-        At time 0 the first wheel is ``LEAD_TIME`` before the first sensor, at its position in ``described``.
+        At time 0 the first wheel is ``SIMULATION.lead_time`` before the first sensor, at its position in ``described``.
         """
         for term in self.terms:
             vehicle = term.vehicle(vehicle)
         sign = 1 if passage.direction == "facing" else -1
         positions = sign * np.array([s.place for s in described or sensors])
-        start = sign * (positions.min() - speed * LEAD_TIME)
-        distance = np.ptp(positions) + float(vehicle.wheel_positions[-1]) + speed * (LEAD_TIME + 2.0 * EDGE_TIME)
+        start = sign * (positions.min() - speed * SIMULATION.lead_time)
+        distance = (
+            np.ptp(positions)
+            + float(vehicle.wheel_positions[-1])
+            + speed * (SIMULATION.lead_time + 2.0 * SIMULATION.edge_time)
+        )
         seats = [place_sensor(s, self.terms).probe(self.track) for s in sensors]
         drive = Drive(start, speed, sign, surfaces or self.turnout.surfaces(passage.route), path_step=0.01)
         outcome = run(self.prepared, distance / speed, [*seats, *probes], vehicle, drive, forces=False, tolerance=1e-3)

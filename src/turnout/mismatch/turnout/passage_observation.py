@@ -8,23 +8,10 @@ import numpy as np
 from turnout.constants import KMH
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.case import Nuisance, Observation
-from turnout.mismatch.turnout.campaign import LOAD_SD, PassageInput
+from turnout.mismatch.turnout.campaign import PassageInput
 from turnout.mismatch.turnout.passage_band import band_end, band_signals, limit_band, read_at, sample_rate_of, upsample
-from turnout.mismatch.turnout.passage_model import EDGE_TIME
+from turnout.mismatch.turnout.priors import PASSAGE, SIMULATION, TRACK
 from turnout.simulate.sensor import Sensor
-
-# m, s, s: distance, margin and least time for a channel's noise. 4.2 m before a wheel there is noise alone, 1.4 m
-# before it the level is six times higher.
-CLEAR_DISTANCE, RECORD_MARGIN, MIN_QUIET_TIME = 5.0, 0.02, 0.1
-CLIPPING_BLUR = 0.03  # s about a sample at the range, which is disturbed by clipping
-COUPLING_CORNER_SD = 0.7  # Hz, standard deviation of the lower corner of an amplifier without a data sheet
-MIN_READ_RATE = 2500.0  # Hz, sampling rate at which cubic interpolation is right to 0.03 % at 112 Hz
-MIN_SAMPLES_PER_PERIOD = (
-    3.0  # samples per shortest period of the band; its edge ends at 1.25 times that: Nyquist needs 2.5
-)
-MIN_SAMPLES, AMPLITUDE_WINDOW = 20, 31  # least samples of a passage; samples over which its amplitude is taken
-SPEED_SD, TIME_SD = 0.004, 1.5e-3  # relative, s; errors of the alignment
-LOAD_BOUND_SDS = 2.0  # bounds of an unknown load in prior standard deviations: a seventh beyond empty and full
 
 
 @dataclass(frozen=True)
@@ -85,34 +72,37 @@ def observe_passage(passage, sensors, reference, speed, tolerance):
     """(AlignedPassage, Observation) of a passage."""
     recording = passage.recording
     signals = band_signals(recording, sensors, band_end(speed))
-    stop = reference + duration_of(passage, speed, sensors) + EDGE_TIME
+    stop = reference + duration_of(passage, speed, sensors) + SIMULATION.edge_time
     step = 1.0 / sample_rate_of(speed)
-    time = np.arange(max(0.0, reference - EDGE_TIME), min(stop, recording.duration - 0.01), step)
-    if time.size < MIN_SAMPLES:
+    time = np.arange(max(0.0, reference - SIMULATION.edge_time), min(stop, recording.duration - 0.01), step)
+    if time.size < PASSAGE.min_samples:
         raise SimulationError("the train lies outside the recording")
-    if recording.rate < MIN_SAMPLES_PER_PERIOD * band_end(speed):
+    if recording.rate < PASSAGE.min_samples_per_period * band_end(speed):
         raise SimulationError(f"{recording.rate:g} samples per second are too few for {band_end(speed):.0f} Hz")
     aligned = AlignedPassage(passage.name, passage, tuple(sensors), time, reference, speed)
-    factor = max(1, int(np.ceil(MIN_READ_RATE / recording.rate)))
+    factor = max(1, int(np.ceil(PASSAGE.min_read_rate / recording.rate)))
     signals, rate = upsample(signals, factor) if factor > 1 else signals, factor * recording.rate
     data = read_at(signals, rate, time)
     noise = np.zeros(len(sensors))
     for start, end in _wheel_free_times(aligned):
-        if end - start >= MIN_QUIET_TIME:
+        if end - start >= PASSAGE.min_quiet_time:
             noise = np.std(read_at(signals, rate, np.arange(start, end, step)), axis=1)
             break
     return aligned, observation_of(aligned, data, noise, tolerance, _clipped_samples(recording, sensors, time))
 
 
 def _wheel_free_times(aligned):
-    """(start, end) [s] before and after the train, with no wheel within ``CLEAR_DISTANCE`` of a sensor."""
-    clear_time, passage = CLEAR_DISTANCE / aligned.speed, aligned.passage
+    """(start, end) [s] before and after the train, with no wheel within ``PASSAGE.clear_distance`` of a sensor."""
+    clear_time, passage = PASSAGE.clear_distance / aligned.speed, aligned.passage
     end = aligned.reference + duration_of(passage, aligned.speed, aligned.sensors) + clear_time
-    return (RECORD_MARGIN, aligned.reference - clear_time), (end, passage.recording.duration - RECORD_MARGIN)
+    return (PASSAGE.record_margin, aligned.reference - clear_time), (
+        end,
+        passage.recording.duration - PASSAGE.record_margin,
+    )
 
 
 def _clipped_samples(recording, sensors, time):
-    """(n_sensor, n) whether the channel reached its range within ``CLIPPING_BLUR`` of each time.
+    """(n_sensor, n) whether the channel reached its range within ``PASSAGE.clipping_blur`` of each time.
 
     The samples that were cut off disturb the whole band there.
     """
@@ -121,9 +111,9 @@ def _clipped_samples(recording, sensors, time):
         k = recording.index(sensor.name)
         limit = recording.channels[k].limit
         if limit is not None:
-            clipped_times = np.flatnonzero(np.abs(recording.samples[k]) >= 0.999 * limit) / recording.rate
-            row[:] = np.searchsorted(clipped_times, time - CLIPPING_BLUR) < np.searchsorted(
-                clipped_times, time + CLIPPING_BLUR
+            clipped_times = np.flatnonzero(np.abs(recording.samples[k]) >= PASSAGE.range_share * limit) / recording.rate
+            row[:] = np.searchsorted(clipped_times, time - PASSAGE.clipping_blur) < np.searchsorted(
+                clipped_times, time + PASSAGE.clipping_blur
             )
     return clipped
 
@@ -133,9 +123,9 @@ def observation_of(aligned, data, noise, tolerance, clipped=None):
 
     ``clipped`` samples have an error as large as the largest sample of their channel.
     """
-    width = min(AMPLITUDE_WINDOW, data.shape[1])
+    width = min(PASSAGE.amplitude_window, data.shape[1])
     mean_square = np.array([np.convolve(row**2, np.ones(width) / width, mode="same") for row in data])
-    floor = 0.02 * np.sqrt(np.mean(data**2, axis=1)) + 1e-9
+    floor = PASSAGE.noise_floor_share * np.sqrt(np.mean(data**2, axis=1)) + 1e-9
     sigma = np.sqrt((noise**2 + floor**2)[:, None] + tolerance**2 * mean_square)
     if clipped is not None and clipped.any():
         sigma = np.where(clipped, np.hypot(sigma, np.max(np.abs(data), axis=1, keepdims=True)), sigma)
@@ -149,19 +139,30 @@ def observation_of(aligned, data, noise, tolerance, clipped=None):
         covariates["temperature"] = float(temperature)
     condition = " ".join(condition_words)
     return Observation(
-        aligned.name, condition, data.ravel(), sigma.ravel(), 0.35, "passage", covariates, cells, labels, rows=len(data)
+        aligned.name,
+        condition,
+        data.ravel(),
+        sigma.ravel(),
+        PASSAGE.effective_share,
+        "passage",
+        covariates,
+        cells,
+        labels,
+        rows=len(data),
     )
 
 
 def coupling_modes(aligned, data):
     r"""(n_sensor * n_time, n_sensor) error modes of amplifiers whose lower corner frequency is uncertain.
 
-    Well above its corner a high-pass adds :math:`-2 \pi f_c \int a\,dt`; f_c is known to ``COUPLING_CORNER_SD``.
+    Well above its corner a high-pass adds :math:`-2 \pi f_c \int a\,dt`; f_c is known to 0.7 Hz.
     """
     rows = data.reshape(len(aligned.sensors), -1)
     velocity = np.cumsum(rows - rows.mean(axis=1, keepdims=True), axis=1) / aligned.clock
     modes = np.zeros((rows.size, rows.shape[0]))
-    for k, row in enumerate(2.0 * np.pi * COUPLING_CORNER_SD * (velocity - velocity.mean(axis=1, keepdims=True))):
+    for k, row in enumerate(
+        2.0 * np.pi * PASSAGE.coupling_corner_sd * (velocity - velocity.mean(axis=1, keepdims=True))
+    ):
         modes[k * row.size : (k + 1) * row.size, k] = row
     return modes
 
@@ -177,8 +178,8 @@ def _cells(aligned):
     for sensor in aligned.sensors:
         distance = np.abs(position - sensor.place)
         axle = np.argmin(distance, axis=0)
-        near = distance[axle, np.arange(n)] < 3.0
-        bay = np.round(position[axle, np.arange(n)] / 0.6).astype(int)
+        near = distance[axle, np.arange(n)] < PASSAGE.cell_reach
+        bay = np.round(position[axle, np.arange(n)] / PASSAGE.cell_length).astype(int)
         for a, b, inside in zip(axle, bay, near):
             key = (sensor.name, int(a), int(b)) if inside else None
             index.append(-1 if key is None else cell_index.setdefault(key, len(cell_index)))
@@ -186,7 +187,7 @@ def _cells(aligned):
         "sensor": [name for name, _, _ in cell_index],
         "train": [train for _ in cell_index],
         "wheel": [f"{train}, axle {a + 1}" for _, a, _ in cell_index],
-        "place": [f"{0.6 * b:.1f}" for _, _, b in cell_index],
+        "place": [f"{PASSAGE.cell_length * b:.1f}" for _, _, b in cell_index],
         "condition": [speed for _ in cell_index],
     }
     return np.array(index, dtype=np.int64), {k: np.array(v, dtype=object) for k, v in labels.items()}
@@ -194,10 +195,10 @@ def _cells(aligned):
 
 def passage_nuisances(passage):
     """Time, speed and load of one passage. They are named after the passage, since all its sensors share them."""
-    reach = np.inf if passage.load_sd <= LOAD_SD else LOAD_BOUND_SDS * passage.load_sd
+    reach = np.inf if passage.load_sd <= TRACK.load_sd else TRACK.load_bound_sds * passage.load_sd
     priors = (
-        ("time", "s", TIME_SD, np.inf),
-        ("speed", "-", SPEED_SD, np.inf),
+        ("time", "s", PASSAGE.time_sd, np.inf),
+        ("speed", "-", PASSAGE.speed_sd, np.inf),
         ("load", "-", passage.load_sd, reach),
     )
     return [

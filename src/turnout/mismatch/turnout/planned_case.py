@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from turnout.config.settings.mismatch import MismatchSettings
-from turnout.mismatch.turnout import passage_band, passage_model, passage_observation, receptance_observation
+from turnout.mismatch.turnout import passage_band, passage_observation, receptance_observation
 from turnout.mismatch.turnout.campaign import CampaignInput, HammerInput, PassageInput
 from turnout.mismatch.turnout.candidates.catalogue import list_candidates
 from turnout.mismatch.turnout.case import TrackCase
@@ -19,6 +19,7 @@ from turnout.mismatch.turnout.observations import CaseData
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.passage_observation import AlignedPassage
 from turnout.mismatch.turnout.prediction import Predictor
+from turnout.mismatch.turnout.priors import SIMULATION
 from turnout.mismatch.turnout.receptance_observation import FrfPair
 from turnout.mismatch.turnout.site import site_of
 from turnout.mismatch.turnout.wheel_roughness import wheel_modes
@@ -135,8 +136,8 @@ def _planned_pairs(campaign: CampaignInput) -> dict[str, FrfPair]:
 
 def _planned_passage(passage: PassageInput, sensors: tuple[Sensor, ...]) -> AlignedPassage:
     """A passage that reaches the first sensor after ``PLANNED_LEAD``."""
-    stop = passage_observation.duration_of(passage, passage.speed, sensors) + PLANNED_LEAD + passage_model.EDGE_TIME
-    time = np.arange(PLANNED_LEAD - passage_model.EDGE_TIME, stop, 1.0 / passage_band.sample_rate_of(passage.speed))
+    stop = passage_observation.duration_of(passage, passage.speed, sensors) + PLANNED_LEAD + SIMULATION.edge_time
+    time = np.arange(PLANNED_LEAD - SIMULATION.edge_time, stop, 1.0 / passage_band.sample_rate_of(passage.speed))
     return AlignedPassage(passage.name, passage, sensors, time, PLANNED_LEAD, passage.speed)
 
 

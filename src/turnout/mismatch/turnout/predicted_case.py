@@ -104,9 +104,9 @@ class PredictedCase(Case):
         n, n_accepted = len(self._site_nuisances), len(self.accepted.nuisances)
         fixed = copy(self)
         fixed.predictions = self.predictor
-        fixed.nuisances, fixed.candidates = self._site_nuisances, self.all_candidates
         if not n_accepted:
             return fixed, fit
+        fixed.nuisances, fixed.candidates = self._site_nuisances, self.all_candidates
         fixed.accepted = self.accepted.fixed_at(fit.values)
         return fixed, replace(fit, jacobian=[np.delete(j, slice(n, n + n_accepted), axis=1) for j in fit.jacobian])
 

@@ -16,6 +16,7 @@ from turnout.mismatch.turnout import passage_band, passage_model, receptance_mod
 from turnout.mismatch.turnout.campaign import PassageInput
 from turnout.mismatch.turnout.passage_model import PassageSimulator, Track1D
 from turnout.mismatch.turnout.passage_observation import AlignedPassage
+from turnout.mismatch.turnout.priors import SIMULATION
 from turnout.mismatch.turnout.pseudo_forces import probes
 from turnout.mismatch.turnout.rail_roughness import Waves
 from turnout.mismatch.turnout.receptance_model import ReceptanceModel
@@ -37,10 +38,6 @@ from turnout.simulate.track import Track
 
 Values: TypeAlias = Mapping[str, float]  # nuisance parameters by name
 Terms: TypeAlias = Sequence[PhysicsTerm]
-
-SIGNAL_CACHE_SIZE = 150  # simulated passages in the cache
-PROBE_CACHE_SPARE = 4  # cached passages with probes beyond the number of passages
-SENSITIVITY_CACHE_SIZE, RAIL_CACHE_SIZE, SIMULATOR_CACHE_SIZE = 8, 9, 12  # tracks in each cache
 
 
 class Predictions(Protocol):
@@ -224,7 +221,7 @@ class Predictor:
             self._sensitivities[key] = ReceptanceSensitivity(model, pair_keys, seats, self.zone)
             # all positions at once: rounding depends on what is solved together
             model.solve((*(position for position, _ in pair_keys), *seats.values()))
-            _shorten(self._sensitivities, SENSITIVITY_CACHE_SIZE)
+            _shorten(self._sensitivities, SIMULATION.sensitivity_cache_size)
         return self._sensitivities[key]
 
     def _track_near(self, rail: Values) -> Track:
@@ -232,7 +229,7 @@ class Predictor:
         key = tuple(rail.values())
         if key not in self._rail_tracks:
             self._rail_tracks[key] = with_rail(self.site.nominal, rail).turnout.track_of("main")
-            _shorten(self._rail_tracks, RAIL_CACHE_SIZE)
+            _shorten(self._rail_tracks, SIMULATION.rail_cache_size)
         return self._rail_tracks[key]
 
     def _pairs_and_seats(self, values: Values, terms: Terms, conditions: Mapping[str, Any]) -> tuple[tuple, dict]:
@@ -278,7 +275,7 @@ class Predictor:
         self, values: Values, terms: Terms, aligned: AlignedPassage, sensor: Sensor, signal: np.ndarray
     ) -> np.ndarray:
         """Output of the channel of a sensor for the simulated signal ``signal``, at the times of the recording."""
-        start = aligned.reference + values[f"time@{aligned.name}"] - passage_model.LEAD_TIME
+        start = aligned.reference + values[f"time@{aligned.name}"] - SIMULATION.lead_time
         rate, time = 4.0 * self.solver.rate, aligned.time - start
         for term in terms:
             if term.effect_type == "channel":
@@ -335,8 +332,8 @@ class Predictor:
             aligned.passage, vehicle, aligned.speed * (1.0 + speed), sensors, probe_points, surfaces, aligned.sensors
         )
         self._signals[key], self._signals_with_probes[key] = signals[: len(sensors)].copy(), signals
-        _shorten(self._signals, SIGNAL_CACHE_SIZE)
-        _shorten(self._signals_with_probes, len(self.aligned_passages) + PROBE_CACHE_SPARE)
+        _shorten(self._signals, SIMULATION.signal_cache_size)
+        _shorten(self._signals_with_probes, len(self.aligned_passages) + SIMULATION.probe_cache_spare)
 
     def passage_simulator(self, values: Values, terms: Terms, passage: PassageInput) -> PassageSimulator:
         """``PassageSimulator`` of a passage's route with these terms, cached."""
@@ -344,7 +341,7 @@ class Predictor:
         if key not in self._simulators:
             track = track_with(self.track(passage.route, terms), self.zone, values)
             self._simulators[key] = PassageSimulator(self.zone.turnout, track, terms, self.solver)
-            _shorten(self._simulators, SIMULATOR_CACHE_SIZE)
+            _shorten(self._simulators, SIMULATION.simulator_cache_size)
         return self._simulators[key]
 
 

@@ -8,24 +8,24 @@ from dataclasses import replace
 
 import numpy as np
 
-from turnout.mismatch.turnout import passage_band, passage_model
+from turnout.mismatch.turnout.passage_band import transfer_lines
+from turnout.mismatch.turnout.priors import RECEPTANCE, SIMULATION
 from turnout.mismatch.turnout.receptance_model import linear_matrices
 from turnout.mismatch.turnout.track_parameters import track_with
 from turnout.mismatch.turnout.wave_response import WaveTransfer
 from turnout.simulate.frequency_response import responses
 from turnout.simulate.run import Probe
 
-POSITION_STEP = 0.01  # m, step of the derivative by the position of a sensor
 RAIL, SLEEPER, PAD = range(3)  # targets; the force of a pad acts on the rail and reversed on the sleeper
 
 
 def probes(predictor, values, terms, aligned):
     """Probes of rail and sleeper at every support of the zone, for pseudo-forces, and of sensors moved by
-    ``POSITION_STEP``.
+    ``RECEPTANCE.seat_step``.
     """
     sensors = [predictor.seat(s, values, terms) for s in aligned.sensors]
     track = predictor.track(aligned.passage.route)
-    shifted = [replace(s, place=s.place + POSITION_STEP).probe(track) for s in sensors]
+    shifted = [replace(s, place=s.place + RECEPTANCE.seat_step).probe(track) for s in sensors]
     return [Probe((layer, j), 0) for j in predictor.zone.supports for layer in ("rail", "sleeper")] + shifted
 
 
@@ -41,7 +41,7 @@ def green_functions(predictor, values, terms, aligned):
     under = [t.under_conditions(aligned.conditions) for t in terms]
     track = track_with(predictor.track(aligned.passage.route, under), predictor.zone, values)
     matrices = linear_matrices(track, under)
-    frequency = np.arange(4.0, 1.3 * passage_band.BAND_HIGH, 2.0)
+    frequency = transfer_lines()
     positions = [predictor.seat(s, values, terms).probe(track).place for s in aligned.sensors]
     rows = [matrices.index[layer, j] for j in predictor.zone.supports for layer in ("rail", "sleeper")]
     h = responses(matrices, frequency, positions, rows)
@@ -80,7 +80,7 @@ def force_responses(predictor, values, terms, aligned, forces):
     clock = (np.arange(history.shape[1]) + 0.5) / predictor.solver.rate
     paths = np.empty((support.size, transfer.wheel_delays.size, transfer.path_grid.size))
     for w in range(transfer.wheel_delays.size):
-        when = transfer.times(w, passage_model.LEAD_TIME)
+        when = transfer.times(w, SIMULATION.lead_time)
         for k, force in enumerate(history):
             paths[k, w] = np.interp(when, clock, force, 0.0, 0.0) * deflection[support[k], :, target[k]]
     columns = transfer.force_response(history, g[:, :, support, target], first)

@@ -9,23 +9,21 @@ from functools import cached_property
 import numpy as np
 
 from turnout.mismatch.engine.case import Nuisance
-from turnout.mismatch.turnout import passage_band
+from turnout.mismatch.turnout.priors import PASSAGE, ROUGHNESS
 from turnout.mismatch.turnout.wave_response import WaveTransfer
 from turnout.simulate.roughness import level
 from turnout.simulate.wheel_path import Sampled
-
-ROLLING_REACH = 3.0  # m before the first and behind the last sensor, from where a wheel still excites them
-LONGEST_WAVE, SHORTEST_WAVE = 3.0, passage_band.SHORTEST_WAVE  # m, of the free waves
-PATH_STEP = 0.02  # m, between samples of the path
 
 
 class Waves:
     """Cosines and sines over the range of the sensors; ``names`` of their amplitudes."""
 
     def __init__(self, positions, offset):
-        self.start, self.end = min(positions) - ROLLING_REACH, max(positions) + ROLLING_REACH
-        self.length = 1.1 * (self.end - self.start)
-        orders = np.arange(int(np.ceil(self.length / LONGEST_WAVE)), int(self.length / SHORTEST_WAVE) + 1)
+        self.start, self.end = min(positions) - ROUGHNESS.rolling_reach, max(positions) + ROUGHNESS.rolling_reach
+        self.length = ROUGHNESS.period_ratio * (self.end - self.start)
+        orders = np.arange(
+            int(np.ceil(self.length / ROUGHNESS.longest_wave)), int(self.length / PASSAGE.shortest_wave) + 1
+        )
         self.lengths = self.length / orders
         self.wavelength = np.repeat(self.lengths, 2)
         self.phase_offset = np.tile([0.0, 0.5 * np.pi], orders.size)
@@ -41,7 +39,7 @@ class Waves:
 
     def fade(self, x):
         """(n,) 0 to 1: envelope that fades the waves at both ends."""
-        edge = np.clip(np.minimum(x - self.start, self.end - x) / 0.8, 0.0, 1.0)
+        edge = np.clip(np.minimum(x - self.start, self.end - x) / ROUGHNESS.fade_length, 0.0, 1.0)
         return edge * edge * (3.0 - 2.0 * edge)
 
     def shapes(self, x):
@@ -58,12 +56,12 @@ class Waves:
         amplitude = self.amplitudes(values)
         if not amplitude.any():
             return ()
-        return (Sampled(self.start, PATH_STEP, amplitude @ self._path_shapes),)
+        return (Sampled(self.start, ROUGHNESS.path_step, amplitude @ self._path_shapes),)
 
     @cached_property
     def _path_shapes(self):
-        """(n_wave, n) waves every ``PATH_STEP``."""
-        return self.shapes(np.arange(self.start, self.end + PATH_STEP, PATH_STEP))
+        """(n_wave, n) waves every ``ROUGHNESS.path_step``."""
+        return self.shapes(np.arange(self.start, self.end + ROUGHNESS.path_step, ROUGHNESS.path_step))
 
 
 def amplitude_sd(wavelength, length, offset):

@@ -11,6 +11,7 @@ from scipy.sparse import csr_array, lil_array
 
 from turnout.mismatch.turnout import receptance_observation
 from turnout.mismatch.turnout.matrix_cache import FixedLinks, matrices_of
+from turnout.mismatch.turnout.priors import RECEPTANCE
 from turnout.mismatch.turnout.receptance_observation import LINES, SHIFTED_LINES
 from turnout.mismatch.turnout.track_parameters import SUPPORT_PARAMETERS
 from turnout.physics.term import PhysicsTerm
@@ -18,22 +19,18 @@ from turnout.simulate.frequency_response import responses
 from turnout.simulate.links import Link, links_of, ports_of, with_links
 from turnout.simulate.matrices import link_vector
 
-TANGENT_MOTION = 1e-6  # m, motion under an impact, for the secant of a port
-# Sliding rate of a joint under an impact, free and stuck, and the friction force between both.
-# For impacts of 5 kN on a simulated track, friction of 0.3 to 8 kN fits best with 20, 13, 8, 3 and 1.5 mm/s.
-FREE_RATE, STUCK_RATE, STICKING_FORCE = 0.021, 1.5e-3, 2e3  # [m/s, m/s, N]
-RELATIVE_STEP = 1e-3  # relative change of a support's value, for derivatives of links that follow it
-
 
 def tangent_links(terms, track):
     """Links that replace the nonlinear ports of terms: secant stiffness over 1 µm, and damping at the sliding rate."""
     links = []
     for port in ports_of(terms, track):
         law, d = port.law, -port.gap
-        k = (float(law.force(d + TANGENT_MOTION, 0.0)) - float(law.force(d - TANGENT_MOTION, 0.0))) / (
-            2.0 * TANGENT_MOTION
+        k = (
+            float(law.force(d + RECEPTANCE.tangent_motion, 0.0)) - float(law.force(d - RECEPTANCE.tangent_motion, 0.0))
+        ) / (2.0 * RECEPTANCE.tangent_motion)
+        rate = RECEPTANCE.stuck_rate + (RECEPTANCE.free_rate - RECEPTANCE.stuck_rate) * np.exp(
+            -abs(_friction_force(law, d, RECEPTANCE.free_rate)) / RECEPTANCE.sticking_force
         )
-        rate = STUCK_RATE + (FREE_RATE - STUCK_RATE) * np.exp(-abs(_friction_force(law, d, FREE_RATE)) / STICKING_FORCE)
         c = _friction_force(law, d, rate) / rate
         links.append(Link(port.ends, k, c, tag="tangent"))
     return links
@@ -96,7 +93,7 @@ class ReceptanceModel:
         h = self.nodal_motion(excited, measured)
         return h if isinstance(measured, tuple) else h + self.matrices.compliance(float(excited), float(measured))
 
-    def seat_gradient(self, excited, measured, step=0.01):
+    def seat_gradient(self, excited, measured, step=RECEPTANCE.seat_step):
         """Derivative by the position of the sensor on the rail, (n_line,) [1/N]; 0 on a sleeper."""
         if isinstance(measured, tuple):
             return np.zeros(LINES.size, dtype=complex)
@@ -120,11 +117,12 @@ class ReceptanceModel:
         links, before = [], self.links(self.terms)
         for field in dict.fromkeys(o.field for o in SUPPORT_PARAMETERS):
             after = self.links(
-                self.terms, self.track.with_(**{field: getattr(self.track, field) * (1.0 + RELATIVE_STEP)})
+                self.terms, self.track.with_(**{field: getattr(self.track, field) * (1.0 + RECEPTANCE.relative_step)})
             )
             for a, b in zip(before, after):
                 change = tuple(
-                    (getattr(b, name) - getattr(a, name)) / RELATIVE_STEP for name in ("stiffness", "damping", "mass")
+                    (getattr(b, name) - getattr(a, name)) / RECEPTANCE.relative_step
+                    for name in ("stiffness", "damping", "mass")
                 )
                 if any(change):
                     links.append((field, a.ends[0][0][1], *link_vector(a, self.matrices.index), change))

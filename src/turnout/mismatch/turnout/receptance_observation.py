@@ -7,17 +7,11 @@ import numpy as np
 
 from turnout.hammer_test import find_impacts
 from turnout.mismatch.engine.case import Observation
+from turnout.mismatch.turnout.priors import RECEPTANCE
 
-LINES = np.unique(np.round(np.geomspace(35.0, 900.0, 44) / 2.0) * 2.0)  # [Hz]
-# 1/s: records are weighted by exp(-DECAY_RATE t), so that ringing at their end is not truncated. Models are evaluated
-# at the corresponding complex frequencies, which is exact. After 0.15 s a weight of 5 % remains.
-DECAY_RATE = 20.0
-SHIFTED_LINES = LINES - 1j * DECAY_RATE / (2.0 * np.pi)  # [Hz]
-DELAY_SD = 8e-6  # s, standard deviation of the delay of a pair: 2 degrees at 700 Hz
-MIN_IMPACTS = 2  # accepted impacts of a channel, at least
-SMOOTHING_OCTAVES = 0.3  # octaves, correlation length of model errors
-DOUBLING_DISTANCE = 1.5  # m, distance that doubles the error variance, by errors of wave speed and decay
-LINE_SHARE = 0.4  # share of the tolerance that is independent from line to line
+LINES = np.geomspace(RECEPTANCE.lowest_line, RECEPTANCE.highest_line, RECEPTANCE.n_lines)  # [Hz]
+LINES = np.unique(np.round(LINES / RECEPTANCE.line_step) * RECEPTANCE.line_step)
+SHIFTED_LINES = LINES - 1j * RECEPTANCE.decay_rate / (2.0 * np.pi)  # [Hz]
 
 
 @dataclass(frozen=True)
@@ -58,15 +52,15 @@ def pairs_of_test(test, sensors, tolerance):
             continue
         impacts = find_impacts(test.recordings, test.force, sensor.name, test.impact_settings)
         accepted = [i for i in impacts if i.accepted]
-        if len(accepted) < MIN_IMPACTS:
+        if len(accepted) < RECEPTANCE.min_impacts:
             continue
         h, spread = _receptance_and_error(accepted)
         usable = (
             np.isfinite(spread)
-            & (spread < 0.3 * np.abs(h))
-            & (LINES < 0.9 * np.median([i.band_edge for i in accepted]))
+            & (spread < RECEPTANCE.max_relative_error * np.abs(h))
+            & (LINES < RECEPTANCE.max_band_share * np.median([i.band_edge for i in accepted]))
         )
-        if usable.sum() < 8:
+        if usable.sum() < RECEPTANCE.min_lines:
             continue
         name = f"{test.name}:{sensor.name}"
         pair = FrfPair(name, test, sensor.name, sensor, LINES[usable], np.abs(h[usable]), dict(test.conditions))
@@ -102,19 +96,30 @@ def with_magnitude(pair, size):
 
 def observation_of(pair, h, spread, tolerance):
     """Observation of a receptance (n,) with standard error ``spread`` (n,)."""
-    sigma = np.sqrt((spread / pair.size) ** 2 / 2.0 + (LINE_SHARE * tolerance * _local_magnitude_ratio(pair)) ** 2)
+    sigma = np.sqrt(
+        (spread / pair.size) ** 2 / 2.0 + (RECEPTANCE.line_share * tolerance * _local_magnitude_ratio(pair)) ** 2
+    )
     data = np.concatenate([h.real, h.imag]) / np.tile(pair.size, 2)
-    octave = np.floor(np.log2(pair.frequency / 31.25)).astype(int)
+    octave = np.floor(np.log2(pair.frequency / RECEPTANCE.lowest_band)).astype(int)
     bands = np.unique(octave)
     cells = np.tile(np.searchsorted(bands, octave), 2)
     frame_levels = {"sensor": pair.channel, "place": f"{pair.test.place:.1f}", "condition": pair.test.visit}
     labels = {frame: np.array([level] * bands.size, dtype=object) for frame, level in frame_levels.items()}
-    labels["frequency"] = np.array([f"{31.25 * 2.0**b:.0f} Hz" for b in bands], dtype=object)
+    labels["frequency"] = np.array([f"{RECEPTANCE.lowest_band * 2.0**b:.0f} Hz" for b in bands], dtype=object)
     condition = f"blows at {pair.test.place:.1f} m {pair.test.visit}".strip()
     return Observation(
-        pair.name, condition, data, np.tile(sigma, 2), 0.7, "hammer", dict(pair.conditions), cells, labels,
-        error_modes(pair, h, tolerance), 2,
-    )  # fmt: skip
+        pair.name,
+        condition,
+        data,
+        np.tile(sigma, 2),
+        RECEPTANCE.effective_share,
+        "hammer",
+        dict(pair.conditions),
+        cells,
+        labels,
+        error_modes(pair, h, tolerance),
+        rows=2,
+    )
 
 
 def _local_magnitude_ratio(pair):
@@ -122,7 +127,7 @@ def _local_magnitude_ratio(pair):
 
     Model errors fill the antiresonances.
     """
-    near = np.abs(np.log2(pair.frequency[:, None] / pair.frequency)) < 0.34
+    near = np.abs(np.log2(pair.frequency[:, None] / pair.frequency)) < RECEPTANCE.magnitude_octaves
     return np.maximum(np.sqrt(near @ pair.size**2 / near.sum(axis=1)) / pair.size, 1.0)
 
 
@@ -135,14 +140,14 @@ def error_modes(pair, h, tolerance):
     """
     octave = np.log2(pair.frequency)
     position = getattr(pair.sensor, "place", pair.test.place)
-    size = tolerance * np.hypot(1.0, (position - pair.test.place) / DOUBLING_DISTANCE)
-    kernel = np.exp(-0.5 * ((octave[:, None] - octave) / SMOOTHING_OCTAVES) ** 2)
+    size = tolerance * np.hypot(1.0, (position - pair.test.place) / RECEPTANCE.doubling_distance)
+    kernel = np.exp(-0.5 * ((octave[:, None] - octave) / RECEPTANCE.smoothing_octaves) ** 2)
     power, vectors = np.linalg.eigh(kernel)
     keep = power > 1e-3
     smooth = size * vectors[:, keep] * np.sqrt(power[keep])
     calibration = np.column_stack([np.full(octave.size, tolerance), tolerance * (octave - np.log2(200.0)) / 2.0])
     unit = (h / np.abs(h) * _local_magnitude_ratio(pair))[:, None]
-    delay = (-2j * np.pi * pair.frequency * DELAY_SD * h / np.abs(h))[:, None]
+    delay = (-2j * np.pi * pair.frequency * RECEPTANCE.delay_sd * h / np.abs(h))[:, None]
     columns = np.column_stack([unit * smooth, 1j * unit * smooth, (h / np.abs(h))[:, None] * calibration, delay])
     return np.concatenate([columns.real, columns.imag])
 

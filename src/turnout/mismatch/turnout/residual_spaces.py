@@ -8,13 +8,11 @@ sensors s. This holds for a change of a support, a mass or a loose fastening ali
 import numpy as np
 
 from turnout.mismatch.engine.localization import ResidualSpace
-from turnout.mismatch.turnout import passage_band, receptance_observation
+from turnout.mismatch.turnout import receptance_observation
+from turnout.mismatch.turnout.priors import PASSAGE, TRACK, WHEELS
 from turnout.mismatch.turnout.pseudo_forces import green_functions
 from turnout.mismatch.turnout.rail_roughness import amplitude_sd
 from turnout.mismatch.turnout.wave_response import WaveTransfer, channel_responses
-from turnout.mismatch.turnout.wheel_roughness import WHEEL_LEVEL
-
-EXTRA_SUPPORTS = 8  # supports beyond the zone that a change of the whole track includes
 
 
 def source_spaces(case, fit):
@@ -36,7 +34,7 @@ def _force_space(case, fit, aligned):
     """
     n, n_sensor = aligned.time.size, len(aligned.sensors)
     step = aligned.clock / n
-    lines = step * np.arange(np.ceil(passage_band.BAND_LOW / step), np.floor(1.1 * aligned.high / step) + 1)
+    lines = step * np.arange(np.ceil(PASSAGE.band_low / step), np.floor(1.1 * aligned.high / step) + 1)
     phase = 2.0 * np.pi * aligned.time[:, None] * lines
     harmonics = np.sqrt(2.0 / n) * np.stack([np.cos(phase), np.sin(phase)], axis=-1).reshape(n, -1)
     columns = np.kron(np.eye(n_sensor), harmonics)
@@ -64,7 +62,7 @@ def _real_blocks(transfer):
 def _wheel_space(case, fit, aligned):
     """Waves of each wheel, which are errors of ordinary size in the model of the passage."""
     waves, transfer = case.predictor.waves, WaveTransfer(case.predictor, fit.values, aligned, case.all_terms(fit))
-    sd = np.repeat(amplitude_sd(waves.lengths, waves.length, WHEEL_LEVEL), 2)
+    sd = np.repeat(amplitude_sd(waves.lengths, waves.length, WHEELS.level), 2)
     spectra = transfer.spectra(waves.lengths, np.ones(transfer.node.size))
     blocks = [transfer.signals_from(spectra, transfer.wheel(w)) * sd for w in range(transfer.wheel_delays.size)]
     train, subspaces, first = aligned.train, {}, 0
@@ -130,7 +128,8 @@ def _extended_supports(case):
     """Supports of the zone and some beyond."""
     last = case.predictor.track().support.size
     return range(
-        max(0, case.predictor.zone.first - EXTRA_SUPPORTS), min(last, case.predictor.zone.last + 1 + EXTRA_SUPPORTS)
+        max(0, case.predictor.zone.first - TRACK.extra_supports),
+        min(last, case.predictor.zone.last + 1 + TRACK.extra_supports),
     )
 
 

@@ -9,20 +9,10 @@ import numpy as np
 
 from turnout.mismatch.engine.case import Nuisance
 from turnout.mismatch.engine.cross_validation import jackknife_errors
-from turnout.mismatch.turnout.wheel_roughness import ROUGHNESS_MARGIN
+from turnout.mismatch.turnout.priors import SURFACE, TRACK, WHEELS
 
 POSITION_FIELDS = ("place", "start", "end")  # their spread is a share of the distance from the origin
 LENGTH_FIELDS = ("length", "wavelength")
-SHAPE_SD = 0.25  # sd of ln power of a kink with an estimated depth: 1.2 to 3.3, from a V to a cusp
-DERIVATIVE_STEP = 0.02  # m, or change of a logarithm, for the derivative of a passage
-MAX_RELATIVE_STEP = 0.3  # share of its length by which a component may move in one fit step: the derivative is local
-MIN_DEPTH = 1e-6  # m; shallower components are ignored
-# Model errors that are the same at every axle, of a logarithm and in metres. With long trains depth was 15 % and
-# length 19 % too small and a position 4 cm off, ten times the errors of the fit.
-MODEL_ERROR, MODEL_POSITION_ERROR = 0.1, 0.02
-MAX_ERROR_RATIO = 0.5  # largest error of a reported number over its prior sd,
-MIN_DEVIATION_RATIO = 2.0  # unless it deviates by so many prior sd and so many errors
-MIN_DATA_SHARE = 0.5  # least share of the information on a number that is attributed to the recordings
 
 
 @dataclass(frozen=True)
@@ -45,7 +35,9 @@ class SurfaceParameter:
         )
         if self.field in POSITION_FIELDS:
             sd = self.spread * abs(getattr(self.component, self.field))
-            trust = min(3.0, MAX_RELATIVE_STEP * _field_values(self.component, LENGTH_FIELDS)[0] / sd)
+            trust = min(
+                SURFACE.max_step_sd, SURFACE.max_relative_step * _field_values(self.component, LENGTH_FIELDS)[0] / sd
+            )
             return Nuisance(
                 self.name,
                 "m",
@@ -56,7 +48,10 @@ class SurfaceParameter:
                 can_mask=False,
                 group="surface",
             )
-        value, bounds = getattr(self.component, self.field), (-6.0 * self.spread, 6.0 * self.spread)
+        value, bounds = (
+            getattr(self.component, self.field),
+            (-TRACK.bound_sds * self.spread, TRACK.bound_sds * self.spread),
+        )
         if self.field == "share":
             bounds = bounds[0], -0.05 - np.log(value)
         elif self.field == "power":
@@ -94,19 +89,19 @@ class SurfaceParameter:
 class RunningSurface:
     """Surfaces of the ``routes`` of ``turnout`` that trains took.
 
-    Numbers of components within ``ROUGHNESS_MARGIN`` of the free ``waves`` of the rail may be off: ``parameters`` are
-    these numbers, ``names`` those of their nuisances.
+    Numbers of components near the free ``waves`` of the rail may be off: ``parameters`` are these numbers, ``names``
+    those of their nuisances.
     """
 
     def __init__(self, turnout, waves, routes):
-        x = np.arange(waves.start - ROUGHNESS_MARGIN, waves.end + ROUGHNESS_MARGIN, 0.02)
+        x = np.arange(waves.start - WHEELS.roughness_margin, waves.end + WHEELS.roughness_margin, SURFACE.grid_step)
         route_components = [
             component for route in routes for components in turnout.surfaces(route) for component in components
         ]
         near_components = [
             component
             for component in turnout.spreads
-            if component in route_components and np.max(np.abs(component(x, 0))) > MIN_DEPTH
+            if component in route_components and np.max(np.abs(component(x, 0))) > SURFACE.min_depth
         ]
         listed = [
             (k, component, *entry)
@@ -144,7 +139,7 @@ class RunningSurface:
 
         Values are those of the recordings without the prior, so that repeated visits are not all drawn to the file.
         With the fit's :math:`m, s^2` under a prior of variance :math:`\tau^2` they are :math:`m / c` of variance
-        :math:`s^2 / c`, :math:`c = 1 - s^2 / \tau^2`, at least ``MIN_DATA_SHARE``.
+        :math:`s^2 / c`, :math:`c = 1 - s^2 / \tau^2`, at least ``SURFACE.min_data_share``.
         """
         index = {n.name: k for k, n in enumerate(case.nuisances)}
         between_trains = (
@@ -152,11 +147,13 @@ class RunningSurface:
         )
         for u in self.parameters:
             k = index[u.name]
-            model = MODEL_POSITION_ERROR if u.field in POSITION_FIELDS else MODEL_ERROR
+            model = SURFACE.model_position_error if u.field in POSITION_FIELDS else SURFACE.model_error
             sd, variance = u.nuisance.sd, fit.covariance[k, k]
-            free = max(1.0 - variance / sd**2, MIN_DATA_SHARE)
+            free = max(1.0 - variance / sd**2, SURFACE.min_data_share)
             by, error = fit.values[u.name] / free, float(np.sqrt(variance / free + between_trains[k] ** 2 + model**2))
-            if error < MAX_ERROR_RATIO * sd or abs(by) > max(MIN_DEVIATION_RATIO * sd, MIN_DEVIATION_RATIO * error):
+            if error < SURFACE.max_error_ratio * sd or abs(by) > max(
+                SURFACE.min_deviation_ratio * sd, SURFACE.min_deviation_ratio * error
+            ):
                 yield u.estimate(by, error)
 
 
@@ -164,7 +161,7 @@ def _component_spreads(turnout, component):
     """Relative spreads of the numbers of a component; the shape of an estimated nose is an estimate as well."""
     spreads = turnout.spreads[component]
     return (
-        {**spreads, "power": SHAPE_SD}
+        {**spreads, "power": SURFACE.shape_sd}
         if hasattr(component, "power") and "depth" in spreads and "power" not in spreads
         else spreads
     )

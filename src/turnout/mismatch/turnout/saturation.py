@@ -8,12 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from turnout.hammer_test import find_impacts
-
-MIN_IMPACTS = 3  # accepted impacts of a test, at least, to estimate its level and scatter
-SCATTER_FLOOR = 0.02  # ln, least scatter of peaks: sampling, ringing mountings, impacts beside the mark
-NEAR_IMPACT_DISTANCE = 0.3  # m, half a bay: a sensor this near the impact measures the motion there
-MIN_LIMIT_SHARE = 0.9  # least limit as a share of the largest peak of the channel
-LIMIT_STEP = 0.25 * SCATTER_FLOOR  # ln, between trial limits
+from turnout.mismatch.turnout.priors import PASSAGE, SATURATION
 
 
 def limit_under_impacts(hammer, sensor):
@@ -30,7 +25,7 @@ def limit_under_impacts(hammer, sensor):
     sides = [common_limit([(force, side[k]) for _, (force, side) in tests]) for k in (0, 1)]
     gains = [gain for _, gain in sides]
     is_near = not sensor.mounting.startswith("sleeper") and any(
-        abs(x - sensor.place) < NEAR_IMPACT_DISTANCE for x, _ in tests
+        abs(x - sensor.place) < SATURATION.near_impact_distance for x, _ in tests
     )
     gain = max(gains) if is_near else min(gains)
     if gain <= 0.0:
@@ -41,11 +36,11 @@ def limit_under_impacts(hammer, sensor):
 def _peaks(test, name):
     """(ln force peaks (n,), ln channel peaks (2, n), upward and downward) of the accepted impacts of a test.
 
-    None where they are fewer than ``MIN_IMPACTS``. Impacts that reach the range stated in the file are not accepted.
+    None where they are too few. Impacts that reach the range stated in the file are not accepted.
     """
     recordings = [r for r in test.recordings if any(c.name == name for c in r.channels)]
     impacts = [i for i in find_impacts(recordings, test.force, name, test.impact_settings) if i.accepted]
-    if len(impacts) < MIN_IMPACTS:
+    if len(impacts) < SATURATION.min_impacts:
         return None
     sides = [[np.max(sign * i.acceleration) for i in impacts] for sign in (1.0, -1.0)]
     return np.log([i.peak for i in impacts]), np.log(np.maximum(sides, 1e-12))
@@ -64,11 +59,17 @@ def common_limit(tests):
     n, top = sum(x.size for x, _ in tests), max(y.max() for _, y in tests)
     free = sum(_fit_line(x, y)[1] for x, y in tests) / n
     best_fit = -np.inf, top
-    for c in np.arange(top, top + np.log(MIN_LIMIT_SHARE), -LIMIT_STEP):
+    for c in np.arange(top, top + np.log(SATURATION.min_limit_share), -SATURATION.limit_step):
         residual, reached = np.sum([_fit_capped(x, y, c) for x, y in tests], axis=0)
         if reached >= 2:
             best_fit = max(
-                best_fit, (0.5 * n * np.log((free + SCATTER_FLOOR**2) / (residual / n + SCATTER_FLOOR**2)), c)
+                best_fit,
+                (
+                    0.5
+                    * n
+                    * np.log((free + SATURATION.scatter_floor**2) / (residual / n + SATURATION.scatter_floor**2)),
+                    c,
+                ),
             )
     return float(np.exp(best_fit[1])), float(best_fit[0] - 0.5 * np.log(n))
 
@@ -96,15 +97,6 @@ def _fit_capped(x, y, c):
     return best_fit
 
 
-MIN_PASSAGES, MIN_SENSORS = 4, 3  # at least, for a limit from passages
-TOP_SHARE = 0.8  # share of the peak above which a clipped channel stays for long
-FILTER_RINGING = (
-    np.pi / 4.0
-)  # limit over peak of a clipped wave, of which a recorder's filter passes the first harmonic
-MIN_SIDE_RATIO = 0.9  # limit of one side of an amplifier over that of the other, at least
-LIMIT_SD = 0.1  # relative standard deviation of the limit: both sides of an amplifier differ
-
-
 @dataclass(frozen=True)
 class SaturationLimit:
     """The ``limit`` of a channel [m/s²] and its evidence, ``gain`` [nats]."""
@@ -123,7 +115,9 @@ def saturated_channels(campaign, threshold):
         by_impacts = SaturationLimit(*limit_under_impacts(campaign.hammer, sensor))
         limit = _combine_limits(by_passages.get(sensor.name, by_impacts), by_impacts)
         limit = replace(limit, gain=limit.gain - float(np.log(len(campaign.sensors))))
-        if limit.gain > threshold and limit.limit >= MIN_SIDE_RATIO * FILTER_RINGING * raw_peak(campaign, sensor.name):
+        if limit.gain > threshold and limit.limit >= SATURATION.min_side_ratio * SATURATION.filter_ringing * raw_peak(
+            campaign, sensor.name
+        ):
             saturated[sensor.name] = limit
     return saturated if len(saturated) < len(campaign.sensors) else {}
 
@@ -133,7 +127,7 @@ def _combine_limits(by_passages, by_impacts):
     stronger = max(by_passages, by_impacts, key=lambda c: c.gain)
     if by_passages is by_impacts or min(by_passages.gain, by_impacts.gain) <= 0.0:
         return stronger
-    same_limit = abs(np.log(by_passages.limit / by_impacts.limit)) < 2.0 * LIMIT_SD
+    same_limit = abs(np.log(by_passages.limit / by_impacts.limit)) < 2.0 * SATURATION.limit_sd
     return replace(stronger, gain=by_passages.gain + by_impacts.gain) if same_limit else stronger
 
 
@@ -142,7 +136,7 @@ def _limits_in_passages(campaign):
     names = [s.name for s in campaign.sensors]
     recordings = [p.recording for p in campaign.passages]
     recordings = [r for r in recordings if set(names) <= {c.name for c in r.channels} and not _is_at_range(r)]
-    if len(recordings) < MIN_PASSAGES or len(names) < MIN_SENSORS:
+    if len(recordings) < SATURATION.min_passages or len(names) < SATURATION.min_sensors:
         return {}
     sizes = [np.abs(r.samples[[r.index(n) for n in names]]) for r in recordings]
     peaks, limits = np.log([np.maximum(np.max(x, axis=1), 1e-12) for x in sizes]), {}
@@ -155,7 +149,7 @@ def _limits_in_passages(campaign):
 
 def _is_at_range(recording):
     """Whether a channel reaches the range stated in its file, beyond which it is known to be clipped."""
-    limits = [np.inf if c.limit is None else 0.999 * c.limit for c in recording.channels]
+    limits = [np.inf if c.limit is None else PASSAGE.range_share * c.limit for c in recording.channels]
     return bool(np.any(np.max(np.abs(recording.samples), axis=1) >= limits))
 
 
@@ -176,7 +170,8 @@ def saturation_gain(peaks, reference):
         if a + x[below] >= c:
             capped.append(np.sum((y[below:] - c) ** 2) + np.sum((follows[:below] - a) ** 2))
     return float(
-        0.5 * n * np.log((free / n + SCATTER_FLOOR**2) / (min(capped) / n + SCATTER_FLOOR**2)) - 0.5 * np.log(n)
+        0.5 * n * np.log((free / n + SATURATION.scatter_floor**2) / (min(capped) / n + SATURATION.scatter_floor**2))
+        - 0.5 * np.log(n)
     )
 
 
@@ -186,10 +181,10 @@ def _dwell_limit(sizes):
     None where that passage is not among the loudest. A clipped channel stays at its limit; a flat or a nose gives
     single peaks.
     """
-    dwelling = max(sizes, key=lambda x: (np.mean(x > TOP_SHARE * x.max()), x.max()))
-    if dwelling.max() < TOP_SHARE * max(x.max() for x in sizes):
+    dwelling = max(sizes, key=lambda x: (np.mean(x > SATURATION.top_share * x.max()), x.max()))
+    if dwelling.max() < SATURATION.top_share * max(x.max() for x in sizes):
         return None
-    return float(np.median(dwelling[dwelling > TOP_SHARE * dwelling.max()]))
+    return float(np.median(dwelling[dwelling > SATURATION.top_share * dwelling.max()]))
 
 
 def without_saturated(campaign, saturated):

@@ -4,11 +4,9 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.turnout import passage_band, receptance_observation
-from turnout.mismatch.turnout.pseudo_forces import POSITION_STEP, support_columns, support_motion
+from turnout.mismatch.turnout.priors import RECEPTANCE, SIMULATION
+from turnout.mismatch.turnout.pseudo_forces import support_columns, support_motion
 from turnout.mismatch.turnout.rail_roughness import wave_columns
-from turnout.mismatch.turnout.running_surface import DERIVATIVE_STEP as SURFACE_STEP
-
-LOG_STEP = 0.04  # difference of a logarithm
 
 
 def nuisance_jacobian(predictor, nuisances, values, terms, observations, base):
@@ -57,8 +55,8 @@ def fill_pair_columns(predictor, values, terms, pair, sensitivity, predicted, ja
 
 
 def _fill_common_columns(predictor, values, terms, passages, index):
-    parameters = [(f"wheels_{train}", LOG_STEP, train) for train in predictor.site.trains]
-    parameters += [(name, SURFACE_STEP, None) for name in predictor.surface.names]
+    parameters = [(f"wheels_{train}", SIMULATION.log_step, train) for train in predictor.site.trains]
+    parameters += [(name, SIMULATION.surface_step, None) for name in predictor.surface.names]
     for name, step, train in parameters:
         for o, predicted, jacobian in passages:
             aligned = predictor.aligned_passages[o.name]
@@ -79,13 +77,13 @@ def own_columns(predictor, values, terms, aligned, predicted):
     n = aligned.time.size
     moment = f"time@{aligned.name}"
     later = predictor.predict_passage(
-        {**values, moment: values[moment] + 1e-5}, terms, aligned
+        {**values, moment: values[moment] + SIMULATION.time_step}, terms, aligned
     )  # nothing is simulated again
-    slope = -(later - predicted).reshape(-1, n) / 1e-5
+    slope = -(later - predicted).reshape(-1, n) / SIMULATION.time_step
     yield moment, -slope.ravel()
     yield f"speed@{aligned.name}", (slope * (aligned.time - aligned.reference)).ravel()
     load = f"load@{aligned.name}"
-    yield load, _difference(predictor, values, terms, aligned, predicted, load, 0.03)
+    yield load, _difference(predictor, values, terms, aligned, predicted, load, SIMULATION.load_step)
 
 
 def _seat_columns(predictor, values, terms, aligned, predicted):
@@ -97,7 +95,9 @@ def _seat_columns(predictor, values, terms, aligned, predicted):
     for k, sensor in enumerate(aligned.sensors):
         if not sensor.mounting.startswith("sleeper"):
             column = np.zeros_like(rows)
-            column[k] = (predictor.channel_output(values, terms, aligned, sensor, shifted[k]) - rows[k]) / POSITION_STEP
+            column[k] = (
+                predictor.channel_output(values, terms, aligned, sensor, shifted[k]) - rows[k]
+            ) / RECEPTANCE.seat_step
             yield f"seat_{sensor.name}", column.ravel()
 
 

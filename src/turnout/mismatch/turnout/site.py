@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from turnout.mismatch.engine.case import Nuisance
 from turnout.mismatch.turnout.campaign import CampaignInput, PassageInput
 from turnout.mismatch.turnout.passage_observation import passage_nuisances
+from turnout.mismatch.turnout.priors import TRACK
 from turnout.mismatch.turnout.rail_roughness import Waves
 from turnout.mismatch.turnout.running_surface import RunningSurface
-from turnout.mismatch.turnout.track_parameters import SEAT_SD, Zone, track_nuisances, zone_of
+from turnout.mismatch.turnout.track_parameters import Zone, track_nuisances, zone_of
 from turnout.simulate.sensor import Sensor
-
-GAIN_SD = 0.02  # relative standard deviation of the gain of a sensor
 
 
 @dataclass(frozen=True)
@@ -48,11 +47,22 @@ def _sensor_nuisances(sensors: Iterable[Sensor]) -> Iterator[Nuisance]:
     """Gain of every sensor, and position of those on the rail."""
     for sensor in sensors:
         yield Nuisance(
-            f"gain_{sensor.name}", "-", 0.0, GAIN_SD, meaning="gain of a sensor less one", can_mask=False, group="gain"
+            f"gain_{sensor.name}",
+            "-",
+            0.0,
+            TRACK.gain_sd,
+            meaning="gain of a sensor less one",
+            can_mask=False,
+            group="gain",
         )
         if not sensor.mounting.startswith("sleeper"):
             yield Nuisance(
-                f"seat_{sensor.name}", "m", 0.0, SEAT_SD, meaning="place of a sensor less its file's", group="seat"
+                f"seat_{sensor.name}",
+                "m",
+                0.0,
+                TRACK.seat_sd,
+                meaning="place of a sensor less its file's",
+                group="seat",
             )
 
 

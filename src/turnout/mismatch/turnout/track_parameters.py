@@ -8,16 +8,17 @@ from operator import itemgetter
 import numpy as np
 
 from turnout.mismatch.engine.case import Nuisance
+from turnout.mismatch.turnout.priors import TRACK
 from turnout.simulate.track import NODE_TOLERANCE, PER_SUPPORT, RailStretch
 
 # Common logarithmic factor on a value of all supports: field, tag of its links, quantity of the link, prior sd.
 # Priors: spread of published values, Knothe and Grassie 1993, tables 1 to 3.
 COMMON_PARAMETERS = (
-    ("pad_stiffness", "pad", "stiffness", 0.25),
-    ("pad_damping", "pad", "damping", 0.5),
-    ("ballast_stiffness", "ballast", "stiffness", 0.25),
-    ("ballast_damping", "ballast", "damping", 0.5),
-    ("sleeper_mass", "sleeper", "mass", 0.06),
+    ("pad_stiffness", "pad", "stiffness", TRACK.common_stiffness_sd),
+    ("pad_damping", "pad", "damping", TRACK.common_damping_sd),
+    ("ballast_stiffness", "ballast", "stiffness", TRACK.common_stiffness_sd),
+    ("ballast_damping", "ballast", "damping", TRACK.common_damping_sd),
+    ("sleeper_mass", "sleeper", "mass", TRACK.common_mass_sd),
 )
 
 
@@ -38,25 +39,17 @@ class SupportParameter:
 
 # Scatter from support to support: Oscarsson 2002. Dampers were never measured singly; sleepers are cast alike.
 SUPPORT_PARAMETERS = (
-    SupportParameter("pad_stiffness", "pad", "pad", "stiffness", 0.10),
-    SupportParameter("ballast_stiffness", "ballast", "ballast", "stiffness", 0.10),
-    SupportParameter("pad_damping", "pad_damper", "pad", "damping", 0.15),
-    SupportParameter("ballast_damping", "ballast_damper", "ballast", "damping", 0.15),
-    SupportParameter("sleeper_mass", "sleeper", "sleeper", "mass", 0.03),
+    SupportParameter("pad_stiffness", "pad", "pad", "stiffness", TRACK.support_stiffness_sd),
+    SupportParameter("ballast_stiffness", "ballast", "ballast", "stiffness", TRACK.support_stiffness_sd),
+    SupportParameter("pad_damping", "pad_damper", "pad", "damping", TRACK.support_damping_sd),
+    SupportParameter("ballast_damping", "ballast_damper", "ballast", "damping", TRACK.support_damping_sd),
+    SupportParameter("sleeper_mass", "sleeper", "sleeper", "mass", TRACK.support_mass_sd),
 )
 # Prior sd of ln stiffness of the rail: wear and rolling tolerances. Published shear coefficients of 60E1 are 0.34 to
 # 0.41; 14 controls of another simulator, checked against closed forms, needed 0.12 ± 0.02 less (95 %).
-RAIL_SDS = (("rail_bending", 0.015), ("rail_shear", 0.12))
+RAIL_SDS = (("rail_bending", TRACK.rail_bending_sd), ("rail_shear", TRACK.rail_shear_sd))
 # The same for a piece of other rail, inner and at an end: the file has one section for a casting that varies.
-CASTING_SDS = (("cast_bending", 0.10, 0.30), ("cast_mass", 0.10, 0.30))
-MIN_PIECE_LENGTH = 0.02  # m; shorter pieces between two ends are ignored
-SECTION_RAMP = 0.3  # m, over which the section of a casting grows at its ends
-RAIL_STEP = 0.05  # of logarithms of rail values; derivatives by pads err by 8 % over 0.12
-WHEELS_SD = 0.06  # sd of ln unsprung mass: reprofiling takes 10 %; 42 wheelsets of another simulator: 0.054
-SEAT_SD = 0.02  # m, standard deviation of the position of a sensor
-SUPPORT_REACH = 1.9  # m beyond sensors and impacts; supports there have values of their own
-EFFECT_REACH = 0.7  # m, the same for effects; the outermost supports absorb deviations of those beyond
-TRACK_MARGIN = 18.0  # m of track modelled beyond sensors and impacts
+CASTING_SDS = (("cast_bending", *TRACK.casting_sds), ("cast_mass", *TRACK.casting_sds))
 
 
 @dataclass(frozen=True)
@@ -95,7 +88,7 @@ def zone_of(turnout, positions):
     low, high = min(positions), max(positions)
 
     def cut(track):
-        keep = (track.support >= low - TRACK_MARGIN) & (track.support <= high + TRACK_MARGIN)
+        keep = (track.support >= low - TRACK.track_margin) & (track.support <= high + TRACK.track_margin)
         values = {name: getattr(track, name)[keep] for name in PER_SUPPORT}
         section = tuple(s for s, k in zip(track.section, keep) if k)
         return replace(track, support=track.support[keep], section=section, **values)
@@ -104,10 +97,10 @@ def zone_of(turnout, positions):
     smaller = replace(turnout, track=cut(turnout.track), tracks=tracks)
     support = smaller.track.support
     inside, effect_supports = (
-        np.flatnonzero((support >= low - r) & (support <= high + r)) for r in (SUPPORT_REACH, EFFECT_REACH)
+        np.flatnonzero((support >= low - r) & (support <= high + r)) for r in (TRACK.support_reach, TRACK.effect_reach)
     )
     castings = castings_of(
-        smaller.track_of("main"), low - SUPPORT_REACH, high + SUPPORT_REACH
+        smaller.track_of("main"), low - TRACK.support_reach, high + TRACK.support_reach
     )  # receptances are modelled on it
     return Zone(
         smaller, int(inside[0]), int(inside[-1]), range(int(effect_supports[0]), int(effect_supports[-1]) + 1), castings
@@ -115,22 +108,28 @@ def zone_of(turnout, positions):
 
 
 def castings_of(track, low, high):
-    """Pieces of other rail, and of what lies within ``SECTION_RAMP`` of it, between ``low`` and ``high`` [m].
+    """Pieces of other rail, and of what lies within ``TRACK.section_ramp`` of it, between ``low`` and ``high`` [m].
 
-    Cuts are at all ends, at ``SECTION_RAMP`` from them, where a section grows from that of the rail, and every metre or
-    so.
+    Cuts are at all ends, at ``TRACK.section_ramp`` from them, where a section grows from that of the rail, and every
+    metre or so.
     """
-    cuts = {x for s in track.stretches for x in (s.start - SECTION_RAMP, s.start, s.end, s.end + SECTION_RAMP)}
+    cuts = {
+        x for s in track.stretches for x in (s.start - TRACK.section_ramp, s.start, s.end, s.end + TRACK.section_ramp)
+    }
     for s in track.stretches:
-        if s.end - s.start > 2.0 * SECTION_RAMP:
-            cuts |= set(np.linspace(s.start + SECTION_RAMP, s.end - SECTION_RAMP, 1 + max(1, round(s.end - s.start))))
+        if s.end - s.start > 2.0 * TRACK.section_ramp:
+            cuts |= set(
+                np.linspace(
+                    s.start + TRACK.section_ramp, s.end - TRACK.section_ramp, 1 + max(1, round(s.end - s.start))
+                )
+            )
     castings = []
     for start, end in pairwise(sorted(cuts)):
         middle = 0.5 * (start + end)
-        near = [s for s in track.stretches if s.start - SECTION_RAMP < middle < s.end + SECTION_RAMP]
-        if near and end - start > MIN_PIECE_LENGTH and end > low and start < high:
+        near = [s for s in track.stretches if s.start - TRACK.section_ramp < middle < s.end + TRACK.section_ramp]
+        if near and end - start > TRACK.min_piece_length and end > low and start < high:
             stretch = next((s for s in reversed(near) if s.start <= middle < s.end), near[-1])
-            inner = stretch.start + SECTION_RAMP < middle < stretch.end - SECTION_RAMP
+            inner = stretch.start + TRACK.section_ramp < middle < stretch.end - TRACK.section_ramp
             castings.append(Casting(stretch, RailStretch(float(start), float(end), track.rail_at(middle)), inner))
     return tuple(castings)
 
@@ -177,31 +176,47 @@ def with_rail(zone, values):
 
 
 def rail_on_grid(values, names):
-    """Rail values rounded to a grid of ``RAIL_STEP``: models are made there and linear from there to ``values``."""
-    return {name: RAIL_STEP * round(values[name] / RAIL_STEP) for name in names}
+    """Rail values rounded to a grid: models are made there and are linear from there to ``values``."""
+    return {name: TRACK.rail_step * round(values[name] / TRACK.rail_step) for name in names}
 
 
 def track_nuisances(zone, trains):
     """Nuisances of track and vehicles, all as logarithms of a factor on the value of the file."""
     nuisances = [
-        Nuisance(name, "-", 0.0, sd, bounds=(-2.0, 2.0), meaning=f"ln {name}", group="track")
+        Nuisance(
+            name, "-", 0.0, sd, bounds=(-TRACK.common_bound, TRACK.common_bound), meaning=f"ln {name}", group="track"
+        )
         for name, _, _, sd in COMMON_PARAMETERS
     ]
     for parameter in SUPPORT_PARAMETERS:
         steps = steps_of(getattr(zone.turnout.track, parameter.field))
         for j in zone.supports:
             sd = float(np.hypot(parameter.sd, steps[j]))
-            meaning, most = f"ln {parameter.field} of {j}", 6.0 * sd
+            meaning, most = f"ln {parameter.field} of {j}", TRACK.bound_sds * sd
             name = f"{parameter.tag}_{j}"
             nuisances.append(Nuisance(name, "-", 0.0, sd, None, (-most, most), meaning, group=parameter.tag, index=j))
     for name, sd in rail_sds(zone).items():
         nuisances.append(
-            Nuisance(name, "-", 0.0, sd, bounds=(-6.0 * sd, 6.0 * sd), meaning=f"ln {name} of the rail", group="rail")
+            Nuisance(
+                name,
+                "-",
+                0.0,
+                sd,
+                bounds=(-TRACK.bound_sds * sd, TRACK.bound_sds * sd),
+                meaning=f"ln {name} of the rail",
+                group="rail",
+            )
         )
     for train in trains:
         nuisances.append(
             Nuisance(
-                f"wheels_{train}", "-", 0.0, WHEELS_SD, bounds=(-0.5, 0.5), meaning="ln unsprung mass", group="wheels"
+                f"wheels_{train}",
+                "-",
+                0.0,
+                TRACK.wheels_sd,
+                bounds=(-TRACK.wheels_bound, TRACK.wheels_bound),
+                meaning="ln unsprung mass",
+                group="wheels",
             )
         )
     return nuisances

@@ -7,21 +7,17 @@ a free track carries to the sensors. A force of frequency :math:`f_0` that moves
 .. math:: S_s(f) = T \mathrm{sinc}^2((f - f_0) T) \sum_n F_n G_{sn}(f) e^{-2 \pi i (f - f_0) \tau_n}
 
 Here :math:`\tau_n` is the time at the node and T the distance between nodes over v. :math:`F_n` is the force on the
-rail about the node: its receptance is averaged over ``AVERAGING_LENGTH``, since a wheel rings on for a few bays.
+rail about the node: its receptance is averaged over 2.4 m, since a wheel rings on for a few bays.
 """
 
 import numpy as np
 
-from turnout.mismatch.turnout import passage_band, passage_model
+from turnout.mismatch.turnout import passage_band
+from turnout.mismatch.turnout.priors import PASSAGE, SIMULATION
 from turnout.mismatch.turnout.receptance_model import linear_matrices
 from turnout.mismatch.turnout.receptance_observation import channel_factor
 from turnout.mismatch.turnout.track_parameters import track_with, vehicle_with
 from turnout.simulate.frequency_response import responses
-
-NODE_STRIDE = 2  # every second node is used; in between a force is shared linearly
-PATH_STEP = 0.01  # m, step of a fine path
-RING_TIME = 0.35  # s, ringing of the track after the last wheel
-AVERAGING_LENGTH = 2.4  # m; with 0.6 and 1.2 errors near the wheel resonance are larger, with the whole rail above it
 
 
 class WaveTransfer:
@@ -38,9 +34,11 @@ class WaveTransfer:
         self.sign = 1.0 if aligned.passage.direction == "facing" else -1.0
         self.first = self.sign * min(self.sign * s.place for s in aligned.sensors)
         self.wheel_delays = vehicle.wheel_positions / self.speed
-        span = (waves.end - waves.start + 2.0 * beyond) / self.speed + self.wheel_delays[-1] + RING_TIME
+        span = (waves.end - waves.start + 2.0 * beyond) / self.speed + self.wheel_delays[-1] + SIMULATION.ring_time
         self.rate, self.simulation_rate = aligned.clock, predictor.solver.rate
-        size = 1 << int(np.ceil(np.log2(self.rate * max(span, aligned.time[-1] - aligned.time[0] + RING_TIME))))
+        size = 1 << int(
+            np.ceil(np.log2(self.rate * max(span, aligned.time[-1] - aligned.time[0] + SIMULATION.ring_time)))
+        )
         self.size, self.period, self.start = size, waves.length, waves.start
         grid = np.fft.rfftfreq(size, 1.0 / self.rate)
         self.inside = np.flatnonzero((grid >= lines[0]) & (grid <= min(lines[-1], 1.25 * aligned.high)))
@@ -51,7 +49,7 @@ class WaveTransfer:
         self.node_transfer = transfer_at_grid * np.exp(-2j * np.pi * self.grid[:, None, None] * self.node_times)
         self.lines, self.compliance = lines, point + wheel_and_contact_receptance(vehicle, lines)[:, None]
         start_time = aligned.time[0] - aligned.reference - values[f"time@{aligned.name}"]
-        gate = passage_band.band_window(self.grid, passage_band.BAND_LOW, aligned.high)
+        gate = passage_band.band_window(self.grid, PASSAGE.band_low, aligned.high)
         channels = channel_responses(values, terms, aligned, self.grid)
         self.clock = (gate * self.rate * np.exp(2j * np.pi * self.grid * start_time))[:, None] * channels
 
@@ -98,7 +96,7 @@ class WaveTransfer:
     def _harmonics(self, paths):
         """Spectra of the waves of ``path_grid``, and amplitudes (..., n_wave) of paths (..., n_x) in them."""
         n_x = paths.shape[-1]
-        orders = np.arange(1, min(n_x // 2, int(self.period / passage_band.SHORTEST_WAVE)) + 1)
+        orders = np.arange(1, min(n_x // 2, int(self.period / PASSAGE.shortest_wave)) + 1)
         amplitude = 2.0 / n_x * np.fft.rfft(paths, axis=-1)[..., orders]
         amplitude = amplitude * np.exp(-2j * np.pi * orders * self.start / self.period)  # cosines count from x = 0
         if self.sign < 0.0:
@@ -120,7 +118,7 @@ class WaveTransfer:
     @property
     def path_grid(self):
         """(n_x,) positions of the paths of ``reactions``: one period, so that its ends have no effect."""
-        return self._period_grid(2 * int(np.ceil(self.period / passage_band.SHORTEST_WAVE)) + 2)
+        return self._period_grid(2 * int(np.ceil(self.period / PASSAGE.shortest_wave)) + 2)
 
     @property
     def fine_grid(self):
@@ -128,7 +126,7 @@ class WaveTransfer:
 
         Sampled as coarsely as ``path_grid``, a kink would alias to longer waves.
         """
-        return self._period_grid(int(self.period / PATH_STEP))
+        return self._period_grid(int(self.period / SIMULATION.path_step))
 
     def _period_grid(self, n):
         return self.start + self.period * np.arange(n) / n
@@ -148,7 +146,7 @@ class WaveTransfer:
         slow = histories[:, : n * fold].reshape(-1, n, fold).mean(axis=2)
         spectrum = np.fft.rfft(slow - slow[:, :1], self.size)[:, self.inside]
         spectrum /= np.sinc(self.grid / self.rate)  # what the mean over the block took
-        start_time = 0.5 / self.rate - passage_model.LEAD_TIME
+        start_time = 0.5 / self.rate - SIMULATION.lead_time
         spectrum = spectrum * np.exp(-2j * np.pi * self.grid * start_time) / self.rate
         response = _interpolate(self.grid, self.lines, transfer) * spectrum.T[:, None, :]
         return self._on_clock(np.add.reduceat(response, first, axis=-1))
@@ -181,12 +179,12 @@ def _transfers(predictor, values, aligned, terms, beyond):
     """
     track = track_with(predictor.track(aligned.passage.route, terms), predictor.zone, values)
     matrices = linear_matrices(track, terms)
-    frequency = np.arange(4.0, 1.3 * passage_band.BAND_HIGH, 2.0)
-    beyond += 0.3
+    frequency = passage_band.transfer_lines()
+    beyond += SIMULATION.node_margin
     near = np.flatnonzero(
         (matrices.node >= predictor.waves.start - beyond) & (matrices.node <= predictor.waves.end + beyond)
     )
-    near = near[::NODE_STRIDE]
+    near = near[:: SIMULATION.node_stride]
     positions = [predictor.seat(s, values, terms).probe(track).place for s in aligned.sensors]
     h, mean_receptance = rail_receptances(matrices, frequency, near, positions)
     return frequency, -((2.0 * np.pi * frequency) ** 2)[:, None, None] * h, mean_receptance, matrices.node[near]
@@ -195,11 +193,11 @@ def _transfers(predictor, values, aligned, terms, beyond):
 def rail_receptances(matrices, frequency, near, positions):
     """(m, n_place, n) receptances between positions and nodes ``near``, and (m, n) rail receptance at these nodes.
 
-    The latter is averaged over ``AVERAGING_LENGTH``. [m/N]
+    The latter is averaged over ``SIMULATION.averaging_length``. [m/N]
     """
     node = matrices.node[near]
     h = responses(matrices, frequency, [*positions, *node.tolist()], matrices.node_index[near])
-    about = np.abs(node[:, None] - node) < 0.5 * AVERAGING_LENGTH
+    about = np.abs(node[:, None] - node) < 0.5 * SIMULATION.averaging_length
     mean_receptance = np.diagonal(h[:, len(positions) :], axis1=1, axis2=2) @ (about / about.sum(axis=0))
     return h[:, : len(positions)], mean_receptance
 

@@ -13,14 +13,9 @@ import numpy as np
 from scipy.linalg import eigh
 
 from turnout.mismatch.engine.candidate_search import masked_candidates
+from turnout.mismatch.turnout.priors import WHEELS
 from turnout.mismatch.turnout.rail_roughness import amplitude_sd
 from turnout.mismatch.turnout.wave_response import WaveTransfer
-
-DEPTH_SD, LENGTH_SD = 0.2, 0.15  # relative sd of depth and length of a component from wheel to wheel
-POSITION_SD = 0.03  # m, sd of its position from wheel to wheel
-SHARPNESS_SD = 0.5  # sd of its shape, as a share of the difference between powers 1.5 and 2
-MAX_NOSE_LENGTH = 1.0  # m to either side of the deepest point
-MIN_DEPTH = 1e-6  # m; shallower components are ignored
 
 
 def profile_modes(predictor, values, aligned, transfer):
@@ -53,20 +48,18 @@ def _deviations(component, grid):
     inside = (grid >= ends[0]) & (grid <= ends[1])
     dip = np.where(inside, component(grid, 0) - np.interp(grid, ends, component(np.array(ends), 0)), 0.0)
     deepest = np.max(np.abs(dip))
-    if deepest < MIN_DEPTH:
+    if deepest < WHEELS.min_depth:
         return []
     slope = np.gradient(dip, grid)
-    from_middle = np.clip(grid - grid[np.argmax(np.abs(dip))], -MAX_NOSE_LENGTH, MAX_NOSE_LENGTH)
+    from_middle = np.clip(grid - grid[np.argmax(np.abs(dip))], -WHEELS.max_nose_length, WHEELS.max_nose_length)
     share = np.abs(dip) / deepest
     sharper = np.sign(dip) * deepest * (share**0.75 - share)
-    return [DEPTH_SD * dip, POSITION_SD * slope, LENGTH_SD * from_middle * slope, SHARPNESS_SD * sharper]
-
-
-OUT_OF_ROUND_SD = 1.5e-5  # m, first three harmonics of wheels in service (Johansson 2006, Vehicle System Dynamics 44)
-WHEEL_LEVEL = -2.0  # dB over the limit curve of rails: disc-braked wheels
-MIN_MODE_VARIANCE = 0.02  # share of a sample's own variance below which a mode is left out
-FAINT_SHARE = 0.1  # of that: single waves below this are left out before they are combined
-ROUGHNESS_MARGIN = 6.0  # m beyond the free waves; lightly damped track carries a wheel's noise that far
+    return [
+        WHEELS.depth_sd * dip,
+        WHEELS.position_sd * slope,
+        WHEELS.length_sd * from_middle * slope,
+        WHEELS.sharpness_sd * sharper,
+    ]
 
 
 def wheel_modes(predictor, values, aligned, sigma):
@@ -78,7 +71,7 @@ def wheel_modes(predictor, values, aligned, sigma):
     waves, scale = predictor.waves, sigma[:, None].astype(np.float32)
     radii, transfer = (
         aligned.passage.vehicle.wheel_values("radius"),
-        WaveTransfer(predictor, values, aligned, beyond=ROUGHNESS_MARGIN),
+        WaveTransfer(predictor, values, aligned, beyond=WHEELS.roughness_margin),
     )
     treads = {radius: _wave_sds(waves, radius) for radius in radii}
     modes = [profile_modes(predictor, values, aligned, transfer).astype(np.float32)]
@@ -87,19 +80,23 @@ def wheel_modes(predictor, values, aligned, sigma):
         for w, radius in enumerate(radii):
             sd = np.hypot(treads[radius], rail)
             columns = (transfer.signals_from(spectra, transfer.wheel(w)) * np.repeat(sd, 2)).astype(np.float32)
-            modes.append(columns[:, np.sum((columns / scale) ** 2, axis=0) > FAINT_SHARE * MIN_MODE_VARIANCE])
+            modes.append(
+                columns[:, np.sum((columns / scale) ** 2, axis=0) > WHEELS.faint_share * WHEELS.min_mode_variance]
+            )
     modes = np.concatenate(modes, axis=1)
     scaled = modes / scale
     power, vectors = eigh(scaled.T @ scaled, driver="evd", overwrite_a=True)  # scipy's: half the time of numpy's
-    return modes @ vectors[:, power > MIN_MODE_VARIANCE]
+    return modes @ vectors[:, power > WHEELS.min_mode_variance]
 
 
 def _wave_sds(waves, radius):
     """(n_length,) standard deviation of the waves of a wheel [m]."""
-    sd, circumference = amplitude_sd(waves.lengths, waves.length, WHEEL_LEVEL), 2.0 * np.pi * radius
+    sd, circumference = amplitude_sd(waves.lengths, waves.length, WHEELS.level), 2.0 * np.pi * radius
     # out of round: the variance of an harmonic is spread over the waves up to half an order beside it
     is_out_of_round = np.clip(np.round(circumference / waves.lengths), 1, 99) <= 3
-    sd[is_out_of_round] = np.maximum(sd[is_out_of_round], OUT_OF_ROUND_SD * np.sqrt(circumference / waves.length))
+    sd[is_out_of_round] = np.maximum(
+        sd[is_out_of_round], WHEELS.out_of_round_sd * np.sqrt(circumference / waves.length)
+    )
     return sd
 
 

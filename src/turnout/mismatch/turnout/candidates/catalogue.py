@@ -14,7 +14,7 @@ import numpy as np
 
 from turnout import physics
 from turnout.mismatch.engine.candidate import Candidate
-from turnout.mismatch.turnout.saturation import LIMIT_SD, MIN_SIDE_RATIO
+from turnout.mismatch.turnout.priors import SATURATION
 from turnout.physics.hypothesis import (
     ChannelSite,
     ContactSite,
@@ -131,13 +131,13 @@ def channel_sites(data: CaseData) -> Iterator[ChannelSite | SaturatedChannelSite
         name = sensor.name
         pairs = tuple(pair.name for pair in data.frf_pairs.values() if pair.channel == name)
         peak = data.band_peak(name) if data.aligned_passages else 0.0
-        lowest_limit = MIN_SIDE_RATIO * data.raw_peak(name) if peak > 0.0 else 0.0
+        lowest_limit = SATURATION.min_side_ratio * data.raw_peak(name) if peak > 0.0 else 0.0
         material = data.settings.materiality * peak
         yield ChannelSite(
             name, len(data.campaign.sensors), pairs, bool(data.aligned_passages), peak, lowest_limit, material
         )
     for name, estimate in data.saturated.items():
-        yield SaturatedChannelSite(name, estimate.limit, LIMIT_SD * estimate.limit, estimate.gain)
+        yield SaturatedChannelSite(name, estimate.limit, SATURATION.limit_sd * estimate.limit, estimate.gain)
 
 
 def has_required_range(data: CaseData, candidate: Candidate) -> bool:

@@ -1,6 +1,6 @@
 r"""Find polygonal wheels in the residual of passages: which wheel of which train, order and amplitude.
 
-Waves longer than ``SHORTEST_WAVE`` are found in the band of the fit. The wave of a wheel is a line at v/λ in every
+Waves longer than 0.3 m are found in the band of the fit. The wave of a wheel is a line at v/λ in every
 passage of its train, at an unknown angle. C are its two whitened signals, a quarter wave apart. Their amplitudes have
 the standard deviation a, the same in all passages. Each passage gives, with the angle integrated out,
 
@@ -8,8 +8,8 @@ the standard deviation a, the same in all passages. Each passage gives, with the
 
 M is that of the first wheel: it is the same for all wheels of a train.
 
-Shorter waves are found in the sound level. While a wheel is within ``WHEEL_REACH`` of a sensor, it dominates the
-signal. With P the power at that time in bins of :math:`\lambda = v/f` and B that of the bins around it,
+Shorter waves are found in the sound level. While a wheel is within 1.2 m of a sensor, it dominates the signal. With P
+the power at that time in bins of :math:`\lambda = v/f` and B that of the bins around it,
 
 .. math:: z = \ln (P / B) - \mathrm{median}_{wheels} \ln (P / B)
 
@@ -27,13 +27,8 @@ import numpy as np
 
 from turnout import physics
 from turnout.mismatch.turnout.candidates.catalogue import candidate_of
-from turnout.mismatch.turnout.candidates.short_corrugation import (
-    MAX_FREQUENCY_SHARE,
-    MIN_WAVELENGTH,
-    RESPONSE_ERROR,
-    response_energy,
-)
-from turnout.mismatch.turnout.passage_band import SHORTEST_WAVE
+from turnout.mismatch.turnout.candidates.short_corrugation import response_energy
+from turnout.mismatch.turnout.priors import CORRUGATION, PASSAGE, POLYGONS, SHORT_POLYGONS
 from turnout.mismatch.turnout.wave_response import WaveTransfer
 from turnout.physics.hypothesis import Hypothesis
 from turnout.physics.out_of_round import MIN_AMPLITUDE
@@ -47,10 +42,9 @@ if TYPE_CHECKING:
 
 # (nats, train, wheel, wavelength [m], [(recording, cosine, sine)])
 WheelEvidence: TypeAlias = tuple[float, str, int, float, list[tuple[str, float, float]]]
-WAVELENGTHS = np.geomspace(SHORTEST_WAVE, 1.0, 100)  # m; over 10 m neighbours differ by a third of a period
-FINE_FACTORS = np.linspace(0.985, 1.015, 13)  # of the wavelength, for its refinement
-AMPLITUDES = np.geomspace(1e-5, 4e-4, 5)  # m, prior sd of cosine and sine
-ANGLES_PER_PASSAGE = 12.0  # distinguishable angles per passage
+WAVELENGTHS = np.geomspace(PASSAGE.shortest_wave, POLYGONS.longest_wave, POLYGONS.n_wavelengths)  # m
+FINE_FACTORS = np.linspace(*POLYGONS.fine_factors)  # of the wavelength, for its refinement
+AMPLITUDES = np.geomspace(*POLYGONS.amplitudes)  # m, prior sd of cosine and sine
 
 
 def polygon_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, ...]:
@@ -140,23 +134,11 @@ def _candidate(
         starts=((amplitude, 0.0, 0.0),),
         fixed={"wheel": wheel, "order": order, "radius": radius, "train": train, "phases": phases},
         where={"train": train, "axle": wheel + 1},
-        n_scanned=scanned * ANGLES_PER_PASSAGE ** len(phases),
+        n_scanned=scanned * POLYGONS.angles_per_passage ** len(phases),
         smallest_reportable=MIN_AMPLITUDE,
         promise=float(nats - np.log(scanned)),
     )
     return candidate_of(physics.OutOfRound, hypothesis)
-
-
-WHEEL_REACH = 1.2  # m from wheel to sensor; axles of a bogie are at least 1.8 m apart
-BIN_WIDTH, NEAR_OFFSET, FAR_OFFSET = (
-    0.04,
-    0.2,
-    0.6,
-)  # of ln wavelength: bin width, nearest and farthest bins of the background
-RESOLUTION = 0.16  # of ln wavelength: resolution of 2.4 m of rail at 0.2 m
-WHEEL_SD, SENSOR_SD = 0.5, 0.8  # sd of z: between wheels (twice that in another simulator), of one spectrum
-POLYGON_SD = 2.5  # prior sd of z of a polygonal wheel
-MIN_WHEELS = 3  # least wheels of a train, for a median
 
 
 @dataclass(frozen=True)
@@ -180,13 +162,15 @@ def short_polygon_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, ...]
     if not passages:
         return ()
     lengths = bin_wavelengths(passages)
-    bins = np.flatnonzero((lengths < SHORTEST_WAVE) & (lengths > lengths.min(initial=np.inf) * np.exp(FAR_OFFSET)))
+    bins = np.flatnonzero(
+        (lengths < PASSAGE.shortest_wave) & (lengths > lengths.min(initial=np.inf) * np.exp(SHORT_POLYGONS.far_offset))
+    )
     if not bins.size:
         return ()
     wheel_fits, n = [], 0
     for train in case.trains:
         spectra = [wheel_spectra(m, lengths) for m in passages if m.conditions["train"] == train]
-        if spectra and spectra[0].level.shape[1] >= MIN_WHEELS:
+        if spectra and spectra[0].level.shape[1] >= SHORT_POLYGONS.min_wheels:
             z, n_slots = wheel_excess(spectra, bins, lengths)
             n += z.shape[0]
             w, k = np.unravel_index(int(np.argmax(z)), z.shape)
@@ -197,7 +181,7 @@ def short_polygon_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, ...]
     if not wheel_fits:
         return ()
     nats, train, wheel, chosen_bin, spectra = max(wheel_fits, key=lambda f: f[0])
-    scanned = n * max(1.0, float(np.ptp(np.log(lengths[bins]))) / RESOLUTION)
+    scanned = n * max(1.0, float(np.ptp(np.log(lengths[bins]))) / SHORT_POLYGONS.resolution)
     if nats < np.log(scanned):
         return ()
     return (_short_candidate(case, fit, train, wheel, lengths, chosen_bin, nats, scanned, spectra),)
@@ -212,21 +196,23 @@ def bin_wavelengths(passages: Sequence[AlignedPassage]) -> np.ndarray:
     """(n,) centres of the bins, longest first; those at both ends serve as background. [m]"""
     shortest = max(
         [
-            MIN_WAVELENGTH * np.exp(-FAR_OFFSET),
-            *(m.speed / (MAX_FREQUENCY_SHARE * m.passage.recording.rate) for m in passages),
+            CORRUGATION.min_wavelength * np.exp(-SHORT_POLYGONS.far_offset),
+            *(m.speed / (CORRUGATION.max_frequency_share * m.passage.recording.rate) for m in passages),
         ]
     )
-    longest = SHORTEST_WAVE * np.exp(FAR_OFFSET)
-    return longest * np.exp(-np.arange(0.0, np.log(longest / shortest), BIN_WIDTH))
+    longest = PASSAGE.shortest_wave * np.exp(SHORT_POLYGONS.far_offset)
+    return longest * np.exp(-np.arange(0.0, np.log(longest / shortest), SHORT_POLYGONS.bin_width))
 
 
 def wheel_spectra(aligned: AlignedPassage, lengths: np.ndarray) -> WheelSpectra:
     """``WheelSpectra`` of a passage."""
     recording, speed = aligned.passage.recording, aligned.speed
-    n = round(2.0 * WHEEL_REACH / speed * recording.rate)
+    n = round(2.0 * SHORT_POLYGONS.wheel_reach / speed * recording.rate)
     window, size = np.hanning(n), 1 << int(np.ceil(np.log2(8 * n)))
     frequency = np.arange(size // 2 + 1) * recording.rate / size
-    edges = np.searchsorted(frequency, speed / lengths[:, None] * np.exp([-0.5 * BIN_WIDTH, 0.5 * BIN_WIDTH]))
+    edges = np.searchsorted(
+        frequency, speed / lengths[:, None] * np.exp([-0.5 * SHORT_POLYGONS.bin_width, 0.5 * SHORT_POLYGONS.bin_width])
+    )
     edges[:, 1] = np.maximum(edges[:, 1], edges[:, 0] + 1)
     sign = 1.0 if aligned.passage.direction == "facing" else -1.0
     first = sign * min(sign * s.place for s in aligned.sensors)
@@ -249,7 +235,10 @@ def wheel_spectra(aligned: AlignedPassage, lengths: np.ndarray) -> WheelSpectra:
 def _background(level: np.ndarray, k: int, lengths: np.ndarray) -> np.ndarray:
     """(n_sensor, n_wheel) background level of bin k from the bins around it, mean of both sides."""
     away = np.log(lengths[k] / lengths)
-    sides = [(away > NEAR_OFFSET) & (away < FAR_OFFSET), (-away > NEAR_OFFSET) & (-away < FAR_OFFSET)]
+    sides = [
+        (away > SHORT_POLYGONS.near_offset) & (away < SHORT_POLYGONS.far_offset),
+        (-away > SHORT_POLYGONS.near_offset) & (-away < SHORT_POLYGONS.far_offset),
+    ]
     return np.mean([np.median(level[..., side], axis=-1) for side in sides], axis=0)
 
 
@@ -267,8 +256,8 @@ def wheel_excess(
 
 def polygon_evidence(z: float, n_slots: int) -> float:
     """Nats for a polygonal wheel over a round one, from its mean z over so many spectra."""
-    spread = WHEEL_SD**2 + SENSOR_SD**2 / n_slots
-    wide = spread + POLYGON_SD**2
+    spread = SHORT_POLYGONS.wheel_sd**2 + SHORT_POLYGONS.sensor_sd**2 / n_slots
+    wide = spread + SHORT_POLYGONS.polygon_sd**2
     z = max(float(z), 0.0)
     return 0.5 * np.log(spread / wide) + 0.5 * z**2 * (1.0 / spread - 1.0 / wide)
 
@@ -288,7 +277,7 @@ def _short_candidate(
     order = round(2.0 * np.pi * radius / lengths[k])
     sizes = np.concatenate([_amplitudes(case, fit, s, wheel, lengths, k) for s in spectra])
     amplitude = float(np.clip(np.median(sizes), 1e-6, 9e-4))
-    error = amplitude * float(np.hypot(RESPONSE_ERROR, np.std(np.log(sizes)) / np.sqrt(sizes.size)))
+    error = amplitude * float(np.hypot(CORRUGATION.response_error, np.std(np.log(sizes)) / np.sqrt(sizes.size)))
     parameters = tuple(
         replace(p, prior=(amplitude, error)) for p in physics.OutOfRound.parameters if p.name == "cosine"
     )  # fmt: skip
@@ -313,12 +302,16 @@ def _amplitudes(
     .. math:: \sum_f |Y|^2 = \tfrac{N}{2} f_s \int y^2 h^2 dt, \quad
               \int y^2 h^2 dt = \tfrac12 a^2 |F|^2 \omega^4 \int |G(x)|^2 h(x)^2 dx / v
     """
-    aligned, near = spectra.aligned, np.flatnonzero(np.abs(np.log(lengths / lengths[k])) < NEAR_OFFSET)
+    aligned, near = spectra.aligned, np.flatnonzero(np.abs(np.log(lengths / lengths[k])) < SHORT_POLYGONS.near_offset)
     excess = np.exp(spectra.level[:, wheel, near]) - np.exp(_background(spectra.level, k, lengths)[:, wheel, None])
     energy = 2.0 * np.sum(excess * spectra.width[near], axis=1) / (spectra.size * aligned.passage.recording.rate)
     node, gain = response_energy(case, fit, aligned, lengths[k])
     distance = np.array([s.place for s in aligned.sensors])[:, None] - node
-    window = np.where(np.abs(distance) < WHEEL_REACH, np.cos(0.5 * np.pi * distance / WHEEL_REACH) ** 2, 0.0)
+    window = np.where(
+        np.abs(distance) < SHORT_POLYGONS.wheel_reach,
+        np.cos(0.5 * np.pi * distance / SHORT_POLYGONS.wheel_reach) ** 2,
+        0.0,
+    )
     unit_energy = 0.5 / aligned.speed * np.trapezoid(gain * window**2, node, axis=1)
     is_valid = np.isfinite(energy) & (energy > 0.0)
     return np.sqrt(energy[is_valid] / unit_energy[is_valid]) if is_valid.any() else np.array([1e-6])

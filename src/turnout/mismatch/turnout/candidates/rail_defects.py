@@ -25,7 +25,7 @@ from turnout.mismatch.turnout.candidates.catalogue import candidate_of
 from turnout.mismatch.turnout.candidates.out_of_roundness import polygon_candidates, short_polygon_candidates
 from turnout.mismatch.turnout.candidates.short_corrugation import short_corrugation_candidates
 from turnout.mismatch.turnout.candidates.wheel_flats import flat_candidates
-from turnout.mismatch.turnout.passage_band import SHORTEST_WAVE
+from turnout.mismatch.turnout.priors import GEOMETRY, PASSAGE
 from turnout.physics.hypothesis import Hypothesis
 
 if TYPE_CHECKING:
@@ -33,15 +33,9 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.map_fit import Fit
     from turnout.mismatch.turnout.case import TrackCase
 
-DIP_POSITION_STEP, SENSOR_MARGIN = 0.1, 1.0  # m, between trial positions of a dip; margin beyond the sensors
-LENGTHS, SHARPNESSES = (0.25, 0.4, 0.6, 0.9), (0.2, 0.9)  # m, -; trial values of a dip
-DIP_RESOLUTION = 0.3  # m; closer dips cannot be distinguished
-UNIT_DEPTH = 1e-3  # m, of a trial dip
-UNIT_WAVES = ((1e-5, 0.0), (0.0, 1e-5))  # m, (sine, cosine) of trial corrugation
-WAVELENGTHS = np.geomspace(1.02 * SHORTEST_WAVE, 0.75, 34)  # m; shorter ones are no free waves
-HALF_LENGTHS = (1.8, 3.2, 5.0)  # m, half the length of a corrugated stretch
-AMPLITUDE_SD = 3e-5  # m, prior sd of the amplitude: corrugation that is ground away
-N_INDEPENDENT_WAVES = 12.0  # distinguishable wavelengths in that range for sensors 6 m apart
+WAVELENGTHS = np.geomspace(
+    GEOMETRY.wavelength_ratio * PASSAGE.shortest_wave, GEOMETRY.longest_wave, GEOMETRY.n_wavelengths
+)  # m; shorter ones are no free waves
 
 
 class RailScan:
@@ -85,34 +79,38 @@ def scan_rail(case: TrackCase, fit: Fit, families: Collection[str] | None = None
 
 def _dip(case: TrackCase, scan: RailScan) -> Hypothesis:
     positions = [s.place for s in case.campaign.sensors]
-    grid = np.arange(min(positions) - SENSOR_MARGIN, max(positions) + SENSOR_MARGIN, DIP_POSITION_STEP)
-    trials = [(x, length, sharp) for length in LENGTHS for sharp in SHARPNESSES for x in grid]
-    shapes = np.array([_path(physics.SurfaceDip(x, UNIT_DEPTH, *more), scan.x) for x, *more in trials])
+    grid = np.arange(
+        min(positions) - GEOMETRY.sensor_margin, max(positions) + GEOMETRY.sensor_margin, GEOMETRY.position_step
+    )
+    trials = [(x, length, sharp) for length in GEOMETRY.lengths for sharp in GEOMETRY.sharpnesses for x in grid]
+    shapes = np.array([_path(physics.SurfaceDip(x, GEOMETRY.unit_depth, *more), scan.x) for x, *more in trials])
     slope, size = scan.score(shapes)
     size = np.maximum(np.diag(size), 1e-12)
     best_index = int(np.argmax(slope**2 / size))
-    (x, length, sharp), depth = trials[best_index], UNIT_DEPTH * slope[best_index] / size[best_index]
+    (x, length, sharp), depth = trials[best_index], GEOMETRY.unit_depth * slope[best_index] / size[best_index]
     depth = float(np.clip(depth, -2.5e-3, 5e-3))
-    scanned = np.ptp(grid) / DIP_RESOLUTION
+    scanned = np.ptp(grid) / GEOMETRY.resolution
     return Hypothesis(
         starts=((depth, length, sharp, 0.0),),
         fixed={"place": float(x)},
         where={"place": round(float(x), 3)},
         n_scanned=scanned,
-        parameters=_parameters_with(physics.SurfaceDip, shift=(0.0, DIP_RESOLUTION)),
+        parameters=_parameters_with(physics.SurfaceDip, shift=(0.0, GEOMETRY.resolution)),
         promise=float(0.5 * slope[best_index] ** 2 / size[best_index] - np.log(scanned)),
-        start_nuisances=scan.waves_without(shapes[best_index] * depth / UNIT_DEPTH),
+        start_nuisances=scan.waves_without(shapes[best_index] * depth / GEOMETRY.unit_depth),
     )
 
 
 def _corrugation(case: TrackCase, scan: RailScan) -> Hypothesis:
     positions = [s.place for s in case.campaign.sensors]
     middles = np.arange(min(positions), max(positions) + 0.1, 0.75)
-    trials = [(m, r, w) for m in middles for r in HALF_LENGTHS for w in WAVELENGTHS]
+    trials = [(m, r, w) for m in middles for r in GEOMETRY.half_lengths for w in WAVELENGTHS]
     best_fit: tuple | None = None
     for middle, reach, wavelength in trials:
         a, b = middle - reach, middle + reach
-        pair = np.array([_path(physics.RailCorrugation(a, b, s, c, wavelength), scan.x) for s, c in UNIT_WAVES])
+        pair = np.array(
+            [_path(physics.RailCorrugation(a, b, s, c, wavelength), scan.x) for s, c in GEOMETRY.unit_waves]
+        )
         slope, size = scan.score(pair)
         amount = np.linalg.solve(size + 1e-9 * np.trace(size) * np.eye(2), slope)
         gain = float(slope @ amount)
@@ -121,10 +119,10 @@ def _corrugation(case: TrackCase, scan: RailScan) -> Hypothesis:
     assert best_fit is not None
     gain, a, b, wavelength, amount, pair = best_fit
     sine, cosine = (float(v) for v in np.clip(1e-5 * amount, -2.5e-4, 2.5e-4))
-    scanned = N_INDEPENDENT_WAVES * len(middles)
+    scanned = GEOMETRY.n_independent_waves * len(middles)
     priors = {
-        "sine": (0.0, AMPLITUDE_SD),
-        "cosine": (0.0, AMPLITUDE_SD),
+        "sine": (0.0, GEOMETRY.amplitude_sd),
+        "cosine": (0.0, GEOMETRY.amplitude_sd),
         "wavelength": (float(wavelength), 0.03 * float(wavelength)),
     }
     return Hypothesis(

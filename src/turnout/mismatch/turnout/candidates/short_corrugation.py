@@ -21,9 +21,9 @@ import numpy as np
 from scipy.signal.windows import tukey
 
 from turnout import physics
-from turnout.mismatch.turnout import passage_band, passage_model
 from turnout.mismatch.turnout.candidates.catalogue import candidate_of
 from turnout.mismatch.turnout.matrix_cache import matrices_of
+from turnout.mismatch.turnout.priors import CORRUGATION, PASSAGE, SIMULATION
 from turnout.mismatch.turnout.track_parameters import track_with
 from turnout.mismatch.turnout.wave_response import rail_receptances, wheel_and_contact_receptance
 from turnout.physics.hypothesis import Hypothesis
@@ -35,19 +35,7 @@ if TYPE_CHECKING:
     from turnout.mismatch.turnout.case import TrackCase
     from turnout.mismatch.turnout.passage_observation import AlignedPassage
 
-MIN_WAVELENGTH, BIN_WIDTH = 0.05, 0.05  # m; bin width in ln wavelength, the resolution of 5 m of rail at 0.2 m
-LINE_BINS = 2  # bins to either side over which a line spreads
-BACKGROUND_GAP, BACKGROUND_REACH = 2, 6  # bins, nearest and farthest of the background
-MAX_FREQUENCY_SHARE = 0.35  # highest frequency over the sampling rate: above, the anti-alias filter may act
-SENSOR_SD = 0.8  # sd of z of one sensor on intact rail: 0.62 and 1.0 in two simulators
-CORRUGATION_SD = 2.0  # prior sd of z of corrugation
-MIN_TRAINS = 2  # least trains, to distinguish the rail from wheels
-MIN_SPEED_RATIO = 1.25  # least ratio of fastest to slowest passage, to distinguish a wavelength from a frequency
-INDEPENDENT_DISTANCE = 2.0  # m; closer sensors measure the same rail
-HALF_LENGTHS = (1.0, 1.8, 3.2, 5.0)  # m, half the length of the stretch
-AMPLITUDES = np.geomspace(2e-6, 3e-4, 60)  # m, tested
-RESPONSE_ERROR = 0.15  # relative error of the response at one frequency
-NODE_STRIDE = 2  # every second node is used
+AMPLITUDES = np.geomspace(*CORRUGATION.amplitudes)  # m, tested
 
 
 @dataclass(frozen=True)
@@ -73,11 +61,16 @@ class BandPower:
 
 def bin_wavelengths(passages: Sequence[AlignedPassage]) -> np.ndarray:
     """(n,) wavelengths that every passage covers, longest first [m]."""
-    shortest = max([MIN_WAVELENGTH, *(m.speed / (MAX_FREQUENCY_SHARE * m.passage.recording.rate) for m in passages)])
-    longest = passage_band.SHORTEST_WAVE * np.exp(
-        BIN_WIDTH * (BACKGROUND_REACH + 1)
+    shortest = max(
+        [
+            CORRUGATION.min_wavelength,
+            *(m.speed / (CORRUGATION.max_frequency_share * m.passage.recording.rate) for m in passages),
+        ]
+    )
+    longest = PASSAGE.shortest_wave * np.exp(
+        CORRUGATION.bin_width * (CORRUGATION.background_reach + 1)
     )  # the first bins are background alone
-    return longest * np.exp(-np.arange(0.0, np.log(longest / shortest), BIN_WIDTH))
+    return longest * np.exp(-np.arange(0.0, np.log(longest / shortest), CORRUGATION.bin_width))
 
 
 def band_power(case: TrackCase, aligned: AlignedPassage, wavelengths: np.ndarray) -> BandPower:
@@ -86,19 +79,20 @@ def band_power(case: TrackCase, aligned: AlignedPassage, wavelengths: np.ndarray
     rows = [recording.index(s.name) for s in aligned.sensors]
     first, last = (round(t * recording.rate) for t in (aligned.time[0], aligned.time[-1]))
     samples = recording.samples[rows][:, max(first, 0) : last]
-    edge = 2.0 * passage_model.EDGE_TIME * recording.rate / samples.shape[1]
+    edge = 2.0 * SIMULATION.edge_time * recording.rate / samples.shape[1]
     n = 1 << int(np.ceil(np.log2(4 * samples.shape[1])))  # finer lines than bins
     power = np.abs(np.fft.rfft(samples * tukey(samples.shape[1], min(edge, 1.0)), n)) ** 2
     frequency = np.arange(power.shape[1]) * recording.rate / n
     edges = np.searchsorted(
-        frequency, aligned.speed / wavelengths[:, None] * np.exp([-0.5 * BIN_WIDTH, 0.5 * BIN_WIDTH])
+        frequency,
+        aligned.speed / wavelengths[:, None] * np.exp([-0.5 * CORRUGATION.bin_width, 0.5 * CORRUGATION.bin_width]),
     )
     alive = np.any(samples != samples[:, :1], axis=1)
     power = power[alive]
     total = np.column_stack([power[:, a : max(b, a + 1)].mean(axis=1) for a, b in edges])
     level = np.log(total)
     near = np.abs(np.subtract.outer(np.arange(wavelengths.size), np.arange(wavelengths.size)))
-    near = (near >= BACKGROUND_GAP) & (near <= BACKGROUND_REACH)
+    near = (near >= CORRUGATION.background_gap) & (near <= CORRUGATION.background_reach)
     usual = np.exp(np.column_stack([np.median(level[:, row], axis=1) for row in near]))
     return BandPower(aligned.name, aligned.passage.train, aligned.speed, total, usual, alive)
 
@@ -117,8 +111,8 @@ def corrugation_evidence(passages: Sequence[BandPower], n_sensors: float) -> np.
     ``n_sensors`` is the number of sensors on different rail.
     """
     z = np.min([np.mean([p.excess.mean(axis=0) for p in group], axis=0) for group in passage_groups(passages)], axis=0)
-    z, spread = np.maximum(z, 0.0), SENSOR_SD**2 / n_sensors
-    wide = spread + CORRUGATION_SD**2
+    z, spread = np.maximum(z, 0.0), CORRUGATION.sensor_sd**2 / n_sensors
+    wide = spread + CORRUGATION.corrugation_sd**2
     return 0.5 * np.log(spread / wide) + 0.5 * z**2 * (1.0 / spread - 1.0 / wide)
 
 
@@ -128,7 +122,7 @@ def short_corrugation_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, 
     if any(c.family == physics.RailCorrugation.name for c in fit.candidates) or not _can_distinguish(passages):
         return ()
     wavelengths = bin_wavelengths(passages)
-    if wavelengths.size <= 2 * BACKGROUND_REACH:
+    if wavelengths.size <= 2 * CORRUGATION.background_reach:
         return ()
     band_powers = [band_power(case, m, wavelengths) for m in passages]
     if not all(len(p.power) for p in band_powers):
@@ -136,11 +130,7 @@ def short_corrugation_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, 
     nats = corrugation_evidence(band_powers, _n_independent_sensors(case))
     nats[_is_in_file(case, wavelengths)] = -np.inf
     k = int(np.argmax(nats))
-    if (
-        wavelengths[k] >= passage_band.SHORTEST_WAVE
-        or nats[k] < np.log(nats.size)
-        or not _is_repeatable(band_powers, k)
-    ):
+    if wavelengths[k] >= PASSAGE.shortest_wave or nats[k] < np.log(nats.size) or not _is_repeatable(band_powers, k):
         return ()
     return (_candidate(case, fit, wavelengths, k, float(nats[k]), band_powers),)
 
@@ -148,13 +138,15 @@ def short_corrugation_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, 
 def _can_distinguish(passages: Sequence[AlignedPassage]) -> bool:
     """Whether trains and speeds differ enough to distinguish the rail from wheels and from frequencies."""
     speeds = [m.speed for m in passages]
-    return len({m.passage.train for m in passages}) >= MIN_TRAINS and max(speeds) > MIN_SPEED_RATIO * min(speeds)
+    return len({m.passage.train for m in passages}) >= CORRUGATION.min_trains and max(
+        speeds
+    ) > CORRUGATION.min_speed_ratio * min(speeds)
 
 
 def _n_independent_sensors(case: TrackCase) -> float:
     """Effective number of sensors on different rail."""
     positions = sorted(s.place for s in case.campaign.sensors)
-    return 1.0 + float(np.sum(np.minimum(np.diff(positions) / INDEPENDENT_DISTANCE, 1.0)))
+    return 1.0 + float(np.sum(np.minimum(np.diff(positions) / CORRUGATION.independent_distance, 1.0)))
 
 
 def _is_in_file(case: TrackCase, wavelengths: np.ndarray) -> np.ndarray:
@@ -166,7 +158,9 @@ def _is_in_file(case: TrackCase, wavelengths: np.ndarray) -> np.ndarray:
         for p in s
     ]
     lengths = np.array([p.wavelength for p in components if hasattr(p, "wavelength")])
-    return np.any(np.abs(np.log(wavelengths[:, None] / lengths)) < (LINE_BINS + 0.5) * BIN_WIDTH, axis=1)
+    return np.any(
+        np.abs(np.log(wavelengths[:, None] / lengths)) < (CORRUGATION.line_bins + 0.5) * CORRUGATION.bin_width, axis=1
+    )
 
 
 def _is_repeatable(band_powers: Sequence[BandPower], k: int) -> bool:
@@ -187,14 +181,14 @@ def _candidate(
     length = float(np.exp(weight @ np.log(wavelengths[line]) / weight.sum()))
     middle, reach, amplitude, error = _fit_stretch(case, fit, length, line, band_powers)
     a, b = middle - reach, middle + reach
-    priors = {"sine": (amplitude, error), "wavelength": (length, 0.5 * BIN_WIDTH * length)}
+    priors = {"sine": (amplitude, error), "wavelength": (length, 0.5 * CORRUGATION.bin_width * length)}
     parameters = tuple(replace(p, prior=priors[p.name]) for p in physics.RailCorrugation.parameters if p.name in priors)
     where = {"wavelength": round(length, 3), "place": round(float(middle), 2)}
     hypothesis = Hypothesis(
         starts=((amplitude, length),),
         fixed={"start": a, "end": b},
         where=where,
-        n_scanned=int(np.count_nonzero(wavelengths < passage_band.SHORTEST_WAVE)),
+        n_scanned=int(np.count_nonzero(wavelengths < PASSAGE.shortest_wave)),
         parameters=parameters,
         smallest_reportable=MIN_AMPLITUDE,
         promise=nats - float(np.log(wavelengths.size)),
@@ -205,7 +199,7 @@ def _candidate(
 
 def _line_bins(k: int) -> slice:
     """Bins over which a line spreads: a stretch of 3 m is some 10 % wide at 0.3 m."""
-    return slice(max(k - LINE_BINS, 0), k + LINE_BINS + 1)
+    return slice(max(k - CORRUGATION.line_bins, 0), k + CORRUGATION.line_bins + 1)
 
 
 def _fit_stretch(
@@ -217,7 +211,7 @@ def _fit_stretch(
     """
     positions = [s.place for s in case.campaign.sensors]
     middles = np.arange(min(positions), max(positions) + 0.1, 0.5)
-    shapes = [(m, r) for m in middles for r in HALF_LENGTHS]
+    shapes = [(m, r) for m in middles for r in CORRUGATION.half_lengths]
     misfit = np.zeros((len(shapes), AMPLITUDES.size))
     for p in band_powers:
         unit = _unit_energy(case, fit, case.aligned_passages[p.name], length, shapes)  # (n_shape, n_sensor)
@@ -226,10 +220,10 @@ def _fit_stretch(
     n = sum(len(p.power) for p in band_powers)
     best_shape, size = np.unravel_index(int(np.argmin(misfit)), misfit.shape)
     spread = misfit[best_shape, size] / n
-    posterior = np.exp(-0.5 * (misfit - misfit[best_shape, size]) / max(spread, SENSOR_SD**2))
+    posterior = np.exp(-0.5 * (misfit - misfit[best_shape, size]) / max(spread, CORRUGATION.sensor_sd**2))
     posterior = posterior.sum(axis=0) / posterior.sum()
     mean = float(posterior @ np.log(AMPLITUDES))
-    error = float(np.sqrt(posterior @ (np.log(AMPLITUDES) - mean) ** 2 + RESPONSE_ERROR**2))
+    error = float(np.sqrt(posterior @ (np.log(AMPLITUDES) - mean) ** 2 + CORRUGATION.response_error**2))
     return *shapes[best_shape], float(np.exp(mean)), error * float(np.exp(mean))
 
 
@@ -249,7 +243,7 @@ def _unit_energy(
         0.5 * len(aligned.passage.vehicle.wheels) / aligned.speed * np.trapezoid(inside[:, None] * gain, node, axis=2)
     )
     return (
-        energy * aligned.passage.recording.rate**2 / (2.0 * BIN_WIDTH * aligned.speed / length)
+        energy * aligned.passage.recording.rate**2 / (2.0 * CORRUGATION.bin_width * aligned.speed / length)
     )  # Parseval, half at f < 0
 
 
@@ -261,7 +255,7 @@ def response_energy(case: TrackCase, fit: Fit, aligned: AlignedPassage, length: 
     track = track_with(case.predictor.track(aligned.passage.route), case.predictor.zone, fit.values)
     matrices, frequency = matrices_of(track), np.array([aligned.speed / length])
     near = np.flatnonzero((matrices.node >= case.predictor.waves.start) & (matrices.node <= case.predictor.waves.end))[
-        ::NODE_STRIDE
+        :: CORRUGATION.node_stride
     ]
     h, mean_receptance = rail_receptances(matrices, frequency, near, [s.probe(track).place for s in aligned.sensors])
     force = 1.0 / np.abs(wheel_and_contact_receptance(aligned.passage.vehicle, frequency)[:, None] + mean_receptance)[0]

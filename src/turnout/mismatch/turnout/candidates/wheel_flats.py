@@ -29,6 +29,7 @@ from turnout.constants import MAD_TO_SD
 from turnout.errors import SimulationError
 from turnout.mismatch.turnout.candidates.catalogue import candidate_of
 from turnout.mismatch.turnout.passage_band import limit_band
+from turnout.mismatch.turnout.priors import FLATS
 from turnout.physics.hypothesis import Hypothesis
 
 if TYPE_CHECKING:
@@ -38,24 +39,7 @@ if TYPE_CHECKING:
     from turnout.mismatch.turnout.passage_observation import AlignedPassage
 
 Phases: TypeAlias = tuple[tuple[str, float], ...]  # (recording, rolling distance to the first impact [m])
-LOW_FREQUENCY, HIGH_FREQUENCY = 250.0, 900.0  # Hz, band of the level
-BIN_TIME, IMPACT_TIME, BACKGROUND_TIME = (
-    0.002,
-    0.006,
-    0.12,
-)  # s: bin, half width of an impact, half width of its background
-RADIUS_CHANGES = np.arange(-0.05, 0.031, 0.01)  # relative to the file: a wheel is turned down in service
-PHASE_STEP = 0.06  # m, between trial phases
-COMPARISON_STEP = 0.02  # m, between positions where wheels are compared
-MIN_COMMON = 2.0  # deviations, least median over the wheels that is no noise
-STRENGTHS, DECAYS = (
-    (2.0, 4.0, 7.0, 12.0, 20.0),
-    (0.3, 0.8, 1.6, 3.0),
-)  # A in deviations of the noise, beta in deviations per metre
-OUTLIER_SHARE, OUTLIER_DENSITY = 0.05, 1.0 / 20.0  # share and density of outliers
-IMPACT_SCATTER = 0.25  # scatter of the impacts, as a share of their expected level
-MAX_SENSOR_DISTANCE = 5.0  # m; farther impacts are masked by nearer wheels
-SENSOR_WEIGHT = 0.5  # sensors measure the same impact: their data count half
+RADIUS_CHANGES = np.arange(*FLATS.radius_changes)  # relative to the file: a wheel is turned down in service
 
 
 @dataclass(frozen=True)
@@ -74,18 +58,26 @@ class FlatEvidence:
 
 def robust_band_level(samples: np.ndarray, rate: float, start: float, stop: float) -> tuple[np.ndarray, np.ndarray]:
     """(time (n,) [s], (n_channel, n)) loudest moment around each time, in robust deviations from the background."""
-    fold = max(1, round(BIN_TIME * rate))
-    power = limit_band(samples, rate, low=LOW_FREQUENCY, high=min(HIGH_FREQUENCY, 0.35 * rate)) ** 2
+    fold = max(1, round(FLATS.bin_time * rate))
+    power = (
+        limit_band(
+            samples, rate, low=FLATS.low_frequency, high=min(FLATS.high_frequency, FLATS.max_frequency_share * rate)
+        )
+        ** 2
+    )
     n = power.shape[1] // fold
     level = np.log(power[:, : n * fold].reshape(-1, n, fold).mean(axis=2) + 1e-12)
     time = (np.arange(n) + 0.5) * fold / rate
     keep = (time > start) & (time < stop)
     time, level = time[keep], level[:, keep]
-    half = max(1, round(IMPACT_TIME * rate / fold))
+    half = max(1, round(FLATS.impact_time * rate / fold))
     loudest = np.max(_shifted_copies(level, np.arange(-half, half + 1)), axis=0)
     background = np.median(
         _shifted_copies(
-            loudest, np.arange(-round(BACKGROUND_TIME / BIN_TIME), round(BACKGROUND_TIME / BIN_TIME) + 1, 4)
+            loudest,
+            np.arange(
+                -round(FLATS.background_time / FLATS.bin_time), round(FLATS.background_time / FLATS.bin_time) + 1, 4
+            ),
         ),
         axis=0,
     )
@@ -102,9 +94,9 @@ def _shifted_copies(rows: np.ndarray, steps: np.ndarray) -> np.ndarray:
 
 def log_likelihood_ratio(deviations: np.ndarray, expected: np.ndarray | float) -> np.ndarray:
     """Log likelihood ratio of ``deviations`` for an impact of ``expected`` deviations against none. [nats]"""
-    noise, impact = (_normal_density(deviations - m, 1.0 + IMPACT_SCATTER * m) for m in (0.0, expected))
-    return np.log((1.0 - OUTLIER_SHARE) * impact + OUTLIER_SHARE * OUTLIER_DENSITY) - np.log(
-        (1.0 - OUTLIER_SHARE) * noise + OUTLIER_SHARE * OUTLIER_DENSITY
+    noise, impact = (_normal_density(deviations - m, 1.0 + FLATS.impact_scatter * m) for m in (0.0, expected))
+    return np.log((1.0 - FLATS.outlier_share) * impact + FLATS.outlier_share * FLATS.outlier_density) - np.log(
+        (1.0 - FLATS.outlier_share) * noise + FLATS.outlier_share * FLATS.outlier_density
     )
 
 
@@ -131,13 +123,15 @@ def _common_excess(aligned: AlignedPassage, time: np.ndarray, excess: np.ndarray
     if len(behind) < 2:
         return np.zeros_like(excess)
     distance = np.arange(
-        -MAX_SENSOR_DISTANCE, np.ptp([s.place for s in aligned.sensors]) + MAX_SENSOR_DISTANCE, COMPARISON_STEP
+        -FLATS.max_sensor_distance,
+        np.ptp([s.place for s in aligned.sensors]) + FLATS.max_sensor_distance,
+        FLATS.comparison_step,
     )  # from the first sensor
     passed = aligned.reference + (distance + behind) / aligned.speed
     each = np.array(
         [np.sort([np.interp(t, time, row) for t in passed], axis=0)[(len(behind) - 1) // 2] for row in excess]
     )
-    common = np.where(each > MIN_COMMON, each, 0.0)
+    common = np.where(each > FLATS.min_common, each, 0.0)
     rolled = (time - aligned.reference) * aligned.speed - behind
     return np.array([np.max(np.interp(rolled, distance, row, 0.0, 0.0), axis=0) for row in common])
 
@@ -155,7 +149,7 @@ def best_flat_on_wheel(
     totals = np.array([total for total, *_ in fits])
     nats, best_index = _log_mean(totals.ravel(), axis=0), np.unravel_index(int(np.argmax(totals)), totals.shape)
     _, share, ratios = fits[best_index[0]]
-    phases = tuple((m.name, float(PHASE_STEP * np.argmax(r[:, best_index[1]]))) for m, r in zip(passages, ratios))
+    phases = tuple((m.name, float(FLATS.phase_step * np.argmax(r[:, best_index[1]]))) for m, r in zip(passages, ratios))
     return float(nats), float(share * radius), phases
 
 
@@ -169,26 +163,26 @@ def _log_ratios(
     aligned: AlignedPassage, time: np.ndarray, excess: np.ndarray, wheel: int, circumference: float
 ) -> np.ndarray:
     """(n_phase, n_strength * n_decay) log ratios of one passage."""
-    phases = np.arange(0.0, circumference, PHASE_STEP)
+    phases = np.arange(0.0, circumference, FLATS.phase_step)
     sign = 1.0 if aligned.passage.direction == "facing" else -1.0
     sensors = np.array([s.place for s in aligned.sensors])
     first = sign * np.min(sign * sensors)
     turns = np.arange(
-        np.floor((sensors.min() - MAX_SENSOR_DISTANCE) / circumference) - 1,
-        np.ceil((sensors.max() + MAX_SENSOR_DISTANCE) / circumference) + 1,
+        np.floor((sensors.min() - FLATS.max_sensor_distance) / circumference) - 1,
+        np.ceil((sensors.max() + FLATS.max_sensor_distance) / circumference) + 1,
     )
     position = phases[:, None] + circumference * turns  # (n_phase, n_impact)
     when = (
         aligned.reference + (sign * (position - first) + aligned.passage.vehicle.wheel_positions[wheel]) / aligned.speed
     )
     distance = np.abs(position[..., None] - sensors)
-    is_audible = ((when > time[0]) & (when < time[-1]))[..., None] & (distance < MAX_SENSOR_DISTANCE)
+    is_audible = ((when > time[0]) & (when < time[-1]))[..., None] & (distance < FLATS.max_sensor_distance)
     observed = np.stack([np.interp(when, time, row) for row in excess], axis=-1)
     ratios = []
-    for strength in STRENGTHS:
-        for decay in DECAYS:
+    for strength in FLATS.strengths:
+        for decay in FLATS.decays:
             ratio = log_likelihood_ratio(observed, np.maximum(strength - decay * distance, 0.0))
-            ratios.append(SENSOR_WEIGHT * np.sum(np.where(is_audible, ratio, 0.0), axis=(1, 2)))
+            ratios.append(FLATS.sensor_weight * np.sum(np.where(is_audible, ratio, 0.0), axis=(1, 2)))
     return np.array(ratios).T
 
 
@@ -207,14 +201,7 @@ def flat_evidence(case: TrackCase) -> list[FlatEvidence]:
     return sorted(evidence, key=lambda s: -s.nats)
 
 
-MAX_WHEELS, MAX_EVIDENCE_GAP = 2, 3.0  # wheels proposed; nats by which the second may lie behind the first
-MIN_EVIDENCE = 3.0  # nats of the impacts, less the logarithm of the number of wheels, at least
-PHASE_OFFSETS, PHASE_RESOLUTION = (
-    np.arange(-0.24, 0.25, 0.06),
-    0.15,
-)  # m, trial phases about that of the impacts; their resolution
-FINE_PHASE_OFFSETS = (-0.03, 0.0, 0.03)  # m, about the best of them
-MEDIUM_LENGTH, FLAT_LENGTHS = 0.05, (0.025, 0.035, 0.045, 0.055, 0.07, 0.09)  # m, first and trial lengths
+PHASE_OFFSETS = np.arange(*FLATS.phase_offsets)  # m, trial phases about that of the impacts
 
 
 def flat_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, ...]:
@@ -223,14 +210,16 @@ def flat_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, ...]:
         flat_evidence(case),
         {c.where.get("train") for c in fit.candidates if "axle" in c.where},
     )
-    likely = [s for s in evidence if s.nats > MIN_EVIDENCE + np.log(len(evidence)) and s.train not in explained_trains]
-    likely = [s for s in likely if s.nats > likely[0].nats - MAX_EVIDENCE_GAP]
-    return tuple(_candidate(case, fit, s, len(evidence)) for s in likely[:MAX_WHEELS])
+    likely = [
+        s for s in evidence if s.nats > FLATS.min_evidence + np.log(len(evidence)) and s.train not in explained_trains
+    ]
+    likely = [s for s in likely if s.nats > likely[0].nats - FLATS.max_evidence_gap]
+    return tuple(_candidate(case, fit, s, len(evidence)) for s in likely[: FLATS.max_wheels])
 
 
 def _candidate(case: TrackCase, fit: Fit, flat: FlatEvidence, n_wheels: int) -> Candidate:
     length, phases, gain = _fit_flat(case, fit, flat)
-    scanned = n_wheels * (1.0 + np.ptp(PHASE_OFFSETS) / PHASE_RESOLUTION) ** len(phases)
+    scanned = n_wheels * (1.0 + np.ptp(PHASE_OFFSETS) / FLATS.phase_resolution) ** len(phases)
     hypothesis = Hypothesis(
         starts=((length,),),
         fixed={"wheel": flat.wheel, "radius": flat.radius, "train": flat.train, "phases": phases},
@@ -244,10 +233,10 @@ def _candidate(case: TrackCase, fit: Fit, flat: FlatEvidence, n_wheels: int) -> 
 
 def _fit_flat(case: TrackCase, fit: Fit, flat: FlatEvidence) -> tuple[float, Phases, float]:
     """(length [m], phases, nats) at which the simulated flat explains most of the band, with loss of contact."""
-    phases = _fit_phases(case, fit, flat, flat.phases, PHASE_OFFSETS, MEDIUM_LENGTH)
+    phases = _fit_phases(case, fit, flat, flat.phases, PHASE_OFFSETS, FLATS.medium_length)
     length, gain = _fit_length(case, fit, flat, phases)
     if gain > 0.0:  # else a flat of no length explains anything
-        phases = _fit_phases(case, fit, flat, phases, FINE_PHASE_OFFSETS, length)
+        phases = _fit_phases(case, fit, flat, phases, FLATS.fine_phase_offsets, length)
         length, gain = _fit_length(case, fit, flat, phases)
     return length, phases, max(gain, 0.0)
 
@@ -268,7 +257,7 @@ def _fit_phases(
 
 def _fit_length(case: TrackCase, fit: Fit, flat: FlatEvidence, phases: Phases) -> tuple[float, float]:
     """(length, nats) of the length that explains most at these phases."""
-    sizes = [(sum(_explained_nats(case, fit, flat, *at, length) for at in phases), length) for length in FLAT_LENGTHS]
+    sizes = [(sum(_explained_nats(case, fit, flat, *at, length) for at in phases), length) for length in FLATS.lengths]
     gain, length = max(sizes)
     return length, gain
 

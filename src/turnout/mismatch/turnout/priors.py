@@ -1,0 +1,505 @@
+"""Numeric constants of the case of a turnout in one place, each with its unit, its reason and its source.
+
+Standard deviations of priors, limits of observations and searches, steps of computations. Settings that users change
+are in ``turnout.config.settings.mismatch``. A source is a page below ``docs``, a publication, or one word: "convention"
+(a usual value), "numerical" (accuracy or time of a computation).
+"""
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any
+
+from turnout.mismatch.engine.thresholds import threshold as prior
+
+LOCAL_RAIL = "decisions/local-rail-properties.md"
+CROSSING_PANELS = "decisions/crossing-panels.md"
+COMMON_PARAMETERS = "decisions/common-parameter-derivatives.md"
+ERROR_MODES = "decisions/marginalized-errors.md"
+RAIL_ROUGHNESS = "decisions/rail-roughness-parameters.md"
+WHEEL_ROUGHNESS = "decisions/wheel-roughness-errors.md"
+RUNNING_SURFACE = "decisions/running-surface-priors.md"
+WEIGHTING = "decisions/exponential-weighting.md"
+FRICTION = "decisions/friction-secant-rate.md"
+JOINT_RECEPTANCE = "decisions/joint-receptance-evidence.md"
+RADAU_SCHEME = "decisions/radau-scheme.md"
+SATURATED = "decisions/saturation-from-impacts.md"
+LOCATED = "decisions/residual-localization.md"
+DEFECTS = "decisions/rail-and-wheel-defects.md"
+SHORT_WAVES = "decisions/short-wave-corrugation.md"
+EFFECT_SIZES = "decisions/blind-effect-sizes.md"
+FITS = "decisions/joint-fit-convergence.md"
+PRESCREEN = "decisions/hammer-prescreen.md"
+GUIDE = "mismatch.md"
+KNOTHE, OSCARSSON = "Knothe and Grassie 1993", "Oscarsson 2002"
+
+
+# fmt: off
+@dataclass(frozen=True)
+class TrackPriors:
+    """Track, sensors and wheelsets of the base model."""
+
+    common_stiffness_sd: float = prior(
+        0.25, "ln", "of pads or ballast of the whole track: spread of published values", KNOTHE)
+    common_damping_sd: float = prior(
+        0.5, "ln", "of pads or ballast of the whole track: spread of published values", KNOTHE)
+    common_mass_sd: float = prior(0.06, "ln", "of all sleepers: spread of published values", KNOTHE)
+    common_bound: float = prior(
+        2.0, "ln", "largest deviation of a value of the whole track: a factor of seven", "numerical")
+    support_stiffness_sd: float = prior(0.10, "ln", "scatter of pads or ballast from support to support", OSCARSSON)
+    support_damping_sd: float = prior(
+        0.15, "ln", "scatter from support to support: dampers were never measured singly", OSCARSSON)
+    support_mass_sd: float = prior(0.03, "ln", "scatter of sleepers: they are cast alike", OSCARSSON)
+    rail_bending_sd: float = prior(
+        0.015, "ln", "bending stiffness of the rail: wear and rolling tolerances", ERROR_MODES)
+    rail_shear_sd: float = prior(
+        0.12, "ln", "shear stiffness: published coefficients are 0.34 to 0.41; 14 controls of another simulator",
+        ERROR_MODES)
+    casting_sds: tuple[float, float] = prior(
+        (0.10, 0.30), "ln", "stiffness and mass of inner and end pieces: the file has one section for a casting",
+        CROSSING_PANELS)
+    bound_sds: float = prior(
+        6.0, "prior sd", "largest deviation of values of single supports, of the rail and of the surface", "numerical")
+    wheels_sd: float = prior(
+        0.06, "ln", "unsprung mass: reprofiling takes 10 %; 42 wheelsets of another simulator scatter by 0.054",
+        "convention")
+    wheels_bound: float = prior(
+        0.5, "ln", "largest deviation of an unsprung mass: beyond, it is an effect", "numerical")
+    gain_sd: float = prior(0.02, "-", "gain of a sensor: calibration", "convention")
+    seat_sd: float = prior(0.02, "m", "position of a sensor along the rail", ERROR_MODES)
+    load_sd: float = prior(0.05, "-", "sprung mass whose load was measured or noted, as a share of it", "convention")
+    load_bound_sds: float = prior(
+        2.0, "prior sd", "bounds of an unknown load: a seventh beyond empty and full", "convention")
+    min_piece_length: float = prior(0.02, "m", "shorter pieces of a casting between two ends are ignored", "numerical")
+    section_ramp: float = prior(0.3, "m", "over which the section of a casting grows at its ends", CROSSING_PANELS)
+    rail_step: float = prior(
+        0.05, "ln", "grid of rail values about which receptances are linear; derivatives by pads err by 8 % over 0.12",
+        JOINT_RECEPTANCE)
+    support_reach: float = prior(
+        1.9, "m", "beyond sensors and impacts: supports there have values of their own", COMMON_PARAMETERS)
+    effect_reach: float = prior(
+        0.7, "m", "beyond sensors and impacts: supports there may have an effect; those farther out absorb all beyond",
+        LOCATED)
+    track_margin: float = prior(18.0, "m", "of track that is modelled beyond sensors and impacts", "numerical")
+    extra_supports: int = prior(8, "supports", "beyond the zone that a change of the whole track includes", LOCATED)
+
+
+@dataclass(frozen=True)
+class AcceptedPriors:
+    """Effects that were accepted into a track's file."""
+
+    sd_share: float = prior(
+        0.5, "-", "prior sd of an accepted value over its distance from neutral: it may grow", GUIDE)
+    max_neutral_ratio: float = prior(
+        100.0, "-", "a neutral value above this multiple of the accepted one means no limit", "convention")
+    min_errors: float = prior(3.0, "standard errors", "least prior sd of an accepted value", "convention")
+    min_sd_share: float = prior(1e-3, "share of the bounds", "least prior sd of an accepted value", "numerical")
+    derivative_step: float = prior(
+        0.02, "prior sd", "step of the difference quotient by an accepted value", "numerical")
+
+
+@dataclass(frozen=True)
+class CasePriors:
+    """When the base of a case is computed again, and which effects it can test."""
+
+    update_threshold: float = prior(
+        0.15, "ln", "change of unsprung mass or rail from which errors are new: a fifth of a response near P2",
+        WHEEL_ROUGHNESS)
+    max_hammer_distance: float = prior(
+        8.0, "m", "from impact to sensor: beyond, the model error leaves a thirtieth of the information", ERROR_MODES)
+    min_timed_correlation: float = prior(
+        0.25, "-", "above it the time of a train is certain; at wrong times it reaches 0.10", RUNNING_SURFACE)
+
+
+@dataclass(frozen=True)
+class ReceptancePriors:
+    """Receptances of hammer tests, their lines and their errors."""
+
+    lowest_line: float = prior(35.0, "Hz", "of the lines, below the ballast resonance", "convention")
+    highest_line: float = prior(900.0, "Hz", "of the lines, above the railpad resonance", "convention")
+    n_lines: int = prior(44, "lines", "in geometric steps of 8 % between these two", "numerical")
+    line_step: float = prior(2.0, "Hz", "to which lines are rounded", "numerical")
+    decay_rate: float = prior(
+        20.0, "1/s", "records are weighted by exp(-rate t), so that ringing at their end is not truncated", WEIGHTING)
+    min_impacts: int = prior(2, "impacts", "accepted ones of a channel, at least", "convention")
+    min_lines: int = prior(8, "lines", "that can be used of a channel, at least", "convention")
+    max_relative_error: float = prior(0.3, "-", "scatter between impacts beyond which a line is not used", "convention")
+    max_band_share: float = prior(
+        0.9, "share of the band edge", "of the force spectrum, above which a line is not used", "convention")
+    effective_share: float = prior(0.7, "-", "of the lines that count as independent", "convention")
+    delay_sd: float = prior(8e-6, "s", "delay of a pair: 2 degrees at 700 Hz", ERROR_MODES)
+    smoothing_octaves: float = prior(0.3, "octaves", "correlation length of model errors", ERROR_MODES)
+    doubling_distance: float = prior(
+        1.5, "m", "that doubles the error variance, by errors of wave speed and decay", ERROR_MODES)
+    line_share: float = prior(0.4, "share of the tolerance", "that is independent from line to line", ERROR_MODES)
+    magnitude_octaves: float = prior(
+        0.34, "octaves", "to either side over which the local magnitude is taken: a third", "convention")
+    lowest_band: float = prior(31.25, "Hz", "start of the octave bands of a residual", "convention")
+    broad_error: float = prior(
+        0.1, "-", "relative error in the first, broad fit: its optimum has a wide basin", PRESCREEN)
+    tangent_motion: float = prior(1e-6, "m", "under an impact, for the secant of a port", FRICTION)
+    free_rate: float = prior(
+        0.021, "m/s", "sliding rate of a free joint under an impact: friction of 0.3 kN fits best with 20 mm/s",
+        FRICTION)
+    stuck_rate: float = prior(
+        1.5e-3, "m/s", "sliding rate of a stuck joint under an impact: friction of 8 kN fits best with it", FRICTION)
+    sticking_force: float = prior(
+        2e3, "N", "friction force between a free and a stuck joint, for impacts of 5 kN", FRICTION)
+    relative_step: float = prior(
+        1e-3, "-", "change of a support's value, for derivatives of links that follow it", "numerical")
+    seat_step: float = prior(0.01, "m", "of the derivative by the position of a sensor", "numerical")
+
+
+@dataclass(frozen=True)
+class PassagePriors:
+    """Passages as observations: band, samples and errors."""
+
+    shortest_wave: float = prior(
+        0.3, "m", "of the modelled roughness of the rail: shorter waves are not fitted", ERROR_MODES)
+    band_low: float = prior(5.0, "Hz", "lower end of the band of a passage", ERROR_MODES)
+    band_high: float = prior(
+        112.0, "Hz", "upper end of the band in which the deterministic part dominates the roughness", ERROR_MODES)
+    rate_divisors: tuple[int, ...] = prior(
+        (9, 6, 5), "-", "simulation steps per sample of an observation; the first that suffices is used", "numerical")
+    clear_distance: float = prior(
+        5.0, "m", "to a wheel, for a channel's noise: at 4.2 m there is noise alone, at 1.4 m six times as much",
+        ERROR_MODES)
+    record_margin: float = prior(0.02, "s", "at both ends of a recording that is no noise", "convention")
+    min_quiet_time: float = prior(0.1, "s", "without a wheel, at least, for a channel's noise", "convention")
+    clipping_blur: float = prior(0.03, "s", "about a sample at the range, which is disturbed by clipping", "numerical")
+    range_share: float = prior(0.999, "share of the range", "from which a sample counts as clipped", "numerical")
+    coupling_corner_sd: float = prior(0.7, "Hz", "lower corner of an amplifier without a data sheet", ERROR_MODES)
+    noise_floor_share: float = prior(0.02, "share of the rms", "least error of a sample", "convention")
+    effective_share: float = prior(0.35, "-", "of the samples that count as independent", "convention")
+    min_read_rate: float = prior(2500.0, "Hz", "at which cubic interpolation is right to 0.03 % at 112 Hz", "numerical")
+    min_samples_per_period: float = prior(
+        3.0, "samples", "of the shortest period of the band, whose edge ends at 1.25 times that: Nyquist needs 2.5",
+        "numerical")
+    min_samples: int = prior(20, "samples", "of a passage, at least", "convention")
+    amplitude_window: int = prior(31, "samples", "over which the local amplitude is taken", "convention")
+    speed_sd: float = prior(0.004, "-", "relative error of the speed after alignment", RUNNING_SURFACE)
+    time_sd: float = prior(1.5e-3, "s", "error of the time after alignment", RUNNING_SURFACE)
+    cell_reach: float = prior(
+        3.0, "m", "from an axle to a sensor within which a sample belongs to the axle's cells", LOCATED)
+    cell_length: float = prior(0.6, "m", "of a cell of the residual: one sleeper bay", LOCATED)
+    ridge_share: float = prior(
+        0.02, "share of the largest power", "that regularises the reconstruction of a force", "numerical")
+    max_wheel_distance: float = prior(6.0, "m", "of the nearest wheel as a covariate of a latent force", "convention")
+
+
+@dataclass(frozen=True)
+class SimulationPriors:
+    """Simulation of passages in fits, and the linear responses beside it."""
+
+    rate: float = prior(1800.0, "Hz", "of the simulation; errors 1 to 2 % of the waveform with Radau IIA", RADAU_SCHEME)
+    elements_per_bay: int = prior(
+        2, "elements", "of the rail per bay: 0.2 to 0.5 % of the waveform below 112 Hz from 4", RADAU_SCHEME)
+    decay_exponent: float = prior(
+        8.0, "-", "at which a force's effect along the rail is cut off in a step; error 3e-6", RADAU_SCHEME)
+    lead_time: float = prior(0.25, "s", "before the first wheel reaches the first sensor", "numerical")
+    edge_time: float = prior(0.08, "s", "of signal before the first and after the last wheel", "numerical")
+    signal_cache_size: int = prior(150, "passages", "whose signals are kept", "numerical")
+    probe_cache_spare: int = prior(
+        4, "passages", "with probes that are kept beyond the number of passages", "numerical")
+    sensitivity_cache_size: int = prior(8, "tracks", "whose receptances are kept", "numerical")
+    rail_cache_size: int = prior(9, "rails", "whose tracks are kept", "numerical")
+    simulator_cache_size: int = prior(12, "tracks", "whose factorisations are kept", "numerical")
+    template_cache_size: int = prior(
+        24, "templates", "of matrices that are kept, and rails and link sets of each", "numerical")
+    log_step: float = prior(0.04, "ln", "of the difference quotient by an unsprung mass", "numerical")
+    load_step: float = prior(0.03, "-", "of the difference quotient by a load", "numerical")
+    time_step: float = prior(1e-5, "s", "of the difference quotient by the time of a passage", "numerical")
+    surface_step: float = prior(
+        0.02, "m or ln", "of the difference quotient by a number of the running surface", "numerical")
+    lowest_line: float = prior(4.0, "Hz", "of the transfer functions of a passage", "numerical")
+    line_step: float = prior(2.0, "Hz", "of the transfer functions of a passage", "numerical")
+    band_margin: float = prior(1.3, "-", "highest line of the transfer functions over the end of the band", "numerical")
+    node_stride: int = prior(2, "nodes", "every second one is used; in between a force is shared linearly", "numerical")
+    node_margin: float = prior(0.3, "m", "of nodes beyond the free waves", "numerical")
+    path_step: float = prior(0.01, "m", "of a fine path", "numerical")
+    ring_time: float = prior(0.35, "s", "ringing of the track after the last wheel", LOCAL_RAIL)
+    averaging_length: float = prior(
+        2.4, "m", "of the rail about a wheel; 0.6 and 1.2 err near the wheel resonance, the whole rail above it",
+        LOCAL_RAIL)
+
+
+@dataclass(frozen=True)
+class AlignmentPriors:
+    """Alignment of passages with their simulation, and the search for the running surface."""
+
+    band_end: float = prior(30.0, "Hz", "of the rail's deflection under the axles", RUNNING_SURFACE)
+    min_correlation: float = prior(
+        0.65, "-", "of a passage with its train: 0.8 with a dip, 0.6 to 0.7 with a flat, a wrong train at most 0.6",
+        RUNNING_SURFACE)
+    sample_step: float = prior(1.0 / 800.0, "s", "of signals that are correlated", "numerical")
+    max_stretch: float = prior(0.015, "-", "by which the recorded speed may be wrong", "convention")
+    n_stretches: int = prior(13, "trials", "of the speed of a passage", "numerical")
+    max_trial_passages: int = prior(
+        3, "passages", "used, those of the shortest trains; each is simulated 20 times a number, or more", "numerical")
+    position_step: float = prior(0.15, "m", "from one trial position to the next", RUNNING_SURFACE)
+    max_deviation: float = prior(2.0, "prior sd", "of a trial position", RUNNING_SURFACE)
+    trial_factors: tuple[float, ...] = prior(
+        (-1.0, -0.5, 0.5, 1.0), "prior sd", "trial changes of other numbers", RUNNING_SURFACE)
+    refinement: int = prior(4, "-", "subdivision of the position step in the second round", "numerical")
+    n_fine_steps: int = prior(3, "steps", "to each side in the second round", "numerical")
+    effective_samples: float = prior(
+        20.0, "samples", "independent ones of a passage below 30 Hz: its weight against the prior", RUNNING_SURFACE)
+    max_correlation: float = prior(0.999, "-", "a larger one contains no information on the surface", "numerical")
+
+
+@dataclass(frozen=True)
+class SurfacePriors:
+    """Uncertain numbers of blade, nose and joints."""
+
+    shape_sd: float = prior(
+        0.25, "ln", "power of a kink with an estimated depth: 1.2 to 3.3, from a V to a cusp", RUNNING_SURFACE)
+    max_step_sd: float = prior(3.0, "prior sd", "by which a position may move in one fit step", FITS)
+    max_relative_step: float = prior(
+        0.3, "share of the length", "by which a component may move in one fit step: the derivative is local",
+        RUNNING_SURFACE)
+    min_depth: float = prior(1e-6, "m", "shallower components are ignored", "numerical")
+    model_error: float = prior(
+        0.1, "ln", "the same at every axle: with long trains depth was 15 % and length 19 % too small", RUNNING_SURFACE)
+    model_position_error: float = prior(
+        0.02, "m", "the same at every axle: with long trains a position was 4 cm off", RUNNING_SURFACE)
+    max_error_ratio: float = prior(0.5, "prior sd", "largest error of a number that is reported", RUNNING_SURFACE)
+    min_deviation_ratio: float = prior(
+        2.0, "prior sd and errors", "from which a number is reported whatever its error", RUNNING_SURFACE)
+    min_data_share: float = prior(
+        0.5, "share of the information", "on a number that is attributed to the recordings, at least", RUNNING_SURFACE)
+    grid_step: float = prior(0.02, "m", "at which components are looked at near the sensors", "numerical")
+
+
+@dataclass(frozen=True)
+class WheelPriors:
+    """Roughness and profile of single wheels: error modes of a passage."""
+
+    depth_sd: float = prior(0.2, "-", "relative depth of a component from wheel to wheel", CROSSING_PANELS)
+    length_sd: float = prior(0.15, "-", "relative length of a component from wheel to wheel", CROSSING_PANELS)
+    position_sd: float = prior(0.03, "m", "position of a component from wheel to wheel", CROSSING_PANELS)
+    sharpness_sd: float = prior(
+        0.5, "-", "shape of a component, as a share of the difference between powers 1.5 and 2", CROSSING_PANELS)
+    max_nose_length: float = prior(1.0, "m", "to either side of the deepest point", CROSSING_PANELS)
+    min_depth: float = prior(1e-6, "m", "shallower components are ignored", "numerical")
+    out_of_round_sd: float = prior(1.5e-5, "m", "first three harmonics of wheels in service", "Johansson 2006")
+    level: float = prior(-2.0, "dB", "over the limit curve of rails: disc-braked wheels", "convention")
+    min_mode_variance: float = prior(
+        0.02, "share of the variance", "of a sample below which a mode is left out", "numerical")
+    faint_share: float = prior(
+        0.1, "share of that", "single waves below it are left out before they are combined", "numerical")
+    roughness_margin: float = prior(
+        6.0, "m", "beyond the free waves; lightly damped track carries a wheel's noise that far", ERROR_MODES)
+
+
+@dataclass(frozen=True)
+class RoughnessPriors:
+    """Free waves of the rail's roughness."""
+
+    rolling_reach: float = prior(
+        3.0, "m", "before the first and behind the last sensor, from where a wheel still excites them", RAIL_ROUGHNESS)
+    longest_wave: float = prior(3.0, "m", "of the free waves", RAIL_ROUGHNESS)
+    period_ratio: float = prior(
+        1.1, "-", "period of the waves over the length of rail, so that both ends are independent", "numerical")
+    fade_length: float = prior(0.8, "m", "over which waves fade at both ends", "numerical")
+    path_step: float = prior(0.02, "m", "between samples of the path", "numerical")
+
+
+@dataclass(frozen=True)
+class SaturationPriors:
+    """Saturated channels, from peaks of impacts and of passages."""
+
+    min_impacts: int = prior(
+        3, "impacts", "accepted ones of a test, at least, to estimate its level and scatter", SATURATED)
+    scatter_floor: float = prior(
+        0.02, "ln", "least scatter of peaks: sampling, ringing mountings, impacts beside the mark", SATURATED)
+    near_impact_distance: float = prior(
+        0.3, "m", "half a bay: a sensor this near the impact measures the motion there", SATURATED)
+    min_limit_share: float = prior(
+        0.9, "share of the largest peak", "of the channel that a limit reaches at least", SATURATED)
+    limit_step: float = prior(0.25 * 0.02, "ln", "between trial limits: a quarter of the least scatter", "numerical")
+    min_passages: int = prior(4, "passages", "at least, for a limit from passages", SATURATED)
+    min_sensors: int = prior(3, "sensors", "at least, for a limit from passages", SATURATED)
+    top_share: float = prior(0.8, "share of the peak", "above which a clipped channel stays for long", SATURATED)
+    filter_ringing: float = prior(
+        math.pi / 4.0, "-", "limit over peak of a clipped wave, of which a recorder's filter passes the first harmonic",
+        SATURATED)
+    min_side_ratio: float = prior(
+        0.9, "-", "limit of one side of an amplifier over that of the other, at least", SATURATED)
+    limit_sd: float = prior(0.1, "-", "relative error of the limit: both sides of an amplifier differ", SATURATED)
+
+
+@dataclass(frozen=True)
+class DisturbancePriors:
+    """Passages in which another source shakes the sensors."""
+
+    min_wheel_distance: float = prior(
+        12.0, "m", "to the nearest sensor: vibration of the train has decayed there", LOCATED)
+    car_length: float = prior(26.0, "m", "a train that does not match its file may be longer by a car", "convention")
+    min_quiet_time: float = prior(0.15, "s", "of the shortest segment that is tested", LOCATED)
+    record_margin: float = prior(0.02, "s", "at both ends of a recording that is not tested", "convention")
+    band: tuple[float, float] = prior((5.0, 100.0), "Hz", "of the level", LOCATED)
+    min_excess: float = prior(3.0, "dB", "over the other passages; undisturbed ones differ by 1 dB", LOCATED)
+    hann_correlation: float = prior(
+        1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0), "-", "variance factor of correlated lines of a Hann window", "Welch 1967")
+    max_chance: float = prior(1e-4, "probability", "that it is chance, over all segments", LOCATED)
+
+
+@dataclass(frozen=True)
+class FlatPriors:
+    """Wheel flats, from their impacts in the sound level and their signal in the band."""
+
+    low_frequency: float = prior(250.0, "Hz", "lower end of the level: roughness hides impacts below 100 Hz", DEFECTS)
+    high_frequency: float = prior(900.0, "Hz", "upper end of the level", DEFECTS)
+    max_frequency_share: float = prior(0.35, "share of the rate", "above, the anti-alias filter may act", "convention")
+    bin_time: float = prior(0.002, "s", "of a bin of the level", DEFECTS)
+    impact_time: float = prior(0.006, "s", "half width of an impact", DEFECTS)
+    background_time: float = prior(0.12, "s", "half width of the background of an impact", DEFECTS)
+    radius_changes: tuple[float, ...] = prior(
+        (-0.05, 0.031, 0.01), "-", "start, end and step, relative to the file: a wheel is turned down in service",
+        DEFECTS)
+    phase_step: float = prior(0.06, "m", "between trial phases", DEFECTS)
+    comparison_step: float = prior(0.02, "m", "between positions where wheels are compared", "numerical")
+    min_common: float = prior(2.0, "deviations", "least median over the wheels that is no noise", "convention")
+    strengths: tuple[float, ...] = prior(
+        (2.0, 4.0, 7.0, 12.0, 20.0), "deviations", "trial levels of an impact beside the sensor", DEFECTS)
+    decays: tuple[float, ...] = prior(
+        (0.3, 0.8, 1.6, 3.0), "deviations per m", "trial decays of the level along the rail", DEFECTS)
+    outlier_share: float = prior(0.05, "share of the data", "that has any other cause", DEFECTS)
+    outlier_density: float = prior(1.0 / 20.0, "1 / deviation", "uniform over 20 deviations", DEFECTS)
+    impact_scatter: float = prior(0.25, "share of the level", "impacts on a sleeper and between two differ", DEFECTS)
+    max_sensor_distance: float = prior(5.0, "m", "farther impacts are masked by nearer wheels", DEFECTS)
+    sensor_weight: float = prior(0.5, "-", "sensors measure the same impact: their data count half", DEFECTS)
+    max_wheels: int = prior(2, "wheels", "that are proposed at most", DEFECTS)
+    max_evidence_gap: float = prior(3.0, "nats", "by which the second may lie behind the first", DEFECTS)
+    min_evidence: float = prior(
+        3.0, "nats", "of the impacts, less the logarithm of the number of wheels, at least", DEFECTS)
+    phase_offsets: tuple[float, ...] = prior(
+        (-0.24, 0.25, 0.06), "m", "start, end and step of trial phases about that of the impacts", DEFECTS)
+    phase_resolution: float = prior(0.15, "m", "of the phases: closer ones are one trial", DEFECTS)
+    fine_phase_offsets: tuple[float, ...] = prior(
+        (-0.03, 0.0, 0.03), "m", "trial phases about the best of them", DEFECTS)
+    medium_length: float = prior(0.05, "m", "of the flat whose phase is searched first", EFFECT_SIZES)
+    lengths: tuple[float, ...] = prior(
+        (0.025, 0.035, 0.045, 0.055, 0.07, 0.09), "m", "trial lengths of a flat", EFFECT_SIZES)
+
+
+@dataclass(frozen=True)
+class PolygonPriors:
+    """Polygonal wheels with waves in the band of the fit."""
+
+    longest_wave: float = prior(1.0, "m", "limit of the waves searched", DEFECTS)
+    n_wavelengths: int = prior(100, "trials", "over 10 m neighbours differ by a third of a period", "numerical")
+    fine_factors: tuple[float, float, int] = prior(
+        (0.985, 1.015, 13), "-", "lowest, highest and number of factors of the wavelength, for its refinement",
+        "numerical")
+    amplitudes: tuple[float, float, int] = prior(
+        (1e-5, 4e-4, 5), "m", "lowest, highest and number of prior sds of cosine and sine", EFFECT_SIZES)
+    angles_per_passage: float = prior(12.0, "angles", "that can be distinguished in a passage", DEFECTS)
+
+
+@dataclass(frozen=True)
+class ShortPolygonPriors:
+    """Polygonal wheels with shorter waves, from the sound level."""
+
+    wheel_reach: float = prior(1.2, "m", "from wheel to sensor; axles of a bogie are at least 1.8 m apart", SHORT_WAVES)
+    bin_width: float = prior(0.04, "ln", "of a bin of the wavelength", SHORT_WAVES)
+    near_offset: float = prior(0.2, "ln", "nearest bins of the background", SHORT_WAVES)
+    far_offset: float = prior(0.6, "ln", "farthest bins of the background", SHORT_WAVES)
+    resolution: float = prior(0.16, "ln", "of 2.4 m of rail at 0.2 m", SHORT_WAVES)
+    wheel_sd: float = prior(0.5, "ln", "level between round wheels; twice that in another simulator", SHORT_WAVES)
+    sensor_sd: float = prior(0.8, "ln", "level of one spectrum", SHORT_WAVES)
+    polygon_sd: float = prior(2.5, "ln", "level of a polygonal wheel over its neighbours", SHORT_WAVES)
+    min_wheels: int = prior(3, "wheels", "of a train, at least, for a median", "convention")
+
+
+@dataclass(frozen=True)
+class GeometryPriors:
+    """Dips and corrugation, from the free waves of the rail."""
+
+    position_step: float = prior(0.1, "m", "between trial positions of a dip", DEFECTS)
+    sensor_margin: float = prior(1.0, "m", "beyond the sensors that is searched", DEFECTS)
+    lengths: tuple[float, ...] = prior((0.25, 0.4, 0.6, 0.9), "m", "trial lengths of a dip", EFFECT_SIZES)
+    sharpnesses: tuple[float, ...] = prior((0.2, 0.9), "-", "trial shapes of a dip", DEFECTS)
+    resolution: float = prior(0.3, "m", "closer dips cannot be distinguished", DEFECTS)
+    unit_depth: float = prior(1e-3, "m", "of a trial dip", "numerical")
+    unit_waves: tuple[tuple[float, float], ...] = prior(
+        ((1e-5, 0.0), (0.0, 1e-5)), "m", "sine and cosine of trial corrugation", "numerical")
+    wavelength_ratio: float = prior(1.02, "-", "shortest trial wavelength over the shortest free wave", "numerical")
+    longest_wave: float = prior(0.75, "m", "longest wave of trial corrugation", DEFECTS)
+    n_wavelengths: int = prior(34, "trials", "of the wavelength of corrugation", "numerical")
+    half_lengths: tuple[float, ...] = prior((1.8, 3.2, 5.0), "m", "half the length of a corrugated stretch", DEFECTS)
+    amplitude_sd: float = prior(3e-5, "m", "prior of the amplitude: corrugation that is ground away", EFFECT_SIZES)
+    n_independent_waves: float = prior(12.0, "wavelengths", "that can be distinguished by sensors 6 m apart", DEFECTS)
+
+
+@dataclass(frozen=True)
+class CorrugationPriors:
+    """Corrugation with shorter waves, from the sound level."""
+
+    min_wavelength: float = prior(0.05, "m", "limit of the waves searched", SHORT_WAVES)
+    bin_width: float = prior(
+        0.05, "ln", "of a bin of the wavelength: the resolution of 5 m of rail at 0.2 m", SHORT_WAVES)
+    line_bins: int = prior(2, "bins", "to either side over which a line spreads", SHORT_WAVES)
+    background_gap: int = prior(2, "bins", "nearest of the background", SHORT_WAVES)
+    background_reach: int = prior(6, "bins", "farthest of the background", SHORT_WAVES)
+    max_frequency_share: float = prior(0.35, "share of the rate", "above, the anti-alias filter may act", "convention")
+    sensor_sd: float = prior(
+        0.8, "ln", "level of one sensor on intact rail: 0.62 and 1.0 in two simulators", SHORT_WAVES)
+    corrugation_sd: float = prior(2.0, "ln", "prior of the level of corrugation", SHORT_WAVES)
+    min_trains: int = prior(2, "trains", "at least, to distinguish the rail from wheels", SHORT_WAVES)
+    min_speed_ratio: float = prior(
+        1.25, "-", "fastest over slowest passage, to distinguish a wavelength from a frequency", SHORT_WAVES)
+    independent_distance: float = prior(2.0, "m", "closer sensors measure the same rail", SHORT_WAVES)
+    half_lengths: tuple[float, ...] = prior((1.0, 1.8, 3.2, 5.0), "m", "half the length of the stretch", SHORT_WAVES)
+    amplitudes: tuple[float, float, int] = prior(
+        (2e-6, 3e-4, 60), "m", "lowest, highest and number of amplitudes that are tested", SHORT_WAVES)
+    response_error: float = prior(0.15, "-", "relative error of the response at one frequency", SHORT_WAVES)
+    node_stride: int = prior(2, "nodes", "every second one is used", "numerical")
+
+
+# fmt: on
+TRACK = TrackPriors()
+ACCEPTED = AcceptedPriors()
+CASE = CasePriors()
+RECEPTANCE = ReceptancePriors()
+PASSAGE = PassagePriors()
+SIMULATION = SimulationPriors()
+ALIGNMENT = AlignmentPriors()
+SURFACE = SurfacePriors()
+WHEELS = WheelPriors()
+ROUGHNESS = RoughnessPriors()
+SATURATION = SaturationPriors()
+DISTURBANCE = DisturbancePriors()
+FLATS = FlatPriors()
+POLYGONS = PolygonPriors()
+SHORT_POLYGONS = ShortPolygonPriors()
+GEOMETRY = GeometryPriors()
+CORRUGATION = CorrugationPriors()
+
+GROUPS = (
+    TRACK,
+    ACCEPTED,
+    CASE,
+    RECEPTANCE,
+    PASSAGE,
+    SIMULATION,
+    ALIGNMENT,
+    SURFACE,
+    WHEELS,
+    ROUGHNESS,
+    SATURATION,
+    DISTURBANCE,
+    FLATS,
+    POLYGONS,
+    SHORT_POLYGONS,
+    GEOMETRY,
+    CORRUGATION,
+)
+
+
+def prior_rows() -> list[tuple[str, str, Any, str, str, str]]:
+    """(group, name, value, unit, reason, source) of every constant, in the order of the code."""
+    return [
+        (type(group).__name__, f.name, f.default, f.metadata["unit"], f.metadata["reason"], f.metadata["source"])
+        for group in GROUPS
+        for f in fields(group)
+    ]

@@ -1,0 +1,41 @@
+"""Every numeric constant of the case of a turnout says its unit, its reason and its source."""
+
+import ast
+import re
+
+from turnout.mismatch.turnout import priors
+
+# Constants of modules that are no numbers, or follow from those in ``priors``.
+TABLES = {
+    "AMPLITUDES", "CASTING_SDS", "COMMON_PARAMETERS", "FACTOR", "FIELDS", "FINE_FACTORS", "FIRST_ORDER_TYPES",
+    "LENGTH_FIELDS", "LINES", "LINK_VALUES", "NO_EFFECTS", "NO_RECORDING", "OMEGA", "PAD", "PHASE_OFFSETS",
+    "POSITION_FIELDS", "RADIUS_CHANGES", "RAIL", "RAIL_SDS", "SCANS", "SHIFTED_LINES", "SLEEPER", "SUPPORT_FIELDS",
+    "SUPPORT_PARAMETERS", "TARGETS", "WAVELENGTHS",
+}  # fmt: skip
+
+
+def test_every_constant_has_a_unit_a_reason_and_a_source(repository):
+    rows = priors.prior_rows()
+    names = [(group, name) for group, name, *_ in rows]
+    assert len(set(names)) == len(names) > 200
+    for group, name, value, unit, reason, source in rows:
+        (instance,) = (g for g in priors.GROUPS if type(g).__name__ == group)
+        assert getattr(instance, name) == value and unit and len(reason.split()) >= 3, name
+        is_page = source.endswith(".md")
+        assert not is_page or (repository / "docs" / source).is_file(), source
+        assert is_page or source in ("convention", "numerical") or re.search(r"(19|20)\d\d$", source), source
+
+
+def test_modules_hold_no_constants_of_their_own(repository):
+    folder = repository / "src" / "turnout" / "mismatch" / "turnout"
+    found = {
+        target.id
+        for path in folder.rglob("*.py")
+        if path.name not in ("priors.py", "planned_case.py")
+        for node in ast.parse(path.read_text(encoding="utf-8")).body
+        if isinstance(node, ast.Assign)
+        for name in node.targets
+        for target in ast.walk(name)
+        if isinstance(target, ast.Name) and target.id.strip("_").isupper() and not target.id.startswith("_")
+    }
+    assert found <= TABLES, sorted(found - TABLES)
