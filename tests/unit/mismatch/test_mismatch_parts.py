@@ -7,7 +7,7 @@ import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine.candidate import Candidate
-from turnout.mismatch.engine.candidate_search import component_rivals, with_fitted_start
+from turnout.mismatch.engine.candidate_search import Entry, component_rivals, with_fitted_start
 from turnout.mismatch.engine.case import Nuisance
 from turnout.mismatch.engine.decision import judge
 from turnout.mismatch.engine.evidence import is_within_spread
@@ -80,9 +80,9 @@ def test_laws_of_the_leading_parts_are_refitted_from_their_best_starts():
     there = {"sleeper": 9, "place": 5.4}
     leader, gap = candidate("local_ballast", component="ballast"), candidate("hanging_sleeper", component="ballast")
     other, far = candidate("sensor_gain", {"sensor": "S1"}), candidate("hanging_sleeper", there, component="ballast")
-    chosen = [(40.0, leader, np.array([0.4]), {}), (30.0, other, np.array([0.9]), {})]
-    weak, strong = (-9.0, gap, np.array([1.0]), {}), (-2.0, gap, np.array([2.0]), {})
-    scored = {"local_ballast": chosen[:1], "hanging_sleeper": [strong, (5.0, far, np.array([3.0]), {}), weak]}
+    chosen = [Entry(40.0, leader, np.array([0.4]), {}), Entry(30.0, other, np.array([0.9]), {})]
+    weak, strong = Entry(-9.0, gap, np.array([1.0]), {}), Entry(-2.0, gap, np.array([2.0]), {})
+    scored = {"local_ballast": chosen[:1], "hanging_sleeper": [strong, Entry(5.0, far, np.array([3.0]), {}), weak]}
     assert component_rivals(chosen, scored) == [strong]
     assert component_rivals(chosen[1:], scored) == []
 
@@ -165,8 +165,9 @@ def test_what_explains_too_little_leaves_the_lead_to_what_other_data_tell():
 
 def test_a_fit_that_was_made_is_a_better_start_than_a_column():
     here, there = candidate("sensor_gain", {"sensor": "A1"}), candidate("sensor_gain", {"sensor": "A2"})
-    column = (90.0, here, np.array([0.85]), {})
-    made, elsewhere = (60.0, here, np.array([0.66]), {"gain_A1": 0.0}), (70.0, there, np.array([0.9]), {"gain_A2": 0.1})
+    column = Entry(90.0, here, np.array([0.85]), {})
+    made = Entry(60.0, here, np.array([0.66]), {"gain_A1": 0.0})
+    elsewhere = Entry(70.0, there, np.array([0.9]), {"gain_A2": 0.1})
     scored = {"sensor_gain": [column, made, elsewhere]}
     assert with_fitted_start(column, scored) is made
     assert with_fitted_start(column, {"sensor_gain": [column, elsewhere]}) is column

@@ -9,7 +9,7 @@ import pytest
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch import diagnose
 from turnout.mismatch.engine.candidate import Candidate
-from turnout.mismatch.engine.candidate_search import Projector, is_same_site, required_promise
+from turnout.mismatch.engine.candidate_search import Entry, Projector, is_same_site, required_promise
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
 from turnout.mismatch.engine.decision import grade_name, judge
 from turnout.mismatch.engine.diagnose import grade_names
@@ -296,7 +296,7 @@ def test_a_second_effect_that_blows_alone_promise_half_of_is_refitted(promised, 
     """What trains say of it comes on top: a soft rail of 12 nats in blows had 20 in all. What a column promises is of
     all recordings together, and has to be a name; a first effect is asked from 2 nats on."""
     settings, candidate = MismatchSettings(), Candidate("soft_rail", AMOUNT, tuple, ((0.5,),))
-    entry, beside = (promised, candidate, np.array([0.5]), {}), SimpleNamespace(candidates=("pad",))
+    entry, beside = Entry(promised, candidate, np.array([0.5]), {}), SimpleNamespace(candidates=("pad",))
     assert required_promise(entry, beside, {candidate.key: scouted}, settings) == asked
     assert required_promise(entry, SimpleNamespace(candidates=()), {candidate.key: scouted}, settings) == 2.0
 

@@ -1,11 +1,19 @@
 """Candidate effects: one effect at one position, wheelset or sensor, with its term, parameters and starts."""
 
-from collections.abc import Callable, Mapping
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from turnout.mismatch.engine.thresholds import THRESHOLDS
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from turnout.physics import Parameter
 
 
 @dataclass(frozen=True)
@@ -75,10 +83,10 @@ class Candidate:
     """
 
     family: str
-    parameters: tuple
-    make: Callable[[Mapping[str, float]], object]
+    parameters: tuple[Parameter, ...]
+    make: Callable[[Mapping[str, float]], Any]
     starts: tuple[tuple[float, ...], ...]
-    where: Mapping[str, object] = field(default_factory=dict)
+    where: Mapping[str, Any] = field(default_factory=dict)
     frame: str = ""
     n_scanned: float = 1
     start_from_base: bool = True
@@ -106,27 +114,27 @@ class Candidate:
     min_significance: float = 0.0
 
     @property
-    def key(self):
+    def key(self) -> str:
         """Family and site in one word."""
         position = ",".join(f"{k}={v}" for k, v in sorted(self.where.items()))
         return f"{self.family}[{position}]" if position else self.family
 
     @property
-    def part(self):
+    def part(self) -> tuple[str, Any]:
         """(component, position or sensor) that the effect changes."""
         return self.component, self.where.get("place", self.where.get("sensor"))
 
     @property
-    def neutral(self):
+    def neutral(self) -> np.ndarray:
         """(n_parameter,) values at which the term vanishes."""
         return np.array([p.neutral for p in self.parameters])
 
-    def mirror_image(self, values):
+    def mirror_image(self, values: ArrayLike) -> np.ndarray:
         """``values`` (n_parameter,) with the first parameter mirrored about neutral."""
         image = np.array(values, dtype=float)
         image[0] = 2.0 * self.parameters[0].neutral - image[0]
         return image
 
-    def term(self, values):
+    def term(self, values: Iterable[float]) -> Any:
         """The term with parameters (n_parameter,)."""
         return self.make({p.name: float(v) for p, v in zip(self.parameters, values)})

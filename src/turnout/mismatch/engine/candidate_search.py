@@ -5,7 +5,11 @@ Scores order the queue and decide nothing.
 The size and evidence of an effect that a nuisance parameter may have absorbed follow in closed form from the base fit.
 """
 
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -13,12 +17,40 @@ from turnout.errors import SimulationError
 from turnout.mismatch.engine.map_fit import JointProblem
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
+if TYPE_CHECKING:
+    from turnout.config.settings.mismatch import MismatchSettings
+    from turnout.mismatch.engine.candidate import Candidate
+    from turnout.mismatch.engine.case import Case
+    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.search import Search
 
-def masked_candidates(case, fit):
-    """(gain [nats], candidate, start, values) of every candidate with a ``masking_parameter`` among the nuisances.
 
-    The estimate of the masking parameter is the effect, drawn towards the prior. ``values`` are all nuisance parameters
-    with the masking parameter back at its mean and the effect in its place.
+class Entry(NamedTuple):
+    """A candidate with the ``gain`` [nats] that it promises from ``start`` (n_term,) and nuisance ``values``.
+
+    Without ``values`` a refit starts at the nuisances of the base fit.
+    """
+
+    gain: float
+    candidate: Candidate
+    start: np.ndarray
+    values: dict[str, float]
+
+
+def masked_candidates(case: Case, fit: Fit) -> list[Entry]:
+    """Every candidate with a masking parameter among the nuisances.
+
+    The estimate of the masking parameter is the effect, drawn towards the prior. The values of an entry are all
+    nuisance parameters with the masking parameter back at its mean and the effect in its place.
+
+    Parameters
+    ----------
+    case : Case
+    fit : Fit
+
+    Returns
+    -------
+    list of Entry
     """
     index = {n.name: k for k, n in enumerate(case.nuisances)}
     entries = []
@@ -38,18 +70,36 @@ def masked_candidates(case, fit):
         }  # fmt: skip
         low, high = candidate.parameters[0].bounds
         start = np.clip([(candidate.from_masking or np.exp)(size)], low, high)
-        entries.append((gain - np.log(candidate.n_scanned), candidate, start, {**values, masking.name: masking.mean}))
+        values[masking.name] = masking.mean
+        entries.append(Entry(gain - np.log(candidate.n_scanned), candidate, start, values))
     return entries
 
 
-def gain_with_wide_prior(m, s, tau, wide_sd):
-    r"""(gain [nats], estimate) when a prior N(0, τ²), under which the posterior is N(m, s²), becomes N(0, T²).
+def gain_with_wide_prior(m: float, s: float, tau: float, wide_sd: float) -> tuple[float, float] | None:
+    r"""Gain when a prior N(0, τ²), under which the posterior is N(m, s²), becomes N(0, T²).
 
     .. math:: s'^{-2} = s^{-2} - \tau^{-2}, \quad m' = m\, s'^2 / s^2, \quad
               g = \ln N(m'; 0, s'^2 + T^2) - \ln N(m'; 0, s'^2 + \tau^2)
 
-    The estimate is that under the wide prior, :math:`m' T^2 / (s'^2 + T^2)`. None if the data add nothing to the prior.
+    Parameters
+    ----------
+    m, s : float
+        Mean and standard deviation of the posterior.
+    tau : float
+        Standard deviation of the prior.
+    wide_sd : float
+        T, that of the wide prior.
 
+    Returns
+    -------
+    gain : float
+        [nats]
+    estimate : float
+        That under the wide prior, :math:`m' T^2 / (s'^2 + T^2)`. None instead of both if the data add nothing to the
+        prior.
+
+    Examples
+    --------
     >>> gain_with_wide_prior(0.0, 0.1, 0.1, 0.7) is None
     True
     """
@@ -72,25 +122,34 @@ class RefitTask:
     of its component gains something.
     """
 
-    candidate: object
+    candidate: Candidate
     start: np.ndarray
-    values: dict
+    values: dict[str, float]
     cheap_gain: float = 0.0
     rival: bool = False
 
 
-def shortlist(search, fit, promising=()):
-    """Tasks in order of promise.
+def shortlist(search: Search, fit: Fit, promising: Collection[str] | None = ()) -> list[RefitTask]:
+    """Candidates to refit on top of a fit.
 
     If predictions are cheap, every family is refitted from every start. In an expensive case, ``prescreen`` fits the
     families that show in the cheap observations. The others are scored by the columns of their starts
-    (``Case.screen``), or by a prediction if there is no column. On top of a first effect, ``prescreen`` takes only
-    families of the whole track, which the common parameters mask, and the ``promising`` ones (None: all). For the
-    others the residual is small enough for columns.
-    """
-    from turnout.mismatch.engine.hammer_prescreen import prescreen
+    (``Case.screen``), or by a prediction if there is no column.
 
-    case, settings = search.case, search.settings
+    Parameters
+    ----------
+    search : Search
+    fit : Fit
+    promising : collection of str or None
+        Families that ``prescreen`` tries on top of a first effect, beside those of the whole track, which the common
+        parameters mask; None: all. For others the residual is small enough for columns.
+
+    Returns
+    -------
+    list of RefitTask
+        In order of promise.
+    """
+    case = search.case
     candidates = [
         c
         for c in (*case.candidates, *case.residual_candidates(fit))
@@ -98,91 +157,145 @@ def shortlist(search, fit, promising=()):
     ]
     if not case.expensive:
         return [RefitTask(c, np.asarray(s, dtype=float), {}) for c in candidates for s in c.starts]
-    by_family, prescreen_gains = {}, {}
+    prescreened = [e for e in _prescreened_entries(search, fit, promising) if e.candidate in candidates]
+    masked = [e for e in masked_candidates(case, fit) if e.candidate in candidates]
+    by_family: dict[str, list[Entry]] = {}
+    for entry in (*prescreened, *masked, *_screened_entries(case, fit, candidates)):
+        by_family.setdefault(entry.candidate.family, []).append(entry)
+    prescreen_gains = {e.candidate.key: e.gain for e in prescreened}
+    selected = [
+        entry
+        for entry in _most_promising(by_family, search.settings)
+        if entry.gain > required_promise(entry, fit, prescreen_gains, search.settings)
+    ]
+    min_gain = THRESHOLDS.min_promise_share * max((entry.gain for entry in selected), default=0.0)
+    chosen = [e for rank, e in enumerate(selected) if rank < THRESHOLDS.n_always_refitted or e.gain > min_gain]
+    tasks = [(e, False) for e in chosen] + [(e, True) for e in component_rivals(chosen, by_family)]
+    tasks = [(with_fitted_start(e, by_family), rival) for e, rival in tasks]
+    return [RefitTask(*e[1:], prescreen_gains.get(e.candidate.key, 0.0), rival) for e, rival in tasks]
+
+
+def _prescreened_entries(search: Search, fit: Fit, promising: Collection[str] | None) -> list[Entry]:
+    """Candidates fitted to the cheap observations."""
+    from turnout.mismatch.engine.hammer_prescreen import prescreen
+
+    families = None
     if fit.candidates and promising is not None:
-        promising = {*promising, *(c.family for c in case.candidates if c.prescreen_group and c.n_scanned == 1)}
-    for trial in prescreen(search, fit, promising if fit.candidates else None):
-        if trial.candidate in candidates:
-            entry = trial.gain, trial.candidate, trial.psi, trial.values
-            prescreen_gains[trial.candidate.key] = trial.gain
-            by_family.setdefault(trial.candidate.family, []).append(entry)
-    for entry in masked_candidates(case, fit):
-        if entry[1] in candidates:
-            by_family.setdefault(entry[1].family, []).append(entry)
+        families = {
+            *promising,
+            *(c.family for c in search.case.candidates if c.prescreen_group and c.n_scanned == 1),
+        }
+    return [Entry(trial.gain, trial.candidate, trial.psi, trial.values) for trial in prescreen(search, fit, families)]
+
+
+def _screened_entries(case: Case, fit: Fit, candidates: Sequence[Candidate]) -> Iterator[Entry]:
+    """Starts scored by the change that they make: distant ones and those without a column are predicted."""
     projector, columns = Projector(case, fit), case.screen(fit)
-    for candidate, start in case.distant_starts(fit):
+    for candidate, distant in case.distant_starts(fit):
         if candidate in candidates:
-            entry = _distant_entry(
-                case, fit, projector, replace(candidate, starts=(start,), nonlinear_in_size=True), candidate
-            )
-            by_family.setdefault(candidate.family, []).append(entry)
+            at_start = replace(candidate, starts=(distant,), nonlinear_in_size=True)
+            yield _distant_entry(case, fit, projector, at_start, candidate)
     for candidate in candidates:
         if candidate.promise is not None:
-            entry = candidate.promise, candidate, np.asarray(candidate.starts[0]), dict(candidate.start_nuisances)
-            by_family.setdefault(candidate.family, []).append(entry)
+            start = np.asarray(candidate.starts[0])
+            yield Entry(candidate.promise, candidate, start, dict(candidate.start_nuisances))
             continue
         for k in range(len(candidate.starts)):
             changes = columns.get((candidate.key, k))
             if changes is None:
                 changes = _predicted_change(case, fit, candidate, k)
             gain, share = projector.score(changes, candidate, k)
-            entry = 0.5 * gain - np.log(candidate.n_scanned), candidate, scaled_start(candidate, k, share), {}
-            by_family.setdefault(candidate.family, []).append(entry)
-    selected = [
-        entry
-        for entry in _most_promising(by_family, settings)
-        if entry[0] > required_promise(entry, fit, prescreen_gains, settings)
-    ]
-    min_gain = THRESHOLDS.min_promise_share * max((entry[0] for entry in selected), default=0.0)
-    chosen = [
-        entry for rank, entry in enumerate(selected) if rank < THRESHOLDS.n_always_refitted or entry[0] > min_gain
-    ]
-    selected = [(e, False) for e in chosen] + [(e, True) for e in component_rivals(chosen, by_family)]
-    selected = [(with_fitted_start(e, by_family), rival) for e, rival in selected]
-    return [RefitTask(*e[1:], prescreen_gains.get(e[1].key, 0.0), rival) for e, rival in selected]
+            yield Entry(0.5 * gain - np.log(candidate.n_scanned), candidate, scaled_start(candidate, k, share), {})
 
 
-def _distant_entry(case, fit, projector, at_start, candidate):
+def _distant_entry(case: Case, fit: Fit, projector: Projector, at_start: Candidate, candidate: Candidate) -> Entry:
     """Entry of a ``candidate`` simulated ``at_start``, with its masking parameter at the mean: no change is small."""
     reset_values = {n.name: n.mean for n in case.nuisances if n.name == candidate.masking_parameter}
     changes = _predicted_change(case, replace(fit, values={**fit.values, **reset_values}), at_start, 0)
     gain, _ = projector.score(changes, at_start, 0)
-    return 0.5 * gain - np.log(candidate.n_scanned), candidate, np.array(at_start.starts[0]), reset_values
+    return Entry(0.5 * gain - np.log(candidate.n_scanned), candidate, np.array(at_start.starts[0]), reset_values)
 
 
-def required_promise(entry, fit, prescreen_gains, settings):
-    """Promise from which an entry is refitted. Beside a first effect it must be that of a separate name. [nats]"""
+def required_promise(entry: Entry, fit: Fit, prescreen_gains: Mapping[str, float], settings: MismatchSettings) -> float:
+    """Promise from which an entry is refitted. Beside a first effect it must be that of a separate name.
+
+    Parameters
+    ----------
+    entry : Entry
+    fit : Fit
+        Without the candidate of the entry.
+    prescreen_gains : mapping
+        Key of a candidate -> its gain in the cheap observations. [nats]
+    settings : MismatchSettings
+
+    Returns
+    -------
+    float
+        [nats]
+    """
     if not fit.candidates:
         return settings.promise
-    is_cheap_gain = entry[0] == prescreen_gains.get(entry[1].key)
+    is_cheap_gain = entry.gain == prescreen_gains.get(entry.candidate.key)
     return settings.threshold * (THRESHOLDS.cheap_promise_share if is_cheap_gain else 1.0)
 
 
-def with_fitted_start(entry, by_family):
+def with_fitted_start(entry: Entry, by_family: Mapping[str, Sequence[Entry]]) -> Entry:
     """The entry, with start and nuisance parameters of the best fit of the same candidate, if there is one.
 
     A column is linear, and from it all nuisance parameters would have to return.
+
+    Parameters
+    ----------
+    entry : Entry
+    by_family : mapping
+        Family -> its entries.
+
+    Returns
+    -------
+    Entry
     """
-    fitted = [e for e in by_family[entry[1].family] if e[1].key == entry[1].key and e[3]]
-    return max(fitted, key=lambda e: e[0], default=entry)
+    candidate = entry.candidate
+    fitted = [e for e in by_family[candidate.family] if e.candidate.key == candidate.key and e.values]
+    return max(fitted, key=lambda e: e.gain, default=entry)
 
 
-def component_rivals(chosen, by_family):
-    """Best starts of other effects on the components of the first two chosen: columns hardly separate them."""
-    sites = [e[1].part for e in chosen if e[1].component][:2]
-    chosen_effects, best_entries = {(entry[1].family, entry[1].part) for entry in chosen}, {}
-    for entry in sorted((e for entries in by_family.values() for e in entries), key=lambda e: e[0]):
-        effect = entry[1].family, entry[1].part
-        if entry[1].part in sites and effect not in chosen_effects:
+def component_rivals(chosen: Sequence[Entry], by_family: Mapping[str, Sequence[Entry]]) -> list[Entry]:
+    """Best starts of other effects on the components of the first two chosen: columns hardly separate them.
+
+    Parameters
+    ----------
+    chosen : sequence of Entry
+        In order of promise.
+    by_family : mapping
+        Family -> its entries.
+
+    Returns
+    -------
+    list of Entry
+    """
+    sites = [e.candidate.part for e in chosen if e.candidate.component][:2]
+    chosen_effects = {(e.candidate.family, e.candidate.part) for e in chosen}
+    best_entries: dict[tuple, Entry] = {}
+    for entry in sorted((e for entries in by_family.values() for e in entries), key=lambda e: e.gain):
+        effect = entry.candidate.family, entry.candidate.part
+        if entry.candidate.part in sites and effect not in chosen_effects:
             best_entries[effect] = entry
     return list(best_entries.values())
 
 
-def is_same_site(candidate, accepted):
+def is_same_site(candidate: Candidate, accepted: Candidate) -> bool:
     """Whether a second effect at the position, sensor or train of an accepted one would only correct its shape.
 
     Not so for two exact effects, nor for an effect of all wheels beside one of a single wheel that is known by its
     impacts.
+
+    Parameters
+    ----------
+    candidate, accepted : Candidate
+
+    Returns
+    -------
+    bool
     """
     if candidate.key == accepted.key:
         return True
@@ -196,14 +309,26 @@ def is_same_site(candidate, accepted):
     return is_near or any(k in a and a[k] == b.get(k) for k in ("sensor", "train"))
 
 
-def scaled_start(candidate, k, share):
-    """The start with its first parameter at ``share`` of the distance from neutral. The others define its shape."""
+def scaled_start(candidate: Candidate, k: int, share: float) -> np.ndarray:
+    """A start with its first parameter at a share of the distance from neutral. The others define its shape.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    k : int
+        Number of the start.
+    share : float
+
+    Returns
+    -------
+    (n_term,) array of float
+    """
     start = np.array(candidate.starts[k], dtype=float)
     start[0] = candidate.neutral[0] + share * (start[0] - candidate.neutral[0])
     return start
 
 
-def _predicted_change(case, fit, candidate, k):
+def _predicted_change(case: Case, fit: Fit, candidate: Candidate, k: int) -> list[np.ndarray] | None:
     """Change of the prediction at a start. None if the effect cannot be simulated at this size."""
     try:
         new = case.predict(fit.values, (*fit.terms, candidate.term(candidate.starts[k])), case.observations)
@@ -212,22 +337,22 @@ def _predicted_change(case, fit, candidate, k):
     return [a - b for a, b in zip(new, fit.predictions)]
 
 
-def _most_promising(by_family, settings):
+def _most_promising(by_family: Mapping[str, Sequence[Entry]], settings: MismatchSettings) -> list[Entry]:
     """The best start of each of the first ``refits`` families. Of the first few also their second best site."""
-    ranked = [sorted(entries, key=lambda e: -e[0]) for entries in by_family.values()]
-    ranked.sort(key=lambda entries: -entries[0][0])
+    ranked = [sorted(entries, key=lambda e: -e.gain) for entries in by_family.values()]
+    ranked.sort(key=lambda entries: -entries[0].gain)
     chosen = []
-    for rank, entries in enumerate(ranked[: settings.refits]):
-        chosen.append(entries[0])
+    for rank, (leader, *others) in enumerate(ranked[: settings.refits]):
+        chosen.append(leader)
         if rank < THRESHOLDS.n_families_with_sites:
-            chosen += [e for e in entries[1:] if e[1].key != entries[0][1].key][: settings.joint_starts - 1]
+            chosen += [e for e in others if e.candidate.key != leader.candidate.key][: settings.joint_starts - 1]
     return chosen
 
 
 class Projector:
     """Scores columns against the residual of ``fit`` with its nuisances projected out."""
 
-    def __init__(self, case, fit):
+    def __init__(self, case: Case, fit: Fit) -> None:
         self.joint, self.fit = JointProblem(case, fit.candidates), fit
         self.scaled, self.right = self.joint.stack(fit.jacobian, fit.white, fit.scale)
         self.scaled *= self.joint.sd
@@ -236,12 +361,27 @@ class Projector:
         self.pull = (self.joint.mean - theta) / self.joint.sd
         self.shift = self.normal @ (self.scaled.T @ self.right + self.pull)
 
-    def score(self, changes, candidate, start):
-        r"""(gain, share): best gain in chi-squared along a column, and how much of it, within the bounds.
+    def score(self, changes: Sequence[np.ndarray] | None, candidate: Candidate, start: int) -> tuple[float, float]:
+        r"""Best gain along a column, and how much of it, within the bounds.
 
         .. math:: g = \max_a\, 2a\,c^T P r - a^2 c^T P c, \quad P = I - J (J^T J + I)^{-1} J^T
 
         with the distance of the nuisances from their priors included. A column that nuisances imitate scores low.
+
+        Parameters
+        ----------
+        changes : sequence of (n,) array of float or None
+            Change of each observation at the start; None if it cannot be simulated.
+        candidate : Candidate
+        start : int
+            Number of the start.
+
+        Returns
+        -------
+        gain : float
+            In chi-squared.
+        share : float
+            Multiple of the start's distance from neutral.
         """
         if changes is None:
             return 0.0, 1.0
@@ -254,13 +394,12 @@ class Projector:
         if size <= 1e-12 * float(column @ column) or size <= 0.0:
             return 0.0, 1.0
         optimum = slope / size if not candidate.nonlinear_in_size else 1.0
-        share = float(
-            np.clip(optimum, THRESHOLDS.min_start_multiple, _max_multiple(candidate, candidate.starts[start]))
-        )
+        most = _max_multiple(candidate, candidate.starts[start])
+        share = float(np.clip(optimum, THRESHOLDS.min_start_multiple, most))
         return 2.0 * share * slope - share**2 * size, share
 
 
-def _max_multiple(candidate, start):
+def _max_multiple(candidate: Candidate, start: Sequence[float]) -> float:
     """Largest multiple of the distance from neutral to ``start`` within the bounds and the range of a column."""
     multiple = THRESHOLDS.max_start_multiple
     for p, s in list(zip(candidate.parameters, start))[:1]:

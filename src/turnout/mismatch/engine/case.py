@@ -3,14 +3,26 @@
 An observation is one recording with its data, errors, condition and time-frequency cells.
 """
 
-from collections.abc import Mapping
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.thresholds import THRESHOLDS
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from turnout.mismatch.engine.localization import ResidualSpace
+    from turnout.mismatch.engine.map_fit import Fit
+
+Values: TypeAlias = Mapping[str, float]  # nuisance parameters by name
+Terms: TypeAlias = Sequence[Any]  # effects in the model, as ``Candidate.term`` gives them
 
 
 @dataclass(frozen=True)
@@ -41,7 +53,7 @@ class Observation:
     modes: np.ndarray | None = None
     rows: int = 1
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         data = np.asarray(self.data, dtype=float)
         sigma = np.broadcast_to(np.asarray(self.sigma, dtype=float), data.shape)
         if data.ndim != 1 or not np.all(np.isfinite(data)):
@@ -54,7 +66,7 @@ class Observation:
         object.__setattr__(self, "sigma", sigma)
 
     @cached_property
-    def _subspace(self):
+    def _subspace(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Orthonormal directions (n, m) of the modes over sigma, and the shrinkage of each (m,)."""
         if self.modes is None or not self.modes.shape[1]:
             return None
@@ -65,10 +77,23 @@ class Observation:
         directions = (scaled @ eigenvectors[:, keep] / np.sqrt(eigenvalues)).astype(self.modes.dtype)
         return directions, 1.0 - 1.0 / np.sqrt(1.0 + eigenvalues)
 
-    def whiten(self, values):
-        r"""``values`` (n,) or (n, k) over the standard deviation of all random errors: :math:`C^{-1/2} x`,
+    def whiten(self, values: np.ndarray) -> np.ndarray:
+        r"""Values over the standard deviation of all random errors: :math:`C^{-1/2} x`.
+
         :math:`C = \mathrm{diag}(\sigma^2) + M M^T` with M the ``modes``.
 
+        Parameters
+        ----------
+        values : (n,) or (n, k) array of float
+            In the unit of the data. ``Whitened`` values are returned as they are.
+
+        Returns
+        -------
+        array of float
+            Of the same shape, without unit.
+
+        Examples
+        --------
         >>> o = Observation("a", "a", np.zeros(3), 2.0, modes=np.array([[2.0], [2.0], [2.0]]))
         >>> [round(float(v), 3) for v in o.whiten(np.array([2.0, 2.0, 2.0]))]  # along the mode: over sqrt(1 + 3)
         [0.5, 0.5, 0.5]
@@ -86,7 +111,7 @@ class Observation:
         return scaled - directions @ projection
 
     @property
-    def n_effective(self):
+    def n_effective(self) -> float:
         """Number of independent samples."""
         return self.effective * self.data.size
 
@@ -94,7 +119,7 @@ class Observation:
 class Whitened(np.ndarray):
     """Values of an observation that are already whitened."""
 
-    def __new__(cls, values):
+    def __new__(cls, values: ArrayLike) -> Whitened:
         return np.asarray(values, dtype=float).view(cls)
 
 
@@ -154,31 +179,104 @@ class Case:
     nuisances: tuple[Nuisance, ...] = ()
     candidates: tuple[Candidate, ...] = ()
     expensive = False
-    start_values: Mapping[str, float] = {}
+    start_values: Values = {}
     control_level: Mapping[str, float] = {}
     cell_level: Mapping[str, float] = {}
     disturbed_recordings: tuple = ()
     mismatched_trains: tuple = ()
     measured_range = (-np.inf, np.inf)
 
-    def is_cheap(self, observation):
+    def is_cheap(self, observation: Observation) -> bool:
         """Whether derivatives of this observation cost next to nothing."""
         return False
 
-    def predict(self, values, terms, observations):
-        """List of (n,) predictions, one per observation; ``values`` are nuisances, ``terms`` the effects."""
+    def predict(self, values: Values, terms: Terms, observations: Sequence[Observation]) -> list[np.ndarray]:
+        """Predictions of observations.
+
+        Parameters
+        ----------
+        values : mapping
+            Nuisance parameter -> value.
+        terms : sequence
+            Effects in the model, as ``Candidate.term`` gives them.
+        observations : sequence of Observation
+            Fitted or reserved ones.
+
+        Returns
+        -------
+        list of (n,) array of float
+            One per observation, in the unit of its data.
+
+        Raises
+        ------
+        SimulationError
+            If the model cannot be simulated with these values.
+        """
         raise NotImplementedError
 
-    def predict_near(self, values, terms, new, observations, predictions):
-        """Predictions with ``new`` terms, a small step from ``terms`` with known ``predictions``, for derivatives."""
+    def predict_near(
+        self,
+        values: Values,
+        terms: Terms,
+        new: Terms,
+        observations: Sequence[Observation],
+        predictions: Sequence[np.ndarray],
+    ) -> list[np.ndarray]:
+        """Predictions a small step from known ones, for derivatives.
+
+        Parameters
+        ----------
+        values : mapping
+            Nuisance parameter -> value.
+        terms : sequence
+            Effects for which the predictions are known.
+        new : sequence
+            The same effects with one parameter changed.
+        observations : sequence of Observation
+        predictions : sequence of (n,) array of float
+            Those with ``terms``.
+
+        Returns
+        -------
+        list of (n,) array of float
+            One per observation.
+
+        Raises
+        ------
+        SimulationError
+            If the model cannot be simulated with these values.
+        """
         return self.predict(values, new, observations)
 
-    def nuisance_jacobian(self, values, terms, observations, base):
-        """List of (n, n_nuisance) derivatives, by forward differences unless a case overrides this.
+    def nuisance_jacobian(
+        self, values: Values, terms: Terms, observations: Sequence[Observation], base: Sequence[np.ndarray]
+    ) -> list[np.ndarray]:
+        """Derivatives of predictions by all nuisances, by forward differences unless a case overrides this.
 
         Nuisances of different owners are shifted together: one prediction serves them all.
+
+        Parameters
+        ----------
+        values : mapping
+            Nuisance parameter -> value.
+        terms : sequence
+            Effects in the model.
+        observations : sequence of Observation
+        base : sequence of (n,) array of float
+            Predictions at these values.
+
+        Returns
+        -------
+        list of (n, n_nuisance) array of float
+            One per observation.
+
+        Raises
+        ------
+        SimulationError
+            If the model cannot be simulated a step away.
         """
-        groups, last_rank = {}, {}
+        groups: dict[object, list[int]] = {}
+        last_rank: dict[str, int] = {}
         for k, nuisance in enumerate(self.nuisances):
             if nuisance.owner is None:
                 groups[nuisance.name] = [k]
@@ -198,48 +296,94 @@ class Case:
                         jacobian[:, k] = (new - old) / (THRESHOLDS.nuisance_step * nuisance.sd)
         return jacobians
 
-    def own_jacobian(self, values, terms, observation, predicted, names):
-        """(n, n_name) derivatives of an observation by the nuisances that it owns."""
+    def own_jacobian(
+        self, values: Values, terms: Terms, observation: Observation, predicted: np.ndarray, names: Sequence[str]
+    ) -> np.ndarray:
+        """Derivatives of an observation by the nuisances that it owns.
+
+        Parameters
+        ----------
+        values : mapping
+            Nuisance parameter -> value.
+        terms : sequence
+            Effects in the model.
+        observation : Observation
+        predicted : (n,) array of float
+            Its prediction at these values.
+        names : sequence of str
+            Nuisances of the observation.
+
+        Returns
+        -------
+        (n, n_name) array of float
+
+        Raises
+        ------
+        SimulationError
+            If the model cannot be simulated a step away.
+        """
         full = self.nuisance_jacobian(values, terms, [observation], [predicted])[0]
         order = [n.name for n in self.nuisances]
         return full[:, [order.index(name) for name in names]]
 
-    def screen(self, fit):
-        """Columns of candidates at their starts, (key, start) -> list of (n,) per observation. Others are predicted."""
+    def screen(self, fit: Fit) -> dict[tuple[str, int], list[np.ndarray]]:
+        """Columns of candidates at their starts, from which a shortlist estimates their gain.
+
+        Parameters
+        ----------
+        fit : Fit
+            The fit whose residual is to be explained.
+
+        Returns
+        -------
+        dict
+            (key of the candidate, number of the start) -> changes (n,) of each observation. Candidates without a
+            column are predicted.
+        """
         return {}
 
-    def residual_candidates(self, fit):
+    def residual_candidates(self, fit: Fit) -> Sequence[Candidate]:
         """Candidates that only the residual of ``fit`` suggests."""
         return ()
 
-    def distant_starts(self, fit):
+    def distant_starts(self, fit: Fit) -> Iterable[tuple[Candidate, tuple[float, ...]]]:
         """(candidate, start) too far from neutral for a column: predicted, with the masking parameter at its mean."""
         return ()
 
-    def with_broad_errors(self):
+    def with_broad_errors(self) -> Case:
         """The same case with large independent errors: its optimum has a wide basin."""
         return self
 
-    def hammer_positions(self):
+    def hammer_positions(self) -> dict[str, float]:
         """Condition -> position of the impacts [m], for hammer tests."""
         return {}
 
-    def with_updated_errors(self, fit):
+    def with_updated_errors(self, fit: Fit) -> Case:
         """The same case with errors of its observations as the model of ``fit`` gives them. Itself if unchanged."""
         return self
 
-    def cheap_case(self):
+    def cheap_case(self) -> Case | None:
         """A case of the cheap observations alone, with the same shared nuisances. None if there are none."""
         return None
 
-    def residual_spaces(self, fit):
+    def residual_spaces(self, fit: Fit) -> Iterable[ResidualSpace]:
         """``ResidualSpace`` objects: subspaces of the observations to which a cause may be fixed. None by default."""
         return ()
 
-    def latent_covariates(self, fit):
-        """Covariates of the latent force: name -> (n,), with "force". None if the case has no such view."""
+    def latent_covariates(self, fit: Fit) -> dict[str, Any] | None:
+        """Covariates of the latent force, by which its law is sought.
+
+        Parameters
+        ----------
+        fit : Fit
+
+        Returns
+        -------
+        dict or None
+            Name -> (n,) values, with "force" and its "unit". None if the case has no such view.
+        """
         return None
 
-    def numerical_error(self, fit):
+    def numerical_error(self, fit: Fit) -> list[np.ndarray] | None:
         """Numerical error of each observation's prediction, list of (n,), or None if it is exact."""
         return None

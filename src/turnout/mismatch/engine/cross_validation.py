@@ -4,15 +4,26 @@ A single witness is one recording, or all impacts at one position, without which
 the share of the change by one effect in sensors and recordings that another effect changes as well.
 """
 
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.map_fit import JointProblem
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
+if TYPE_CHECKING:
+    from turnout.mismatch.engine.candidate import Candidate
+    from turnout.mismatch.engine.case import Case, Observation
+    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.search import Search
 
-def held_out_score(case, fit):
-    r"""Log predictive density [nats] of each left-out condition, dict condition -> density.
+
+def held_out_score(case: Case, fit: Fit) -> dict[str, float]:
+    r"""Log predictive density of each left-out condition.
 
     .. math:: \ln p(y_c \mid y_{-c}) = \ln N(r_c;\; J_c(\hat\theta_{-c} - \hat\theta),\;
               S + J_c C_{-c} J_c^T)
@@ -20,6 +31,17 @@ def held_out_score(case, fit):
     The fit without condition c follows from the full fit by one Gauss-Newton step. Nuisances of the left-out condition
     return to their prior and are integrated out, not fitted. S holds sigma times the noise scale of the other
     conditions. Correlated samples count by their ``effective`` share.
+
+    Parameters
+    ----------
+    case : Case
+    fit : Fit
+        With its Jacobian.
+
+    Returns
+    -------
+    dict
+        Condition -> log density [nats]. {} if there is one condition alone.
     """
     joint, theta, sums = _problem_and_sums(case, fit)
     conditions = [o.condition for o in joint.observations]
@@ -32,12 +54,28 @@ def held_out_score(case, fit):
     return densities
 
 
-def jackknife_errors(case, fit, data_type):
-    r"""Jackknife standard errors of all parameters of ``fit`` over its recordings of one ``data_type``.
+def jackknife_errors(case: Case, fit: Fit, data_type: str) -> np.ndarray:
+    r"""Jackknife standard errors of all parameters over the recordings of one data type.
 
-    :math:`\sqrt{(m - 1) / m \sum (\theta_i - \bar\theta)^2}` (Efron and Stein 1981) over the m recordings, with one
-    Gauss-Newton step for each. It includes errors of single recordings that are no noise, for example of a vehicle
-    file or a coarse time step. Zeros for fewer than three recordings.
+    :math:`\sqrt{(m - 1) / m \sum (\theta_i - \bar\theta)^2}` over the m recordings, with one Gauss-Newton step for
+    each. It includes errors of single recordings that are no noise, for example of a vehicle file or a coarse time
+    step.
+
+    Parameters
+    ----------
+    case : Case
+    fit : Fit
+        With its Jacobian.
+    data_type : str
+
+    Returns
+    -------
+    (n,) array of float
+        Of the nuisances, then of the effects' parameters. Zeros for fewer than three recordings.
+
+    References
+    ----------
+    Efron and Stein 1981, The jackknife estimate of variance.
     """
     joint, theta, sums = _problem_and_sums(case, fit)
     normal = np.eye(theta.size) + sum(p.gram / fit.scale[p.data_type] for p in sums)
@@ -50,11 +88,25 @@ def jackknife_errors(case, fit, data_type):
     return joint.sd * np.sqrt((len(selected) - 1) * np.var(jackknifed, axis=0))
 
 
-def single_type_estimate(case, fit, data_type, name, sd):
-    """Estimate of the nuisance ``name`` from the observations of one ``data_type`` alone, with its prior widened to
-    ``sd``.
+def single_type_estimate(case: Case, fit: Fit, data_type: str, name: str, sd: float) -> float:
+    """Estimate of one nuisance from the observations of one data type alone, with its prior widened.
 
     It is one Gauss-Newton step from ``fit``, with all other nuisances free under their priors.
+
+    Parameters
+    ----------
+    case : Case
+    fit : Fit
+        With its Jacobian.
+    data_type : str
+    name : str
+        The nuisance.
+    sd : float
+        Prior standard deviation that it gets.
+
+    Returns
+    -------
+    float
     """
     joint = JointProblem(case)
     theta = np.array([fit.values[n.name] for n in case.nuisances])
@@ -69,7 +121,7 @@ def single_type_estimate(case, fit, data_type, name, sd):
     return float(theta[k] + joint.sd[k] * np.linalg.solve(normal, right)[k])
 
 
-def _problem_and_sums(case, fit):
+def _problem_and_sums(case: Case, fit: Fit) -> tuple[JointProblem, np.ndarray, list[_ObservationSums]]:
     """The joint problem, its parameters in ``fit``, and the sums over each observation."""
     joint = JointProblem(case, fit.candidates)
     theta = np.concatenate([[fit.values[n.name] for n in case.nuisances], fit.psi])
@@ -83,7 +135,7 @@ def _problem_and_sums(case, fit):
 class _ObservationSums:
     """Sums over one observation, at noise scale 1, with distances in prior standard deviations."""
 
-    def __init__(self, joint, observation, jacobian, white):
+    def __init__(self, joint: JointProblem, observation: Observation, jacobian: np.ndarray, white: np.ndarray) -> None:
         rows = np.sqrt(observation.effective) * jacobian * joint.sd
         right = np.sqrt(observation.effective) * white
         self.data_type, self.n = observation.data_type, observation.n_effective
@@ -91,16 +143,23 @@ class _ObservationSums:
         self.log_sigma = observation.effective * float(np.sum(np.log(observation.sigma)))
 
 
-def _noise_scales(fit, retained):
+def _noise_scales(fit: Fit, retained: Sequence[_ObservationSums]) -> dict[str, float]:
     """Noise scale by data type from the retained observations. A type wholly left out keeps that of the full fit."""
-    total, count = {}, {}
+    total: dict[str, float] = {}
+    count: dict[str, float] = {}
     for p in retained:
         total[p.data_type] = total.get(p.data_type, 0.0) + p.square
         count[p.data_type] = count.get(p.data_type, 0.0) + p.n
     return {**fit.scale, **{data_type: max(1.0, total[data_type] / count[data_type]) for data_type in total}}
 
 
-def _predictive_density(joint, fit, theta, left_out, retained):
+def _predictive_density(
+    joint: JointProblem,
+    fit: Fit,
+    theta: np.ndarray,
+    left_out: Sequence[_ObservationSums],
+    retained: Sequence[_ObservationSums],
+) -> float:
     scale = _noise_scales(fit, retained)
     gram, across = (sum(getattr(p, what) / scale[p.data_type] for p in retained) for what in ("gram", "across"))
     normal = gram + np.eye(theta.size)
@@ -118,16 +177,36 @@ def _predictive_density(joint, fit, theta, left_out, retained):
     return float(-0.5 * (quadratic + log_ratio + n * np.log(2.0 * np.pi)) - log_sigma)
 
 
-def weighted_mean_square(observations, predictions):
-    """Mean square of ``observations`` minus ``predictions``, whitened."""
+def weighted_mean_square(observations: Sequence[Observation], predictions: Sequence[np.ndarray]) -> float:
+    """Mean square of observations minus predictions, whitened.
+
+    Parameters
+    ----------
+    observations : sequence of Observation
+    predictions : sequence of (n,) array of float
+
+    Returns
+    -------
+    float
+    """
     total = sum(o.effective * float(np.sum(o.whiten(o.data - p) ** 2)) for o, p in zip(observations, predictions))
     return total / sum(o.n_effective for o in observations)
 
 
-def effect_signature(case, fit, candidate):
-    """Change by ``candidate``, one of those in ``fit``, in each observation at its nuisances, whitened.
+def effect_signature(case: Case, fit: Fit, candidate: Candidate) -> list[np.ndarray]:
+    """Change by a candidate in each observation, whitened, at the nuisances of ``fit``.
 
-    [] if the simulation fails without it.
+    Parameters
+    ----------
+    case : Case
+    fit : Fit
+    candidate : Candidate
+        One of those in ``fit``.
+
+    Returns
+    -------
+    list of (n,) array of float
+        [] if the simulation fails without it.
     """
     other_terms = tuple(t for c, t in zip(fit.candidates, fit.terms) if c.key != candidate.key)
     try:
@@ -137,28 +216,43 @@ def effect_signature(case, fit, candidate):
     return [o.whiten(p - q) for o, p, q in zip(case.observations, fit.predictions, without)]
 
 
-def signature_overlap(case, fit, first, second):
+def signature_overlap(case: Case, fit: Fit, first: Candidate, second: Candidate) -> float:
     r"""Overlap of two effects in sensors and recordings: 0 if they show apart, 1 if alike.
 
     .. math:: \sum_k \sqrt{p_k q_k}
 
-    with p and q the shares of energy of each change in sensor and recording k (Bhattacharyya 1943). 1 if the simulation
-    fails without one of them.
+    with p and q the shares of energy of each change in sensor and recording k.
+
+    Parameters
+    ----------
+    case : Case
+    fit : Fit
+        With both effects.
+    first, second : Candidate
+
+    Returns
+    -------
+    float
+        1 if the simulation fails without one of them.
+
+    References
+    ----------
+    Bhattacharyya 1943, On a measure of divergence between two statistical populations.
     """
-    shares = [_energy_shares(case.observations, effect_signature(case, fit, c)) for c in (first, second)]
-    if any(p is None for p in shares):
+    p, q = (_energy_shares(case.observations, effect_signature(case, fit, c)) for c in (first, second))
+    if p is None or q is None:
         return 1.0
-    return float(np.sum(np.sqrt(shares[0] * shares[1])))
+    return float(np.sum(np.sqrt(p * q)))
 
 
-def _energy_shares(observations, changes):
+def _energy_shares(observations: Sequence[Observation], changes: Sequence[np.ndarray]) -> np.ndarray | None:
     """(n_sensor_and_recording,) shares of the energy of ``changes``. None if it is zero."""
     energies = [e for o, d in zip(observations, changes) for e in _energy_by_sensor(o, o.effective * np.square(d))]
     total = float(np.sum(energies))
     return np.array(energies) / total if total > 0.0 else None
 
 
-def _energy_by_sensor(observation, energy):
+def _energy_by_sensor(observation: Observation, energy: np.ndarray) -> Iterable[float]:
     """Sums of ``energy`` (n,) by sensor. One sum if the observation has no sensor labels."""
     if observation.cells is None or "sensor" not in observation.labels:
         return [float(np.sum(energy))]
@@ -167,7 +261,9 @@ def _energy_by_sensor(observation, energy):
     return np.bincount(code[observation.cells[inside]], energy[inside], minlength=level.size)
 
 
-def single_witness(search, fit, candidate, gain, by_condition):
+def single_witness(
+    search: Search, fit: Fit, candidate: Candidate, gain: float, by_condition: Mapping[str, float]
+) -> str:
     """The condition whose gain alone supports a name while the gain of all others together does not.
 
     "" if there is none.
@@ -194,7 +290,7 @@ def single_witness(search, fit, candidate, gain, by_condition):
     case, threshold = search.case, search.settings.threshold
     if position := _single_hammer_position(case.hammer_positions(), gain, by_condition, threshold):
         return position
-    strongest = max(by_condition, key=by_condition.get, default="")
+    strongest = max(by_condition, key=lambda c: by_condition[c], default="")
     if not strongest or by_condition[strongest] <= threshold or "train" in candidate.where:
         return ""
     other_gain = sum(by_condition.values()) - by_condition[strongest]
@@ -205,18 +301,20 @@ def single_witness(search, fit, candidate, gain, by_condition):
     return strongest if sum(energy >= min_energy for energy in energies.values()) >= THRESHOLDS.min_witnesses else ""
 
 
-def _single_hammer_position(hammer_positions, gain, by_condition, threshold):
+def _single_hammer_position(
+    hammer_positions: Mapping[str, float], gain: float, by_condition: Mapping[str, float], threshold: float
+) -> str:
     """Position, in words, whose impacts alone support a name, or half of one, while all others do not.
 
     "" if there is none.
     """
-    gains = {}
+    gains: dict[float, float] = {}
     for condition, condition_gain in by_condition.items():
         if condition in hammer_positions:
             gains[hammer_positions[condition]] = gains.get(hammer_positions[condition], 0.0) + condition_gain
     if len(gains) < THRESHOLDS.min_hammer_positions:
         return ""
-    strongest = max(gains, key=gains.get)
+    strongest = max(gains, key=lambda position: gains[position])
     other_gain = sum(by_condition.values()) - gains[strongest]
     if other_gain > 0.0 and gains[strongest] + other_gain < THRESHOLDS.min_held_out_share * gain:
         return ""
@@ -227,20 +325,43 @@ def _single_hammer_position(hammer_positions, gain, by_condition, threshold):
     )
 
 
-def effect_energy(case, fit, candidate):
-    """Condition -> weighted energy of the change by ``candidate`` at the nuisances of ``fit``.
+def effect_energy(case: Case, fit: Fit, candidate: Candidate) -> dict[str, float]:
+    """Weighted energy of the change by a candidate, by condition.
 
-    {} if the simulation fails without it.
+    Parameters
+    ----------
+    case : Case
+    fit : Fit
+    candidate : Candidate
+        One of those in ``fit``.
+
+    Returns
+    -------
+    dict
+        Condition -> energy. {} if the simulation fails without the candidate.
     """
-    energies = {}
+    energies: dict[str, float] = {}
     for o, change in zip(case.observations, effect_signature(case, fit, candidate)):
         energy = o.effective * float(np.sum(change**2))
         energies[o.condition] = energies.get(o.condition, 0.0) + energy
     return energies
 
 
-def gain_where_unmasked(case, fit, by_condition):
-    """Gain of the conditions in which no effect of ``fit`` shows, 0 if it has none. [nats]"""
+def gain_where_unmasked(case: Case, fit: Fit, by_condition: Mapping[str, float]) -> float:
+    """Gain of the conditions in which no effect of ``fit`` shows.
+
+    Parameters
+    ----------
+    case : Case
+    fit : Fit
+    by_condition : mapping
+        Condition -> gain when it is left out. [nats]
+
+    Returns
+    -------
+    float
+        0 if ``fit`` has no effect. [nats]
+    """
     unmasked = dict(by_condition) if fit.candidates else {}
     for candidate in fit.candidates:
         energies = effect_energy(case, fit, candidate)

@@ -1,12 +1,22 @@
 """Effects that a planned campaign can distinguish: expected loss of log evidence if one is explained by another."""
 
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.map_fit import JointProblem, fit_jointly
 from turnout.mismatch.engine.thresholds import THRESHOLDS
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from turnout.mismatch.engine.candidate import Candidate
+    from turnout.mismatch.engine.case import Case
 
 
 @dataclass(frozen=True)
@@ -21,13 +31,31 @@ class Distinguishability:
     loss: np.ndarray
     detectability: np.ndarray
 
-    def confused_with(self, name, min_evidence=THRESHOLDS.min_evidence):
-        """Effects that cannot be distinguished from ``name``, with "none" if it cannot be detected at all."""
+    def confused_with(self, name: str, min_evidence: float = THRESHOLDS.min_evidence) -> list[str]:
+        """Effects that cannot be distinguished from one of them.
+
+        Parameters
+        ----------
+        name : str
+            The effect.
+        min_evidence : float
+            Evidence from which two effects are distinguished. [nats]
+
+        Returns
+        -------
+        list of str
+            With "none" first if the effect cannot be detected at all.
+
+        Raises
+        ------
+        ValueError
+            If the effect is not among ``names``.
+        """
         row = self.names.index(name)
         confused_names = [] if self.detectability[row] >= min_evidence else ["none"]
         return confused_names + [n for k, n in enumerate(self.names) if k != row and self.loss[row, k] < min_evidence]
 
-    def __str__(self):
+    def __str__(self) -> str:
         width = max(len(n) for n in self.names)
         head = " " * width + "      none " + " ".join(f"{n[:9]:>9}" for n in self.names)
         lines = [head]
@@ -36,8 +64,8 @@ class Distinguishability:
         return "\n".join(lines)
 
 
-def distinguishability(case, strengths=None):
-    r"""Matrix for the ``case``. No data are needed, only predictions of recordings.
+def distinguishability(case: Case, strengths: Mapping[str, ArrayLike] | None = None) -> Distinguishability:
+    r"""Expected evidence between the effects of a case. No data are needed, only predictions of recordings.
 
     .. math:: L_{AB} = \tfrac12 \min_a (c_A - a c_B)^T P (c_A - a c_B)
 
@@ -47,9 +75,18 @@ def distinguishability(case, strengths=None):
     ----------
     case : Case
         Its data may be its own predictions.
-    strengths : dict or None
-        Key of a candidate -> its parameters; by default each candidate's first start. One candidate of each family
-        is taken, the first.
+    strengths : mapping or None
+        Key of a candidate -> its parameters; by default each candidate's first start. One candidate of each family is
+        taken, the first with a strength, else the one at the middle site.
+
+    Returns
+    -------
+    Distinguishability
+
+    Raises
+    ------
+    SimulationError
+        If the base model cannot be simulated. Effects that cannot be simulated are left out.
     """
     fit = fit_jointly(case, iterations=0)
     joint = JointProblem(case)
@@ -80,9 +117,9 @@ def distinguishability(case, strengths=None):
     return Distinguishability(tuple(names), loss, 0.5 * size)
 
 
-def _one_per_family(candidates, strengths):
+def _one_per_family(candidates: Iterable[Candidate], strengths: Mapping[str, ArrayLike]) -> Iterator[Candidate]:
     """The candidates with given strengths, and the middle site of every other family."""
-    by_family = {}
+    by_family: dict[str, list[Candidate]] = {}
     for candidate in candidates:
         by_family.setdefault(candidate.family, []).append(candidate)
     for members in by_family.values():
@@ -90,10 +127,29 @@ def _one_per_family(candidates, strengths):
         yield chosen[0] if chosen else members[len(members) // 2]
 
 
-def cheapest_addition(base, additions, min_evidence=THRESHOLDS.min_evidence):
-    """(name, pairs distinguished, nats gained) of the addition that resolves most pairs, the cheapest among equals.
+def cheapest_addition(
+    base: Distinguishability,
+    additions: Mapping[str, tuple[float, Distinguishability]],
+    min_evidence: float = THRESHOLDS.min_evidence,
+) -> tuple[str, int, float]:
+    """The addition to a plan that resolves most pairs of effects, the cheapest among equals.
 
-    ``base`` is a Distinguishability, ``additions`` name -> (cost, Distinguishability of the plan with it).
+    Parameters
+    ----------
+    base : Distinguishability
+        Of the plan as it is.
+    additions : mapping
+        Name -> (cost, Distinguishability of the plan with it).
+    min_evidence : float
+        Evidence from which two effects are distinguished. [nats]
+
+    Returns
+    -------
+    name : str
+    resolved : int
+        Number of pairs that it resolves.
+    gained : float
+        Evidence that it adds. [nats]
     """
     ranked, most = [], THRESHOLDS.max_useful_evidence
     for name, (cost, extended) in additions.items():

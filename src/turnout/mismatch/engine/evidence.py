@@ -11,13 +11,14 @@ import numpy as np
 
 from turnout.mismatch.engine.cross_validation import held_out_score, single_type_estimate, weighted_mean_square
 from turnout.mismatch.engine.decision import is_contradicted, judge, likeliest
-from turnout.mismatch.engine.latent_force import latent_law
+from turnout.mismatch.engine.latent_force import LatentForce, latent_law
 from turnout.mismatch.engine.reserved_data import is_significantly_worse, reserved_fit
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
+    from turnout.mismatch.engine.case import Case
     from turnout.mismatch.engine.map_fit import Fit
     from turnout.mismatch.engine.search import Search
     from turnout.mismatch.engine.verdict import Verdict
@@ -95,7 +96,7 @@ def _is_supported(search: Search, fit: Fit, refit: Fit, candidate: Candidate) ->
     return supported and not _is_opposed(search.case, fit, refit, candidate)
 
 
-def _is_opposed(case, fit, refit, candidate):
+def _is_opposed(case: Case, fit: Fit, refit: Fit, candidate: Candidate) -> bool:
     """Whether observations that must not oppose a candidate contradict it.
 
     They do so if they put its masking parameter, with a prior as wide as the effect's, nearer to its value without the
@@ -112,12 +113,25 @@ def _is_opposed(case, fit, refit, candidate):
     )
 
 
-def is_within_spread(case, refit, candidate):
-    r"""Whether a component differs by no more than ``max_ordinary_spreads`` from similar ones, the effect included.
+def is_within_spread(case: Case, refit: Fit, candidate: Candidate) -> bool:
+    r"""Whether a component differs from similar ones by no more than they do among themselves, the effect included.
 
     .. math:: |\ln \psi| < 3 s, \quad s^2 = \overline{(v_j - \bar v)^2} + \overline{\sigma_j^2}
 
     with :math:`v_j` the fitted logarithms of the other components and :math:`\sigma_j` their standard errors.
+
+    Parameters
+    ----------
+    case : Case
+    refit : Fit
+        With the candidate.
+    candidate : Candidate
+        Its masking parameter is that of the component.
+
+    Returns
+    -------
+    bool
+        False if there are too few similar components.
     """
     if not candidate.masking_parameter or candidate.from_masking:
         return False
@@ -146,7 +160,7 @@ def worst_excess(search: Search, fit: Fit) -> float:
     return max(excess_ratio(search, fit), worst_channel_excess(search.case, fit))
 
 
-def worst_channel_excess(case, fit):
+def worst_channel_excess(case: Case, fit: Fit) -> float:
     """Largest mean square of one channel in one recording over that of controls, for data types with such a level."""
     ratios = [0.0]
     for o, white in zip(case.observations, fit.white):
@@ -196,7 +210,7 @@ def assess(search: Search, fit: Fit, scores: Sequence[Score]) -> tuple[Verdict, 
     return verdict, verdict.scores[0]
 
 
-def residual_structure(case, fit):
+def residual_structure(case: Case, fit: Fit) -> float:
     """Share of the residual of ``fit`` that a free force law of the state still explains."""
     latent = latent_force_of(case, fit)
     return max(latent.r2.values(), default=0.0) if latent else 0.0
@@ -235,7 +249,7 @@ def predicts_reserved(search: Search, base: Fit, score: Score) -> bool:
     return squares[1] <= settings.withdrawn_ratio * squares[0] and not has_fallen
 
 
-def latent_force_of(case, fit):
+def latent_force_of(case: Case, fit: Fit) -> LatentForce | None:
     """``LatentForce`` that ``fit`` lacks. None if the case has no such view."""
     latent_data = case.latent_covariates(fit)
     if not latent_data:

@@ -5,7 +5,11 @@ from the priors with the effect in it. A first fit with large independent errors
 actual errors finds the minimum: smooth errors would accept a resonance at a wrong frequency.
 """
 
-from dataclasses import dataclass
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -13,6 +17,13 @@ from turnout.errors import SimulationError
 from turnout.mismatch.engine.candidate_search import Projector, scaled_start
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.thresholds import THRESHOLDS
+
+if TYPE_CHECKING:
+    from turnout.config.settings.mismatch import MismatchSettings
+    from turnout.mismatch.engine.candidate import Candidate
+    from turnout.mismatch.engine.case import Case
+    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.search import Search
 
 
 @dataclass(frozen=True)
@@ -24,64 +35,155 @@ class PrescreenFit:
     """
 
     gain: float
-    candidate: object
+    candidate: Candidate
     psi: np.ndarray
-    values: dict
+    values: dict[str, float]
     level: float
     before: float
 
 
-def prescreen(search, fit, families=None):
-    """Fits at the best site of every family, or of these ``families``, that the cheap observations show on top of
-    ``fit``.
+class _Start(NamedTuple):
+    """A start of a candidate, scaled, with half the gain in chi-squared that its column promises."""
 
-    [] without cheap observations.
+    gain: float
+    candidate: Candidate
+    start: np.ndarray
+
+
+@dataclass
+class _Prescreen:
+    """The cheap observations with broad and with actual errors, and the fits of the ``accepted`` effects to both.
+
+    ``trial_gains`` are gains of trial fits at the sites of a group of families.
     """
-    case, settings = search.case, search.settings
+
+    settings: MismatchSettings
+    broad_case: Case
+    cheap_case: Case
+    accepted: tuple[Candidate, ...]
+    broad_fit: Fit
+    base: Fit
+    trial_gains: dict[tuple, float] = field(default_factory=dict)
+
+    def fit(self, candidate: Candidate, start: np.ndarray) -> PrescreenFit | None:
+        """Fit from the priors with the broad errors, then with the actual ones.
+
+        None if the simulation fails, or if the broad fit of a family that is tried without any promise gains too
+        little.
+        """
+        candidates = (*self.accepted, candidate)
+        psi, n = np.concatenate([self.broad_fit.psi, start]), self.broad_fit.psi.size
+        max_cost = self.broad_fit.cost - 2.0 * self.settings.promise if candidate.prescreen_group else np.inf
+        try:
+            broad_fit = _fit_cheaply(self.broad_case, candidates, psi, _prior_means(self.broad_case))
+            if broad_fit.cost > max_cost:
+                return None
+            refit = _fit_cheaply(self.cheap_case, candidates, broad_fit.psi, broad_fit.values)
+        except SimulationError:
+            return None
+        gain = refit.evidence - self.base.evidence - np.log(candidate.n_scanned)
+        values = informed_values(self.cheap_case, refit, candidate)
+        level, before = (max(f.level.values()) for f in (refit, self.base))
+        return PrescreenFit(gain, candidate, refit.psi[n:], values, level, before)
+
+    def likeliest_starts(self, starts: Sequence[_Start]) -> list[tuple[Candidate, np.ndarray]]:
+        """The most promising sites of a family, each with its best start.
+
+        Families that the base model absorbs (``prescreen_group``) are tried at every site by a few steps of the broad
+        fit. Families of one group share these gains. A family of the whole track is tried from its most promising
+        starts.
+        """
+        ranked = sorted(starts, key=lambda s: s.gain)
+        best_starts = {s.candidate.key: s for s in ranked}
+        group = next(iter(best_starts.values())).candidate.prescreen_group
+        if group and len(best_starts) == 1:
+            return [self._best_of_track(ranked)]
+        if group:
+            gains = {s.candidate.key: self._gain_at_site(group, s) for s in best_starts.values()}
+            likeliest = sorted(best_starts.values(), key=lambda s: -gains[s.candidate.key])
+            return [(s.candidate, s.start) for s in likeliest[: self.settings.scouted_places]]
+        likeliest = sorted(best_starts.values(), key=lambda s: -s.gain)[: self.settings.scouted_places]
+        return [(s.candidate, s.start) for s in likeliest if s.gain > self.settings.promise]
+
+    def _best_of_track(self, ranked: Sequence[_Start]) -> tuple[Candidate, np.ndarray]:
+        """The best of the most promising starts of a family of the whole track."""
+        starts = {tuple(s.start): (s.candidate, s.start) for s in ranked}
+        trials = list(starts.values())[-THRESHOLDS.max_trial_starts :]
+        return max(trials, key=lambda trial: self._trial_gain(*trial)) if trials[1:] else trials[0]
+
+    def _gain_at_site(self, group: str, start: _Start) -> float:
+        """Gain of a trial fit at a site, computed for the first family of the group that asks."""
+        site = group, tuple(sorted(start.candidate.where.items()))
+        if site not in self.trial_gains:
+            self.trial_gains[site] = self._trial_gain(start.candidate, start.start)
+        return self.trial_gains[site]
+
+    def _trial_gain(self, candidate: Candidate, start: np.ndarray) -> float:
+        """Gain in half the cost after a few steps of the broad fit from the priors."""
+        psi, candidates = np.concatenate([self.broad_fit.psi, start]), (*self.accepted, candidate)
+        values, steps = _prior_means(self.broad_case), THRESHOLDS.n_trial_steps
+        try:
+            fit = fit_jointly(self.broad_case, candidates, psi, values, iterations=steps)
+        except SimulationError:
+            return -np.inf
+        return 0.5 * (self.broad_fit.cost - fit.cost)
+
+
+def prescreen(search: Search, fit: Fit, families: Collection[str] | None = None) -> list[PrescreenFit]:
+    """Fits at the best site of every family that the cheap observations show on top of ``fit``.
+
+    Parameters
+    ----------
+    search : Search
+    fit : Fit
+        Its candidates are in the model.
+    families : collection of str or None
+        Families that are tried; None: all.
+
+    Returns
+    -------
+    list of PrescreenFit
+        The largest gain first. [] without cheap observations.
+    """
+    case = search.case
     cheap_case = case.cheap_case()
     if cheap_case is None or (families is not None and not families):
         return []
-    accepted, n_psi = fit.candidates, fit.psi.size
-    broad_case = cheap_case.with_broad_errors()
-    broad_fit = fit_jointly(
-        broad_case, accepted, fit.psi, iterations=THRESHOLDS.max_cheap_steps, min_gain=THRESHOLDS.min_cheap_step_gain
-    )
-    base = fit_jointly(
-        cheap_case,
-        accepted,
-        broad_fit.psi,
-        broad_fit.values,
-        iterations=THRESHOLDS.max_cheap_steps,
-        min_gain=THRESHOLDS.min_cheap_step_gain,
-    )
-    entries = _column_entries(case, broad_case, broad_fit, accepted) + _column_entries(case, cheap_case, base, accepted)
-    prescreened, trial_gains = [], {}
-    for family, members in _by_family(entries).items():
+    accepted, broad_case = fit.candidates, cheap_case.with_broad_errors()
+    broad_fit = _fit_cheaply(broad_case, accepted, fit.psi)
+    base = _fit_cheaply(cheap_case, accepted, broad_fit.psi, broad_fit.values)
+    step = _Prescreen(search.settings, broad_case, cheap_case, accepted, broad_fit, base)
+    by_family: dict[str, list[_Start]] = {}
+    for entry in _column_starts(case, broad_case, broad_fit) + _column_starts(case, cheap_case, base):
+        by_family.setdefault(entry.candidate.family, []).append(entry)
+    best_fits = []
+    for family, starts in by_family.items():
         if families is not None and family not in families:
             continue
-        top = None
-        for candidate, start in _likeliest_starts(members, broad_case, broad_fit, accepted, settings, trial_gains):
-            max_cost = broad_fit.cost - 2.0 * settings.promise if candidate.prescreen_group else np.inf
-            refit = _fit_candidates(
-                broad_case, cheap_case, (*accepted, candidate), np.concatenate([broad_fit.psi, start]), max_cost
-            )
-            if refit is None:
-                continue
-            gain = refit.evidence - base.evidence - np.log(candidate.n_scanned)
-            if top is None or gain > top.gain:
-                levels = (max(f.level.values()) for f in (refit, base))
-                top = PrescreenFit(
-                    gain, candidate, refit.psi[n_psi:], informed_values(cheap_case, refit, candidate), *levels
-                )
-        if top is not None:
-            prescreened.append(top)
-    return sorted(prescreened, key=lambda f: -f.gain)
+        fits = [step.fit(candidate, start) for candidate, start in step.likeliest_starts(starts)]
+        successful = [f for f in fits if f is not None]
+        if successful:
+            best_fits.append(max(successful, key=lambda f: f.gain))
+    return sorted(best_fits, key=lambda f: -f.gain)
 
 
-def informed_values(case, fit, candidate):
+def informed_values(case: Case, fit: Fit, candidate: Candidate) -> dict[str, float]:
     """Values of the nuisances that the cheap observations determine, and of the masking parameter.
 
     They do not determine the masking parameter beside the candidate. Its value in the base fit must not come on top.
+
+    Parameters
+    ----------
+    case : Case
+        Of the cheap observations.
+    fit : Fit
+        With the candidate.
+    candidate : Candidate
+
+    Returns
+    -------
+    dict
+        Nuisance parameter -> value.
     """
     sd = np.sqrt(np.diag(fit.covariance))
     is_informed = {
@@ -91,97 +193,27 @@ def informed_values(case, fit, candidate):
     return {name: fit.values[name] for name, informed in is_informed.items() if informed}
 
 
-def _column_entries(case, cheap_case, fit, accepted):
-    """(nats, candidate, start) by the columns of every candidate that shows in the cheap observations."""
-    projector, columns, ranked = Projector(cheap_case, fit), cheap_case.screen(fit), []
-    accepted_keys = {c.key for c in accepted}
+def _fit_cheaply(
+    case: Case, candidates: Sequence[Candidate], psi: np.ndarray, values: Mapping[str, float] | None = None
+) -> Fit:
+    """Joint fit to cheap observations, with many steps."""
+    steps, min_gain = THRESHOLDS.max_cheap_steps, THRESHOLDS.min_cheap_step_gain
+    return fit_jointly(case, candidates, psi, values, iterations=steps, min_gain=min_gain)
+
+
+def _prior_means(case: Case) -> dict[str, float]:
+    return {n.name: n.mean for n in case.nuisances}
+
+
+def _column_starts(case: Case, cheap_case: Case, fit: Fit) -> list[_Start]:
+    """Starts of every candidate that shows in the cheap observations, scaled by their columns."""
+    projector, columns, starts = Projector(cheap_case, fit), cheap_case.screen(fit), []
+    accepted_keys = {c.key for c in fit.candidates}
     for candidate in case.candidates:
         for k in range(len(candidate.starts)):
             changes = columns.get((candidate.key, k))
             if candidate.key in accepted_keys or changes is None or not any(p.any() for p in changes):
                 continue
             gain, share = projector.score(changes, candidate, k)
-            ranked.append((0.5 * gain, candidate, scaled_start(candidate, k, share)))
-    return ranked
-
-
-def _by_family(entries):
-    families = {}
-    for entry in entries:
-        families.setdefault(entry[1].family, []).append(entry)
-    return families
-
-
-def _likeliest_starts(members, broad_case, broad_fit, accepted, settings, trial_gains):
-    """The most promising sites of a family, each with its best start.
-
-    Families that the base model absorbs (``prescreen_group``) are tried at every site by a few steps of the broad fit.
-    Families of one group share these ``trial_gains``. A family of the whole track is tried from its
-    ``max_trial_starts`` most promising starts.
-    """
-    best_starts = {}
-    for gain, candidate, start in sorted(members, key=lambda m: m[0]):
-        best_starts[candidate.key] = gain, candidate, start
-    group = next(iter(best_starts.values()))[1].prescreen_group
-    if group and len(best_starts) == 1:
-        starts = {tuple(start): (candidate, start) for _, candidate, start in sorted(members, key=lambda m: m[0])}
-        trials = list(starts.values())[-THRESHOLDS.max_trial_starts :]
-        return [
-            max(trials, key=lambda m: _trial_gain(broad_case, broad_fit, accepted, *m)) if trials[1:] else trials[0]
-        ]
-    if group:
-        for _, c, s in best_starts.values() if len(best_starts) > 1 else ():
-            site = group, tuple(sorted(c.where.items()))
-            if site not in trial_gains:
-                trial_gains[site] = _trial_gain(broad_case, broad_fit, accepted, c, s)
-        ranked = sorted(
-            best_starts.values(), key=lambda m: -trial_gains.get((group, tuple(sorted(m[1].where.items()))), 0.0)
-        )
-        return [(c, s) for _, c, s in ranked[: settings.scouted_places]]
-    ranked = sorted(best_starts.values(), key=lambda m: -m[0])[: settings.scouted_places]
-    return [(c, s) for gain, c, s in ranked if gain > settings.promise]
-
-
-def _trial_gain(broad_case, broad_fit, accepted, candidate, start):
-    """Gain in half the cost after a few steps of the broad fit from the priors."""
-    psi = np.concatenate([broad_fit.psi, start])
-    try:
-        fit = fit_jointly(
-            broad_case,
-            (*accepted, candidate),
-            psi,
-            {n.name: n.mean for n in broad_case.nuisances},
-            iterations=THRESHOLDS.n_trial_steps,
-        )
-    except SimulationError:
-        return -np.inf
-    return 0.5 * (broad_fit.cost - fit.cost)
-
-
-def _fit_candidates(broad_case, cheap_case, candidates, psi, max_cost):
-    """Fit from the priors with the broad errors, then with the actual ones.
-
-    None if the simulation fails, or if the broad fit costs more than ``max_cost``, the limit for candidates that were
-    tried without any promise.
-    """
-    try:
-        broad_fit = fit_jointly(
-            broad_case,
-            candidates,
-            psi,
-            {n.name: n.mean for n in broad_case.nuisances},
-            iterations=THRESHOLDS.max_cheap_steps,
-            min_gain=THRESHOLDS.min_cheap_step_gain,
-        )
-        if broad_fit.cost > max_cost:
-            return None
-        return fit_jointly(
-            cheap_case,
-            candidates,
-            broad_fit.psi,
-            broad_fit.values,
-            iterations=THRESHOLDS.max_cheap_steps,
-            min_gain=THRESHOLDS.min_cheap_step_gain,
-        )
-    except SimulationError:
-        return None
+            starts.append(_Start(0.5 * gain, candidate, scaled_start(candidate, k, share)))
+    return starts

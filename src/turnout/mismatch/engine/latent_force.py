@@ -1,10 +1,17 @@
 """Missing force without a model: against displacement, velocity, position, time and temperature."""
 
+from __future__ import annotations
+
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.mismatch.engine.thresholds import THRESHOLDS
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 
 @dataclass(frozen=True)
@@ -15,23 +22,42 @@ class LatentForce:
     -> (centres, mean force, its standard error). ``unit`` of the force.
     """
 
-    r2: dict
-    curves: dict
+    r2: dict[str, float]
+    curves: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]
     unit: str = "N"
 
     @property
-    def best_covariate(self):
+    def best_covariate(self) -> str:
         """Covariate that explains most, "" if none explains anything."""
-        name = max(self.r2, key=self.r2.get, default="")
+        name = max(self.r2, key=lambda n: self.r2[n], default="")
         return name if name and self.r2[name] > 0.0 else ""
 
 
-def latent_law(force, covariates, unit="N", blocks=THRESHOLDS.n_held_out_blocks):
+def latent_law(
+    force: ArrayLike, covariates: Mapping[str, ArrayLike], unit: str = "N", blocks: int = THRESHOLDS.n_held_out_blocks
+) -> LatentForce:
     r"""Free law of a missing force for each covariate, tested on held-out blocks of time.
 
     A piecewise constant law over equally filled classes; :math:`R^2 = 1 - \overline{(f - \hat f_{-b})^2} /
     \overline{(f - \bar f)^2}` with law and mean from the other blocks.
 
+    Parameters
+    ----------
+    force : (n,) array of float
+        In ``unit``; samples that are not finite are left out.
+    covariates : mapping
+        Name -> (n,) values.
+    unit : str
+        Unit of the force.
+    blocks : int
+        Number of blocks of time.
+
+    Returns
+    -------
+    LatentForce
+
+    Examples
+    --------
     >>> x = np.sin(np.arange(4000) * 0.1)
     >>> law = latent_law(x**3, {"displacement": x, "time": np.arange(4000.0)})
     >>> law.best_covariate, law.r2["displacement"] > 0.95, law.r2["time"] < 0.3
@@ -55,7 +81,7 @@ def latent_law(force, covariates, unit="N", blocks=THRESHOLDS.n_held_out_blocks)
     return LatentForce(r2, curves, unit)
 
 
-def _left_out_r2(force, code, block, levels):
+def _left_out_r2(force: np.ndarray, code: np.ndarray, block: np.ndarray, levels: int) -> float:
     """Share of the variance on held-out blocks. Sums by block make every held-out mean a subtraction."""
     n_block = int(block.max()) + 1
     flat = block * levels + code
@@ -69,7 +95,9 @@ def _left_out_r2(force, code, block, levels):
     return float(1.0 - missed / spread) if spread > 0.0 else 0.0
 
 
-def _curve(force, x, code, levels):
+def _curve(
+    force: np.ndarray, x: np.ndarray, code: np.ndarray, levels: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     count = np.maximum(np.bincount(code, minlength=levels), 1)
     centre, mean = np.bincount(code, x, levels) / count, np.bincount(code, force, levels) / count
     square = np.bincount(code, force**2, levels) / count

@@ -3,9 +3,26 @@
 The damping rises until the cost falls.
 """
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
 import numpy as np
 
 from turnout.mismatch.engine.thresholds import THRESHOLDS
+
+if TYPE_CHECKING:
+    from turnout.mismatch.engine.map_fit import JointProblem
+
+
+class FitPoint(NamedTuple):
+    """Parameters ``theta`` (n,) of a joint fit, with the predictions, whitened residuals and cost there."""
+
+    theta: np.ndarray
+    predictions: list[np.ndarray]
+    residuals: list[np.ndarray]
+    cost: float
 
 
 class DampedSteps:
@@ -14,8 +31,11 @@ class DampedSteps:
     The noise scale is that after the undamped step. With the scale of a bad start, the priors would weigh too much.
     """
 
-    def __init__(self, joint, theta, residuals, jacobian):
-        self.joint, self.theta, sums = joint, theta, {}
+    def __init__(
+        self, joint: JointProblem, theta: np.ndarray, residuals: Sequence[np.ndarray], jacobian: Sequence[np.ndarray]
+    ) -> None:
+        self.joint, self.theta = joint, theta
+        sums: dict[str, tuple[Any, ...]] = {}
         for o, j, r in zip(joint.observations, jacobian, residuals):
             weight = np.sqrt(o.effective)
             rows, right = weight * j * joint.sd, weight * r
@@ -31,11 +51,21 @@ class DampedSteps:
             step = np.linalg.solve(self.normal, self.right)
             squares = {k: max(0.0, p[2] - 2.0 * step @ p[1] + step @ p[0] @ step) for k, p in sums.items()}
 
-    def damped_step(self, damping):
-        """(n,) step with ``damping`` times the diagonal added.
+    def damped_step(self, damping: float) -> np.ndarray:
+        """Step with a damping added to the diagonal of the normal matrix.
 
         A parameter that would leave its trust region gets more damping. One at its bound that would go beyond stays
         there, while the others move.
+
+        Parameters
+        ----------
+        damping : float
+            Times the diagonal.
+
+        Returns
+        -------
+        (n,) array of float
+            In the units of the parameters.
         """
         joint, diagonal = self.joint, np.diag(self.normal)
         reach, damping_factors = joint.reach / joint.sd, np.full(self.theta.size, damping)
@@ -51,15 +81,28 @@ class DampedSteps:
             )
         return joint.sd * np.clip(step, -reach, reach)
 
-    def predicted_decrease(self, step):
+    def predicted_decrease(self, step: np.ndarray) -> float:
         """Decrease of the cost if the problem were linear."""
         step = step / self.joint.sd
         return float(2.0 * step @ self.right - step @ self.normal @ step)
 
-    def first_improvement(self, cost, damping):
-        """((theta, predictions, residuals, cost), next damping) of the first step that costs less, with rising damping.
+    def first_improvement(self, cost: float, damping: float) -> tuple[FitPoint | None, float]:
+        """First step that costs less, with rising damping.
 
-        (None, 0) if there is none, or if none predicts a tenth of the least decrease for which the fit goes on.
+        Parameters
+        ----------
+        cost : float
+            Cost before the step.
+        damping : float
+            Times the diagonal, of the first trial.
+
+        Returns
+        -------
+        improvement : FitPoint or None
+            None if no step costs less, or if none predicts more than a share of the least decrease for which the fit
+            goes on.
+        damping : float
+            For the next step; 0 without an improvement.
         """
         joint = self.joint
         for _ in range(THRESHOLDS.max_damping_tries):
@@ -72,18 +115,35 @@ class DampedSteps:
                 residuals = joint.residuals(predictions)
                 new_cost = joint.cost(trial, residuals)
                 if new_cost < cost:
-                    return (
-                        trial,
-                        predictions,
-                        residuals,
-                        new_cost,
-                    ), damping * THRESHOLDS.damping_decrease if damping > THRESHOLDS.min_damping else 0.0
+                    next_damping = damping * THRESHOLDS.damping_decrease if damping > THRESHOLDS.min_damping else 0.0
+                    return FitPoint(trial, predictions, residuals, new_cost), next_damping
             damping = max(THRESHOLDS.damping_increase * damping, THRESHOLDS.first_damping)
         return None, 0.0
 
 
-def broyden_update(jacobian, weight, step, before, after):
-    """Rank-one update by which the Jacobian agrees with the last ``step``, in prior standard deviations."""
+def broyden_update(
+    jacobian: Sequence[np.ndarray],
+    weight: np.ndarray,
+    step: np.ndarray,
+    before: Sequence[np.ndarray],
+    after: Sequence[np.ndarray],
+) -> list[np.ndarray]:
+    """Rank-one update by which the Jacobian agrees with the last step, in prior standard deviations.
+
+    Parameters
+    ----------
+    jacobian : sequence of (n, p) array of float
+        By observation.
+    weight : (p,) array of float
+        The step over the prior variances.
+    step : (p,) array of float
+    before, after : sequence of (n,) array of float
+        Residuals before and after the step, by observation.
+
+    Returns
+    -------
+    list of (n, p) array of float
+    """
     size = float(weight @ step)
     change = [
         np.outer((a - b - j @ step).astype(j.dtype), (weight / size).astype(j.dtype))

@@ -10,12 +10,21 @@ whose evidence over :math:`N(0, \nu I)` follows in closed form from the eigenval
 their best values, ν not below the level of intact recordings.
 """
 
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from turnout.mismatch.engine.candidate_search import Projector
 from turnout.mismatch.engine.thresholds import THRESHOLDS
+
+if TYPE_CHECKING:
+    from turnout.mismatch.engine.case import Case, Observation
+    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.score import Score
 
 AMPLITUDES = np.concatenate(
     [[0.0], np.geomspace(THRESHOLDS.min_amplitude, THRESHOLDS.max_amplitude, THRESHOLDS.n_amplitudes)]
@@ -33,7 +42,7 @@ class ResidualSpace:
 
     names: tuple[str, ...]
     columns: np.ndarray
-    combinations: dict
+    combinations: Mapping[tuple[str, Any], np.ndarray | None]
 
 
 @dataclass(frozen=True)
@@ -41,13 +50,13 @@ class SpaceEvidence:
     """Evidence [nats] that the residual is fixed to ``level`` of ``frame``; ``by_space`` nats by name of the space."""
 
     frame: str
-    level: object
+    level: Any
     nats: float
-    by_space: dict = field(default_factory=dict)
+    by_space: dict[str, float] = field(default_factory=dict)
 
 
-def subspace_evidence(gram, inner, square, n, floor):
-    r"""Gain in log likelihood of a residual by a random effect in a subspace, at least 0. [nats]
+def subspace_evidence(gram: np.ndarray, inner: np.ndarray, square: float, n: int, floor: float) -> float:
+    r"""Gain in log likelihood of a residual by a random effect in a subspace.
 
     With eigenvalues λ of :math:`B^T B` scaled to mean 1 and u the residual along the eigenvectors,
 
@@ -63,7 +72,16 @@ def subspace_evidence(gram, inner, square, n, floor):
     inner : (k,) array of float
         :math:`B^T r`.
     square : float
-        :math:`r^T r`, of ``n`` samples.
+        :math:`r^T r`.
+    n : int
+        Number of samples of the residual.
+    floor : float
+        Mean square of intact recordings.
+
+    Returns
+    -------
+    float
+        At least 0. [nats]
     """
     eigenvalues, eigenvectors = np.linalg.eigh(gram)
     keep = eigenvalues > 1e-9 * max(eigenvalues[-1], 1e-300)
@@ -78,17 +96,30 @@ def subspace_evidence(gram, inner, square, n, floor):
     return max(0.0, float(log_likelihood.max() - log_likelihood[0].max()))
 
 
-def weigh_spaces(case, fit, floor):
-    """Evidence for each level, largest first, for the residual of ``fit``.
+def weigh_spaces(case: Case, fit: Fit, floor: Mapping[str, float]) -> list[SpaceEvidence]:
+    """Evidence for each level of each frame, for the residual of a fit.
 
-    ``floor`` by data type is the mean square of intact recordings. Columns are whitened. The nuisances are projected
-    out of them under their priors, as they are out of the residual.
+    Columns are whitened. The nuisances are projected out of them under their priors, as they are out of the residual.
+
+    Parameters
+    ----------
+    case : Case
+    fit : Fit
+        With its Jacobian.
+    floor : mapping
+        Data type -> mean square of intact recordings.
+
+    Returns
+    -------
+    list of SpaceEvidence
+        The largest first.
     """
-    projector, offsets, n_samples = Projector(case, fit), {}, 0
+    projector, n_samples = Projector(case, fit), 0
+    offsets: dict[str, tuple[int, int]] = {}
     for k, o in enumerate(case.observations):
         offsets[o.name] = k, n_samples
         n_samples += o.data.size
-    by_level = {}
+    by_level: dict[tuple[str, Any], dict[str, float]] = {}
     for space in case.residual_spaces(fit):
         members = [(case.observations[offsets[name][0]], *offsets[name]) for name in space.names]
         columns = _project_out(projector, space.columns, members)
@@ -96,22 +127,28 @@ def weigh_spaces(case, fit, floor):
         first_member = members[0][0]
         for key, nats in _level_evidence(space, columns, residual, floor[first_member.data_type]):
             by_level.setdefault(key, {})[space.names[0]] = first_member.effective * nats
-    witnesses = [SpaceEvidence(*key, sum(by_space.values()), by_space) for key, by_space in by_level.items()]
+    witnesses = [
+        SpaceEvidence(frame, level, sum(by_space.values()), by_space) for (frame, level), by_space in by_level.items()
+    ]
     return sorted(witnesses, key=lambda w: -w.nats)
 
 
-def _project_out(projector, columns, members):
+def _project_out(
+    projector: Projector, columns: np.ndarray, members: Sequence[tuple[Observation, int, int]]
+) -> np.ndarray:
     """(n, k) columns whitened, less what the nuisances can imitate of them under their priors."""
-    white, rows, first = [], [], 0
+    white_parts, row_parts, first = [], [], 0
     for o, _, start in members:
-        white.append(o.whiten(columns[first : first + o.data.size]))
-        rows.append(projector.scaled[start : start + o.data.size])
+        white_parts.append(o.whiten(columns[first : first + o.data.size]))
+        row_parts.append(projector.scaled[start : start + o.data.size])
         first += o.data.size
-    white, rows = np.concatenate(white), np.concatenate(rows)
+    white, rows = np.concatenate(white_parts), np.concatenate(row_parts)
     return white - rows @ (projector.normal @ (rows.T @ white))
 
 
-def _level_evidence(space, columns, residual, floor):
+def _level_evidence(
+    space: ResidualSpace, columns: np.ndarray, residual: np.ndarray, floor: float
+) -> Iterator[tuple[tuple[str, Any], float]]:
     gram, inner, square = columns.T @ columns, columns.T @ residual, float(residual @ residual)
     for key, combination in space.combinations.items():
         if combination is None:
@@ -136,7 +173,7 @@ class Location:
     """
 
     frame: str
-    level: object
+    level: Any
     nats: float
     place: float | None = None
     low: float | None = None
@@ -144,10 +181,10 @@ class Location:
     sensor: str | None = None
     train: str | None = None
     axle: int | None = None
-    next_best: dict = field(default_factory=dict)
-    measured_range: tuple = (float("-inf"), float("inf"))
+    next_best: dict[str, float] = field(default_factory=dict)
+    measured_range: tuple[float, float] = (float("-inf"), float("inf"))
 
-    def __str__(self):
+    def __str__(self) -> str:
         if self.place is not None and not self.measured_range[0] <= self.place <= self.measured_range[1]:
             before = self.place < self.measured_range[0]
             end = self.measured_range[0] if before else self.measured_range[1]
@@ -167,11 +204,23 @@ class Location:
         )
 
 
-def locate(case, fit, leader=None, cause=""):
-    """Location of the residual of ``fit``. ``leader`` is the Score of the best candidate that got no name, or None.
+def locate(case: Case, fit: Fit, leader: Score | None = None, cause: str = "") -> Location | None:
+    """Location of the residual of a fit.
 
-    If recordings that were not fitted are the ``cause`` of the verdict, they give the location. None if the case has no
-    residual spaces, or none of them exceeds the level of intact recordings.
+    Parameters
+    ----------
+    case : Case
+    fit : Fit
+        With its Jacobian.
+    leader : Score or None
+        The best candidate that got no name.
+    cause : str
+        "clock" or "train" if recordings that were not fitted are the cause of the verdict: they give the location then.
+
+    Returns
+    -------
+    Location or None
+        None if the case has no residual spaces, or none of them exceeds the level of intact recordings.
     """
     if cause == "clock":
         names = ", ".join(d.name for d in case.disturbed_recordings)
@@ -180,13 +229,16 @@ def locate(case, fit, leader=None, cause=""):
         return Location("train", case.mismatched_trains[0], 0.0, train=case.mismatched_trains[0])
     floor = {o.data_type: case.control_level.get(o.data_type, 1.0) for o in case.observations}
     witnesses = sorted(_credible_evidence(case, weigh_spaces(case, fit, floor)), key=lambda w: -w.nats)
-    is_credible = leader is not None and leader.explained >= THRESHOLDS.min_explained_share
-    if is_credible and (not witnesses or leader.gain > witnesses[0].nats):
+    if (
+        leader is not None
+        and leader.explained >= THRESHOLDS.min_explained_share
+        and (not witnesses or leader.gain > witnesses[0].nats)
+    ):
         return replace(_location_of_candidate(leader), measured_range=case.measured_range)
     return replace(_location_of_evidence(witnesses), measured_range=case.measured_range) if witnesses else None
 
 
-def _credible_evidence(case, witnesses):
+def _credible_evidence(case: Case, witnesses: Sequence[SpaceEvidence]) -> Iterator[SpaceEvidence]:
     """Evidence that counts: of a wheel, less that of wheels of other trains, which belongs to the rail; of a channel,
     only if impacts, if any, support it.
     """
@@ -205,7 +257,7 @@ def _credible_evidence(case, witnesses):
             yield replace(w, nats=nats)
 
 
-def _location_of_candidate(score):
+def _location_of_candidate(score: Score) -> Location:
     where = score.candidate.where
     position = where.get("place")
     return Location(
@@ -214,11 +266,11 @@ def _location_of_candidate(score):
     )  # fmt: skip
 
 
-def _location_of_evidence(witnesses):
-    strongest, by_frame = witnesses[0], {}
+def _location_of_evidence(witnesses: Sequence[SpaceEvidence]) -> Location:
+    strongest, by_frame = witnesses[0], dict[str, float]()
     for w in witnesses:
         by_frame.setdefault(w.frame, w.nats)
-    fields = {"next_best": {k: round(v, 1) for k, v in by_frame.items() if k != strongest.frame}}
+    fields: dict[str, Any] = {"next_best": {k: round(v, 1) for k, v in by_frame.items() if k != strongest.frame}}
     if strongest.frame == "place":
         positions = [
             w.level for w in witnesses if w.frame == "place" and strongest.nats - w.nats < THRESHOLDS.position_margin

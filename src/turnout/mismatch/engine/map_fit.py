@@ -3,13 +3,24 @@
 The result is a ``Fit``, with all that later steps of the diagnosis need.
 """
 
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.engine.levenberg_marquardt import DampedSteps, broyden_update
+from turnout.mismatch.engine.levenberg_marquardt import DampedSteps, FitPoint, broyden_update
 from turnout.mismatch.engine.thresholds import THRESHOLDS
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from turnout.mismatch.engine.candidate import Candidate
+    from turnout.mismatch.engine.case import Case, Observation
+    from turnout.physics import Parameter
 
 
 @dataclass(frozen=True)
@@ -23,35 +34,49 @@ class Fit:
     ``evidence`` log probability of the data by Laplace's approximation, up to a constant of the case. [nats]
     """
 
-    values: dict
-    candidates: tuple
+    values: dict[str, float]
+    candidates: tuple[Candidate, ...]
     psi: np.ndarray
-    predictions: list
-    residuals: list
-    jacobian: list
-    scale: dict
-    level: dict
+    predictions: list[np.ndarray]
+    residuals: list[np.ndarray]
+    jacobian: list[np.ndarray]
+    scale: dict[str, float]
+    level: dict[str, float]
     cost: float
     covariance: np.ndarray
     evaluations: int
-    white: list
+    white: list[np.ndarray]
     evidence: float = 0.0
 
     @property
-    def terms(self):
+    def terms(self) -> tuple[Any, ...]:
         """The terms with their fitted parameters."""
         return terms_of(self.candidates, self.psi)
 
-    def without_jacobian(self):
+    def without_jacobian(self) -> Fit:
         """The same fit without its Jacobian, by far its largest item."""
         return replace(self, jacobian=[])
 
-    def with_candidates(self, candidates):
+    def with_candidates(self, candidates: Iterable[Candidate]) -> Fit:
         """The same fit with these candidates, which carry functions and are not stored on disk."""
         return replace(self, candidates=tuple(candidates))
 
-    def part(self, candidate):
-        """Slice of the parameters of ``candidate`` in ``psi``."""
+    def part(self, candidate: Candidate) -> slice:
+        """Slice of the parameters of a candidate in ``psi``.
+
+        Parameters
+        ----------
+        candidate : Candidate
+
+        Returns
+        -------
+        slice
+
+        Raises
+        ------
+        KeyError
+            If the candidate is not in this fit.
+        """
         first = 0
         for fitted in self.candidates:
             last = first + len(fitted.parameters)
@@ -61,7 +86,7 @@ class Fit:
         raise KeyError(f"{candidate.key} is not in this fit")
 
     @property
-    def psi_se(self):
+    def psi_se(self) -> np.ndarray:
         """(n_term,) standard errors of the terms' parameters; a size also errs by its ``model_error_share``."""
         errors, first = np.sqrt(np.maximum(np.diag(self.covariance)[len(self.values) :], 0.0)), 0
         for candidate in self.candidates:
@@ -72,7 +97,7 @@ class Fit:
         return errors
 
 
-def terms_of(candidates, psi):
+def terms_of(candidates: Sequence[Candidate], psi: np.ndarray) -> tuple[Any, ...]:
     """Terms of several candidates from their stacked parameters."""
     terms, first = [], 0
     for candidate in candidates:
@@ -82,21 +107,18 @@ def terms_of(candidates, psi):
     return tuple(terms)
 
 
-MAX_CHEAP_STEPS = THRESHOLDS.max_cheap_steps
-
-
 class JointProblem:
     """Least-squares problem of a case with some candidates: all that does not change between steps."""
 
     def __init__(
         self,
-        case,
-        candidates=(),
-        observations=None,
-        iterations=THRESHOLDS.n_steps,
-        min_gain=THRESHOLDS.min_gain,
-        stall=THRESHOLDS.stall,
-    ):
+        case: Case,
+        candidates: Iterable[Candidate] = (),
+        observations: Iterable[Observation] | None = None,
+        iterations: int = THRESHOLDS.n_steps,
+        min_gain: float = THRESHOLDS.min_gain,
+        stall: float = THRESHOLDS.stall,
+    ) -> None:
         self.case, self.candidates = case, tuple(candidates)
         self.observations = tuple(case.observations if observations is None else observations)
         self.parameters = [p for c in self.candidates for p in c.parameters]
@@ -104,43 +126,56 @@ class JointProblem:
         size = sum(o.n_effective for o in self.observations)
         self.min_decrease = max(2.0 * min_gain, stall * size if case.expensive else 0.0)
         priors = [(n.mean, n.sd) for n in case.nuisances] + [_prior(p) for p in self.parameters]
-        self.mean, self.sd = (np.array(v, dtype=float) for v in zip(*priors)) if priors else (np.zeros(0),) * 2
+        self.mean, self.sd = np.array(priors, dtype=float).reshape(-1, 2).T.copy()
         bounds = [n.bounds for n in case.nuisances] + [p.bounds for p in self.parameters]
-        self.low, self.high = np.array(bounds, dtype=float).T if bounds else (np.zeros(0),) * 2
+        self.low, self.high = np.array(bounds, dtype=float).reshape(-1, 2).T
         self.n = len(case.nuisances)
         self.reach = np.array([n.max_step_sd * n.sd for n in case.nuisances] + [_max_step(p) for p in self.parameters])
 
-    def split(self, theta):
+    def split(self, theta: np.ndarray) -> tuple[dict[str, float], np.ndarray]:
         """Nuisances by name, and the term parameters."""
         return {n.name: float(v) for n, v in zip(self.case.nuisances, theta)}, np.asarray(theta[self.n :])
 
-    def predict(self, theta):
-        """Predictions at ``theta``."""
+    def predict(self, theta: np.ndarray) -> list[np.ndarray]:
+        """Predictions at ``theta``; SimulationError if the model cannot be simulated there."""
         values, psi = self.split(theta)
         self.evaluations += 1
         return self.case.predict(values, terms_of(self.candidates, psi), self.observations)
 
-    def predict_or_none(self, theta):
+    def predict_or_none(self, theta: np.ndarray) -> list[np.ndarray] | None:
         """Predictions at ``theta``, None if the simulation fails."""
         try:
             return self.predict(theta)
         except SimulationError:
             return None
 
-    def residuals(self, predictions):
+    def residuals(self, predictions: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Data minus prediction, whitened."""
         return [o.whiten(o.data - p) for o, p in zip(self.observations, predictions)]
 
-    def level(self, residuals):
+    def level(self, residuals: Sequence[np.ndarray]) -> dict[str, float]:
         """Mean square of whitened residuals, by data type."""
-        total, count = {}, {}
+        total: dict[str, float] = {}
+        count: dict[str, float] = {}
         for o, r in zip(self.observations, residuals):
             total[o.data_type] = total.get(o.data_type, 0.0) + o.effective * float(np.sum(r**2))
             count[o.data_type] = count.get(o.data_type, 0.0) + o.n_effective
         return {data_type: total[data_type] / count[data_type] for data_type in total}
 
-    def cost(self, theta, residuals):
-        """Minus twice the log posterior with the noise scale at its best value, never below 1."""
+    def cost(self, theta: np.ndarray, residuals: Sequence[np.ndarray]) -> float:
+        """Minus twice the log posterior with the noise scale at its best value, never below 1.
+
+        Parameters
+        ----------
+        theta : (n,) array of float
+            Nuisances, then parameters of the effects.
+        residuals : sequence of array
+            Whitened residuals at ``theta``, by observation.
+
+        Returns
+        -------
+        float
+        """
         level, value = self.level(residuals), 0.0
         for data_type, mean_square in level.items():
             n = sum(o.n_effective for o in self.observations if o.data_type == data_type)
@@ -148,8 +183,25 @@ class JointProblem:
             value += n * (np.log(scale) + mean_square / scale)
         return value + float(np.sum(((theta - self.mean) / self.sd) ** 2))
 
-    def stack(self, jacobian, residuals, scale):
-        """Stacked weighted Jacobian (n, p) and residual (n,) from whitened ones."""
+    def stack(
+        self, jacobian: Sequence[np.ndarray], residuals: Sequence[np.ndarray], scale: Mapping[str, float]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Weighted Jacobian and residual of all observations, one below the other.
+
+        Parameters
+        ----------
+        jacobian : sequence of (n, p) array of float
+            Whitened, by observation.
+        residuals : sequence of (n,) array of float
+            Whitened, by observation.
+        scale : mapping
+            Noise scale by data type.
+
+        Returns
+        -------
+        rows : (n, p) array of float
+        right : (n,) array of float
+        """
         rows, right = [], []
         for o, j, r in zip(self.observations, jacobian, residuals):
             weight = np.sqrt(o.effective / scale[o.data_type])
@@ -157,8 +209,29 @@ class JointProblem:
             right.append(weight * r)
         return np.concatenate(rows), np.concatenate(right)
 
-    def jacobian(self, theta, predictions, reused=None):
-        """Whitened derivatives at ``theta``; those by nuisances from ``reused``, if given."""
+    def jacobian(
+        self, theta: np.ndarray, predictions: Sequence[np.ndarray], reused: Sequence[np.ndarray] | None = None
+    ) -> list[np.ndarray]:
+        """Whitened derivatives at ``theta``.
+
+        Parameters
+        ----------
+        theta : (p,) array of float
+        predictions : sequence of array
+            Those at ``theta``.
+        reused : sequence of array or None
+            An earlier Jacobian, from which the columns of the nuisances are taken.
+
+        Returns
+        -------
+        list of (n, p) array of float
+            By observation; in single precision in an expensive case.
+
+        Raises
+        ------
+        SimulationError
+            If the model cannot be simulated on either side of a parameter.
+        """
         values, psi = self.split(theta)
         terms = terms_of(self.candidates, psi)
         if reused is None:
@@ -170,7 +243,9 @@ class JointProblem:
         full = [np.column_stack([j, *(c[i] for c in columns)]) if columns else np.array(j) for i, j in enumerate(base)]
         return [j.astype(np.float32) for j in full] if self.case.expensive else full
 
-    def with_new_cheap_columns(self, theta, predictions, jacobian):
+    def with_new_cheap_columns(
+        self, theta: np.ndarray, predictions: Sequence[np.ndarray], jacobian: list[np.ndarray]
+    ) -> list[np.ndarray]:
         """The Jacobian with new derivatives of cheap observations."""
         chosen = [i for i, o in enumerate(self.observations) if self.case.is_cheap(o)]
         if not chosen:
@@ -182,7 +257,7 @@ class JointProblem:
             updated[i] = j
         return updated
 
-    def _column(self, theta, k, predictions):
+    def _column(self, theta: np.ndarray, k: int, predictions: Sequence[np.ndarray]) -> list[np.ndarray]:
         p = self.parameters[k - self.n]
         size = max(abs(theta[k] - p.neutral), THRESHOLDS.min_derivative_size * _max_step(p))
         scales = p.bounds[1] - p.bounds[0], THRESHOLDS.derivative_sds * self.sd[k], size
@@ -206,67 +281,107 @@ class JointProblem:
         return [o.whiten((b - a) / increment) for o, a, b in zip(self.observations, predictions, shifted_predictions)]
 
 
-def _prior(p):
+def _prior(p: Parameter) -> tuple[float, float]:
     low, high = p.bounds
     return p.prior if p.prior else (0.5 * (low + high), THRESHOLDS.default_prior_sd * (high - low))
 
 
-def _max_step(p):
+def _max_step(p: Parameter) -> float:
     return THRESHOLDS.max_term_step * (p.bounds[1] - p.bounds[0])
 
 
-def cost_at(case, candidates, psi, values):
-    """Minus twice the log posterior at these parameters and nuisances, without a fit."""
+def cost_at(case: Case, candidates: Iterable[Candidate], psi: np.ndarray, values: Mapping[str, float]) -> float:
+    """Minus twice the log posterior at these parameters and nuisances, without a fit.
+
+    Parameters
+    ----------
+    case : Case
+    candidates : iterable of Candidate
+    psi : (n_term,) array of float
+        Their parameters.
+    values : mapping
+        Nuisance parameter -> value; others are at their prior mean.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    SimulationError
+        If the model cannot be simulated there.
+    """
     joint = JointProblem(case, candidates)
     theta = np.concatenate([[values.get(n.name, n.mean) for n in case.nuisances], psi])
     return joint.cost(theta, joint.residuals(joint.predict(theta)))
 
 
 def fit_jointly(
-    case,
-    candidates=(),
-    start=None,
-    values=None,
-    reused_jacobian=None,
-    observations=None,
-    iterations=THRESHOLDS.n_steps,
-    min_gain=THRESHOLDS.min_gain,
-    stall=THRESHOLDS.stall,
-):
+    case: Case,
+    candidates: Iterable[Candidate] = (),
+    start: ArrayLike | None = None,
+    values: Mapping[str, float] | None = None,
+    reused_jacobian: Sequence[np.ndarray] | None = None,
+    observations: Iterable[Observation] | None = None,
+    iterations: int = THRESHOLDS.n_steps,
+    min_gain: float = THRESHOLDS.min_gain,
+    stall: float = THRESHOLDS.stall,
+) -> Fit:
     r"""Maximum of the posterior of nuisances and term parameters together.
 
     .. math:: \min_{\eta,\psi} \sum_k n_k \left[\ln s_k^2 + \overline{r^2}_k / s_k^2\right]
               + \sum (\eta - \mu)^2 / \sigma_\eta^2, \quad s_k \ge 1
 
-    Damped Gauss-Newton steps (Levenberg and Marquardt), until a step gains less than ``min_gain`` nats, or in an
-    expensive case ``stall`` of the cost per sample. ``start`` (n_term,) of psi. ``values`` of the nuisances. The
-    nuisance columns of ``reused_jacobian`` are used instead of new ones, and updated by Broyden's formula.
+    Damped Gauss-Newton steps (Levenberg and Marquardt).
+
+    Parameters
+    ----------
+    case : Case
+    candidates : iterable of Candidate
+        Effects in the model.
+    start : (n_term,) array of float or None
+        Parameters of the effects where the fit starts; None: neutral.
+    values : mapping or None
+        Nuisance parameters where the fit starts; others start where the case says, or at their prior mean.
+    reused_jacobian : sequence of array or None
+        Its nuisance columns are used instead of new ones, and updated by Broyden's formula.
+    observations : iterable of Observation or None
+        Those that are fitted; None: all of the case.
+    iterations : int
+        Largest number of steps.
+    min_gain : float
+        A step that gains less is the last. [nats]
+    stall : float
+        The same for an expensive case, as a share of the cost per sample.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    SimulationError
+        If the model cannot be simulated at the start, or beside a point at which derivatives are needed.
     """
     joint = JointProblem(case, candidates, observations, iterations, min_gain, stall)
     psi = np.array([p.neutral for p in joint.parameters]) if start is None else np.asarray(start, dtype=float)
     start_values = {**case.start_values, **(values or {})}
-    start_nuisances = [start_values.get(n.name, n.mean) for n in case.nuisances]
-    theta = np.concatenate([start_nuisances, psi])
+    theta = np.concatenate([[start_values.get(n.name, n.mean) for n in case.nuisances], psi])
     predictions = joint.predict(theta)
     residuals = joint.residuals(predictions)
-    cost, jacobian = joint.cost(theta, residuals), None
-    if theta.size:
-        jacobian = joint.jacobian(theta, predictions, reused_jacobian)
-        if reused_jacobian is not None:
-            jacobian = joint.with_new_cheap_columns(theta, predictions, jacobian)
-        theta, predictions, residuals, jacobian, cost = _iterate(
-            joint,
-            theta,
-            predictions,
-            residuals,
-            jacobian,
-            cost,
-            THRESHOLDS.n_refresh_steps if reused_jacobian is None else 0,
-        )
-    return _fit_result(joint, theta, predictions, residuals, jacobian, cost)
+    point = FitPoint(theta, predictions, residuals, joint.cost(theta, residuals))
+    if not theta.size:
+        return _fit_result(joint, point, [np.zeros((o.data.size, 0)) for o in joint.observations])
+    jacobian = joint.jacobian(theta, predictions, reused_jacobian)
+    if reused_jacobian is not None:
+        jacobian = joint.with_new_cheap_columns(theta, predictions, jacobian)
+    refresh_steps = THRESHOLDS.n_refresh_steps if reused_jacobian is None else 0
+    return _fit_result(joint, *_iterate(joint, point, jacobian, refresh_steps))
 
 
-def _iterate(joint, theta, predictions, residuals, jacobian, cost, refresh_steps):
+def _iterate(
+    joint: JointProblem, point: FitPoint, jacobian: list[np.ndarray], refresh_steps: int
+) -> tuple[FitPoint, list[np.ndarray]]:
     """Steps until nothing is gained.
 
     The Jacobian of an expensive case is updated. It is computed anew after every ``refresh_steps`` steps (0: never) and
@@ -275,15 +390,13 @@ def _iterate(joint, theta, predictions, residuals, jacobian, cost, refresh_steps
     expensive = joint.case.expensive
     min_decrease, n_since_refresh, damping = joint.min_decrease, 0, 0.0
     for _ in range(joint.iterations):
-        improvement, damping = DampedSteps(joint, theta, residuals, jacobian).first_improvement(cost, damping)
-        gain = cost - improvement[3] if improvement else 0.0
+        steps = DampedSteps(joint, point.theta, point.residuals, jacobian)
+        improvement, damping = steps.first_improvement(point.cost, damping)
+        gain = point.cost - improvement.cost if improvement else 0.0
         if improvement:
-            trial, new_predictions = improvement[0], improvement[1]
             if expensive:
-                step = trial - theta
-                jacobian = broyden_update(jacobian, step / joint.sd**2, step, residuals, improvement[2])
-                jacobian = joint.with_new_cheap_columns(trial, new_predictions, jacobian)
-            theta, predictions, residuals, cost = improvement
+                jacobian = _updated_jacobian(joint, jacobian, point, improvement)
+            point = improvement
         n_since_refresh += 1
         if (
             gain < min_decrease
@@ -292,40 +405,48 @@ def _iterate(joint, theta, predictions, residuals, jacobian, cost, refresh_steps
         ):
             break
         if not expensive or 0 < refresh_steps <= n_since_refresh or (refresh_steps and gain < min_decrease):
-            jacobian, n_since_refresh = _refreshed_jacobian(joint, theta, predictions, jacobian), 0
+            jacobian, n_since_refresh = _refreshed_jacobian(joint, point, jacobian), 0
     else:
-        jacobian = (
-            _refreshed_jacobian(joint, theta, predictions, jacobian) if refresh_steps and n_since_refresh else jacobian
-        )
-    return theta, predictions, residuals, jacobian, cost
+        if refresh_steps and n_since_refresh:
+            jacobian = _refreshed_jacobian(joint, point, jacobian)
+    return point, jacobian
 
 
-def _refreshed_jacobian(joint, theta, predictions, updated):
-    """A new Jacobian. In an expensive case the ``updated`` one if the simulation fails close to ``theta``."""
+def _updated_jacobian(
+    joint: JointProblem, jacobian: list[np.ndarray], before: FitPoint, after: FitPoint
+) -> list[np.ndarray]:
+    """The Jacobian after a step, updated; new for the cheap observations."""
+    step = after.theta - before.theta
+    jacobian = broyden_update(jacobian, step / joint.sd**2, step, before.residuals, after.residuals)
+    return joint.with_new_cheap_columns(after.theta, after.predictions, jacobian)
+
+
+def _refreshed_jacobian(joint: JointProblem, point: FitPoint, updated: list[np.ndarray]) -> list[np.ndarray]:
+    """A new Jacobian. In an expensive case the ``updated`` one if the simulation fails close to the point."""
     try:
-        return joint.jacobian(theta, predictions)
+        return joint.jacobian(point.theta, point.predictions)
     except SimulationError:
         if joint.case.expensive:
             return updated
         raise
 
 
-def _fit_result(joint, theta, predictions, residuals, jacobian, cost):
-    level = joint.level(residuals)
+def _fit_result(joint: JointProblem, point: FitPoint, jacobian: list[np.ndarray]) -> Fit:
+    """The fit that ends at this point, with its covariance and evidence."""
+    level, n = joint.level(point.residuals), point.theta.size
     scale = {data_type: max(1.0, v) for data_type, v in level.items()}
-    covariance, evidence = np.zeros((theta.size, theta.size)), -0.5 * cost
-    if theta.size:
-        normal = np.eye(theta.size)
+    covariance: np.ndarray = np.zeros((n, n))
+    evidence = -0.5 * point.cost
+    if n:
+        normal = np.eye(n)
         for o, j in zip(joint.observations, jacobian):
             scaled = np.sqrt(o.effective / scale[o.data_type]) * j * joint.sd
             normal += scaled.T @ scaled
         covariance = np.linalg.inv(normal) * np.outer(joint.sd, joint.sd)
         evidence -= 0.5 * float(np.linalg.slogdet(normal)[1])
-    else:
-        jacobian = [np.zeros((o.data.size, 0)) for o in joint.observations]
-    values, psi = joint.split(theta)
-    plain = [o.data - p for o, p in zip(joint.observations, predictions)]
+    values, psi = joint.split(point.theta)
+    plain = [o.data - p for o, p in zip(joint.observations, point.predictions)]
     return Fit(
-        values, joint.candidates, psi, predictions, plain, jacobian, scale, level, cost, covariance,
-        joint.evaluations, residuals, evidence,
+        values, joint.candidates, psi, point.predictions, plain, jacobian, scale, level, point.cost, covariance,
+        joint.evaluations, point.residuals, evidence,
     )  # fmt: skip

@@ -2,25 +2,44 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.cross_validation import weighted_mean_square
+from turnout.mismatch.engine.levenberg_marquardt import FitPoint
 from turnout.mismatch.engine.map_fit import JointProblem
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
+    from turnout.mismatch.engine.case import Case, Observation
     from turnout.mismatch.engine.map_fit import Fit
     from turnout.mismatch.engine.score import Score
     from turnout.mismatch.engine.search import Search
 
 
-def fit_percent(observations, predictions, centre=True):
-    r"""Share of the recordings that is predicted, :math:`100 (1 - \|y - \hat y\| / \|y - \bar y\|)` in units of sigma.
+def fit_percent(observations: Sequence[Observation], predictions: Sequence[np.ndarray], centre: bool = True) -> float:
+    r"""Share of the recordings that is predicted, in units of sigma.
 
+    .. math:: 100 (1 - \|y - \hat y\| / \|y - \bar y\|)
+
+    Parameters
+    ----------
+    observations : sequence of Observation
+    predictions : sequence of (n,) array of float
+    centre : bool
+        Whether the mean of each recording is subtracted from it.
+
+    Returns
+    -------
+    float
+        [%]
+
+    Examples
+    --------
     >>> from turnout.mismatch.engine.case import Observation
     >>> y = np.array([1.0, -1.0, 1.0, -1.0])
     >>> fit_percent([Observation("a", "a", y, 1.0)], [0.9 * y])
@@ -34,8 +53,21 @@ def fit_percent(observations, predictions, centre=True):
     return round(100.0 * (1.0 - float(np.sqrt(missed / total))), 4)
 
 
-def reserved_fit(case, fit):
-    """(predictions of the reserved recordings, fit [%]) by a fitted model. (None, None) if the simulation fails."""
+def reserved_fit(case: Case, fit: Fit) -> tuple[list[np.ndarray], float] | tuple[None, None]:
+    """Predictions of the reserved recordings by a fitted model, and how well they fit.
+
+    Parameters
+    ----------
+    case : Case
+    fit : Fit
+
+    Returns
+    -------
+    predictions : list of array or None
+        None if the simulation fails.
+    percent : float or None
+        As ``fit_percent``. [%]
+    """
     try:
         predictions = predict_reserved(case, fit, case.reserved)
     except SimulationError:
@@ -43,12 +75,27 @@ def reserved_fit(case, fit):
     return predictions, fit_percent(case.reserved, predictions)
 
 
-def gain_error(observations, before, after):
-    r"""Standard error of ``fit_percent`` of ``after`` less that of ``before``, in points.
+def gain_error(observations: Sequence[Observation], before: Sequence[np.ndarray], after: Sequence[np.ndarray]) -> float:
+    r"""Standard error of ``fit_percent`` of ``after`` less that of ``before``.
 
-    Jackknife over ``n_blocks`` stretches of each observation, each in all of its rows (Efron and Stein 1981): with the
-    gain :math:`d_i` of all stretches but one, :math:`\sqrt{(m - 1) / m \sum (d_i - \bar d)^2}`. Both fits lack the same
-    roughness, and so do all sensors under one train. The gain is therefore more certain than either fit.
+    Jackknife over stretches of each observation, each in all of its rows: with the gain :math:`d_i` of all stretches
+    but one, :math:`\sqrt{(m - 1) / m \sum (d_i - \bar d)^2}`. Both fits lack the same roughness, and so do all sensors
+    under one train. The gain is therefore more certain than either fit.
+
+    Parameters
+    ----------
+    observations : sequence of Observation
+    before, after : sequence of (n,) array of float
+        Two predictions of each.
+
+    Returns
+    -------
+    float
+        In points of fit.
+
+    References
+    ----------
+    Efron and Stein 1981, The jackknife estimate of variance.
     """
     sums = np.array([_block_squares(o, b, a) for o, b, a in zip(observations, before, after)]).transpose(1, 0, 2)
     missed_before, missed_after, total = (np.sum(s) - s.ravel() for s in sums)
@@ -56,23 +103,37 @@ def gain_error(observations, before, after):
     return float(np.sqrt((gain.size - 1) * np.var(gain)))
 
 
-def _block_squares(o, before, after):
+def _block_squares(o: Observation, before: np.ndarray, after: np.ndarray) -> list[list[float]]:
     """(3, n_blocks) weighted sums of squares of the residuals ``before`` and ``after``, and of the recording."""
     residuals = (o.data - before, o.data - after, o.data - np.mean(o.data))
     return [_block_sums(o, (p / o.sigma) ** 2) for p in residuals]
 
 
-def _block_sums(o, squares):
+def _block_sums(o: Observation, squares: np.ndarray) -> list[float]:
     """(n_blocks,) sums of ``squares`` (n,) over stretches of the observation, each in all of its rows."""
     per_sample = squares.reshape(o.rows, -1).sum(axis=0)
     return [o.effective * float(np.sum(b)) for b in np.array_split(per_sample, THRESHOLDS.n_blocks)]
 
 
-def is_significantly_worse(observations, before, after, points):
-    """Whether ``after`` fits worse than ``before`` by more than ``points`` of fit and than two standard errors.
+def is_significantly_worse(
+    observations: Sequence[Observation], before: Sequence[np.ndarray], after: Sequence[np.ndarray], points: float
+) -> bool:
+    """Whether a prediction fits worse by more than some points of fit and two standard errors.
 
-    The standard error is that of the difference of weighted squares over ``n_blocks`` stretches of each observation,
-    each in all of its rows. One in six names that say nothing about these observations reaches one standard error.
+    The standard error is that of the difference of weighted squares over stretches of each observation, each in all of
+    its rows. One in six names that say nothing about these observations reaches one standard error.
+
+    Parameters
+    ----------
+    observations : sequence of Observation
+    before, after : sequence of (n,) array of float
+        Two predictions of each.
+    points : float
+        Loss of ``fit_percent`` that is allowed.
+
+    Returns
+    -------
+    bool
     """
     losses = (((o.data - a) ** 2 - (o.data - b) ** 2) / o.sigma**2 for o, b, a in zip(observations, before, after))
     block_losses = [block_loss for o, d in zip(observations, losses) for block_loss in _block_sums(o, d)]
@@ -83,11 +144,26 @@ def is_significantly_worse(observations, before, after, points):
     )
 
 
-def predict_reserved(case, fit, observations):
-    """Predictions of ``observations`` by the fitted model; only nuisances that they own are fitted to them.
+def predict_reserved(case: Case, fit: Fit, observations: Sequence[Observation]) -> list[np.ndarray]:
+    """Predictions by the fitted model; only nuisances that the observations own are fitted to them.
 
-    Any model gets the same freedom (speed, time and load of a passage), so that models stay comparable. SimulationError
-    if the model cannot be simulated there.
+    Any model gets the same freedom (speed, time and load of a passage), so that models stay comparable.
+
+    Parameters
+    ----------
+    case : Case
+    fit : Fit
+    observations : sequence of Observation
+        Reserved ones.
+
+    Returns
+    -------
+    list of (n,) array of float
+
+    Raises
+    ------
+    SimulationError
+        If the model cannot be simulated there.
     """
     joint = JointProblem(case, fit.candidates, observations)
     theta = np.concatenate([[fit.values[n.name] for n in case.nuisances], fit.psi])
@@ -101,17 +177,25 @@ def predict_reserved(case, fit, observations):
     for _ in range(THRESHOLDS.max_reserved_steps):
         step = _owned_step(case, joint, theta, fit.terms, predictions, residuals, is_owned)
         trials = (_try_step(joint, theta, is_owned, 0.5**h * step) for h in range(THRESHOLDS.n_step_trials))
-        improvement = next((f for f in trials if f is not None and f[3] < cost), None)
+        improvement = next((f for f in trials if f is not None and f.cost < cost), None)
         if improvement is None:
             break
-        gain = cost - improvement[3]
+        gain = cost - improvement.cost
         theta, predictions, residuals, cost = improvement
         if gain < THRESHOLDS.min_cost_decrease:
             break
     return predictions
 
 
-def _owned_step(case, joint, theta, terms, predictions, residuals, is_owned):
+def _owned_step(
+    case: Case,
+    joint: JointProblem,
+    theta: np.ndarray,
+    terms: tuple[Any, ...],
+    predictions: Sequence[np.ndarray],
+    residuals: Sequence[np.ndarray],
+    is_owned: np.ndarray,
+) -> np.ndarray:
     """Gauss-Newton step of the nuisances that the observations own, at most one prior standard deviation each."""
     white = _owned_columns(case, joint, theta, terms, predictions, is_owned)
     scale = {data_type: max(1.0, v) for data_type, v in joint.level(residuals).items()}
@@ -122,17 +206,24 @@ def _owned_step(case, joint, theta, terms, predictions, residuals, is_owned):
     return joint.sd[is_owned] * np.clip(step, -1.0, 1.0)
 
 
-def _try_step(joint, theta, is_owned, step):
+def _try_step(joint: JointProblem, theta: np.ndarray, is_owned: np.ndarray, step: np.ndarray) -> FitPoint | None:
     trial = theta.copy()
     trial[is_owned] += step
     predictions = joint.predict_or_none(trial)
     if predictions is None:
         return None
     residuals = joint.residuals(predictions)
-    return trial, predictions, residuals, joint.cost(trial, residuals)
+    return FitPoint(trial, predictions, residuals, joint.cost(trial, residuals))
 
 
-def _owned_columns(case, joint, theta, terms, predictions, is_owned):
+def _owned_columns(
+    case: Case,
+    joint: JointProblem,
+    theta: np.ndarray,
+    terms: tuple[Any, ...],
+    predictions: Sequence[np.ndarray],
+    is_owned: np.ndarray,
+) -> list[np.ndarray]:
     """Whitened derivatives by the owned nuisances, for each observation by its own alone."""
     values, jacobians = joint.split(theta)[0], []
     owned = [n for n, selected in zip(case.nuisances, is_owned) if selected]
@@ -145,18 +236,40 @@ def _owned_columns(case, joint, theta, terms, predictions, is_owned):
     return jacobians
 
 
-def predict_with_decoy(observations, predictions, reserved, reserved_predictions, n):
-    """Predictions of ``reserved`` by the base model and a filter of ``n`` free taps behind it.
+def predict_with_decoy(
+    observations: Sequence[Observation],
+    predictions: Sequence[np.ndarray],
+    reserved: Sequence[Observation],
+    reserved_predictions: Sequence[np.ndarray],
+    n: int,
+) -> list[np.ndarray]:
+    """Predictions of reserved recordings by the base model and a filter of free taps behind it.
 
-    The taps (on the prediction delayed and advanced) are fitted to the ``observations`` of the reserved data types.
-    They show what any n free numbers gain.
+    The taps (on the prediction delayed and advanced) are fitted to the observations of the reserved data types. They
+    show what any such free numbers gain.
+
+    Parameters
+    ----------
+    observations : sequence of Observation
+        Those that were fitted.
+    predictions : sequence of (n,) array of float
+        Of these.
+    reserved : sequence of Observation
+    reserved_predictions : sequence of (n,) array of float
+        Of these.
+    n : int
+        Number of taps.
+
+    Returns
+    -------
+    list of (n,) array of float
     """
     kinds = {o.data_type for o in reserved}
     fitted = [(o, p, np.sqrt(o.effective) / o.sigma) for o, p in zip(observations, predictions) if o.data_type in kinds]
     if not fitted:
         return list(reserved_predictions)
 
-    def columns(p):
+    def columns(p: np.ndarray) -> np.ndarray:
         shifts = [s for k in range(1, n + 1) for s in (k, -k)][:n]
         return np.column_stack([np.roll(p, s) for s in shifts])
 
@@ -209,7 +322,7 @@ def verify(search: Search, base: Fit, fit: Fit, rival: Score | None) -> Verifica
     if not case.reserved:
         return Verification(0, float("nan"))
     n, (before, before_percent) = len(case.reserved), reserved_fit(case, base)
-    if before is None:
+    if before is None or before_percent is None:
         return Verification(n, float("nan"))
     excess = reserved_excess_ratio(search, before)
     if fit is base:

@@ -5,12 +5,21 @@ level stands out only by more than the other levels of its frame differ among th
 valid for any dependence of the cells within a level.
 """
 
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.stats import t as student
 
 from turnout.mismatch.engine.thresholds import THRESHOLDS
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from turnout.mismatch.engine.case import Observation
 
 
 @dataclass(frozen=True)
@@ -22,7 +31,7 @@ class Attribution:
     """
 
     frame: str
-    level: object
+    level: Any
     effect: float
     share: float
     p: float
@@ -30,9 +39,26 @@ class Attribution:
     n: int
 
 
-def cell_energies(observations, residuals):
-    """Log mean square of the whitened residual of every cell, (n,), and its levels: frame -> (n,) object."""
-    energy, labels, names = [], {}, sorted({k for o in observations for k in o.labels})
+def cell_energies(
+    observations: Sequence[Observation], residuals: Sequence[np.ndarray]
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Log mean square of the whitened residual of every cell, and the levels of each cell.
+
+    Parameters
+    ----------
+    observations : sequence of Observation
+        Those without cells are left out.
+    residuals : sequence of (n,) array of float
+        In the unit of the data.
+
+    Returns
+    -------
+    energy : (n,) array of float
+    labels : dict
+        Frame -> (n,) levels; None where a cell has no such frame.
+    """
+    energy, names = [], sorted({k for o in observations for k in o.labels})
+    labels: dict[str, list[np.ndarray]] = {}
     for o, r in zip(observations, residuals):
         if o.cells is None:
             continue
@@ -51,7 +77,7 @@ def cell_energies(observations, residuals):
     return np.concatenate(energy), {name: np.concatenate(v) for name, v in labels.items()}
 
 
-def attribute(energy, labels):
+def attribute(energy: ArrayLike, labels: Mapping[str, np.ndarray]) -> list[Attribution]:
     r"""Frames in order of evidence.
 
     The means of the other frames' levels are subtracted first (two-way). The largest of the means of L levels is then
@@ -96,9 +122,20 @@ def attribute(energy, labels):
     return sorted((replace(f, q=q) for f, q in zip(attributions, corrected)), key=lambda f: (f.q, -f.share))
 
 
-def outlier_p_value(means):
-    """Probability that the largest of ``means`` (n,) stands out as much, or more, if all are alike.
+def outlier_p_value(means: np.ndarray) -> float:
+    """Probability that the largest of some means stands out as much, or more, if all are alike.
 
+    Parameters
+    ----------
+    means : (n,) array of float
+
+    Returns
+    -------
+    float
+        1 for fewer means than can be compared.
+
+    Examples
+    --------
     >>> round(outlier_p_value(np.array([0.0, 0.1, -0.1, 3.0])), 3), outlier_p_value(np.array([0.0, 3.0]))
     (0.003, 1.0)
     """
@@ -109,7 +146,7 @@ def outlier_p_value(means):
     return min(1.0, means.size * float(student.sf((means.max() - remaining.mean()) / spread, remaining.size - 1)))
 
 
-def _without_other_frames(e, name, codes):
+def _without_other_frames(e: np.ndarray, name: str, codes: Mapping[str, np.ndarray]) -> np.ndarray:
     """Log energy less the level means of all other frames, in two sweeps.
 
     A frame is skipped if each of its levels lies within one level of this frame, as axles within trains: it would
@@ -125,14 +162,28 @@ def _without_other_frames(e, name, codes):
     return e
 
 
-def _is_nested(inner, outer):
+def _is_nested(inner: np.ndarray, outer: np.ndarray) -> bool:
     pairs = np.unique(inner.astype(np.int64) * (outer.max() + 1) + outer)
     return pairs.size == np.unique(inner).size
 
 
-def benjamini_hochberg(p):
-    """Corrected p values: expected share of wrong discoveries if all below are called (Benjamini, Hochberg 1995).
+def benjamini_hochberg(p: ArrayLike) -> list[float]:
+    """Corrected p values: expected share of wrong discoveries if all below are called.
 
+    Parameters
+    ----------
+    p : (n,) sequence of float
+
+    Returns
+    -------
+    list of float
+
+    References
+    ----------
+    Benjamini and Hochberg 1995, Controlling the false discovery rate.
+
+    Examples
+    --------
     >>> [round(q, 3) for q in benjamini_hochberg([0.01, 0.04, 0.03])]
     [0.03, 0.04, 0.04]
     """

@@ -1,10 +1,18 @@
 """Score of a candidate after its joint refit: its gain, and what supports and contradicts it."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.mismatch.engine.thresholds import THRESHOLDS
+
+if TYPE_CHECKING:
+    from turnout.config.settings.mismatch import MismatchSettings
+    from turnout.mismatch.engine.candidate import Candidate
+    from turnout.mismatch.engine.map_fit import Fit
 
 
 @dataclass(frozen=True)
@@ -18,40 +26,41 @@ class Score:
     effect shows.
     """
 
-    candidate: object
+    candidate: Candidate
     gain: float
     worst_gain: float
     explained: float
-    fit: object
-    by_condition: dict = field(default_factory=dict)
+    fit: Fit
+    by_condition: dict[str, float] = field(default_factory=dict)
     is_ordinary: bool = False
     single_witness: str = ""
     unmasked_gain: float = 0.0
 
     @property
-    def estimates(self):
+    def estimates(self) -> tuple[np.ndarray, np.ndarray]:
         """(values, standard errors) of its parameters; the first is the size of the effect."""
         psi_slice = self.fit.part(self.candidate)
         return self.fit.psi[psi_slice], self.fit.psi_se[psi_slice]
 
     @property
-    def family(self):
+    def family(self) -> str:
         """Name of the effect."""
         return self.candidate.family
 
     @property
-    def is_reportable(self):
+    def is_reportable(self) -> bool:
         """Whether it is so large that somebody would act."""
         if self.is_ordinary:
             return False
         parameters, n_size = self.candidate.parameters, self.candidate.n_size_parameters
-        size = np.linalg.norm(self.estimates[0][:n_size] - self.candidate.neutral[:n_size]) if parameters else np.inf
+        change = self.estimates[0][:n_size] - self.candidate.neutral[:n_size] if parameters else np.array([np.inf])
+        size = float(np.linalg.norm(change))
         uncertainty = (
             self.candidate.min_significance * float(self.estimates[1][0]) if self.candidate.min_significance else 0.0
         )
         return size - uncertainty >= self.candidate.smallest_reportable
 
-    def exemption_reason(self, settings):
+    def exemption_reason(self, settings: MismatchSettings) -> str:
         """Reason, in words, why the residual of the fit does not count against it, "" if there is none.
 
         Either external evidence alone is enough, and the fit becomes worse by no more than a margin. Or conditions
@@ -68,34 +77,34 @@ class Score:
         is_unmasked = self.unmasked_gain - position_cost > settings.threshold
         return "seen where the effect named before does not show" if is_unmasked else ""
 
-    def explains_too_little(self, excess, settings):
+    def explains_too_little(self, excess: float, settings: MismatchSettings) -> bool:
         """Whether it explains too little of an ``excess`` over controls to be its cause."""
         return excess > 1.0 and self.explained < settings.explained
 
     @property
-    def is_unbounded(self):
+    def is_unbounded(self) -> bool:
         """Whether only a lower limit of its size is known, and beyond it is its ``unbounded_form``."""
         if not self.candidate.unbounded_form:
             return False
         sizes, errors = self.estimates
         return bool(errors[0] > THRESHOLDS.max_bounded_error * abs(sizes[0] - self.candidate.neutral[0]))
 
-    def is_limit_of(self, rival):
+    def is_limit_of(self, rival: Score) -> bool:
         """Whether ``rival`` at the same site is at its bound, within a standard error, where it looks like this one."""
-        if getattr(rival.candidate, "limit_form", "") != self.family or rival.candidate.where != self.candidate.where:
+        if rival.candidate.limit_form != self.family or rival.candidate.where != self.candidate.where:
             return False
         sizes, errors = rival.estimates
         return float(sizes[0] - errors[0]) <= rival.candidate.parameters[0].bounds[0]
 
-    def is_simpler_form_of(self, rival):
+    def is_simpler_form_of(self, rival: Score) -> bool:
         """Whether ``rival`` at the same site is the same effect with one more parameter: the sizes agree."""
         family, k = rival.candidate.simpler_form or ("", 0)
         if family != self.family or rival.candidate.where != self.candidate.where:
             return False
         (own_sizes, error), (rival_sizes, errors) = self.estimates, rival.estimates
-        return abs(own_sizes[0] - rival_sizes[k]) <= 2.0 * np.hypot(error[0], errors[k])
+        return bool(abs(own_sizes[0] - rival_sizes[k]) <= 2.0 * np.hypot(error[0], errors[k]))
 
-    def is_independent_of(self, rival):
+    def is_independent_of(self, rival: Score) -> bool:
         """Whether two effects confirm one another.
 
         Two of one family, or of one component, do not: together they can correct nearly any shape. Those of two trains

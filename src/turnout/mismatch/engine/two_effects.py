@@ -272,7 +272,7 @@ class PairEvidence:
         (before, before_percent), (after, after_percent) = (
             reserved_fit(case, fit) for fit in (first_alone, self.findings.fit)
         )
-        if before is None or after is None:
+        if before is None or after is None or before_percent is None or after_percent is None:
             return False
         return before_percent - after_percent > max(THRESHOLDS.max_fit_loss, gain_error(case.reserved, before, after))
 
