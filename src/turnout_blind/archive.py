@@ -1,8 +1,11 @@
 """Store a revealed set in one small file: seals, truths and findings. Seeds reproduce the recordings."""
 
+from __future__ import annotations
+
 import gzip
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from turnout_blind.campaign import stage
 from turnout_blind.effect import load_effects
@@ -11,13 +14,38 @@ from turnout_blind.seal import SET_FILE, BlindError, digest, file_digests, verif
 from turnout_blind.site import PLAIN
 from turnout_blind.strata import CasePlan, case_id, plan_cases
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import Any
+
+    from turnout_blind.effect import Effect
+
 ARCHIVE_NAME = "set.json.gz"
 
 
-def write_archive(out, folder, truth=None):
+def write_archive(out: str | Path, folder: str | Path, truth: str | Path | None = None) -> Path:
     """Write ``folder``/set.json.gz: the commit, the sealed truths, and the findings where the set was diagnosed.
 
-    ``truth`` is the folder of truths, by default those revealed in ``out``. All seals are verified first.
+    All seals are verified first.
+
+    Parameters
+    ----------
+    out : str or Path
+        Folder of the set.
+    folder : str or Path
+        Folder of the archive, created where it does not exist.
+    truth : str, Path or None
+        Folder of the truths; None: those revealed in ``out``.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    BlindError
+        If a seal is broken.
     """
     out, folder = Path(out), Path(folder)
     truth = out / "revealed" if truth is None else Path(truth)
@@ -36,16 +64,44 @@ def write_archive(out, folder, truth=None):
     return folder / ARCHIVE_NAME
 
 
-def read_archive(folder):
-    """Content of an archive, as ``write_archive`` wrote it."""
+def read_archive(folder: str | Path) -> dict[str, Any]:
+    """Content of an archive, as ``write_archive`` wrote it.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Folder of the archive.
+
+    Returns
+    -------
+    dict
+        "commit" and "set" as text, "truths" by case, "rows" by case, "diagnosis".
+    """
     return json.loads(gzip.decompress((Path(folder) / ARCHIVE_NAME).read_bytes()))
 
 
-def verify_archive(archive, effects=None):
-    """Truths by case, after every check that needs no recording. BlindError at the first check that fails.
+def verify_archive(archive: Mapping[str, Any], effects: Mapping[str, Effect] | None = None) -> dict[str, Any]:
+    """Truths by case, after every check that needs no recording.
 
     Checked are the seals of set and truths, and the ids, strata, effects and seeds of the plan. Position and size of
     every effect must be those that the seed of the case draws.
+
+    Parameters
+    ----------
+    archive : mapping
+        Content of an archive, from ``read_archive``.
+    effects : mapping or None
+        Effects by kind; None: those of the package.
+
+    Returns
+    -------
+    dict
+        Truth by case.
+
+    Raises
+    ------
+    BlindError
+        At the first check that fails.
     """
     commit, set_info = json.loads(archive["commit"]), json.loads(archive["set"])
     effects = effects or load_effects()
@@ -71,8 +127,23 @@ def verify_archive(archive, effects=None):
     return truths
 
 
-def verify_recordings(archive, case, folder):
-    """BlindError if the files of a regenerated case below ``folder``/``case`` differ from the sealed ones."""
+def verify_recordings(archive: Mapping[str, Any], case: str, folder: str | Path) -> None:
+    """Compare the files of a regenerated case with the sealed ones.
+
+    Parameters
+    ----------
+    archive : mapping
+        Content of an archive, from ``read_archive``.
+    case : str
+        Id of the case.
+    folder : str or Path
+        Folder with a folder for the case.
+
+    Raises
+    ------
+    BlindError
+        If they differ.
+    """
     _check_same(
         Path(folder) / case,
         "files",
@@ -81,23 +152,36 @@ def verify_recordings(archive, case, folder):
     )
 
 
-def plan_of(archive, case):
-    """``CasePlan`` of an archived case."""
+def plan_of(archive: Mapping[str, Any], case: str) -> CasePlan:
+    """``CasePlan`` of an archived case.
+
+    Parameters
+    ----------
+    archive : mapping
+        Content of an archive, from ``read_archive``.
+    case : str
+        Id of the case.
+
+    Returns
+    -------
+    CasePlan
+        The plan.
+    """
     truth = json.loads(archive["truths"][case])
     return CasePlan(
         truth["stratum"], tuple((e["kind"], e["rung"]) for e in truth["effects"]), tuple(truth["seed"]), _panel(truth)
     )
 
 
-def _panel(description):
+def _panel(description: Mapping[str, Any]) -> str:
     """Panel of a set or a case. Older sets had plain track only."""
     return description.get("panel", PLAIN)
 
 
-def _as_json(mapping):
+def _as_json(mapping: Mapping[str, Any]) -> dict[str, Any]:
     return json.loads(json.dumps(dict(mapping)))
 
 
-def _check_same(path, where, actual, expected):
+def _check_same(path: str | Path, where: str, actual: Any, expected: Any) -> None:
     if actual != expected:
         raise BlindError(path, where, "not what was sealed", "Take the kept set from its commit again")

@@ -3,10 +3,13 @@
 The truth is returned and not written here.
 """
 
+from __future__ import annotations
+
 import csv
 import os
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,11 +19,37 @@ from turnout_blind.record import CAMPAIGNS, FIRST_PASSAGE, N_IMPACTS, PASSAGE_IN
 from turnout_blind.site import draw_site
 from turnout_blind.visibility import effect_visibility
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+    from typing import Any
+
+    from turnout_blind.effect import ConcealedEffect, Effect
+    from turnout_blind.site import Site
+    from turnout_blind.strata import CasePlan
+    from turnout_blind.true_site import World
+
 FILE_TIME = 1_700_000_000  # modification time of every file [s since 1970]
 
 
-def make_case(folder, case, plan, effects):
-    """Write the campaign of a ``plan`` (``strata.CasePlan``) below ``folder``/``case``; returns its truth (a dict)."""
+def make_case(folder: str | Path, case: str, plan: CasePlan, effects: Mapping[str, Effect]) -> dict[str, Any]:
+    """Write the campaign of a plan below ``folder``/``case``.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Folder of the cases.
+    case : str
+        Id of the case.
+    plan : CasePlan
+        Plan of the case.
+    effects : mapping
+        Effects by kind.
+
+    Returns
+    -------
+    dict
+        Truth of the case.
+    """
     rng, site, world, concealed = stage(plan, effects)
     decoys, decoy_truth = draw_decoys(rng, site)
     folder = Path(folder) / case
@@ -45,10 +74,25 @@ def make_case(folder, case, plan, effects):
     }
 
 
-def stage(plan, effects):
-    """(random generator, site, world with the effects in it, list of ``ConcealedEffect``) of a plan."""
+def stage(
+    plan: CasePlan, effects: Mapping[str, Effect]
+) -> tuple[np.random.Generator, Site, World, list[ConcealedEffect]]:
+    """Site and world of a plan.
+
+    Parameters
+    ----------
+    plan : CasePlan
+        Plan of the case.
+    effects : mapping
+        Effects by kind.
+
+    Returns
+    -------
+    (Generator, Site, World, list of ConcealedEffect)
+        Random generator, site, world with the effects in it, and the effects.
+    """
     rng = np.random.default_rng(list(plan.seed))
-    options = {"panel": plan.panel}
+    options: dict[str, Any] = {"panel": plan.panel}
     for effect_type, _ in plan.effects:
         options.update(effects[effect_type].site)
     site = draw_site(rng, **options)
@@ -60,8 +104,21 @@ def stage(plan, effects):
     return rng, site, world, concealed
 
 
-def draw_decoys(rng, site):
-    """Visible but harmless disturbances: (what is added to the recordings, their description in the truth)."""
+def draw_decoys(rng: np.random.Generator, site: Site) -> tuple[dict[Any, Any], dict[str, Any]]:
+    """Visible but harmless disturbances.
+
+    Parameters
+    ----------
+    rng : Generator
+        Source of the random numbers.
+    site : Site
+        The site.
+
+    Returns
+    -------
+    (dict, dict)
+        What is added to the recordings, by sensor or by impact; its description in the truth.
+    """
     hum_sensor = str(rng.choice(site.names()))
     hum_frequency, hum_level = float(rng.choice([50.0, 16.7])), float(rng.uniform(0.02, 0.1))
     noisy_sensor = str(rng.choice([n for n in site.names() if n != hum_sensor]))
@@ -88,7 +145,9 @@ def draw_decoys(rng, site):
     }
 
 
-def _write_recordings(folder, site, world, rng, decoys):
+def _write_recordings(
+    folder: Path, site: Site, world: World, rng: np.random.Generator, decoys: Mapping[Any, Any]
+) -> None:
     (folder / "passages").mkdir(parents=True, exist_ok=True)
     for c, when in enumerate(CAMPAIGNS):
         campaign_folder = folder / "hammer" / when.date().isoformat()
@@ -110,7 +169,7 @@ def _write_recordings(folder, site, world, rng, decoys):
     _write_notes(folder, site, speeds, rng)
 
 
-def _write_notes(folder, site, speeds, rng):
+def _write_notes(folder: Path, site: Site, speeds: Sequence[float], rng: np.random.Generator) -> None:
     """Write campaigns.csv and trains.csv with realistic errors of such notes. One train in eight has no speed."""
     rows = [["campaign", "started_at_utc", "rail_temperature_c", "hammer_id", "tip", "operator"]]
     for when, t in zip(CAMPAIGNS, site.temperatures):
@@ -130,12 +189,12 @@ def _write_notes(folder, site, speeds, rng):
     _write_csv(folder / "trains.csv", rows)
 
 
-def _write_csv(path, rows):
+def _write_csv(path: Path, rows: Iterable[Sequence[str]]) -> None:
     with open(path, "w", newline="") as file:
         csv.writer(file, lineterminator="\n").writerows(rows)
 
 
-def _set_file_times(folder):
+def _set_file_times(folder: Path) -> None:
     """Give all files the same modification time."""
     for path in sorted(Path(folder).rglob("*")):
         os.utime(path, (FILE_TIME, FILE_TIME))

@@ -1,5 +1,7 @@
 """Run the unchanged tool on every case of a set, in processes that cannot read the truth."""
 
+from __future__ import annotations
+
 import json
 import os
 import shlex
@@ -7,11 +9,16 @@ import shutil
 import sys
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import turnout
 from turnout_blind.isolation import HiddenFolders
 from turnout_blind.limited_process import run, with_cpu_limit
 from turnout_blind.seal import BlindError, digest, digest_of_folder, read_commit
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterable, Mapping
+    from typing import Any
 
 # Runs in a copy of the case, which holds config/ and raw/. Filled in are {python}, {case}, {folder} (the copy), {work}
 # (a folder for this case) and {out} (a JSON file of rows). Without {out} the rows are the JSON that the tool prints.
@@ -20,22 +27,63 @@ MAX_WALL_TIME, MAX_CPU_TIME = 1800.0, 900.0  # budget of a case: wall clock and 
 
 
 def diagnose_set(
-    out, truth, command=COMMAND, only=None, timeout=MAX_WALL_TIME, workers=1, report=print, cpu=MAX_CPU_TIME,
-    again=False, progress=None, label=None,
-):  # fmt: skip
-    """Write ``out``/findings/<case>.json and ``out``/diagnosis.json; returns the content of diagnosis.json.
+    out: str | Path,
+    truth: str | Path,
+    command: str = COMMAND,
+    only: Collection[str] | None = None,
+    timeout: float = MAX_WALL_TIME,
+    workers: int = 1,
+    report: Callable[[str], Any] = print,
+    cpu: float = MAX_CPU_TIME,
+    again: bool = False,
+    progress: Callable[..., Iterable] | None = None,
+    label: str | None = None,
+) -> dict[str, Any]:
+    """Write ``out``/findings/<case>.json and ``out``/diagnosis.json.
 
-    A case that has run is not run again; with ``again`` failed ones are. BlindError if the tool or the command has
-    changed, or if the set is revealed already. A case fails if the tool fails, or exceeds ``timeout`` [s] of wall clock
-    or ``cpu`` [s]. It then has no rows, only the last line of output. A failure never stops the other cases, and the
-    scorer counts it as no answer. ``only`` lists the cases to run, ``workers`` is the number at a time, and
-    ``progress`` wraps the finished cases. With a ``label`` it is an ablation: another command on the same cases, stored
-    below ``out``/ablations/<label>.
+    A case that has run is not run again; with ``again`` failed ones are. A case fails if the tool fails, or exceeds its
+    budget. It then has no rows, only the last line of output. A failure never stops the other cases, and the scorer
+    counts it as no answer.
+
+    Parameters
+    ----------
+    out : str or Path
+        Folder of the set.
+    truth : str or Path
+        Folder of the truths.
+    command : str
+        Command of a case, see ``COMMAND``.
+    only : collection of str or None
+        Cases to run; None: all.
+    timeout : float
+        Limit of wall clock per case. [s]
+    workers : int
+        Number of cases at a time.
+    report : callable
+        Called with a line for each case.
+    cpu : float
+        Limit of CPU time per case. [s]
+    again : bool
+        Whether failed cases are run again.
+    progress : callable or None
+        (iterable of finished cases, their number) -> iterable.
+    label : str or None
+        Name of an ablation: another command on the same cases, stored below ``out``/ablations/<label>.
+
+    Returns
+    -------
+    dict
+        Content of diagnosis.json.
+
+    Raises
+    ------
+    BlindError
+        If the tool or the command has changed, if the set was made for another tool, or if it is revealed already.
     """
     out, commit = Path(out).resolve(), read_commit(out)
     tool, folder = Path(turnout.__file__).parent, diagnosis_folder(out, label)
     tool_sha256, record_path = digest_of_folder(tool), folder / "diagnosis.json"
-    diagnosis = (
+    diagnosis: dict[str, Any] = (
         json.loads(record_path.read_text()) if record_path.exists() else {"tool_sha256": tool_sha256, "cases": {}}
     )
     if diagnosis["tool_sha256"] != tool_sha256:
@@ -78,29 +126,44 @@ def diagnose_set(
     return diagnosis
 
 
-def _is_pending(run, again):
+def _is_pending(run: Mapping[str, Any] | None, again: bool) -> bool:
     return run is None or (again and run["status"] != "answered")
 
 
-def _write_record(path, diagnosis):
+def _write_record(path: Path, diagnosis: Mapping[str, Any]) -> None:
     """Replace the file at once: an interrupted write leaves the former file."""
     temporary = path.with_suffix(".part")
     temporary.write_text(json.dumps(diagnosis, indent=1, sort_keys=True) + "\n")
     os.replace(temporary, path)
 
 
-def _generator_folders():
+def _generator_folders() -> list[Path]:
     """Folders of every copy of this package that an import could find."""
     folders = {Path(__file__).parent, *(Path(p or ".").resolve() / "turnout_blind" for p in sys.path)}
     return sorted(folder for folder in folders if folder.is_dir())
 
 
-def diagnosis_folder(out, label=None):
-    """Folder of the findings: of the tool, or of an ablation of it."""
+def diagnosis_folder(out: str | Path, label: str | None = None) -> Path:
+    """Folder of the findings: of the tool, or of an ablation of it.
+
+    Parameters
+    ----------
+    out : str or Path
+        Folder of the set.
+    label : str or None
+        Name of an ablation; None: the tool itself.
+
+    Returns
+    -------
+    Path
+        The folder.
+    """
     return Path(out) if label is None else Path(out) / "ablations" / label
 
 
-def _diagnose_safely(hidden, folders, case, command, timeout, cpu):
+def _diagnose_safely(
+    hidden: HiddenFolders, folders: tuple[Path, Path], case: str, command: str, timeout: float, cpu: float
+) -> dict[str, Any]:
     """``_diagnose_case``, with any error turned into the result of that case."""
     try:
         return _diagnose_case(hidden, *folders, case, command, timeout, cpu)
@@ -108,7 +171,9 @@ def _diagnose_safely(hidden, folders, case, command, timeout, cpu):
         return _run_record("failed", -1, 0.0, 0.0, f"{type(error).__name__}: {error}", None)
 
 
-def _diagnose_case(hidden, out, folder, case, command, timeout, cpu):
+def _diagnose_case(
+    hidden: HiddenFolders, out: Path, folder: Path, case: str, command: str, timeout: float, cpu: float
+) -> dict[str, Any]:
     rows_path, work, copy = folder / "findings" / f"{case}.json", folder / "work" / case, folder / "copies" / case
     shutil.rmtree(copy, ignore_errors=True)
     shutil.copytree(out / "cases" / case, copy)  # files that the tool writes break no seal
@@ -131,14 +196,16 @@ def _diagnose_case(hidden, out, folder, case, command, timeout, cpu):
     return _run_record(status, process.code, process.cpu, process.wall, message, rows_path if ok else None)
 
 
-def _run_record(status, code, cpu, wall, message, rows_path):
+def _run_record(
+    status: str, code: int, cpu: float, wall: float, message: str, rows_path: Path | None
+) -> dict[str, Any]:
     return {
         "status": status, "exit_code": code, "cpu_s": round(cpu, 2), "wall_s": round(wall, 2), "said": message[:300],
         "rows_sha256": digest(rows_path.read_bytes()) if rows_path else None,
     }  # fmt: skip
 
 
-def _holds_rows(path):
+def _holds_rows(path: Path) -> bool:
     """Whether the file holds a list of objects with a verdict, at least one."""
     try:
         rows = json.loads(path.read_text())
@@ -147,10 +214,22 @@ def _holds_rows(path):
     return isinstance(rows, list) and bool(rows) and all(isinstance(r, dict) and r.get("verdict") for r in rows)
 
 
-def printed_rows(text):
-    """Rows of the last JSON object or array that begins a line of ``text``, or None.
+def printed_rows(text: str) -> list | None:
+    r"""Rows of the last JSON object or array that begins a line, or None.
 
-    >>> printed_rows('reading\\n[{"verdict": "none"}]\\npage: results/pages/T1.html')
+    Parameters
+    ----------
+    text : str
+        Output of the tool.
+
+    Returns
+    -------
+    list or None
+        Rows; a single object is one row.
+
+    Examples
+    --------
+    >>> printed_rows('reading\n[{"verdict": "none"}]\npage: results/pages/T1.html')
     [{'verdict': 'none'}]
     >>> printed_rows("nothing") is None
     True

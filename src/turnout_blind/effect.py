@@ -4,12 +4,20 @@ The file defines ``EFFECT``, an ``Effect``. No other file needs a change: the pl
 them. The scorer counts every name for it as wrong, unless ``score/names.py`` or ``--names`` lists right ones.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    from turnout_blind.site import Site
 
 LOCKS = ("place", "wheel", "train", "sensor", "wavelength", "frequency", "clock", "condition", "amplitude")
 STRATA = ("single", "outside", "unidentifiable")
@@ -24,8 +32,8 @@ class ConcealedEffect:
 
     kind: str
     locked_to: str
-    where: Mapping = field(default_factory=dict)
-    parameters: Mapping = field(default_factory=dict)
+    where: Mapping[str, Any] = field(default_factory=dict)
+    parameters: Mapping[str, Any] = field(default_factory=dict)
     rung: int = 0
 
 
@@ -40,25 +48,57 @@ class Effect:
 
     kind: str
     locked_to: str
-    ladder: tuple
+    ladder: tuple[Any, ...]
     draw: Callable
     act: Callable
     stratum: str = "single"
-    site: Mapping = field(default_factory=dict)
+    site: Mapping[str, Any] = field(default_factory=dict)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.locked_to not in LOCKS or self.stratum not in STRATA:
             raise ValueError(f"effect {self.kind!r}: locked to {self.locked_to!r} or stratum {self.stratum!r} unknown")
 
-    def draw_concealed(self, rng, site, rung):
-        """A ``ConcealedEffect`` at ``rung`` of the ladder, counted from 0."""
+    def draw_concealed(self, rng: np.random.Generator, site: Site, rung: int) -> ConcealedEffect:
+        """Draw one effect.
+
+        Parameters
+        ----------
+        rng : Generator
+            Source of the random numbers.
+        site : Site
+            The site.
+        rung : int
+            Rung of the ladder, counted from 0.
+
+        Returns
+        -------
+        ConcealedEffect
+            The effect with its position and parameters.
+        """
         where, parameters = self.draw(rng, site, self.ladder[rung])
         return ConcealedEffect(self.kind, self.locked_to, where, parameters, rung)
 
 
-def load_effects(*folders):
-    """Effects by kind from this package and from ``folders``. ValueError names a file without an effect.
+def load_effects(*folders: str | Path) -> dict[str, Effect]:
+    """Effects of this package and of further folders.
 
+    Parameters
+    ----------
+    *folders : str or Path
+        Folders with further effects, one per file.
+
+    Returns
+    -------
+    dict
+        Effect by kind.
+
+    Raises
+    ------
+    ValueError
+        For a file that defines no effect.
+
+    Examples
+    --------
     >>> from turnout_blind.effect import load_effects
     >>> sorted(load_effects())[:3]
     ['ballast', 'bilinear_clip', 'bottomless_void']
@@ -69,6 +109,8 @@ def load_effects(*folders):
             if path.name.startswith("_"):
                 continue
             spec = spec_from_file_location(f"turnout_blind_effect_{path.stem}", path)
+            if spec is None or spec.loader is None:
+                raise ValueError(f"{path}: cannot be imported")
             module = module_from_spec(spec)
             spec.loader.exec_module(module)
             effect = getattr(module, "EFFECT", None)
@@ -78,25 +120,75 @@ def load_effects(*folders):
     return effects
 
 
-def draw_sign(rng):
-    """+1 or -1 with equal probability."""
+def draw_sign(rng: np.random.Generator) -> float:
+    """+1 or -1 with equal probability.
+
+    Parameters
+    ----------
+    rng : Generator
+        Source of the random numbers.
+
+    Returns
+    -------
+    float
+        The sign.
+    """
     return 1.0 if rng.random() < 0.5 else -1.0
 
 
-def draw_sleeper(rng, site):
-    """{"sleeper": index, "position": [m]} of a sleeper between the sensors, drawn uniformly."""
+def draw_sleeper(rng: np.random.Generator, site: Site) -> dict[str, Any]:
+    """A sleeper between the sensors, drawn uniformly.
+
+    Parameters
+    ----------
+    rng : Generator
+        Source of the random numbers.
+    site : Site
+        The site.
+
+    Returns
+    -------
+    dict
+        {"sleeper": index, "position": [m]}.
+    """
     low, high = min(site.sensors) - 0.35, max(site.sensors) + 0.35
     inside = np.flatnonzero((site.world.position > low) & (site.world.position < high))
     j = int(rng.choice(inside))
     return {"sleeper": j, "position": float(site.world.position[j])}
 
 
-def draw_sensor(rng, site):
-    """{"sensor": name}, drawn uniformly."""
+def draw_sensor(rng: np.random.Generator, site: Site) -> dict[str, Any]:
+    """A sensor, drawn uniformly.
+
+    Parameters
+    ----------
+    rng : Generator
+        Source of the random numbers.
+    site : Site
+        The site.
+
+    Returns
+    -------
+    dict
+        {"sensor": name}.
+    """
     return {"sensor": str(rng.choice(site.names()))}
 
 
-def draw_axle(rng, site):
-    """{"train", "axle"}, the train drawn uniformly and then one of its axles, counted from 1."""
+def draw_axle(rng: np.random.Generator, site: Site) -> dict[str, Any]:
+    """An axle: the train drawn uniformly and then one of its axles.
+
+    Parameters
+    ----------
+    rng : Generator
+        Source of the random numbers.
+    site : Site
+        The site.
+
+    Returns
+    -------
+    dict
+        {"train": name, "axle": number, counted from 1}.
+    """
     train = str(rng.choice(sorted(site.trains)))
     return {"train": train, "axle": int(rng.integers(1, site.trains[train].axles().size + 1))}

@@ -1,8 +1,14 @@
 """The rail on a staggered finite-difference grid, with absorbing layers (sponges) at its ends."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 
 @dataclass(frozen=True)
@@ -31,23 +37,48 @@ class Grid:
     sponge_rate: float = 400.0
 
     @property
-    def end(self):
+    def end(self) -> float:
         """Position of the last node [m]."""
         return self.start + (self.n - 1) * self.step
 
-    def rates(self, shift=0.0):
-        """(n,) damping rate at the nodes, or ``shift`` steps beside them [1/s]. It grows cubically into the sponge."""
+    def rates(self, shift: float = 0.0) -> np.ndarray:
+        """Damping rate at the nodes; it grows cubically into the sponge.
+
+        Parameters
+        ----------
+        shift : float
+            Distance from the nodes. [steps]
+
+        Returns
+        -------
+        (n,) array of float
+            Damping rate. [1/s]
+        """
         distance = self.step * (np.arange(self.n) + shift)
         edge = np.minimum(distance, (self.n - 1) * self.step - distance)
         depth = np.clip(1.0 - edge / self.sponge, 0.0, 1.0) if self.sponge else np.zeros(self.n)
         return self.sponge_rate * depth**3
 
 
-def stable_step(grid, rail):
+def stable_step(grid: Grid, rail: Rail) -> float:
     r"""Largest stable time step of the leapfrog march [s].
 
     .. math:: \Delta t < 2 / \sqrt{4 c^2 / h^2 + \kappa G A / \rho I}, \quad c^2 = \max(EI/\rho I, \kappa GA/m)
 
+    Parameters
+    ----------
+    grid : Grid
+        Grid of the rail.
+    rail : Rail
+        Profile of the rail.
+
+    Returns
+    -------
+    float
+        Time step. [s]
+
+    Examples
+    --------
     >>> bool(1.7e-5 < stable_step(Grid(), Rail()) < 2.1e-5)
     True
     """
@@ -55,9 +86,23 @@ def stable_step(grid, rail):
     return 2.0 / np.sqrt(4.0 * fastest / grid.step**2 + rail.shear / rail.rotary)
 
 
-def spread(grid, positions):
-    """(first node, (n, 4) weights) of the cubic B-spline at each of ``positions`` [m]: a load 4 steps wide.
+def spread(grid: Grid, positions: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+    """Weights of the cubic B-spline at some positions: a load 4 steps wide.
 
+    Parameters
+    ----------
+    grid : Grid
+        Grid of the rail.
+    positions : (n,) array of float
+        Positions. [m]
+
+    Returns
+    -------
+    (n,) array of int, (n, 4) array of float
+        First of the four nodes, and weights.
+
+    Examples
+    --------
     >>> first, weights = spread(Grid(start=0.0, n=101), [5.05])
     >>> int(first[0]), round(float(weights[0].sum()), 12), round(float(weights[0] @ np.arange(4)), 12)
     (49, 1.0, 1.5)
@@ -77,8 +122,21 @@ def spread(grid, positions):
     return node - 1, weights / 6.0
 
 
-def interpolation_weights(grid, positions):
-    """(first node, (n, 4) weights) of the cubic through the four nodes about each of ``positions`` [m]."""
+def interpolation_weights(grid: Grid, positions: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+    """Weights of the cubic through the four nodes about some positions.
+
+    Parameters
+    ----------
+    grid : Grid
+        Grid of the rail.
+    positions : (n,) array of float
+        Positions. [m]
+
+    Returns
+    -------
+    (n,) array of int, (n, 4) array of float
+        First of the four nodes, and weights.
+    """
     coordinate = (np.atleast_1d(np.asarray(positions, dtype=float)) - grid.start) / grid.step
     node = np.floor(coordinate).astype(np.int64)
     s = coordinate - node
@@ -94,7 +152,7 @@ def interpolation_weights(grid, positions):
     return node - 1, weights
 
 
-def lost_compliance(grid, rail):
+def lost_compliance(grid: Grid, rail: Rail) -> float:
     r"""Compliance that a point load loses because it is spread over four steps, as is the response [m/N].
 
     .. math:: l = \frac{E|\xi - \xi'|}{2\,\kappa G A}, \qquad E|\xi - \xi'| = 0.6556\,h
@@ -102,5 +160,17 @@ def lost_compliance(grid, rail):
     with two positions drawn from the B-spline. In shear the rail deflects like a rope, :math:`|x| / 2 \kappa GA`. The
     loss in bending is of higher order in h and neglected. 0.6556 is the quadrature of the spline of order seven, the
     convolution of both.
+
+    Parameters
+    ----------
+    grid : Grid
+        Grid of the rail.
+    rail : Rail
+        Profile of the rail.
+
+    Returns
+    -------
+    float
+        Compliance. [m/N]
     """
     return 0.6556 * grid.step / (2.0 * rail.shear)

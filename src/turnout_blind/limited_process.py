@@ -1,5 +1,7 @@
 """Run one process with limits of wall clock and CPU time, and return its output and cost."""
 
+from __future__ import annotations
+
 import os
 import shlex
 import signal
@@ -7,6 +9,11 @@ import subprocess
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+    from typing import Any
 
 POLL_INTERVAL = 0.2  # interval at which a running process is polled [s]
 MAX_LINE_LENGTH = 300  # length to which the last line of output is cut [characters]
@@ -27,22 +34,53 @@ class ProcessResult:
     stop_reason: str = ""
 
     @property
-    def last_line(self):
+    def last_line(self) -> str:
         """Last line of output, or why the process was stopped."""
         return self.stop_reason or next(reversed((self.out + self.err).strip().splitlines()), "")[:MAX_LINE_LENGTH]
 
 
-def with_cpu_limit(command, cpu):
-    """``command`` (list) with a limit of ``cpu`` [s], after which the system ends it by a signal."""
+def with_cpu_limit(command: Iterable[Any], cpu: float) -> list[str]:
+    """A command with a limit of CPU time, after which the system ends it by a signal.
+
+    Parameters
+    ----------
+    command : iterable
+        Command and its arguments.
+    cpu : float
+        Limit, cut to whole seconds. [s]
+
+    Returns
+    -------
+    list of str
+        The command with its limit.
+    """
     soft = int(cpu)
     return ["sh", "-c", f"ulimit -S -t {soft}; ulimit -H -t {soft + 5}; exec {shlex.join(map(str, command))}"]
 
 
-def run(command, folder, logs, wall, cpu):
-    """``ProcessResult`` of ``command`` (list) in ``folder``; its output goes to files in ``logs``.
+def run(command: Sequence[str], folder: str | Path, logs: str | Path, wall: float, cpu: float) -> ProcessResult:
+    """Run a command in a folder; its output goes to files.
 
-    It is killed with all its children after ``wall`` [s] of wall clock, and by the system after ``cpu`` [s].
-    CPU time is that of the process and of the children it has waited for.
+    It is killed with all its children after the limit of wall clock, and by the system after that of CPU time. CPU time
+    is that of the process and of the children it has waited for.
+
+    Parameters
+    ----------
+    command : sequence of str
+        Command and its arguments.
+    folder : str or Path
+        Working folder.
+    logs : str or Path
+        Folder of the output.
+    wall : float
+        Limit of wall clock. [s]
+    cpu : float
+        Limit of CPU time that the command has. [s]
+
+    Returns
+    -------
+    ProcessResult
+        Exit code, output and cost.
     """
     logs = Path(logs)
     logs.mkdir(parents=True, exist_ok=True)
@@ -62,10 +100,10 @@ def run(command, folder, logs, wall, cpu):
     if not stop_reason and (code == -signal.SIGXCPU or (code == -signal.SIGKILL and cpu_time >= 0.8 * cpu)):
         stop_reason = f"no answer within {cpu:.0f} s of the processor"
     texts = [(logs / name).read_text(encoding="utf-8", errors="replace") for name in ("out.txt", "err.txt")]
-    return ProcessResult(code, *texts, cpu_time, time.monotonic() - start, stop_reason)
+    return ProcessResult(code, texts[0], texts[1], cpu_time, time.monotonic() - start, stop_reason)
 
 
-def _wait_until(pid, deadline):
+def _wait_until(pid: int, deadline: float) -> tuple[int, Any, bool]:
     """(status, usage, whether it was killed at the deadline)."""
     while True:
         finished_pid, status, usage = os.wait4(pid, os.WNOHANG)
@@ -78,7 +116,7 @@ def _wait_until(pid, deadline):
         time.sleep(POLL_INTERVAL)
 
 
-def _kill(pid):
+def _kill(pid: int) -> None:
     """Kill the process and its children: it leads a session of its own."""
     try:
         os.killpg(pid, signal.SIGKILL)

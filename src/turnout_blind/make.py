@@ -1,5 +1,7 @@
 """Make a blind set: campaigns in one folder, sealed truths in another. An interrupted run can be continued."""
 
+from __future__ import annotations
+
 import json
 import os
 import platform
@@ -7,19 +9,36 @@ import secrets
 import shutil
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import turnout
 from turnout_blind.campaign import make_case
 from turnout_blind.effect import load_effects
 from turnout_blind.seal import SET_FILE, BlindError, digest, digest_of_folder, seed_for, write_commit, write_truth
 from turnout_blind.site import PLAIN
-from turnout_blind.strata import case_id, plan_cases
+from turnout_blind.strata import CasePlan, case_id, plan_cases
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterable, Sequence
+    from typing import Any
+
+# folder of the cases, folder of the truths, id, plan, folders with further effects, seed of the set
+Job = tuple[Path, Path, str, CasePlan, tuple[str, ...], int]
 
 
 def make_set(
-    out, truth, seed=None, full=True, folders=(), only=None, limit=None, panel=PLAIN, workers=1, progress=None
-):
-    """Write ``out``/cases, ``out``/commit.json and the truths below ``truth``; returns the SHA-256 of commit.json.
+    out: str | Path,
+    truth: str | Path,
+    seed: int | str | None = None,
+    full: bool = True,
+    folders: Sequence[str | Path] = (),
+    only: Collection[str] | None = None,
+    limit: int | None = None,
+    panel: str = PLAIN,
+    workers: int = 1,
+    progress: Callable[..., Iterable] | None = None,
+) -> str:
+    """Write ``out``/cases, ``out``/commit.json and the truths below ``truth``.
 
     Parameters
     ----------
@@ -42,8 +61,16 @@ def make_set(
     progress : callable or None
         (iterable of finished cases, their number) -> iterable.
 
-    Errors: BlindError if ``truth`` lies inside ``out``, if ``out`` holds a complete set already, or if an interrupted
-    set was started with other options or other sources.
+    Returns
+    -------
+    str
+        SHA-256 of commit.json.
+
+    Raises
+    ------
+    BlindError
+        If ``truth`` lies inside ``out``, if ``out`` holds a complete set already, or if an interrupted set was started
+        with other options or other sources.
     """
     out, truth = Path(out).resolve(), Path(truth).resolve()
     if truth.is_relative_to(out):
@@ -55,10 +82,12 @@ def make_set(
         available = ", ".join(sorted(load_effects(*folders)))
         raise BlindError("--only", unknown[0], "no such kind", f"There are {available}")
     set_info = _open_set(truth, seed_for(examines) if examines else seed, full, folders, only, limit, panel)
-    seed = set_info["seed"]
-    plans = plan_cases(seed, load_effects(*folders), full, only, panel)[:limit]
-    folders = tuple(map(str, folders))
-    jobs = [(out / "cases", truth, case_id(seed, k), plan, folders, seed) for k, plan in enumerate(plans)]
+    set_seed: int = set_info["seed"]
+    plans = plan_cases(set_seed, load_effects(*folders), full, only, panel)[:limit]
+    effect_folders = tuple(map(str, folders))
+    jobs = [
+        (out / "cases", truth, case_id(set_seed, k), plan, effect_folders, set_seed) for k, plan in enumerate(plans)
+    ]
     pending = [job for job in jobs if not _is_made(job)]
     with ProcessPoolExecutor(workers) as pool:
         futures = [pool.submit(_make, job) for job in pending]
@@ -70,7 +99,15 @@ def make_set(
     return write_commit(out, truths, examines)
 
 
-def _open_set(truth, seed, full, folders, only, limit, panel):
+def _open_set(
+    truth: Path,
+    seed: int | str | None,
+    full: bool,
+    folders: Iterable[str | Path],
+    only: Iterable[str] | None,
+    limit: int | None,
+    panel: str,
+) -> dict[str, Any]:
     """Content of set.json: seed and options of an interrupted set, or written now."""
     settings = {"full": full, "effects": sorted(map(str, folders)), "only": sorted(only or ()), "limit": limit}
     settings |= {
@@ -92,12 +129,12 @@ def _open_set(truth, seed, full, folders, only, limit, panel):
     return set_info
 
 
-def _is_made(job):
+def _is_made(job: Job) -> bool:
     cases, truth, case, *_ = job
     return (cases / case).is_dir() and (truth / f"{case}.json").exists()
 
 
-def _make(job):
+def _make(job: Job) -> str:
     """Make a case in a temporary folder, write its truth, then move it: an incomplete case is never taken for one."""
     cases, truth, case, plan, folders, seed = job
     temporary = cases.parent / "unfinished"

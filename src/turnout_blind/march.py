@@ -5,27 +5,69 @@ beam). Every support, contact and body is explicit. At 1/60000 s the stiffest, a
 0.2 rad a step. Damping forces use the velocity half a step earlier.
 """
 
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, TypeVar, cast
+
 import numba
 import numpy as np
 from numba.extending import overload
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
+
+    from turnout_blind.march_inputs import AttachedMasses, Beam, Cars, Hammer, Supports, WheelMotion, Wheels
+
 TIME_STEP = 1.0 / 60000.0
+Function = TypeVar("Function", bound=Callable)
 
 
-def _value_at(value, i):
+def compiled(fastmath: bool = False) -> Callable[[Function], Function]:
+    """Decorator: compile a function with numba, and store its machine code beside the source.
+
+    Parameters
+    ----------
+    fastmath : bool
+        Whether sums may be reordered.
+
+    Returns
+    -------
+    callable
+        The decorator.
+    """
+    return cast("Callable[[Function], Function]", numba.njit(cache=True, fastmath=fastmath))
+
+
+def _value_at(value: Any, i: int) -> Any:
     """``value`` at the ``i``-th node. For a uniform rail ``value`` is a constant."""
     return value[i] if isinstance(value, np.ndarray) else value
 
 
 @overload(_value_at)
-def _compile_value_at(value, i):
-    if isinstance(value, numba.types.Array):
-        return lambda value, i: value[i]
-    return lambda value, i: value
+def _compile_value_at(value: Any, i: int) -> Callable:
+    # numba compares these signatures with that above, types included
+    def at_node(value: Any, i: int) -> Any:
+        return value[i]
+
+    def at_every_node(value: Any, i: int) -> Any:
+        return value
+
+    return at_node if isinstance(value, numba.types.Array) else at_every_node
 
 
-@numba.njit(cache=True, fastmath=True)
-def _rail_step(beam, dt, v, turn, q, moment, w, f):
+@compiled(fastmath=True)
+def _rail_step(
+    beam: Beam,
+    dt: float,
+    v: np.ndarray,
+    turn: np.ndarray,
+    q: np.ndarray,
+    moment: np.ndarray,
+    w: np.ndarray,
+    f: np.ndarray,
+) -> None:
     n = v.size
     h = beam.step
     for i in range(1, n - 1):
@@ -43,19 +85,19 @@ def _rail_step(beam, dt, v, turn, q, moment, w, f):
         w[i] += dt * v[i]
 
 
-@numba.njit(cache=True)
-def _interpolate(x, first, weights):
+@compiled()
+def _interpolate(x: np.ndarray, first: int, weights: np.ndarray) -> float:
     return x[first] * weights[0] + x[first + 1] * weights[1] + x[first + 2] * weights[2] + x[first + 3] * weights[3]
 
 
-@numba.njit(cache=True)
-def _add_force(f, first, weights, force):
+@compiled()
+def _add_force(f: np.ndarray, first: int, weights: np.ndarray, force: float) -> None:
     for k in range(4):
         f[first + k] += weights[k] * force
 
 
-@numba.njit(cache=True)
-def _ballast_force(s, j, y, rate, t):
+@compiled()
+def _ballast_force(s: Supports, j: int, y: float, rate: float, t: float) -> float:
     k = s.ballast[j] * (1.0 + s.drift[j] * t)
     if s.gap[j] < 0.0:
         return k * y * (1.0 + s.hardening[j] * abs(y)) + s.ballast_damping[j] * rate
@@ -69,8 +111,22 @@ def _ballast_force(s, j, y, rate, t):
     )
 
 
-@numba.njit(cache=True)
-def _support_step(s, dt, t, w, v, f, y, rate, branch, last, decay, grow, force):
+@compiled()
+def _support_step(
+    s: Supports,
+    dt: float,
+    t: float,
+    w: np.ndarray,
+    v: np.ndarray,
+    f: np.ndarray,
+    y: np.ndarray,
+    rate: np.ndarray,
+    branch: np.ndarray,
+    last: np.ndarray,
+    decay: np.ndarray,
+    grow: np.ndarray,
+    force: np.ndarray,
+) -> None:
     n, nb = y.size, decay.size
     force[:] = 0.0
     for j in range(n):
@@ -92,8 +148,10 @@ def _support_step(s, dt, t, w, v, f, y, rate, branch, last, decay, grow, force):
         y[j] += dt * rate[j]
 
 
-@numba.njit(cache=True)
-def _attached_mass_step(r, dt, w, v, f, y, rate):
+@compiled()
+def _attached_mass_step(
+    r: AttachedMasses, dt: float, w: np.ndarray, v: np.ndarray, f: np.ndarray, y: np.ndarray, rate: np.ndarray
+) -> None:
     for j in range(y.size):
         d = _interpolate(w, r.first[j], r.weights[j]) - y[j]
         force = r.stiffness[j] * d + r.damping[j] * (_interpolate(v, r.first[j], r.weights[j]) - rate[j])
@@ -106,8 +164,8 @@ def _attached_mass_step(r, dt, w, v, f, y, rate):
         y[j] += dt * rate[j]
 
 
-@numba.njit(cache=True)
-def _path_height(wheels, i, x):
+@compiled()
+def _path_height(wheels: Wheels, i: int, x: float) -> float:
     coordinate = (x - wheels.path_start) / wheels.path_step
     k = int(np.floor(coordinate))
     if k < 1 or k > wheels.path.shape[1] - 3:
@@ -117,9 +175,26 @@ def _path_height(wheels, i, x):
     return b + 0.5 * s * (c - a + s * (2.0 * a - 5.0 * b + 4.0 * c - d + s * (3.0 * (b - c) + d - a)))
 
 
-@numba.njit(cache=True)
-def hertz_force(stiffness, local, approach, guess):
-    """Contact force [N] of F = k max(0, approach - local F)^1.5 by Newton's method from ``guess``; 0 if apart."""
+@compiled()
+def hertz_force(stiffness: float, local: float, approach: float, guess: float) -> float:
+    """Contact force F = k max(0, approach - local F)^1.5 by Newton's method.
+
+    Parameters
+    ----------
+    stiffness : float
+        Hertz constant k. [N/m^1.5]
+    local : float
+        Compliance of the rail. [m/N]
+    approach : float
+        Approach of the bodies. [m]
+    guess : float
+        First guess of the force. [N]
+
+    Returns
+    -------
+    float
+        Force, 0 if the bodies are apart. [N]
+    """
     if approach <= 0.0:
         return 0.0
     force = guess
@@ -136,8 +211,8 @@ def hertz_force(stiffness, local, approach, guess):
     return force
 
 
-@numba.njit(cache=True)
-def _contact_share(motion, x):
+@compiled()
+def _contact_share(motion: WheelMotion, x: float) -> float:
     if x <= motion.engage_start or x >= motion.release_end:
         return 0.0
     s = 1.0
@@ -148,8 +223,20 @@ def _contact_share(motion, x):
     return s * s * (3.0 - 2.0 * s)
 
 
-@numba.njit(cache=True)
-def _wheel_forces(wheels, motion, grid_start, h, n, t, w, f, z, contact, stencil):
+@compiled()
+def _wheel_forces(
+    wheels: Wheels,
+    motion: WheelMotion,
+    grid_start: float,
+    h: float,
+    n: int,
+    t: float,
+    w: np.ndarray,
+    f: np.ndarray,
+    z: np.ndarray,
+    contact: np.ndarray,
+    stencil: np.ndarray,
+) -> None:
     for i in range(z.size):
         x = motion.start + motion.speed * t - wheels.distance_behind[i]
         share = _contact_share(motion, x)
@@ -169,8 +256,17 @@ def _wheel_forces(wheels, motion, grid_start, h, n, t, w, f, z, contact, stencil
         _add_force(f, k - 1, stencil, share * contact[i])
 
 
-@numba.njit(cache=True)
-def _car_step(cars, wheels, dt, z, zv, b, bv, contact):
+@compiled()
+def _car_step(
+    cars: Cars,
+    wheels: Wheels,
+    dt: float,
+    z: np.ndarray,
+    zv: np.ndarray,
+    b: np.ndarray,
+    bv: np.ndarray,
+    contact: np.ndarray,
+) -> None:
     """Advance the cars. ``b`` holds per car: bounce and pitch of the body, and bounce and pitch of two bogies."""
     for c in range(cars.body.size):
         o = 6 * c
@@ -201,12 +297,61 @@ def _car_step(cars, wheels, dt, z, zv, b, bv, contact):
         b[i] += dt * bv[i]
 
 
-@numba.njit(cache=True)
-def march(n_step, dt, grid_start, beam, supports, attached_masses, cars, wheels, motion, hammer, first, weights, every):
-    """(velocities (n_step, n_sensor) [m/s], hammer force, wheel forces, last state).
+@compiled()
+def march(
+    n_step: int,
+    dt: float,
+    grid_start: float,
+    beam: Beam,
+    supports: Supports,
+    attached_masses: AttachedMasses,
+    cars: Cars,
+    wheels: Wheels,
+    motion: WheelMotion,
+    hammer: Hammer,
+    first: np.ndarray,
+    weights: np.ndarray,
+    every: int,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
+    """March ``n_step`` steps.
 
-    Velocities are those half a step after each whole step. Wheel forces are stored every ``every`` steps. The state is
-    (w, v, turn, q, moment, sleeper displacement, sleeper velocity).
+    Velocities are those half a step after each whole step. The state is (w, v, turn, q, moment, sleeper displacement,
+    sleeper velocity).
+
+    Parameters
+    ----------
+    n_step : int
+        Number of time steps.
+    dt : float
+        Time step. [s]
+    grid_start : float
+        Position of the first node. [m]
+    beam : Beam
+        The rail.
+    supports : Supports
+        Pads, sleepers and ballast.
+    attached_masses : AttachedMasses
+        Masses attached to the rail.
+    cars : Cars
+        Bodies and bogies.
+    wheels : Wheels
+        Wheels and their paths.
+    motion : WheelMotion
+        Position and speed of the train.
+    hammer : Hammer
+        Hammer; mass 0: none.
+    first : (n_sensor,) array of int
+        First node of each sensor.
+    weights : (n_sensor, 4) array of float
+        Weights of its four nodes.
+    every : int
+        Steps between two stored wheel forces.
+
+    Returns
+    -------
+    (array, array, array, tuple of arrays)
+        Velocities (n_step, n_sensor) [m/s], hammer force (n_step,) [N], wheel forces (n_step // every + 1, n_wheel)
+        [N], last state.
     """
     n = beam.rate.size
     w, v, q, moment, f = np.zeros(n), np.zeros(n), np.zeros(n - 1), np.zeros(n), np.zeros(n)

@@ -13,10 +13,10 @@ class Beam(NamedTuple):
     """
 
     step: float
-    bending: object
-    shear: object
-    mass: object
-    rotary: object
+    bending: float | np.ndarray
+    shear: float | np.ndarray
+    mass: float | np.ndarray
+    rotary: float | np.ndarray
     rate: np.ndarray
     rate_between: np.ndarray
 

@@ -1,8 +1,19 @@
 """Write the files of the owner: layout, track, vehicles and table of turnouts, with nominal values and no effect."""
 
+from __future__ import annotations
+
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from turnout_blind.site import RAIL_DAMPING
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from turnout_blind.crossing import Crossing
+    from turnout_blind.instrument import MeasurementChain
+    from turnout_blind.site import Site
+    from turnout_blind.vehicle import Train
 
 SOURCE = "the owner's register"
 RAIL = (("youngs_modulus", 210.0, "GPa"), ("second_moment", 3037.0, "cm⁴"), ("area", 76.7, "cm²"),
@@ -10,8 +21,18 @@ RAIL = (("youngs_modulus", 210.0, "GPa"), ("second_moment", 3037.0, "cm⁴"), ("
         ("density", 7850.0, "kg/m³"), ("damping", RAIL_DAMPING, "N s/m²"))  # fmt: skip
 
 
-def write_configuration(folder, turnout, site):
-    """Write config/ of one site below ``folder``, in the formats of the project."""
+def write_configuration(folder: str | Path, turnout: str, site: Site) -> None:
+    """Write config/ of one site below ``folder``, in the formats of the project.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Folder of the configuration, created where it does not exist.
+    turnout : str
+        Id of the turnout.
+    site : Site
+        The site.
+    """
     folder = Path(folder)
     for name in ("layouts", "tracks", "vehicles"):
         (folder / name).mkdir(parents=True, exist_ok=True)
@@ -24,8 +45,19 @@ def write_configuration(folder, turnout, site):
     (folder / "vehicles" / "axle_patterns.yaml").write_text(patterns(site.trains))
 
 
-def layout(site):
-    """Sections at the sensors, channels of hammer tests and passages."""
+def layout(site: Site) -> str:
+    """Sections at the sensors, channels of hammer tests and passages.
+
+    Parameters
+    ----------
+    site : Site
+        The site.
+
+    Returns
+    -------
+    str
+        Text of the file.
+    """
     lines = ["description: four sensors on the rail of one track", "sections:"]
     for i, position in enumerate(site.sensors, 1):
         lines += [f"  S{i}:", "    panel: CLP", "    track: main", f"    position: {position:.2f}", "    hammer:"]
@@ -43,20 +75,31 @@ def layout(site):
     return "\n".join(lines) + "\n"
 
 
-def _channel(chain, name, suffix):
+def _channel(chain: MeasurementChain, name: str, suffix: str) -> str:
     return (
         f"    {name}: {{source: {name}, quantity: acceleration, unit: m/s², mounting: rail web, "
         f"limit: {chain.full_scale:g}, resolution: {chain.step:.6g}{suffix}}}"
     )
 
 
-def _value(value, unit, prior=None):
+def _value(value: float, unit: str, prior: float | None = None) -> str:
     prior_text = "" if prior is None else f", prior: {prior}"
     return f'{{value: {value:.6g}, unit: "{unit}", source: register{prior_text}}}'
 
 
-def track(site):
-    """Nominal rail, and supports of two zones."""
+def track(site: Site) -> str:
+    """Nominal rail, and supports of two zones.
+
+    Parameters
+    ----------
+    site : Site
+        The site.
+
+    Returns
+    -------
+    str
+        Text of the file.
+    """
     lines = ["name: site", "layers: 2", "elements_per_bay: 4", "sources:", f'  register: "{SOURCE}"']
     lines += ["extent:", f"  from: {_value(-45.0, 'm')}", f"  to: {_value(57.0, 'm')}"]
     lines += [f"spacing: {_value(0.6, 'm', 0.03)}", "absorbing_end:"]
@@ -75,7 +118,7 @@ def track(site):
     return "\n".join(lines) + "\n"
 
 
-def _casting(crossing):
+def _casting(crossing: Crossing) -> list[str]:
     """The crossing casting as a stretch of another rail, without the ramps at its ends."""
     factors = {"second_moment": crossing.bending, "area": crossing.mass, "mass": crossing.mass}
     start, end = crossing.ends
@@ -84,14 +127,14 @@ def _casting(crossing):
     return lines + [f"      {name}: {_value(value * factors.get(name, 1.0), unit)}" for name, value, unit in RAIL]
 
 
-def _nose(c):
+def _nose(c: Crossing) -> str:
     """The nose of the crossing, with priors as wide as an estimate deserves."""
     position, share = _value(c.nose, "m", round(0.05 / c.nose, 4)), _value(c.share, "-", 0.2)
     depth, length = _value(1e3 * c.depth, "mm", 0.4), _value(c.length, "m", 0.2)
     return f"{{kind: kink, place: {position}, depth: {depth}, length: {length}, share: {share}}}"
 
 
-def _support(v):
+def _support(v: Mapping[str, float]) -> list[str]:
     return [
         f"  pad_stiffness: {_value(v['pad'] / 1e6, 'MN/m', 0.3)}",
         f"  pad_damping: {_value(v['pad_damping'] / 1e3, 'kN s/m', 0.5)}",
@@ -101,8 +144,19 @@ def _support(v):
     ]
 
 
-def vehicle(train):
-    """A vehicle file: whole cars, both rails."""
+def vehicle(train: Train) -> str:
+    """A vehicle file: whole cars, both rails.
+
+    Parameters
+    ----------
+    train : Train
+        Train as filed.
+
+    Returns
+    -------
+    str
+        Text of the file.
+    """
     c, n = train.cars[0], len(train.cars)
     lines = [f"name: {train.name}", f"title: {train.name} of {n} cars", "sources:", f'  register: "{SOURCE}"']
     lines += [f"length: {_value(n * c.length, 'm')}", "wheel:", f"  radius: {_value(train.radius, 'm', 0.03)}"]
@@ -112,7 +166,11 @@ def vehicle(train):
         f"    inertia: {_value(c.body_inertia / 1e3, 't m²', 0.1)}",
     ]
     lines += ["bogie_types:", "  bogie:"]
-    bogie = (("mass", c.bogie, "kg"), ("inertia", c.bogie_inertia, "kg m²"), ("base", c.base, "m"))
+    bogie: tuple[tuple[str, float, str], ...] = (
+        ("mass", c.bogie, "kg"),
+        ("inertia", c.bogie_inertia, "kg m²"),
+        ("base", c.base, "m"),
+    )
     bogie += (("wheelset_mass", c.wheelset, "kg"), ("primary_stiffness", c.primary / 1e6, "MN/m"))
     bogie += (("primary_damping", c.primary_damping / 1e3, "kN s/m"),)
     bogie += (("secondary_stiffness", c.secondary / 1e6, "MN/m"),)
@@ -125,13 +183,24 @@ def vehicle(train):
             lines.append(f"  - {{label: b{2 * k + side + 1}, type: bogie, centre: {_value(centre, 'm')}}}")
     lines += ["cars:"]
     for k in range(n):
-        centre = _value((k + 0.5) * c.length, "m")
-        lines.append(f"  - {{type: body, rests_on: [b{2 * k + 1}, b{2 * k + 2}], centre: {centre}}}")
+        middle = _value((k + 0.5) * c.length, "m")
+        lines.append(f"  - {{type: body, rests_on: [b{2 * k + 1}, b{2 * k + 2}], centre: {middle}}}")
     return "\n".join(lines) + "\n"
 
 
-def patterns(trains):
-    """Axle patterns of the trains."""
+def patterns(trains: Mapping[str, Train]) -> str:
+    """Axle patterns of the trains.
+
+    Parameters
+    ----------
+    trains : mapping
+        Trains by name.
+
+    Returns
+    -------
+    str
+        Text of the file.
+    """
     lines = ["vehicles:"]
     for name, train in trains.items():
         positions = ", ".join(f"{x:.3f}" for x in train.axles())

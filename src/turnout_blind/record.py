@@ -1,6 +1,9 @@
 """Simulated recordings: hammer tests and passages of a site in a given world."""
 
+from __future__ import annotations
+
 from datetime import datetime, timedelta
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import signal
@@ -10,6 +13,13 @@ from turnout_blind.instrument import digitise
 from turnout_blind.march import TIME_STEP
 from turnout_blind.run import ENGAGE_LENGTH, simulate_impacts, simulate_passage
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from typing import Any
+
+    from turnout_blind.site import Site
+    from turnout_blind.true_site import World
+
 RATE = 1.0 / TIME_STEP
 HAMMER_DECIMATION, PASSAGE_DECIMATION = 3, 12  # 20 kHz and 5 kHz
 HAMMER_DURATION, PRETRIGGER, PASSAGE_DURATION = 0.25, 0.025, 3.5  # [s]
@@ -18,21 +28,68 @@ CAMPAIGNS = (datetime(2024, 2, 6, 9, 0), datetime(2024, 7, 16, 9, 0))
 FIRST_PASSAGE, PASSAGE_INTERVAL = datetime(2024, 7, 16, 11, 0), timedelta(minutes=30)
 
 
-def sensor_positions(site, world):
-    """True positions of the sensors [m]."""
+def sensor_positions(site: Site, world: World) -> list[float]:
+    """True positions of the sensors.
+
+    Parameters
+    ----------
+    site : Site
+        The site.
+    world : World
+        True state of the site.
+
+    Returns
+    -------
+    list of float
+        Positions. [m]
+    """
     return [x + world.sensor_shift.get(c.name, 0.0) for x, c in zip(site.sensors, site.chains)]
 
 
-def channels(site):
-    """Channels of the sensors as the owner describes them."""
+def channels(site: Site) -> tuple[Channel, ...]:
+    """Channels of the sensors as the owner describes them.
+
+    Parameters
+    ----------
+    site : Site
+        The site.
+
+    Returns
+    -------
+    tuple of Channel
+        One channel for each sensor.
+    """
     return tuple(
         Channel(c.name, "acceleration", x, "rail web", limit=c.full_scale, resolution=c.step)
         for x, c in zip(site.sensors, site.chains)
     )
 
 
-def hammer_test(site, world, campaign, position, rng, decoys):
-    """Recordings, one per impact, of a hammer test at ``position`` [m] in campaign 0 or 1."""
+def hammer_test(
+    site: Site, world: World, campaign: int, position: float, rng: np.random.Generator, decoys: Mapping[Any, Any]
+) -> list[Recording]:
+    """Recordings of a hammer test.
+
+    Parameters
+    ----------
+    site : Site
+        The site.
+    world : World
+        True state of the site.
+    campaign : int
+        Number of the campaign, 0 or 1.
+    position : float
+        Position of the impacts, one of ``site.hammer_positions``. [m]
+    rng : Generator
+        Source of the random numbers.
+    decoys : mapping
+        Disturbances from ``draw_decoys``.
+
+    Returns
+    -------
+    list of Recording
+        One recording for each impact.
+    """
     force = Channel("force", "force", position, "hammer", limit=site.force.full_scale, resolution=site.force.step)
     recordings, start = [], CAMPAIGNS[campaign] + timedelta(minutes=20 * site.hammer_positions.index(position))
     for k in range(N_IMPACTS):
@@ -50,7 +107,9 @@ def hammer_test(site, world, campaign, position, rng, decoys):
     return recordings
 
 
-def _draw_impact(site, world, temperature, position, rng, fault):
+def _draw_impact(
+    site: Site, world: World, temperature: float, position: float, rng: np.random.Generator, fault: str | None
+) -> tuple[np.ndarray, np.ndarray]:
     """(force, accelerations) of one impact: beside the mark, slightly off centre, and with the given ``fault``."""
     speed = 0.95 * float(np.exp(0.12 * rng.normal()))
     offset = float(np.clip(0.008 * rng.normal(), -0.02, 0.02))
@@ -74,7 +133,7 @@ def _draw_impact(site, world, temperature, position, rng, fault):
     return f, a + decay[:, None] * twist
 
 
-def _torsion_acceleration(force, share, site):
+def _torsion_acceleration(force: np.ndarray, share: float, site: Site) -> np.ndarray:
     """Acceleration by torsion of the rail under an off-centre impact: one mode of 60 kg near 460 Hz.
 
     A beam model of vertical motion cannot have it.
@@ -84,8 +143,27 @@ def _torsion_acceleration(force, share, site):
     return share * signal.lfilter(b, a, force) / 60.0
 
 
-def passage(site, world, k, rng, decoys):
-    """Recording of the ``k``-th passage."""
+def passage(site: Site, world: World, k: int, rng: np.random.Generator, decoys: Mapping[Any, Any]) -> Recording:
+    """Recording of one passage.
+
+    Parameters
+    ----------
+    site : Site
+        The site.
+    world : World
+        True state of the site.
+    k : int
+        Number of the passage.
+    rng : Generator
+        Source of the random numbers.
+    decoys : mapping
+        Disturbances from ``draw_decoys``.
+
+    Returns
+    -------
+    Recording
+        The recording.
+    """
     plan = site.passages[k]
     a = passage_motion(site, world, k, rng)
     rows = []
@@ -100,13 +178,30 @@ def passage(site, world, k, rng, decoys):
     )
 
 
-def passage_motion(site, world, k, rng):
-    """(n_sensor, n) true accelerations of the ``k``-th passage [m/s²]."""
+def passage_motion(site: Site, world: World, k: int, rng: np.random.Generator | None) -> np.ndarray:
+    """True accelerations of one passage.
+
+    Parameters
+    ----------
+    site : Site
+        The site.
+    world : World
+        True state of the site.
+    k : int
+        Number of the passage.
+    rng : Generator or None
+        Source of the noise of other sources; not used without one.
+
+    Returns
+    -------
+    (n_sensor, n) array of float
+        Accelerations. [m/s²]
+    """
     plan = site.passages[k]
     train = site.true_trains[plan.train]
     positions = sensor_positions(site, world)
 
-    def roughness(i, x):
+    def roughness(i: int, x: np.ndarray) -> np.ndarray:
         return site.roughness["rail"](x) + site.roughness[plan.train, i + 1](x, plan.phase)
 
     a, _, _ = simulate_passage(
@@ -118,6 +213,21 @@ def passage_motion(site, world, k, rng):
     return a
 
 
-def lead_time(world, positions, speed):
-    """Time from the start until the first wheel reaches the first sensor [s]; it starts where it engages the rail."""
+def lead_time(world: World, positions: Sequence[float], speed: float) -> float:
+    """Time from the start until the first wheel reaches the first sensor; it starts where it engages the rail.
+
+    Parameters
+    ----------
+    world : World
+        True state of the site.
+    positions : sequence of float
+        True positions of the sensors. [m]
+    speed : float
+        Speed of the train. [m/s]
+
+    Returns
+    -------
+    float
+        Time. [s]
+    """
     return (min(positions) - world.grid.start - 0.25 * ENGAGE_LENGTH) / speed

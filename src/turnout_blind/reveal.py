@@ -1,17 +1,38 @@
 """Reveal a set: verify every seal, then put the truths beside the findings."""
 
+from __future__ import annotations
+
 import json
 import shutil
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from turnout_blind.diagnose import diagnosis_folder
 from turnout_blind.seal import BlindError, digest, read_commit, verify
 
+if TYPE_CHECKING:
+    from typing import Any
 
-def reveal(out, truth):
-    """Copy the truths to ``out``/revealed, after verifying all seals and that findings exist; returns the truths.
 
-    Errors: BlindError if a seal is broken, or if nothing has been diagnosed yet.
+def reveal(out: str | Path, truth: str | Path) -> dict[str, Any]:
+    """Copy the truths to ``out``/revealed, after verifying all seals and that findings exist.
+
+    Parameters
+    ----------
+    out : str or Path
+        Folder of the set.
+    truth : str or Path
+        Folder of the truths.
+
+    Returns
+    -------
+    dict
+        Truth by case.
+
+    Raises
+    ------
+    BlindError
+        If a seal is broken, or if nothing has been diagnosed yet.
     """
     out, truth = Path(out), Path(truth)
     truths = verify(out, truth)
@@ -27,10 +48,27 @@ def reveal(out, truth):
     return truths
 
 
-def read_revealed(out, label=None):
-    """(truths, rows by case, diagnosis) of a revealed set, with its seals verified again.
+def read_revealed(
+    out: str | Path, label: str | None = None
+) -> tuple[dict[str, Any], dict[str, list | None], dict[str, Any]]:
+    """Truths and findings of a revealed set, with its seals verified again.
 
-    Rows are None where the tool failed. ``label`` selects the findings of an ablation.
+    Parameters
+    ----------
+    out : str or Path
+        Folder of the set.
+    label : str or None
+        Name of an ablation; None: the tool itself.
+
+    Returns
+    -------
+    (dict, dict, dict)
+        Truth by case, rows by case (None where the tool failed), diagnosis.
+
+    Raises
+    ------
+    BlindError
+        If the set is not revealed, or a seal is broken.
     """
     out = Path(out)
     if not (out / "revealed").exists():
@@ -38,14 +76,32 @@ def read_revealed(out, label=None):
     return verify(out, out / "revealed"), *read_findings(out, label)
 
 
-def read_findings(out, label=None):
-    """(rows by case, diagnosis) of a set; BlindError if they are not what the tool wrote under this commit."""
+def read_findings(out: str | Path, label: str | None = None) -> tuple[dict[str, list | None], dict[str, Any]]:
+    """Findings of a set.
+
+    Parameters
+    ----------
+    out : str or Path
+        Folder of the set.
+    label : str or None
+        Name of an ablation; None: the tool itself.
+
+    Returns
+    -------
+    (dict, dict)
+        Rows by case (None where the tool failed), diagnosis.
+
+    Raises
+    ------
+    BlindError
+        If they are not what the tool wrote under this commit.
+    """
     folder = diagnosis_folder(out, label)
     record = folder / "diagnosis.json"
     diagnosis = json.loads(record.read_text())
     if diagnosis["commit_sha256"] != digest((Path(out) / "commit.json").read_bytes()):
         raise BlindError(record, "commit_sha256", "diagnosed under another commit", "This set proves nothing")
-    rows = {}
+    rows: dict[str, list | None] = {}
     for case in read_commit(out)["cases"]:
         run, path = diagnosis["cases"].get(case), folder / "findings" / f"{case}.json"
         rows[case] = None

@@ -1,11 +1,23 @@
 """Simulate a given world under hammer impacts or under a train: rail accelerations at the rate of the time step."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from turnout_blind.grid import interpolation_weights, lost_compliance
 from turnout_blind.march import TIME_STEP, march
 from turnout_blind.march_inputs import Hammer, WheelMotion
 from turnout_blind.vehicle import cars_of, no_train, wheels_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import ArrayLike
+
+    from turnout_blind.true_site import World
+    from turnout_blind.vehicle import Train
 
 PATH_STEP = 5e-3
 ENGAGE_LENGTH = 4.0  # length over which a wheel engages the rail gradually [m]
@@ -14,27 +26,68 @@ NO_HAMMER = Hammer(1, np.zeros(4), 0.0, 0.0, 0.0, np.zeros(0), np.zeros(0))
 NO_MOTION = WheelMotion(0.0, 0.0, 0.0, 1.0, 2.0, 3.0)
 
 
-def accelerations(velocity, dt):
-    """(n_sensor, n) accelerations [m/s²] from velocities half a step after each whole step; sample k is at k dt."""
+def accelerations(velocity: np.ndarray, dt: float) -> np.ndarray:
+    """Accelerations from velocities half a step after each whole step.
+
+    Parameters
+    ----------
+    velocity : (n, n_sensor) array of float
+        Velocities. [m/s]
+    dt : float
+        Time step. [s]
+
+    Returns
+    -------
+    (n_sensor, n) array of float
+        Accelerations; sample k is at k dt. [m/s²]
+    """
     return np.diff(velocity, axis=0, prepend=0.0).T / dt
 
 
 def simulate_impacts(
-    world,
-    sensor_positions,
-    hammer_position,
-    times,
-    velocities,
-    duration,
-    temperature=None,
-    mass=5.5,
-    tip=1.5e9,
-    loss=0.1,
-    dt=TIME_STEP,
-):
-    """(force (n,) [N], accelerations (n_sensor, n) [m/s²], last state) of hammer impacts at ``hammer_position`` [m].
+    world: World,
+    sensor_positions: ArrayLike,
+    hammer_position: float,
+    times: ArrayLike,
+    velocities: ArrayLike,
+    duration: float,
+    temperature: float | None = None,
+    mass: float = 5.5,
+    tip: float = 1.5e9,
+    loss: float = 0.1,
+    dt: float = TIME_STEP,
+) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
+    """Hammer impacts at one position.
 
-    ``tip`` and ``loss`` are the constants of k d^1.5 (1 + loss d') [N/m^1.5, s/m]. A second time is a double hit.
+    Parameters
+    ----------
+    world : World
+        True state of the site.
+    sensor_positions : (n_sensor,) array of float
+        True positions of the sensors. [m]
+    hammer_position : float
+        Position of the impacts. [m]
+    times : (n_impact,) array of float
+        Time of each impact; a second one is a double hit. [s]
+    velocities : (n_impact,) array of float
+        Speed of the hammer at each. [m/s]
+    duration : float
+        Duration of the march. [s]
+    temperature : float or None
+        Rail temperature [°C]; None: the reference.
+    mass : float
+        Mass of the hammer. [kg]
+    tip : float
+        Constant k of the tip force k d^1.5 (1 + loss d'). [N/m^1.5]
+    loss : float
+        Constant loss of the tip force. [s/m]
+    dt : float
+        Time step. [s]
+
+    Returns
+    -------
+    ((n,) array, (n_sensor, n) array, tuple of arrays)
+        Force [N], accelerations [m/s²], last state.
     """
     first, weights = interpolation_weights(world.grid, hammer_position)
     hammer = Hammer(int(first[0]), weights[0], mass, tip, loss, np.asarray(times, float), np.asarray(velocities, float))
@@ -47,8 +100,27 @@ def simulate_impacts(
     return force, accelerations(velocity, dt), state
 
 
-def wheel_paths(world, train, roughness, phase):
-    """(n_wheel, m) dips that each wheel meets along the grid [m], from the start of the grid."""
+def wheel_paths(
+    world: World, train: Train, roughness: Callable[[int, np.ndarray], np.ndarray] | None, phase: float
+) -> np.ndarray:
+    """Dips that each wheel meets along the grid, from the start of the grid.
+
+    Parameters
+    ----------
+    world : World
+        True state of the site.
+    train : Train
+        The train.
+    roughness : callable or None
+        Wheel and positions [m] -> dips [m].
+    phase : float
+        Rotation of all wheels at the start. [rad]
+
+    Returns
+    -------
+    (n_wheel, m) array of float
+        Dips, in steps of ``PATH_STEP``. [m]
+    """
     x = np.arange(world.grid.start, world.grid.end, PATH_STEP)
     rail_dips = sum((dip(x) for dip in world.surface), np.zeros(x.size))
     dips = np.tile(rail_dips, (train.axles().size, 1))
@@ -61,23 +133,49 @@ def wheel_paths(world, train, roughness, phase):
 
 
 def simulate_passage(
-    world,
-    train,
-    speed,
-    sensor_positions,
-    duration,
-    lead,
-    temperature=None,
-    roughness=None,
-    phase=0.0,
-    n_passages=0.0,
-    dt=TIME_STEP,
-):
-    """(accelerations (n_sensor, n) [m/s²], wheel forces (n_wheel, m) [N], last state) of a passage.
+    world: World,
+    train: Train,
+    speed: float,
+    sensor_positions: Sequence[float],
+    duration: float,
+    lead: float,
+    temperature: float | None = None,
+    roughness: Callable[[int, np.ndarray], np.ndarray] | None = None,
+    phase: float = 0.0,
+    n_passages: float = 0.0,
+    dt: float = TIME_STEP,
+) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
+    """A passage of a train.
 
-    The first wheel reaches the first of ``sensor_positions`` [m] after ``lead`` [s]. ``roughness`` is a function
-    (wheel, positions) -> dips. ``phase`` [rad] is the rotation of all wheels at the start. ``n_passages`` before this
-    one have worn the supports.
+    Parameters
+    ----------
+    world : World
+        True state of the site.
+    train : Train
+        The train.
+    speed : float
+        Speed of the train. [m/s]
+    sensor_positions : sequence of float
+        True positions of the sensors. [m]
+    duration : float
+        Duration of the march. [s]
+    lead : float
+        Time until the first wheel reaches the first sensor. [s]
+    temperature : float or None
+        Rail temperature [°C]; None: the reference.
+    roughness : callable or None
+        Wheel and positions [m] -> dips [m].
+    phase : float
+        Rotation of all wheels at the start. [rad]
+    n_passages : float
+        Passages before this one, which have worn the supports.
+    dt : float
+        Time step. [s]
+
+    Returns
+    -------
+    ((n_sensor, n) array, (n_wheel, m) array, tuple of arrays)
+        Accelerations [m/s²], wheel forces [N], last state.
     """
     local_compliance = lost_compliance(world.grid, world.rail)
     path = wheel_paths(world, train, roughness, phase)

@@ -1,10 +1,17 @@
 """Seal and verify a set: SHA-256 of every truth with its nonce, and of every file."""
 
+from __future__ import annotations
+
 import hashlib
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from turnout.errors import TurnoutError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import Any
 
 COMMIT_FILE, SET_FILE, FORMAT_VERSION = "commit.json", "set.json", 1
 
@@ -12,21 +19,46 @@ COMMIT_FILE, SET_FILE, FORMAT_VERSION = "commit.json", "set.json", 1
 class BlindError(TurnoutError):
     """A blind set does not match its seals, or cannot be kept blind."""
 
-    def __init__(self, path, where, problem, remedy):
+    def __init__(self, path: str | Path, where: str, problem: str, remedy: str) -> None:
         super().__init__(f"{path}, {where}: {problem}. {remedy}.")
 
 
-def digest(data):
+def digest(data: bytes) -> str:
     """SHA-256 of bytes as hex.
 
+    Parameters
+    ----------
+    data : bytes
+        Content.
+
+    Returns
+    -------
+    str
+        64 hexadecimal digits.
+
+    Examples
+    --------
     >>> digest(b"abc")[:16]
     'ba7816bf8f01cfea'
     """
     return hashlib.sha256(data).hexdigest()
 
 
-def digest_of_folder(folder, pattern="*"):
-    """SHA-256 over names and contents of all matching files below ``folder``, sorted by name, without caches."""
+def digest_of_folder(folder: str | Path, pattern: str = "*") -> str:
+    """SHA-256 over names and contents of all matching files below ``folder``, sorted by name, without caches.
+
+    Parameters
+    ----------
+    folder : str or Path
+        The folder.
+    pattern : str
+        Pattern of the file names.
+
+    Returns
+    -------
+    str
+        64 hexadecimal digits.
+    """
     hasher = hashlib.sha256()
     for path in sorted(Path(folder).rglob(pattern)):
         if path.is_file() and "__pycache__" not in path.parts:
@@ -34,15 +66,42 @@ def digest_of_folder(folder, pattern="*"):
     return hasher.hexdigest()
 
 
-def seed_for(tool_sha256):
-    """Seed of the set for this version of the tool: it exists no earlier than the tool, and nobody chose it."""
+def seed_for(tool_sha256: str) -> int:
+    """Seed of the set for this version of the tool: it exists no earlier than the tool, and nobody chose it.
+
+    Parameters
+    ----------
+    tool_sha256 : str
+        Hash of the sources of the tool.
+
+    Returns
+    -------
+    int
+        The seed.
+    """
     return int(digest(f"turnout blind {tool_sha256}".encode())[:15], 16)
 
 
-def write_truth(folder, name, content, seed):
-    """Write ``content`` as ``name``.json with a nonce of 16 bytes; returns the SHA-256 of the file.
+def write_truth(folder: str | Path, name: str, content: Mapping[str, Any], seed: int) -> str:
+    """Write a truth as ``name``.json with a nonce of 16 bytes.
 
     The nonce follows from the ``seed`` of the set.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Folder of the truths.
+    name : str
+        Id of the case, or "set".
+    content : mapping
+        The truth.
+    seed : int
+        Seed of the set.
+
+    Returns
+    -------
+    str
+        SHA-256 of the file.
     """
     nonce = digest(f"nonce {seed} {name}".encode())[:32]
     data = json.dumps({**content, "nonce": nonce}, indent=1, sort_keys=True).encode() + b"\n"
@@ -51,18 +110,40 @@ def write_truth(folder, name, content, seed):
     return digest(data)
 
 
-def file_digests(case):
-    """{path below the case: SHA-256} of all files of a case."""
+def file_digests(case: str | Path) -> dict[str, str]:
+    """Hashes of all files of a case.
+
+    Parameters
+    ----------
+    case : str or Path
+        Folder of the case.
+
+    Returns
+    -------
+    dict
+        SHA-256 by path below the case.
+    """
     return {
         p.relative_to(case).as_posix(): digest(p.read_bytes()) for p in sorted(Path(case).rglob("*")) if p.is_file()
     }
 
 
-def write_commit(out, truths, examines=None):
-    """Write commit.json; returns its SHA-256.
+def write_commit(out: str | Path, truths: Mapping[str, str], examines: str | None = None) -> str:
+    """Write commit.json.
 
-    ``truths`` is {case: SHA-256 of its truth, "set": SHA-256 of set.json}. ``examines`` is the hash of the tool that
-    the set was made for, None for any tool.
+    Parameters
+    ----------
+    out : str or Path
+        Folder of the set.
+    truths : mapping
+        SHA-256 of the truth of each case, and that of set.json under "set".
+    examines : str or None
+        Hash of the tool that the set was made for, None for any tool.
+
+    Returns
+    -------
+    str
+        Its SHA-256.
     """
     out = Path(out)
     package = Path(__file__).parent
@@ -81,16 +162,50 @@ def write_commit(out, truths, examines=None):
     return digest(data)
 
 
-def read_commit(out):
-    """commit.json as a dictionary."""
+def read_commit(out: str | Path) -> dict[str, Any]:
+    """Content of commit.json.
+
+    Parameters
+    ----------
+    out : str or Path
+        Folder of the set.
+
+    Returns
+    -------
+    dict
+        Its content.
+
+    Raises
+    ------
+    BlindError
+        If there is no such file.
+    """
     path = Path(out) / COMMIT_FILE
     if not path.exists():
         raise BlindError(path, "line 1", "no such file", "Make a set first: turnout blind make --out FOLDER")
     return json.loads(path.read_bytes())
 
 
-def verify(out, truth):
-    """Truths by case; BlindError at the first truth or recording that does not match its seal."""
+def verify(out: str | Path, truth: str | Path) -> dict[str, Any]:
+    """Truths by case, after comparing every truth and recording with its seal.
+
+    Parameters
+    ----------
+    out : str or Path
+        Folder of the set.
+    truth : str or Path
+        Folder of the truths.
+
+    Returns
+    -------
+    dict
+        Truth by case.
+
+    Raises
+    ------
+    BlindError
+        At the first truth or recording that does not match its seal.
+    """
     out, truth, commit = Path(out), Path(truth), read_commit(out)
     _check_seal(truth / SET_FILE, commit["set_sha256"])
     truths = {}
@@ -109,7 +224,7 @@ def verify(out, truth):
     return truths
 
 
-def _check_seal(path, sha):
+def _check_seal(path: Path, sha: str) -> None:
     if not path.exists():
         raise BlindError(path, "line 1", "no such truth", "Give the folder of the truth with --truth")
     if digest(path.read_bytes()) != sha:

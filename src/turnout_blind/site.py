@@ -1,6 +1,9 @@
 """One monitored site: what its owner assumes (nominal), and what there really is before any effect (truth)."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +14,10 @@ from turnout_blind.instrument import MeasurementChain
 from turnout_blind.roughness import rail_roughness, wheel_roughness
 from turnout_blind.true_site import SPACING, World
 from turnout_blind.vehicle import Car, Train
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from typing import Any
 
 SENSOR_SETS = ((2.4, 4.5, 6.6, 8.7), (2.4, 4.2, 6.3, 9.0), (1.8, 3.9, 6.0, 8.1), (2.1, 4.2, 6.6, 9.0))
 NOMINAL_RANGES = {
@@ -45,31 +52,49 @@ class Site:
     ``temperatures`` are those of the two campaigns [°C]. ``crossing`` is as drawn, None on plain track.
     """
 
-    zones: tuple
-    nominal: tuple
-    sensors: tuple
-    hammer_positions: tuple
-    trains: dict
-    true_trains: dict
-    passages: list
-    temperatures: tuple
+    zones: tuple[tuple[float, float], ...]
+    nominal: tuple[dict[str, float], ...]
+    sensors: tuple[float, ...]
+    hammer_positions: tuple[float, ...]
+    trains: dict[str, Train]
+    true_trains: dict[str, Train]
+    passages: list[PlannedPassage]
+    temperatures: tuple[float, float]
     world: World
-    chains: tuple
+    chains: tuple[MeasurementChain, ...]
     force: MeasurementChain
-    roughness: dict = field(default_factory=dict)
+    roughness: dict[Any, Callable[..., np.ndarray]] = field(default_factory=dict)
     tip: float = 1.1e9
     crossing: Crossing | None = None
 
-    def names(self):
+    def names(self) -> tuple[str, ...]:
         """Names of the sensors."""
         return tuple(f"A{i + 1}" for i in range(len(self.sensors)))
 
 
-def draw_site(rng, same_temperature=None, one_speed=None, panel=PLAIN):
+def draw_site(
+    rng: np.random.Generator, same_temperature: bool | None = None, one_speed: bool | None = None, panel: str = PLAIN
+) -> Site:
     """Draw a site.
 
     ``same_temperature`` in both campaigns or not (None: in one case of four), ``one_speed`` for all trains or not
     (None: in one case of ten), ``panel`` of ``PANELS``.
+
+    Parameters
+    ----------
+    rng : Generator
+        Source of the random numbers.
+    same_temperature : bool or None
+        Whether both campaigns have the same temperature; None: in one case of four.
+    one_speed : bool or None
+        Whether all trains have one speed; None: in one case of ten.
+    panel : str
+        One of ``PANELS``.
+
+    Returns
+    -------
+    Site
+        The site.
     """
     one_speed = bool(rng.random() < 0.1) if one_speed is None else one_speed
     boundary = float(rng.choice([3.9, 4.5, 5.7, 6.9]))
@@ -100,8 +125,21 @@ def draw_site(rng, same_temperature=None, one_speed=None, panel=PLAIN):
     return with_crossing(rng, site) if panel == CROSSING else site
 
 
-def with_crossing(rng, site):
-    """The site with bearers from the zone boundary on, and a crossing behind it."""
+def with_crossing(rng: np.random.Generator, site: Site) -> Site:
+    """The site with bearers from the zone boundary on, and a crossing behind it.
+
+    Parameters
+    ----------
+    rng : Generator
+        Source of the random numbers.
+    site : Site
+        The site.
+
+    Returns
+    -------
+    Site
+        The same site, changed.
+    """
     (west, east), boundary = site.nominal, site.zones[1][0]
     nominal_factor, true_factor = draw_bearer_mass_ratio(rng)
     site.nominal = west, {**east, "mass": round(nominal_factor * east["mass"])}
@@ -112,7 +150,7 @@ def with_crossing(rng, site):
     return site
 
 
-def _draw_nominal(rng):
+def _draw_nominal(rng: np.random.Generator) -> tuple[dict[str, float], ...]:
     first = {name: float(rng.uniform(*span)) for name, span in NOMINAL_RANGES.items()}
     second = {name: value * float(np.exp(rng.uniform(-0.35, 0.35))) for name, value in first.items()}
     second["mass"] = first["mass"]
@@ -120,13 +158,13 @@ def _draw_nominal(rng):
     return tuple({k: round(v, digits[k]) for k, v in zone.items()} for zone in (first, second))
 
 
-def _draw_temperatures(rng, same):
+def _draw_temperatures(rng: np.random.Generator, same: bool | None) -> tuple[float, float]:
     same = bool(rng.random() < 0.25) if same is None else same
     cold, warm = float(rng.uniform(-4.0, 9.0)), float(rng.uniform(20.0, 33.0))
     return (warm, warm + float(rng.uniform(-1.0, 1.0))) if same else (cold, warm)
 
 
-def _nominal_trains():
+def _nominal_trains() -> dict[str, Train]:
     return {
         "railcar": Train("railcar", (vehicle.RAILCAR, vehicle.RAILCAR), 0.43, 9.3e10),
         "locomotive": Train("locomotive", (vehicle.LOCOMOTIVE,), 0.61, 1.0e11),
@@ -134,10 +172,10 @@ def _nominal_trains():
     }
 
 
-def _draw_true_train(train, rng):
+def _draw_true_train(train: Train, rng: np.random.Generator) -> Train:
     """The true train: masses, springs, dampers, wheels and axle positions with their deviations from the file."""
 
-    def car(c):
+    def car(c: Car) -> Car:
         spread = {"body": 0.03, "bogie": 0.03, "wheelset": 0.02, "primary": 0.1, "secondary": 0.1}
         spread |= {"primary_damping": 0.2, "secondary_damping": 0.2, "body_inertia": 0.05, "bogie_inertia": 0.05}
         values = {k: getattr(c, k) * float(np.exp(s * rng.normal())) for k, s in spread.items()}
@@ -148,7 +186,9 @@ def _draw_true_train(train, rng):
     return Train(train.name, tuple(car(c) for c in train.cars), radius, train.contact * float(rng.uniform(0.9, 1.1)))
 
 
-def _draw_passages(rng, temperatures, one_speed):
+def _draw_passages(
+    rng: np.random.Generator, temperatures: tuple[float, float], one_speed: bool
+) -> list[PlannedPassage]:
     plan = [("railcar", 25.0), ("railcar", 33.0), ("railcar", 42.0), ("locomotive", 28.0), ("locomotive", 38.0)]
     plan += [("loaded", 20.0), ("loaded", 25.0), ("loaded", 29.0)]
     order = rng.permutation(len(plan))
@@ -162,12 +202,14 @@ def _draw_passages(rng, temperatures, one_speed):
     return passages
 
 
-def _draw_world(rng, zones, nominal):
+def _draw_world(
+    rng: np.random.Generator, zones: tuple[tuple[float, float], ...], nominal: tuple[dict[str, float], ...]
+) -> World:
     grid = Grid()
     n_support = int((grid.end - grid.start - 1.0) / SPACING)
     ideal = grid.start + SPACING * np.arange(1, n_support + 1)
     position = ideal + 0.008 * rng.normal(size=n_support)
-    values = {}
+    values: dict[str, Any] = {}
     common = {name: float(np.exp(s * rng.normal())) for name, s in COMMON_ERROR.items()}
     for name, s in SUPPORT_SCATTER.items():
         base = np.where(ideal < zones[0][1], nominal[0][name], nominal[1][name])
@@ -181,9 +223,9 @@ def _draw_world(rng, zones, nominal):
     return world
 
 
-def _draw_roughness(rng, trains):
+def _draw_roughness(rng: np.random.Generator, trains: Mapping[str, Train]) -> dict[Any, Callable[..., np.ndarray]]:
     """Functions that give dips: "rail" of position; (train, axle) of position and phase."""
-    roughness = {"rail": rail_roughness(rng, float(rng.uniform(-3.0, 4.0)))}
+    roughness: dict[Any, Callable[..., np.ndarray]] = {"rail": rail_roughness(rng, float(rng.uniform(-3.0, 4.0)))}
     for train in trains.values():
         level = float(rng.uniform(-8.0, -1.0))
         for axle in range(1, train.axles().size + 1):

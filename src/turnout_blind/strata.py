@@ -1,11 +1,19 @@
 """Plan the cases of a set: controls, single effects, doubles, outside the library, not identifiable."""
 
+from __future__ import annotations
+
 import hashlib
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout_blind.site import PLAIN
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Mapping
+
+    from turnout_blind.effect import Effect
 
 FULL_COUNTS = {"control": 60, "single": 1, "double": 20, "outside": 20, "unidentifiable": 16}
 FAST_COUNTS = {"control": 10, "single": 17, "double": 3, "outside": 5, "unidentifiable": 5}
@@ -20,17 +28,38 @@ class CasePlan:
     """``stratum`` and ``effects`` ((kind, rung), ...) of one case, ``seed`` of its random generator, and ``panel``."""
 
     stratum: str
-    effects: tuple
-    seed: tuple
+    effects: tuple[tuple[str, int], ...]
+    seed: tuple[int, ...]
     panel: str = PLAIN
 
 
-def plan_cases(seed, effects, full=True, only=None, panel=PLAIN):
+def plan_cases(
+    seed: int, effects: Mapping[str, Effect], full: bool = True, only: Collection[str] | None = None, panel: str = PLAIN
+) -> list[CasePlan]:
     """Plans of a whole set in shuffled order.
 
-    A full set has every single effect at each rung of its ladder; the fast tier has one rung each. ``only`` lists the
-    kinds beside the controls. ``panel`` is that of all cases.
+    A full set has every single effect at each rung of its ladder; the fast tier has one rung each.
 
+    Parameters
+    ----------
+    seed : int
+        Seed of the set.
+    effects : mapping
+        Effects by kind.
+    full : bool
+        All strata, or the fast tier.
+    only : collection of str or None
+        Kinds beside the controls; None: all.
+    panel : str
+        Panel of all cases.
+
+    Returns
+    -------
+    list of CasePlan
+        The plans.
+
+    Examples
+    --------
     >>> from turnout_blind.effect import load_effects
     >>> plans = plan_cases(7, load_effects(), full=False)
     >>> len(plans), sum(p.stratum == "control" for p in plans)
@@ -41,7 +70,7 @@ def plan_cases(seed, effects, full=True, only=None, panel=PLAIN):
         s: [k for k, e in sorted(effects.items()) if e.stratum == s] for s in ("single", "outside", "unidentifiable")
     }
     counts = FULL_COUNTS if full else FAST_COUNTS
-    cases = [("control", ())] * counts["control"]
+    cases: list[tuple[str, tuple[tuple[str, int], ...]]] = [("control", ())] * counts["control"]
     if full:
         cases += [("single", ((k, r),)) for k in effect_types["single"] for r in range(len(effects[k].ladder))]
     else:
@@ -58,10 +87,11 @@ def plan_cases(seed, effects, full=True, only=None, panel=PLAIN):
     if only is not None:
         cases = [m for m in cases if all(k in only for k, _ in m[1])]
     order = rng.permutation(len(cases))
-    return [CasePlan(*cases[i], seed=(seed, 23, k), panel=panel) for k, i in enumerate(order)]
+    shuffled = (cases[i] for i in order.tolist())
+    return [CasePlan(stratum, kinds, (seed, 23, k), panel) for k, (stratum, kinds) in enumerate(shuffled)]
 
 
-def _draw_pair(rng, effects):
+def _draw_pair(rng: np.random.Generator, effects: Mapping[str, Effect]) -> tuple[tuple[str, int], ...]:
     available = [k for k in PAIR_EFFECTS if k in effects]
     while True:
         pair = rng.choice(available, 2, replace=False).tolist()
@@ -69,9 +99,23 @@ def _draw_pair(rng, effects):
             return tuple((k, int(rng.integers(len(effects[k].ladder) // 2 + 1, len(effects[k].ladder)))) for k in pair)
 
 
-def case_id(seed, k):
-    """Name of the ``k``-th case: eight hex digits that tell nothing of its content.
+def case_id(seed: int, k: int) -> str:
+    """Name of a case.
 
+    Parameters
+    ----------
+    seed : int
+        Seed of the set.
+    k : int
+        Number of the case in the set.
+
+    Returns
+    -------
+    str
+        "T" and eight hexadecimal digits that tell nothing of the content.
+
+    Examples
+    --------
     >>> len(case_id(1, 0))
     9
     """

@@ -1,17 +1,22 @@
 """The true state of one site: rail, supports, attached masses, surfaces, sensors. Effects change it."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from turnout_blind.grid import Grid, Rail, spread
+from turnout_blind.instrument import Fault
 from turnout_blind.march_inputs import AttachedMasses, Beam, Supports
 
 SPACING = 0.6
 PER_SUPPORT = ("place", "pad", "pad_damping", "mass", "ballast", "ballast_damping")
 
 
-def _empty_array():
+def _empty_array() -> np.ndarray:
     return np.zeros(0)
 
 
@@ -47,27 +52,27 @@ class World:
     branch_share: np.ndarray = field(default_factory=_empty_array)
     branch_rate: np.ndarray = field(default_factory=_empty_array)
     reference: float = 15.0
-    softening: object = None
-    attached_masses: list = field(default_factory=list)
-    profile: tuple | None = None
-    surface: list = field(default_factory=list)
-    treads: dict = field(default_factory=dict)
-    wheel_mass: dict = field(default_factory=dict)
-    wear_per_passage: dict = field(default_factory=dict)
-    channels: dict = field(default_factory=dict)
-    sensor_shift: dict = field(default_factory=dict)
-    passage_noise: list = field(default_factory=list)
+    softening: Callable[[float], float] | None = None
+    attached_masses: list[tuple[float, ...]] = field(default_factory=list)
+    profile: tuple[np.ndarray, np.ndarray] | None = None
+    surface: list[Callable[[np.ndarray], np.ndarray]] = field(default_factory=list)
+    treads: dict[tuple[str, int], list[Callable[..., np.ndarray]]] = field(default_factory=dict)
+    wheel_mass: dict[str, float] = field(default_factory=dict)
+    wear_per_passage: dict[int, tuple[float, float]] = field(default_factory=dict)
+    channels: dict[str, list[Callable[[str, np.random.Generator], Fault]]] = field(default_factory=dict)
+    sensor_shift: dict[str, float] = field(default_factory=dict)
+    passage_noise: list[Callable[..., np.ndarray]] = field(default_factory=list)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         n = self.position.size
         neutral = {"lift": 1.0, "gap": -1.0, "seated": 0.0, "close": 1e-4, "hardening": 0.0, "drift": 0.0}
         for name, value in neutral.items():
             if getattr(self, name).size != n:
                 setattr(self, name, np.full(n, value))
 
-    def copy(self):
+    def copy(self) -> World:
         """A copy whose arrays and lists can be changed without changing this world."""
-        values = {}
+        values: dict[str, Any] = {}
         for name, value in self.__dict__.items():
             if isinstance(value, np.ndarray):
                 values[name] = value.copy()
@@ -77,11 +82,22 @@ class World:
                 values[name] = {k: list(v) if isinstance(v, list) else v for k, v in value.items()}
         return replace(self, **values)
 
-    def nearest(self, position):
-        """Index of the support nearest to ``position`` [m]."""
+    def nearest(self, position: float) -> int:
+        """Index of the nearest support.
+
+        Parameters
+        ----------
+        position : float
+            Position. [m]
+
+        Returns
+        -------
+        int
+            Index of the support.
+        """
         return int(np.argmin(np.abs(self.position - position)))
 
-    def beam(self):
+    def beam(self) -> Beam:
         """Inputs of the march: the rail."""
         g, r = self.grid, self.rail
         loss, rates = r.damping / r.mass, (g.rates(), g.rates(0.5)[:-1])
@@ -94,8 +110,21 @@ class World:
             rates[0] + loss / mass, rates[1],
         )  # fmt: skip
 
-    def supports(self, temperature=None, n_passages=0.0):
-        """Inputs of the march: pads, sleepers and ballast at a rail ``temperature`` [°C] after ``n_passages``."""
+    def supports(self, temperature: float | None = None, n_passages: float = 0.0) -> Supports:
+        """Inputs of the march: pads, sleepers and ballast.
+
+        Parameters
+        ----------
+        temperature : float or None
+            Rail temperature [°C]; None: the reference.
+        n_passages : float
+            Passages before, which have worn the supports.
+
+        Returns
+        -------
+        Supports
+            Inputs of the march.
+        """
         first, weights = spread(self.grid, self.position)
         pad_factor = 1.0
         if self.softening is not None and temperature is not None:
@@ -111,7 +140,7 @@ class World:
             np.full(n, self.shear), np.full(n, self.shear_damping), self.branch_share, self.branch_rate,
         )  # fmt: skip
 
-    def attached_mass_inputs(self):
+    def attached_mass_inputs(self) -> AttachedMasses:
         """Inputs of the march: masses attached to the rail."""
         table = np.array(self.attached_masses, dtype=float).reshape(-1, 6)
         first, weights = spread(self.grid, table[:, 0])
@@ -119,20 +148,50 @@ class World:
 
 
 def uniform_world(
-    length=60.0,
-    step=0.1,
-    pad=3e8,
-    pad_damping=2e4,
-    mass=140.0,
-    ballast=1e8,
-    ballast_damping=6e4,
-    rail=None,
-    sponge=12.0,
-):
-    """A world of equal supports every ``SPACING`` [m] about 0, for the verification of the simulation."""
+    length: float = 60.0,
+    step: float = 0.1,
+    pad: float = 3e8,
+    pad_damping: float = 2e4,
+    mass: float = 140.0,
+    ballast: float = 1e8,
+    ballast_damping: float = 6e4,
+    rail: Rail | None = None,
+    sponge: float = 12.0,
+) -> World:
+    """A world of equal supports every ``SPACING`` [m] about 0, for the verification of the simulation.
+
+    Parameters
+    ----------
+    length : float
+        Length of the grid. [m]
+    step : float
+        Distance of its nodes. [m]
+    pad : float
+        Pad stiffness. [N/m]
+    pad_damping : float
+        Pad damping. [N s/m]
+    mass : float
+        Mass of half a sleeper. [kg]
+    ballast : float
+        Ballast stiffness. [N/m]
+    ballast_damping : float
+        Ballast damping. [N s/m]
+    rail : Rail or None
+        Profile of the rail; None: that of ``Rail()``.
+    sponge : float
+        Length of the absorbing layers. [m]
+
+    Returns
+    -------
+    World
+        The world.
+    """
     rail = rail or Rail()
     grid = Grid(-0.5 * length, round(length / step) + 1, step, sponge)
     half = int(0.5 * length / SPACING) - 1
     position = SPACING * np.arange(-half, half + 1)
-    values = (pad, pad_damping, mass, ballast, ballast_damping)
-    return World(grid, rail, position, *(np.full(position.size, float(v)) for v in values))
+    values: dict[str, float] = {
+        "pad": pad, "pad_damping": pad_damping, "mass": mass, "ballast": ballast, "ballast_damping": ballast_damping,
+    }  # fmt: skip
+    arrays: dict[str, Any] = {name: np.full(position.size, float(v)) for name, v in values.items()}
+    return World(grid, rail, position, **arrays)

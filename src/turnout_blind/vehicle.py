@@ -1,10 +1,16 @@
 """Trains of cars with a body on two bogies of two wheelsets; simulated is the half on one rail."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout_blind.march_inputs import Cars, Wheels
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 GRAVITY = 9.81
 
@@ -27,7 +33,7 @@ class Car:
     length: float
 
     @property
-    def axle_load(self):
+    def axle_load(self) -> float:
         """Static load of an axle [N]."""
         return GRAVITY * (0.25 * self.body + 0.5 * self.bogie + self.wheelset)
 
@@ -37,11 +43,11 @@ class Train:
     """``name`` of the vehicle file, ``cars`` from the front, wheel ``radius`` [m] and Hertz constant ``contact``."""
 
     name: str
-    cars: tuple
+    cars: tuple[Car, ...]
     radius: float = 0.46
     contact: float = 9.3e10
 
-    def axles(self):
+    def axles(self) -> np.ndarray:
         """Distances of the axles from the front end [m]."""
         positions, front = [], 0.0
         for car in self.cars:
@@ -52,15 +58,26 @@ class Train:
         return np.array(positions)
 
     @property
-    def axle_load(self):
+    def axle_load(self) -> float:
         """Mean static load of an axle [N]."""
         return float(np.mean([c.axle_load for c in self.cars]))
 
 
-def cars_of(train):
-    """Inputs of the march: half of every car."""
+def cars_of(train: Train) -> Cars:
+    """Inputs of the march: half of every car.
 
-    def per_car(quantity):
+    Parameters
+    ----------
+    train : Train
+        The train.
+
+    Returns
+    -------
+    Cars
+        Values of each car.
+    """
+
+    def per_car(quantity: Callable[[Car], float]) -> np.ndarray:
         return np.array([float(quantity(c)) for c in train.cars])
 
     return Cars(
@@ -72,8 +89,31 @@ def cars_of(train):
     )  # fmt: skip
 
 
-def wheels_of(train, path, path_start, path_step, local, factor=1.0):
-    """Inputs of the march: wheels with unsprung mass times ``factor``, and their paths (n_wheel, m) [m]."""
+def wheels_of(
+    train: Train, path: np.ndarray, path_start: float, path_step: float, local: float, factor: float = 1.0
+) -> Wheels:
+    """Inputs of the march: wheels with their paths.
+
+    Parameters
+    ----------
+    train : Train
+        The train.
+    path : (n_wheel, m) array of float
+        Dips that each wheel meets. [m]
+    path_start : float
+        Position of the first dip. [m]
+    path_step : float
+        Distance of two dips. [m]
+    local : float
+        Compliance of the rail that the grid lacks. [m/N]
+    factor : float
+        Factor on the unsprung mass.
+
+    Returns
+    -------
+    Wheels
+        Values of each wheel.
+    """
     mass = np.repeat([0.5 * factor * c.wheelset for c in train.cars], 4)
     sprung = np.repeat([0.125 * c.body + 0.25 * c.bogie for c in train.cars], 4)
     axles = train.axles()
@@ -81,7 +121,7 @@ def wheels_of(train, path, path_start, path_step, local, factor=1.0):
     return Wheels(mass, GRAVITY * (mass + sprung), axles - axles[0], contact, local, path, path_start, path_step)
 
 
-def no_train():
+def no_train() -> tuple[Cars, Wheels]:
     """Inputs of the march without a train."""
     none = np.zeros(0)
     return Cars(*([none] * 10)), Wheels(none, none, none, none, 0.0, np.zeros((0, 8)), 0.0, 1.0)

@@ -1,5 +1,9 @@
 """Share of the recordings that a concealed effect makes up, by simulation of the site with and without it."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from turnout_blind.instrument import amplify
@@ -7,21 +11,42 @@ from turnout_blind.march import TIME_STEP
 from turnout_blind.record import PASSAGE_DECIMATION, RATE, passage_motion, sensor_positions
 from turnout_blind.run import simulate_impacts
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from turnout_blind.site import Site
+    from turnout_blind.true_site import World
+
 HAMMER_BAND, PASSAGE_BAND = (30.0, 800.0), (5.0, 800.0)  # [Hz]
 
 
-def effect_visibility(site, world, seed):
-    r"""{"hammer_pct", "passage_pct"}: share of the response that an effect makes up, largest over the sensors.
+def effect_visibility(site: Site, world: World, seed: Sequence[int]) -> dict[str, float]:
+    r"""Share of the response that an effect makes up, largest over the sensors.
 
     .. math:: 100\, \|y - y_0\| / \|y\|
 
     with :math:`y_0` of the same rails, wheels and impacts without the effect, below 800 Hz and without noise. The fit
     cannot lose more than this if the effect is left out, even without a refit. Used are one impact per position and the
     first passage of each train.
+
+    Parameters
+    ----------
+    site : Site
+        The site.
+    world : World
+        World with the effect.
+    seed : sequence of int
+        Seed of the faults and of other sources.
+
+    Returns
+    -------
+    dict
+        "hammer_pct" and "passage_pct". [%]
     """
-    hammer_pair = [_impact_signals(site, w, seed) for w in (site.world, world)]
-    hammer = _relative_difference(*hammer_pair, HAMMER_BAND, 3)
-    passage_pairs, first_passage = [], {}
+    before, after = (_impact_signals(site, w, seed) for w in (site.world, world))
+    hammer = _relative_difference(before, after, HAMMER_BAND, 3)
+    passage_pairs: list[list[np.ndarray]] = []
+    first_passage: dict[str, int] = {}
     for k, plan in enumerate(site.passages):
         first_passage.setdefault(plan.train, k)
     for k in first_passage.values():
@@ -30,7 +55,7 @@ def effect_visibility(site, world, seed):
     return {"hammer_pct": round(hammer, 2), "passage_pct": round(passage, 2)}
 
 
-def _sensor_signals(site, world, a, recording_type, seed):
+def _sensor_signals(site: Site, world: World, a: np.ndarray, recording_type: str, seed: Sequence[int]) -> np.ndarray:
     """Signals of the sensors under the motion ``a``, with faults and without noise."""
     rows = []
     for i, chain in enumerate(site.chains):
@@ -39,7 +64,7 @@ def _sensor_signals(site, world, a, recording_type, seed):
     return np.array(rows)
 
 
-def _impact_signals(site, world, seed):
+def _impact_signals(site: Site, world: World, seed: Sequence[int]) -> np.ndarray:
     """Responses to one impact at each position, at the temperature of the second campaign, concatenated."""
     rows = []
     for position in site.hammer_positions:
@@ -51,11 +76,11 @@ def _impact_signals(site, world, seed):
     return np.concatenate(rows, axis=1)
 
 
-def _passage_signals(site, world, k, seed):
+def _passage_signals(site: Site, world: World, k: int, seed: Sequence[int]) -> np.ndarray:
     return _sensor_signals(site, world, passage_motion(site, world, k, np.random.default_rng(seed)), "passage", seed)
 
 
-def _relative_difference(before, after, band, decimation):
+def _relative_difference(before: np.ndarray, after: np.ndarray, band: tuple[float, float], decimation: int) -> float:
     f = np.fft.rfftfreq(before.shape[1], TIME_STEP)
     inside = (f >= band[0]) & (f <= band[1])
     a, b = (np.fft.rfft(x)[:, inside] for x in (before, after))

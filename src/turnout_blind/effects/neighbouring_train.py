@@ -1,21 +1,59 @@
 """A train on the other track during some passages: ground-borne waves that no wheel of the passing train explains."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy import signal
 
 from turnout_blind.effect import Effect
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from typing import Any
 
-def draw(rng, site, level):
-    """Indices of the passages, level [m/s²] and centre frequency [Hz]."""
+    from turnout_blind.site import Site
+    from turnout_blind.true_site import World
+
+
+def draw(rng: np.random.Generator, site: Site, level: float) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Indices of the passages, level [m/s²] and centre frequency [Hz].
+
+    Parameters
+    ----------
+    rng : Generator
+        Source of the random numbers.
+    site : Site
+        The site without the effect.
+    level : float
+        Level of the noise, rms at its strongest. [m/s²]
+
+    Returns
+    -------
+    (dict, dict)
+        Where the effect is, and its parameters.
+    """
     passages = sorted(int(k) for k in rng.choice(len(site.passages), 3, replace=False))
     return {}, {"level": float(level), "passages": passages, "centre": float(rng.uniform(18.0, 45.0))}
 
 
-def act(world, site, where, p):
-    """Add narrow-band noise that rises and falls and reaches the sensors with 250 m/s."""
+def act(world: World, site: Site, where: Mapping[str, Any], p: Mapping[str, Any]) -> None:
+    """Add narrow-band noise that rises and falls and reaches the sensors with 250 m/s.
 
-    def source(time, positions, k, rng):
+    Parameters
+    ----------
+    world : World
+        World that is changed.
+    site : Site
+        The site without the effect.
+    where : mapping
+        Where the effect is, from ``draw``.
+    p : mapping
+        Parameters, from ``draw``.
+    """
+
+    def source(time: np.ndarray, positions: Sequence[float], k: int, rng: np.random.Generator) -> np.ndarray:
         if k not in p["passages"]:
             return np.zeros((len(positions), time.size))
         rate = 1.0 / (time[1] - time[0])

@@ -1,8 +1,15 @@
 """Convert finding rows into answers of one form, whichever program wrote the rows."""
 
+from __future__ import annotations
+
 import json
 import re
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+    from typing import Any
 
 
 @dataclass(frozen=True)
@@ -23,14 +30,26 @@ class Answer:
     parameters: dict = field(default_factory=dict)
 
     @property
-    def says_none(self):
+    def says_none(self) -> bool:
         """Whether the answer is that nothing is wrong."""
         return self.verdict == "none"
 
 
-def answers_of(rows):
+def answers_of(rows: Iterable[Mapping[str, Any]] | None) -> list[Answer] | None:
     """Answers of a case, in the order of the rows; None where the tool gave no rows.
 
+    Parameters
+    ----------
+    rows : iterable of mapping or None
+        Finding rows of the case.
+
+    Returns
+    -------
+    list of Answer or None
+        Answers; a row with several terms gives several.
+
+    Examples
+    --------
     >>> rows = [{"verdict": "named", "term": "wheel_flat", "sentence": "a flat on railcar, axle 3",
     ...          "parameters_json": '[{"name": "length", "value": 0.05, "se": 0.01}]'}]
     >>> answer = answers_of(rows)[0]
@@ -40,7 +59,7 @@ def answers_of(rows):
     return None if rows is None else [answer for row in rows for answer in _answers_of_row(row)]
 
 
-def _answers_of_row(row):
+def _answers_of_row(row: Mapping[str, Any]) -> Iterator[Answer]:
     """The answer of a row, and one for each further term in it.
 
     Further terms are read from ``term_json``. Without that column they are the terms named by the parameters.
@@ -56,7 +75,7 @@ def _answers_of_row(row):
             yield Answer("named", (term,), parameters=_parameters(row["parameters_json"], term)[1])
 
 
-def _further_answer(term):
+def _further_answer(term: Mapping[str, Any]) -> Answer:
     """The answer of a further term: its name or two, its position and its parameters.
 
     >>> dip = {"term": "surface_dip", "or": "wheel_flat", "fixed": {"place": 21.0},
@@ -78,11 +97,11 @@ def _further_answer(term):
     )  # fmt: skip
 
 
-def _values(term):
+def _values(term: Mapping[str, Any]) -> dict[str, Any]:
     return {name: (p.get("value"), p.get("se")) for name, p in term.get("parameters", {}).items()}
 
 
-def _first_answer(row):
+def _first_answer(row: Mapping[str, Any]) -> Answer:
     where, parameters = _parameters(row.get("parameters_json"), row.get("term"))
     sentence = row.get("sentence") or ""
     train, axle = _train_and_axle(row.get("train"))
@@ -98,25 +117,25 @@ def _first_answer(row):
     )  # fmt: skip
 
 
-def _train_and_axle(text):
+def _train_and_axle(text: str | None) -> tuple[str | None, int | None]:
     """(train, axle) of "loaded, axle 3"; either is None if it is missing."""
     train, _, axle = (text or "").partition(", axle ")
     return train or None, int(axle) if axle.isdecimal() else None
 
 
-def _parameters(text, term=None):
+def _parameters(text: Any, term: str | None = None) -> tuple[dict[str, Any], dict[str, Any]]:
     """(where, {name: (value, se)}) of the column, for one term if the entries name their term."""
     where, entries = _entries(text)
     term_entries = [r for r in entries if r.get("term") in (None, term)]
     return where, {r["name"]: (r.get("value"), r.get("se", r.get("standard_error"))) for r in term_entries}
 
 
-def _entries(text):
+def _entries(text: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """(where, entries) of the column: a list of objects, or an object of objects or numbers."""
     content = json.loads(text) if isinstance(text, str) and text else text or {}
     where = content.pop("where", {}) if isinstance(content, dict) else {}
     return where, content if isinstance(content, list) else [{"name": k, **_as_entry(v)} for k, v in content.items()]
 
 
-def _as_entry(value):
+def _as_entry(value: Any) -> dict[str, Any]:
     return value if isinstance(value, dict) else {"value": value}

@@ -1,6 +1,9 @@
 """Report single cases: what was concealed, how it shows in the signals, the answer, and the fits."""
 
+from __future__ import annotations
+
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +18,17 @@ from turnout_blind.score.matching import judge
 from turnout_blind.score.plots import most_changed, outcome, pyplot, relative_changes, save, spectrum
 from turnout_blind.strata import PLAIN, CasePlan
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from typing import Any
+
+    from matplotlib.axes import Axes
+
+    from turnout_blind.effect import Effect
+    from turnout_blind.score.matching import CaseResult
+    from turnout_blind.site import Site
+    from turnout_blind.true_site import World
+
 METRE_KEYS = "position depth length gap close play amplitude shift wavelength reach"
 UNITS = dict.fromkeys(METRE_KEYS.split(), "m") | {
     "delay": "s", "frequency": "Hz", "mass": "kg", "limit": "m/s²", "coefficient": "1/K", "angle": "rad",
@@ -26,8 +40,19 @@ MIN_SPECTRUM_CHANGE = (
 )
 
 
-def choose_cases(results):
-    """Ids of three cases: the least visible single effect named rightly, two effects, and the most visible failure."""
+def choose_cases(results: Sequence[CaseResult]) -> list[str]:
+    """Ids of three cases: the least visible single effect named rightly, two effects, and the most visible failure.
+
+    Parameters
+    ----------
+    results : sequence of CaseResult
+        Results of the cases.
+
+    Returns
+    -------
+    list of str
+        Ids, fewer where there is no such case.
+    """
     right = [j for j in results if j.stratum == "single" and j.is_clear and outcome(j) == "right"]
     double = [j for j in results if j.stratum == "double"]
     failed = [j for j in results if j.kinds and j.is_clear and outcome(j) in ("wrong", "none", "unknown")]
@@ -38,10 +63,37 @@ def choose_cases(results):
     return list(dict.fromkeys(j.case for j in chosen))
 
 
-def case_texts(out, page, cases=None, extra_names=None, oracle=None, effects=()):
-    """Markdown reports of ``cases`` (ids; None chooses three). A picture of each case is written beside the ``page``.
+def case_texts(
+    out: str | Path,
+    page: str | Path,
+    cases: Sequence[str] | None = None,
+    extra_names: Mapping[str, Sequence[str]] | None = None,
+    oracle: Mapping[str, tuple[float, float]] | None = None,
+    effects: Iterable[str | Path] = (),
+) -> str:
+    """Markdown reports of some cases. A picture of each is written beside the page.
 
     The generator makes the recordings without the effect from the seed in the truth.
+
+    Parameters
+    ----------
+    out : str or Path
+        Folder of the set.
+    page : str or Path
+        File of the page.
+    cases : sequence of str or None
+        Ids; None: three are chosen.
+    extra_names : mapping or None
+        Right names of added effects by kind.
+    oracle : mapping or None
+        Result of ``read_oracle``.
+    effects : iterable of str or Path
+        Folders with further effects.
+
+    Returns
+    -------
+    str
+        Markdown.
     """
     truths, rows, _ = read_revealed(out)
     results = {case: judge(truths[case], answers_of(rows[case]), extra_names) for case in truths}
@@ -59,12 +111,25 @@ def case_texts(out, page, cases=None, extra_names=None, oracle=None, effects=())
     return "\n\n".join(texts)
 
 
-def _title(truth):
+def _title(truth: Mapping[str, Any]) -> str:
     return f"{truth['case']}: " + (" and ".join(e["kind"].replace("_", " ") for e in truth["effects"]) or "nothing")
 
 
-def case_text(truth, rows):
-    """What was concealed and what was answered, in sentences."""
+def case_text(truth: Mapping[str, Any], rows: Sequence[Mapping[str, Any]] | None) -> str:
+    """What was concealed and what was answered, in sentences.
+
+    Parameters
+    ----------
+    truth : mapping
+        Truth of the case.
+    rows : sequence of mapping or None
+        Finding rows; None: no answer.
+
+    Returns
+    -------
+    str
+        The sentences.
+    """
     concealed = "; ".join(
         f"{e['kind'].replace('_', ' ')} ({_numbers({**e['where'], **e['parameters']})})" for e in truth["effects"]
     )
@@ -76,17 +141,17 @@ def case_text(truth, rows):
     )
 
 
-def _row_text(row):
+def _row_text(row: Mapping[str, Any]) -> str:
     sure = row.get("probability")
     sentence = row.get("sentence") or row.get("term") or ""
     return f"{row['verdict'].replace('_', ' ')}{'' if sure is None else f' (probability {sure:.2f})'}: {sentence}"
 
 
-def _numbers(values):
+def _numbers(values: Mapping[str, Any]) -> str:
     return ", ".join(f"{k} {_number(v, UNITS.get(k, ''))}" for k, v in values.items())
 
 
-def _number(value, unit):
+def _number(value: Any, unit: str) -> str:
     """
     >>> _number(0.000323, "m"), _number(1.312, ""), _number(7, "")
     ('0.323 mm', '1.31', '7')
@@ -98,8 +163,33 @@ def _number(value, unit):
     return f"{value:.3g} {unit}".rstrip()
 
 
-def draw_case(truth, rows, oracle, path, effects):
-    """Draw one case: impact and train with and without the effect, the track with truth and answers, and the fits."""
+def draw_case(
+    truth: Mapping[str, Any],
+    rows: Sequence[Mapping[str, Any]] | None,
+    oracle: float | None,
+    path: Path,
+    effects: Mapping[str, Effect],
+) -> Path:
+    """Draw one case: impact and train with and without the effect, the track with truth and answers, and the fits.
+
+    Parameters
+    ----------
+    truth : mapping
+        Truth of the case.
+    rows : sequence of mapping or None
+        Finding rows; None: no answer.
+    oracle : float or None
+        Held-out fit with the true effect [%]; None: not computed.
+    path : Path
+        File of the picture.
+    effects : mapping
+        Effects by kind.
+
+    Returns
+    -------
+    Path
+        The picture.
+    """
     plt = pyplot()
     concealed = tuple((e["kind"], e["rung"]) for e in truth["effects"])
     plan = CasePlan(truth["stratum"], concealed, tuple(truth["seed"]), truth.get("panel", PLAIN))
@@ -117,7 +207,7 @@ def draw_case(truth, rows, oracle, path, effects):
     return save(figure, path)
 
 
-def _plot_comparison(axis, before, after, top, window):
+def _plot_comparison(axis: Axes, before: np.ndarray, after: np.ndarray, top: float, window: str) -> None:
     """Plot spectra without and with the effect up to ``top`` [Hz]; if they coincide, as for a delay, 30 ms of time."""
     (f, density_before), (_, density_after) = (spectrum(signal[None], RATE, window) for signal in (before, after))
     inside = (f > 5.0) & (f < top)
@@ -138,10 +228,10 @@ def _plot_comparison(axis, before, after, top, window):
     axis.set(xlabel=label[0], ylabel=label[1])
 
 
-def _impact_comparison(site, world):
+def _impact_comparison(site: Site, world: World) -> tuple[str, np.ndarray, np.ndarray, float, str]:
     """(title, without, with, top [Hz], window) of an impact at the position where the effect shows most."""
 
-    def both_signals(position):
+    def both_signals(position: float) -> Iterator[np.ndarray]:
         for w in (site.world, world):
             warm = site.temperatures[1]
             _, a, _ = simulate_impacts(
@@ -153,10 +243,10 @@ def _impact_comparison(site, world):
     return f"a blow at {position:.1f} m", before, after, 900.0, "boxcar"
 
 
-def _passage_comparison(site, world):
+def _passage_comparison(site: Site, world: World) -> tuple[str, np.ndarray, np.ndarray, float, str]:
     """(title, without, with, top [Hz], window) of the passage in which the effect shows most."""
 
-    def both_signals(k):
+    def both_signals(k: int) -> Iterator[np.ndarray]:
         for w in (site.world, world):
             yield _sensor_signals(site, w, passage_motion(site, w, k, np.random.default_rng(k)), "passage")
 
@@ -165,12 +255,12 @@ def _passage_comparison(site, world):
     return f"{p.train}, {3.6 * p.speed:.0f} km/h", before, after, 250.0, "hann"
 
 
-def _most_different(comparisons):
+def _most_different(comparisons: Iterable[tuple]) -> tuple:
     """The (key, without, with) that differs most."""
     return max(comparisons, key=lambda s: relative_changes(*s[1:]).max())
 
 
-def _sensor_signals(site, world, motion, recording_type):
+def _sensor_signals(site: Site, world: World, motion: np.ndarray, recording_type: str) -> np.ndarray:
     """Signals of the sensors under ``motion`` with their faults, in a "hammer" test or a "passage"."""
     rows = []
     for x, chain in zip(motion, site.chains):
@@ -180,7 +270,7 @@ def _sensor_signals(site, world, motion, recording_type):
     return np.array(rows)
 
 
-def _plot_track(axis, truth, rows, site):
+def _plot_track(axis: Axes, truth: Mapping[str, Any], rows: Sequence[Mapping[str, Any]] | None, site: Site) -> None:
     """Plot along the rail: sensors, hammer positions, concealed effects (filled) and answers (open)."""
     axis.set_xlim(min(site.sensors) - 2.5, max(site.sensors) + 2.5)
     axis.plot(site.sensors, np.zeros(len(site.sensors)), "^", color="0.4", label="sensor")
@@ -200,7 +290,9 @@ def _plot_track(axis, truth, rows, site):
     axis.legend(loc="lower right", ncols=2, fontsize=7)
 
 
-def _plot_mark(axis, x, y, text, train, axle, **style):
+def _plot_mark(
+    axis: Axes, x: float | None, y: float, text: str, train: str | None, axle: int | None, **style: Any
+) -> None:
     """Mark an effect at its position ``x``; one without a position stands at the left with its wheel or train."""
     if x is not None:
         axis.plot(x, y, "o", **style)
@@ -210,7 +302,7 @@ def _plot_mark(axis, x, y, text, train, axle, **style):
     axis.annotate(f"{text.replace('_', ' ')}: {wheel}", (0.02, y), xycoords=("axes fraction", "data"), fontsize=8)
 
 
-def _annotate(axis, x, y, text):
+def _annotate(axis: Axes, x: float, y: float, text: str) -> None:
     """Write the text beside the point, towards the middle of the axis."""
     low, high = axis.get_xlim()
     side = "right" if x > 0.5 * (low + high) else "left"
@@ -218,12 +310,12 @@ def _annotate(axis, x, y, text):
                   textcoords="offset points", fontsize=8, ha=side)  # fmt: skip
 
 
-def _plot_fits(axis, rows, oracle):
+def _plot_fits(axis: Axes, rows: Sequence[Mapping[str, Any]] | None, oracle: float | None) -> None:
     """Plot the fits of the held-out recordings."""
     row = (rows or [{}])[0]
     fits = {label: row.get(f"fit_{name}_pct") for name, label in FIT_LABELS.items()} | {"told the truth": oracle}
-    fits = {name: value for name, value in fits.items() if value is not None}
-    axis.barh(list(fits), list(fits.values()), color="C0")
+    stated: dict[str, Any] = {name: value for name, value in fits.items() if value is not None}
+    axis.barh(list(stated), list(stated.values()), color="C0")
     axis.set_xlabel("fit on recordings never used [%]")
-    if not fits:
+    if not stated:
         axis.text(0.5, 0.5, "no fit was given", ha="center", transform=axis.transAxes)

@@ -3,11 +3,29 @@
 from scipy.stats import beta
 
 
-def clopper_pearson(k, n, confidence=0.95):
-    """(low, high) of a share if ``k`` of ``n`` were observed; (0, 1) for n = 0.
+def clopper_pearson(k: int, n: int, confidence: float = 0.95) -> tuple[float, float]:
+    """Confidence interval of a share.
 
-    No alarm in 60 gives an upper limit of 6.0 % (two-sided). One in 30 gives 0.1 to 17.2 %:
+    Parameters
+    ----------
+    k : int
+        Number of cases that were observed.
+    n : int
+        Number of all cases.
+    confidence : float
+        Probability of the interval.
 
+    Returns
+    -------
+    (float, float)
+        Lower and upper limit; (0, 1) for n = 0.
+
+    References
+    ----------
+    Clopper and Pearson 1934, The use of confidence or fiducial limits illustrated in the case of the binomial.
+
+    Examples
+    --------
     >>> [round(100 * x, 1) for x in (*clopper_pearson(0, 60), *clopper_pearson(1, 30))]
     [0.0, 6.0, 0.1, 17.2]
     """

@@ -1,10 +1,19 @@
 """Compare the answers of one case with its truth."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout_blind.score.names import right_locks, right_names, same_parameters
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+    from typing import Any
+
+    from turnout_blind.score.answers import Answer
 
 MAX_POSITION_ERROR = 0.6  # largest error of a right position: one sleeper bay [m]
 CONTROL_RESIDUAL = 46.0  # residual of controls in a held-out passage, mostly roughness [% of its norm]
@@ -40,16 +49,28 @@ class CaseResult:
     gain_error: float | None = None
 
     @property
-    def is_clear(self):
+    def is_clear(self) -> bool:
         """Whether the effect costs enough fit to be detectable."""
         return self.gain > MIN_CLEAR_GAIN
 
 
-def gain_of(visible):
-    """Visibility in points of fit of an effect that makes up a share ``visible`` of the response [%].
+def gain_of(visible: Mapping[str, float]) -> float:
+    """Visibility in points of fit of an effect that makes up a share of the response.
 
     Its square adds to that of the control residual: sqrt(46^2 + v^2) - 46. 3 points are lost at v = 16.9 %.
 
+    Parameters
+    ----------
+    visible : mapping
+        Shares "hammer_pct" and "passage_pct". [%]
+
+    Returns
+    -------
+    float
+        Visibility. [points of fit]
+
+    Examples
+    --------
     >>> round(gain_of({"hammer_pct": 1.0, "passage_pct": 16.9}), 2)
     3.01
     """
@@ -57,8 +78,25 @@ def gain_of(visible):
     return float(np.hypot(CONTROL_RESIDUAL, share) - CONTROL_RESIDUAL)
 
 
-def judge(truth, answers, extra_names=None):
-    """``CaseResult`` of a case from its truth and ``answers`` (None if the tool gave none)."""
+def judge(
+    truth: Mapping[str, Any], answers: Sequence[Answer] | None, extra_names: Mapping[str, Sequence[str]] | None = None
+) -> CaseResult:
+    """Result of a case from its truth and the answers.
+
+    Parameters
+    ----------
+    truth : mapping
+        Truth of the case.
+    answers : sequence of Answer or None
+        Answers; None: the tool gave none.
+    extra_names : mapping or None
+        Right names of added effects by kind.
+
+    Returns
+    -------
+    CaseResult
+        The result.
+    """
     effects = truth["effects"]
     kinds = tuple(e["kind"] for e in effects)
     alarms = [a for a in answers or () if not a.says_none]
@@ -68,7 +106,7 @@ def judge(truth, answers, extra_names=None):
     wrong_names = _wrong_names(right_by_effect, alarms)
     is_first_right = bool(alarms) and alarms[0].verdict == "named" and alarms[0].names[0] in allowed
     probability, is_right = _stated_probability(truth, answers, alarms, bool(allowed), wrong_names)
-    leading = alarms[0] if alarms else (answers or [None])[0]
+    leading = alarms[0] if alarms else answers[0] if answers else None
     return CaseResult(
         truth["case"], truth["stratum"], kinds, tuple(e["rung"] for e in effects), gain_of(truth["visible"]),
         bool(answers), bool(alarms), matches,
@@ -76,11 +114,12 @@ def judge(truth, answers, extra_names=None):
         is_first_right, wrong_names, _first_answer_text(answers, alarms),
         _location_checks(effects, right_by_effect, alarms),
         tuple(_parameter_errors(effects, right_by_effect, alarms)), probability, is_right,
-        (None, None) if leading is None else (leading.before, leading.after), leading and leading.gain_error,
+        (None, None) if leading is None else (leading.before, leading.after),
+        None if leading is None else leading.gain_error,
     )  # fmt: skip
 
 
-def _wrong_names(right_by_effect, alarms):
+def _wrong_names(right_by_effect: Sequence[Sequence[str]], alarms: Sequence[Answer]) -> tuple[str, ...]:
     """Names of the answers that match no effect, or only one that is named already."""
     unmatched, wrong_names = list(right_by_effect), []
     for answer in (a for a in alarms if a.names):
@@ -92,14 +131,14 @@ def _wrong_names(right_by_effect, alarms):
     return tuple(wrong_names)
 
 
-def _match_verdict(names, alarms):
+def _match_verdict(names: Sequence[str], alarms: Sequence[Answer]) -> str:
     for verdict in ("named", "a_or_b"):
         if any(a.verdict == verdict and set(a.names) & set(names) for a in alarms):
             return verdict
     return ""
 
 
-def _first_answer_text(answers, alarms):
+def _first_answer_text(answers: Sequence[Answer] | None, alarms: Sequence[Answer]) -> str:
     if not answers:
         return "no answer"
     if not alarms:
@@ -107,7 +146,13 @@ def _first_answer_text(answers, alarms):
     return alarms[0].names[0] if alarms[0].verdict == "named" else alarms[0].verdict
 
 
-def _stated_probability(truth, answers, alarms, is_known, wrong_names):
+def _stated_probability(
+    truth: Mapping[str, Any],
+    answers: Sequence[Answer] | None,
+    alarms: Sequence[Answer],
+    is_known: bool,
+    wrong_names: Sequence[str],
+) -> tuple[float | None, bool | None]:
     """(stated probability of the answer, whether the answer is right).
 
     "none" is right without a clear effect, "unknown" if the library does not hold the effects (``is_known`` False).
@@ -125,12 +170,14 @@ def _stated_probability(truth, answers, alarms, is_known, wrong_names):
     return leading.probability, not wrong_names
 
 
-def _answer_to(names, alarms):
+def _answer_to(names: Sequence[str], alarms: Sequence[Answer]) -> Answer | None:
     """The answer that refers to an effect: one that names it, else the first."""
     return next((a for a in alarms if set(a.names) & set(names)), alarms[0] if alarms else None)
 
 
-def _location_checks(effects, right_by_effect, alarms):
+def _location_checks(
+    effects: Sequence[Mapping[str, Any]], right_by_effect: Sequence[Sequence[str]], alarms: Sequence[Answer]
+) -> dict[str, bool]:
     """{"lock", "place", "axle", "sensor"}: True or False for each that a single effect has."""
     if len(effects) != 1:
         return {}
@@ -139,21 +186,23 @@ def _location_checks(effects, right_by_effect, alarms):
     return {"lock": lock, **_position_checks(effect, right_by_effect[0], alarms)}
 
 
-def _position_checks(effect, names, alarms):
+def _position_checks(effect: Mapping[str, Any], names: Sequence[str], alarms: Sequence[Answer]) -> dict[str, bool]:
     """{"place", "axle", "sensor"}: True or False for each that an effect of the right ``names`` has."""
-    answer, where, checks = _answer_to(names, alarms), effect["where"], {}
+    answer, where = _answer_to(names, alarms), effect["where"]
+    checks: dict[str, bool] = {}
     if effect["locked_to"] in ("place", "amplitude") and "position" in where:
-        has_position = answer is not None and answer.position is not None
-        checks["place"] = has_position and abs(answer.position - where["position"]) <= MAX_POSITION_ERROR
+        position = None if answer is None else answer.position
+        checks["place"] = position is not None and abs(position - where["position"]) <= MAX_POSITION_ERROR
     if "axle" in where:
-        is_same_axle = answer is not None and answer.axle == where["axle"]
-        checks["axle"] = is_same_axle and answer.train == where["train"]
+        checks["axle"] = answer is not None and answer.axle == where["axle"] and answer.train == where["train"]
     if "sensor" in where:
         checks["sensor"] = answer is not None and answer.sensor == where["sensor"]
     return checks
 
 
-def _parameter_errors(effects, right_by_effect, alarms):
+def _parameter_errors(
+    effects: Sequence[Mapping[str, Any]], right_by_effect: Sequence[Sequence[str]], alarms: Sequence[Answer]
+) -> Iterator[tuple[float, bool | None]]:
     """(relative error, whether the 95 % interval covers the truth) of each parameter of a named effect.
 
     The error is relative to the size of the effect. Without a standard error the second is None.

@@ -1,12 +1,22 @@
 """Compute the figures of the proof, each with its number of cases, interval and target (bar)."""
 
+from __future__ import annotations
+
 from collections import Counter
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout_blind.score.intervals import clopper_pearson
 from turnout_blind.score.matching import MIN_CLEAR_GAIN
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+    from typing import Any
+
+    from turnout_blind.score.matching import CaseResult
 
 MAX_FIT_LOSS = 1.0  # loss of held-out fit that counts if the row gives no standard error [points]
 MIN_GROUP_SIZE = 5  # smallest group of stated probabilities that is compared with its bar [cases]
@@ -23,17 +33,18 @@ class Share:
     sense: str = ">="
 
     @property
-    def share(self):
+    def share(self) -> float:
         """Share in percent, nan for n = 0."""
         return 100.0 * self.k / self.n if self.n else float("nan")
 
     @property
-    def interval(self):
+    def interval(self) -> tuple[float, float]:
         """Two-sided 95 % interval of Clopper and Pearson [%]."""
-        return tuple(100.0 * x for x in clopper_pearson(self.k, self.n))
+        low, high = clopper_pearson(self.k, self.n)
+        return 100.0 * low, 100.0 * high
 
     @property
-    def is_met(self):
+    def is_met(self) -> bool | None:
         """Whether the bar is met, None without bar or cases."""
         if self.bar is None or self.n == 0:
             return None
@@ -52,15 +63,30 @@ class Value:
     unit: str = ""
 
     @property
-    def is_met(self):
+    def is_met(self) -> bool | None:
         """Whether the bar is met, None without bar or cases."""
         if self.bar is None or self.n == 0:
             return None
         return self.value <= self.bar if self.sense == "<=" else self.value >= self.bar
 
 
-def figures(results, oracle=None):
-    """All figures of the ``results`` of cases; ``oracle`` is that of ``read_oracle``, {} if there is none."""
+def figures(
+    results: Sequence[CaseResult], oracle: Mapping[str, tuple[float, float]] | None = None
+) -> list[Share | Value]:
+    """All figures of a set.
+
+    Parameters
+    ----------
+    results : sequence of CaseResult
+        Results of the cases.
+    oracle : mapping or None
+        Result of ``read_oracle``.
+
+    Returns
+    -------
+    list of Share or Value
+        The figures.
+    """
     by_stratum = {
         s: [j for j in results if j.stratum == s] for s in ("control", "single", "double", "outside", "unidentifiable")
     }
@@ -100,38 +126,59 @@ def figures(results, oracle=None):
     ]
 
 
-def _share(name, cases, test, bar=None, sense=">="):
+def _share(
+    name: str,
+    cases: Sequence[CaseResult],
+    test: Callable[[CaseResult], Any],
+    bar: float | None = None,
+    sense: str = ">=",
+) -> Share:
     return Share(name, sum(bool(test(j)) for j in cases), len(cases), bar, sense)
 
 
-def _location_and_name_figures(cases, which):
+def _is_located(what: str, j: CaseResult) -> bool:
+    return j.located[what]
+
+
+def _location_and_name_figures(cases: Sequence[CaseResult], which: str) -> Iterator[Share]:
     for what in ("lock", "place", "axle", "sensor"):
         cases_with = [j for j in cases if what in j.located]
-        yield _share(f"where: {what} right ({which})", cases_with, lambda j, w=what: j.located[w], 95.0)
+        yield _share(f"where: {what} right ({which})", cases_with, partial(_is_located, what), 95.0)
     yield _share(f"what: top-1 ({which})", cases, lambda j: j.is_first_right, 85.0)
     yield _share(f"what: top-2 ({which})", cases, lambda j: bool(j.matches[0]), 95.0)
 
 
-def _oracle_gain(j, oracle):
+def _oracle_gain(j: CaseResult, oracle: Mapping[str, tuple[float, float]]) -> float:
     """Points of held-out fit that the true effect gains in the same engine, nan if it was not computed."""
     before, after = oracle.get(j.case, (float("nan"), float("nan")))
     return after - before
 
 
-def is_handled_right(j):
-    """Whether an unidentifiable effect got the right kind of answer: none, or "a or b" with the truth among them."""
+def is_handled_right(j: CaseResult) -> bool:
+    """Whether an unidentifiable effect got the right kind of answer: none, or "a or b" with the truth among them.
+
+    Parameters
+    ----------
+    j : CaseResult
+        Result of the case.
+
+    Returns
+    -------
+    bool
+        False also without an answer.
+    """
     return j.answered and not j.wrong_names and (not j.alarm or j.matches[0] == "a_or_b")
 
 
-def _has_both_right(j):
+def _has_both_right(j: CaseResult) -> bool:
     return all(h == "named" and located for h, located in zip(j.matches, j.is_located))
 
 
-def _has_one_right(j):
+def _has_one_right(j: CaseResult) -> bool:
     return any(h == "named" and located for h, located in zip(j.matches, j.is_located)) and not j.wrong_names
 
 
-def _parameter_figures(results):
+def _parameter_figures(results: Sequence[CaseResult]) -> Iterator[Share | Value]:
     compared = [p for j in results for p in j.parameters]
     covered = [c for _, c in compared if c is not None]
     errors = [100.0 * e for e, _ in compared]
@@ -139,7 +186,9 @@ def _parameter_figures(results):
     yield Value("parameters: median error", _median(errors), len(errors), 20.0, "<=", "%")
 
 
-def _held_out_figures(results, with_gain, oracle):
+def _held_out_figures(
+    results: Sequence[CaseResult], with_gain: Sequence[CaseResult], oracle: Mapping[str, tuple[float, float]]
+) -> Iterator[Share | Value]:
     """Figures of the fit gained by names on held-out recordings.
 
     No answer closes no gap. A named model without a fit counts as worse. Without a standard error of the gain, one
@@ -157,29 +206,40 @@ def _held_out_figures(results, with_gain, oracle):
     )
 
 
-def _gap_closed(j, before, oracle_fit):
+def _gap_closed(j: CaseResult, before: float, oracle_fit: float) -> float:
     after = j.fits[1] if j.fits[1] is not None else j.fits[0] if j.fits[0] is not None else before
     return 100.0 * (after - before) / (oracle_fit - before)
 
 
-def _has_lost_fit(j):
+def _has_lost_fit(j: CaseResult) -> bool:
     before, after = j.fits
     return after is None or after < before - (MAX_FIT_LOSS if j.gain_error is None else j.gain_error)
 
 
-def _calibration_figure(results):
+def _calibration_figure(results: Sequence[CaseResult]) -> Value:
     differences = [abs(stated - share) for stated, share, n in reliability(results) if n >= MIN_GROUP_SIZE]
     n = sum(j.probability is not None for j in results)
     name = "probability: worst fifth, stated from seen"
     return Value(name, max(differences, default=float("nan")), n if differences else 0, 0.1)
 
 
-def _median(values):
+def _median(values: Collection[float]) -> float:
     return float(np.median(list(values))) if values else float("nan")
 
 
-def reliability(results):
-    """(mean stated probability, share right, n) of five groups of equal size, except that ties stay together."""
+def reliability(results: Sequence[CaseResult]) -> list[tuple[float, float, int]]:
+    """Stated and observed probability of five groups of equal size, except that ties stay together.
+
+    Parameters
+    ----------
+    results : sequence of CaseResult
+        Results of the cases.
+
+    Returns
+    -------
+    list of (float, float, int)
+        Mean stated probability, share right and number of cases.
+    """
     stated = sorted((j.probability, j.is_answer_right) for j in results if j.probability is not None)
     if not stated:
         return []
@@ -192,17 +252,39 @@ def reliability(results):
     ]
 
 
-def confusion(results):
-    """{row: Counter of first answers}; a double counts under both its kinds, joined."""
-    table = {}
+def confusion(results: Sequence[CaseResult]) -> dict[str, Counter[str]]:
+    """First answers by what was concealed; a double counts under both its kinds, joined.
+
+    Parameters
+    ----------
+    results : sequence of CaseResult
+        Results of the cases.
+
+    Returns
+    -------
+    dict of Counter
+        Number of first answers by concealed kind.
+    """
+    table: dict[str, Counter[str]] = {}
     for j in results:
         table.setdefault(" + ".join(sorted(j.kinds)) or "control", Counter())[j.first_answer] += 1
     return table
 
 
-def severity(results):
-    """{kind: [(rung, visibility [points], first answer, whether it is right)]} of single effects, by rung."""
-    table = {}
+def severity(results: Sequence[CaseResult]) -> dict[str, list[tuple[int, float, str, bool]]]:
+    """First answers to single effects, by rung.
+
+    Parameters
+    ----------
+    results : sequence of CaseResult
+        Results of the cases.
+
+    Returns
+    -------
+    dict of list
+        Rung, visibility [points], first answer and whether it is right, by kind.
+    """
+    table: dict[str, list[tuple[int, float, str, bool]]] = {}
     for j in results:
         if j.stratum in ("single", "outside"):
             table.setdefault(j.kinds[0], []).append((j.rungs[0], j.gain, j.first_answer, bool(j.matches[0])))

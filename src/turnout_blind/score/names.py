@@ -1,5 +1,13 @@
 """Right names of each concealed effect: the only module in which the vocabularies of generator and tool meet."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from typing import Any
+
 # Kind -> right names. A kind outside the library of the tool has none, unless the library has since been extended.
 RIGHT_NAMES = {
     "void": ("hanging_sleeper",),
@@ -66,21 +74,57 @@ SAME_PARAMETERS = {
 }
 
 
-def right_names(effect_type, extra_names=None):
-    """Right names of an effect type; ``extra_names`` {kind: [names]} are those of added effects."""
+def right_names(effect_type: str, extra_names: Mapping[str, Sequence[str]] | None = None) -> tuple[str, ...]:
+    """Right names of an effect type.
+
+    Parameters
+    ----------
+    effect_type : str
+        Kind of the effect.
+    extra_names : mapping or None
+        Right names of added effects by kind.
+
+    Returns
+    -------
+    tuple of str
+        Names, none for an effect outside the library.
+    """
     return tuple(RIGHT_NAMES.get(effect_type, ())) + tuple((extra_names or {}).get(effect_type, ()))
 
 
-def same_parameters(effect):
-    """{parameter: parameter of the tool with the same meaning} of one concealed effect (its entry in the truth).
+def same_parameters(effect: Mapping[str, Any]) -> dict[str, str]:
+    """Parameters of a concealed effect that have the same meaning in the tool.
 
     A sleeper that is partly supported has no comparable gap: only one that hangs completely has.
+
+    Parameters
+    ----------
+    effect : mapping
+        Entry of the effect in the truth.
+
+    Returns
+    -------
+    dict
+        Parameter of the tool by parameter of the effect.
     """
     if effect["parameters"].get("seated", 0.0) > 0.0:
         return {}
     return SAME_PARAMETERS.get(effect["kind"], {})
 
 
-def right_locks(effect_type, locked_to):
-    """Right locks of an effect type."""
+def right_locks(effect_type: str, locked_to: str) -> tuple[str, ...]:
+    """Right locks of an effect type.
+
+    Parameters
+    ----------
+    effect_type : str
+        Kind of the effect.
+    locked_to : str
+        What the effect is locked to, the only right lock if none is listed.
+
+    Returns
+    -------
+    tuple of str
+        Locks.
+    """
     return RIGHT_LOCKS.get(effect_type, (locked_to,))

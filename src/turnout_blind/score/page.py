@@ -1,11 +1,17 @@
 """Write the measured part of a page, between two marks, from a scored set. The other text stays unchanged."""
 
+from __future__ import annotations
+
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from turnout_blind.score.case_reports import case_texts
 from turnout_blind.score.plots import draw_reliability, draw_severity
 from turnout_blind.score.report import read_oracle, report_text, score_set
 from turnout_blind.seal import BlindError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
 
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 PICTURE_KEY = (
@@ -13,10 +19,39 @@ PICTURE_KEY = (
 )
 
 
-def write_page(path, out, extra_names=None, effects=(), cases=None):
-    """Write report, pictures and case reports of the set ``out`` between the marks of the page at ``path``.
+def write_page(
+    path: str | Path,
+    out: str | Path,
+    extra_names: Mapping[str, Sequence[str]] | None = None,
+    effects: Iterable[str | Path] = (),
+    cases: Sequence[str] | None = None,
+) -> Path:
+    """Write report, pictures and case reports of a set between the marks of a page.
 
-    Pictures are written beside the page under its name. Errors: BlindError if the page lacks the marks.
+    Pictures are written beside the page under its name.
+
+    Parameters
+    ----------
+    path : str or Path
+        File of the page.
+    out : str or Path
+        Folder of the set.
+    extra_names : mapping or None
+        Right names of added effects by kind.
+    effects : iterable of str or Path
+        Folders with further effects.
+    cases : sequence of str or None
+        Cases that are reported; None: three are chosen.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    BlindError
+        If the page lacks the marks.
     """
     path = Path(path)
     text = path.read_text(encoding="utf-8")

@@ -1,15 +1,28 @@
 """Pictures of a scored set: the answers along every ladder, and the reliability of stated probabilities."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from turnout_blind.score.intervals import clopper_pearson
 from turnout_blind.score.metrics import reliability
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+    from pathlib import Path
+    from types import ModuleType
+
+    from matplotlib.figure import Figure
+
+    from turnout_blind.score.matching import CaseResult
+
 COLOURS = {"right": "#2a7f3f", "among two": "#8fce9a", "none": "#e8e8e8", "unknown": "#9ab6d8", "wrong": "#c0392b"}
 LETTERS = {"right": "✓", "among two": "½", "none": "–", "unknown": "?", "wrong": "✗"}
 
 
-def pyplot():
+def pyplot() -> ModuleType:
     """pyplot with SVG output that is the same in every run."""
     import matplotlib
 
@@ -20,15 +33,39 @@ def pyplot():
     return plt
 
 
-def save(figure, path):
-    """Write an SVG file without a date."""
+def save(figure: Figure, path: Path) -> Path:
+    """Write an SVG file without a date.
+
+    Parameters
+    ----------
+    figure : Figure
+        Figure that is closed.
+    path : Path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        The same path.
+    """
     figure.savefig(path, metadata={"Date": None})
     pyplot().close(figure)
     return path
 
 
-def outcome(result):
-    """Outcome of a case, a key of ``COLOURS``. A wrong name outweighs a right one beside it."""
+def outcome(result: CaseResult) -> str:
+    """Outcome of a case, a key of ``COLOURS``. A wrong name outweighs a right one beside it.
+
+    Parameters
+    ----------
+    result : CaseResult
+        Result of the case.
+
+    Returns
+    -------
+    str
+        "right", "among two", "none", "unknown" or "wrong".
+    """
     if result.wrong_names:
         return "wrong"
     if all(h == "named" for h in result.matches) and result.matches:
@@ -38,8 +75,21 @@ def outcome(result):
     return "unknown" if result.alarm else "none"
 
 
-def draw_severity(results, path):
-    """Draw a cell per kind and rung, from hidden to obvious, with the outcome; framed: visibility above 3 points."""
+def draw_severity(results: Sequence[CaseResult], path: Path) -> Path:
+    """Draw a cell per kind and rung, from hidden to obvious, with the outcome; framed: visibility above 3 points.
+
+    Parameters
+    ----------
+    results : sequence of CaseResult
+        Results of the cases.
+    path : Path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        The picture.
+    """
     plt = pyplot()
     cells = [j for j in results if j.stratum in ("single", "outside", "unidentifiable")]
     effect_types = sorted({(("single", "outside", "unidentifiable").index(j.stratum), j.kinds[0]) for j in cells})
@@ -60,17 +110,30 @@ def draw_severity(results, path):
     return save(figure, path)
 
 
-def _offsets_in_cell(results):
+def _offsets_in_cell(results: Iterable[CaseResult]) -> Iterator[tuple[float, CaseResult]]:
     """(offset, case): cases of one kind and rung side by side, each a quarter of a cell further right."""
-    counts = {}
+    counts: dict[tuple[str, int], int] = {}
     for j in results:
         key = j.kinds[0], j.rungs[0]
         yield 0.25 * counts.get(key, 0), j
         counts[key] = counts.get(key, 0) + 1
 
 
-def draw_reliability(results, path):
-    """Draw the share right against the stated probability, by fifths of the cases, with 95 % intervals."""
+def draw_reliability(results: Sequence[CaseResult], path: Path) -> Path:
+    """Draw the share right against the stated probability, by fifths of the cases, with 95 % intervals.
+
+    Parameters
+    ----------
+    results : sequence of CaseResult
+        Results of the cases.
+    path : Path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        The picture.
+    """
     plt = pyplot()
     figure, axis = plt.subplots(figsize=(4.2, 3.8), layout="constrained")
     axis.plot([0, 1], [0, 1], color="0.6", lw=1)
@@ -87,21 +150,59 @@ def draw_reliability(results, path):
     return save(figure, path)
 
 
-def spectrum(rows, rate, window="hann"):
-    """(frequency [Hz], density) of the rows (n_sensor, n), from windowed segments of 0.25 s that overlap by half.
+def spectrum(rows: np.ndarray, rate: float, window: str = "hann") -> tuple[np.ndarray, np.ndarray]:
+    """Spectra from windowed segments of 0.25 s that overlap by half.
 
-    For an impact at the start of a segment use the window "boxcar": others suppress it.
+    Parameters
+    ----------
+    rows : (n_sensor, n) array of float
+        Signals.
+    rate : float
+        Sampling rate. [Hz]
+    window : str
+        Window of a segment; for an impact at its start "boxcar", as others suppress it.
+
+    Returns
+    -------
+    (n_line,) and (n_sensor, n_line) arrays of float
+        Frequency [Hz] and power density.
     """
     from scipy import signal
 
     return signal.welch(rows, rate, window, nperseg=min(rows.shape[1], int(rate / 4.0)), axis=1)
 
 
-def relative_changes(before, after):
-    """(n_sensor,) relative change of each row."""
+def relative_changes(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Relative change of each row.
+
+    Parameters
+    ----------
+    before : (n_sensor, n) array of float
+        Signals before.
+    after : (n_sensor, n) array of float
+        Signals after.
+
+    Returns
+    -------
+    (n_sensor,) array of float
+        Change relative to ``before``.
+    """
     return np.linalg.norm(after - before, axis=1) / np.linalg.norm(before, axis=1)
 
 
-def most_changed(before, after):
-    """Index of the row with the largest relative change."""
+def most_changed(before: np.ndarray, after: np.ndarray) -> int:
+    """Index of the row with the largest relative change.
+
+    Parameters
+    ----------
+    before : (n_sensor, n) array of float
+        Signals before.
+    after : (n_sensor, n) array of float
+        Signals after.
+
+    Returns
+    -------
+    int
+        Index of the row.
+    """
     return int(np.argmax(relative_changes(before, after)))

@@ -1,7 +1,10 @@
 """Write the report of a revealed set as Markdown."""
 
+from __future__ import annotations
+
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from turnout_blind.reveal import read_revealed
 from turnout_blind.score.answers import answers_of
@@ -9,14 +12,39 @@ from turnout_blind.score.matching import judge
 from turnout_blind.score.metrics import Share, confusion, figures, is_handled_right, reliability, severity
 from turnout_blind.seal import BlindError, read_commit
 
+if TYPE_CHECKING:
+    from collections import Counter
+    from collections.abc import Iterable, Mapping, Sequence
+    from typing import Any
+
+    from turnout_blind.score.matching import CaseResult
+    from turnout_blind.score.metrics import Value
+
 KEY_FIGURES = (
     "controls: false alarms", "what: top-1 (clear singles)", "what: a wrong name (all singles)",
     "outside the library: named wrongly", "two effects: both right", "cases without an answer",
 )  # fmt: skip
 
 
-def score_set(out, extra_names=None, label=None):
-    """(results of cases, diagnosis) of a revealed set or of an ablation on it; cases not run are left out."""
+def score_set(
+    out: str | Path, extra_names: Mapping[str, Sequence[str]] | None = None, label: str | None = None
+) -> tuple[list[CaseResult], dict[str, Any]]:
+    """Score a revealed set or an ablation on it; cases not run are left out.
+
+    Parameters
+    ----------
+    out : str or Path
+        Folder of the set.
+    extra_names : mapping or None
+        Right names of added effects by kind.
+    label : str or None
+        Name of an ablation; None: the tool itself.
+
+    Returns
+    -------
+    (list of CaseResult, dict)
+        Results of the cases that were run, and the diagnosis.
+    """
     truths, rows, diagnosis = read_revealed(out, label)
     return [
         judge(truths[case], answers_of(rows[case]), extra_names)
@@ -25,15 +53,39 @@ def score_set(out, extra_names=None, label=None):
     ], diagnosis
 
 
-def provenance(record):
-    """Hashes of the tool and of the set, from a diagnosis or an oracle file."""
+def provenance(record: Mapping[str, Any]) -> dict[str, str]:
+    """Hashes of the tool and of the set, from a diagnosis or an oracle file.
+
+    Parameters
+    ----------
+    record : mapping
+        Content of the file.
+
+    Returns
+    -------
+    dict
+        "tool_sha256" and "commit_sha256".
+    """
     return {name: record[name] for name in ("tool_sha256", "commit_sha256")}
 
 
-def read_oracle(out):
-    """{case: held-out fit (without, with) the true effect [%]} from ``out``/oracle.json, {} if there is none.
+def read_oracle(out: str | Path) -> dict[str, tuple[float, float]]:
+    """Fits with the true effect, from ``out``/oracle.json.
 
-    Errors: BlindError if it was computed with another tool or for another set.
+    Parameters
+    ----------
+    out : str or Path
+        Folder of the set.
+
+    Returns
+    -------
+    dict of (float, float)
+        Held-out fit without and with the true effect [%], by case; {} if there is no such file.
+
+    Raises
+    ------
+    BlindError
+        If it was computed with another tool or for another set.
     """
     path = Path(out) / "oracle.json"
     if not path.exists():
@@ -44,8 +96,19 @@ def read_oracle(out):
     return {case: (r["before"], r["oracle"]) for case, r in oracle["fits"].items() if r.get("oracle") is not None}
 
 
-def oracle_text(out):
-    """Number of cases asked of the oracle, and those without an answer; [] if there is no oracle file."""
+def oracle_text(out: str | Path) -> list[str]:
+    """Number of cases asked of the oracle, and those without an answer.
+
+    Parameters
+    ----------
+    out : str or Path
+        Folder of the set.
+
+    Returns
+    -------
+    list of str
+        One sentence, [] if there is no oracle file.
+    """
     path = Path(out) / "oracle.json"
     if not path.exists():
         return []
@@ -61,15 +124,38 @@ def oracle_text(out):
     ]
 
 
-def ablation_labels(out):
-    """Labels of the ablations of this set."""
+def ablation_labels(out: str | Path) -> list[str]:
+    """Labels of the ablations of this set.
+
+    Parameters
+    ----------
+    out : str or Path
+        Folder of the set.
+
+    Returns
+    -------
+    list of str
+        Labels, sorted.
+    """
     return sorted(p.parent.name for p in (Path(out) / "ablations").glob("*/diagnosis.json"))
 
 
-def report_text(out, extra_names=None):
+def report_text(out: str | Path, extra_names: Mapping[str, Sequence[str]] | None = None) -> str:
     """Markdown: figures with their bars, confusion, severity, reliability, failures, ablations, cost.
 
-    ``extra_names`` {kind: [right names]}. Fits with the true effect are read from ``out``/oracle.json.
+    Fits with the true effect are read from ``out``/oracle.json.
+
+    Parameters
+    ----------
+    out : str or Path
+        Folder of the set.
+    extra_names : mapping or None
+        Right names of added effects by kind.
+
+    Returns
+    -------
+    str
+        Markdown.
     """
     results, diagnosis = score_set(out, extra_names)
     sections = [
@@ -90,8 +176,23 @@ def report_text(out, extra_names=None):
     return "\n\n".join(sections) + "\n"
 
 
-def cost_text(results, diagnosis, total):
-    """One paragraph: number of cases of ``total``, hashes, and CPU time."""
+def cost_text(results: Sequence[CaseResult], diagnosis: Mapping[str, Any], total: int) -> str:
+    """One paragraph: number of cases, hashes, and CPU time.
+
+    Parameters
+    ----------
+    results : sequence of CaseResult
+        Results of the cases.
+    diagnosis : mapping
+        Content of diagnosis.json.
+    total : int
+        Number of cases of the set.
+
+    Returns
+    -------
+    str
+        The paragraph.
+    """
     cpu = sorted(run["cpu_s"] for run in diagnosis["cases"].values()) or [float("nan")]
     commit, tool = diagnosis["commit_sha256"][:16], diagnosis["tool_sha256"][:16]
     return (
@@ -101,10 +202,20 @@ def cost_text(results, diagnosis, total):
     )
 
 
-def failure_table(results):
+def failure_table(results: Sequence[CaseResult]) -> str:
     """A row per failed case: alarm on a control, wrong name, clear effect missed, or no answer.
 
     An unidentifiable effect fails with any answer but none or "a or b" with the truth among them.
+
+    Parameters
+    ----------
+    results : sequence of CaseResult
+        Results of the cases.
+
+    Returns
+    -------
+    str
+        Markdown, "None." without a failure.
     """
     lines = [
         "| case | concealed | visibility [points] | said first | wrong names | probability |",
@@ -121,7 +232,7 @@ def failure_table(results):
     return "\n".join(lines) if len(lines) > 2 else "None."
 
 
-def _is_failure(j):
+def _is_failure(j: CaseResult) -> bool:
     checks = {
         "control": lambda: j.alarm,
         "outside": lambda: j.is_clear and not j.alarm,
@@ -130,10 +241,27 @@ def _is_failure(j):
     return not j.answered or bool(j.wrong_names) or checks.get(j.stratum, lambda: j.is_clear and not all(j.matches))()
 
 
-def ablation_table(out, results, extra_names=None):
-    """A row per key figure and a column per ablation, each over its own cases."""
+def ablation_table(
+    out: str | Path, results: Sequence[CaseResult], extra_names: Mapping[str, Sequence[str]] | None = None
+) -> str:
+    """A row per key figure and a column per ablation, each over its own cases.
+
+    Parameters
+    ----------
+    out : str or Path
+        Folder of the set.
+    results : sequence of CaseResult
+        Results of the tool itself.
+    extra_names : mapping or None
+        Right names of added effects by kind.
+
+    Returns
+    -------
+    str
+        Markdown.
+    """
     columns = {"the tool": results} | {label: score_set(out, extra_names, label)[0] for label in ablation_labels(out)}
-    by_column = {name: {f.name: f for f in figures(cases)} for name, cases in columns.items()}
+    by_column = {name: {f.name: f for f in figures(cases) if isinstance(f, Share)} for name, cases in columns.items()}
     lines = ["| figure | " + " | ".join(f"{n} (n = {len(c)})" for n, c in columns.items()) + " |"]
     lines.append("|---" * (len(columns) + 1) + "|")
     for name in KEY_FIGURES:
@@ -142,8 +270,19 @@ def ablation_table(out, results, extra_names=None):
     return "\n".join(lines)
 
 
-def figure_table(values):
-    """A row per figure: figure, 95 % interval, n, bar, met or missed."""
+def figure_table(values: Iterable[Share | Value]) -> str:
+    """A row per figure: figure, 95 % interval, n, bar, met or missed.
+
+    Parameters
+    ----------
+    values : iterable of Share or Value
+        Figures.
+
+    Returns
+    -------
+    str
+        Markdown.
+    """
     lines = ["| figure | measured | 95 % | n | bar | |", "|---|---|---|---|---|---|"]
     for f in values:
         verdict = {True: "met", False: "missed", None: ""}[f.is_met]
@@ -160,8 +299,19 @@ def figure_table(values):
     return "\n".join(lines)
 
 
-def confusion_table(table):
-    """Rows of concealed effects, columns of first answers."""
+def confusion_table(table: Mapping[str, Counter[str]]) -> str:
+    """Rows of concealed effects, columns of first answers.
+
+    Parameters
+    ----------
+    table : mapping
+        Result of ``confusion``.
+
+    Returns
+    -------
+    str
+        Markdown.
+    """
     columns = sorted(
         {answer for row in table.values() for answer in row}, key=lambda s: (s not in ("none", "unknown"), s)
     )
@@ -172,8 +322,19 @@ def confusion_table(table):
     return "\n".join(lines)
 
 
-def severity_table(table):
-    """One line per kind, rung by rung."""
+def severity_table(table: Mapping[str, Sequence[tuple[int, float, str, bool]]]) -> str:
+    """One line per kind, rung by rung.
+
+    Parameters
+    ----------
+    table : mapping
+        Result of ``severity``.
+
+    Returns
+    -------
+    str
+        Markdown.
+    """
     lines = []
     for effect_type, rows in table.items():
         entries = ", ".join(f"{gain:.1f}: {answer}{'*' if right else ''}" for _, gain, answer, right in rows)
