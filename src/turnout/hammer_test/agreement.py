@@ -1,10 +1,20 @@
 """Find the impact of a test that disagrees with all others, by pairwise coherence and by response gain."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy.fft import next_fast_len, rfft, rfftfreq
 
 from turnout.constants import MAD_TO_SD
 from turnout.records import Rejection
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from turnout.config.settings.receptance import ReceptanceSettings
+    from turnout.hammer_test.segmentation import Cut
 
 # Least number of impacts from which the spread of a test is estimated.
 MIN_IMPACTS = 5
@@ -82,8 +92,16 @@ def response_gain(force: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
     return gain / median_gain if median_gain > 0.0 else np.ones_like(gain)
 
 
-def judge_agreement(cuts, settings):
-    """Reject impacts that disagree with the others of the test, first in shape (coherence), then in gain."""
+def judge_agreement(cuts: Sequence[Cut], settings: ReceptanceSettings) -> None:
+    """Reject impacts that disagree with the others of the test, first in shape (coherence), then in gain.
+
+    Parameters
+    ----------
+    cuts : sequence of Cut
+        The impacts of one test with one sampling rate; the result is entered in them.
+    settings : ReceptanceSettings
+        Limits of the quality of an impact.
+    """
     cuts = [c for c in cuts if not c.rejections]
     if len(cuts) < 3:
         return
@@ -93,7 +111,9 @@ def judge_agreement(cuts, settings):
     _judge_gain([cuts[k] for k in agreeing], force[agreeing], acceleration[agreeing], settings)
 
 
-def _judge_coherence(cuts, force, acceleration, settings):
+def _judge_coherence(
+    cuts: Sequence[Cut], force: np.ndarray, acceleration: np.ndarray, settings: ReceptanceSettings
+) -> None:
     """Reject, one at a time, the impact that agrees with no other although the others agree among themselves.
 
     The worst impact is an outlier under two conditions. Its median pairwise coherence lies ``agreement_gap`` below the
@@ -123,7 +143,7 @@ def _judge_coherence(cuts, force, acceleration, settings):
         cuts[outlier].rejections.append(Rejection("odd_one_out", float(medians[worst]), float(limit), detail))
 
 
-def _judge_gain(cuts, force, acceleration, settings):
+def _judge_gain(cuts: Sequence[Cut], force: np.ndarray, acceleration: np.ndarray, settings: ReceptanceSettings) -> None:
     """Report a response too large or too small for its force, in a test with enough impacts to estimate the spread.
 
     A clipped hammer channel records a force too small for its response, and yet among the largest of the test. In a
@@ -143,13 +163,13 @@ def _judge_gain(cuts, force, acceleration, settings):
             detail = f"the response is {gain[k]:.3f} of what the other blows predict from the force"
             bound = 1.0 + (limit if gain[k] > 1.0 else -limit)
             if clipped:
-                force = cut.channels[0].name
-                cut.rejections.append(Rejection("overload", float(gain[k]), float(bound), detail, force))
+                channel = cut.channels[0].name
+                cut.rejections.append(Rejection("overload", float(gain[k]), float(bound), detail, channel))
             else:
                 cut.notes.append(Rejection("odd_one_out", float(gain[k]), float(bound), detail))
 
 
-def _spectra(cuts, settings):
+def _spectra(cuts: Sequence[Cut], settings: ReceptanceSettings) -> tuple[np.ndarray, np.ndarray]:
     n_fft = next_fast_len(max(c.force.size for c in cuts), real=True)
     rate = cuts[0].rate
     frequency = rfftfreq(n_fft, 1.0 / rate)
@@ -163,7 +183,7 @@ def _spectra(cuts, settings):
     return spectra[0], spectra[1]
 
 
-def _test_coherence(force, acceleration, impacts):
+def _test_coherence(force: np.ndarray, acceleration: np.ndarray, impacts: list[int]) -> float:
     f, a = force[impacts], acceleration[impacts]
     cross = np.abs(np.sum(f.conj() * a, axis=0)) ** 2
     power = np.sum(np.abs(f) ** 2, axis=0) * np.sum(np.abs(a) ** 2, axis=0)

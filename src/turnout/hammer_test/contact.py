@@ -4,14 +4,20 @@ Further contacts in the force of one impact (double hits) are found. The band ed
 which its force spectrum has fallen by 20 dB.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.fft import next_fast_len, rfft
 from scipy.signal import find_peaks
 
 from turnout.constants import MAD_TO_SD
+
+if TYPE_CHECKING:
+    from turnout.config.settings.receptance import ReceptanceSettings
+    from turnout.hammer_test.segmentation import Cut
 
 
 @dataclass(frozen=True)
@@ -33,12 +39,27 @@ class Contact:
     zero_acceleration: float
 
 
-def measure_contact(cut, level):
-    r"""Contact of one cut: the run of samples above ``level`` times the peak that contains the peak.
+NO_CONTACT = Contact(0, 0, 0, *[float("nan")] * 6)  # of an impact that was not measured
+
+
+def measure_contact(cut: Cut, level: float) -> Contact:
+    """Contact of one cut: the run of samples above ``level`` times the peak that contains the peak.
 
     The impulse is the integral of the force over the contact by the rectangle rule. Noise levels are standard
     deviations before the first contact. With fewer than 8 samples there, that of the force is taken from the whole
     record (by its median absolute deviation), and that of the acceleration from the last tenth.
+
+    Parameters
+    ----------
+    cut : Cut
+        The impact.
+    level : float
+        Share of the peak above which there is contact. [-]
+
+    Returns
+    -------
+    Contact
+        The main contact with the noise before it.
     """
     force = cut.polarity * cut.force
     top = int(np.argmax(force))
@@ -58,9 +79,25 @@ def measure_contact(cut, level):
     )  # fmt: skip
 
 
-def run_around(x, top, level):
+def run_around(x: np.ndarray, top: int, level: float) -> tuple[int, int]:
     """First and last index of the unbroken run of samples above ``level`` around ``top``.
 
+    Parameters
+    ----------
+    x : (n,) array of float
+        Samples. [any unit]
+    top : int
+        Sample within the run.
+    level : float
+        The level. [same unit]
+
+    Returns
+    -------
+    first, last : int
+        Samples of the run.
+
+    Examples
+    --------
     >>> run_around(np.array([0.0, 3, 0, 2, 5, 2, 0]), 4, 1.0)
     (3, 5)
     """
@@ -70,9 +107,27 @@ def run_around(x, top, level):
     return onset, (top + int(below[0]) if below.size else x.size - 1)
 
 
-def crossing(x, top, level, step):
+def crossing(x: np.ndarray, top: int, level: float, step: int) -> float:
     """Point at which x falls through ``level``, from ``top`` in direction ``step`` (+1, -1), interpolated linearly.
 
+    Parameters
+    ----------
+    x : (n,) array of float
+        Samples. [any unit]
+    top : int
+        Sample above the level.
+    level : float
+        The level. [same unit]
+    step : int
+        +1 for later samples, -1 for earlier ones.
+
+    Returns
+    -------
+    float
+        The first or last sample where x never falls through the level. [samples]
+
+    Examples
+    --------
     >>> x = np.array([0.0, 1.0, 4.0, 2.0, 0.0])
     >>> float(crossing(x, 2, 3.0, 1)), float(crossing(x, 2, 2.5, -1))
     (2.5, 1.5)
@@ -95,11 +150,25 @@ NOISE_FACTOR = 6.0
 FURTHER_CONTACT_LEVEL = 0.1
 
 
-def smoothed_force(force, half_width):
+def smoothed_force(force: np.ndarray, half_width: float) -> np.ndarray:
     """Force behind a Hann kernel as long as the main pulse's half width, at least three samples; the sum is kept.
 
     As it is as wide as the tip's own pulse, it reduces noise and lowers a second pulse no more than the first.
 
+    Parameters
+    ----------
+    force : (n,) array of float
+        Force. [N]
+    half_width : float
+        Width of the pulse at half its height. [samples]
+
+    Returns
+    -------
+    (n,) array of float
+        Smoothed force. [N]
+
+    Examples
+    --------
     >>> smoothed_force(np.array([0.0, 0.0, 4.0, 0.0, 0.0]), 2.0)
     array([0., 1., 2., 1., 0.])
     """
@@ -117,12 +186,28 @@ class FurtherContact(NamedTuple):
     share: float
 
 
-def further_contacts(cut, contact, settings):
+def further_contacts(cut: Cut, contact: Contact, settings: ReceptanceSettings) -> tuple[list[FurtherContact], float]:
     """Contacts besides the main one: list of FurtherContact in order of time, and the level they exceed.
 
     A contact is a local maximum of the smoothed force. It exceeds ``double_hit_level`` of the peak and six standard
     deviations of the noise, with a prominence of ``double_hit_prominence``. The noise is the median absolute deviation
     outside the main contact, so that hum or a drifting zero raise the limit instead of causing findings.
+
+    Parameters
+    ----------
+    cut : Cut
+        The impact.
+    contact : Contact
+        Its main contact.
+    settings : ReceptanceSettings
+        Level and prominence of a double impact.
+
+    Returns
+    -------
+    contacts : list of FurtherContact
+        In order of time.
+    level : float
+        Level that they exceed, over the main peak. [-]
     """
     force = smoothed_force(cut.polarity * cut.force, contact.half_width)
     margin = max(2, round(MIN_CONTACT_INTERVAL * cut.rate))
@@ -151,9 +236,9 @@ def band_edges(pulses: list[np.ndarray], rate: float, fall: float = 20.0, resolu
     pulses : list of (n,) arrays
         Force of one contact each. [N]
     rate : float
-        [Hz]
+        Sampling rate. [Hz]
     fall : float
-        [dB]
+        How far the spectrum falls. [dB]
     resolution : float
         Spacing of the lines between which the edge is interpolated; n is padded with zeros. [Hz]
 

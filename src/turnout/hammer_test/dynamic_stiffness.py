@@ -4,7 +4,9 @@ import numpy as np
 from scipy.stats import f as fisher
 
 
-def dynamic_stiffness(frequency, h1, coherence, passed, n: int, at: float) -> tuple[float, float, float] | None:
+def dynamic_stiffness(
+    frequency: np.ndarray, h1: np.ndarray, coherence: np.ndarray, passed: np.ndarray, n: int, at: float
+) -> tuple[float, float, float] | None:
     r"""Dynamic stiffness :math:`|F/x| = 1/|H_1|` with its 95 % limits.
 
     .. math:: |\hat H - H| \le |\hat H| \sqrt{\frac{F_{2,\,2n-2}}{n-1} \frac{1-\gamma^2}{\gamma^2}}
@@ -14,6 +16,8 @@ def dynamic_stiffness(frequency, h1, coherence, passed, n: int, at: float) -> tu
     frequency, h1, coherence, passed : (n_frequency,) arrays
         Lines [Hz] and the average over ``n`` impacts there: complex receptance [m/N], magnitude-squared coherence [-],
         and whether the line passes the coherence gate.
+    n : int
+        Number of impacts; fewer than two give None.
     at : float
         Frequency; the line next to it is taken. [Hz]
 

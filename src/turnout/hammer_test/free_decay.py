@@ -1,9 +1,17 @@
 """Find start and end of the free decay after an impact, and check whether enough of it was recorded."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from turnout.hammer_test.contact import further_contacts
 from turnout.records import Rejection
+
+if TYPE_CHECKING:
+    from turnout.config.settings.receptance import ReceptanceSettings
+    from turnout.hammer_test.segmentation import Cut
 
 # s, end of a record over which its remaining amplitude is taken: a period of the slowest mode.
 TAIL_TIME = 0.01
@@ -11,7 +19,7 @@ TAIL_TIME = 0.01
 MIN_REPEATED_SHARE, MIN_REPEATED_DELAY = 0.7, 60.0
 
 
-def judge_second_contact(cut, settings):
+def judge_second_contact(cut: Cut, settings: ReceptanceSettings) -> None:
     """Note or reject a double hit; keep the free decay on one side of the second contact, if there is enough.
 
     A double hit is a valid input of a linear system, but no free decay follows it at once. Under ``move``
@@ -20,6 +28,13 @@ def judge_second_contact(cut, settings):
     - otherwise the decay starts after the last contact, if its amplitude there is at least
       ``double_hit_remaining`` of that after the main contact;
     - in a damped track too little remains, and the impact is rejected.
+
+    Parameters
+    ----------
+    cut : Cut
+        One impact; what is found is entered in it.
+    settings : ReceptanceSettings
+        How to use an impact with a double impact.
     """
     further, level = further_contacts(cut, cut.contact, settings)
     if not further:
@@ -44,10 +59,17 @@ def judge_second_contact(cut, settings):
         cut.rejections.append(Rejection("double_hit", largest.share, level, text))
 
 
-def judge_decay(cut, settings):
+def judge_decay(cut: Cut, settings: ReceptanceSettings) -> None:
     """Set the start of the decay; reject one that is too short or has not decayed at its end.
 
     An exponential window counts as decay: it prevents the leakage that the check is for.
+
+    Parameters
+    ----------
+    cut : Cut
+        One impact; what is found is entered in it.
+    settings : ReceptanceSettings
+        Least length, and largest amplitude at the end.
     """
     cut.decay_start = cut.contact_end + 1 + round(settings.decay_gap * cut.rate)
     duration = max(0.0, (cut.force.size - cut.decay_start) / cut.rate)
@@ -61,7 +83,7 @@ def judge_decay(cut, settings):
         cut.rejections.append(Rejection("cut_off", share, limit, detail))
 
 
-def _remaining_amplitude(cut, end, settings):
+def _remaining_amplitude(cut: Cut, end: int, settings: ReceptanceSettings) -> tuple[float, float]:
     """Amplitude just before sample ``end`` over the peak, and its limit."""
     tail = cut.acceleration[max(0, end - max(round(TAIL_TIME * cut.rate), end // 20)) : end]
     window = np.exp(-settings.exponential_window * (end - cut.contact.onset) / cut.rate)
@@ -72,7 +94,7 @@ def _remaining_amplitude(cut, end, settings):
     return float(window * np.sqrt(2.0) * np.std(tail) / top), float(max(settings.cut_off, window * noise / top))
 
 
-def _has_died_away(cut, end, settings):
+def _has_died_away(cut: Cut, end: int, settings: ReceptanceSettings) -> bool:
     """Whether the vibration has decayed by sample ``end``, at least two shortest decays behind the main contact."""
     if end < cut.contact.end + 1 + 2 * round(settings.minimum_decay * cut.rate):
         return False
@@ -80,7 +102,7 @@ def _has_died_away(cut, end, settings):
     return share <= limit
 
 
-def _decay_ratio(cut, start, settings):
+def _decay_ratio(cut: Cut, start: int, settings: ReceptanceSettings) -> float:
     """Amplitude of the decay from ``start`` on over that after the main contact; 0 if too short."""
     n = round(settings.minimum_decay * cut.rate)
     decay_start = cut.contact.end + 1 + round(settings.decay_gap * cut.rate)

@@ -48,6 +48,18 @@ def h2(g_aa: np.ndarray, g_fa: np.ndarray) -> np.ndarray:
 
     Always :math:`H_1 / \gamma^2`, so it lies above H1 and is the upper bound.
 
+    Parameters
+    ----------
+    g_aa : (n_frequency,) array of float
+        Auto-spectrum of the acceleration. [(m/s²)²/Hz]
+    g_fa : (n_frequency,) array of complex
+        Mean over impacts of conj(force) * acceleration. [N m/s²/Hz]
+
+    Returns
+    -------
+    (n_frequency,) array of complex
+        nan where force and acceleration share no power. [m/s²/N]
+
     References
     ----------
     Barkhordari et al., eq. 3, with the conjugate that gives the correct phase.
@@ -110,21 +122,35 @@ def hv(g_ff: np.ndarray, g_aa: np.ndarray, g_fa: np.ndarray, noise_ratio: float)
 
 
 def coherence(g_ff: np.ndarray, g_aa: np.ndarray, g_fa: np.ndarray) -> np.ndarray:
-    r"""Magnitude-squared coherence :math:`|G_{Fa}|^2 / (G_{FF} G_{aa})`, (n_frequency,), nan without power.
+    """Magnitude-squared coherence :math:`|G_{Fa}|^2 / (G_{FF} G_{aa})`, (n_frequency,), nan without power.
 
     For one record it is 1 at every frequency and has no meaning.
+
+    Parameters
+    ----------
+    g_ff, g_aa : (n_frequency,) array of float
+        Auto-spectra of force and acceleration. [N²/Hz], [(m/s²)²/Hz]
+    g_fa : (n_frequency,) array of complex
+        Cross-spectrum. [N m/s²/Hz]
+
+    Returns
+    -------
+    (n_frequency,) array of float
+        Coherence. [-]
 
     References
     ----------
     Barkhordari et al., eq. 2.
 
+    Examples
+    --------
     >>> print(coherence(np.array([4.0]), np.array([4.0]), np.array([2.0 + 2.0j])))
     [0.5]
     """
     return np.minimum(_quotient(np.abs(g_fa) ** 2, g_ff * g_aa), 1.0)
 
 
-def _quotient(numerator, denominator):
+def _quotient(numerator: np.ndarray, denominator: np.ndarray) -> np.ndarray:
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(denominator == 0.0, np.nan, numerator / np.where(denominator == 0.0, 1.0, denominator))
 
@@ -141,6 +167,7 @@ def receptance_of(impacts: Sequence[Impact], settings: ReceptanceSettings | None
         Those with rejections are left out. Records of unequal length are padded with zeros, since an accepted decay
         is complete.
     settings : ReceptanceSettings, optional
+        Windows, gate and highest frequency; the defaults without one.
 
     Returns
     -------
@@ -203,7 +230,7 @@ def receptance_of(impacts: Sequence[Impact], settings: ReceptanceSettings | None
     )
 
 
-def _records(impacts, settings):
+def _records(impacts: Sequence[Impact], settings: ReceptanceSettings) -> tuple[np.ndarray, np.ndarray]:
     """(n_impact, n_sample) force and acceleration, windowed and padded to the longest."""
     n_sample = max(i.force.size for i in impacts)
     force, acceleration = np.zeros((2, len(impacts), n_sample))
@@ -219,14 +246,14 @@ def _records(impacts, settings):
     return force, acceleration
 
 
-def _noise_ratio(impacts):
+def _noise_ratio(impacts: Sequence[Impact]) -> float:
     """Noise of the acceleration over noise of the force; infinite where the force has none."""
     force = float(np.sqrt(np.mean([i.noise_force**2 for i in impacts])))
     acceleration = float(np.sqrt(np.mean([i.noise_acceleration**2 for i in impacts])))
     return acceleration / force if force > 0.0 else np.inf
 
 
-def _empty_receptance(settings):
+def _empty_receptance(settings: ReceptanceSettings) -> Receptance:
     no_values, no_complex = np.empty(0), np.empty(0, dtype=complex)
     return Receptance(
         no_values,

@@ -21,6 +21,7 @@ def bands_passed(
     Parameters
     ----------
     receptance : Receptance
+        Averaged receptance with the result of the gate.
     ballast, railpad : (float, float)
         Band edges. [Hz]
 
@@ -48,6 +49,15 @@ def gate_rejections(
     receptance: Receptance, ballast: Band = BALLAST_BAND, settings: ReceptanceSettings | None = None
 ) -> tuple[Rejection, ...]:
     """Reasons to reject a whole test: too few impacts, or no coherence in the band of the ballast mode.
+
+    Parameters
+    ----------
+    receptance : Receptance
+        Averaged receptance with the result of the gate.
+    ballast : (float, float)
+        Edges of the band of the ballast resonance. [Hz]
+    settings : ReceptanceSettings, optional
+        Least number of impacts and share of the lines; the defaults without one.
 
     Returns
     -------

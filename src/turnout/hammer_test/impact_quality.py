@@ -5,6 +5,10 @@ soft saturation. The same impact appears twice where a test was exported again. 
 test's medians: weak, out of range, noisy.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy.interpolate import CubicSpline
 
@@ -12,15 +16,36 @@ from turnout.constants import MAD_TO_SD
 from turnout.hammer_test.contact import crossing
 from turnout.records import Rejection
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from turnout.config.settings.receptance import ReceptanceSettings
+    from turnout.hammer_test.contact import Contact
+    from turnout.hammer_test.segmentation import Cut
+
 # Steps: a parabola one step deep over m equal samples falls by 9 steps within as many samples again, and 1 by rounding.
 MAX_NATURAL_FALL = 12.0
 # Probability below which repeated codes are no chance event.
 MAX_CHANCE = 1e-3
 
 
-def value_out_of_range(x, limit):
+def value_out_of_range(x: np.ndarray, limit: float | None) -> float | None:
     """Largest absolute sample if it reaches a known range, else None.
 
+    Parameters
+    ----------
+    x : (n,) array of float
+        Recorded samples. [any unit]
+    limit : float or None
+        Range of the channel, None if it is not known. [same unit]
+
+    Returns
+    -------
+    float or None
+        [same unit]
+
+    Examples
+    --------
     >>> value_out_of_range(np.array([0.0, -5.0, 3.0]), 5.0), value_out_of_range(np.array([1.0]), None)
     (5.0, None)
     """
@@ -28,7 +53,7 @@ def value_out_of_range(x, limit):
     return size if limit is not None and size >= 0.999 * limit else None
 
 
-def rail_code(x, resolution=None, noise=0.0):
+def rail_code(x: np.ndarray, resolution: float | None = None, noise: float = 0.0) -> tuple[int, float] | None:
     r"""Samples that repeat one extreme code in the way of a clipped signal: (number of samples, code), or None.
 
     A smooth top may repeat its highest code as well, on a quiet converter with few bits. Then it is nearly a
@@ -49,6 +74,11 @@ def rail_code(x, resolution=None, noise=0.0):
         One step of the converter; by default the smallest step that occurs.
     noise : float
         Standard deviation of the noise. [the same unit]
+
+    Returns
+    -------
+    (int, float) or None
+        Number of samples, and the code [the same unit].
 
     Examples
     --------
@@ -76,10 +106,22 @@ def rail_code(x, resolution=None, noise=0.0):
     return None
 
 
-def overload(cut, contact):
+def overload(cut: Cut, contact: Contact) -> Rejection | None:
     """Rejection for the first sign of an overload on either channel of an impact, or None.
 
     The range applies to the recorded samples, before the zero line is subtracted.
+
+    Parameters
+    ----------
+    cut : Cut
+        The impact.
+    contact : Contact
+        Contact of the hammer.
+
+    Returns
+    -------
+    Rejection or None
+        "overload", with the channel.
     """
     signals = (cut.force, contact.noise_force), (cut.acceleration, contact.noise_acceleration)
     for (x, noise), zero, channel in zip(signals, cut.zeros, cut.channels):
@@ -92,12 +134,12 @@ def overload(cut, contact):
     return None
 
 
-def _runs(indices):
+def _runs(indices: np.ndarray) -> list[tuple[int, int]]:
     groups = np.split(indices, np.flatnonzero(np.diff(indices) > 1) + 1)
     return [(int(p[0]), int(p[-1])) for p in groups if p.size]
 
 
-def _smallest_step(y):
+def _smallest_step(y: np.ndarray) -> float:
     steps = np.diff(np.unique(y))
     steps = steps[steps > 1e-12 * np.ptp(y)]
     return float(steps.min()) if steps.size else np.inf
@@ -118,7 +160,7 @@ MIN_IMPACTS = 5
 MAX_TOP_NOISE = 0.02
 
 
-def top_share(force, contact, polarity=1):
+def top_share(force: np.ndarray, contact: Contact, polarity: int = 1) -> float | None:
     r"""Share of the time above half the peak in which a pulse is within 5 % of its peak.
 
     .. math:: q = w(0.95) / w(0.5)
@@ -126,6 +168,20 @@ def top_share(force, contact, polarity=1):
     Half-sine 0.303, haversine 0.287, Hertzian :math:`\sin^{3/2}` 0.293, parabola 0.316. No pulse with its largest
     curvature at the top exceeds the parabola, at any width, height or skew. A half-sine clipped at 90 % of its peak
     has 0.49, behind a saturation tanh(1) 0.36. None for pulses of fewer than ``MIN_TOP_SAMPLES`` at half height.
+
+    Parameters
+    ----------
+    force : (n,) array of float
+        Force. [N]
+    contact : Contact
+        Contact of the hammer in it.
+    polarity : int
+        Sign of the impact.
+
+    Returns
+    -------
+    float or None
+        q. [-]
 
     Examples
     --------
@@ -147,17 +203,35 @@ def top_share(force, contact, polarity=1):
     return width[0] / width[1]
 
 
-def natural_top(contact):
-    """Largest natural ``top_share``: noise shifts the 5 % line, with dw/w = d(level) / (2 * 0.05), at three sigma."""
+def natural_top(contact: Contact) -> float:
+    """Largest natural ``top_share``: noise shifts the 5 % line, with dw/w = d(level) / (2 * 0.05), at three sigma.
+
+    Parameters
+    ----------
+    contact : Contact
+        Contact of the hammer.
+
+    Returns
+    -------
+    float
+        [-]
+    """
     return MAX_NATURAL_TOP * float(np.sqrt(1.0 + 60.0 * contact.noise_force / abs(contact.peak)))
 
 
-def judge_tops(cuts, deviation):
+def judge_tops(cuts: Sequence[Cut], deviation: float) -> None:
     """Reject the impacts with a top flatter than a natural pulse or than the others of the test.
 
     A top flatter than a parabola is rejected unless the test's other impacts have the same: then it is the shape of
     this tip. In a test of ``MIN_IMPACTS`` or more, one hammer with one tip makes one shape, and an outlier is rejected
     too. A soft saturation may leave a pointed pulse no flatter than a natural half-sine.
+
+    Parameters
+    ----------
+    cuts : sequence of Cut
+        The impacts of a test; the result is entered in them.
+    deviation : float
+        Robust standard deviations beyond which a top is an outlier. [-]
     """
     measured = [(c, share) for c in cuts if (share := _share_if_quiet(c)) is not None]
     shares = np.array([share for _, share in measured])
@@ -178,7 +252,7 @@ def judge_tops(cuts, deviation):
             cut.rejections.append(Rejection("overload", float(share), float(limit), detail, cut.channels[0].name))
 
 
-def _share_if_quiet(cut):
+def _share_if_quiet(cut: Cut) -> float | None:
     if cut.rejections or cut.contact.noise_force > MAX_TOP_NOISE * abs(cut.contact.peak):
         return None
     return top_share(cut.force, cut.contact, cut.polarity)
@@ -188,11 +262,16 @@ def _share_if_quiet(cut):
 MAX_REPEAT_DIFFERENCE = 1e-4
 
 
-def judge_repeats(cuts):
+def judge_repeats(cuts: Sequence[Cut]) -> None:
     """Reject every impact whose force and acceleration are those of an earlier one.
 
     Counted twice it would make all errors too small. The windows are compared with their peaks aligned, over their
     common length.
+
+    Parameters
+    ----------
+    cuts : sequence of Cut
+        The impacts of a test in their order; the result is entered in them.
     """
     peaks = np.array([np.max(np.abs(c.force)) for c in cuts])
     order = np.argsort(peaks, kind="stable")
@@ -211,8 +290,19 @@ def judge_repeats(cuts):
                 cuts[second].rejections.append(rejection)
 
 
-def difference(first, second) -> float:
-    """Largest difference of force or acceleration over the largest value of either; inf for different rates."""
+def difference(first: Cut, second: Cut) -> float:
+    """Largest difference of force or acceleration over the largest value of either; inf for different rates.
+
+    Parameters
+    ----------
+    first, second : Cut
+        Two impacts.
+
+    Returns
+    -------
+    float
+        0 for equal ones. [-]
+    """
     if first.rate != second.rate:
         return np.inf
     tops = [int(np.argmax(np.abs(c.force))) for c in (first, second)]
@@ -227,8 +317,19 @@ def difference(first, second) -> float:
     return largest
 
 
-def is_repeated(cut) -> bool:
-    """Whether ``judge_repeats`` found the impact to repeat an earlier one."""
+def is_repeated(cut: Cut) -> bool:
+    """Whether ``judge_repeats`` found the impact to repeat an earlier one.
+
+    Parameters
+    ----------
+    cut : Cut
+        An impact.
+
+    Returns
+    -------
+    bool
+        True for a repeated record.
+    """
     return any(r.reason == "duplicate" for r in cut.rejections)
 
 
@@ -238,11 +339,18 @@ MIN_NOISE_LIMIT = 0.02
 MIN_SIGNAL_TO_NOISE = 5.0
 
 
-def judge_against_median(cuts, settings):
+def judge_against_median(cuts: Sequence[Cut], settings: ReceptanceSettings) -> None:
     """Add to each cut the rejections that only a comparison with the whole test can show.
 
     A number is an outlier if it lies ``deviation`` robust standard deviations *and* a given factor from the median of
     the test. The factor alone would reject uneven impacts, the deviation alone a test of very even impacts.
+
+    Parameters
+    ----------
+    cuts : sequence of Cut
+        The impacts of a test; the result is entered in them.
+    settings : ReceptanceSettings
+        Limits of the quality of an impact.
     """
     if not cuts:
         return
@@ -277,9 +385,9 @@ def judge_against_median(cuts, settings):
             _reject(cut, "noisy", noise[k], limit, f"{text}, {median_noise:.3f} in the median blow", response)
 
 
-def _largest_response(cut):
+def _largest_response(cut: Cut) -> float:
     return float(np.max(np.abs(cut.acceleration[cut.contact.onset :] - cut.contact.zero_acceleration)))
 
 
-def _reject(cut, reason, value, limit, detail, channel=None):
+def _reject(cut: Cut, reason: str, value: float, limit: float, detail: str, channel: str | None = None) -> None:
     cut.rejections.append(Rejection(reason, float(value), float(limit), detail, channel))

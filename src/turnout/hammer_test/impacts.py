@@ -1,16 +1,23 @@
 """Find all impacts of a hammer test, each with its measurements and the reasons to reject it."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.hammer_test.agreement import judge_agreement
-from turnout.hammer_test.contact import band_edges, measure_contact
+from turnout.hammer_test.contact import NO_CONTACT, band_edges, measure_contact
 from turnout.hammer_test.free_decay import judge_decay, judge_second_contact
 from turnout.hammer_test.impact_quality import is_repeated, judge_against_median, judge_repeats, judge_tops, overload
 from turnout.hammer_test.segmentation import cut_impacts
 from turnout.records import Impact, Recording, Rejection
+
+if TYPE_CHECKING:
+    from turnout.hammer_test.contact import Contact
+    from turnout.hammer_test.segmentation import Cut
 
 # N, largest peak force: far above any hammer, and below newtons that were read as kilonewtons.
 MAX_FORCE = 1e6
@@ -29,12 +36,18 @@ def find_impacts(
     force, response : str
         Names of the hammer's and the accelerometer's channel; KeyError if a recording has no such channel.
     settings : ReceptanceSettings, optional
+        Limits of the quality; the defaults without one.
 
     Returns
     -------
     tuple of Impact
         In the order of the recordings. An impact that is not used has ``rejections``. A recording without impact
         gives one Impact with the reason "no_impact", "dead_channel" or "not_finite".
+
+    Raises
+    ------
+    KeyError
+        A recording has no channel of that name.
 
     Examples
     --------
@@ -68,7 +81,7 @@ def find_impacts(
     return tuple(_impact(c) for c in cuts)
 
 
-def _band_edges(cuts, pulses):
+def _band_edges(cuts: Sequence[Cut], pulses: list[np.ndarray]) -> np.ndarray:
     edges = np.empty(len(cuts))
     for rate in {c.rate for c in cuts}:
         rows = [k for k, c in enumerate(cuts) if c.rate == rate]
@@ -76,7 +89,7 @@ def _band_edges(cuts, pulses):
     return edges
 
 
-def _measure(cut, settings):
+def _measure(cut: Cut, settings: ReceptanceSettings) -> None:
     """Measure zero lines, contacts and start of the decay of one impact, and judge it by itself."""
     contact = measure_contact(cut, settings.contact_level)
     force, response = (channel.name for channel in cut.channels)
@@ -100,7 +113,7 @@ def _measure(cut, settings):
     judge_decay(cut, settings)
 
 
-def _judge_scale(cuts, min_median_peak):
+def _judge_scale(cuts: Sequence[Cut], min_median_peak: float) -> None:
     """Reject a test whose median peak is too small for any hammer on a track.
 
     A single small impact is weak, not out of scale.
@@ -115,7 +128,7 @@ def _judge_scale(cuts, min_median_peak):
             "is wrong (kN read as N?); for a small hammer set receptance.softest_blow")))  # fmt: skip
 
 
-def _judge_start(cut, settings):
+def _judge_start(cut: Cut, settings: ReceptanceSettings) -> None:
     """Reject an impact that began before its record: the response to the missing force is in the record."""
     contact, at_start = cut.contact, cut.polarity * float(cut.force[0])
     limit = max(settings.contact_level * abs(contact.peak), 5.0 * contact.noise_force)
@@ -124,27 +137,19 @@ def _judge_start(cut, settings):
         cut.rejections.append(Rejection("late", at_start, limit, detail))
 
 
-def _significant_zero(cut, contact):
+def _significant_zero(cut: Cut, contact: Contact) -> float:
     """Mean before the impact if it is statistically significant, else 0: a correct zero line must not be changed."""
     n_quiet = max(1, min(cut.first, contact.onset))
     significant = abs(contact.zero_acceleration) > 4.0 * contact.noise_acceleration / np.sqrt(n_quiet)
     return contact.zero_acceleration if significant else 0.0
 
 
-def _impact(cut):
+def _impact(cut: Cut) -> Impact:
     c = cut.contact
-    common = dict(
-        force=cut.force, acceleration=cut.acceleration, rate=cut.rate, source=cut.recording.source, record=cut.record,
-        rejections=tuple(cut.rejections), notes=tuple(cut.notes),
-    )  # fmt: skip
-    if c is None:
-        nan = float("nan")
-        return Impact(
-            onset=0, contact_end=0, decay_start=0, peak=nan, contact=nan, impulse=nan, noise_force=nan,
-            noise_acceleration=nan, band_edge=nan, **common,
-        )  # fmt: skip
     return Impact(
+        force=cut.force, acceleration=cut.acceleration, rate=cut.rate, source=cut.recording.source, record=cut.record,
         onset=c.onset, contact_end=cut.contact_end, decay_start=cut.decay_start, peak=c.peak,
-        contact=(c.end - c.onset + 1) / cut.rate, impulse=c.impulse, noise_force=c.noise_force,
-        noise_acceleration=c.noise_acceleration, band_edge=float(cut.band_edge), **common,
+        contact=float("nan") if c is NO_CONTACT else (c.end - c.onset + 1) / cut.rate, impulse=c.impulse,
+        noise_force=c.noise_force, noise_acceleration=c.noise_acceleration, band_edge=float(cut.band_edge),
+        rejections=tuple(cut.rejections), notes=tuple(cut.notes),
     )  # fmt: skip

@@ -1,11 +1,21 @@
 """Cut impacts out of recordings, one window each, whether a record holds one impact or many."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.constants import MAD_TO_SD
+from turnout.hammer_test.contact import NO_CONTACT, Contact
 from turnout.records import Recording, Rejection
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from turnout.config.settings.receptance import ReceptanceSettings
+    from turnout.records import Channel
 
 
 @dataclass
@@ -14,7 +24,8 @@ class Cut:
 
     ``force`` [N] has its zero line subtracted; ``polarity`` (+1, -1) is the sign of the impact. ``first`` and ``last``
     are the first and last sample above the trigger, counted from the start of the window. ``zeros`` were subtracted
-    from force and acceleration: add them to get the recorded values.
+    from force and acceleration: add them to get the recorded values. ``contact``, ``contact_end``, ``decay_start`` and
+    ``band_edge`` [Hz] are set when the impact is measured; a rejected cut may stay without them.
     """
 
     force: np.ndarray
@@ -25,19 +36,41 @@ class Cut:
     polarity: int
     force_noise: float
     recording: Recording
-    channels: tuple
+    channels: tuple[Channel, Channel]
     zeros: tuple[float, float] = (0.0, 0.0)
     record: int = 0
-    rejections: list = field(default_factory=list)
-    notes: list = field(default_factory=list)
-    contact: object = None
+    rejections: list[Rejection] = field(default_factory=list)
+    notes: list[Rejection] = field(default_factory=list)
+    contact: Contact = NO_CONTACT
+    contact_end: int = 0
+    decay_start: int = 0
+    band_edge: float = float("nan")
 
 
-def cut_impacts(recordings, force, response, settings):
+def cut_impacts(recordings: Sequence[Recording], force: str, response: str, settings: ReceptanceSettings) -> list[Cut]:
     """Every impact of a test, in order; a recording without one gives one cut with that rejection.
 
     The number ``record`` is the recording's own where each record of its file holds one impact, else the impact's
     number within the file.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        All recordings of the test.
+    force, response : str
+        Names of the hammer's and the accelerometer's channel.
+    settings : ReceptanceSettings
+        Trigger, separation and length of the windows.
+
+    Returns
+    -------
+    list of Cut
+        In the order of the recordings.
+
+    Raises
+    ------
+    KeyError
+        A recording has no channel of that name.
     """
     per_recording = [_cut_recording(r, force, response, settings) for r in recordings]
     sources_with_many = {r.source for r, cuts in zip(recordings, per_recording) if len(cuts) > 1}
@@ -50,7 +83,7 @@ def cut_impacts(recordings, force, response, settings):
     return [cut for cuts in per_recording for cut in cuts]
 
 
-def _cut_recording(recording, force, response, settings):
+def _cut_recording(recording: Recording, force: str, response: str, settings: ReceptanceSettings) -> list[Cut]:
     force_index, response_index = recording.index(force), recording.index(response)
     channels = recording.channels[force_index], recording.channels[response_index]
     f, a = recording.samples[force_index], recording.samples[response_index]
@@ -92,7 +125,7 @@ def _cut_recording(recording, force, response, settings):
     return cuts
 
 
-def _not_finite(finite, record, start=0):
+def _not_finite(finite: np.ndarray, record: Cut, start: int = 0) -> Rejection | None:
     """Rejection of a window from sample ``start`` on in which the force or the response is not finite, else None."""
     bad = np.flatnonzero(~finite.all(axis=0))
     if bad.size == 0:
@@ -102,7 +135,9 @@ def _not_finite(finite, record, start=0):
     return Rejection("not_finite", float(bad.size), 0.0, detail, channel.name, time=first / record.rate)
 
 
-def _find_triggers(f, noise, rate, settings):
+def _find_triggers(
+    f: np.ndarray, noise: float, rate: float, settings: ReceptanceSettings
+) -> tuple[list[tuple[int, int]], float]:
     """(first, last) sample above the trigger for each impact, and the trigger [N].
 
     The typical peak is the upper quartile of all candidates, so that neither handling noise nor one overflow shifts

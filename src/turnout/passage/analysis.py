@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,12 +25,24 @@ from turnout.passage.train_detection import audible_sensors, restrict_to, sensor
 from turnout.passage.train_type import UNKNOWN
 from turnout.records import Recording, Rejection
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from turnout.config.settings.passage import PassageSettings
+    from turnout.passage.axle_patterns import Pattern
+    from turnout.passage.axles import AxleFinding
+    from turnout.passage.result import PassageSensor
+    from turnout.passage.sensor_stack import SensorEnvelopes
+    from turnout.passage.train_type import TypeFinding
+
 MAX_SHORT_SPAN, SHORT_SPAN_ERROR = 10.0, 0.3  # m: span of a short row of sensors; position error of each in it
 MIN_DURATION = 0.1  # s, least duration of a recording: two blocks of the quiet level
 MIN_CONTRAST = 1.5  # least ratio of accepted to rejected peaks of an unknown train
 
 
-def analyse(recording: Recording, sensors, patterns, settings) -> Passage:
+def analyse(
+    recording: Recording, sensors: Sequence[PassageSensor], patterns: Sequence[Pattern], settings: PassageSettings
+) -> Passage:
     """Find the train in a recording.
 
     Parameters
@@ -41,6 +54,7 @@ def analyse(recording: Recording, sensors, patterns, settings) -> Passage:
     patterns : sequence of Pattern
         Axle patterns of known trains, may be empty.
     settings : PassageSettings
+        Settings of the passage analysis.
 
     Returns
     -------
@@ -63,7 +77,8 @@ def analyse(recording: Recording, sensors, patterns, settings) -> Passage:
         return Passage("rejected", (*findings, Rejection("no_train", recording.duration, MIN_DURATION, text)))
     samples = np.array([recording.signal(s.name) for s in usable])
     samples = samples - np.median(samples, axis=1, keepdims=True)  # a zero offset is no vibration
-    envelopes = sensor_envelopes(samples, recording.rate, [s.position for s in usable], settings.envelope_step)
+    positions = np.array([s.position for s in usable])
+    envelopes = sensor_envelopes(samples, recording.rate, positions, settings.envelope_step)
     if envelopes is None:
         return Passage("rejected", (*findings, Rejection("no_train", 0.0, None, "nothing stands out of the noise")))
     track, _ = train_track(envelopes, [s.track for s in usable])
@@ -77,20 +92,22 @@ def analyse(recording: Recording, sensors, patterns, settings) -> Passage:
     return _with_lost_sensors(passage, envelopes, usable, lost) if passage.n_axle else passage
 
 
-def _with_lost_sensors(passage, envelopes, sensors, lost):
+def _with_lost_sensors(
+    passage: Passage, envelopes: SensorEnvelopes, sensors: Sequence[PassageSensor], lost: Sequence[PassageSensor]
+) -> Passage:
     """Passage completed with the sensors that were lost: they say nothing about the train.
 
     Their data up to that moment can still be fitted.
     """
-    on_track = [i for i, s in enumerate(sensors) if s.track in ("both", passage.track)]
-    times = {sensors[i].name: passage.motion.passing(passage.offsets, sensors[i].position) for i in on_track}
+    on_track, motion = [i for i, s in enumerate(sensors) if s.track in ("both", passage.track)], passage.train_motion
+    times = {sensors[i].name: motion.passing(passage.offsets, sensors[i].position) for i in on_track}
     doubted_names = {name for f in passage.findings for name in f.channels}
     on_track = [i for i in on_track if sensors[i].name not in doubted_names]
     if not on_track and not lost:
         return passage
     names = [sensors[i].name for i in on_track]
-    silent = lost_sensors(envelopes.select(on_track), names, times, passage.motion.speed) if on_track else ()
-    lost_times = {s.name: passage.motion.passing(passage.offsets, s.position) for s in lost}
+    silent = lost_sensors(envelopes.select(on_track), names, times, motion.speed) if on_track else []
+    lost_times = {s.name: motion.passing(passage.offsets, s.position) for s in lost}
     lost_times |= {name: times[name] for f in silent for name in f.channels}
     findings = (*passage.findings, *silent)
     return replace(
@@ -101,7 +118,15 @@ def _with_lost_sensors(passage, envelopes, sensors, lost):
     )
 
 
-def _analyse_train(envelopes, sensors, track, findings, duration, patterns, settings) -> Passage:
+def _analyse_train(
+    envelopes: SensorEnvelopes,
+    sensors: Sequence[PassageSensor],
+    track: str,
+    findings: list[Rejection],
+    duration: float,
+    patterns: Sequence[Pattern],
+    settings: PassageSettings,
+) -> Passage:
     """Passage of the train that ``sensors`` record."""
     is_multi_sensor, direction, all_envelopes = bool(np.ptp(envelopes.positions) > 0.05), "unknown", envelopes
     if is_multi_sensor:
@@ -110,31 +135,37 @@ def _analyse_train(envelopes, sensors, track, findings, duration, patterns, sett
         )
     else:
         count = count_without_distance(envelopes, patterns, settings)
-    motion, axles, train_type = count
-    if axles is None:
+    if count is None:
         return Passage("rejected", (*findings, Rejection("no_train", 0.0, None, "sound, but no axles in it")))
+    motion, axles, train_type = count
     passage = _estimate_motion(envelopes, sensors, motion, axles, train_type, settings, is_multi_sensor)
     passage = replace(passage, direction=direction, track=track, begin=envelopes.begin, end=envelopes.end)
-    if passage.type.type == UNKNOWN:
+    if train_type.type == UNKNOWN:
         findings += _axle_count_doubts(passage, all_envelopes, is_multi_sensor)
     findings += _truncation_findings(envelopes, passage, duration) + second_train(envelopes, passage, settings)
     return replace(passage, status="partly" if findings else "accepted", findings=tuple(findings))
 
 
-def _count_by_several_sensors(envelopes, sensors, findings, patterns, settings):
-    """(envelopes, sensors, direction, (motion, axle finding, type)) from several sensors along the rail.
+def _count_by_several_sensors(
+    envelopes: SensorEnvelopes,
+    sensors: Sequence[PassageSensor],
+    findings: list[Rejection],
+    patterns: Sequence[Pattern],
+    settings: PassageSettings,
+) -> tuple[SensorEnvelopes, Sequence[PassageSensor], str, tuple[Motion, AxleFinding, TypeFinding] | None]:
+    """(envelopes, sensors, direction, (motion, axle finding, type) or None) from several sensors along the rail.
 
     Sensors that agree on no motion go into ``findings``. They do not if a known train's impacts at a nose explain the
     data.
     """
     inconsistencies, consistent, motion, direction = _consistent_sensors(envelopes, sensors, settings)
     count = best_count(
-        consistent[0], align_sensors(consistent[0], motion), np.ptp(envelopes.positions), patterns, settings
+        consistent[0], align_sensors(consistent[0], motion), float(np.ptp(envelopes.positions)), patterns, settings
     )
     is_simultaneous = (
         bool(inconsistencies) and simultaneity(envelopes, motion) > -MIN_MOTION_GAIN
     )  # impacts at one moment look like wrong clocks
-    if count[1] is None or count[2].type == UNKNOWN or is_simultaneous:
+    if count is None or count[2].type == UNKNOWN or is_simultaneous:
         at_nose = detect_at_nose(envelopes, patterns, settings)
         if at_nose is not None:
             return envelopes, sensors, "facing" if at_nose[0].direction > 0 else "trailing", at_nose
@@ -142,19 +173,22 @@ def _count_by_several_sensors(envelopes, sensors, findings, patterns, settings):
     return *consistent, direction, count
 
 
-def _axle_count_doubts(passage, envelopes, is_multi_sensor) -> list[Rejection]:
+def _axle_count_doubts(passage: Passage, envelopes: SensorEnvelopes, is_multi_sensor: bool) -> list[Rejection]:
     """Reasons to doubt the number of axles of a train without template."""
-    min_contrast, doubts = MIN_CONTRAST if is_multi_sensor else 2.0 * MIN_CONTRAST, []
+    doubts: list[Rejection] = []
+    min_contrast = MIN_CONTRAST if is_multi_sensor else 2.0 * MIN_CONTRAST
     if passage.contrast < min_contrast:
         text = f"{passage.n_axle} axles, but the weakest peak is only {passage.contrast:.2f} times the next one"
         doubts.append(Rejection("axles_uncertain", passage.contrast, min_contrast, text))
-    if is_multi_sensor and (impacts := fixed_impact_correlation(envelopes, passage.motion)):
+    if is_multi_sensor and (impacts := fixed_impact_correlation(envelopes, passage.train_motion)):
         text = f"{passage.n_axle} axles, but sensors hear blows at one moment, as of a crossing's nose or a deep dip"
         doubts.append(Rejection("axles_uncertain", *impacts, text))
     return doubts
 
 
-def _consistent_sensors(envelopes, sensors, settings):
+def _consistent_sensors(
+    envelopes: SensorEnvelopes, sensors: Sequence[PassageSensor], settings: PassageSettings
+) -> tuple[list[Rejection], tuple[SensorEnvelopes, Sequence[PassageSensor]], Motion, str]:
     """(findings on inconsistent sensors, (envelopes, sensors) of the consistent ones, their motion, its direction)."""
     findings, keep = inconsistent_channels(envelopes, sensors, settings)
     sensors, envelopes = [s for s, k in zip(sensors, keep) if k], envelopes.select(np.flatnonzero(keep))
@@ -167,7 +201,7 @@ def _consistent_sensors(envelopes, sensors, settings):
     return findings, (envelopes, sensors), motion, direction
 
 
-def _motion_from_scan(envelopes, settings):
+def _motion_from_scan(envelopes: SensorEnvelopes, settings: PassageSettings) -> tuple[Motion, str]:
     """First motion, and the name of its direction, from the slant stack."""
     scan = scan_slowness(envelopes.levels.values, envelopes.levels.step, envelopes.positions, settings)
     values, step, positions = envelopes.levels.values, envelopes.levels.step, envelopes.positions
@@ -188,7 +222,15 @@ def _motion_from_scan(envelopes, settings):
     return with_acceleration(envelopes, steady, settings.acceleration_limit), name
 
 
-def _estimate_motion(envelopes, sensors, initial, axles, train_type, settings, is_multi_sensor) -> Passage:
+def _estimate_motion(
+    envelopes: SensorEnvelopes,
+    sensors: Sequence[PassageSensor],
+    initial: Motion,
+    axles: AxleFinding,
+    train_type: TypeFinding,
+    settings: PassageSettings,
+    is_multi_sensor: bool,
+) -> Passage:
     """Passage with motion from sensors and template together: axle offsets on its scale, times at the sensors."""
     motion, offsets = initial, axles.offsets
     # a short row of sensors and no template: the position error of each sensor decides
@@ -203,13 +245,7 @@ def _estimate_motion(envelopes, sensors, initial, axles, train_type, settings, i
         centre = motion.time(offsets)
         middle = 0.5 * float(centre[0] + centre[-1])
         if train_type.type != UNKNOWN:
-            from_type = (
-                train_type.middle_speed,
-                train_type.middle_speed_se,
-                train_type.acceleration,
-                train_type.acceleration_se,
-                middle,
-            )
+            from_type = (*train_type.middle_motion, middle)
         if from_sensors is None and from_type is None:
             # an unknown train at one sensor: its bogies give the speed to one sixth
             from_type = (motion.speed, 0.16 * motion.speed, 0.0, 0.3, middle)
@@ -227,7 +263,9 @@ def _estimate_motion(envelopes, sensors, initial, axles, train_type, settings, i
     )
 
 
-def _sensor_speed(times, envelopes, direction, position_error, settings):
+def _sensor_speed(
+    times: np.ndarray, envelopes: SensorEnvelopes, direction: int, position_error: float, settings: PassageSettings
+) -> tuple[float, float, float, float, float] | None:
     """(v, se, a, a_se, time) from delays between sensors; None where fewer than two axles have times at two sensors."""
     is_timed = np.isfinite(times)
     axles = is_timed.sum(axis=0) >= 2
@@ -241,12 +279,13 @@ def _sensor_speed(times, envelopes, direction, position_error, settings):
     return 1 / q, se / q**2, -change / q**2, max(change_se / q**2, 1e-4), mean_time
 
 
-def _truncation_findings(envelopes, passage, duration):
+def _truncation_findings(envelopes: SensorEnvelopes, passage: Passage, duration: float) -> list[Rejection]:
     """Findings where the train is present at the start or at the end of the recording."""
     findings = []
     # an unknown train may have a further bogie, as far away as its bogies are from each other
-    gap = 3.0 if passage.type.type != UNKNOWN else 1.05 * max(np.diff(passage.offsets).max(initial=3.0), 3.0)
-    reach = gap / passage.motion.speed
+    is_typed = passage.type is not None and passage.type.type != UNKNOWN
+    gap = 3.0 if is_typed else 1.05 * max(np.diff(passage.offsets).max(initial=3.0), 3.0)
+    reach = gap / passage.train_motion.speed
     first = min(t[0] for t in passage.at_sensor.values())
     last = max(t[-1] for t in passage.at_sensor.values())
     if first < reach or envelopes.begin < 0.05:

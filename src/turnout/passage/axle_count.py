@@ -10,6 +10,7 @@ Its comb must explain more than any other's, and no other shape of its vehicles 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import stats
@@ -28,6 +29,13 @@ from turnout.passage.kinematics import Motion
 from turnout.passage.sensor_stack import axle_counts, template_counts
 from turnout.passage.train_type import UNKNOWN, TypeFinding, find_type, unknown_evidence
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from turnout.config.settings.passage import PassageSettings
+    from turnout.passage.axle_patterns import Pattern
+    from turnout.passage.sensor_stack import SensorEnvelopes
+
 MIN_EVIDENCE = 10.0  # nat, least log Bayes factor of a comb against no train
 # Largest gain by another shape of the vehicles, as a share of the evidence, less what free numbers gain by chance.
 # Simulated trains with a template gain 0.08 at most, similar trains without one at least 0.22.
@@ -40,7 +48,9 @@ STEADY_ACCELERATION, STEADY_SHARE = (
 )  # m/s², sd of a steady train; share of trains that pass a turnout at a steady speed
 
 
-def match_template(envelopes, motions, patterns, settings):
+def match_template(
+    envelopes: SensorEnvelopes, motions: Sequence[Motion], patterns: Sequence[Pattern], settings: PassageSettings
+) -> tuple[Motion, AxleFinding, TypeFinding] | None:
     """(motion, AxleFinding, TypeFinding) of the train of ``patterns`` in the envelopes, None where none is certain.
 
     Parameters
@@ -53,6 +63,11 @@ def match_template(envelopes, motions, patterns, settings):
         Known trains; their rows are tried with one vehicle type per group, then vehicle by vehicle.
     settings : PassageSettings
         Least probability of a type, prior of trains without template, limit of the acceleration.
+
+    Returns
+    -------
+    (Motion, AxleFinding, TypeFinding) or None
+        Motion at the best speed, axles of the comb, and the type with its posterior probability.
     """
     rows_by_type = likeliest_rows(envelopes, motions, tuple(patterns)) if patterns else {}
     if not rows_by_type:
@@ -104,11 +119,31 @@ def match_template(envelopes, motions, patterns, settings):
     return fitted.motion, axles, train_type
 
 
-def estimate_speed(envelopes, fitted: FittedRow, settings):
+def estimate_speed(
+    envelopes: SensorEnvelopes, fitted: FittedRow, settings: PassageSettings
+) -> tuple[float, float, float, float, FittedRow]:
     """(speed halfway [m/s], its standard error, acceleration [m/s²], its standard error, the likeliest fit).
 
     Posterior means of both, from the comb's evidence. Most trains pass a turnout at a steady speed: 0.8 of the prior of
     the acceleration is 0 ± 0.02 m/s², the remainder 0 ± a quarter of the limit.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Envelopes of the sensors.
+    fitted : FittedRow
+        Row of vehicles near the best speed.
+    settings : PassageSettings
+        Settings of the passage analysis.
+
+    Returns
+    -------
+    speed, speed_se : float
+        Posterior mean and standard deviation halfway through the passage. [m/s]
+    acceleration, acceleration_se : float
+        The same of the acceleration. [m/s²]
+    likeliest : FittedRow
+        The row at the most probable speed and acceleration.
     """
     duration = fitted.comb.offsets[-1] / fitted.motion.speed
     step = 16.0 * BEND_STEP / duration**2
@@ -151,11 +186,31 @@ SHORT_SPAN_ERROR = 0.3  # m, position error of a wheel at each of two sensors cl
 POSITION_SE = 0.05  # m, error of a fitted axle position; from simulated passages
 
 
-def best_count(envelopes, motion, span, patterns, settings):
+def best_count(
+    envelopes: SensorEnvelopes, motion: Motion, span: float, patterns: Sequence[Pattern], settings: PassageSettings
+) -> tuple[Motion, AxleFinding, TypeFinding] | None:
     """(motion, axle finding, type): the count whose axles fit a template, else the one with the largest contrast.
 
     With few sensors a template is matched by its comb. With more sensors the cuts between peaks are tried first. Then
     the rows of vehicles that collect most of the profile are tried.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Envelopes of the sensors.
+    motion : Motion
+        Motion from the sensors.
+    span : float
+        Distance between the first and the last sensor. [m]
+    patterns : sequence of Pattern
+        Axle patterns of known trains.
+    settings : PassageSettings
+        Settings of the passage analysis.
+
+    Returns
+    -------
+    (Motion, AxleFinding, TypeFinding) or None
+        None where no axle is found.
     """
     error = motion.speed * np.sqrt(2.0) * max(2 * settings.place_error, _position_error(span)) / max(span, 0.1)
     error = min(error, 0.25 * motion.speed)
@@ -173,11 +228,11 @@ def best_count(envelopes, motion, span, patterns, settings):
         typed, _ = _first_with_type(
             envelopes, motion, template_counts(envelopes, motion, patterns), error, patterns, settings
         )
-    axles, train_type = typed or first or (None, None)
-    return motion, axles, train_type
+    likeliest = typed or first
+    return (motion, *likeliest) if likeliest else None
 
 
-def _motions_near(motion, envelopes, reach):
+def _motions_near(motion: Motion, envelopes: SensorEnvelopes, reach: float) -> list[Motion]:
     """Motions at speeds within ``reach`` [m/s] of a given one, with the train's middle at the same time."""
     middle = 0.5 * (envelopes.begin + envelopes.end)
     speed = float(motion.speed_at(middle))
@@ -188,12 +243,19 @@ def _motions_near(motion, envelopes, reach):
     ]
 
 
-def _position_error(span):
+def _position_error(span: float) -> float:
     """Position error of a wheel at one sensor [m]: a long row of sensors averages it out."""
     return SHORT_SPAN_ERROR if span < 10.0 else 0.1
 
 
-def _first_with_type(envelopes, motion, candidates, error, patterns, settings):
+def _first_with_type(
+    envelopes: SensorEnvelopes,
+    motion: Motion,
+    candidates: Sequence[AxleFinding],
+    error: float,
+    patterns: Sequence[Pattern],
+    settings: PassageSettings,
+) -> tuple[tuple[AxleFinding, TypeFinding] | None, tuple[AxleFinding, TypeFinding] | None]:
     """First (axle finding, type) that fits a template, and the first one tried; None where there is none."""
     untyped, checked = None, set()
     for candidate in candidates:
@@ -210,7 +272,7 @@ def _first_with_type(envelopes, motion, candidates, error, patterns, settings):
     return None, untyped
 
 
-def _is_whole_train(envelopes, motion, offsets) -> bool:
+def _is_whole_train(envelopes: SensorEnvelopes, motion: Motion, offsets: np.ndarray) -> bool:
     """Whether the axles reach along the whole audible length.
 
     A few axles of a longer train would fit a shorter one by chance.
@@ -219,16 +281,32 @@ def _is_whole_train(envelopes, motion, offsets) -> bool:
     return bool(offsets[-1] - offsets[0] + ENVELOPE_MARGIN >= 0.9 * audible_length)
 
 
-def _position_variants(envelopes, motion, axles):
+def _position_variants(envelopes: SensorEnvelopes, motion: Motion, axles: AxleFinding) -> Iterator[AxleFinding]:
     """The axles with positions fitted to the level around them, and then as given by the peaks."""
     yield replace(axles, offsets=fit_axle_positions(envelopes, motion, axles.offsets))
     yield axles
 
 
-def count_without_distance(envelopes, patterns, settings):
+def count_without_distance(
+    envelopes: SensorEnvelopes, patterns: Sequence[Pattern], settings: PassageSettings
+) -> tuple[Motion, AxleFinding, TypeFinding] | None:
     """(motion, axle finding, type) from one sensor.
 
     A known train is sought at any speed. Else the speed is taken that makes the most plausible bogies.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Envelopes of one sensor, or of sensors at one position.
+    patterns : sequence of Pattern
+        Axle patterns of known trains.
+    settings : PassageSettings
+        Settings of the passage analysis.
+
+    Returns
+    -------
+    (Motion, AxleFinding, TypeFinding) or None
+        Motion past the sensor, axles and type; None where no axle is found.
     """
     match = match_template(envelopes, motions_at_all_speeds(envelopes.begin, settings), patterns, settings)
     if match is not None:
@@ -246,4 +324,4 @@ def count_without_distance(envelopes, patterns, settings):
         _, typed = _first_with_type(envelopes, motion, [axles], 0.12 * motion.speed, (), settings)
         if typed is not None:
             return motion, *typed
-    return None, None, None
+    return None

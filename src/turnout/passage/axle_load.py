@@ -4,11 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import signal
 
 from turnout.passage.axles import GRID_STEP, along_train
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import ArrayLike
+
+    from turnout.config.settings.passage import PassageSettings
+    from turnout.passage.result import Passage
+    from turnout.records import Recording
 
 TIME_STEP = 0.001  # s, bins of the slow acceleration
 MAX_AMPLITUDE_ERROR = 0.3  # relative standard error of an amplitude; above it the logarithm has no normal error
@@ -45,18 +55,34 @@ class LoadFinding:
     per_axle: np.ndarray
 
 
-def quasi_static(samples, rate: float, passage, position: float) -> np.ndarray:
+def quasi_static(samples: np.ndarray, rate: float, passage: Passage, position: float) -> np.ndarray:
     r"""(n_axle,) amplitude of each axle in the slow acceleration at one sensor, positive for a load. [m/s²]
 
     Least squares of :math:`\sum_j A_j (v_j/v_0)^2 \kappa(s - d_j)`, κ the curvature of a rail on an elastic foundation
     with wavenumber 1.1 per metre. Data and κ are both limited to ``WAVENUMBER_BAND`` along the train. v_j is the speed
     of axle j at the sensor; v_0 is the speed of the motion, which is that of the calibration.
+
+    Parameters
+    ----------
+    samples : (n_sample,) array of float
+        Acceleration of one sensor. [m/s²]
+    rate : float
+        Sampling rate. [Hz]
+    passage : Passage
+        Motion and axle offsets of the train.
+    position : float
+        Position of the sensor. [m]
+
+    Returns
+    -------
+    (n_axle,) array of float
+        Amplitude of each axle. [m/s²]
     """
     per_bin = max(round(TIME_STEP * rate), 1)
     n = len(samples) // per_bin
     slow = np.asarray(samples[: n * per_bin], float).reshape(n, per_bin).mean(axis=1)
     start, stop = passage.offsets[0] - 12.0, passage.offsets[-1] + 12.0
-    motion = passage.motion
+    motion = passage.train_motion
     row = along_train((slow - np.median(slow))[None], per_bin / rate, [position], motion, start, stop)[0]
     sections = signal.butter(3, WAVENUMBER_BAND, btype="bandpass", fs=1.0 / GRID_STEP, output="sos")
     grid = np.arange(len(row)) * GRID_STEP + start
@@ -67,11 +93,23 @@ def quasi_static(samples, rate: float, passage, position: float) -> np.ndarray:
     return np.linalg.lstsq(columns, signal.sosfiltfilt(sections, row), rcond=None)[0]
 
 
-def train_amplitude(per_axle) -> tuple[float, float]:
+def train_amplitude(per_axle: np.ndarray) -> tuple[float, float]:
     """Mean of ``quasi_static`` (n_axle,) and its standard error, both signed like a load; inf from a single axle.
 
     A slow train causes less than the noise, by v² w''. Its axles then differ by more than loads do; the error shows it.
 
+    Parameters
+    ----------
+    per_axle : (n_axle,) array of float
+        Amplitude of each axle. [m/s²]
+
+    Returns
+    -------
+    mean, se : float
+        Mean amplitude and its standard error. [m/s²]
+
+    Examples
+    --------
     >>> mean, se = train_amplitude([1.0, 1.2, 0.8, 1.0])
     >>> print(f"{mean:.2f} ± {se:.2f}")
     1.00 ± 0.08
@@ -82,7 +120,9 @@ def train_amplitude(per_axle) -> tuple[float, float]:
     return float(per_axle.mean()), float(per_axle.std(ddof=1) / np.sqrt(per_axle.size))
 
 
-def calibrate(amplitudes, loads, speeds, min_trains: int = 5, errors=None) -> LoadCalibration | None:
+def calibrate(
+    amplitudes: ArrayLike, loads: ArrayLike, speeds: ArrayLike, min_trains: int = 5, errors: ArrayLike | None = None
+) -> LoadCalibration | None:
     """Calibration of one channel from trains of known mean axle load; None from fewer than ``min_trains``.
 
     Parameters
@@ -90,25 +130,31 @@ def calibrate(amplitudes, loads, speeds, min_trains: int = 5, errors=None) -> Lo
     amplitudes : (n_train,) array of float
         Mean amplitude of each train at the channel, sign of the sensor included. [m/s²]
     loads : (n_train,) array of float
-        [t]
+        Mean axle load of each train. [t]
     speeds : (n_train,) array of float
-        [m/s]
+        Speed of each train. [m/s]
     min_trains : int
+        Least number of usable trains; at least 3 are needed.
     errors : (n_train,) array of float or None
         Standard errors of the amplitudes; trains above ``MAX_AMPLITUDE_ERROR`` do not count. [m/s²]
+
+    Returns
+    -------
+    LoadCalibration or None
+        None from fewer trains.
     """
-    amplitudes, loads, speeds = (np.asarray(x, dtype=float) for x in (amplitudes, loads, speeds))
-    amplitudes = np.abs(amplitudes)
-    errors = np.zeros(amplitudes.shape) if errors is None else np.asarray(errors, dtype=float)
-    is_usable = (amplitudes > 0) & (loads > 0) & (errors <= MAX_AMPLITUDE_ERROR * amplitudes)
+    amplitude, load, speed = (np.asarray(x, dtype=float) for x in (amplitudes, loads, speeds))
+    amplitude = np.abs(amplitude)
+    error = np.zeros(amplitude.shape) if errors is None else np.asarray(errors, dtype=float)
+    is_usable = (amplitude > 0) & (load > 0) & (error <= MAX_AMPLITUDE_ERROR * amplitude)
     if is_usable.sum() < max(min_trains, 3):
         return None
-    reference = float(np.exp(np.mean(np.log(speeds[is_usable]))))
-    relative = np.log(speeds[is_usable] / reference)
-    target = np.log(amplitudes[is_usable] / loads[is_usable])
+    reference = float(np.exp(np.mean(np.log(speed[is_usable]))))
+    relative = np.log(speed[is_usable] / reference)
+    target = np.log(amplitude[is_usable] / load[is_usable])
     # acceleration goes with v²; trains of one speed cannot show anything else
     prior = np.array([[0.0, 0.0], [0.0, 1 / 0.3**2]])
-    scatter, own_variance = 0.05, (errors[is_usable] / amplitudes[is_usable]) ** 2
+    scatter, own_variance = 0.05, (error[is_usable] / amplitude[is_usable]) ** 2
     design = np.column_stack([np.ones(is_usable.sum()), relative])
     for _ in range(10):
         weight = 1.0 / (scatter**2 + own_variance)
@@ -120,7 +166,7 @@ def calibrate(amplitudes, loads, speeds, min_trains: int = 5, errors=None) -> Lo
             np.sum(weight * (residual**2 * is_usable.sum() / max(is_usable.sum() - 2, 1) - own_variance)) / weight.sum()
         )
         scatter = float(np.sqrt(max(excess, 1e-6)))
-    low, high = speeds[is_usable].min(), speeds[is_usable].max()
+    low, high = speed[is_usable].min(), speed[is_usable].max()
     covariance = np.linalg.inv(normal)
     return LoadCalibration(
         float(solution[0]),
@@ -134,11 +180,25 @@ def calibrate(amplitudes, loads, speeds, min_trains: int = 5, errors=None) -> Lo
     )
 
 
-def with_error_correlation(calibrations, trains) -> dict[str, LoadCalibration]:
+def with_error_correlation(
+    calibrations: Mapping[str, LoadCalibration], trains: Sequence[Mapping]
+) -> dict[str, LoadCalibration]:
     """The ``calibrations`` by channel, with the correlation of the trains' residuals in any two channels.
 
     A wrong speed, frozen ballast and the train's own roughness are the same in all sensors: more sensors do not help.
     ``trains`` are dicts with "load" [t], "speed" [m/s] and "amplitudes", channel -> (mean, standard error) [m/s²].
+
+    Parameters
+    ----------
+    calibrations : mapping
+        Channel -> LoadCalibration.
+    trains : sequence of mappings
+        Trains of the calibration, as described above.
+
+    Returns
+    -------
+    dict
+        Channel -> LoadCalibration with ``shared``, the correlation between channels [-].
     """
     residuals = {
         name: [_standardised_residual(calibration, train, name) for train in trains]
@@ -153,7 +213,7 @@ def with_error_correlation(calibrations, trains) -> dict[str, LoadCalibration]:
     return {name: replace(calibration, shared=shared) for name, calibration in calibrations.items()}
 
 
-def _standardised_residual(calibration, train, name):
+def _standardised_residual(calibration: LoadCalibration, train: Mapping, name: str) -> float | None:
     """Residual of one train in one channel, in standard deviations; None where the train did not count."""
     mean, error = np.abs(train["amplitudes"].get(name, (0.0, 0.0)))
     if mean == 0.0 or train["load"] <= 0.0 or error > MAX_AMPLITUDE_ERROR * mean:
@@ -162,19 +222,41 @@ def _standardised_residual(calibration, train, name):
     return float((np.log(mean / train["load"]) - expected) / np.hypot(calibration.scatter, error / mean))
 
 
-def axle_load(recording, passage, calibrations, settings) -> LoadFinding | None:
+def axle_load(
+    recording: Recording, passage: Passage, calibrations: Mapping[str, LoadCalibration], settings: PassageSettings
+) -> LoadFinding | None:
     """Mean axle load from all calibrated channels; None ("unavailable") where its error would exceed the setting.
 
     A calibration is used between 0.8 times its slowest and 1.25 times its fastest train.
+
+    Parameters
+    ----------
+    recording : Recording
+        Recording of the passage.
+    passage : Passage
+        The train that was found.
+    calibrations : mapping
+        Channel -> LoadCalibration.
+    settings : PassageSettings
+        Settings of the passage analysis.
+
+    Returns
+    -------
+    LoadFinding or None
+        Mean axle load with its standard error, and the load of each axle. [t]
     """
     logs, errors, shapes, shared = [], [], [], 1.0
-    channels = {c.name: c for c in recording.channels}
+    positions = {c.name: c.position for c in recording.channels}
     for name in passage.at_sensor:
-        calibration = calibrations.get(name)
-        speed = passage.motion.speed
-        if calibration is None or not 0.8 * calibration.slowest <= speed <= 1.25 * calibration.fastest:
+        calibration, position = calibrations.get(name), positions[name]
+        speed = passage.train_motion.speed
+        if (
+            calibration is None
+            or position is None
+            or not 0.8 * calibration.slowest <= speed <= 1.25 * calibration.fastest
+        ):
             continue
-        amplitudes = quasi_static(recording.signal(name), recording.rate, passage, channels[name].position)
+        amplitudes = quasi_static(recording.signal(name), recording.rate, passage, position)
         mean, error = np.abs(train_amplitude(amplitudes))
         if mean == 0 or error > MAX_AMPLITUDE_ERROR * mean:
             continue

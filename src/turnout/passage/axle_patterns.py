@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
 
 
 @dataclass(frozen=True)
@@ -17,7 +21,7 @@ class Vehicle:
     length: float
     axles: tuple[float, ...]
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not self.axles or sorted(self.axles) != list(self.axles):
             raise ValueError(f"vehicle {self.name}: axles must be in order, got {self.axles}")
         if self.axles[0] < 0 or self.axles[-1] > self.length:
@@ -29,7 +33,13 @@ class Vehicle:
         return self.length - self.axles[-1]
 
     def reverse(self) -> Vehicle:
-        """The vehicle in the other direction; itself where it is symmetric to a millimetre."""
+        """The vehicle in the other direction; itself where it is symmetric to a millimetre.
+
+        Returns
+        -------
+        Vehicle
+            With its axles counted from the other end.
+        """
         axles = tuple(round(self.length - x, 4) for x in reversed(self.axles))
         if np.allclose(axles, self.axles, atol=1e-3):
             return self
@@ -40,6 +50,25 @@ class Vehicle:
     def of(cls, name: str, values: Mapping) -> Vehicle:
         """From a mapping: ``length`` with ``axles``, or ``length``, ``pivots`` and ``wheelbase`` of two bogies.
 
+        Parameters
+        ----------
+        name : str
+            Name of the vehicle.
+        values : mapping
+            ``length`` over couplers and the axles. [m]
+
+        Returns
+        -------
+        Vehicle
+            The vehicle as described.
+
+        Raises
+        ------
+        ValueError
+            Axles out of order or beyond the length.
+
+        Examples
+        --------
         >>> Vehicle.of("coach", {"length": 26.4, "pivots": 19.0, "wheelbase": 2.5}).axles
         (2.45, 4.95, 21.45, 23.95)
         """
@@ -68,20 +97,45 @@ class Pattern:
     groups: tuple[Group, ...]
 
     def reverse(self) -> Pattern:
-        """The same train in the other direction."""
+        """The same train in the other direction.
+
+        Returns
+        -------
+        Pattern
+            Groups and vehicles in reverse order.
+        """
         groups = tuple(
             Group(tuple(v.reverse() for v in g.vehicles), g.minimum, g.maximum) for g in reversed(self.groups)
         )
         return Pattern(self.type, groups)
 
-    def fixed_row(self):
-        """(0.0, vehicles, 0.0) where the pattern has one composition only, else None."""
+    def fixed_row(self) -> tuple[float, tuple[Vehicle, ...], float] | None:
+        """(0.0, vehicles, 0.0) where the pattern has one composition only, else None.
+
+        Returns
+        -------
+        (float, tuple of Vehicle, float) or None
+            Cost 0, the row, and logarithm 0 of its number of choices, as ``closest_row`` has them. [nat]
+        """
         if any(len(g.vehicles) > 1 or g.minimum != g.maximum for g in self.groups):
             return None
         return 0.0, tuple(v for g in self.groups for v in g.vehicles * g.minimum), 0.0
 
-    def next_vehicles(self, g: int, count: int):
-        """(group, vehicles used of it) of each possible next vehicle behind ``count`` vehicles of group ``g``."""
+    def next_vehicles(self, g: int, count: int) -> Iterator[tuple[int, int]]:
+        """(group, vehicles used of it) of each possible next vehicle behind ``count`` vehicles of group ``g``.
+
+        Parameters
+        ----------
+        g : int
+            Index of the group.
+        count : int
+            Vehicles of this group so far.
+
+        Yields
+        ------
+        (int, int)
+            Index of the group and the number of its vehicles with the next one.
+        """
         if count < self.groups[g].maximum:
             yield g, count + 1
         if count >= self.groups[g].minimum:
@@ -91,17 +145,42 @@ class Pattern:
                     return
 
     def can_end(self, g: int, count: int) -> bool:
-        """Whether the train can end behind ``count`` vehicles of group ``g``."""
+        """Whether the train can end behind ``count`` vehicles of group ``g``.
+
+        Parameters
+        ----------
+        g : int
+            Index of the group.
+        count : int
+            Vehicles of this group so far.
+
+        Returns
+        -------
+        bool
+            True where no further vehicle is required.
+        """
         return count >= self.groups[g].minimum and all(group.minimum == 0 for group in self.groups[g + 1 :])
 
     def lengths(self) -> tuple[float, float]:
-        """Smallest and largest length over couplers. [m]"""
+        """Smallest and largest length over couplers. [m]
+
+        Returns
+        -------
+        low, high : float
+            Smallest and largest length. [m]
+        """
         lengths = [[v.length for v in g.vehicles] for g in self.groups]
         low = sum(min(x) * g.minimum for x, g in zip(lengths, self.groups))
         return low, sum(max(x) * g.maximum for x, g in zip(lengths, self.groups))
 
     def axle_counts(self) -> tuple[int, int]:
-        """Smallest and largest number of axles."""
+        """Smallest and largest number of axles.
+
+        Returns
+        -------
+        low, high : int
+            Smallest and largest number.
+        """
         return self._axle_counts
 
     @cached_property
@@ -115,15 +194,27 @@ class Pattern:
         return [float(np.log(len(g.vehicles))) for g in self.groups]
 
     @cached_property
-    def _axle_counts(self):
+    def _axle_counts(self) -> tuple[int, int]:
         counts = [[len(v.axles) for v in g.vehicles] for g in self.groups]
         low = sum(min(c) * g.minimum for c, g in zip(counts, self.groups))
         return low, sum(max(c) * g.maximum for c, g in zip(counts, self.groups))
 
 
-def offsets(vehicles) -> np.ndarray:
+def offsets(vehicles: Sequence[Vehicle]) -> np.ndarray:
     """(n_axle,) metres behind the first axle of a row of vehicles.
 
+    Parameters
+    ----------
+    vehicles : sequence of Vehicle
+        The row, front first.
+
+    Returns
+    -------
+    (n_axle,) array of float
+        Distance of each axle behind the first. [m]
+
+    Examples
+    --------
     >>> wagon = Vehicle("wagon", 10.0, (2.0, 8.0))
     >>> offsets([wagon, wagon]).tolist()
     [0.0, 6.0, 10.0, 16.0]
@@ -139,6 +230,23 @@ def read_patterns(document: Mapping) -> tuple[Pattern, ...]:
     A train is ``units``: a list whose items name a vehicle, or give ``any: [names]`` with ``count: [least, most]``.
     A name ending in ``'`` is the reversed vehicle. ``coupled`` is the largest number of whole units in a train.
     ``type`` is the train type where that is not the train's own name. KeyError names a vehicle that is not described.
+
+    Parameters
+    ----------
+    document : mapping
+        ``vehicles`` and ``trains``, as read from YAML.
+
+    Returns
+    -------
+    tuple of Pattern
+        Every composition of every type.
+
+    Raises
+    ------
+    KeyError
+        A train names a vehicle that is not described; the message names both.
+    ValueError
+        Axles of a vehicle out of order or beyond its length.
     """
     vehicles = {name: Vehicle.of(name, values) for name, values in document["vehicles"].items()}
     patterns: list[Pattern] = []
@@ -154,7 +262,7 @@ def read_patterns(document: Mapping) -> tuple[Pattern, ...]:
     return tuple(patterns)
 
 
-def _group(item, vehicles, type_) -> Group:
+def _group(item: str | Mapping, vehicles: Mapping[str, Vehicle], type_: str) -> Group:
     if isinstance(item, str):
         item = {"any": [item]}
     names = item["any"] if isinstance(item["any"], list) else [item["any"]]

@@ -7,11 +7,17 @@ gives the times at which the axles pass that sensor.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import ndimage, signal
 
 from turnout.passage.kinematics import Motion
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from turnout.passage.sensor_stack import SensorEnvelopes
 
 GRID_STEP = 0.04  # m, step of the grid along the train
 
@@ -29,8 +35,29 @@ class AxleFinding:
     feature: str = ""
 
 
-def along_train(values, step: float, positions, motion: Motion, start: float, stop: float) -> np.ndarray:
-    """(n_sensor, n) values at every ``GRID_STEP`` metres along the train between ``start`` and ``stop`` [m]."""
+def along_train(
+    values: np.ndarray, step: float, positions: Sequence[float] | np.ndarray, motion: Motion, start: float, stop: float
+) -> np.ndarray:
+    """(n_sensor, n) values at every ``GRID_STEP`` metres along the train between ``start`` and ``stop`` [m].
+
+    Parameters
+    ----------
+    values : (n_sensor, n_bin) array of float
+        Values over time, for example levels. [any unit]
+    step : float
+        Length of a bin. [s]
+    positions : (n_sensor,) array of float
+        Positions of the sensors. [m]
+    motion : Motion
+        Motion of the train.
+    start, stop : float
+        Range behind the motion's origin. [m]
+
+    Returns
+    -------
+    (n_sensor, n) array of float
+        Values along the train; 0 outside the recording. [same unit]
+    """
     offsets = np.arange(start, stop, GRID_STEP)
     bins = np.arange(values.shape[1])
     rows = [
@@ -40,12 +67,34 @@ def along_train(values, step: float, positions, motion: Motion, start: float, st
     return np.array(rows)
 
 
-def axle_candidates(profile, start: float, spacing: float, noise: float, feature: str = "", n: int = 4):
+def axle_candidates(
+    profile: np.ndarray, start: float, spacing: float, noise: float, feature: str = "", n: int = 4
+) -> list[AxleFinding]:
     """Up to ``n`` counts of the peaks of ``profile`` (n,), the one with the largest contrast first.
 
     Peaks are at least ``spacing`` metres from each other. The lesser of prominence and twice the height must exceed
     ``noise``. The cut lies where the ratio between neighbouring ranks is large. It never rejects peaks of more than 60
     % of the typical height.
+
+    Parameters
+    ----------
+    profile : (n,) array of float
+        Feature along the train on a grid of ``GRID_STEP``, about 1 at a wheel. [-]
+    start : float
+        Offset of the first point. [m]
+    spacing : float
+        Least distance between axles. [m]
+    noise : float
+        Least height of a peak. [-]
+    feature : str
+        Name of the feature.
+    n : int
+        Largest number of counts.
+
+    Returns
+    -------
+    list of AxleFinding
+        Empty where fewer than two peaks are certain.
     """
     peaks, properties = signal.find_peaks(profile, distance=max(int(spacing / GRID_STEP), 1), prominence=0.2 * noise)
     height = np.minimum(properties["prominences"], 2.0 * profile[peaks])
@@ -67,7 +116,7 @@ def axle_candidates(profile, start: float, spacing: float, noise: float, feature
     ]
 
 
-def _refine_peaks(profile, peaks):
+def _refine_peaks(profile: np.ndarray, peaks: np.ndarray) -> np.ndarray:
     low, mid, high = (profile[np.clip(peaks + d, 0, len(profile) - 1)] for d in (-1, 0, 1))
     curve = low - 2 * mid + high
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -75,17 +124,40 @@ def _refine_peaks(profile, peaks):
     return peaks + np.clip(shift, -0.5, 0.5)
 
 
-def level_feature(stack) -> np.ndarray:
-    """Levels along the train without everything longer than a bogie: one peak per wheel, at any load."""
+def level_feature(stack: np.ndarray) -> np.ndarray:
+    """Levels along the train without everything longer than a bogie: one peak per wheel, at any load.
+
+    Parameters
+    ----------
+    stack : (..., n) array of float
+        Levels along the train on a grid of ``GRID_STEP``. [nepers of power]
+
+    Returns
+    -------
+    (..., n) array of float
+        The feature on the same grid. [nepers of power]
+    """
     return _smooth(stack, 0.2) - _smooth(stack, 0.9)
 
 
-def deflection_feature(stack, wavenumber: float = 1.1) -> np.ndarray:
+def deflection_feature(stack: np.ndarray, wavenumber: float = 1.1) -> np.ndarray:
     r"""Low-frequency acceleration along the train, sharpened to one peak per wheel; its sign is found here.
 
     A wheel causes v² w'' of the rail on its foundation, :math:`w'' \propto e^{-k|x|} (\sin k|x| - \cos kx)`,
     k near 1 per metre for standard rails on ballast. The regularised inverse of that kernel is applied, then a
     Gaussian of 0.25 m. Wheels press in one direction: the sign is that of the larger skewness.
+
+    Parameters
+    ----------
+    stack : (..., n) array of float
+        Slow acceleration along the train on a grid of ``GRID_STEP``. [m/s²]
+    wavenumber : float
+        k of the rail on its foundation. [1/m]
+
+    Returns
+    -------
+    (..., n) array of float
+        The feature on the same grid, positive at wheels. [m/s²]
     """
     x = np.arange(-4.0, 4.0 + GRID_STEP / 2, GRID_STEP)
     kx = wavenumber * np.abs(x)
@@ -100,15 +172,29 @@ def deflection_feature(stack, wavenumber: float = 1.1) -> np.ndarray:
     return np.where(skew < 0, -1.0, 1.0) * sharp
 
 
-def _smooth(profile, deviation):
+def _smooth(profile: np.ndarray, deviation: float) -> np.ndarray:
     return ndimage.gaussian_filter1d(profile, deviation / GRID_STEP, axis=-1)
 
 
-def scale_profile(profile, inside) -> tuple[np.ndarray, float]:
+def scale_profile(profile: np.ndarray, inside: np.ndarray) -> tuple[np.ndarray, float]:
     """Profile divided by its own large values within the train, and its noise on that scale.
 
     The noise is the standard deviation that the quietest 30 % of the values would have if they were normal. They lie
     between the wheels, which is most of a train.
+
+    Parameters
+    ----------
+    profile : (n,) array of float
+        Feature along the train. [any unit]
+    inside : (n,) array of bool
+        Points within the train.
+
+    Returns
+    -------
+    profile : (n,) array of float
+        About 1 at a wheel; 0 where it has no positive values. [-]
+    noise : float
+        Its noise, at least 0.01. [-]
     """
     top = np.quantile(profile[inside], 0.98) if inside.any() else 0.0
     if top <= 0:
@@ -124,7 +210,7 @@ MIN_SEPARATION = 3.5  # m: axles further from each other are fitted one by one
 GRID_STRIDE = 2  # every second point of the grid is compared
 
 
-def fit_axle_positions(envelopes, motion: Motion, offsets) -> np.ndarray:
+def fit_axle_positions(envelopes: SensorEnvelopes, motion: Motion, offsets: np.ndarray) -> np.ndarray:
     r"""(n_axle,) offsets [m] of the model that comes closest to the level along the train.
 
     .. math:: L(s) = \ln\Bigl(1 + \sum_j e^{\alpha_j - 2 r_j/\ell}\Bigr), \qquad r_j = \sqrt{(s - d_j)^2 + \rho^2}
@@ -132,6 +218,20 @@ def fit_axle_positions(envelopes, motion: Motion, offsets) -> np.ndarray:
     Power decays from a wheel at the same rate in both directions; powers of wheels add. Peaks of a sharpened profile
     are biased outwards within a bogie, and each depends on little data. Here 4 m of record determine each axle. An
     axle that would move more than 0.6 m stays where it was.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Envelopes of the sensors.
+    motion : Motion
+        Motion of the train.
+    offsets : (n_axle,) array of float
+        First estimates, increasing. [m]
+
+    Returns
+    -------
+    (n_axle,) array of float
+        Fitted offsets; the first estimates where the fitted ones are not in order. [m]
     """
     offsets = np.asarray(offsets, dtype=float)
     start, stop = offsets[0] - FIT_REACH, offsets[-1] + FIT_REACH
@@ -148,7 +248,7 @@ def fit_axle_positions(envelopes, motion: Motion, offsets) -> np.ndarray:
     return new_offsets if np.all(np.diff(new_offsets) > 0.5) else offsets
 
 
-def _fit_positions(grid, level, x, n, passes=15):
+def _fit_positions(grid: np.ndarray, level: np.ndarray, x: np.ndarray, n: int, passes: int = 15) -> np.ndarray:
     """(n,) positions by Levenberg and Marquardt from ``x``: positions, heights, logarithm of the decay length."""
     misfit, jacobian = _level_misfit(grid, level, x, n)
     cost, damping = misfit @ misfit, 1e-2
@@ -171,7 +271,7 @@ def _fit_positions(grid, level, x, n, passes=15):
     return x[:n]
 
 
-def _level_misfit(grid, level, x, n):
+def _level_misfit(grid: np.ndarray, level: np.ndarray, x: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
     """Misfit (n_grid,) and its derivatives (n_grid, 2 n + 1)."""
     distance = grid[:, None] - x[:n]
     r, length = np.hypot(distance, CONTACT_ROUNDING), np.exp(x[-1])
@@ -182,8 +282,23 @@ def _level_misfit(grid, level, x, n):
     return np.log(total[:, 0]) - level, np.hstack([share * 2.0 / length * distance / r, share, by_length])
 
 
-def sensor_times(envelopes, motion: Motion, offsets) -> np.ndarray:
-    """(n_sensor, n_axle) passing times [s]; nan where a sensor's axle position deviates much from the common one."""
+def sensor_times(envelopes: SensorEnvelopes, motion: Motion, offsets: np.ndarray) -> np.ndarray:
+    """(n_sensor, n_axle) passing times [s]; nan where a sensor's axle position deviates much from the common one.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Envelopes of the sensors.
+    motion : Motion
+        Motion of the train.
+    offsets : (n_axle,) array of float
+        Offsets of the axles behind the first. [m]
+
+    Returns
+    -------
+    (n_sensor, n_axle) array of float
+        Passing times. [s]
+    """
     rows = []
     for i, x in enumerate(envelopes.positions):
         axle_positions = fit_axle_positions(envelopes.select([i]), motion, offsets)

@@ -10,13 +10,22 @@ Find sensors whose records disagree with their positions: swapped channels, drif
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import ndimage
 
 from turnout.passage.axles import GRID_STEP, along_train
-from turnout.passage.kinematics import coarsen, pair_correlations, slowness_grid, stack_correlations
+from turnout.passage.kinematics import Motion, coarsen, pair_correlations, slowness_grid, stack_correlations
 from turnout.records import Recording, Rejection
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from turnout.config.settings.passage import PassageSettings
+    from turnout.passage.result import PassageSensor
+    from turnout.passage.sensor_stack import SensorEnvelopes
+    from turnout.records import Channel
 
 
 @dataclass(frozen=True)
@@ -34,12 +43,23 @@ class ChannelState:
 
 
 def channel_states(recording: Recording) -> tuple[ChannelState, ...]:
-    """State of every acceleration channel, in the order of ``recording.of_quantity("acceleration")``."""
+    """State of every acceleration channel, in the order of ``recording.of_quantity("acceleration")``.
+
+    Parameters
+    ----------
+    recording : Recording
+        Recording of the passage.
+
+    Returns
+    -------
+    tuple of ChannelState
+        One per acceleration channel.
+    """
     rows = recording.of_quantity("acceleration")
     return tuple(_channel_state(recording.channels[i], recording.samples[i], recording.rate) for i in rows)
 
 
-def _channel_state(channel, samples, rate) -> ChannelState:
+def _channel_state(channel: Channel, samples: np.ndarray, rate: float) -> ChannelState:
     if not np.all(np.isfinite(samples)):
         bad = np.flatnonzero(~np.isfinite(samples))
         first = float(bad[0] / rate)
@@ -62,12 +82,28 @@ def _channel_state(channel, samples, rate) -> ChannelState:
     return ChannelState(channel.name, share < 0.2, not findings, tuple(findings), lost_at)
 
 
-def clipped_share(samples, limit: float | None, run: int = 3) -> tuple[float, float]:
+def clipped_share(samples: np.ndarray, limit: float | None, run: int = 3) -> tuple[float, float]:
     """Share of samples at the limit of the channel, and that limit. [-], [m/s²]
 
     The limit is the configured one (within 0.1 %). Without one it is an extreme value that is repeated ``run`` times
     in a row, at least twice: noise does not do that, a saturated converter does.
 
+    Parameters
+    ----------
+    samples : (n_sample,) array of float
+        Acceleration. [m/s²]
+    limit : float or None
+        Range of the channel, None if it is not known. [m/s²]
+    run : int
+        Equal extreme samples in a row that count as clipped.
+
+    Returns
+    -------
+    share, level : float
+        Share of the samples at the limit [-], and the limit or the largest value [m/s²].
+
+    Examples
+    --------
     >>> y = np.sin(np.linspace(0, 20, 400))
     >>> share, level = clipped_share(np.clip(y, -0.8, 0.8), None)
     >>> print(f"{share:.2f} at {level:.1f}")
@@ -86,11 +122,27 @@ def clipped_share(samples, limit: float | None, run: int = 3) -> tuple[float, fl
     return (float(at_limit.mean()), top) if clipped else (0.0, top)
 
 
-def silent_from(samples, rate: float, block: float = 0.05) -> float | None:
+def silent_from(samples: np.ndarray, rate: float, block: float = 0.05) -> float | None:
     """Time from which a channel is constant up to its end [s], None where it changes to the end.
 
     A sensor that had this value before the train as well, within one step of its converter, is quiet and not lost.
 
+    Parameters
+    ----------
+    samples : (n_sample,) array of float
+        Acceleration. [m/s²]
+    rate : float
+        Sampling rate. [Hz]
+    block : float
+        Shortest constant end that counts, and length of the start that it is compared with. [s]
+
+    Returns
+    -------
+    float or None
+        Time of the last change. [s]
+
+    Examples
+    --------
     >>> y = np.sin(np.arange(100.0))
     >>> silent_from(np.r_[y, np.full(900, 0.1)], 1000.0), silent_from(np.r_[np.zeros(60), y, np.zeros(900)], 1000.0)
     (0.1, None)
@@ -104,8 +156,19 @@ def silent_from(samples, rate: float, block: float = 0.05) -> float | None:
     return None if changes.size and quiet else float(last)
 
 
-def converter_step(samples) -> float:
-    """Smallest change from one sample to the next: a converter's step, or nearly 0; 0 where nothing changes."""
+def converter_step(samples: np.ndarray) -> float:
+    """Smallest change from one sample to the next: a converter's step, or nearly 0; 0 where nothing changes.
+
+    Parameters
+    ----------
+    samples : (n_sample,) array of float
+        Acceleration. [m/s²]
+
+    Returns
+    -------
+    float
+        [m/s²]
+    """
     change = np.abs(np.diff(samples))
     return float(np.min(change, where=change > 0, initial=np.inf)) if change.any() else 0.0
 
@@ -115,11 +178,25 @@ MAX_PULSE_DELAY, MIN_SENSOR_SPAN = 2e-4, 2.0  # s: largest delay between sensors
 PULSE_MARGIN, MAX_PULSE_DURATION = 3e-3, 1e-2  # s: filter ringing on both sides of a pulse; longest pulse
 
 
-def without_pulses(recording: Recording, sensors) -> tuple[Recording, tuple[Rejection, ...]]:
+def without_pulses(recording: Recording, sensors: Sequence[PassageSensor]) -> tuple[Recording, tuple[Rejection, ...]]:
     """The recording with straight lines in place of its electrical pulses, and the findings.
 
     ``sensors`` are PassageSensors. Nothing is cut where the live ones are less than 2 m from each other. A channel
     that is constant or not finite stays as it is and is not asked.
+
+    Parameters
+    ----------
+    recording : Recording
+        Recording of the passage.
+    sensors : sequence of PassageSensor
+        What the channels are.
+
+    Returns
+    -------
+    recording : Recording
+        The same object where nothing is cut.
+    findings : tuple of Rejection
+        One finding "interference", or none.
     """
     positions = {s.name: s.position for s in sensors}
     rows = [i for i, c in enumerate(recording.channels) if c.name in positions and _is_live(recording.samples[i])]
@@ -143,11 +220,11 @@ def without_pulses(recording: Recording, sensors) -> tuple[Recording, tuple[Reje
     return replace(recording, samples=samples), (Rejection("interference", float(n), 0.0, text, time=first),)
 
 
-def _is_live(samples) -> bool:
+def _is_live(samples: np.ndarray) -> bool:
     return bool(np.isfinite(samples).all()) and np.ptp(samples) > 0.0
 
 
-def _pulse_regions(is_pulse, rate):
+def _pulse_regions(is_pulse: np.ndarray, rate: float) -> tuple[np.ndarray, int]:
     """((n_sample,) bool to cut, number of pulses): pulses with their ringing; longer events are not pulses."""
     label, _n = ndimage.label(ndimage.maximum_filter1d(is_pulse, 2 * round(PULSE_MARGIN * rate) + 1))
     runs = ndimage.find_objects(label)
@@ -162,7 +239,9 @@ MIN_RELATIVE_LEVEL = 0.2  # of a sensor's typical log level at axles: below it a
 AXLE_REACH = 0.5  # m around an axle in which its level is taken
 
 
-def lost_sensors(envelopes, names, at_sensor, speed: float) -> list[Rejection]:
+def lost_sensors(
+    envelopes: SensorEnvelopes, names: Sequence[str], at_sensor: Mapping[str, np.ndarray], speed: float
+) -> list[Rejection]:
     """A finding "sensor_lost" for every sensor that records the first half of the train and not its last two axles.
 
     Parameters
@@ -170,10 +249,11 @@ def lost_sensors(envelopes, names, at_sensor, speed: float) -> list[Rejection]:
     envelopes : SensorEnvelopes
         Levels of the sensors ``names``, in that order.
     names : sequence of str
+        Names of the sensors of ``envelopes``.
     at_sensor : mapping
         Channel -> (n_axle,) times of the axles there. [s]
     speed : float
-        [m/s]
+        Speed of the train. [m/s]
 
     Returns
     -------
@@ -210,12 +290,30 @@ MIN_CONSISTENT_SHARE, MIN_REPAIRED_SHARE = (
 SMOOTHING_TIME = 0.02  # s, smoothing of the levels
 
 
-def inconsistent_channels(envelopes, sensors, settings):
+def inconsistent_channels(
+    envelopes: SensorEnvelopes, sensors: Sequence[PassageSensor], settings: PassageSettings
+) -> tuple[list[Rejection], np.ndarray]:
     """Findings and (n_sensor,) bool of the sensors to keep: channels that make all others disagree.
 
     They are sought only where no speed correlates the sensors' levels nearly as well as free shifts do. Then every
     exchange of two channels is tried, and every sensor is left out once. The one that helps decisively is reported.
     Fewer than four sensors cannot show which one is wrong.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Envelopes of the sensors.
+    sensors : sequence of PassageSensor
+        The sensors of ``envelopes``.
+    settings : PassageSettings
+        Settings of the passage analysis.
+
+    Returns
+    -------
+    findings : list of Rejection
+        "channels_swapped" or "clock_drift", or none.
+    keep : (n_sensor,) array of bool
+        False for the channels of the finding.
     """
     n = len(sensors)
     keep = np.ones(n, dtype=bool)
@@ -229,7 +327,7 @@ def inconsistent_channels(envelopes, sensors, settings):
     best_correlation = stack_correlations(correlations, step, positions, slowness).max()
     if best_correlation >= MIN_CONSISTENT_SHARE * free_correlation:
         return [], keep
-    trials = []
+    trials: list[tuple[float, tuple[int, ...]]] = []
     for i, j in correlations:
         changed = positions.astype(float).copy()
         changed[[i, j]] = changed[[j, i]]
@@ -245,18 +343,36 @@ def inconsistent_channels(envelopes, sensors, settings):
     names, share = [sensors[i].name for i in suspects], float(best_correlation / free_correlation)
     if len(suspects) == 2:
         text = f"{' and '.join(names)}: each hears the train in the other's place"
-        return [Rejection("channels_swapped", share, MIN_CONSISTENT_SHARE, text, *names)], keep
+        return [Rejection("channels_swapped", share, MIN_CONSISTENT_SHARE, text, names[0], names[1])], keep
     text = f"{names[0]}: hears the train at another time than its place says"
-    return [Rejection("clock_drift", share, MIN_CONSISTENT_SHARE, text, *names)], keep
+    return [Rejection("clock_drift", share, MIN_CONSISTENT_SHARE, text, names[0])], keep
 
 
-def inconsistent_positions(envelopes, motion, sensors):
+def inconsistent_positions(
+    envelopes: SensorEnvelopes, motion: Motion, sensors: Sequence[PassageSensor]
+) -> tuple[list[Rejection], np.ndarray]:
     """Findings and (n_sensor,) bool of the sensors to keep: small offsets, once the motion is known.
 
     Each sensor's level along the train is compared with the median of the others, in the first and in the second half.
     A shift that changes is a drifting clock; a constant one is an error of the clock or of the configured position. In
     the crossing panel a constant shift below ``MAX_NOSE_SHIFT`` is no finding: it may be the distance to the nose.
     Fewer than four sensors cannot show which one is wrong.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Envelopes of the sensors.
+    motion : Motion
+        Motion of the train.
+    sensors : sequence of PassageSensor
+        The sensors of ``envelopes``.
+
+    Returns
+    -------
+    findings : list of Rejection
+        One "clock_drift" per inconsistent sensor.
+    keep : (n_sensor,) array of bool
+        False for the sensors of the findings.
     """
     n = len(sensors)
     keep = np.ones(n, dtype=bool)
@@ -271,7 +387,7 @@ def inconsistent_positions(envelopes, motion, sensors):
     if suspects.size == 0 or suspects.size > n // 2:
         return [], keep
     findings = []
-    for i in suspects:
+    for i in suspects.tolist():
         first, last = shifts[i] / motion.speed * 1e3
         if is_drifting[i]:
             text = f"{sensors[i].name}: its clock drifts, from {first:.0f} to {last:.0f} ms against the others"
@@ -284,8 +400,23 @@ def inconsistent_positions(envelopes, motion, sensors):
     return findings, keep
 
 
-def half_shifts(envelopes, motion, reach: float = 20.0) -> np.ndarray:
-    """(n_sensor, 2) shift [m] of each sensor against the others, in the first and second half of the train."""
+def half_shifts(envelopes: SensorEnvelopes, motion: Motion, reach: float = 20.0) -> np.ndarray:
+    """(n_sensor, 2) shift [m] of each sensor against the others, in the first and second half of the train.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Envelopes of the sensors.
+    motion : Motion
+        Motion of the train.
+    reach : float
+        Largest shift that is tried, to either side. [m]
+
+    Returns
+    -------
+    (n_sensor, 2) array of float
+        Shift in the first and the second half. [m]
+    """
     extent = motion.distance(np.array([envelopes.begin, envelopes.end]))
     middle = motion.direction * np.mean(envelopes.positions)
     start, stop = extent[0] - middle - 30.0, extent[1] - middle + 30.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +15,12 @@ from turnout.passage.model_tests import DirectionTest, NullBand, direction_test,
 from turnout.passage.scores import Scores, common_delay, delay_power, forecast, score
 from turnout.passage.wheel_basis import apply_filter, band_pass, wheel_basis
 from turnout.records import ModalModel
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from turnout.config.settings.passage import PassageSettings
+    from turnout.passage.wheel_basis import WheelBasis
 
 ACCEPTED, NULL, NOT_AN_IMPULSE, REJECTED = "accepted", "null_explains", "not_an_impulse", "rejected"
 LEAD_TIME = 0.25  # s before the first wheel, in which the band-pass settles
@@ -54,8 +61,15 @@ class ChannelFit:
 
 
 def fit_channel(
-    samples, rate: float, axle_times, speed: float, model: ModalModel, settings, other_models=None, with_null=True
-):
+    samples: np.ndarray,
+    rate: float,
+    axle_times: np.ndarray,
+    speed: float,
+    model: ModalModel,
+    settings: PassageSettings,
+    other_models: Mapping[str, ModalModel] | None = None,
+    with_null: bool = True,
+) -> ChannelFit:
     """Fit ``model`` to one sensor.
 
     Parameters
@@ -67,10 +81,11 @@ def fit_channel(
     axle_times : (n_wheel,) array of float
         When the axles pass this sensor; those without a whole window in the recording are left out. [s]
     speed : float
-        [m/s]
+        Speed of the train. [m/s]
     model : ModalModel
         Of the sensor's section.
     settings : PassageSettings
+        Settings of the passage analysis.
     other_models : mapping or None
         Name -> ModalModel of other sections, whose forecast skill is given for comparison.
     with_null : bool
@@ -79,6 +94,7 @@ def fit_channel(
     Returns
     -------
     ChannelFit
+        "rejected" without two wheels whose windows lie within the recording.
     """
     samples = np.asarray(samples, dtype=float)
     samples = samples - np.median(samples)  # the filters start from zero: an offset would act as an impact
@@ -133,12 +149,14 @@ def fit_channel(
     )
 
 
-def _excerpt_start(samples, rate, axle_times) -> float:
+def _excerpt_start(samples: np.ndarray, rate: float, axle_times: np.ndarray) -> float:
     """Start of the excerpt that is analysed. [s]"""
     return max(int((np.min(axle_times) - LEAD_TIME) * rate), 0) / rate
 
 
-def _cut_excerpt(samples, rate, axle_times, settings):
+def _cut_excerpt(
+    samples: np.ndarray, rate: float, axle_times: np.ndarray, settings: PassageSettings
+) -> tuple[np.ndarray, np.ndarray]:
     """The excerpt of the record with the train in it, and the axle times in its samples."""
     start = round(_excerpt_start(samples, rate, axle_times) * rate)
     stop = min(int((np.max(axle_times) + settings.score_window + 0.2) * rate), len(samples))
@@ -148,7 +166,7 @@ def _cut_excerpt(samples, rate, axle_times, settings):
     return samples[start:stop], expected[inside]
 
 
-def _quiet_samples(samples, rate, axle_times, speed):
+def _quiet_samples(samples: np.ndarray, rate: float, axle_times: np.ndarray, speed: float) -> np.ndarray:
     """Record at least 15 m and 0.5 s from any wheel: before or after the train, whichever is longer."""
     away = max(15.0 / speed, 0.5) * rate
     before = samples[: max(int(np.min(axle_times) * rate - away), 0)]
@@ -157,7 +175,14 @@ def _quiet_samples(samples, rate, axle_times, speed):
 
 
 def _impacts_and_test(
-    excerpt, expected, quiet, speed, model, rate, settings, min_noise
+    excerpt: np.ndarray,
+    expected: np.ndarray,
+    quiet: np.ndarray,
+    speed: float,
+    model: ModalModel,
+    rate: float,
+    settings: PassageSettings,
+    min_noise: float,
 ) -> tuple[ImpactTimes, DirectionTest]:
     """Impact times and the test of the jump's direction, both on whitened data."""
     taps, noise = whitener(quiet[: int(rate)] if quiet.size > 0.1 * rate else np.diff(excerpt[: int(rate)]))
@@ -170,7 +195,7 @@ def _impacts_and_test(
     return times, direction_test(white, np.sort(times.times), basis, noise, settings.chi_squared_level)
 
 
-def _judge(scores, null, test, settings) -> tuple[str, str]:
+def _judge(scores: Scores, null: NullBand | None, test: DirectionTest, settings: PassageSettings) -> tuple[str, str]:
     """Status and reason: first whether the null explains the scores, then whether the load was an impulse.
 
     The chi-squared test alone cannot show that. At 40 dB it fails for a model 5 % off in one resonance, whose fit is
@@ -186,14 +211,16 @@ def _judge(scores, null, test, settings) -> tuple[str, str]:
     return ACCEPTED, "without null band" if null is None else ""
 
 
-def _filtered_basis(model, rate, settings):
+def _filtered_basis(model: ModalModel, rate: float, settings: PassageSettings) -> WheelBasis:
     """``wheel_basis`` behind the band-pass. It is cached: the same few models are used for every passage."""
     matrices = tuple(np.ascontiguousarray(x, dtype=float).tobytes() for x in (model.a, model.b, model.c))
     return _cached_basis(matrices, len(np.atleast_1d(model.b)), model.rate, rate, settings)
 
 
 @lru_cache(maxsize=64)
-def _cached_basis(matrices, n, model_rate, rate, settings):
+def _cached_basis(
+    matrices: tuple[bytes, bytes, bytes], n: int, model_rate: float, rate: float, settings: PassageSettings
+) -> WheelBasis:
     a, b, c = (np.frombuffer(x) for x in matrices)
     model = ModalModel(a.reshape(n, n), b, c, model_rate, ())
     band_filter = band_pass(settings.band_low, settings.band_high, settings.filter_order, rate)
@@ -201,6 +228,6 @@ def _cached_basis(matrices, n, model_rate, rate, settings):
 
 
 @lru_cache(maxsize=8)
-def _cached_null_bases(order, rate, settings):
+def _cached_null_bases(order: int, rate: float, settings: PassageSettings) -> list[WheelBasis]:
     band_filter = band_pass(settings.band_low, settings.band_high, settings.filter_order, rate)
     return null_bases(order, band_filter, rate, settings)

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import optimize, stats
+
+if TYPE_CHECKING:
+    from turnout.config.settings.passage import PassageSettings
 
 MIN_SD = np.array([0.01, 0.02])  # least standard deviations of ln(speed) and ln(load)
 
@@ -37,15 +41,44 @@ class Clusters:
     clusters: tuple[Cluster, ...]
     used: Mapping[str, int] = field(default_factory=dict)
 
-    def highest_number(self, train_type) -> int:
-        """The highest number used for a type, 0 where it had none."""
+    def highest_number(self, train_type: str) -> int:
+        """The highest number used for a type, 0 where it had none.
+
+        Parameters
+        ----------
+        train_type : str
+            Type of train.
+
+        Returns
+        -------
+        int
+            Also of clusters that have ended.
+        """
         numbers = [_number(c.id) for c in self.clusters if c.type == train_type]
         return max([self.used.get(train_type, 0), *numbers])
 
-    def assign(self, train_type, speed_kmh, axle_load_t, level: float = 1e-4) -> str | None:
+    def assign(
+        self, train_type: str | None, speed_kmh: float | None, axle_load_t: float | None, level: float = 1e-4
+    ) -> str | None:
         """Id of the cluster that a passage most likely belongs to; None where it lies outside all clusters of its type.
 
         Outside: only a share below ``level`` of a cluster's members would be so far from it.
+
+        Parameters
+        ----------
+        train_type : str or None
+            Type of train; None gives None.
+        speed_kmh : float or None
+            Speed; None gives None. [km/h]
+        axle_load_t : float or None
+            Mean axle load; without it the speed alone is compared. [t]
+        level : float
+            Share of a cluster's members beyond which a passage is outside. [-]
+
+        Returns
+        -------
+        str or None
+            Id of the cluster.
         """
         if train_type is None or speed_kmh is None:
             return None
@@ -66,7 +99,13 @@ class Clusters:
         return cluster_id
 
     def document(self) -> dict:
-        """As plain values, for a JSON file."""
+        """As plain values, for a JSON file.
+
+        Returns
+        -------
+        dict
+            Version, highest numbers and clusters; ``of`` reads it.
+        """
         return {
             "version": self.version,
             "used": dict(self.used),
@@ -77,7 +116,18 @@ class Clusters:
 
     @classmethod
     def of(cls, document: Mapping) -> Clusters:
-        """From ``document()``."""
+        """From ``document()``.
+
+        Parameters
+        ----------
+        document : mapping
+            As ``document`` makes it.
+
+        Returns
+        -------
+        Clusters
+            The same clusters.
+        """
         clusters = [
             Cluster(**{**c, "mean": np.array(c["mean"]), "covariance": np.array(c["covariance"])})
             for c in document["clusters"]
@@ -85,7 +135,7 @@ class Clusters:
         return cls(int(document["version"]), tuple(clusters), dict(document.get("used", {})))
 
 
-def fit_clusters(passages: Sequence[Mapping], settings, previous: Clusters | None = None) -> Clusters:
+def fit_clusters(passages: Sequence[Mapping], settings: PassageSettings, previous: Clusters | None = None) -> Clusters:
     """Gaussian mixtures over (ln speed, ln load) for every train type, their number by BIC.
 
     Parameters
@@ -93,6 +143,7 @@ def fit_clusters(passages: Sequence[Mapping], settings, previous: Clusters | Non
     passages : sequence of mappings
         With train_type, speed_kmh, axle_load_t (may be None).
     settings : PassageSettings
+        Largest number of clusters of a type, and the seed.
     previous : Clusters or None
         A cluster nearest to one of these keeps its id; new clusters get new numbers.
 
@@ -118,7 +169,7 @@ def fit_clusters(passages: Sequence[Mapping], settings, previous: Clusters | Non
     return replace(fitted, used={t: max(previous.highest_number(t), fitted.highest_number(t)) for t in types})
 
 
-def _mixture(points, settings):
+def _mixture(points: np.ndarray, settings: PassageSettings) -> list[tuple[float, np.ndarray, np.ndarray]]:
     """(weight, mean, covariance) of the mixture with the lowest BIC, largest weight first."""
     from sklearn.mixture import GaussianMixture
 
@@ -129,7 +180,8 @@ def _mixture(points, settings):
     scaled = points / min_sd
     if len(points) == 1:  # one passage has no spread of its own
         return [(1.0, points[0], np.diag(min_sd**2))]
-    chosen, lowest, n_worse = None, np.inf, 0
+    chosen: Any = None
+    lowest, n_worse = np.inf, 0
     for k in range(1, min(settings.cluster_maximum, max(len(points) // (5 * n_dimension), 1)) + 1):
         mixture = GaussianMixture(k, n_init=3, random_state=settings.cluster_seed, reg_covar=1.0).fit(scaled)
         bic = mixture.bic(scaled)
@@ -143,7 +195,13 @@ def _mixture(points, settings):
     return sorted(components, key=lambda p: (-p[0], tuple(p[1])))
 
 
-def _with_ids(type_, components, n, previous_clusters, next_number):
+def _with_ids(
+    type_: str,
+    components: Sequence[tuple[float, np.ndarray, np.ndarray]],
+    n: int,
+    previous_clusters: Sequence[Cluster],
+    next_number: int,
+) -> list[Cluster]:
     """Clusters with ids: that of the nearest previous cluster where it is nearer than two of its standard deviations.
 
     The others get numbers from ``next_number`` on.
@@ -168,5 +226,5 @@ def _with_ids(type_, components, n, previous_clusters, next_number):
     return sorted(clusters, key=lambda c: _number(c.id))
 
 
-def _number(id_):
+def _number(id_: str) -> int:
     return int(id_.rsplit("/", 1)[1])

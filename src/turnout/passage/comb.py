@@ -10,9 +10,17 @@ Nothing is cut into peaks. A fit of the vehicles' shape moves their axles alike 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import linalg, ndimage
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from turnout.passage.axle_patterns import Vehicle
+    from turnout.passage.kinematics import Motion
+    from turnout.passage.sensor_stack import SensorEnvelopes
 
 COMB_STEP = 0.2  # m, step of the grid along the train
 TOOTH_HALF_WIDTH = 2.4  # m either side of a wheel: less than bogie and gap, else a tooth could be a bogie
@@ -32,8 +40,19 @@ class Comb:
     inverse: np.ndarray
 
     @classmethod
-    def of(cls, offsets) -> Comb:
-        """For axle offsets that begin at 0. [m]"""
+    def of(cls, offsets: np.ndarray) -> Comb:
+        """For axle offsets that begin at 0. [m]
+
+        Parameters
+        ----------
+        offsets : (n_axle,) array of float
+            Distances of the axles behind the first; the first is 0. [m]
+
+        Returns
+        -------
+        Comb
+            On a grid of ``COMB_STEP``.
+        """
         offsets = np.asarray(offsets, float)
         teeth = np.zeros(int(offsets[-1] / COMB_STEP) + 3)
         whole = np.floor(offsets / COMB_STEP).astype(int)
@@ -62,14 +81,38 @@ class Profiles:
     origin: np.ndarray
 
     def select(self, k: int) -> Profiles:
-        """Motion number ``k`` alone."""
+        """Motion number ``k`` alone.
+
+        Parameters
+        ----------
+        k : int
+            Number of the motion.
+
+        Returns
+        -------
+        Profiles
+            With one motion.
+        """
         row = slice(k, k + 1)
         values, spectra = self.values[:, row], self.spectra[:, row]
         return Profiles(self.motions[row], values, spectra, self.power[row], self.length[row], self.origin[row])
 
 
-def profiles_at(envelopes, motions) -> Profiles:
-    """Profiles of all sensors for ``motions``, a sequence of ``Motion``."""
+def profiles_at(envelopes: SensorEnvelopes, motions: Sequence[Motion]) -> Profiles:
+    """Profiles of all sensors for ``motions``, a sequence of ``Motion``.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Envelopes of the sensors.
+    motions : sequence of Motion
+        Motions for which the records are put on the grid.
+
+    Returns
+    -------
+    Profiles
+        In the order of ``motions``.
+    """
     step, amplitude, positions = envelopes.levels.step, envelopes.levels.amplitude, envelopes.positions
     extents = np.array([[m.distance(t) for t in (envelopes.begin, envelopes.end)] for m in motions])
     middle = np.array([m.direction * np.mean(positions) for m in motions])
@@ -94,16 +137,34 @@ def profiles_at(envelopes, motions) -> Profiles:
     return Profiles(tuple(motions), values, np.fft.rfft(values, size, axis=2), power, length, origin)
 
 
-def explained_share(profiles: Profiles, comb: Comb, rows, stride: int = 1):
+def explained_share(profiles: Profiles, comb: Comb, rows: np.ndarray, stride: int = 1) -> tuple[np.ndarray, np.ndarray]:
     """(n_row, n_start) share of the profiles' power that the comb explains in the motions ``rows``, and the starts [m].
 
     A start is the position of the first axle, in metres behind the beginning of the audible part.
+
+    Parameters
+    ----------
+    profiles : Profiles
+        Records of the sensors along the train.
+    comb : Comb
+        Axles of the row.
+    rows : (n_row,) array of int
+        Numbers of the motions.
+    stride : int
+        Every how many grid points a start is tried.
+
+    Returns
+    -------
+    share : (n_row, n_start) array of float
+        Explained share of the power. [-]
+    starts : (n_start,) array of float
+        Position of the first axle. [m]
     """
     size, half = 2 * (profiles.spectra.shape[2] - 1), N_TAPS // 2
     teeth = np.fft.rfft(comb.teeth, size).conj()
     last = max(float(profiles.length[rows].max() - comb.offsets[-1]), 0.0) + 4.0
     first, stop = int((LEAD_LENGTH - 4.0) / COMB_STEP), int((LEAD_LENGTH + last) / COMB_STEP) + 1
-    total = 0.0
+    total = np.zeros((len(rows), 1))
     for spectra in profiles.spectra:
         correlation = np.fft.irfft(spectra[rows] * teeth, size, axis=1)
         windows = np.lib.stride_tricks.sliding_window_view(correlation[:, first - half : stop + half], N_TAPS, axis=1)
@@ -113,18 +174,53 @@ def explained_share(profiles: Profiles, comb: Comb, rows, stride: int = 1):
     return total / profiles.power[rows][:, None], starts[: total.shape[1]]
 
 
-def evidence(share, length, n_sensor: int):
+def evidence(share: np.ndarray | float, length: np.ndarray | float, n_sensor: int) -> np.ndarray:
     r"""Log Bayes factor of the comb against no comb: :math:`-\frac n2 \ln(1 - R^2)` less the Schwarz penalty.
 
     The penalty is what the free numbers of the teeth gain by chance. ``share`` is R², ``length`` [m] the audible
     length.
+
+    Parameters
+    ----------
+    share : array of float
+        R², the explained share of the power. [-]
+    length : array of float
+        Audible length, of the same shape or one that broadcasts. [m]
+    n_sensor : int
+        Number of independent sensors.
+
+    Returns
+    -------
+    array of float
+        Log Bayes factor. [nat]
+
+    References
+    ----------
+    Schwarz 1978, Estimating the dimension of a model, Annals of Statistics 6, 461-464.
     """
     n = np.maximum(length / CORRELATION_LENGTH, 2.0) * n_sensor
     return -0.5 * n * np.log(np.maximum(1.0 - share, 1e-6)) - 0.5 * N_TAPS * n_sensor * np.log(n)
 
 
-def teeth_of(profiles: Profiles, comb: Comb, start: float):
-    """(n_sensor, N_TAPS) tooth of each sensor, (n_sensor, n) residual of the comb; ``profiles`` of one motion."""
+def teeth_of(profiles: Profiles, comb: Comb, start: float) -> tuple[np.ndarray, np.ndarray]:
+    """(n_sensor, N_TAPS) tooth of each sensor, (n_sensor, n) residual of the comb; ``profiles`` of one motion.
+
+    Parameters
+    ----------
+    profiles : Profiles
+        Records along the train for one motion.
+    comb : Comb
+        Axles of the row.
+    start : float
+        First axle behind the beginning of the audible part. [m]
+
+    Returns
+    -------
+    teeth : (n_sensor, N_TAPS) array of float
+        What each sensor records of one wheel. [-]
+    residuals : (n_sensor, n) array of float
+        Profiles without the comb. [-]
+    """
     size, half = 2 * (profiles.spectra.shape[2] - 1), N_TAPS // 2
     index = round((start + LEAD_LENGTH) / COMB_STEP)
     teeth, residuals = [], []
@@ -145,7 +241,9 @@ MIN_SHARE_GAIN = 1e-4  # least gain of the explained share by a move
 START_SHIFTS = np.arange(-2, 3) * COMB_STEP  # m by which the whole row may be shifted
 
 
-def fit_shape(profiles: Profiles, vehicles, positions, start: float, reach: float = 0.6):
+def fit_shape(
+    profiles: Profiles, vehicles: Sequence[Vehicle], positions: np.ndarray, start: float, reach: float = 0.6
+) -> tuple[np.ndarray, float, float]:
     """(positions, share before, share after): ``positions`` moved until the comb explains most, alike in all vehicles.
 
     A train without template that resembles a known one differs in wheelbases or pivots of every vehicle. Axles that
@@ -160,9 +258,16 @@ def fit_shape(profiles: Profiles, vehicles, positions, start: float, reach: floa
     positions : (n_axle,) array of float
         Metres behind the first axle.
     start : float
-        Of the first axle, behind the beginning of the audible part. [m]
+        First axle behind the beginning of the audible part. [m]
     reach : float
         Largest move of an axle. [m]
+
+    Returns
+    -------
+    positions : (n_axle,) array of float
+        Moved positions. [m]
+    share_before, share_after : float
+        Explained share of the power with ``positions`` as given and as moved. [-]
     """
     axle_keys = [(v.name, i) for v in vehicles for i in range(len(v.axles))]
     unique_keys = list(dict.fromkeys(axle_keys))
@@ -184,7 +289,7 @@ def fit_shape(profiles: Profiles, vehicles, positions, start: float, reach: floa
     return positions + change[key_index], share_before, share_after
 
 
-def _shape_moves(vehicles, unique_keys):
+def _shape_moves(vehicles: Sequence[Vehicle], unique_keys: list[tuple[str, int]]) -> list[np.ndarray]:
     """Moves of each axle of a vehicle type: alone, against its neighbour in a bogie, and bogies against each other."""
     index, moves = {key: k for k, key in enumerate(unique_keys)}, list(np.eye(len(unique_keys)))
     for v in {v.name: v for v in vehicles}.values():
@@ -202,7 +307,7 @@ def _shape_moves(vehicles, unique_keys):
     return moves
 
 
-def _best_share(profiles, positions, start):
+def _best_share(profiles: Profiles, positions: np.ndarray, start: float) -> float:
     """Share of the power that a comb at ``positions`` explains, at the best of a few starts near ``start``."""
     first = positions[0]
     if not np.all(np.diff(positions) > 0.5):

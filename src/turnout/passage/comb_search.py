@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,13 +18,20 @@ from turnout.passage.comb import Comb, evidence, explained_share, profiles_at, t
 from turnout.passage.kinematics import Motion
 from turnout.passage.vehicle_sequence import likeliest_row
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from turnout.config.settings.passage import PassageSettings
+    from turnout.passage.axle_patterns import Vehicle
+    from turnout.passage.sensor_stack import SensorEnvelopes
+
 BEYOND_START, BEYOND_END = 5.0, 27.0  # m beyond the last wheel, where wheels of a further vehicle would be
 # Share of the mean amplitude along the row above which a further vehicle runs there. In 68 simulated cases of one
 # sensor it is at most 0.21 without one; the bogies of a locomotive have at least 0.75 of the amplitude of coaches.
 MIN_BEYOND_AMPLITUDE = 0.6
 
 
-def continues_beyond(envelopes, motion, first: float, length: float) -> bool:
+def continues_beyond(envelopes: SensorEnvelopes, motion: Motion, first: float, length: float) -> bool:
     """Whether the sensors record more than ``MIN_BEYOND_AMPLITUDE`` times the row's own amplitude beyond either end.
 
     A row that is a part of the train fits that part as well as the train's own row does. It fits better where the
@@ -32,11 +40,18 @@ def continues_beyond(envelopes, motion, first: float, length: float) -> bool:
     Parameters
     ----------
     envelopes : SensorEnvelopes
+        Envelopes of the sensors.
     motion : Motion
+        Motion of the row.
     first : float
         The row's first axle, in the motion's own coordinate. [m]
     length : float
         From the first axle to the last one. [m]
+
+    Returns
+    -------
+    bool
+        True where the row is a part of a longer train.
     """
     stretches = (
         np.array([[0.0, length], [-BEYOND_END, -BEYOND_START], [length + BEYOND_START, length + BEYOND_END]]) + first
@@ -47,7 +62,7 @@ def continues_beyond(envelopes, motion, first: float, length: float) -> bool:
     return bool(max(before, behind) > MIN_BEYOND_AMPLITUDE * along)
 
 
-def _mean_amplitudes(envelopes, i, motion, stretches):
+def _mean_amplitudes(envelopes: SensorEnvelopes, i: int, motion: Motion, stretches: np.ndarray) -> np.ndarray:
     """(n_stretch,) mean amplitude of sensor ``i`` above its quiet level; 0 where nothing was recorded."""
     amplitude, step = envelopes.levels.amplitude[i], envelopes.levels.step
     above = np.clip(amplitude - np.quantile(amplitude, 0.05), 0.0, None)
@@ -84,8 +99,19 @@ class FittedRow:
 
 
 @lru_cache(maxsize=4)
-def uniform_rows(patterns) -> tuple:
-    """(pattern, vehicles, comb) of every row in which each group has vehicles of one type only."""
+def uniform_rows(patterns: tuple[Pattern, ...]) -> tuple:
+    """(pattern, vehicles, comb) of every row in which each group has vehicles of one type only.
+
+    Parameters
+    ----------
+    patterns : tuple of Pattern
+        Axle patterns of known trains.
+
+    Returns
+    -------
+    tuple of (Pattern, tuple of Vehicle, Comb)
+        Rows of four axles or more, each once.
+    """
     rows = {}
     for pattern in patterns:
         groups = []
@@ -99,25 +125,68 @@ def uniform_rows(patterns) -> tuple:
     return tuple((pattern, row, Comb.of(offsets(row))) for pattern, row in rows.values())
 
 
-def motions_at_all_speeds(begin: float, settings) -> list[Motion]:
-    """Motions at all speeds of trains, ``SPEED_STEP`` apart, with the first axle at 0 at the time ``begin`` [s]."""
+def motions_at_all_speeds(begin: float, settings: PassageSettings) -> list[Motion]:
+    """Motions at all speeds of trains, ``SPEED_STEP`` apart, with the first axle at 0 at the time ``begin`` [s].
+
+    Parameters
+    ----------
+    begin : float
+        Time at which the first axle is at the origin. [s]
+    settings : PassageSettings
+        Slowest and fastest train.
+
+    Returns
+    -------
+    list of Motion
+        Steady motions, the slowest first.
+    """
     slow, fast = settings.speed_minimum / KMH, settings.speed_maximum / KMH
     return [Motion(float(v), begin) for v in np.geomspace(slow, fast, int(np.log(fast / slow) / SPEED_STEP))]
 
 
-def choices_of(pattern, row) -> float:
-    """Logarithm of the largest number of rows with as many vehicles that the pattern allows."""
+def choices_of(pattern: Pattern, row: tuple[Vehicle, ...]) -> float:
+    """Logarithm of the largest number of rows with as many vehicles that the pattern allows.
+
+    Parameters
+    ----------
+    pattern : Pattern
+        Axle pattern of a type of train.
+    row : tuple of Vehicle
+        A row of the pattern.
+
+    Returns
+    -------
+    float
+        Logarithm of the number of rows. [nat]
+    """
     n_choices = max(len(g.vehicles) for g in pattern.groups)
     return float(np.log(n_choices) * len(row)) if len({v.name for v in row}) > 2 else float(np.log(n_choices))
 
 
-def likeliest_rows(envelopes, motions, patterns) -> dict[str, FittedRow]:
+def likeliest_rows(
+    envelopes: SensorEnvelopes, motions: Sequence[Motion], patterns: tuple[Pattern, ...]
+) -> dict[str, FittedRow]:
     """Type -> its likeliest row of vehicles, out of ``motions`` in order of their speed, ``SPEED_STEP`` apart.
 
     A row is left out where the train continues beyond its ends.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Envelopes of the sensors.
+    motions : sequence of Motion
+        Motions that are tried, in order of their speed.
+    patterns : tuple of Pattern
+        Axle patterns of known trains.
+
+    Returns
+    -------
+    dict
+        Type -> FittedRow.
     """
     profiles = profiles_at(envelopes, motions)
-    n_sensor, coarse = len(envelopes.positions), {}
+    n_sensor = len(envelopes.positions)
+    coarse: dict[str, list[FittedRow]] = {}
     for pattern, row, comb in uniform_rows(patterns):
         span = comb.offsets[-1]
         indices = np.flatnonzero(
@@ -147,8 +216,23 @@ def likeliest_rows(envelopes, motions, patterns) -> dict[str, FittedRow]:
     return likeliest_by_type
 
 
-def refine_row(envelopes, fitted: FittedRow, passes: int = 3) -> FittedRow:
-    """The row with refined speed and, where the pattern allows a choice, refined vehicles, in turn."""
+def refine_row(envelopes: SensorEnvelopes, fitted: FittedRow, passes: int = 3) -> FittedRow:
+    """The row with refined speed and, where the pattern allows a choice, refined vehicles, in turn.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Envelopes of the sensors.
+    fitted : FittedRow
+        The row of vehicles.
+    passes : int
+        Largest number of passes.
+
+    Returns
+    -------
+    FittedRow
+        With at least the evidence of ``fitted``.
+    """
     fitted = refine_motion(envelopes, fitted, 0.006)
     for _ in range(passes):
         better = _refine_vehicles(envelopes, fitted)
@@ -159,22 +243,50 @@ def refine_row(envelopes, fitted: FittedRow, passes: int = 3) -> FittedRow:
     return fitted
 
 
-def _row_extent(envelopes, fitted: FittedRow) -> tuple[float, float]:
+def _row_extent(envelopes: SensorEnvelopes, fitted: FittedRow) -> tuple[float, float]:
     """The row's first axle in its motion's own coordinate, and its length. [m]"""
     centre = fitted.motion.direction * float(np.mean(envelopes.positions))
     return float(fitted.motion.distance(envelopes.begin)) - centre + fitted.start, float(fitted.comb.offsets[-1])
 
 
-def motion_at_middle(envelopes, fitted: FittedRow) -> Motion:
-    """The motion relative to the row's middle: ``start`` when it passes the middle of the sensors, ``speed`` then."""
+def motion_at_middle(envelopes: SensorEnvelopes, fitted: FittedRow) -> Motion:
+    """The motion relative to the row's middle: ``start`` when it passes the middle of the sensors, ``speed`` then.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Envelopes of the sensors.
+    fitted : FittedRow
+        The row of vehicles.
+
+    Returns
+    -------
+    Motion
+        The same motion with its speed and origin at the middle of the train.
+    """
     motion, centre = fitted.motion, fitted.motion.direction * float(np.mean(envelopes.positions))
     first, length = _row_extent(envelopes, fitted)
     middle = float(motion.time(first + 0.5 * length + centre))
     return replace(motion, speed=float(motion.speed_at(middle)), start=middle)
 
 
-def refine_motion(envelopes, fitted: FittedRow, reach: float) -> FittedRow:
-    """The same row at the best speed within ``reach`` (relative) and the best acceleration near its own."""
+def refine_motion(envelopes: SensorEnvelopes, fitted: FittedRow, reach: float) -> FittedRow:
+    """The same row at the best speed within ``reach`` (relative) and the best acceleration near its own.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Envelopes of the sensors.
+    fitted : FittedRow
+        The row of vehicles.
+    reach : float
+        Largest relative change of the speed. [-]
+
+    Returns
+    -------
+    FittedRow
+        ``fitted`` itself where nothing is better.
+    """
     middle = motion_at_middle(envelopes, fitted)
     acceleration_step = 16.0 * BEND_STEP / (fitted.comb.offsets[-1] / middle.speed) ** 2
     accelerations = middle.acceleration + min(acceleration_step, BEND_STEP) * np.arange(-2, 3)
@@ -192,7 +304,7 @@ def refine_motion(envelopes, fitted: FittedRow, reach: float) -> FittedRow:
     )
 
 
-def _refine_vehicles(envelopes, fitted):
+def _refine_vehicles(envelopes: SensorEnvelopes, fitted: FittedRow) -> FittedRow:
     """The row that fits best with the tooth of this one; unchanged where the pattern allows no choice."""
     if fitted.pattern.fixed_row() is not None:
         return fitted

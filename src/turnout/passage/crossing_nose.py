@@ -7,6 +7,7 @@ position that the whole train passes. The residual is each sensor's own wheels, 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +16,15 @@ from turnout.passage.comb import COMB_STEP, LEAD_LENGTH, Comb, profiles_at, teet
 from turnout.passage.comb_search import motions_at_all_speeds
 from turnout.passage.kinematics import correlation_at, pair_correlations, stack_correlations
 from turnout.passage.sensor_stack import Levels, SensorEnvelopes, without_train
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from turnout.config.settings.passage import PassageSettings
+    from turnout.passage.axle_patterns import Pattern
+    from turnout.passage.axles import AxleFinding
+    from turnout.passage.kinematics import Motion
+    from turnout.passage.train_type import TypeFinding
 
 MIN_SENSORS = 3  # sensors: the median of two is the mean, which contains the wheels of both
 # m: largest distance between a sensor and the nose, and of the nose outside the row of sensors. The sensors of a
@@ -35,11 +45,27 @@ MIN_MOTION_GAIN = 0.15
 MAX_RESIDUAL_CORRELATION = 0.5  # simultaneous correlation of the residual; 1 % of those 320 passages have 0.52
 
 
-def detect_at_nose(envelopes, patterns, settings):
+def detect_at_nose(
+    envelopes: SensorEnvelopes, patterns: Sequence[Pattern], settings: PassageSettings
+) -> tuple[Motion, AxleFinding, TypeFinding] | None:
     """(motion, AxleFinding, TypeFinding) of a train of ``patterns`` whose wheels make impacts at one position.
 
     None where no train or no direction is certain. ``envelopes``: SensorEnvelopes of at least three sensors. The
     position of the impacts is a result as well: it is the origin of the motion.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Envelopes of at least three sensors.
+    patterns : sequence of Pattern
+        Axle patterns of known trains.
+    settings : PassageSettings
+        Settings of the passage analysis.
+
+    Returns
+    -------
+    (Motion, AxleFinding, TypeFinding) or None
+        Motion relative to the position of the impacts.
     """
     if len(envelopes.positions) < MIN_SENSORS or not patterns:
         return None
@@ -49,7 +75,8 @@ def detect_at_nose(envelopes, patterns, settings):
     if match is None:
         return None
     motion, axles, train_type = match
-    if axles.contrast < 1.0 / (1.0 - MIN_NOSE_SHARE) or train_type.residual > MAX_RESIDUAL * settings.type_tolerance:
+    residual = train_type.residual if train_type.residual is not None else np.inf
+    if axles.contrast < 1.0 / (1.0 - MIN_NOSE_SHARE) or residual > MAX_RESIDUAL * settings.type_tolerance:
         return None
     response = _wheel_response(envelopes, motion, axles.offsets)
     (weaker, _, _), (stronger, nose, direction) = sorted(
@@ -60,11 +87,23 @@ def detect_at_nose(envelopes, patterns, settings):
     return replace(motion.relative_to_axle(-direction * nose), direction=direction), axles, train_type
 
 
-def simultaneity(envelopes, motion) -> float:
+def simultaneity(envelopes: SensorEnvelopes, motion: Motion) -> float:
     """Excess of the sensors' correlation at the same moment over that along a train of this ``motion``.
 
     Above ``-MIN_MOTION_GAIN`` all sensors record the impacts at one position. -1 where they are too close to each
     other.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Envelopes of the sensors.
+    motion : Motion
+        Motion of the train.
+
+    Returns
+    -------
+    float
+        Difference of two correlation coefficients. [-]
     """
     correlations = {
         (i, j): row
@@ -78,21 +117,33 @@ def simultaneity(envelopes, motion) -> float:
     return float(simultaneous - moving)
 
 
-def fixed_impact_correlation(envelopes, motion) -> tuple[float, float] | None:
+def fixed_impact_correlation(envelopes: SensorEnvelopes, motion: Motion) -> tuple[float, float] | None:
     """(correlation, limit) where sensors record simultaneous impacts beside a train of this ``motion``, else None.
 
     Impacts as loud as wheels are counted as axles.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Envelopes of the sensors.
+    motion : Motion
+        Motion of the train.
+
+    Returns
+    -------
+    (correlation, limit) or None
+        Correlation that reveals the impacts, and the limit that it exceeds. [-]
     """
     excess = simultaneity(envelopes, motion)
     if excess > -MIN_MOTION_GAIN:
         return excess, -MIN_MOTION_GAIN
     residual_correlation = float(
-        correlation_at([0.0], without_train(envelopes, motion), envelopes.levels.step, envelopes.positions)[0]
+        correlation_at(np.zeros(1), without_train(envelopes, motion), envelopes.levels.step, envelopes.positions)[0]
     )
     return (residual_correlation, MAX_RESIDUAL_CORRELATION) if residual_correlation > MAX_RESIDUAL_CORRELATION else None
 
 
-def _common_envelopes(envelopes) -> SensorEnvelopes:
+def _common_envelopes(envelopes: SensorEnvelopes) -> SensorEnvelopes:
     """One sensor at position 0 that records what most of them record at the same moment."""
     levels = envelopes.levels
     values, amplitude = (np.median(rows, axis=0)[None] for rows in (levels.values, levels.amplitude))
@@ -100,7 +151,7 @@ def _common_envelopes(envelopes) -> SensorEnvelopes:
     return SensorEnvelopes(common, np.median(envelopes.slow, axis=0)[None], np.zeros(1), envelopes.begin, envelopes.end)
 
 
-def _wheel_response(envelopes, motion, offsets):
+def _wheel_response(envelopes: SensorEnvelopes, motion: Motion, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(distances (n,) [m], (n_sensor, n) response of each sensor to the row of wheels at that distance from the nose).
 
     The impacts are subtracted. The unit is the response's own standard deviation.
@@ -116,7 +167,7 @@ def _wheel_response(envelopes, motion, offsets):
     return distance, collected / np.maximum(np.std(collected, axis=1, keepdims=True), 1e-12)
 
 
-def _nose_position(response, positions, sign) -> tuple[float, float]:
+def _nose_position(response: tuple[np.ndarray, np.ndarray], positions: np.ndarray, sign: int) -> tuple[float, float]:
     """Largest sum of all sensors' response to their own wheels in one direction, and its nose position [m]."""
     distance, collected = response
     noses = np.arange(np.min(positions) - MAX_NOSE_OVERHANG, np.max(positions) + MAX_NOSE_OVERHANG, 0.5 * COMB_STEP)

@@ -6,11 +6,15 @@ A whitening filter for a sensor's noise is estimated here too, so that sums of s
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import linalg
 
 from turnout.passage.wheel_basis import WheelBasis
+
+if TYPE_CHECKING:
+    pass
 
 
 @dataclass(frozen=True)
@@ -28,18 +32,42 @@ class WheelFit:
     prediction: np.ndarray
 
     def standard_errors(self, noise: float) -> np.ndarray:
-        """(n_wheel, n_number) standard errors of ``amplitudes`` under white noise of this standard deviation."""
+        """(n_wheel, n_number) standard errors of ``amplitudes`` under white noise of this standard deviation.
+
+        Parameters
+        ----------
+        noise : float
+            Standard deviation of the noise. [unit of the data]
+
+        Returns
+        -------
+        (n_wheel, n_number) array of float
+            In the unit of ``amplitudes``.
+        """
         return noise * np.sqrt(np.diag(self.covariance)).reshape(self.amplitudes.shape)
 
 
-def onsets(times) -> tuple[np.ndarray, np.ndarray]:
-    """First sample at or after each impact, and the fraction of a sample by which the impact precedes it."""
+def onsets(times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First sample at or after each impact, and the fraction of a sample by which the impact precedes it.
+
+    Parameters
+    ----------
+    times : (n_wheel,) array of float
+        Times of the impacts. [samples]
+
+    Returns
+    -------
+    first : (n_wheel,) array of int
+        First sample at or after each impact.
+    phi : (n_wheel,) array of float
+        Fraction of a sample between impact and ``first``, from 0 to 1. [samples]
+    """
     times = np.asarray(times, dtype=float)
     first = np.ceil(times - 1e-12).astype(int)
     return first, np.maximum(first - times, 0.0)
 
 
-def joint_fit(data, times, basis: WheelBasis, free: bool = False) -> WheelFit:
+def joint_fit(data: np.ndarray, times: np.ndarray, basis: WheelBasis, free: bool = False) -> WheelFit:
     r"""Least squares over all wheels, including their overlaps.
 
     .. math:: \min \| y - \sum_j g_j\, h(k - t_j) \|^2, \qquad h = F * c A^k b
@@ -61,6 +89,11 @@ def joint_fit(data, times, basis: WheelBasis, free: bool = False) -> WheelFit:
     Returns
     -------
     WheelFit
+
+    Raises
+    ------
+    ValueError
+        A wheel lies outside the data.
 
     References
     ----------
@@ -90,8 +123,25 @@ def joint_fit(data, times, basis: WheelBasis, free: bool = False) -> WheelFit:
     return WheelFit(np.asarray(times, float), amplitudes, covariance, prediction)
 
 
-def predict(n: int, first, weights, basis: WheelBasis) -> np.ndarray:
-    """(n,) sum over the wheels of their weighted columns from ``first`` on; ``weights`` (n_wheel, n_column)."""
+def predict(n: int, first: np.ndarray, weights: np.ndarray, basis: WheelBasis) -> np.ndarray:
+    """(n,) sum over the wheels of their weighted columns from ``first`` on; ``weights`` (n_wheel, n_column).
+
+    Parameters
+    ----------
+    n : int
+        Samples of the prediction.
+    first : (n_wheel,) array of int
+        First sample of each response.
+    weights : (n_wheel, n_column) array of float
+        Weights of the columns of ``basis``.
+    basis : WheelBasis
+        Responses of the model.
+
+    Returns
+    -------
+    (n,) array of float
+        Sum of the responses. [m/s²]
+    """
     prediction = np.zeros(n)
     for start, weight in zip(first, weights):
         length = min(basis.n_sample, n - start)
@@ -100,17 +150,21 @@ def predict(n: int, first, weights, basis: WheelBasis) -> np.ndarray:
     return prediction
 
 
-def _weights(basis, phi, free):
+def _weights(basis: WheelBasis, phi: np.ndarray, free: bool) -> np.ndarray:
     """(n_wheel, n_number, n_column)."""
     if not free:
         return basis.coefficients(phi)[:, None, :]
     return np.broadcast_to(np.eye(basis.n_column), (len(phi), basis.n_column, basis.n_column))
 
 
-def _normal_equations(data, first, weights, basis):
+def _normal_equations(
+    data: np.ndarray, first: np.ndarray, weights: np.ndarray, basis: WheelBasis
+) -> tuple[np.ndarray, dict[tuple[int, int], np.ndarray], int]:
     """Right side (n,), blocks {(i, j): (p, p)} of the normal matrix, and how many wheels overlap."""
     n_wheel, p, _ = weights.shape
-    right_side, blocks, n_overlap, grams = np.zeros(n_wheel * p), {}, 0, {}
+    grams: dict[int, np.ndarray] = {}
+    blocks: dict[tuple[int, int], np.ndarray] = {}
+    right_side, n_overlap = np.zeros(n_wheel * p), 0
     for i, start in enumerate(first):
         length = min(basis.n_sample, len(data) - start)
         if length <= 0 or start < 0:
@@ -129,7 +183,9 @@ def _normal_equations(data, first, weights, basis):
     return right_side, blocks, n_overlap
 
 
-def _solve_banded(blocks, right_side, n_overlap):
+def _solve_banded(
+    blocks: dict[tuple[int, int], np.ndarray], right_side: np.ndarray, n_overlap: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Solution and inverse of the banded normal matrix, with a tiny ridge for wheels that coincide."""
     p = next(iter(blocks.values())).shape[0]
     width = (n_overlap + 1) * p
@@ -146,12 +202,33 @@ def _solve_banded(blocks, right_side, n_overlap):
     return linalg.cho_solve_banded((factor, False), right_side), inverse
 
 
-def whitener(quiet, order: int = 16) -> tuple[np.ndarray, float]:
+def whitener(quiet: np.ndarray, order: int = 16) -> tuple[np.ndarray, float]:
     """Taps (order + 1,) of the prediction-error filter of ``quiet`` (n,), and the standard deviation of its residual.
 
     Yule-Walker on the biased autocovariance: always stable, exact for autoregressive noise as n grows. ValueError
     for fewer than ten samples per tap.
 
+    Parameters
+    ----------
+    quiet : (n,) array of float
+        Noise without a train. [any unit]
+    order : int
+        Order of the filter.
+
+    Returns
+    -------
+    taps : (order + 1,) array of float
+        Prediction-error filter. [-]
+    noise : float
+        Standard deviation of its residual. [same unit]
+
+    Raises
+    ------
+    ValueError
+        Fewer than ten samples per tap.
+
+    Examples
+    --------
     >>> rng = np.random.default_rng(0)
     >>> taps, noise = whitener(3.0 * rng.standard_normal(20000), 4)
     >>> print(np.round(taps, 1) + 0.0, round(noise, 1))

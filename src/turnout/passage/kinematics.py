@@ -6,11 +6,17 @@ Estimate speed and direction from the levels of two or more sensors, before any 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import fft, ndimage
 
 from turnout.constants import KMH
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from turnout.config.settings.passage import PassageSettings
 
 
 @dataclass(frozen=True)
@@ -27,9 +33,21 @@ class Motion:
     acceleration: float = 0.0
     direction: int = 1
 
-    def time(self, distance) -> np.ndarray:
+    def time(self, distance: float | np.ndarray) -> np.ndarray:
         """Time at which the first axle is ``distance`` [m] past the origin; negative ``distance`` before it. [s]
 
+        Parameters
+        ----------
+        distance : float or array of float
+            Distance past the origin. [m]
+
+        Returns
+        -------
+        array of float
+            Of the shape of ``distance``. [s]
+
+        Examples
+        --------
         >>> float(Motion(10.0, 1.0, 2.0).time(24.0))
         3.0
         """
@@ -38,21 +56,67 @@ class Motion:
         # rationalised root: no cancellation as the acceleration goes to 0
         return self.start + 2.0 * distance / (self.speed + np.sqrt(speed_squared))
 
-    def distance(self, time) -> np.ndarray:
-        """Distance that the first axle has travelled from the origin at ``time``: the inverse of ``time()``. [m]"""
+    def distance(self, time: float | np.ndarray) -> np.ndarray:
+        """Distance that the first axle has travelled from the origin at ``time``: the inverse of ``time()``. [m]
+
+        Parameters
+        ----------
+        time : float or array of float
+            Time after the start of the recording. [s]
+
+        Returns
+        -------
+        array of float
+            Of the shape of ``time``. [m]
+        """
         elapsed = np.asarray(time, dtype=float) - self.start
         return self.speed * elapsed + 0.5 * self.acceleration * elapsed**2
 
-    def passing(self, offsets, position: float) -> np.ndarray:
-        """Times at which axles ``offsets`` [m] behind the first pass ``position`` [m]. [s]"""
+    def passing(self, offsets: np.ndarray, position: float) -> np.ndarray:
+        """Times at which axles ``offsets`` [m] behind the first pass ``position`` [m]. [s]
+
+        Parameters
+        ----------
+        offsets : array of float
+            Distances of the axles behind the first. [m]
+        position : float
+            Position along the turnout. [m]
+
+        Returns
+        -------
+        array of float
+            Of the shape of ``offsets``. [s]
+        """
         return self.time(np.asarray(offsets, dtype=float) + self.direction * position)
 
-    def speed_at(self, time) -> np.ndarray:
-        """Speed at ``time`` [s]. [m/s]"""
+    def speed_at(self, time: float | np.ndarray) -> np.ndarray:
+        """Speed at ``time`` [s]. [m/s]
+
+        Parameters
+        ----------
+        time : float or array of float
+            Time after the start of the recording. [s]
+
+        Returns
+        -------
+        array of float
+            Of the shape of ``time``. [m/s]
+        """
         return self.speed + self.acceleration * (np.asarray(time) - self.start)
 
     def relative_to_axle(self, distance: float) -> Motion:
-        """The same motion relative to an axle ``distance`` metres behind the first."""
+        """The same motion relative to an axle ``distance`` metres behind the first.
+
+        Parameters
+        ----------
+        distance : float
+            Distance of the axle behind the first. [m]
+
+        Returns
+        -------
+        Motion
+            With that axle at the origin at its start.
+        """
         start = float(self.time(distance))
         return replace(self, speed=float(self.speed_at(start)), start=start)
 
@@ -68,7 +132,20 @@ class Scan:
     correlation: np.ndarray
 
     def peaks(self, n: int = 3, min_distance: float = 0.04) -> list[tuple[float, float]]:
-        """The ``n`` best (slowness, correlation), at least ``min_distance`` (relative) from each other."""
+        """The ``n`` best (slowness, correlation), at least ``min_distance`` (relative) from each other.
+
+        Parameters
+        ----------
+        n : int
+            Largest number of peaks.
+        min_distance : float
+            Least relative distance between peaks. [-]
+
+        Returns
+        -------
+        list of (float, float)
+            Slowness [s/m], interpolated, and correlation there [-]; the best first.
+        """
         peaks, remaining = [], self.correlation.copy()
         for _ in range(n):
             k = int(np.argmax(remaining))
@@ -88,24 +165,70 @@ class Scan:
         return float(self.slowness[k] + np.clip(shift, -1, 1) * step)
 
 
-def slowness_grid(settings, relative: float = 0.008) -> np.ndarray:
-    """Signed slownesses between the slowest and the fastest train, with relative steps ``relative``. [s/m]"""
+def slowness_grid(settings: PassageSettings, relative: float = 0.008) -> np.ndarray:
+    """Signed slownesses between the slowest and the fastest train, with relative steps ``relative``. [s/m]
+
+    Parameters
+    ----------
+    settings : PassageSettings
+        Slowest and fastest train.
+    relative : float
+        Relative step. [-]
+
+    Returns
+    -------
+    (n,) array of float
+        Slownesses, the negative ones first. [s/m]
+    """
     slow, fast = KMH / settings.speed_minimum, KMH / settings.speed_maximum
     positive = np.geomspace(fast, slow, int(np.log(slow / fast) / relative) + 2)
     return np.concatenate([-positive[::-1], positive])
 
 
-def scan_slowness(values, step: float, positions, settings) -> Scan:
+def scan_slowness(values: np.ndarray, step: float, positions: np.ndarray, settings: PassageSettings) -> Scan:
     """Slant stack of levels (n_sensor, n_bin) of sensors at ``positions`` [m].
 
     Bogies are not resolved, so that there are no false maxima.
+
+    Parameters
+    ----------
+    values : (n_sensor, n_bin) array of float
+        Levels of the sensors. [nepers of power]
+    step : float
+        Length of a bin. [s]
+    positions : (n_sensor,) array of float
+        Positions of the sensors. [m]
+    settings : PassageSettings
+        Settings of the passage analysis.
+
+    Returns
+    -------
+    Scan
+        Over all slownesses of trains.
     """
     slowness = slowness_grid(settings)
     return Scan(slowness, correlation_at(slowness, values, step, positions))
 
 
-def correlation_at(slowness, values, step: float, positions) -> np.ndarray:
-    """(n,) correlation of all sensors at each slowness [s/m]; at 0 that of simultaneous records."""
+def correlation_at(slowness: np.ndarray, values: np.ndarray, step: float, positions: np.ndarray) -> np.ndarray:
+    """(n,) correlation of all sensors at each slowness [s/m]; at 0 that of simultaneous records.
+
+    Parameters
+    ----------
+    slowness : (n,) array of float
+        Slownesses. [s/m]
+    values : (n_sensor, n_bin) array of float
+        Levels of the sensors. [nepers of power]
+    step : float
+        Length of a bin. [s]
+    positions : (n_sensor,) array of float
+        Positions of the sensors. [m]
+
+    Returns
+    -------
+    (n,) array of float
+        Mean correlation coefficient. [-]
+    """
     positions = np.asarray(positions, dtype=float)
     # as wide as the grid at the slow end, where a passage is long
     width = np.clip(0.008 * np.ptp(positions) * KMH / 20.0, 0.02, 0.1)
@@ -115,8 +238,33 @@ def correlation_at(slowness, values, step: float, positions) -> np.ndarray:
     )
 
 
-def refine_slowness(correlations, step: float, positions, near: float, reach: float = 0.03) -> tuple[float, float]:
-    """Best slowness within ``reach`` (relative) of ``near`` and its correlation, from fine ``pair_correlations``."""
+def refine_slowness(
+    correlations: Mapping[tuple[int, int], np.ndarray],
+    step: float,
+    positions: np.ndarray,
+    near: float,
+    reach: float = 0.03,
+) -> tuple[float, float]:
+    """Best slowness within ``reach`` (relative) of ``near`` and its correlation, from fine ``pair_correlations``.
+
+    Parameters
+    ----------
+    correlations : mapping
+        As ``pair_correlations`` returns them.
+    step : float
+        Length of a bin. [s]
+    positions : (n_sensor,) array of float
+        Positions of the sensors. [m]
+    near : float
+        Slowness in the middle of the range. [s/m]
+    reach : float
+        Relative half width of the range. [-]
+
+    Returns
+    -------
+    slowness, correlation : float
+        [s/m], [-]
+    """
     positions = np.asarray(positions, dtype=float)
     span = max(np.ptp(positions), 0.1)
     n = int(np.clip(2 * reach * abs(near) * span / (0.5 * step), 21, 601)) | 1
@@ -124,15 +272,47 @@ def refine_slowness(correlations, step: float, positions, near: float, reach: fl
     return Scan(slowness, stack_correlations(correlations, step, positions, slowness)).peaks(1)[0]
 
 
-def coarsen(values, step: float, max_step: float):
-    """(levels, step) averaged over as many bins as fit into ``max_step`` [s]."""
+def coarsen(values: np.ndarray, step: float, max_step: float) -> tuple[np.ndarray, float]:
+    """(levels, step) averaged over as many bins as fit into ``max_step`` [s].
+
+    Parameters
+    ----------
+    values : (n_sensor, n_bin) array of float
+        Levels of the sensors. [any unit]
+    step : float
+        Length of a bin. [s]
+    max_step : float
+        Largest length of the new bins. [s]
+
+    Returns
+    -------
+    values : (n_sensor, n) array of float
+        Means. [same unit]
+    step : float
+        Length of the new bins. [s]
+    """
     values, k = np.atleast_2d(values), max(int(max_step / step + 1e-9), 1)
     n = values.shape[1] // k
     return values[:, : n * k].reshape(len(values), n, k).mean(axis=2), k * step
 
 
-def pair_correlations(values, step, width) -> dict:
-    """(i, j) -> (n_lag,) correlation coefficient of sensors i and j over the lag [bins], negative ones at the end."""
+def pair_correlations(values: np.ndarray, step: float, width: float) -> dict[tuple[int, int], np.ndarray]:
+    """(i, j) -> (n_lag,) correlation coefficient of sensors i and j over the lag [bins], negative ones at the end.
+
+    Parameters
+    ----------
+    values : (n_sensor, n_bin) array of float
+        Levels of the sensors. [any unit]
+    step : float
+        Length of a bin. [s]
+    width : float
+        Length of the moving mean. [s]
+
+    Returns
+    -------
+    dict
+        (i, j) -> (n_lag,) array of float. [-]
+    """
     smooth = ndimage.uniform_filter1d(np.atleast_2d(values), max(round(width / step), 1), axis=1)
     n = fft.next_fast_len(2 * smooth.shape[1], real=True)
     centred = smooth - smooth.mean(axis=1, keepdims=True)
@@ -145,8 +325,27 @@ def pair_correlations(values, step, width) -> dict:
     return correlations
 
 
-def stack_correlations(correlations, step, positions, slowness) -> np.ndarray:
-    """(n,) mean correlation coefficient of the pairs after the shifts of each slowness, weighted by distance to 3 m."""
+def stack_correlations(
+    correlations: Mapping[tuple[int, int], np.ndarray], step: float, positions: np.ndarray, slowness: np.ndarray
+) -> np.ndarray:
+    """(n,) mean correlation coefficient of the pairs after the shifts of each slowness, weighted by distance to 3 m.
+
+    Parameters
+    ----------
+    correlations : mapping
+        As ``pair_correlations`` returns them.
+    step : float
+        Length of a bin. [s]
+    positions : (n_sensor,) array of float
+        Positions of the sensors. [m]
+    slowness : (n,) array of float
+        Slownesses. [s/m]
+
+    Returns
+    -------
+    (n,) array of float
+        -inf where no two sensors are 0.05 m apart. [-]
+    """
     total, weight = np.zeros(len(slowness)), 0.0
     for (i, j), correlation in correlations.items():
         distance = positions[j] - positions[i]

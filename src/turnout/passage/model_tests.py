@@ -7,6 +7,7 @@ show what models unrelated to the section score on the same data.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import linalg, stats
@@ -15,6 +16,11 @@ from turnout.passage.impulse_fit import joint_fit, onsets
 from turnout.passage.scores import Scores, score
 from turnout.passage.wheel_basis import WheelBasis, wheel_basis
 from turnout.records import ModalModel
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from turnout.config.settings.passage import PassageSettings
 
 
 @dataclass(frozen=True)
@@ -35,7 +41,9 @@ class DirectionTest:
     along_share: float = float("nan")
 
 
-def direction_test(data, times, basis: WheelBasis, noise: float, level: float = 0.01) -> DirectionTest:
+def direction_test(
+    data: np.ndarray, times: np.ndarray, basis: WheelBasis, noise: float, level: float = 0.01
+) -> DirectionTest:
     r"""Test of w_j = g_j b against a free jump for every wheel, all wheels estimated together.
 
     .. math:: \chi^2_j = \min_g (\hat w_j - g b)^T \Sigma_j^{-1} (\hat w_j - g b)
@@ -43,6 +51,29 @@ def direction_test(data, times, basis: WheelBasis, noise: float, level: float = 
     is chi-squared; its degrees of freedom are the number of states less one. ``data`` must have white residuals of
     standard deviation ``noise``: raw or whitened, not band-passed. A time estimated from the same data uses
     a part of one more degree, which makes the test slightly lenient. ``times`` in samples.
+
+    Parameters
+    ----------
+    data : (n_sample,) array of float
+        Raw or whitened acceleration, with white residuals. [m/s²]
+    times : (n_wheel,) array of float
+        Times of the impacts, increasing. [samples]
+    basis : WheelBasis
+        Responses of the model behind the filter of ``data``.
+    noise : float
+        Standard deviation of the noise. [m/s²]
+    level : float
+        Level of the test. [-]
+
+    Returns
+    -------
+    DirectionTest
+        One value per wheel.
+
+    Raises
+    ------
+    ValueError
+        ``noise`` is not above 0.
     """
     if not noise > 0:
         raise ValueError(f"the noise must be above 0, got {noise}")
@@ -73,10 +104,22 @@ class NullBand:
 
     @classmethod
     def of(cls, scores: list[Scores]) -> NullBand:
-        """Quantiles over the finite scores; nan where there are none."""
+        """Quantiles over the finite scores; nan where there are none.
+
+        Parameters
+        ----------
+        scores : list of Scores
+            Scores of the null models.
+
+        Returns
+        -------
+        NullBand
+            [%]
+        """
         table = np.array([[s.fit, s.forecast, s.leave_one_out] for s in scores], dtype=float).reshape(-1, 3)
         quantiles = [np.quantile(c[np.isfinite(c)], 0.95) if np.isfinite(c).any() else np.nan for c in table.T]
-        return cls(*(float(q) for q in quantiles), n=len(scores))
+        fit, forecast, leave_one_out = (float(q) for q in quantiles)
+        return cls(fit, forecast, leave_one_out, len(scores))
 
 
 def random_models(n: int, order: int, low: float, high: float, rate: float, seed: int) -> tuple[ModalModel, ...]:
@@ -85,6 +128,26 @@ def random_models(n: int, order: int, low: float, high: float, rate: float, seed
     The frequency is log-uniform between ``low`` and ``high`` [Hz]. The damping ratio is log-uniform between 0.02 and
     0.35, slightly wider than in the paper's tables.
 
+    Parameters
+    ----------
+    n : int
+        Number of models.
+    order : int
+        Number of states; at least one pair of poles is made.
+    low, high : float
+        Limits of the frequencies. [Hz]
+    rate : float
+        Sampling rate. [Hz]
+    seed : int
+        Seed of the random numbers.
+
+    Returns
+    -------
+    tuple of ModalModel
+        The same for the same seed.
+
+    Examples
+    --------
     >>> [m.order for m in random_models(2, 4, 80.0, 800.0, 20000.0, seed=1)]
     [4, 4]
     """
@@ -103,12 +166,48 @@ def random_models(n: int, order: int, low: float, high: float, rate: float, seed
     return tuple(models)
 
 
-def null_bases(order: int, band_filter, rate: float, settings) -> list:
-    """Bases of the random models behind the same filter. They are the same for every passage."""
+def null_bases(order: int, band_filter: np.ndarray | None, rate: float, settings: PassageSettings) -> list[WheelBasis]:
+    """Bases of the random models behind the same filter. They are the same for every passage.
+
+    Parameters
+    ----------
+    order : int
+        Number of states.
+    band_filter : (n_section, 6) array of float or None
+        Filter of the data, see ``apply_filter``.
+    rate : float
+        Sampling rate. [Hz]
+    settings : PassageSettings
+        Number, band and seed of the models.
+
+    Returns
+    -------
+    list of WheelBasis
+        One per random model.
+    """
     models = random_models(settings.null_models, order, settings.band_low, settings.band_high, rate, settings.null_seed)
     return [wheel_basis(model, band_filter, rate, longest=0.1) for model in models]
 
 
-def null_scores(data, expected, bases, settings) -> list[Scores]:
-    """Scores of every null model on the data of one sensor."""
+def null_scores(
+    data: np.ndarray, expected: np.ndarray, bases: Sequence[WheelBasis], settings: PassageSettings
+) -> list[Scores]:
+    """Scores of every null model on the data of one sensor.
+
+    Parameters
+    ----------
+    data : (n_sample,) array of float
+        Acceleration behind the filter of the bases. [m/s²]
+    expected : (n_wheel,) array of float
+        Expected times of the impacts, increasing. [samples]
+    bases : sequence of WheelBasis
+        The random models behind the filter of ``data``.
+    settings : PassageSettings
+        Settings of the passage analysis.
+
+    Returns
+    -------
+    list of Scores
+        One per model.
+    """
     return [score(data, expected, basis, settings) for basis in bases]

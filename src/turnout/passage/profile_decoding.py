@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy import ndimage, signal
 
 from turnout.passage.axle_patterns import Pattern
 from turnout.passage.axles import GRID_STEP, AxleFinding
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from turnout.passage.axle_patterns import Vehicle
 
 POSITION_SLACK = 0.35  # m, largest deviation of an axle from its position behind the previous one
 MIN_HEIGHT = 0.3  # of a typical peak: least height of an axle, and largest height of a peak that is no axle
@@ -14,7 +21,9 @@ SCALES = 1.0 + 0.012 * np.arange(-4, 5)  # factors on the lengths, for an error 
 N_STARTS = 8  # first peaks that are tried as the first axle
 
 
-def decode_profile(profile, start: float, pattern: Pattern, audible_length: float, feature: str) -> AxleFinding | None:
+def decode_profile(
+    profile: np.ndarray, start: float, pattern: Pattern, audible_length: float, feature: str
+) -> AxleFinding | None:
     """Axle count of the row of vehicles of ``pattern`` that collects most of ``profile`` (n,); None if there is none.
 
     The search starts from each of the first peaks, at each of a few scales, and goes from axle to axle. The next axle
@@ -22,6 +31,24 @@ def decode_profile(profile, start: float, pattern: Pattern, audible_length: floa
     the speed does not accumulate. Where the pattern allows a choice, the vehicle that collects more is taken, less the
     peaks that it leaves over within its length. The row ends where the peaks beyond it cost least. ``audible_length``
     [m] is the length of the audible part.
+
+    Parameters
+    ----------
+    profile : (n,) array of float
+        Feature along the train on a grid of ``GRID_STEP``, about 1 at a wheel. [-]
+    start : float
+        Offset of its first point. [m]
+    pattern : Pattern
+        Axle pattern of a type of train.
+    audible_length : float
+        Length of the audible part. [m]
+    feature : str
+        Name of the feature.
+
+    Returns
+    -------
+    AxleFinding or None
+        Offsets of the axles, with a contrast of 1 and what an axle collects on average.
     """
     low, high = pattern.lengths()
     if not low - 8.0 < audible_length * 1.06 or not high + 12.0 > audible_length * 0.9:
@@ -50,7 +77,9 @@ def decode_profile(profile, start: float, pattern: Pattern, audible_length: floa
 class _RowSearch:
     """Search over hypotheses (start, scale), to all of which vehicles are added at once."""
 
-    def __init__(self, profile, highest, peaks, first, scale):
+    def __init__(
+        self, profile: np.ndarray, highest: np.ndarray, peaks: np.ndarray, first: np.ndarray, scale: np.ndarray
+    ) -> None:
         self.profile, self.highest, self.scale = profile, highest, scale
         self.peak_position, self.peak_height = peaks * GRID_STEP, profile[peaks]
         self.first, self.rear = first, np.zeros(first.size)
@@ -58,7 +87,7 @@ class _RowSearch:
         self.positions = np.zeros((first.size, 0))
         self.best_end: tuple[float, np.ndarray | None] = (-np.inf, None)
 
-    def add_vehicle(self, vehicles, is_required):
+    def add_vehicle(self, vehicles: Sequence[Vehicle], is_required: bool) -> None:
         """Add one of ``vehicles`` to every hypothesis; where none is required, the row may also end before it."""
         if not is_required:
             self._consider_end()
@@ -82,12 +111,12 @@ class _RowSearch:
         added[~self.alive] = np.nan
         self.positions = np.hstack([self.positions, added])
 
-    def finish(self):
+    def finish(self) -> tuple[float, np.ndarray | None]:
         """(value, positions) of the best end so far and now."""
         self._consider_end()
         return self.best_end
 
-    def _try_vehicle(self, vehicle):
+    def _try_vehicle(self, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray, Vehicle, np.ndarray]:
         """Net gain per axle (n,), positions (n, n_axle) [m], vehicle, collected height (n,), for each hypothesis."""
         if self.positions.shape[1]:
             last = np.nanmax(np.where(np.isfinite(self.positions), self.positions, -np.inf), axis=1)
@@ -96,12 +125,12 @@ class _RowSearch:
         else:
             position = self.first.copy()
         gaps = np.diff(vehicle.axles, prepend=vehicle.axles[0])
-        positions, gain = [], np.zeros(self.first.size)
+        columns, gain = [], np.zeros(self.first.size)
         for gap in gaps:
             position = self._highest_near(position + self.scale * gap)
-            positions.append(position)
+            columns.append(position)
             gain += self._height(position) - MIN_HEIGHT
-        positions = np.array(positions).T
+        positions = np.array(columns).T
         between = (self.peak_position > positions[:, :1] - 1.5) & (self.peak_position < positions[:, -1:] + 1.5)
         is_collected = np.any(np.abs(self.peak_position - positions[:, :, None]) < 0.6, axis=1)
         uncollected = np.sum(
@@ -109,7 +138,7 @@ class _RowSearch:
         )
         return (gain - uncollected) / len(gaps), positions, vehicle, gain
 
-    def _highest_near(self, position):
+    def _highest_near(self, position: np.ndarray) -> np.ndarray:
         """Highest position within the slack, the nearer of equals."""
         reach = int(POSITION_SLACK / GRID_STEP)
         centre = np.clip(np.round(position / GRID_STEP).astype(int), reach, self.profile.size - reach - 1)
@@ -117,11 +146,11 @@ class _RowSearch:
         distance = (np.arange(-reach, reach + 1) / reach) ** 2
         return (centre - reach + np.argmax(window - 0.15 * distance, axis=1)) * GRID_STEP
 
-    def _height(self, position):
+    def _height(self, position: np.ndarray) -> np.ndarray:
         index = np.clip(np.round(position / GRID_STEP).astype(int), 0, self.profile.size - 1)
         return np.minimum(self.profile[index], 1.0)
 
-    def _consider_end(self):
+    def _consider_end(self) -> None:
         """Keep the best hypothesis if the row ended here: what it collects, less the peaks that it leaves over."""
         if not self.positions.shape[1]:
             return

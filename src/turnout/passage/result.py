@@ -44,7 +44,18 @@ class SpeedFinding:
     time: float = 0.0
 
     def at(self, time: float) -> float:
-        """Speed at another time. [m/s]"""
+        """Speed at another time. [m/s]
+
+        Parameters
+        ----------
+        time : float
+            Time after the start of the recording. [s]
+
+        Returns
+        -------
+        float
+            Speed at that time. [m/s]
+        """
         return self.speed + self.acceleration * (time - self.time)
 
 
@@ -65,7 +76,7 @@ class Passage:
     direction: str = "unknown"
     track: str = "unknown"
     type: TypeFinding | None = None
-    at_sensor: dict = field(default_factory=dict)
+    at_sensor: dict[str, np.ndarray] = field(default_factory=dict)
     contrast: float = 0.0
     begin: float | None = None
     end: float | None = None
@@ -80,15 +91,31 @@ class Passage:
         return f"Passage({self.status}: {', '.join(words)}{f'; {doubts}' if doubts else ''})"
 
     @property
+    def train_motion(self) -> Motion:
+        """Motion of the train.
+
+        Raises
+        ------
+        ValueError
+            No train was found.
+        """
+        if self.motion is None:
+            raise ValueError("no train was found in this recording")
+        return self.motion
+
+    @property
     def n_axle(self) -> int:
+        """Number of axles."""
         return len(self.offsets)
 
     @property
     def times(self) -> np.ndarray:
+        """(n_axle,) times at which the axles pass the turnout's origin; empty without a motion. [s]"""
         return self.motion.time(self.offsets) if self.motion else np.zeros(0)
 
     @property
     def audible_sensors(self) -> tuple[str, ...]:
+        """Names of the channels that recorded the train."""
         return tuple(self.at_sensor)
 
     @property

@@ -42,6 +42,11 @@ def effects(rows: Sequence[Mapping], score: str = "fit_pct") -> tuple[Effect, ..
         With train_type, speed_kmh, axle_load_t and the score; rows without any of them are left out.
     score : str
         Name of the score.
+
+    Returns
+    -------
+    tuple of Effect
+        Empty with fewer than eight complete rows.
     """
     complete = [r for r in rows if all(r.get(k) is not None for k in (*REQUIRED_COLUMNS, score))]
     if len(complete) < 8:
@@ -64,7 +69,9 @@ def effects(rows: Sequence[Mapping], score: str = "fit_pct") -> tuple[Effect, ..
     return tuple(results)
 
 
-def _type_effects(y, is_type, types, covariates, adjusted):
+def _type_effects(
+    y: np.ndarray, is_type: np.ndarray, types: Sequence[str], covariates: np.ndarray, adjusted: bool
+) -> list[Effect]:
     """Effects of each further type against the most frequent one."""
     reference = int(np.argmax(is_type.sum(axis=0)))
     compared = [k for k in range(len(types)) if k != reference]
@@ -73,9 +80,11 @@ def _type_effects(y, is_type, types, covariates, adjusted):
     return _column_effects(y, design, list(range(1, 1 + len(compared))), "train type", names, adjusted)
 
 
-def _column_effects(y, design, columns, factor, names, adjusted):
+def _column_effects(
+    y: np.ndarray, design: np.ndarray, columns: Sequence[int], factor: str, names: Sequence[str], adjusted: bool
+) -> list[Effect]:
     """Effects of some columns of a design; columns that the others determine to 99 % are left out."""
-    results = []
+    results: list[Effect] = []
     n, p = design.shape
     if n <= p + 2:
         return results
@@ -93,7 +102,7 @@ def _column_effects(y, design, columns, factor, names, adjusted):
     return results
 
 
-def _is_determined(design, column) -> bool:
+def _is_determined(design: np.ndarray, column: int) -> bool:
     """Whether the other columns explain this one to 99 % of its variance."""
     other_columns = np.delete(design, column, axis=1)
     x = design[:, column]

@@ -6,6 +6,7 @@ The measures are the same for models and nulls.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import ndimage
@@ -13,6 +14,11 @@ from scipy import ndimage
 from turnout.passage.impact_timing import best_times, gather, search_times
 from turnout.passage.impulse_fit import joint_fit, onsets, predict
 from turnout.passage.wheel_basis import WheelBasis
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from turnout.config.settings.passage import PassageSettings
 
 
 @dataclass(frozen=True)
@@ -31,10 +37,22 @@ class Scores:
     n_parameter: int
 
 
-def fit_percent(measured, predicted) -> float:
+def fit_percent(measured: np.ndarray, predicted: np.ndarray) -> float:
     r"""Amplitude fit of a prediction; 100 is perfect, 0 as good as the mean, without a lower limit.
 
     .. math:: 100\,(1 - \|y - \hat y\| / \|y - \bar y\|)
+
+    Parameters
+    ----------
+    measured : (n,) array of float
+        y, the measured samples. [any unit]
+    predicted : (n,) array of float
+        The prediction of them. [same unit]
+
+    Returns
+    -------
+    float
+        nan for no samples or constant ones. [%]
 
     References
     ----------
@@ -57,22 +75,56 @@ def fit_percent(measured, predicted) -> float:
     return float(100.0 * (1.0 - np.linalg.norm(measured - predicted) / spread))
 
 
-def wheel_windows(expected, n: int, length: int, lead: int) -> tuple[np.ndarray, np.ndarray]:
+def wheel_windows(expected: np.ndarray, n: int, length: int, lead: int) -> tuple[np.ndarray, np.ndarray]:
     """First sample and length of each wheel's own samples: up to the next wheel, at most ``length``. [samples]
 
     They start ``lead`` samples before the expected time, so that no model profits from a later onset.
+
+    Parameters
+    ----------
+    expected : (n_wheel,) array of float
+        Times of the impacts, increasing. [samples]
+    n : int
+        Samples of the recording.
+    length : int
+        Largest number of samples.
+    lead : int
+        Samples before the expected time.
+
+    Returns
+    -------
+    first : (n_wheel,) array of int
+        First sample.
+    length : (n_wheel,) array of int
+        Number of samples, 0 where there are none.
     """
     first = np.floor(np.asarray(expected, dtype=float)).astype(int) - lead
     following = np.append(first[1:], n)
     return first, np.clip(np.minimum(following, n) - first, 0, length)
 
 
-def score(data, expected, basis: WheelBasis, settings) -> Scores:
+def score(data: np.ndarray, expected: np.ndarray, basis: WheelBasis, settings: PassageSettings) -> Scores:
     """Scores of the model behind ``basis``; ``data`` (n_sample,) has passed its filter.
 
     ``expected`` (n_wheel,) are the detected axles [samples], increasing. Every model, true or random, first gets the
     one delay of all wheels that fits best. Then each impact is sought within ``settings.time_search``. The forecast
     uses only data before the predicted samples.
+
+    Parameters
+    ----------
+    data : (n_sample,) array of float
+        Acceleration behind the filter of ``basis``. [m/s²]
+    expected : (n_wheel,) array of float
+        Detected axles, increasing. [samples]
+    basis : WheelBasis
+        Responses of the model behind the filter of ``data``.
+    settings : PassageSettings
+        Windows and search ranges.
+
+    Returns
+    -------
+    Scores
+        [%]
     """
     rate, n = basis.rate, len(data)
     search_range, expected = settings.time_search * rate, np.asarray(expected, dtype=float)
@@ -107,11 +159,27 @@ class DelayPower:
     reach: int
 
 
-def delay_power(data, expected, basis: WheelBasis, settings) -> DelayPower:
+def delay_power(data: np.ndarray, expected: np.ndarray, basis: WheelBasis, settings: PassageSettings) -> DelayPower:
     """Power that each wheel explains at every delay against the detected axles.
 
     An envelope has its peak after an impact, and a sensor records a wheel before it arrives, alike for all wheels. Free
     jumps are compared, a few times per period of the band's upper edge: they do not depend on the phase.
+
+    Parameters
+    ----------
+    data : (n_sample,) array of float
+        Acceleration behind the filter of ``basis``. [m/s²]
+    expected : (n_wheel,) array of float
+        Expected times of the impacts, increasing. [samples]
+    basis : WheelBasis
+        Responses of the model behind the filter of ``data``.
+    settings : PassageSettings
+        Search ranges, and the upper edge of the band.
+
+    Returns
+    -------
+    DelayPower
+        One row per wheel.
     """
     stride = max(int(basis.rate / (12.0 * settings.band_high)), 1)
     reach = round(settings.delay_search * basis.rate / stride) * stride
@@ -127,6 +195,18 @@ def common_delay(delays: DelayPower, leave_own_out: bool = False) -> np.ndarray:
     """(n_wheel,) delay of all wheels against the detected axles that explains most, the same for all. [samples]
 
     ``leave_own_out``: for every wheel the delay from the other wheels, so that its own future does not enter.
+
+    Parameters
+    ----------
+    delays : DelayPower
+        Power at every delay.
+    leave_own_out : bool
+        Whether a wheel's own power is left out.
+
+    Returns
+    -------
+    (n_wheel,) array of float
+        Delays. [samples]
     """
     power = delays.power
     total = np.broadcast_to(power.sum(axis=0), power.shape) - (power if leave_own_out and len(power) > 1 else 0.0)
@@ -137,13 +217,39 @@ def common_delay(delays: DelayPower, leave_own_out: bool = False) -> np.ndarray:
     return np.broadcast_to(np.array(best_steps), len(power)) * delays.stride - delays.reach
 
 
-def forecast(data, expected, basis: WheelBasis, settings, delays: DelayPower | None = None):
+def forecast(
+    data: np.ndarray,
+    expected: np.ndarray,
+    basis: WheelBasis,
+    settings: PassageSettings,
+    delays: DelayPower | None = None,
+) -> tuple[float, np.ndarray]:
     """Forecast skill [%], pooled and (n_wheel,) per wheel: jumps from the first milliseconds predict the next ones.
 
     The forecast is causal, as is the filter: nothing after ``forecast_train`` behind a wheel's expected impact enters
     its time and amplitude. The decay of earlier wheels is taken from their own forecasts. The delay between a sensor's
     record and the detected axles is taken from the other wheels. A wheel whose successor comes too soon is not scored.
     ``delays`` is ``delay_power`` of the same arguments, if it is known.
+
+    Parameters
+    ----------
+    data : (n_sample,) array of float
+        Acceleration behind the filter of ``basis``. [m/s²]
+    expected : (n_wheel,) array of float
+        Expected times of the impacts, increasing. [samples]
+    basis : WheelBasis
+        Responses of the model behind the filter of ``data``.
+    settings : PassageSettings
+        Length of the data before and of the prediction, and the search ranges.
+    delays : DelayPower, optional
+        ``delay_power`` of the same arguments.
+
+    Returns
+    -------
+    skill : float
+        Of all wheels; nan without one that can be scored. [%]
+    skill_by_wheel : (n_wheel,) array of float
+        nan for a wheel that is not scored. [%]
     """
     rate, n = basis.rate, len(data)
     train, test = round(settings.forecast_train * rate), round(settings.forecast_test * rate)
@@ -165,7 +271,9 @@ def forecast(data, expected, basis: WheelBasis, settings, delays: DelayPower | N
     return fit_percent(np.concatenate(measured), np.concatenate(predicted)), skill_by_wheel
 
 
-def _predict_from_training(data, expected, end, basis, search_range):
+def _predict_from_training(
+    data: np.ndarray, expected: np.ndarray, end: np.ndarray, basis: WheelBasis, search_range: float
+) -> np.ndarray:
     """Sum (n,) of the predicted responses, from the data of each wheel before its ``end``."""
     reach = int(np.ceil(search_range)) + 1
     first = np.round(expected).astype(int) - reach
@@ -173,7 +281,7 @@ def _predict_from_training(data, expected, end, basis, search_range):
     short = basis.truncate(span)
     n_observed = span - np.arange(n_lag)
     windows = np.pad(gather(data, first, span), ((0, 0), (0, n_lag - 1)))
-    rows, onset, weight, prediction = windows, None, None, None
+    rows, onset, weight, prediction = windows, first, np.zeros((len(first), short.n_column)), np.zeros(len(data))
     gap = np.diff(expected).min(initial=np.inf) - search_range
     for sweep in range(3 if gap < basis.ring_length else 2 if gap < basis.n_sample else 1):
         if sweep:
@@ -190,8 +298,29 @@ def _predict_from_training(data, expected, end, basis, search_range):
     return prediction
 
 
-def leave_one_out(data, times, basis: WheelBasis, windows):
-    """Score [%] with the jump's direction from the other wheels and one amplitude for the held-out wheel."""
+def leave_one_out(
+    data: np.ndarray, times: np.ndarray, basis: WheelBasis, windows: Sequence[slice]
+) -> tuple[float, np.ndarray]:
+    """Score [%] with the jump's direction from the other wheels and one amplitude for the held-out wheel.
+
+    Parameters
+    ----------
+    data : (n_sample,) array of float
+        Acceleration behind the filter of ``basis``. [m/s²]
+    times : (n_wheel,) array of float
+        Times of the impacts, increasing. [samples]
+    basis : WheelBasis
+        Responses of the model behind the filter of ``data``.
+    windows : sequence of slice
+        Samples of each wheel that are scored.
+
+    Returns
+    -------
+    score : float
+        Of all wheels; nan for fewer than three wheels. [%]
+    score_by_wheel : (n_wheel,) array of float
+        nan for a wheel with fewer than eight samples. [%]
+    """
     if len(times) < 3:
         return float("nan"), np.full(len(times), np.nan)
     free = joint_fit(data, times, basis, free=True)

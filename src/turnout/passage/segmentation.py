@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import signal
+
+if TYPE_CHECKING:
+    from turnout.config.settings.passage import PassageSettings
 
 BAND = (120.0, 400.0)  # Hz, in which wheels are loud on any rail
 BIN_LENGTH = 0.05  # s, length of a bin of the level
@@ -27,7 +31,7 @@ class Excerpt:
     is_whole: bool = True
 
 
-def cut_passages(blocks: Iterable[np.ndarray], rate: float, settings) -> Iterator[Excerpt]:
+def cut_passages(blocks: Iterable[np.ndarray], rate: float, settings: PassageSettings) -> Iterator[Excerpt]:
     """Pieces of a continuous record, one per passage, each with ``settings.margin`` seconds on either side.
 
     A passage exceeds six times the quiet power, mean over the channels, without a gap of more than ``settings.gap``
@@ -39,7 +43,14 @@ def cut_passages(blocks: Iterable[np.ndarray], rate: float, settings) -> Iterato
     blocks : iterable of (n_channel, n) arrays
         Consecutive parts of the record, of any length. [m/s²]
     rate : float
-        [Hz]
+        Sampling rate. [Hz]
+    settings : PassageSettings
+        Lengths of gap, margin and pieces, and the longest passage.
+
+    Yields
+    ------
+    Excerpt
+        In the order of time.
     """
     cutter = _PassageCutter(rate, settings)
     for block in equal_blocks(blocks, max(round(settings.chunk * rate), 1)):
@@ -47,9 +58,23 @@ def cut_passages(blocks: Iterable[np.ndarray], rate: float, settings) -> Iterato
     yield from cutter.end()
 
 
-def equal_blocks(blocks, length: int) -> Iterator[np.ndarray]:
+def equal_blocks(blocks: Iterable[np.ndarray], length: int) -> Iterator[np.ndarray]:
     """The same samples in blocks of ``length``, the last one shorter: results must not depend on the blocks.
 
+    Parameters
+    ----------
+    blocks : iterable of (n_channel, n) arrays
+        Consecutive parts of a record, of any length. [any unit]
+    length : int
+        Samples of the new blocks.
+
+    Yields
+    ------
+    (n_channel, length) array
+        The last one may be shorter. [same unit]
+
+    Examples
+    --------
     >>> [b.tolist() for b in equal_blocks([np.array([[1, 2]]), np.array([[3, 4, 5]])], 3)]
     [[[1, 2, 3]], [[4, 5]]]
     """
@@ -72,21 +97,21 @@ class _PassageCutter:
     """Cut passages from successive blocks; holds the state between them."""
 
     rate: float
-    settings: object
-    filter_sections: np.ndarray = None
-    filter_state: np.ndarray = None
-    blocks: deque = field(default_factory=deque)
+    settings: PassageSettings
+    filter_sections: np.ndarray = field(init=False)
+    filter_state: np.ndarray = field(init=False)
+    blocks: deque[np.ndarray] = field(default_factory=deque)
     blocks_start: int = 0
     n_fed: int = 0
-    remainder: np.ndarray = None
-    quiet_levels: deque = field(default_factory=lambda: deque(maxlen=int(MEMORY_TIME / BIN_LENGTH)))
-    passage_levels: list = field(default_factory=list)
+    remainder: np.ndarray = field(init=False)
+    quiet_levels: deque[float] = field(default_factory=lambda: deque(maxlen=int(MEMORY_TIME / BIN_LENGTH)))
+    passage_levels: list[float] = field(default_factory=list)
     first: int | None = None
     last: int = 0
 
-    def feed(self, block):
+    def feed(self, block: np.ndarray) -> Iterator[Excerpt]:
         """Excerpts that end in this block."""
-        if self.filter_sections is None:
+        if self.n_fed == 0:
             self.filter_sections = signal.butter(2, BAND, btype="bandpass", fs=self.rate, output="sos")
             # as if the channels had always had their first value: an offset is no impact
             offset = np.median(block, axis=1)[None, :, None]
@@ -112,12 +137,12 @@ class _PassageCutter:
                 self.passage_levels.clear()
         self._drop_blocks()
 
-    def end(self):
+    def end(self) -> Iterator[Excerpt]:
         """The excerpt that the end of the record cuts off, if there is one."""
         if self.first is not None:
             yield self._excerpt(self.first, self.n_fed, True)
 
-    def _step(self, sample, per_bin, is_loud):
+    def _step(self, sample: int, per_bin: int, is_loud: bool) -> Iterator[Excerpt]:
         margin = int(self.settings.margin * self.rate)
         if is_loud:
             if self.first is None:
@@ -133,7 +158,7 @@ class _PassageCutter:
             self.first = None
             self.passage_levels.clear()  # a train as long as the memory would be taken as quiet
 
-    def _excerpt(self, start, stop, is_whole):
+    def _excerpt(self, start: int, stop: int, is_whole: bool) -> Excerpt:
         start, blocks, sample = max(start, self.blocks_start), [], self.blocks_start
         for block in self.blocks:
             inside = slice(max(start - sample, 0), max(min(stop - sample, block.shape[1]), 0))
@@ -141,7 +166,7 @@ class _PassageCutter:
             sample += block.shape[1]
         return Excerpt(start, np.concatenate(blocks, axis=1), is_whole)
 
-    def _drop_blocks(self):
+    def _drop_blocks(self) -> None:
         """Remove blocks that no later excerpt can need."""
         margin = int((self.settings.margin + BIN_LENGTH) * self.rate)
         first_needed = self.first if self.first is not None else self.n_fed - margin - self.remainder.shape[1]

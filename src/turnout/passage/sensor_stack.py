@@ -8,6 +8,7 @@ Compute the level of each channel in a few bands on a coarse time grid, in which
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import fft, ndimage
@@ -25,6 +26,13 @@ from turnout.passage.axles import (
 from turnout.passage.kinematics import Motion, correlation_at, slowness_grid
 from turnout.passage.profile_decoding import decode_profile
 from turnout.records import Rejection
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from turnout.config.settings.passage import PassageSettings
+    from turnout.passage.axle_patterns import Pattern
+    from turnout.passage.result import Passage
 
 # Hz. Between ballast and railpad resonance the rail's vibration decays fastest along the track, above them slowest.
 # Three bands, each with its own logarithm, so that no resonance masks the position of the wheel.
@@ -49,14 +57,33 @@ class Levels:
 
     @property
     def n_bin(self) -> int:
+        """Number of bins."""
         return self.values.shape[1]
 
 
-def band_powers(samples, rate: float, step: float, bands=BANDS) -> np.ndarray:
+def band_powers(
+    samples: np.ndarray, rate: float, step: float, bands: Sequence[tuple[float, float]] = BANDS
+) -> np.ndarray:
     """(n_channel, n_band, n_bin) mean square of the band-passed samples in each bin. [(m/s²)²]
 
     One transform per channel. Each band has cosine edges of relative width 0.2. It is transformed back at four samples
     per bin, or more where the band needs it. There is no delay, and the cost is a third of that of filters.
+
+    Parameters
+    ----------
+    samples : (n_channel, n_sample) array of float
+        Acceleration. [m/s²]
+    rate : float
+        Sampling rate. [Hz]
+    step : float
+        Length of a bin. [s]
+    bands : sequence of (float, float)
+        Edges of the bands. [Hz]
+
+    Returns
+    -------
+    (n_channel, n_band, n_bin) array of float
+        Mean square. [(m/s²)²]
     """
     samples = np.atleast_2d(samples)
     per_bin = max(round(step * rate), 1)
@@ -75,17 +102,33 @@ def band_powers(samples, rate: float, step: float, bands=BANDS) -> np.ndarray:
     return powers
 
 
-def _edges(frequency, low, high, width=0.2):
+def _edges(frequency: np.ndarray, low: float, high: float, width: float = 0.2) -> np.ndarray:
     """Window that is 1 between ``low`` and ``high`` and falls to 0 over ``width`` of either edge."""
     rise = np.clip((frequency / low - 1 + width) / width, 0, 1)
     fall = np.clip((1 + width - frequency / high) / width, 0, 1)
     return np.sin(0.5 * np.pi * rise) ** 2 * np.sin(0.5 * np.pi * fall) ** 2
 
 
-def levels(samples, rate: float, step: float, bands=BANDS) -> Levels:
+def levels(samples: np.ndarray, rate: float, step: float, bands: Sequence[tuple[float, float]] = BANDS) -> Levels:
     """Levels of all channels; the quiet level of a band is the median of the quietest fifth of 50 ms blocks.
 
     A bin is the whole number of samples next to ``step``; the ``step`` of the result is its exact length.
+
+    Parameters
+    ----------
+    samples : (n_channel, n_sample) array of float
+        Acceleration. [m/s²]
+    rate : float
+        Sampling rate. [Hz]
+    step : float
+        Wanted length of a bin. [s]
+    bands : sequence of (float, float)
+        Edges of the bands. [Hz]
+
+    Returns
+    -------
+    Levels
+        One row per channel.
     """
     step = max(round(step * rate), 1) / rate
     powers = band_powers(samples, rate, step, bands)
@@ -103,8 +146,21 @@ def levels(samples, rate: float, step: float, bands=BANDS) -> Levels:
     return Levels(values - centre[:, None], step, np.maximum(scatter, 0.05), loud_power, amplitude)
 
 
-def quiet_level(powers, block: int) -> np.ndarray:
-    """(...,) level of the quietest fifth of blocks of bins; never zero."""
+def quiet_level(powers: np.ndarray, block: int) -> np.ndarray:
+    """(...,) level of the quietest fifth of blocks of bins; never zero.
+
+    Parameters
+    ----------
+    powers : (..., n_bin) array of float
+        Mean squares. [(m/s²)²]
+    block : int
+        Bins of a block.
+
+    Returns
+    -------
+    (...) array of float
+        Quiet power. [(m/s²)²]
+    """
     n = max(powers.shape[-1] // block, 1)
     blocks = powers[..., : n * block].reshape(*powers.shape[:-1], n, -1).mean(axis=-1)
     level = np.quantile(blocks, 0.1, axis=-1)
@@ -126,8 +182,19 @@ class SensorEnvelopes:
     begin: float
     end: float
 
-    def select(self, rows) -> SensorEnvelopes:
-        """The envelopes of some of the sensors."""
+    def select(self, rows: Sequence[int] | np.ndarray) -> SensorEnvelopes:
+        """The envelopes of some of the sensors.
+
+        Parameters
+        ----------
+        rows : sequence of int
+            Rows of the sensors.
+
+        Returns
+        -------
+        SensorEnvelopes
+            In the order of ``rows``.
+        """
         rows = np.asarray(rows, dtype=int)
         levels = self.levels
         selected = Levels(
@@ -137,7 +204,22 @@ class SensorEnvelopes:
 
 
 def feature_profiles(envelopes: SensorEnvelopes, motion: Motion) -> tuple[dict, float]:
-    """Feature name -> (profile (n,), noise), and the offset [m] of their first point behind the motion's origin."""
+    """Feature name -> (profile (n,), noise), and the offset [m] of their first point behind the motion's origin.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Envelopes of the sensors.
+    motion : Motion
+        Motion of the train.
+
+    Returns
+    -------
+    features : dict
+        "both", "deflection" and "level" -> (profile (n,), noise), both about 1 at a wheel. [-]
+    start : float
+        Offset of the first point of the profiles. [m]
+    """
     start, stop = _train_extent(envelopes, motion)
     step, positions = envelopes.levels.step, envelopes.positions
     level = level_feature(along_train(envelopes.levels.values, step, positions, motion, start, stop)).mean(axis=0)
@@ -160,6 +242,22 @@ def align_sensors(envelopes: SensorEnvelopes, motion: Motion, reach: float = 2.0
     """The motion with its speed corrected until all sensors' features coincide along the train.
 
     Each sensor's shift against the mean of the others [m], up to ``reach``, is regressed on its position.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Envelopes of the sensors.
+    motion : Motion
+        First estimate.
+    reach : float
+        Largest shift of a sensor in the first pass. [m]
+    passes : int
+        Largest number of passes.
+
+    Returns
+    -------
+    Motion
+        ``motion`` itself where all sensors are within 0.3 m.
     """
     travel = motion.direction * envelopes.positions
     travel = travel - travel.mean()
@@ -180,7 +278,7 @@ def align_sensors(envelopes: SensorEnvelopes, motion: Motion, reach: float = 2.0
     return motion
 
 
-def _sensor_shifts(envelopes, motion, reach):
+def _sensor_shifts(envelopes: SensorEnvelopes, motion: Motion, reach: float) -> np.ndarray:
     """(n_sensor,) shift [m] of each sensor's features against the mean of the others."""
     start, stop = _train_extent(envelopes, motion)
     step, positions = envelopes.levels.step, envelopes.positions
@@ -205,7 +303,7 @@ def _sensor_shifts(envelopes, motion, reach):
     return lags[best_lag] * GRID_STEP * (n - 1) / n
 
 
-def _train_extent(envelopes, motion):
+def _train_extent(envelopes: SensorEnvelopes, motion: Motion) -> tuple[float, float]:
     """Range along the train, from before the first to behind the last axle. [m]"""
     extent = [
         motion.distance(t) - motion.direction * x for t in (envelopes.begin, envelopes.end) for x in envelopes.positions
@@ -213,8 +311,27 @@ def _train_extent(envelopes, motion):
     return min(extent) - 12.0, max(extent) + 12.0
 
 
-def template_counts(envelopes: SensorEnvelopes, motion: Motion, patterns, n: int = 3) -> list[AxleFinding]:
-    """The axle counts of the rows of vehicles that collect most along the train, the best first."""
+def template_counts(
+    envelopes: SensorEnvelopes, motion: Motion, patterns: Sequence[Pattern], n: int = 3
+) -> list[AxleFinding]:
+    """The axle counts of the rows of vehicles that collect most along the train, the best first.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Envelopes of the sensors.
+    motion : Motion
+        Motion of the train.
+    patterns : sequence of Pattern
+        Axle patterns of known trains.
+    n : int
+        Largest number of counts.
+
+    Returns
+    -------
+    list of AxleFinding
+        The one with the largest contrast first.
+    """
     features, start = feature_profiles(envelopes, motion)
     audible_length = min(
         motion.distance(envelopes.end) - motion.distance(envelopes.begin) - np.ptp(envelopes.positions), 2000.0
@@ -226,8 +343,23 @@ def template_counts(envelopes: SensorEnvelopes, motion: Motion, patterns, n: int
     return sorted((o for o in candidates if o is not None), key=lambda o: -o.contrast)[:n]
 
 
-def axle_counts(envelopes: SensorEnvelopes, motion: Motion, settings) -> list[AxleFinding]:
-    """Candidate axle counts of all features, the one with the largest contrast first."""
+def axle_counts(envelopes: SensorEnvelopes, motion: Motion, settings: PassageSettings) -> list[AxleFinding]:
+    """Candidate axle counts of all features, the one with the largest contrast first.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Envelopes of the sensors.
+    motion : Motion
+        Motion of the train.
+    settings : PassageSettings
+        Least spacing and height of the axles.
+
+    Returns
+    -------
+    list of AxleFinding
+        The one with the largest contrast first.
+    """
     features, start = feature_profiles(envelopes, motion)
     candidates = []
     for feature, (profile, noise) in features.items():
@@ -240,7 +372,7 @@ MIN_CORRELATION = 0.25  # least correlation of the residual between sensors
 MIN_LEVEL_SHARE = 0.1  # least level of the second train along its own motion, in half of the sensors, over the first's
 
 
-def second_train(envelopes, passage, settings):
+def second_train(envelopes: SensorEnvelopes, passage: Passage, settings: PassageSettings) -> list[Rejection]:
     """Finding "two_trains" where the residual of the known motion moves coherently in another way.
 
     The common level of all sensors along the known train is subtracted from each: the lower median. A second train
@@ -248,14 +380,29 @@ def second_train(envelopes, passage, settings):
     the crossing's nose, stays too, at the sensors beside it or at all at one moment. So half of the sensors must
     record the second train at a tenth of the first one's level, each at its own time. Needs three sensors, else there
     is no finding.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Envelopes of the sensors.
+    passage : Passage
+        The first train.
+    settings : PassageSettings
+        Slowest and fastest train.
+
+    Returns
+    -------
+    list of Rejection
+        "two_trains", or empty.
     """
     if len(envelopes.positions) < 3:
         return []
-    residual = without_train(envelopes, passage.motion)
+    motion = passage.train_motion
+    residual = without_train(envelopes, motion)
     slowness = slowness_grid(settings)
     correlations = correlation_at(np.append(slowness, 0.0), residual, envelopes.levels.step, envelopes.positions)
     correlation, simultaneous = correlations[:-1], float(correlations[-1])
-    own_slowness = passage.motion.direction / passage.motion.speed
+    own_slowness = motion.direction / motion.speed
     is_other = np.abs(slowness - own_slowness) > 0.15 * abs(own_slowness)
     own_correlation = correlation[~is_other].max(initial=0.0)
     peak = int(np.argmax(np.where(is_other, correlation, -np.inf)))
@@ -264,21 +411,20 @@ def second_train(envelopes, passage, settings):
         return []
     direction = 1 if slowness[peak] > 0 else -1
     second = Motion(1.0 / abs(slowness[peak]), 0.0, 0.0, direction)
-    first_level = _shared_level(envelopes, np.clip(_smooth_levels(envelopes), 0.0, None), passage.motion)
+    first_level = _shared_level(envelopes, np.clip(_smooth_levels(envelopes), 0.0, None), motion)
     if _shared_level(envelopes, residual, second) < MIN_LEVEL_SHARE * first_level:
         return []
     speed = KMH / slowness[peak]
-    direction = "facing" if speed > 0 else "trailing"
-    text = f"another train at about {abs(speed):.0f} km/h, {direction}"
+    text = f"another train at about {abs(speed):.0f} km/h, {'facing' if speed > 0 else 'trailing'}"
     return [Rejection("two_trains", strength, MIN_CORRELATION, text)]
 
 
-def _smooth_levels(envelopes):
+def _smooth_levels(envelopes: SensorEnvelopes) -> np.ndarray:
     """Levels, smoothed over 20 ms."""
     return ndimage.uniform_filter1d(envelopes.levels.values, max(round(0.02 / envelopes.levels.step), 1), axis=1)
 
 
-def _shared_level(envelopes, values, motion) -> float:
+def _shared_level(envelopes: SensorEnvelopes, values: np.ndarray, motion: Motion) -> float:
     """Sum over the time of the lower median over the sensors, each shifted by the motion. [s]"""
     step, end = envelopes.levels.step, values.shape[1] * envelopes.levels.step
     offsets = [motion.distance(t) - motion.direction * x for t in (0.0, end) for x in envelopes.positions]
@@ -286,8 +432,21 @@ def _shared_level(envelopes, values, motion) -> float:
     return float(rows[(len(rows) - 1) // 2].sum() * GRID_STEP / motion.speed)
 
 
-def without_train(envelopes, motion) -> np.ndarray:
-    """(n_sensor, n_bin) levels above the sensors' common level along the train, smoothed over 20 ms, at least 0."""
+def without_train(envelopes: SensorEnvelopes, motion: Motion) -> np.ndarray:
+    """(n_sensor, n_bin) levels above the sensors' common level along the train, smoothed over 20 ms, at least 0.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Envelopes of the sensors.
+    motion : Motion
+        Motion of the train.
+
+    Returns
+    -------
+    (n_sensor, n_bin) array of float
+        Residual levels. [nepers of power]
+    """
     step, positions = envelopes.levels.step, envelopes.positions
     values = _smooth_levels(envelopes)
     extent = [motion.distance(t) - motion.direction * x for t in (envelopes.begin, envelopes.end) for x in positions]

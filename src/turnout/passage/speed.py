@@ -6,6 +6,7 @@ For a train that brakes or accelerates, the records of its first and its second 
 from __future__ import annotations
 
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,8 +15,13 @@ from turnout.passage.channel_checks import half_shifts
 from turnout.passage.kinematics import Motion
 from turnout.passage.result import SpeedFinding
 
+if TYPE_CHECKING:
+    from turnout.passage.sensor_stack import SensorEnvelopes
 
-def slowness_from_sensors(times, positions, direction: int, position_error: float, limit: float):
+
+def slowness_from_sensors(
+    times: np.ndarray, positions: np.ndarray, direction: int, position_error: float, limit: float
+) -> tuple[float, float, float, float, float, np.ndarray]:
     r"""Slowness at the mean time [s/m], its change [s/m per s], and their standard errors.
 
     .. math:: t_{ij} = \tau_j + \frac{2 d\,x_i}{v_j + \sqrt{v_j^2 + 2 a\,d\,x_i}} + b_i q, \qquad
@@ -31,8 +37,23 @@ def slowness_from_sensors(times, positions, direction: int, position_error: floa
         nan where a sensor has no time. [s]
     positions : (n_sensor,) array of float
         [m]
+    direction : int
+        +1 for a train towards larger positions, -1 against them.
+    position_error : float
+        Least standard deviation of the offsets b_i. [m]
     limit : float
         Four standard deviations of the prior of the acceleration: two sensors alone leave it open. [m/s²]
+
+    Returns
+    -------
+    q, change : float
+        Slowness at the mean time [s/m], and its change [s/m per s].
+    q_se, change_se : float
+        Their standard errors.
+    time : float
+        Mean time. [s]
+    residual : (n_sensor, n_axle) array of float
+        Times less the fitted ones, nan where there is no time. [s]
     """
     times, travel = np.asarray(times, float), direction * np.asarray(positions, float)
     travel = travel - travel.mean()
@@ -81,26 +102,63 @@ def slowness_from_sensors(times, positions, direction: int, position_error: floa
     )
 
 
-def _travel_times(q, change, travel, elapsed):
+def _travel_times(q: float, change: float, travel: np.ndarray, elapsed: np.ndarray) -> np.ndarray:
     """Travel times from the middle of the sensors to positions ``travel``, at a slowness ``q`` with a steady change."""
     acceleration = -change / q**2
     speed = np.maximum(1.0 - change / q * elapsed, 0.2) / q
     return 2.0 * travel / (speed + np.sqrt(np.maximum(speed**2 + 2.0 * acceleration * travel, 0.0)))
 
 
-def residual_by_sensor(times, residual, sensor, axle):
-    """(n_sensor, n_axle) residuals [s], nan where there is no time."""
+def residual_by_sensor(times: np.ndarray, residual: np.ndarray, sensor: np.ndarray, axle: np.ndarray) -> np.ndarray:
+    """(n_sensor, n_axle) residuals [s], nan where there is no time.
+
+    Parameters
+    ----------
+    times : (n_sensor, n_axle) array of float
+        Times, for their shape. [s]
+    residual : (n,) array of float
+        Residuals. [s]
+    sensor, axle : (n,) array of int
+        Row and column of each residual.
+
+    Returns
+    -------
+    (n_sensor, n_axle) array of float
+        The residuals in a table. [s]
+    """
     table = np.full(np.shape(times), np.nan)
     table[sensor, axle] = residual
     return table
 
 
-def combine_speeds(from_sensors, from_type, at: float) -> SpeedFinding:
+def combine_speeds(
+    from_sensors: tuple[float, float, float, float, float] | None,
+    from_type: tuple[float, float, float, float, float] | None,
+    at: float,
+) -> SpeedFinding:
     """Speed at the time ``at`` [s] from both sources, weighted by their variances.
 
     Each source is (speed, se, acceleration, acceleration se, time of its speed) or None.
+
+    Parameters
+    ----------
+    from_sensors, from_type : tuple of five float, or None
+        Speed and its standard error [m/s], acceleration and its standard error [m/s²], and time of the speed [s]; at
+        least one of the two sources.
+    at : float
+        Time of the result. [s]
+
+    Returns
+    -------
+    SpeedFinding
+        Axle spacing alone where both differ by more than three standard errors.
+
+    Raises
+    ------
+    ValueError
+        Both sources are None.
     """
-    at_time = []
+    at_time: list[tuple[float, float, float, float] | None] = []
     for source in (from_sensors, from_type):
         if source is None:
             at_time.append(None)
@@ -109,8 +167,10 @@ def combine_speeds(from_sensors, from_type, at: float) -> SpeedFinding:
         at_time.append((v + a * (at - time), float(np.hypot(se, a_se * (at - time))), a, a_se))
     sensors, spacing = at_time
     if sensors is None or spacing is None:
-        v, se, a, a_se = sensors or spacing
-        return SpeedFinding(v, se, a, a_se, "sensors" if sensors else "axle spacing", None, at)
+        single = spacing if sensors is None else sensors
+        if single is None:
+            raise ValueError("a speed needs at least one source")
+        return SpeedFinding(*single, "axle spacing" if sensors is None else "sensors", None, at)
     difference = (sensors[0] - spacing[0]) / np.hypot(sensors[1], spacing[1])
     if abs(difference) > 3.0:
         # distances in a train are known better than the offset between sensor and wheel
@@ -120,9 +180,21 @@ def combine_speeds(from_sensors, from_type, at: float) -> SpeedFinding:
     return SpeedFinding(v, se, a, a_se, "both", float(difference), at)
 
 
-def weighted_mean(first, second) -> tuple[float, float]:
+def weighted_mean(first: tuple[float, float], second: tuple[float, float]) -> tuple[float, float]:
     """Mean of two (value, standard error) by inverse variance.
 
+    Parameters
+    ----------
+    first, second : (float, float)
+        Value and standard error. [any unit]
+
+    Returns
+    -------
+    mean, se : float
+        [same unit]
+
+    Examples
+    --------
     >>> weighted_mean((10.0, 1.0), (20.0, 1e9))
     (10.0, 1.0)
     """
@@ -132,7 +204,22 @@ def weighted_mean(first, second) -> tuple[float, float]:
 
 
 def motion_of(finding: SpeedFinding, start: float, direction: int) -> Motion:
-    """Motion with the speed of ``finding``, first axle at the origin at ``start`` [s]."""
+    """Motion with the speed of ``finding``, first axle at the origin at ``start`` [s].
+
+    Parameters
+    ----------
+    finding : SpeedFinding
+        Speed and acceleration.
+    start : float
+        Time of the first axle at the origin. [s]
+    direction : int
+        +1 for a train towards larger positions, -1 against them.
+
+    Returns
+    -------
+    Motion
+        With the speed at ``start``.
+    """
     return Motion(finding.at(start), start, finding.acceleration, direction)
 
 
@@ -140,8 +227,8 @@ MAX_STEADY_SHIFT = 0.15  # m, largest mean difference between the halves of a st
 MAX_PASSES, SLOPE_TOLERANCE = 6, 2e-3  # largest number of passes; slope at which they have converged
 
 
-def with_acceleration(envelopes, motion: Motion, limit: float) -> Motion:
-    r"""The motion with the acceleration that aligns all sensors in both halves of the train.
+def with_acceleration(envelopes: SensorEnvelopes, motion: Motion, limit: float) -> Motion:
+    """The motion with the acceleration that aligns all sensors in both halves of the train.
 
     If the train runs at v and is assumed to run at v', a sensor x metres on records it :math:`x (v'/v - 1)` metres too
     far back. The slope over the sensors gives the speed of each half. The acceleration is accepted where it more than
@@ -150,11 +237,16 @@ def with_acceleration(envelopes, motion: Motion, limit: float) -> Motion:
     Parameters
     ----------
     envelopes : SensorEnvelopes
-        Of three sensors or more, else the motion stays as it is.
+        Envelopes of three sensors or more, else the motion stays as it is.
     motion : Motion
         At a steady speed.
     limit : float
-        Of accelerations. [m/s²]
+        Largest acceleration. [m/s²]
+
+    Returns
+    -------
+    Motion
+        ``motion`` itself where the acceleration is not accepted.
     """
     if len(envelopes.positions) < 3:
         return motion
@@ -173,19 +265,19 @@ def with_acceleration(envelopes, motion: Motion, limit: float) -> Motion:
     return adjusted if _half_spread(shifts) < 0.5 * spread else motion
 
 
-def _half_spread(shifts) -> float:
+def _half_spread(shifts: np.ndarray) -> float:
     """Mean over the sensors of the difference between the halves, against the median sensor. [m]"""
     change = shifts[:, 1] - shifts[:, 0]
     return float(np.mean(np.abs(change - np.median(change))))
 
 
-def _slope(travel, shift) -> float:
+def _slope(travel: np.ndarray, shift: np.ndarray) -> float:
     """Median slope over all pairs of sensors (Theil and Sen), except pairs at one position."""
     pairs = [(i, j) for i, j in combinations(range(len(travel)), 2) if abs(travel[j] - travel[i]) > 0.5]
     return float(np.median([(shift[j] - shift[i]) / (travel[j] - travel[i]) for i, j in pairs])) if pairs else 0.0
 
 
-def _with_half_slopes(motion, envelopes, slopes) -> Motion:
+def _with_half_slopes(motion: Motion, envelopes: SensorEnvelopes, slopes: np.ndarray) -> Motion:
     """The motion with the speeds in the middles of both halves corrected by ``slopes``, by which they are too high."""
     begin, end = motion.distance(envelopes.begin), motion.distance(envelopes.end)
     times = motion.time(begin + np.array([0.25, 0.75]) * (end - begin))

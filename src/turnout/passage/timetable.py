@@ -24,6 +24,20 @@ def listed_trains(rows: Sequence[Mapping[str, str]]) -> tuple[tuple[ListedTrain,
 
     Columns: passed_at_utc (needed), train_type, speed_kmh, axle_load_t, track, n_axles.
 
+    Parameters
+    ----------
+    rows : sequence of mappings
+        Rows of trains.csv as text.
+
+    Returns
+    -------
+    trains : tuple of ListedTrain
+        In order of time.
+    errors : tuple of str
+        One sentence per unusable row.
+
+    Examples
+    --------
     >>> rows = [{"passed_at_utc": "2024-05-13T10:00:00Z", "speed_kmh": "160"}, {"passed_at_utc": "noon"}]
     >>> found, wrong = listed_trains(rows)
     >>> found[0].speed, wrong
@@ -38,7 +52,7 @@ def listed_trains(rows: Sequence[Mapping[str, str]]) -> tuple[tuple[ListedTrain,
     return tuple(sorted(trains, key=lambda t: (t.passed_at, t.train_type or ""))), tuple(errors)
 
 
-def _listed_train(row) -> ListedTrain:
+def _listed_train(row: Mapping[str, str]) -> ListedTrain:
     text = row.get("passed_at_utc") or ""
     try:
         moment = datetime.fromisoformat(text.removesuffix("Z"))
@@ -49,14 +63,15 @@ def _listed_train(row) -> ListedTrain:
     numbers = {}
     for column, name, low, high in (("speed_kmh", "speed", 1, 400), ("axle_load_t", "axle_load", 0.1, 60)):
         numbers[name] = _number(row.get(column), column, low, high)
-    n_axles = _number(row.get("n_axles"), "n_axles", 1, 2000)
+    count = _number(row.get("n_axles"), "n_axles", 1, 2000)
+    n_axles = None if count is None else int(count)
     track = row.get("track") or None
     if track not in (None, "main", "diverging"):
         raise ValueError(f"track {track!r} is neither main nor diverging")
-    return ListedTrain(moment, row.get("train_type") or None, track=track, n_axles=n_axles and int(n_axles), **numbers)
+    return ListedTrain(moment, row.get("train_type") or None, track=track, n_axles=n_axles, **numbers)
 
 
-def _number(text, column, low, high):
+def _number(text: str | None, column: str, low: float, high: float) -> float | None:
     if not text:
         return None
     value = float(text)
@@ -69,6 +84,22 @@ def listed_for(moment: datetime, n_axles: int, trains: Sequence[ListedTrain], to
     """The listed train nearest in time to ``moment``, within ``tolerance`` [s].
 
     None where it has another number of axles, or where a second one fits nearly as well.
+
+    Parameters
+    ----------
+    moment : datetime
+        Time of the passage, naive UTC.
+    n_axles : int
+        Axles of the passage.
+    trains : sequence of ListedTrain
+        Trains to choose from.
+    tolerance : float
+        Largest difference in time. [s]
+
+    Returns
+    -------
+    ListedTrain or None
+        The train, if it is certain.
     """
     near = [(abs((t.passed_at - moment).total_seconds()), t) for t in trains]
     near = sorted((x for x in near if x[0] <= tolerance), key=lambda x: x[0])

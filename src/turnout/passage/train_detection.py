@@ -3,17 +3,39 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import ndimage
 
 from turnout.passage.sensor_stack import SensorEnvelopes, levels
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+
 QUIET_BLOCK = 0.05  # s over which a level is averaged
 
 
-def sensor_envelopes(samples, rate: float, positions, step: float) -> SensorEnvelopes | None:
-    """``SensorEnvelopes`` of the channels (n_sensor, n_sample), None where nothing is louder than the quiet parts."""
+def sensor_envelopes(samples: np.ndarray, rate: float, positions: np.ndarray, step: float) -> SensorEnvelopes | None:
+    """``SensorEnvelopes`` of the channels (n_sensor, n_sample), None where nothing is louder than the quiet parts.
+
+    Parameters
+    ----------
+    samples : (n_sensor, n_sample) array of float
+        Acceleration without offset. [m/s²]
+    rate : float
+        Sampling rate. [Hz]
+    positions : (n_sensor,) array of float
+        Positions of the sensors. [m]
+    step : float
+        Wanted length of a bin. [s]
+
+    Returns
+    -------
+    SensorEnvelopes or None
+        On one time grid.
+    """
     band_levels = levels(samples, rate, step)
     step, n = band_levels.step, band_levels.n_bin
     per_bin = round(step * rate)
@@ -26,11 +48,25 @@ def sensor_envelopes(samples, rate: float, positions, step: float) -> SensorEnve
     return SensorEnvelopes(band_levels, slow, np.asarray(positions, float), bins[0] * step, (bins[-1] + 1) * step)
 
 
-def audible_bins(level, step: float, min_ratio: float = 8.0) -> np.ndarray:
+def audible_bins(level: np.ndarray, step: float, min_ratio: float = 8.0) -> np.ndarray:
     """(n_bin,) bool: the level (n_bin,) over 50 ms is above a seventh of its range.
 
     All False where that range is below ``min_ratio`` times the scatter of neighbouring blocks, or below half a neper:
     then only noise was recorded.
+
+    Parameters
+    ----------
+    level : (n_bin,) array of float
+        Level of a sensor, or the mean of several. [nepers of power]
+    step : float
+        Length of a bin. [s]
+    min_ratio : float
+        Least range of the level over its scatter. [-]
+
+    Returns
+    -------
+    (n_bin,) array of bool
+        True where the train is audible.
     """
     width = max(round(QUIET_BLOCK / step), 1)
     smooth = ndimage.uniform_filter1d(level, width)
@@ -43,8 +79,21 @@ def audible_bins(level, step: float, min_ratio: float = 8.0) -> np.ndarray:
     return smooth > low + (high - low) / 7.0
 
 
-def restrict_to(envelopes: SensorEnvelopes, rows) -> SensorEnvelopes:
-    """Only the sensors ``rows``, with the begin and end of the train in their envelopes."""
+def restrict_to(envelopes: SensorEnvelopes, rows: np.ndarray) -> SensorEnvelopes:
+    """Only the sensors ``rows``, with the begin and end of the train in their envelopes.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Envelopes of the sensors.
+    rows : sequence of int
+        Rows of the sensors.
+
+    Returns
+    -------
+    SensorEnvelopes
+        Begin and end as before where nothing is audible.
+    """
     selected = envelopes.select(rows)
     bins = np.flatnonzero(audible_bins(selected.levels.values.mean(axis=0), selected.levels.step))
     if bins.size == 0:
@@ -53,7 +102,18 @@ def restrict_to(envelopes: SensorEnvelopes, rows) -> SensorEnvelopes:
 
 
 def loudness(envelopes: SensorEnvelopes) -> np.ndarray:
-    """(n_sensor,) level over 50 ms that a tenth of the passage exceeds; 0 where a sensor records only noise."""
+    """(n_sensor,) level over 50 ms that a tenth of the passage exceeds; 0 where a sensor records only noise.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Envelopes of the sensors.
+
+    Returns
+    -------
+    (n_sensor,) array of float
+        Level above the quiet one. [nepers of power]
+    """
     step = envelopes.levels.step
     width = max(round(QUIET_BLOCK / step), 1)
     passage = slice(int(envelopes.begin / step), max(int(envelopes.end / step), 1))
@@ -68,6 +128,16 @@ def audible_sensors(envelopes: SensorEnvelopes) -> np.ndarray:
 
     A sensor with a tenth of the amplitude of the best third belongs to the neighbouring track; it is not a less
     sensitive sensor.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Envelopes of the sensors.
+
+    Returns
+    -------
+    (n,) array of int
+        Rows, increasing.
     """
     is_loud = loudness(envelopes) > 0.1
     if not is_loud.any():
@@ -76,16 +146,32 @@ def audible_sensors(envelopes: SensorEnvelopes) -> np.ndarray:
     return np.flatnonzero(is_loud & (power >= 0.01 * np.quantile(power[is_loud], 0.7, method="higher")))
 
 
-def train_track(envelopes: SensorEnvelopes, tracks) -> tuple[str, float]:
+def train_track(envelopes: SensorEnvelopes, tracks: Sequence[str]) -> tuple[str, float]:
     """("main" | "diverging" | "unknown", difference): the track whose own sensors are the louder ones.
 
     ``difference`` is in nepers of power; at least twice the amplitude, 1.4 nepers, is required. With sensors of one
     track only, that track is taken if they are not much fainter than the sensors of both tracks. If they record
     nothing, the other track is taken.
+
+    Parameters
+    ----------
+    envelopes : SensorEnvelopes
+        Envelopes of the sensors.
+    tracks : sequence of str
+        "main", "diverging" or "both" of each sensor.
+
+    Returns
+    -------
+    track : str
+        "main", "diverging" or "unknown".
+    difference : float
+        Difference between the tracks. [nepers of power]
     """
-    tracks, is_audible = np.asarray(tracks), loudness(envelopes) > 0.1
+    track_names, is_audible = np.asarray(tracks), loudness(envelopes) > 0.1
     power = np.where(is_audible, np.log(np.maximum(envelopes.levels.loud_power, 1e-300)), -np.inf)
-    mean = {name: power[tracks == name].max() for name in ("main", "diverging", "both") if np.any(tracks == name)}
+    mean = {
+        name: power[track_names == name].max() for name in ("main", "diverging", "both") if np.any(track_names == name)
+    }
     if "main" in mean and "diverging" in mean:
         difference = _difference(mean["main"], mean["diverging"])
         if abs(difference) < 1.4:
@@ -100,6 +186,6 @@ def train_track(envelopes: SensorEnvelopes, tracks) -> tuple[str, float]:
     return only, difference
 
 
-def _difference(first, second) -> float:
+def _difference(first: float, second: float) -> float:
     """Difference of two logarithms, either of which may be that of silence."""
     return 0.0 if first == second else float(np.clip(first - second, -20.0, 20.0))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import stats
@@ -10,6 +11,12 @@ from scipy import stats
 from turnout.constants import KMH
 from turnout.passage.axle_patterns import Vehicle, offsets
 from turnout.passage.vehicle_sequence import closest_row
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from turnout.config.settings.passage import PassageSettings
+    from turnout.passage.axle_patterns import Pattern
 
 UNKNOWN = "unknown"
 # m, axle spacings of a train without template: inside bogies 1.8 to 3.2 m, between them up to 22 m.
@@ -40,6 +47,13 @@ class TypeFinding:
     middle_speed: float | None = None
     middle_speed_se: float | None = None
 
+    @property
+    def middle_motion(self) -> tuple[float, float, float, float]:
+        """Speed and its standard error in the middle, acceleration and its standard error; nan where not known."""
+        values = self.middle_speed, self.middle_speed_se, self.acceleration, self.acceleration_se
+        speed, speed_se, acceleration, acceleration_se = (float("nan") if v is None else v for v in values)
+        return speed, speed_se, acceleration, acceleration_se
+
 
 @dataclass(frozen=True)
 class _Candidate:
@@ -52,7 +66,9 @@ class _Candidate:
     motion: tuple
 
 
-def axle_times_to_motion(times, positions, sigma: float, limit: float):
+def axle_times_to_motion(
+    times: np.ndarray, positions: np.ndarray, sigma: float, limit: float
+) -> tuple[np.ndarray, np.ndarray]:
     r"""Speed and acceleration at the first axle from times and known distances, with their covariance.
 
     .. math:: d = u_0 + v t + \tfrac12 a t^2
@@ -60,6 +76,24 @@ def axle_times_to_motion(times, positions, sigma: float, limit: float):
     Most trains pass a turnout at a steady speed: the acceleration is 0 ± 0.02 m/s² with prior probability 0.8, else
     0 ± ``limit`` / 4. Both fits are weighted by their evidence; the covariance includes the difference between them.
     ``sigma`` [m] is the error of one axle's position. Returns ((v, a), covariance (2, 2)).
+
+    Parameters
+    ----------
+    times : (n_axle,) array of float
+        Times of the axles at one position. [s]
+    positions : (n_axle,) array of float
+        d, distances behind the first axle. [m]
+    sigma : float
+        Standard deviation of one axle's position. [m]
+    limit : float
+        Four standard deviations of the wide prior of the acceleration. [m/s²]
+
+    Returns
+    -------
+    motion : (2,) array of float
+        Speed [m/s] and acceleration [m/s²].
+    covariance : (2, 2) array of float
+        Covariance of both.
     """
     t = np.asarray(times, dtype=float) - times[0]
     design = np.column_stack([np.ones_like(t), t, 0.5 * t**2]) / sigma
@@ -79,11 +113,38 @@ def axle_times_to_motion(times, positions, sigma: float, limit: float):
     return mean, total_covariance
 
 
-def find_type(times, patterns, settings, speed=None, speed_se=None, position_se: float = 0.03) -> TypeFinding:
+def find_type(
+    times: np.ndarray,
+    patterns: Sequence[Pattern],
+    settings: PassageSettings,
+    speed: float | None = None,
+    speed_se: float | None = None,
+    position_se: float = 0.03,
+) -> TypeFinding:
     """Template that the axle ``times`` (n_axle,) [s] fit, at any speed, or at ``speed`` ± ``speed_se`` [m/s].
 
     ``position_se`` [m] is the error of one axle's position along the rail. A type is named if its posterior probability
     reaches ``settings.type_probability`` and its deviations pass a chi-squared test at 0.001; else "unknown".
+
+    Parameters
+    ----------
+    times : (n_axle,) array of float
+        Times of the axles at one position. [s]
+    patterns : sequence of Pattern
+        Axle patterns of known trains.
+    settings : PassageSettings
+        Tolerance of the templates, probabilities, limits of speed and acceleration.
+    speed : float, optional
+        Speed at the first axle, if it is known. [m/s]
+    speed_se : float, optional
+        Its standard error. [m/s]
+    position_se : float
+        Standard error of one axle's position. [m]
+
+    Returns
+    -------
+    TypeFinding
+        "unknown" for fewer than three axles.
     """
     times = np.asarray(times, dtype=float)
     if len(times) < 3:
@@ -97,7 +158,14 @@ def find_type(times, patterns, settings, speed=None, speed_se=None, position_se:
     return _decide_type(times, candidates, len({p.type for p in patterns}), settings, speed, sigma)
 
 
-def _decide_type(times, candidates, n_type, settings, speed, sigma):
+def _decide_type(
+    times: np.ndarray,
+    candidates: dict[str, _Candidate],
+    n_type: int,
+    settings: PassageSettings,
+    speed: float | None,
+    sigma: float,
+) -> TypeFinding:
     log_posterior = {
         name: c.evidence + np.log((1 - settings.unknown_prior) / max(n_type, 1)) for name, c in candidates.items()
     }
@@ -130,11 +198,21 @@ def _decide_type(times, candidates, n_type, settings, speed, sigma):
     )
 
 
-def unknown_evidence(spacing) -> float:
+def unknown_evidence(spacing: np.ndarray) -> float:
     """Log density of axle spacings [m] of a train that has no template.
 
     Short spacings (in a bogie) and long ones form a Markov chain: a short one is nearly always followed by a long one.
     This distinguishes bogies from axles where the speed is not known.
+
+    Parameters
+    ----------
+    spacing : (n_axle - 1,) array of float
+        Distances between neighbouring axles. [m]
+
+    Returns
+    -------
+    float
+        Log density. [nat]
     """
     short = np.asarray(spacing) < MIN_LONG_SPACING
     density = np.where(
@@ -150,7 +228,14 @@ def unknown_evidence(spacing) -> float:
     return float(np.sum(np.log(density)) + np.sum(np.log(transitions)) + first)
 
 
-def _fit_pattern(times, pattern, settings, speed, speed_se, sigma):
+def _fit_pattern(
+    times: np.ndarray,
+    pattern: Pattern,
+    settings: PassageSettings,
+    speed: float | None,
+    speed_se: float | None,
+    sigma: float,
+) -> _Candidate | None:
     """Best row of one pattern: a coarse search over speed and acceleration, then a fine one."""
     low, high = pattern.axle_counts()
     if not low <= len(times) <= high:
@@ -163,7 +248,9 @@ def _fit_pattern(times, pattern, settings, speed, speed_se, sigma):
         starts = _start_values(times, pattern, settings, speed, speed_se)
         rows = [closest_row(np.diff(v * elapsed + 0.5 * a * elapsed**2), pattern, 5.0 * sigma) for v, a in starts]
         row = min((r for r in rows if r), key=lambda r: r[0], default=None)
-        for _ in range(3 if row else 0):
+        for _ in range(3):
+            if row is None:
+                break
             (v, a), _ = axle_times_to_motion(times, offsets(row[1]), sigma, settings.acceleration_limit)
             refined = closest_row(np.diff(v * elapsed + 0.5 * a * elapsed**2), pattern, 2.0 * sigma)
             if refined is None or refined[1] == row[1]:
@@ -172,7 +259,14 @@ def _fit_pattern(times, pattern, settings, speed, speed_se, sigma):
     return _candidate(times, pattern.type, row, settings, speed, speed_se, sigma) if row else None
 
 
-def _is_plausible(times, pattern, row, settings, speed, speed_se):
+def _is_plausible(
+    times: np.ndarray,
+    pattern: Pattern,
+    row: tuple[float, tuple[Vehicle, ...], float] | None,
+    settings: PassageSettings,
+    speed: float,
+    speed_se: float,
+) -> bool:
     """Whether the known speed allows the pattern, by a cheap test.
 
     It compares the length of a fixed row, or the first wheelbase of a free one.
@@ -186,7 +280,15 @@ def _is_plausible(times, pattern, row, settings, speed, speed_se):
     return any(abs(speed * gap - wheelbase) < 4 * speed_se * gap + 0.1 * wheelbase + 0.2 for wheelbase in wheelbases)
 
 
-def _candidate(times, type_, row, settings, speed, speed_se, sigma):
+def _candidate(
+    times: np.ndarray,
+    type_: str,
+    row: tuple[float, tuple[Vehicle, ...], float],
+    settings: PassageSettings,
+    speed: float | None,
+    speed_se: float | None,
+    sigma: float,
+) -> _Candidate | None:
     """Motion, residual and evidence of one row of vehicles."""
     _, vehicles, choices = row
     positions = offsets(vehicles)
@@ -211,7 +313,7 @@ def _candidate(times, type_, row, settings, speed, speed_se, sigma):
     return _Candidate(type_, evidence, p_value, vehicles, positions, rms, ((v, a), covariance))
 
 
-def _variance_inflation(residual) -> float:
+def _variance_inflation(residual: np.ndarray) -> float:
     r"""Factor on a variance for residuals (n,) with autocorrelation: :math:`(1 + \rho) / (1 - \rho)`.
 
     >>> _variance_inflation(np.array([1.0, -1.0] * 4)), round(_variance_inflation(np.repeat([1.0, -1.0], 4)), 1)
@@ -224,7 +326,9 @@ def _variance_inflation(residual) -> float:
     return (1.0 + rho) / (1.0 - rho)
 
 
-def _start_values(times, pattern, settings, speed, speed_se):
+def _start_values(
+    times: np.ndarray, pattern: Pattern, settings: PassageSettings, speed: float | None, speed_se: float | None
+) -> Iterator[tuple[float, float]]:
     """Start values of speed and acceleration, fine enough for the coarse tolerance over the whole train."""
     spacing = np.diff(times)
     if speed is not None:

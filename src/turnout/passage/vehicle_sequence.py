@@ -6,15 +6,22 @@ row of a pattern that is closest to given axle spacings.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from turnout.passage.axle_patterns import Pattern
 from turnout.passage.comb import COMB_STEP, LEAD_LENGTH, N_TAPS, Profiles
 
+if TYPE_CHECKING:
+    from turnout.passage.axle_patterns import Vehicle
+
 LENGTH_SLACK = 1  # grid steps that a vehicle may deviate: rounding of lengths, error of the speed
 
 
-def likeliest_row(profiles: Profiles, teeth, pattern: Pattern, first: float, reach: float = 30.0):
+def likeliest_row(
+    profiles: Profiles, teeth: np.ndarray, pattern: Pattern, first: float, reach: float = 30.0
+) -> tuple[tuple[Vehicle, ...], float] | None:
     r"""(row of vehicles, start [m]) of ``pattern`` with the smallest residual; None where there is none.
 
     .. math:: \|y - \sum_j k(s - d_j)\|^2 = \|y\|^2 - \sum_j \Bigl(2 m(d_j) - \sum_l a(d_j - d_l)\Bigr)
@@ -22,10 +29,28 @@ def likeliest_row(profiles: Profiles, teeth, pattern: Pattern, first: float, rea
     with m the correlation of profile and tooth and a that of the tooth with itself: terms of a vehicle, and of a
     vehicle and the one before it. The first axle is sought within ``reach`` metres of ``first``, both behind the
     beginning of the audible part. ``teeth`` (n_sensor, N_TAPS), ``profiles`` of one motion.
+
+    Parameters
+    ----------
+    profiles : Profiles
+        Records along the train for one motion.
+    teeth : (n_sensor, N_TAPS) array of float
+        What each sensor records of one wheel. [-]
+    pattern : Pattern
+        Axle pattern of a type of train.
+    first : float
+        Expected first axle, behind the beginning of the audible part. [m]
+    reach : float
+        Largest distance of the first axle from ``first``. [m]
+
+    Returns
+    -------
+    (tuple of Vehicle, float) or None
+        The row, and its first axle behind the beginning of the audible part [m].
     """
     values = profiles.values[:, 0]
-    match = sum(np.correlate(np.pad(v, N_TAPS // 2), k, "valid") for v, k in zip(values, teeth))
-    self_match = sum(np.correlate(np.pad(k, N_TAPS - 1), k, "valid") for k in teeth)
+    match = sum((np.correlate(np.pad(v, N_TAPS // 2), k, "valid") for v, k in zip(values, teeth)), np.zeros(1))
+    self_match = sum((np.correlate(np.pad(k, N_TAPS - 1), k, "valid") for k in teeth), np.zeros(1))
     n, gains = match.size, {}
     overlaps = _ToothOverlaps(self_match)
     for group in pattern.groups:
@@ -39,7 +64,7 @@ def likeliest_row(profiles: Profiles, teeth, pattern: Pattern, first: float, rea
             inside = slice(max(index - int(reach / COMB_STEP), 0), max(index + int(reach / COMB_STEP) + 1, 0))
             gain[inside] = gains[v.name][inside]
             layers.setdefault(node, {})[v.name] = (gain, ([None], np.zeros(n, int), np.zeros(n, int)), v)
-    best_end = (-np.inf, None)
+    best_end: tuple[float, tuple | None] = (-np.inf, None)
     for node in [(g, c) for g, group in enumerate(pattern.groups) for c in range(1, group.maximum + 1)]:
         for name, (score, _, v) in layers.get(node, {}).items():
             if not np.isfinite(score).any():
@@ -55,21 +80,21 @@ def likeliest_row(profiles: Profiles, teeth, pattern: Pattern, first: float, rea
 class _ToothOverlaps:
     """What overlapping teeth subtract: -a(distance) twice, between axles."""
 
-    def __init__(self, self_match):
+    def __init__(self, self_match: np.ndarray) -> None:
         self.distances = (np.arange(self_match.size) - N_TAPS + 1) * COMB_STEP
         self.values = self_match
 
-    def at(self, distance):
+    def at(self, distance: np.ndarray) -> np.ndarray:
         """Autocorrelation a of the tooth at ``distance`` [m]."""
         return np.interp(distance, self.distances, self.values, left=0.0, right=0.0)
 
-    def between(self, v, w):
+    def between(self, v: Vehicle, w: Vehicle) -> float:
         """Sum over all axles of ``v`` with those of ``w`` behind it."""
         distance = v.length + np.asarray(w.axles)[None] - np.asarray(v.axles)[:, None]
         return 2.0 * float(np.sum(self.at(distance)))
 
 
-def _vehicle_gain(match, v, overlaps):
+def _vehicle_gain(match: np.ndarray, v: Vehicle, overlaps: _ToothOverlaps) -> np.ndarray:
     """(n,) gain of vehicle ``v`` with its front coupler at each point of the grid."""
     grid = np.arange(match.size)
     total = np.zeros(match.size)
@@ -79,7 +104,16 @@ def _vehicle_gain(match, v, overlaps):
     return total - float(np.sum(overlaps.at(axles[:, None] - axles[None])))
 
 
-def _extend_rows(layers, node, successor, v, w, score, gain, overlaps):
+def _extend_rows(
+    layers: dict[tuple, dict],
+    node: tuple[int, int],
+    successor: tuple[int, int],
+    v: Vehicle,
+    w: Vehicle,
+    score: np.ndarray,
+    gain: np.ndarray,
+    overlaps: _ToothOverlaps,
+) -> None:
     """Couple ``w`` behind every row that ends with ``v``; of rows with the same end the better one stays."""
     n, length = score.size, round(v.length / COMB_STEP)
     reached, step = np.full(n, -np.inf), np.zeros(n, dtype=int)
@@ -99,7 +133,7 @@ def _extend_rows(layers, node, successor, v, w, score, gain, overlaps):
     layers[successor][w.name] = (reached, ([*sources, (node, v.name)], source, step), w)
 
 
-def _trace_back(layers, end):
+def _trace_back(layers: dict[tuple, dict], end: tuple) -> tuple[tuple[Vehicle, ...], float]:
     """(row, start [m]) of the best row, traced from its end to its beginning."""
     row, (node, name, index) = [], end
     while True:
@@ -108,18 +142,34 @@ def _trace_back(layers, end):
         previous = sources[source[index]]
         if previous is None:
             return tuple(reversed(row)), index * COMB_STEP - LEAD_LENGTH + v.axles[0]
-        node, name, index = *previous, index - int(step[index])
+        (node, name), index = previous, index - int(step[index])
 
 
 UNREACHED = (np.inf,)
 
 
-def closest_row(spacing, pattern: Pattern, tolerance: float):
+def closest_row(
+    spacing: np.ndarray, pattern: Pattern, tolerance: float
+) -> tuple[float, tuple[Vehicle, ...], float] | None:
     """(cost [nat], row of vehicles, its choices): axle spacings closest to ``spacing`` (n_axle - 1,) [m].
 
     Cost is half the squared deviation in units of ``tolerance`` [m], summed over the spacings, plus the logarithm of
     the number of vehicles to choose from; ``choices`` is the sum of these logarithms. None where the pattern cannot
     have this number of axles, or where no row is near.
+
+    Parameters
+    ----------
+    spacing : (n_axle - 1,) array of float
+        Distances between neighbouring axles. [m]
+    pattern : Pattern
+        Axle pattern of a type of train.
+    tolerance : float
+        Standard deviation of a spacing. [m]
+
+    Returns
+    -------
+    (float, tuple of Vehicle, float) or None
+        Cost [nat], row and choices [nat].
     """
     n_axle = len(spacing) + 1
     low, high = pattern.axle_counts()
@@ -130,7 +180,7 @@ def closest_row(spacing, pattern: Pattern, tolerance: float):
     spacings, weight, own_spacings = np.asarray(spacing).tolist(), 0.5 / tolerance**2, pattern.spacings
     log_choices = pattern.log_n_choices
     # state: axles used, group, vehicles used of the group, last vehicle -> (cost, row, choices)
-    layers = [{} for _ in range(n_axle + 1)]
+    layers: list[dict[tuple, tuple[float, tuple[Vehicle, ...], float]]] = [{} for _ in range(n_axle + 1)]
     layers[0][(0, 0, None)] = (0.0, (), 0.0)
     for n_axle_used in range(n_axle):
         for (g, count, _), (cost, row, free) in layers[n_axle_used].items():

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import fft, signal
 
 from turnout.records import ModalModel
+
+if TYPE_CHECKING:
+    pass
 
 # Impacts are sought at the middles of 16 equal parts of the interval between two samples.
 FRACTIONS = (np.arange(16) + 0.5) / 16
@@ -42,33 +46,72 @@ class WheelBasis:
 
     @property
     def n_column(self) -> int:
+        """Number of columns."""
         return self.columns.shape[0]
 
     @property
     def n_sample(self) -> int:
+        """Samples of each column."""
         return self.columns.shape[1]
 
-    def coefficients(self, phi, jump=None) -> np.ndarray:
-        """(..., n_column) weights of the columns for a jump (n_state,), default b, ``phi`` samples early."""
+    def coefficients(self, phi: np.ndarray, jump: np.ndarray | None = None) -> np.ndarray:
+        """(..., n_column) weights of the columns for a jump (n_state,), default b, ``phi`` samples early.
+
+        Parameters
+        ----------
+        phi : float or array of float
+            Fraction of a sample by which the impact precedes the first sample. [samples]
+        jump : (n_state,) array of float, optional
+            Jump of the state; b by default.
+
+        Returns
+        -------
+        (..., n_column) array of float
+            Weights; leading shape of ``phi``.
+        """
         jump = self.direction if jump is None else jump
         weight = self.output * (self.to_modes @ jump)
         weight = weight * self.poles ** np.asarray(phi, dtype=float)[..., None]
         return self._real(weight)
 
-    def slopes(self, phi) -> np.ndarray:
-        """(..., n_column) derivative of ``coefficients`` by ``phi``. [1/sample]"""
+    def slopes(self, phi: np.ndarray) -> np.ndarray:
+        """(..., n_column) derivative of ``coefficients`` by ``phi``. [1/sample]
+
+        Parameters
+        ----------
+        phi : float or array of float
+            Fraction of a sample by which the impact precedes the first sample. [samples]
+
+        Returns
+        -------
+        (..., n_column) array of float
+            Derivative. [1/sample]
+        """
         weight = self.output * (self.to_modes @ self.direction) * np.log(self.poles)
         return self._real(weight * self.poles ** np.asarray(phi, dtype=float)[..., None])
 
-    def _real(self, weight) -> np.ndarray:
+    def _real(self, weight: np.ndarray) -> np.ndarray:
         oscillates = self.poles.imag > 0
         components = [np.where(oscillates, 2.0, 1.0) * weight.real, -2.0 * weight.imag]
         stacked = np.stack(components, axis=-1).reshape(*weight.shape[:-1], -1)
         keep = np.stack([np.ones_like(oscillates), oscillates], axis=-1).ravel()
         return stacked[..., keep]
 
-    def advance(self, weights, phi) -> np.ndarray:
-        """(n, n_column) column weights if the impacts are ``phi`` (n,) samples earlier."""
+    def advance(self, weights: np.ndarray, phi: np.ndarray) -> np.ndarray:
+        """(n, n_column) column weights if the impacts are ``phi`` (n,) samples earlier.
+
+        Parameters
+        ----------
+        weights : (n, n_column) or (n_column,) array of float
+            Column weights of each impact, or of all.
+        phi : (n,) array of float
+            By how much each impact is earlier. [samples]
+
+        Returns
+        -------
+        (n, n_column) array of float
+            The new weights.
+        """
         oscillates = self.poles.imag > 0
         index = np.concatenate([[0], np.cumsum(1 + oscillates)[:-1]])
         weights = np.asarray(weights, dtype=float)
@@ -77,8 +120,21 @@ class WheelBasis:
         scale = np.where(oscillates, 2.0, 1.0)
         return self._real((real + 1j * imaginary) / scale * self.poles ** np.asarray(phi, float)[:, None])
 
-    def response(self, phi, jump=None) -> np.ndarray:
-        """(n_sample,) filtered response to one jump."""
+    def response(self, phi: np.ndarray, jump: np.ndarray | None = None) -> np.ndarray:
+        """(n_sample,) filtered response to one jump.
+
+        Parameters
+        ----------
+        phi : float
+            Fraction of a sample by which the impact precedes the first sample. [samples]
+        jump : (n_state,) array of float, optional
+            Jump of the state; b by default.
+
+        Returns
+        -------
+        (n_sample,) array of float
+            Response. [m/s²]
+        """
         return self.coefficients(phi, jump) @ self.columns
 
     @cached_property
@@ -92,8 +148,21 @@ class WheelBasis:
         theta = self.coefficients(FRACTIONS)
         return theta / np.sqrt(np.einsum("qp,pr,qr->q", theta, self.gram, theta))[:, None]
 
-    def correlate(self, rows, n_lag: int) -> np.ndarray:
-        """(n_row, n_lag, n_column) inner products of the columns with each row (n_row, n), shifted by every lag."""
+    def correlate(self, rows: np.ndarray, n_lag: int) -> np.ndarray:
+        """(n_row, n_lag, n_column) inner products of the columns with each row (n_row, n), shifted by every lag.
+
+        Parameters
+        ----------
+        rows : (n_row, n) array of float
+            Data. [m/s²]
+        n_lag : int
+            Number of lags, from 0.
+
+        Returns
+        -------
+        (n_row, n_lag, n_column) array of float
+            Inner products. [(m/s²)²]
+        """
         size = fft.next_fast_len(rows.shape[1], real=True)
         if size not in self._spectra:
             self._spectra[size] = fft.rfft(self.columns, size).conj()
@@ -104,8 +173,19 @@ class WheelBasis:
     def _spectra(self) -> dict:
         return {}
 
-    def truncated_unit_weights(self, n_observed) -> np.ndarray:
-        """(n, n_fraction, n_column) ``unit_weights`` for the first ``n_observed`` (n,) samples of a response."""
+    def truncated_unit_weights(self, n_observed: np.ndarray) -> np.ndarray:
+        """(n, n_fraction, n_column) ``unit_weights`` for the first ``n_observed`` (n,) samples of a response.
+
+        Parameters
+        ----------
+        n_observed : (n,) array of int
+            Samples of the response that are observed.
+
+        Returns
+        -------
+        (n, n_fraction, n_column) array of float
+            Weights.
+        """
         key = tuple(int(k) for k in n_observed)
         if key not in self._truncated_weights:
             products = self.columns[:, None, :] * self.columns[None, :, :]
@@ -132,13 +212,35 @@ class WheelBasis:
         return np.linalg.cholesky(gram).T
 
     def lagged_gram(self, lag: int) -> np.ndarray:
-        """(n_column, n_column) inner products of the columns of a wheel with those of one ``lag`` samples later."""
+        """(n_column, n_column) inner products of the columns of a wheel with those of one ``lag`` samples later.
+
+        Parameters
+        ----------
+        lag : int
+            Samples by which the second wheel is later.
+
+        Returns
+        -------
+        (n_column, n_column) array of float
+            0 where the responses do not overlap.
+        """
         if lag >= self.n_sample:
             return np.zeros((self.n_column, self.n_column))
         return self.columns[:, lag:] @ self.columns[:, : self.n_sample - lag].T
 
     def truncate(self, n: int) -> WheelBasis:
-        """The same basis with the first ``n`` samples of its columns."""
+        """The same basis with the first ``n`` samples of its columns.
+
+        Parameters
+        ----------
+        n : int
+            Samples that stay.
+
+        Returns
+        -------
+        WheelBasis
+            ``self`` where the columns are no longer than that.
+        """
         if n >= self.n_sample:
             return self
         if n not in self._truncated:
@@ -153,15 +255,48 @@ class WheelBasis:
 
 
 def band_pass(low: float, high: float, order: int, rate: float) -> np.ndarray:
-    """(n_section, 6) second-order sections of the causal Butterworth band-pass for data and model alike."""
+    """(n_section, 6) second-order sections of the causal Butterworth band-pass for data and model alike.
+
+    Parameters
+    ----------
+    low, high : float
+        Edges; ``high`` is at most 0.45 times the rate. [Hz]
+    order : int
+        Order of each flank.
+    rate : float
+        Sampling rate. [Hz]
+
+    Returns
+    -------
+    (n_section, 6) array of float
+        Second-order sections.
+
+    Raises
+    ------
+    ValueError
+        The edges are not in order, or not between 0 and 0.45 times the rate.
+    """
     high = min(high, 0.45 * rate)
     if not 0 < low < high:
         raise ValueError(f"no band between {low} Hz and {high} Hz at {rate} samples per second")
     return signal.butter(order, [low, high], btype="bandpass", fs=rate, output="sos")
 
 
-def apply_filter(samples, filter_) -> np.ndarray:
-    """Samples (..., n) behind ``filter_``: second-order sections (n, 6), taps (n,) or None for no filter."""
+def apply_filter(samples: np.ndarray, filter_: np.ndarray | None) -> np.ndarray:
+    """Samples (..., n) behind ``filter_``: second-order sections (n, 6), taps (n,) or None for no filter.
+
+    Parameters
+    ----------
+    samples : (..., n) array of float
+        Samples. [any unit]
+    filter_ : (n_section, 6) or (n_tap,) array of float, or None
+        The filter.
+
+    Returns
+    -------
+    (..., n) array of float
+        Filtered samples. [same unit]
+    """
     if filter_ is None:
         return np.asarray(samples, dtype=float)
     if np.ndim(filter_) == 2:
@@ -169,19 +304,61 @@ def apply_filter(samples, filter_) -> np.ndarray:
     return signal.lfilter(filter_, [1.0], samples, axis=-1)
 
 
-def settling_length(poles, filter_, tolerance: float, longest: int) -> int:
-    """Samples after which the slowest pole of model and filter has decayed to ``tolerance``."""
-    inner = signal.sos2zpk(filter_)[1] if np.ndim(filter_) == 2 else np.zeros(0)
+def settling_length(poles: np.ndarray, filter_: np.ndarray | None, tolerance: float, longest: int) -> int:
+    """Samples after which the slowest pole of model and filter has decayed to ``tolerance``.
+
+    Parameters
+    ----------
+    poles : (n_pole,) array of complex
+        Poles of the model in discrete time. [-]
+    filter_ : (n_section, 6) or (n_tap,) array of float, or None
+        The filter.
+    tolerance : float
+        Remaining amplitude. [-]
+    longest : int
+        Largest number of samples.
+
+    Returns
+    -------
+    int
+        Number of samples, at least 8 unless ``longest`` is less.
+    """
+    inner = signal.sos2zpk(filter_)[1] if filter_ is not None and np.ndim(filter_) == 2 else np.zeros(0)
     radii = np.concatenate([np.abs(poles), np.abs(inner), [0.0]])
     slowest = min(radii.max(), 1 - 1e-6)
     return int(min(longest, max(8, np.ceil(np.log(tolerance) / np.log(slowest)))))
 
 
-def wheel_basis(model: ModalModel, filter_, rate: float, tolerance=1e-4, longest=0.25) -> WheelBasis:
+def wheel_basis(
+    model: ModalModel, filter_: np.ndarray | None, rate: float, tolerance: float = 1e-4, longest: float = 0.25
+) -> WheelBasis:
     """Basis of ``model`` at the sampling ``rate`` of the passage [Hz], behind ``filter_`` (``apply_filter``).
 
     A model identified at another rate is converted by A^(ratio): its poles in 1/s stay the same. ``tolerance``
     is the remaining amplitude at which columns end, ``longest`` [s] their limit. ValueError for an unstable model.
+
+    Parameters
+    ----------
+    model : ModalModel
+        State-space model of a section.
+    filter_ : (n_section, 6) or (n_tap,) array of float, or None
+        Filter of the data, see ``apply_filter``.
+    rate : float
+        Sampling rate of the passage. [Hz]
+    tolerance : float
+        Remaining amplitude at which the columns end. [-]
+    longest : float
+        Largest length of the columns. [s]
+
+    Returns
+    -------
+    WheelBasis
+        Responses of the model.
+
+    Raises
+    ------
+    ValueError
+        The model is unstable.
     """
     poles, vectors = np.linalg.eig(np.asarray(model.a, dtype=float))
     if np.abs(poles).max() >= 1.0:

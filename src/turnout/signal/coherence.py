@@ -29,6 +29,11 @@ def coherence_distribution(estimate: ArrayLike, true: ArrayLike, n: int) -> np.n
     -------
     array of float
 
+    Raises
+    ------
+    ValueError
+        ``n`` is below 2.
+
     References
     ----------
     Carter, Knapp and Nuttall 1973, IEEE Trans. Audio Electroacoust. 21(4), 337-344, eq. 3.
@@ -46,13 +51,13 @@ def coherence_distribution(estimate: ArrayLike, true: ArrayLike, n: int) -> np.n
     return _distribution_of_complements(1.0 - z, 1.0 - c, n)
 
 
-def _distribution_of_complements(b, a, n):
+def _distribution_of_complements(b: np.ndarray, a: np.ndarray, n: int) -> np.ndarray:
     """Distribution from b = 1 - estimate and a = 1 - true, which keeps all digits near coherence 1."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return _sum_of_logs(np.asarray(b), np.asarray(a), n)
 
 
-def _sum_of_logs(b, a, n):
+def _sum_of_logs(b: np.ndarray, a: np.ndarray, n: int) -> np.ndarray:
     """Sum of the series; all terms are positive, and logarithms and ratios avoid overflow at large n."""
     denominator = a + b - a * b
     x = (1.0 - a) * (1.0 - b)
@@ -68,7 +73,7 @@ def _sum_of_logs(b, a, n):
 
 
 @lru_cache(maxsize=256)
-def _quantile_table(n, probability):
+def _quantile_table(n: int, probability: float) -> CubicSpline:
     """Spline from v = -ln(1 - quantile) to u = -ln(1 - true), both free of cancellation and nearly parallel."""
     u = TABLE_NODES
     low, high = np.zeros_like(u), u + 40.0
@@ -85,6 +90,22 @@ def true_coherence_with_quantile(estimate: ArrayLike, n: int, probability: float
     Inverts ``coherence_distribution`` through a table; 0 where zero coherence already
     explains the estimate. One record allows no statement: 0 for probabilities above one half, else 1.
 
+    Parameters
+    ----------
+    estimate : array of float in [0, 1]
+        Magnitude-squared coherence averaged over ``n`` records. [-]
+    n : int
+        Independent records averaged.
+    probability : float
+        Probability of an estimate below the given one. [-]
+
+    Returns
+    -------
+    array of float
+        True coherence; nan where the estimate is nan. [-]
+
+    Examples
+    --------
     >>> print(true_coherence_with_quantile([0.2, 1.0 - 0.05 ** (1 / 9), 1.0], 10, 0.95).round(3))
     [0. 0. 1.]
     """
@@ -134,6 +155,22 @@ def lower_coherence_limit(estimate: ArrayLike, n: int, level: float = 0.95) -> n
 
     For a limit of 0.8 ten averages must give 0.91, thirty 0.87.
 
+    Parameters
+    ----------
+    estimate : array of float in [0, 1]
+        Magnitude-squared coherence averaged over ``n`` records. [-]
+    n : int
+        Independent records averaged.
+    level : float
+        Probability that the true coherence is above the limit. [-]
+
+    Returns
+    -------
+    array of float
+        Lower limit. [-]
+
+    Examples
+    --------
     >>> print(lower_coherence_limit(0.913, 10).round(2), lower_coherence_limit(0.87, 30).round(2))
     0.8 0.8
     """
@@ -141,10 +178,29 @@ def lower_coherence_limit(estimate: ArrayLike, n: int, level: float = 0.95) -> n
 
 
 def zero_coherence_level(n: int, level: float = 0.95) -> float:
-    r"""Estimate that incoherent signals exceed with probability 1 - level.
+    """Estimate that incoherent signals exceed with probability 1 - level.
 
     .. math:: 1 - (1 - p)^{1/(n-1)}
 
+    Parameters
+    ----------
+    n : int
+        Independent records averaged.
+    level : float
+        p, probability that an estimate is below the result. [-]
+
+    Returns
+    -------
+    float
+        1 for a single record. [-]
+
+    References
+    ----------
+    Carter, Knapp and Nuttall 1973, IEEE Trans. Audio Electroacoust. 21(4), 337-344: the distribution for true coherence
+    0.
+
+    Examples
+    --------
     >>> [round(zero_coherence_level(n), 2) for n in (3, 10, 30)]
     [0.78, 0.28, 0.1]
     """

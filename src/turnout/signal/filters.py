@@ -3,10 +3,16 @@
 The module also has the usual shapes of a hammer's contact force.
 """
 
+from __future__ import annotations
+
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import signal
+
+if TYPE_CHECKING:
+    pass
 
 
 @lru_cache(maxsize=64)
@@ -18,7 +24,7 @@ def butterworth_sections(low: float | None, high: float | None, rate: float, ord
     low, high : float or None
         Half-power edges; None leaves that side open. [Hz]
     rate : float
-        [Hz]
+        Sampling rate. [Hz]
     order : int
         Order of each flank.
 
@@ -57,6 +63,31 @@ def band_pass(
     Causal (from rest) by default; a model must pass the same filter. With ``zero_phase`` the filter runs forwards and
     backwards: no delay, twice the attenuation in dB, and energy before every onset.
 
+    Parameters
+    ----------
+    x : (..., n) array of float
+        Samples. [any unit]
+    low, high : float or None
+        Half-power edges; None leaves that side open. [Hz]
+    rate : float
+        Sampling rate. [Hz]
+    order : int
+        Order of each flank.
+    zero_phase : bool
+        Whether the filter runs in both directions.
+
+    Returns
+    -------
+    (..., n) array of float
+        Filtered samples. [same unit]
+
+    Raises
+    ------
+    ValueError
+        Edges missing, crossed, or not between 0 and half the rate.
+
+    Examples
+    --------
     >>> t = np.arange(4000) / 4000.0
     >>> y = band_pass(np.sin(2 * np.pi * 30 * t) + np.sin(2 * np.pi * 300 * t), 150.0, 600.0, 4000.0, zero_phase=True)
     >>> print(f"{np.std(y[500:-500] - np.sin(2 * np.pi * 300 * t)[500:-500]):.3f}")
@@ -70,6 +101,25 @@ def band_pass(
 def reduce_rate(x: np.ndarray, factor: int) -> np.ndarray:
     """Every ``factor``-th sample after a linear-phase anti-alias filter without delay, along the last axis.
 
+    Parameters
+    ----------
+    x : (..., n) array of float
+        Samples. [any unit]
+    factor : int
+        Old rate over new rate. [-]
+
+    Returns
+    -------
+    (..., m) array of float
+        One sample for every ``factor`` of them. [same unit]
+
+    Raises
+    ------
+    ValueError
+        ``factor`` is not a whole number of 1 or more.
+
+    Examples
+    --------
     >>> print(reduce_rate(np.full(400, 2.5), 4).shape)
     (100,)
     """
@@ -84,18 +134,50 @@ SKEW_EXPONENT = 3.0
 SKEW_END = 3.5791
 
 
-def half_sine(x):
-    r""":math:`\sin \pi x`: a mass on a linear spring."""
+def half_sine(x: np.ndarray) -> np.ndarray:
+    r""":math:`\sin \pi x`: a mass on a linear spring.
+
+    Parameters
+    ----------
+    x : array of float
+        Time since the first touch over the contact time. [-]
+
+    Returns
+    -------
+    array of float
+        Force over its peak. [-]
+    """
     return np.sin(np.pi * x)
 
 
-def haversine(x):
-    r""":math:`\sin^2 \pi x`: the smooth standard pulse of shock tests."""
+def haversine(x: np.ndarray) -> np.ndarray:
+    r""":math:`\sin^2 \pi x`: the smooth standard pulse of shock tests.
+
+    Parameters
+    ----------
+    x : array of float
+        Time since the first touch over the contact time. [-]
+
+    Returns
+    -------
+    array of float
+        Force over its peak. [-]
+    """
     return np.sin(np.pi * x) ** 2
 
 
-def hertzian(x):
+def hertzian(x: np.ndarray) -> np.ndarray:
     r""":math:`\sin^{3/2} \pi x`, close to the contact of a sphere on a plane.
+
+    Parameters
+    ----------
+    x : array of float
+        Time since the first touch over the contact time. [-]
+
+    Returns
+    -------
+    array of float
+        Force over its peak. [-]
 
     References
     ----------
@@ -104,8 +186,19 @@ def hertzian(x):
     return np.abs(np.sin(np.pi * x)) ** 1.5
 
 
-def skewed_pulse(x):
-    r""":math:`(u e^{1-u})^3` with u = 3.58 x: a soft tip that yields quickly and recovers slowly."""
+def skewed_pulse(x: np.ndarray) -> np.ndarray:
+    """:math:`(u e^{1-u})^3` with u = 3.58 x: a soft tip that yields quickly and recovers slowly.
+
+    Parameters
+    ----------
+    x : array of float
+        Time since the first touch over the contact time. [-]
+
+    Returns
+    -------
+    array of float
+        Force over its peak. [-]
+    """
     u = SKEW_END * np.asarray(x, dtype=float)
     return (u * np.exp(1.0 - u)) ** SKEW_EXPONENT
 

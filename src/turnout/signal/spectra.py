@@ -81,7 +81,7 @@ def spectral_density(x: np.ndarray, rate: float, n_segment: int) -> tuple[np.nda
     x : (n_sample,) array of float
         [any unit u]
     rate : float
-        [Hz]
+        Sampling rate. [Hz]
     n_segment : int
         Samples per segment; an incomplete last segment is ignored.
 
@@ -91,6 +91,11 @@ def spectral_density(x: np.ndarray, rate: float, n_segment: int) -> tuple[np.nda
         [Hz], [u²/Hz]
     n : int
         Number of segments averaged: what ``density_interval`` needs.
+
+    Raises
+    ------
+    ValueError
+        Fewer samples than one segment.
 
     Examples
     --------
@@ -147,6 +152,22 @@ def force_window(n_sample: int, contact_end: int, taper: int) -> np.ndarray:
 
     It removes noise of the force channel after the contact. Shape (n_sample,), no unit.
 
+    Parameters
+    ----------
+    n_sample : int
+        Length of the window.
+    contact_end : int
+        First sample after the contact.
+    taper : int
+        Samples of the half-cosine.
+
+    Returns
+    -------
+    (n_sample,) array of float
+        Factors. [-]
+
+    Examples
+    --------
     >>> print(force_window(6, 2, 2).round(2))
     [1.  1.  1.  0.5 0.  0. ]
     """
@@ -170,7 +191,17 @@ def exponential_window(n_sample: int, onset: int, decay: float, rate: float) -> 
     decay : float
         a, 0 or more, else ValueError. [1/s]
     rate : float
-        [Hz]
+        Sampling rate. [Hz]
+
+    Returns
+    -------
+    (n_sample,) array of float
+        Factors. [-]
+
+    Raises
+    ------
+    ValueError
+        ``decay`` is negative.
 
     Examples
     --------
@@ -183,7 +214,7 @@ def exponential_window(n_sample: int, onset: int, decay: float, rate: float) -> 
 
 
 def correct_poles(poles: np.ndarray | complex, decay: float) -> np.ndarray:
-    r"""Poles of the structure from poles estimated behind an exponential window: :math:`s = s_w + a`.
+    """Poles of the structure from poles estimated behind an exponential window: :math:`s = s_w + a`.
 
     Correct the pole and compute natural frequency and damping ratio from it. A damping ratio alone cannot be
     corrected, since the window shifts the natural frequency too. Amplitudes (residues) are never rescaled.
@@ -194,6 +225,11 @@ def correct_poles(poles: np.ndarray | complex, decay: float) -> np.ndarray:
         Continuous-time poles. [1/s]
     decay : float
         a of the window. [1/s]
+
+    Returns
+    -------
+    (n,) array of complex
+        Poles of the structure. [1/s]
 
     Examples
     --------

@@ -15,6 +15,8 @@ from turnout.config import load_configuration, with_raw
 from turnout.config.settings.passage import PassageSettings
 from turnout.passage.analysis import analyse
 from turnout.passage.axle_load import axle_load, calibrate, train_amplitude, with_error_correlation
+from turnout.passage.kinematics import Motion
+from turnout.passage.result import Passage
 from turnout.readers.writing import write
 from turnout.records import Channel
 from turnout.stages.passage_context import read_clusters, read_loads
@@ -126,7 +128,7 @@ def test_an_error_that_all_sensors_share_is_not_averaged_away(common, own, monke
         heard = {n: a for n, (a, _) in train(15.0, 33.0)["amplitudes"].items()}
         recording = SimpleNamespace(channels=[SimpleNamespace(name=n, position=0.0) for n in names],
                                     signal=heard.get, rate=1.0)  # fmt: skip
-        passage = SimpleNamespace(at_sensor=dict.fromkeys(names), motion=SimpleNamespace(speed=33.0))
+        passage = Passage("accepted", (), Motion(33.0), at_sensor=dict.fromkeys(names))
         found = axle_load(recording, passage, with_error_correlation(made, trains), settings)
         off.append((found.mean - 15.0) / found.se)
     assert 0.7 < np.sqrt(np.mean(np.square(off))) < 1.25
