@@ -101,7 +101,7 @@ def load_effects(*folders: str | Path) -> dict[str, Effect]:
     --------
     >>> from turnout_blind.effect import load_effects
     >>> sorted(load_effects())[:3]
-    ['ballast', 'bilinear_clip', 'bottomless_void']
+    ['ballast', 'beyond_reach', 'bilinear_clip']
     """
     effects = {}
     for folder in (Path(__file__).with_name("effects"), *map(Path, folders)):

@@ -34,9 +34,9 @@ def test_the_generator_imports_nothing_of_what_it_tests(repository):
 
 
 def test_the_tool_imports_nothing_of_the_generator(repository):
-    """But for the command that starts it."""
+    """But for the command that starts it, and the table of former module names."""
     for path in (repository / "src" / "turnout").rglob("*.py"):
-        if path.name != "blind.py":
+        if path.name not in ("blind.py", "former_names.py"):
             assert "turnout_blind" not in path.read_text(), path
 
 
