@@ -116,7 +116,7 @@ def test_a_load_that_nobody_knows_is_as_open_as_from_empty_to_full(repository, k
     passage = PassageInput("p", None, found.vehicle, found.speed, load_sd=found.load_sd)
     load = next(n for n in passage_nuisances(passage) if n.name == "load@p")
     if known:
-        assert load == Nuisance("load@p", "-", 0.0, 0.05, "p")
+        assert load == Nuisance("load@p", "-", 0.0, 0.05, "p", group="load")
         return
     half, full = (load_vehicle("freight", share, folder) for share in (0.5, 1.0))
     heavier = vehicle_with(half, {}, "freight", np.sqrt(3.0) * load.sd)  # as far as the assumption goes
