@@ -24,7 +24,7 @@ TIME_STEP = 1.0 / 60000.0
 Function = TypeVar("Function", bound=Callable)
 
 
-def compiled(fastmath: bool = False) -> Callable[[Function], Function]:
+def compile_function(fastmath: bool = False) -> Callable[[Function], Function]:
     """Decorator: compile a function with numba, and store its machine code beside the source.
 
     Parameters
@@ -57,7 +57,7 @@ def _compile_value_at(value: Any, i: int) -> Callable:
     return at_node if isinstance(value, numba.types.Array) else at_every_node
 
 
-@compiled(fastmath=True)
+@compile_function(fastmath=True)
 def _rail_step(
     beam: Beam,
     dt: float,
@@ -85,18 +85,18 @@ def _rail_step(
         w[i] += dt * v[i]
 
 
-@compiled()
+@compile_function()
 def _interpolate(x: np.ndarray, first: int, weights: np.ndarray) -> float:
     return x[first] * weights[0] + x[first + 1] * weights[1] + x[first + 2] * weights[2] + x[first + 3] * weights[3]
 
 
-@compiled()
+@compile_function()
 def _add_force(f: np.ndarray, first: int, weights: np.ndarray, force: float) -> None:
     for k in range(4):
         f[first + k] += weights[k] * force
 
 
-@compiled()
+@compile_function()
 def _ballast_force(s: Supports, j: int, y: float, rate: float, t: float) -> float:
     k = s.ballast[j] * (1.0 + s.drift[j] * t)
     if s.gap[j] < 0.0:
@@ -111,7 +111,7 @@ def _ballast_force(s: Supports, j: int, y: float, rate: float, t: float) -> floa
     )
 
 
-@compiled()
+@compile_function()
 def _support_step(
     s: Supports,
     dt: float,
@@ -148,7 +148,7 @@ def _support_step(
         y[j] += dt * rate[j]
 
 
-@compiled()
+@compile_function()
 def _attached_mass_step(
     r: AttachedMasses, dt: float, w: np.ndarray, v: np.ndarray, f: np.ndarray, y: np.ndarray, rate: np.ndarray
 ) -> None:
@@ -164,7 +164,7 @@ def _attached_mass_step(
         y[j] += dt * rate[j]
 
 
-@compiled()
+@compile_function()
 def _path_height(wheels: Wheels, i: int, x: float) -> float:
     coordinate = (x - wheels.path_start) / wheels.path_step
     k = int(np.floor(coordinate))
@@ -175,7 +175,7 @@ def _path_height(wheels: Wheels, i: int, x: float) -> float:
     return b + 0.5 * s * (c - a + s * (2.0 * a - 5.0 * b + 4.0 * c - d + s * (3.0 * (b - c) + d - a)))
 
 
-@compiled()
+@compile_function()
 def hertz_force(stiffness: float, local: float, approach: float, guess: float) -> float:
     """Contact force F = k max(0, approach - local F)^1.5 by Newton's method.
 
@@ -211,7 +211,7 @@ def hertz_force(stiffness: float, local: float, approach: float, guess: float) -
     return force
 
 
-@compiled()
+@compile_function()
 def _contact_share(motion: WheelMotion, x: float) -> float:
     if x <= motion.engage_start or x >= motion.release_end:
         return 0.0
@@ -223,7 +223,7 @@ def _contact_share(motion: WheelMotion, x: float) -> float:
     return s * s * (3.0 - 2.0 * s)
 
 
-@compiled()
+@compile_function()
 def _wheel_forces(
     wheels: Wheels,
     motion: WheelMotion,
@@ -256,7 +256,7 @@ def _wheel_forces(
         _add_force(f, k - 1, stencil, share * contact[i])
 
 
-@compiled()
+@compile_function()
 def _car_step(
     cars: Cars,
     wheels: Wheels,
@@ -297,7 +297,7 @@ def _car_step(
         b[i] += dt * bv[i]
 
 
-@compiled()
+@compile_function()
 def march(
     n_step: int,
     dt: float,
