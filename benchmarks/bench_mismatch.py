@@ -193,6 +193,6 @@ def is_covered(diagnosis, term):
         waves = [names.index("sine"), names.index("cosine")]
         size, covariance = diagnosis.fit.psi[waves], diagnosis.fit.covariance[n:, n:][np.ix_(waves, waves)]
         amplitude = np.hypot(*size)
-        se = np.hypot(np.sqrt(size @ covariance @ size) / amplitude, candidate.model_error_share * amplitude)
+        se = np.hypot(np.sqrt(size @ covariance @ size) / amplitude, candidate.effect.model_error_share * amplitude)
         return abs(amplitude - np.hypot(term.sine, term.cosine)) <= 1.96 * se
     return abs(diagnosis.fit.psi[0] - getattr(term, names[0])) <= 1.96 * diagnosis.fit.psi_se[0]

@@ -57,7 +57,7 @@ def case_of(campaign, settings=None, lesser=None):
         campaign = replace(campaign, hammer=())
     case = TrackCase(campaign, settings)
     if lesser == "single_start":
-        case.candidates = tuple(replace(c, starts=c.starts[:1]) for c in case.candidates)
+        case.candidates = tuple(replace(c, refit=replace(c.refit, points=c.starts[:1])) for c in case.candidates)
     return case, settings
 
 

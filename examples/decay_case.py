@@ -94,7 +94,7 @@ def candidates(dates):
     for family, (_, parameters, starts) in CHANGES.items():
         for since in dates:
             result.append(
-                Candidate(
+                Candidate.of(
                     family, parameters, lambda psi, w=family, s=since: Change(w, s, tuple(psi.values())), starts,
                     {"since": since}, "condition", len(dates),
                 )

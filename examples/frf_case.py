@@ -174,8 +174,8 @@ class FrfCase(Case):
         for o in self.observations:
             gain = _parameter("gain", "-", -0.95, 3.0, (0.0, 0.5))
             where, n = {"blow": o.name}, len(self.observations)
-            yield Candidate("blow_gain", (gain,), lambda p, w=o.name: Effect("blow_gain", w, dict(p)),
-                            ((-0.5,), (0.5,)), where, "condition", n)  # fmt: skip
+            yield Candidate.of("blow_gain", (gain,), lambda p, w=o.name: Effect("blow_gain", w, dict(p)),
+                               ((-0.5,), (0.5,)), where, "condition", n)  # fmt: skip
         yield _single_candidate(
             "structural_damping", "", [_parameter("share", "-", 0.0, 1.0, (0.5, 0.5))], ((0.5,),), self
         )
@@ -207,8 +207,10 @@ class FrfCase(Case):
         ]
         start = (float(np.log(f)), float(np.clip(np.log(zeta), -7.9, -1.6)), *map(float, shape))
         where = f"{f:.0f} Hz"
-        return Candidate("mode", tuple(parameters), lambda p: Effect("mode", where, dict(p)), (start,), {"near": where},
-                         "frequency", scanned, exact=True)  # fmt: skip
+        return Candidate.of(
+            "mode", parameters, lambda p: Effect("mode", where, dict(p)), (start,), {"near": where}, "frequency",
+            scanned, exact=True,
+        )  # fmt: skip
 
     def frequencies(self, values, terms):
         """(n_mode,) natural frequencies [Hz]."""
@@ -282,7 +284,7 @@ def _single_candidate(effect_type, where, parameters, starts, case):
     scanned = case.n_sensor if where else 1
     labels = {"sensor": where} if where else {}
     frame = "sensor" if where else "frequency"
-    return Candidate(
+    return Candidate.of(
         effect_type, tuple(parameters), lambda p: Effect(effect_type, where, dict(p)), starts, labels, frame, scanned
     )
 

@@ -48,8 +48,8 @@ def law_candidates(without=()):
             parameter = Parameter("amount", "-", 0.0, bounds, meaning, SOURCE)
             starts = ((0.05,), (0.5 if bounds[0] < 0.0 else 0.2,))
             result.append(
-                Candidate(name, (parameter,), lambda psi, n=name, k=law_index: LawTerm(n, k, psi["amount"]), starts,
-                          frame="amplitude", component="oscillator")
+                Candidate.of(name, (parameter,), lambda psi, n=name, k=law_index: LawTerm(n, k, psi["amount"]), starts,
+                             frame="amplitude", component="oscillator")
             )  # fmt: skip
     return tuple(result)
 

@@ -74,7 +74,7 @@ class Row(Case):
             Nuisance("damping", "-", 1.0, 0.5, bounds=(0.0, 10.0)),
         )
         self.candidates = tuple(
-            Candidate(
+            Candidate.of(
                 kind,
                 (Parameter("amount", unit, 0.0, bounds, "size of the effect", "example 2026"),),
                 lambda psi, kind=kind, spring=spring: Law(kind, spring, **psi),

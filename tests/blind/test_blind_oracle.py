@@ -17,7 +17,7 @@ FACTOR = Parameter("factor", "-", 1.0, (0.05, 5.0), "of stiffness", "a test")
 
 
 def candidate(family, **where):
-    return Candidate(family, (FACTOR,), dict, ((0.4,), (2.5,)), where, "place" if "place" in where else "sensor", 7)
+    return Candidate.of(family, (FACTOR,), dict, ((0.4,), (2.5,)), where, "place" if "place" in where else "sensor", 7)
 
 
 PADS = [candidate("local_pad", sleeper=j, place=0.6 * j) for j in range(10)]

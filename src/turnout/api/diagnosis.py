@@ -135,7 +135,7 @@ def diagnose(
     >>> amount = Parameter("amount", "N/m³", 0.0, (-3.0, 3.0), "cubic stiffness", "example")
     >>> class Spring(Case):
     ...     nuisances = (Nuisance("stiffness", "N/m", 1.0, 0.3),)
-    ...     candidates = (Candidate("cubic_spring", (amount,), lambda psi: psi["amount"], ((0.1,),)),)
+    ...     candidates = (Candidate.of("cubic_spring", (amount,), lambda psi: psi["amount"], ((0.1,),)),)
     ...     observations = tuple(
     ...         Observation(f"test {day}", f"day {day}", x + 0.5 * x**3 + 0.01 * rng.normal(size=200), 0.01)
     ...         for day in range(4)

@@ -32,7 +32,7 @@ class Springs(Case):
                              np.full(60, 0.1), 0.3))  # fmt: skip
         factor = Parameter("factor", "-", 1.0, (0.05, 8.0), "", "")
         self.candidates = tuple(
-            Candidate("soft", (factor,), lambda p, k=k: (k, p["factor"]), ((0.5,),), {"place": k}, n_scanned=2,
+            Candidate.of("soft", (factor,), lambda p, k=k: (k, p["factor"]), ((0.5,),), {"place": k}, n_scanned=2,
                       masking_parameter=f"spring_{k}") for k in range(2)
         )  # fmt: skip
 

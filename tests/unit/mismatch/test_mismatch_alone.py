@@ -7,7 +7,7 @@ import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
-from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.engine.candidate import Candidate, EffectSite
 from turnout.mismatch.engine.case import Case, Observation
 from turnout.mismatch.engine.cross_validation import effect_energy, gain_where_unmasked, single_witness
 from turnout.mismatch.engine.decision import judge
@@ -28,7 +28,7 @@ class Days(Case):
         self.observations = tuple(
             Observation(n, n, s * BUMP, np.full(BUMP.size, 0.1), 0.5 if n == "b" else 1.0) for n, s in self.loud.items()
         )
-        self.candidates = (Candidate("bump", SIZE, lambda p: p["size"], ((0.5,),)),)
+        self.candidates = (Candidate.of("bump", SIZE, lambda p: p["size"], ((0.5,),)),)
 
     def predict(self, values, terms, observations):
         if not terms and self.loud["c"] < 0.0:
@@ -65,7 +65,7 @@ def test_plainness_is_the_energy_of_the_change():
 def test_what_one_recording_says_and_its_like_do_not(loud, gains, alone):
     case, fit = fitted(loud)
     assert single_witness(Search(case), fit, case.candidates[0], 25.0, gains) == alone
-    of_a_train = replace(case.candidates[0], where={"train": "ic3"})
+    of_a_train = replace(case.candidates[0], site=EffectSite({"train": "ic3"}))
     assert single_witness(Search(case), fit, of_a_train, 25.0, gains) == ""
 
 
@@ -91,7 +91,7 @@ def test_recordings_without_the_first_effect_tell_of_the_second(loud, nats):
 def test_what_others_tell_need_not_explain_what_the_first_left(apart, places, answer):
     """A tenth of an excess of twice the level of controls, which may be the shape of the effect named before; of 20
     places each costs the evidence 3 nats."""
-    candidate = Candidate("bump", (), lambda p: None, (), n_scanned=places)
+    candidate = Candidate.of("bump", (), lambda p: None, (), n_scanned=places)
     said = judge([Score(candidate, 40.0, 0.0, 0.1, None, unmasked_gain=apart)], 2.0, MismatchSettings())
     assert said.answer == answer
     assert "explains 10%" in said.reason
@@ -143,7 +143,7 @@ def test_of_two_spots_neither_is_the_odd_one():
 
 @pytest.mark.parametrize("gain, answer", [(20.0, "none"), (60.0, "unknown")])
 def test_it_gets_no_name(gain, answer):
-    candidate = Candidate("bump", (), lambda p: None, ())
+    candidate = Candidate.of("bump", (), lambda p: None, ())
     score = Score(candidate, gain, 0.0, 1.0, None, {"a": gain}, single_witness="a")
     said = judge([score], 0.8, MismatchSettings())
     assert said.answer == answer and not said.names

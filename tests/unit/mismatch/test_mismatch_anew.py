@@ -29,7 +29,7 @@ class Turning(Case):
     def __init__(self):
         rng = np.random.default_rng(4)
         self.nuisances = (Nuisance("ramp", "-", 0.0, 0.5),)
-        self.candidates = (Candidate("dip", SHAPE, lambda p: p, ((1.0, 6.0),)),)
+        self.candidates = (Candidate.of("dip", SHAPE, lambda p: p, ((1.0, 6.0),)),)
         true = self.wave(DEPTH, LENGTH)
         self.observations = tuple(
             Observation(f"o{k}", f"day {k}", true + 0.05 * rng.normal(size=X.size), 0.05) for k in range(4)
@@ -63,5 +63,6 @@ def test_what_explains_enough_or_has_no_size_stays():
     base = fit_jointly(case)
     found = scored(case, base, [1.0, 4.5], 0.0)
     assert restart_leader(Search(case), base, found) is found
-    plain = replace(found, explained=0.1, candidate=replace(found.candidate, parameters=()))
+    sizeless = replace(found.candidate, effect=replace(found.candidate.effect, parameters=()))
+    plain = replace(found, explained=0.1, candidate=sizeless)
     assert restart_leader(Search(case), base, plain) is plain

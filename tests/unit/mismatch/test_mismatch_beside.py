@@ -29,7 +29,7 @@ class Shapes(Case):
         data = sum(a * SHAPES[n] for n, a in true.items()) + noise
         self.observations = (Observation("all", "all", data, np.full(X.size, 0.1)),)
         self.candidates = tuple(
-            Candidate(
+            Candidate.of(
                 n,
                 AMOUNT,
                 lambda p, n=n: (n, p["amount"]),

@@ -29,7 +29,7 @@ class Brittle(Case):
         rng, self.refuses = np.random.default_rng(5), refuses
         found = [Observation(f"o{k}", f"day {k}", 1.2 * WAVE + 0.1 * rng.normal(size=X.size), 0.1) for k in range(4)]
         self.observations, self.reserved = tuple(found[:3]), tuple(found[3:])
-        self.candidates = (Candidate("wave", AMOUNT, lambda p: p["amount"], ((0.5,),)),)
+        self.candidates = (Candidate.of("wave", AMOUNT, lambda p: p["amount"], ((0.5,),)),)
 
     def predict(self, values, terms, observations):
         if self.refuses(terms, observations):

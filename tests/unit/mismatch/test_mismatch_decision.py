@@ -21,7 +21,7 @@ SIZE = (Parameter("size", "-", 0.0, (0.0, 9.0), "of a shape", "made up 2026"),)
 
 
 def score(family="soft", gain=40.0, worst=0.0, explained=1.0, size=1.0, **more):
-    candidate = Candidate(family, SIZE, dict, ((1.0,),), {"place": 3.0}, **more.pop("flags", {}))
+    candidate = Candidate.of(family, SIZE, dict, ((1.0,),), {"place": 3.0}, **more.pop("flags", {}))
     fit = SimpleNamespace(psi=np.array([size]), psi_se=np.array([more.pop("error", 0.1)]), part=lambda _: slice(0, 1))
     return Score(candidate, gain, worst, explained, fit, **more)
 

@@ -29,7 +29,7 @@ class Pitch(Case):
         data = [self.tone(true) + 0.1 * rng.normal(size=T.size) for _ in range(2)]
         self.observations = tuple(Observation(f"o{k}", f"day {k}", d, np.full(T.size, 0.1)) for k, d in enumerate(data))
         self.candidates = (
-            Candidate("pitch", FACTOR, lambda p: p["factor"], ((1.2,),), masking_parameter="tune", masking_sd=0.3),
+            Candidate.of("pitch", FACTOR, lambda p: p["factor"], ((1.2,),), masking_parameter="tune", masking_sd=0.3),
         )
         self.afar = afar
 
@@ -70,7 +70,7 @@ def test_only_trains_that_leave_more_than_sound_ones_are_simulated():
     case = SimpleNamespace(
         observations=seen, control_level={"passage": 0.7},
         aligned_passages={n: SimpleNamespace(conditions={"train": train}) for n, train in names.items() if train},
-        candidates=[Candidate("unsprung_mass", FACTOR, float, ((1.4,),), {"train": t}) for t in "ab"],
+        candidates=[Candidate.of("unsprung_mass", FACTOR, float, ((1.4,),), {"train": t}) for t in "ab"],
     )  # fmt: skip
     fit = SimpleNamespace(white=[np.full(40, rms[o.name]) for o in seen])
     assert residual_of_train(case, fit, "a") == pytest.approx(2.0) and residual_of_train(

@@ -27,7 +27,7 @@ class Line(Case):
         self.nuisances = (Nuisance("slope", "-", 1.0, slope_sd), Nuisance("level", "-", 0.0, 1.0))
         parameter = Parameter("amount", "-", 0.0, (-2.0, 2.0), "share of a power", "made up 2026")
         self.candidates = tuple(
-            Candidate(f"power_{p}", (parameter,), lambda psi, p=p: (p, psi["amount"]), ((0.3,),)) for p in powers
+            Candidate.of(f"power_{p}", (parameter,), lambda psi, p=p: (p, psi["amount"]), ((0.3,),)) for p in powers
         )
 
     def predict(self, values, terms, observations):
@@ -105,7 +105,7 @@ def test_an_effect_that_the_base_absorbs_is_found_by_the_joint_fit_alone():
     base = fit_jointly(case)
     assert base.values["slope"] > 1.2  # the base has bent to hide it
     parameter = Parameter("amount", "-", 0.0, (-2.0, 2.0), "size of the step", "made up 2026")
-    candidate = Candidate("step", (parameter,), lambda psi: psi["amount"], ((0.4,),), start_from_base=False)
+    candidate = Candidate.of("step", (parameter,), lambda psi: psi["amount"], ((0.4,),), from_base=False)
     predict = case.predict
     case.predict = lambda v, terms, obs: [
         p + sum(terms) * np.tanh(3.0 * (case.x[o.name] - 1.2)) for o, p in zip(obs, predict(v, (), obs))
@@ -225,7 +225,7 @@ def test_two_laws_that_agree_on_one_condition_are_told_apart_by_another():
         data = {n: x + 0.1 * x**3 + 0.08 * rng.normal(size=x.size) for n, x in case.x.items()}
         case.observations, case.reserved = tuple(Observation(n, n, y, 0.08) for n, y in data.items()), ()
         parameter = Parameter("amount", "-", 0.0, (-2.0, 2.0), "share of a law", "made up 2026")
-        square = Candidate("signed_square", (parameter,), lambda psi: ("square", psi["amount"]), ((0.3,),))
+        square = Candidate.of("signed_square", (parameter,), lambda psi: ("square", psi["amount"]), ((0.3,),))
         case.candidates = (*case.candidates, square)
         law = {3: lambda x: x**3, "square": lambda x: x * np.abs(x)}
         case.predict = lambda v, terms, obs: [

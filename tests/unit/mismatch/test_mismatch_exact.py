@@ -30,7 +30,7 @@ class Shapes(Case):
         self.observations = (Observation("all", "all", data, np.full(X.size, 0.1)),)
         starts = (100.0,), (0.3,)
         self.candidates = tuple(
-            Candidate(n, AMOUNT, lambda p, n=n: (n, p["amount"]), starts, {"shape": n}, exact=exact) for n in SHAPES
+            Candidate.of(n, AMOUNT, lambda p, n=n: (n, p["amount"]), starts, {"shape": n}, exact=exact) for n in SHAPES
         )
 
     def predict(self, values, terms, observations):
@@ -122,7 +122,7 @@ def rolled_and_struck():
 def test_friction_is_told_by_trains(rolled_and_struck, kind, material):
     """To blows it is a damper: a fit in which passages gain nothing gives it no name, whatever blows gain."""
     case, base = rolled_and_struck
-    assert {c.required_data_type for c in case.candidates if c.family == "dry_friction"} == {"passage"}
+    assert {c.naming.required_data_type for c in case.candidates if c.family == "dry_friction"} == {"passage"}
     friction = next(c for c in case.candidates if c.family == "dry_friction")
     better = with_whites(case, base, friction, 3000.0, {"hammer": 1.0, "passage": 1.0, kind: 0.5})
     assert bool(score_of(Search(case), base, better, friction).is_reportable) == material
@@ -145,7 +145,7 @@ class Heard(Case):
         struck = tuple(o.name for o in self.observations if o.data_type == "hammer")
         gain = (Parameter("gain", "-", 1.0, (-3.0, 3.0), "shown over true", "made up 2026", (1.0, 0.3)),)
         self.candidates = (
-            Candidate(
+            Candidate.of(
                 "sensor_gain",
                 gain,
                 lambda p: p["gain"],
@@ -195,5 +195,5 @@ def test_a_gain_that_blows_speak_against_is_none(blows, trains, material):
 def test_it_is_the_blows_that_a_sensor_read_that_may_speak_against_its_gain(rolled_and_struck):
     case, _ = rolled_and_struck
     gains = [c for c in case.candidates if c.family == "sensor_gain"]
-    assert any(c.must_not_oppose for c in gains)
-    assert all(case.frf_pairs[name].channel == c.where["sensor"] for c in gains for name in c.must_not_oppose)
+    assert any(c.naming.must_not_oppose for c in gains)
+    assert all(case.frf_pairs[name].channel == c.where["sensor"] for c in gains for name in c.naming.must_not_oppose)

@@ -94,7 +94,7 @@ def diagnosed(answer, candidates, frames):
 def test_a_row_has_no_place_from_a_frame_of_the_residual():
     """A law of the whole track is in no sensor, and where nothing is missing there is nothing to be fixed to."""
     law = physics.PadTemperature
-    warm = Candidate("pad_temperature", law.parameters, lambda p: law(**p), (), {}, "condition")
+    warm = Candidate.of("pad_temperature", law.parameters, lambda p: law(**p), (), {}, "condition")
     frames = [
         Attribution("sensor", "A2", 1.9, 0.1, 1e-3, 4e-3, 1253),
         Attribution("condition", "73 km/h", 1.0, 0.1, 0.2, 0.3, 1253),

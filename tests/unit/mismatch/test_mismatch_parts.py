@@ -25,7 +25,7 @@ def first(_):
 
 
 def candidate(family, where=HERE, **more):
-    return Candidate(family, FACTOR, lambda psi: psi, ((0.4,),), where, **more)
+    return Candidate.of(family, FACTOR, lambda psi: psi, ((0.4,),), where, **more)
 
 
 def score(found, gain, factor, error, explained=1.0):

@@ -43,7 +43,7 @@ class Alike(Case):
         self.control_level = {"response": 0.5}
         size = (Parameter("size", "-", 0.0, (-5.0, 5.0), "", "made up 2026", (0.0, 1.0)),)
         self.candidates = tuple(
-            Candidate(
+            Candidate.of(
                 name,
                 size,
                 lambda p, name=name: (name, p["size"]),
@@ -97,7 +97,7 @@ def test_a_channel_that_raises_the_alarm_is_asked_for_again(after, answer, grade
     """A name of 13 nats that leaves the channel as loud as it was explains nothing of what was heard."""
     search = Search(OneLoud())
     factor = Parameter("factor", "-", 1.0, (0.05, 20.0), "", "made up 2026")
-    pad = Candidate("local_pad", (factor,), lambda p: p, ((0.4,),), {"place": 3.0})
+    pad = Candidate.of("local_pad", (factor,), lambda p: p, ((0.4,),), {"place": 3.0})
     base, refit = with_squares(4.0, 0.5), with_squares(after, 0.45)
     share = explained_share(search, base, refit)
     assert share == pytest.approx(min(1.0, (4.0 - after) / 2.0))
@@ -236,10 +236,10 @@ def test_the_decoy_learns_from_recordings_like_those_it_has_to_predict():
 def dip(place, shift):
     """A diagnosis that names a dip at ``place`` of the grid, ``shift`` beyond it, and a misplaced sensor."""
     parameters = physics.SurfaceDip.parameters
-    candidate = Candidate(
+    candidate = Candidate.of(
         "surface_dip", parameters, lambda p: physics.SurfaceDip(place, **p), (), {"place": place}, "place"
     )
-    other = Candidate("sensor_position", physics.SensorPosition.parameters,
+    other = Candidate.of("sensor_position", physics.SensorPosition.parameters,
                       lambda p: physics.SensorPosition("S1", **p), (), {"sensor": "S1"}, "sensor")  # fmt: skip
     names = [p.name for p in parameters]
     psi = np.array([*({"shift": shift, "depth": 4e-4, "length": 0.4}.get(n, 0.5) for n in names), 0.7])
@@ -262,7 +262,7 @@ def test_a_dip_is_reported_where_it_was_fitted_and_not_where_it_was_looked_for()
 
 def test_the_error_of_a_sensors_place_is_none_of_a_sleepers():
     found = dip(23.0, 0.25)
-    hangs = Candidate("hanging_sleeper", physics.HangingSleeper.parameters,
+    hangs = Candidate.of("hanging_sleeper", physics.HangingSleeper.parameters,
                       lambda p: physics.HangingSleeper(4, **p), (), {"place": 23.4, "sleeper": 4}, "place")  # fmt: skip
     found.fit.candidates = (hangs, found.fit.candidates[1])
     found.fit.psi, found.fit.psi_se = np.array([1e-3, 0.0, 0.7]), np.array([1e-4, 0.1, 0.2])

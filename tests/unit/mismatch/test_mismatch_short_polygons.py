@@ -33,7 +33,7 @@ def test_a_short_polygon_is_found_on_its_wheel_with_its_size(wheel, size, order,
     assert found.where == {"train": "heavy", "axle": wheel + 1}
     mean, error = found.parameters[0].prior
     assert mean == pytest.approx(size, abs=1.96 * error) and error < 0.35 * size
-    assert found.promise > 12.0
+    assert found.refit.promise > 12.0
 
 
 def test_sound_wheels_corrugation_and_hum_are_no_polygons():

@@ -8,7 +8,7 @@ import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch import diagnose
-from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.engine.candidate import Candidate, EffectSite, NamingRules
 from turnout.mismatch.engine.candidate_search import Entry, Projector, is_same_site, required_promise
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
 from turnout.mismatch.engine.decision import grade_name, judge
@@ -35,7 +35,7 @@ class Shapes(Case):
         data = [sum(a * SHAPES[n] for n, a in true.items()) + 0.1 * rng.normal(size=X.size) for _ in range(3)]
         self.observations = tuple(Observation(f"o{k}", f"day {k}", d, np.full(X.size, 0.1)) for k, d in enumerate(data))
         self.candidates = tuple(
-            Candidate(n, AMOUNT, lambda p, n=n: (n, p["amount"]), ((0.5,),), {"shape": n}, component=component)
+            Candidate.of(n, AMOUNT, lambda p, n=n: (n, p["amount"]), ((0.5,),), {"shape": n}, component=component)
             for n in known
         )
 
@@ -123,7 +123,7 @@ class Trains(Shapes):
             for name in self.of
         )
         self.candidates = tuple(
-            Candidate("wave", AMOUNT, lambda p, t=t: (t, p["amount"]), ((0.5,),), {"train" if told else "part": t})
+            Candidate.of("wave", AMOUNT, lambda p, t=t: (t, p["amount"]), ((0.5,),), {"train" if told else "part": t})
             for t in "ab"
         )
 
@@ -166,8 +166,8 @@ GAP = (
 def test_a_gap_and_softer_ballast_that_are_as_likely_are_a_choice(seated, nats, said):
     """A third of the bed bears, and no train closes the gap: that is ballast of a third; nothing tells more."""
     here = {"sleeper": 7, "place": 4.2}
-    ballast = Candidate("local_ballast", FACTOR, lambda p: p, ((0.4,),), here)
-    gap = Candidate("hanging_sleeper", GAP, lambda p: p, ((1e-3, 0.0),), here, simpler_form=("local_ballast", 1))
+    ballast = Candidate.of("local_ballast", FACTOR, lambda p: p, ((0.4,),), here)
+    gap = Candidate.of("hanging_sleeper", GAP, lambda p: p, ((1e-3, 0.0),), here, simpler_form=("local_ballast", 1))
     scores = [own(gap, [3e-3, seated], [1e-3, 0.03], nats), own(ballast, [0.35], [0.04])]
     verdict = judge(scores, 2.0, MismatchSettings())
     assert verdict.names == said
@@ -177,7 +177,7 @@ def test_a_gap_and_softer_ballast_that_are_as_likely_are_a_choice(seated, nats, 
 def test_the_size_of_what_has_two_amplitudes_is_that_of_both():
     """0.3 and 0.4 are half a metre per second squared."""
     pair = (AMOUNT[0], Parameter("cosine", "-", 0.0, (-9.0, 9.0), "the other part", "made up 2026"))
-    hum = Candidate(
+    hum = Candidate.of(
         "hum", pair, lambda p: p, ((1.0, 0.0),), {"sensor": "A"}, smallest_reportable=0.49, n_size_parameters=2
     )
     assert own(hum, [0.3, 0.4], [0.01, 0.01]).is_reportable
@@ -188,7 +188,7 @@ def test_the_size_of_what_has_two_amplitudes_is_that_of_both():
 def test_a_mass_that_may_as_well_be_nothing_is_not_named(error, told):
     """8 kg, of which 5 matter: sure by three standard errors, or open."""
     mass = (Parameter("mass", "kg", 0.0, (0.0, 200.0), "what hangs there", "made up 2026"),)
-    hung = Candidate(
+    hung = Candidate.of(
         "attached_resonator",
         mass,
         lambda p: p,
@@ -205,7 +205,7 @@ def test_a_start_that_turns_promises_what_it_is(whole, share):
     """The data want a third of the start; half the cost falls by 2 s q - s² q with q its size and s the share."""
     case = Shapes(("wave",), wave=1.0)
     projector = Projector(case, fit_jointly(case))
-    candidate = Candidate("wave", AMOUNT, lambda p: p, ((3.0,),), nonlinear_in_size=whole)
+    candidate = Candidate.of("wave", AMOUNT, lambda p: p, ((3.0,),), nonlinear_in_size=whole)
     gain, found = projector.score([3.0 * SHAPES["wave"]] * 3, candidate, 0)
     assert found == pytest.approx(share, rel=0.02)
     assert (gain < 0.0) == whole
@@ -216,7 +216,7 @@ def test_a_twin_goes_back_with_its_effect_even_where_nothing_is_learnt_of_it():
     case = SimpleNamespace(nuisances=[Nuisance(n, "-", 0.0, 0.1) for n in ("seat_A1", "gain_A1", "seat_A2")])
     values = {"seat_A1": 0.0, "gain_A1": 0.03, "seat_A2": 0.0}
     fit = SimpleNamespace(covariance=np.diag([1e-2, 1e-4, 1e-2]), values=values)
-    moved = SimpleNamespace(masking_parameter="seat_A1")
+    moved = SimpleNamespace(site=EffectSite(masking_parameter="seat_A1"))
     assert informed_values(case, fit, moved) == {"seat_A1": 0.0, "gain_A1": 0.03}
 
 
@@ -224,7 +224,7 @@ def test_a_twin_goes_back_with_its_effect_even_where_nothing_is_learnt_of_it():
 def test_a_gap_that_no_train_closes_may_be_no_ballast_at_all(error, names):
     """2.5 ± 3 mm has no upper end: what lies beneath was never touched, and nobody can say whether it is there."""
     here, settings = {"sleeper": 7, "place": 4.2}, MismatchSettings()
-    gap = Candidate("hanging_sleeper", GAP, lambda p: p, ((1e-3, 0.0),), here, unbounded_form="local_ballast")
+    gap = Candidate.of("hanging_sleeper", GAP, lambda p: p, ((1e-3, 0.0),), here, unbounded_form="local_ballast")
     alone = judge([own(gap, [2.5e-3, 0.04], [error, 0.01])], 2.0, settings)
     verdict, _, _ = grade_name(alone, alone.scores[0].fit, 0.9, settings)
     assert verdict.names == names and verdict.answer == ("named" if len(names) == 1 else "a_or_b")
@@ -235,7 +235,9 @@ def test_a_gap_that_no_train_closes_may_be_no_ballast_at_all(error, names):
 def test_a_second_gap_that_no_train_closes_may_be_no_ballast_either(error, answer):
     """Sure of its size when it was named, not in the fit with both."""
     settings = MismatchSettings()
-    gap = Candidate("hanging_sleeper", GAP, lambda p: p, ((1e-3, 0.0),), {"place": 4.2}, unbounded_form="local_ballast")
+    gap = Candidate.of(
+        "hanging_sleeper", GAP, lambda p: p, ((1e-3, 0.0),), {"place": 4.2}, unbounded_form="local_ballast"
+    )
     second = judge([own(gap, [2.5e-3, 0.04], [1e-4, 0.01])], 2.0, settings)
     both = SimpleNamespace(
         psi=np.array([0.3, 2.5e-3, 0.04]), psi_se=np.array([0.02, error, 0.01]), part=lambda _: slice(1, 3),
@@ -248,7 +250,7 @@ def test_a_second_gap_that_no_train_closes_may_be_no_ballast_either(error, answe
 
 def test_a_second_of_a_kind_two_bays_on_is_the_shape_of_the_first():
     def at(family, place):
-        return Candidate(family, FACTOR, lambda p: p, ((0.4,),), {"place": place})
+        return Candidate.of(family, FACTOR, lambda p: p, ((0.4,),), {"place": place})
 
     first = at("local_ballast", 4.2)
     assert is_same_site(at("local_ballast", 5.4), first) and not is_same_site(at("local_pad", 5.4), first)
@@ -264,7 +266,7 @@ def test_a_wheel_known_by_its_blows_is_no_shape_of_heavy_wheels(known, offered, 
     own, and may be what heavy wheels leave."""
 
     def of(where, sounding):
-        return Candidate(
+        return Candidate.of(
             "flat" if "axle" in where else "mass", AMOUNT, tuple, ((0.5,),), where, evidence_suffices=sounding
         )
 
@@ -295,7 +297,7 @@ def test_a_rival_that_keeps_its_gain_on_top_of_the_leader_is_none(left, answer):
 def test_a_second_effect_that_blows_alone_promise_half_of_is_refitted(promised, scouted, asked):
     """What trains say of it comes on top: a soft rail of 12 nats in blows had 20 in all. What a column promises is of
     all recordings together, and has to be a name; a first effect is asked from 2 nats on."""
-    settings, candidate = MismatchSettings(), Candidate("soft_rail", AMOUNT, tuple, ((0.5,),))
+    settings, candidate = MismatchSettings(), Candidate.of("soft_rail", AMOUNT, tuple, ((0.5,),))
     entry, beside = Entry(promised, candidate, np.array([0.5]), {}), SimpleNamespace(candidates=("pad",))
     assert required_promise(entry, beside, {candidate.key: scouted}, settings) == asked
     assert required_promise(entry, SimpleNamespace(candidates=()), {candidate.key: scouted}, settings) == 2.0
@@ -356,7 +358,8 @@ def test_a_second_name_that_recordings_never_used_deny_is_dropped(reserved, left
 @pytest.mark.parametrize("last, grade, said", [("ramp", "A", 2), ("ramp", "B", 1), ("", "B", 2)])
 def test_what_would_leave_nothing_is_no_name_where_something_is_left(last, grade, said):
     """A drifting clock bends what its channel shows into much else: first or second, it has to explain all."""
-    pair = [replace(c, must_reach_control_level=c.family == last) for c in Shapes(("bowl", "ramp")).candidates]
+    rules = {name: NamingRules(must_reach_control_level=name == last) for name in ("bowl", "ramp")}
+    pair = [replace(c, naming=rules[c.family]) for c in Shapes(("bowl", "ramp")).candidates]
     posterior = {"bowl": 0.9, "ramp": 0.05, "unknown": 0.05}
     case = SimpleNamespace(control_level={"passage": 0.7}, cell_level={}, observations=())
     base, fit = (SimpleNamespace(level={"passage": 0.6 if grade == "A" else 0.8}, white=[]) for _ in range(2))
@@ -375,7 +378,8 @@ def test_what_would_leave_nothing_is_no_name_where_something_is_left(last, grade
 def test_a_diagnosis_withdraws_what_would_leave_nothing(ripple, answer):
     """The ramp is there; with a ripple that no candidate has it is of grade B, which a drifting clock may not be."""
     case = Shapes(("wave", "ramp"), ramp=2.5, ripple=ripple)
-    case.candidates = tuple(replace(c, must_reach_control_level=True) for c in case.candidates)
+    rules = NamingRules(must_reach_control_level=True)
+    case.candidates = tuple(replace(c, naming=rules) for c in case.candidates)
     found = diagnose(case)
     assert found.verdict.answer == answer
     assert bool(found.fit.candidates) == (answer == "named")

@@ -7,6 +7,7 @@ import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine import refit
+from turnout.mismatch.engine.candidate import EffectSite, RefitStarts
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.score import Score
@@ -129,8 +130,8 @@ def test_a_law_of_the_whole_track_that_gains_too_little_is_begun_again_farther_o
     prior; what gains most counts. What has a name or a place is left alone."""
     candidate = SimpleNamespace(
         key="a",
-        n_scanned=scanned,
-        start_from_base=True,
+        site=EffectSite(n_scanned=scanned),
+        refit=RefitStarts(()),
         frame="place",
         parameters=(SimpleNamespace(neutral=0.0, bounds=(-9.0, 9.0)),),
     )

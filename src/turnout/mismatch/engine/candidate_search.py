@@ -55,12 +55,12 @@ def masked_candidates(case: Case, fit: Fit) -> list[Entry]:
     index = {n.name: k for k, n in enumerate(case.nuisances)}
     entries = []
     for candidate in case.candidates:
-        k = index.get(candidate.masking_parameter)
+        k = index.get(candidate.site.masking_parameter)
         if k is None:
             continue
         masking = case.nuisances[k]
         m, s = fit.values[masking.name] - masking.mean, float(np.sqrt(fit.covariance[k, k]))
-        gain_and_size = gain_with_wide_prior(m, s, masking.sd, candidate.masking_sd)
+        gain_and_size = gain_with_wide_prior(m, s, masking.sd, candidate.site.masking_sd)
         if gain_and_size is None:
             continue
         gain, size = gain_and_size
@@ -69,9 +69,9 @@ def masked_candidates(case: Case, fit: Fit) -> list[Entry]:
             n.name: float(np.clip(fit.values[n.name] + d, *n.bounds)) for n, d in zip(case.nuisances, shift)
         }  # fmt: skip
         low, high = candidate.parameters[0].bounds
-        start = np.clip([(candidate.from_masking or np.exp)(size)], low, high)
+        start = np.clip([(candidate.site.from_masking or np.exp)(size)], low, high)
         values[masking.name] = masking.mean
-        entries.append(Entry(gain - np.log(candidate.n_scanned), candidate, start, values))
+        entries.append(Entry(gain - np.log(candidate.site.n_scanned), candidate, start, values))
     return entries
 
 
@@ -183,7 +183,7 @@ def _prescreened_entries(search: Search, fit: Fit, promising: Collection[str] | 
     if fit.candidates and promising is not None:
         families = {
             *promising,
-            *(c.family for c in search.case.candidates if c.prescreen_group and c.n_scanned == 1),
+            *(c.family for c in search.case.candidates if c.refit.prescreen_group and c.site.n_scanned == 1),
         }
     return [Entry(trial.gain, trial.candidate, trial.psi, trial.values) for trial in prescreen(search, fit, families)]
 
@@ -193,27 +193,27 @@ def _screened_entries(case: Case, fit: Fit, candidates: Sequence[Candidate]) -> 
     projector, columns = Projector(case, fit), case.screen(fit)
     for candidate, distant in case.distant_starts(fit):
         if candidate in candidates:
-            at_start = replace(candidate, starts=(distant,), nonlinear_in_size=True)
+            at_start = replace(candidate, refit=replace(candidate.refit, points=(distant,), nonlinear_in_size=True))
             yield _distant_entry(case, fit, projector, at_start, candidate)
     for candidate in candidates:
-        if candidate.promise is not None:
+        if candidate.refit.promise is not None:
             start = np.asarray(candidate.starts[0])
-            yield Entry(candidate.promise, candidate, start, dict(candidate.start_nuisances))
+            yield Entry(candidate.refit.promise, candidate, start, dict(candidate.refit.nuisances))
             continue
         for k in range(len(candidate.starts)):
             changes = columns.get((candidate.key, k))
             if changes is None:
                 changes = _predicted_change(case, fit, candidate, k)
             gain, share = projector.score(changes, candidate, k)
-            yield Entry(0.5 * gain - np.log(candidate.n_scanned), candidate, scaled_start(candidate, k, share), {})
+            yield Entry(0.5 * gain - np.log(candidate.site.n_scanned), candidate, scaled_start(candidate, k, share), {})
 
 
 def _distant_entry(case: Case, fit: Fit, projector: Projector, at_start: Candidate, candidate: Candidate) -> Entry:
     """Entry of a ``candidate`` simulated ``at_start``, with its masking parameter at the mean: no change is small."""
-    reset_values = {n.name: n.mean for n in case.nuisances if n.name == candidate.masking_parameter}
+    reset_values = {n.name: n.mean for n in case.nuisances if n.name == candidate.site.masking_parameter}
     changes = _predicted_change(case, replace(fit, values={**fit.values, **reset_values}), at_start, 0)
     gain, _ = projector.score(changes, at_start, 0)
-    return Entry(0.5 * gain - np.log(candidate.n_scanned), candidate, np.array(at_start.starts[0]), reset_values)
+    return Entry(0.5 * gain - np.log(candidate.site.n_scanned), candidate, np.array(at_start.starts[0]), reset_values)
 
 
 def required_promise(entry: Entry, fit: Fit, prescreen_gains: Mapping[str, float], settings: MismatchSettings) -> float:
@@ -273,7 +273,7 @@ def component_rivals(chosen: Sequence[Entry], by_family: Mapping[str, Sequence[E
     -------
     list of Entry
     """
-    sites = [e.candidate.part for e in chosen if e.candidate.component][:2]
+    sites = [e.candidate.part for e in chosen if e.candidate.effect.component][:2]
     chosen_effects = {(e.candidate.family, e.candidate.part) for e in chosen}
     best_entries: dict[tuple, Entry] = {}
     for entry in sorted((e for entries in by_family.values() for e in entries), key=lambda e: e.gain):
@@ -300,8 +300,8 @@ def is_same_site(candidate: Candidate, accepted: Candidate) -> bool:
     if candidate.key == accepted.key:
         return True
     a, b = candidate.where, accepted.where
-    of_one_wheel = {(c.evidence_suffices, "axle" in c.where) for c in (candidate, accepted)}
-    if (candidate.exact and accepted.exact) or of_one_wheel == {(True, True), (False, False)}:
+    of_one_wheel = {(c.naming.evidence_suffices, "axle" in c.where) for c in (candidate, accepted)}
+    if (candidate.effect.exact and accepted.effect.exact) or of_one_wheel == {(True, True), (False, False)}:
         return False
     is_same_effect = candidate.family == accepted.family
     max_distance = THRESHOLDS.same_effect_distance if is_same_effect else THRESHOLDS.same_site_distance
@@ -393,7 +393,7 @@ class Projector:
         slope = float(column @ self.right - across @ self.shift)
         if size <= 1e-12 * float(column @ column) or size <= 0.0:
             return 0.0, 1.0
-        optimum = slope / size if not candidate.nonlinear_in_size else 1.0
+        optimum = slope / size if not candidate.refit.nonlinear_in_size else 1.0
         most = _max_multiple(candidate, candidate.starts[start])
         share = float(np.clip(optimum, THRESHOLDS.min_start_multiple, most))
         return 2.0 * share * slope - share**2 * size, share

@@ -138,7 +138,7 @@ NAME_RULES: tuple[Rule[NameEvidence], ...] = (
     Rule("size_known_from_below", lambda e: e.score.is_unbounded, "a_or_b",
          "the size of {e.score.family} is known from below alone", PAIRS),
     Rule("reaches_control_level", lambda e: e.excess <= 1.0, "A", "", HOW),
-    Rule("must_reach_control_level", lambda e: e.score.candidate.must_reach_control_level, "unknown",
+    Rule("must_reach_control_level", lambda e: e.score.candidate.naming.must_reach_control_level, "unknown",
          "{e.score.family} would leave nothing, and more is left than in sound turnouts", LOCATED),
     Rule("leaves_some_residual", _always, "B", "", HOW),
 )

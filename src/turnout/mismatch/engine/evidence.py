@@ -80,9 +80,11 @@ def score_of(search: Search, fit: Fit, refit: Fit, candidate: Candidate) -> Scor
         gain = sum(by_condition.values()) if by_condition else gain
     explained = explained_share(search, fit, refit)
     worst_gain = min(by_condition.values(), default=0.0)
-    gain += candidate.external_evidence
+    gain += candidate.naming.external_evidence
     is_ordinary = is_within_spread(case, refit, candidate) or not _is_supported(search, fit, refit, candidate)
-    return Score(candidate, gain - np.log(candidate.n_scanned), worst_gain, explained, refit, by_condition, is_ordinary)
+    return Score(
+        candidate, gain - np.log(candidate.site.n_scanned), worst_gain, explained, refit, by_condition, is_ordinary
+    )
 
 
 def _is_supported(search: Search, fit: Fit, refit: Fit, candidate: Candidate) -> bool:
@@ -90,9 +92,9 @@ def _is_supported(search: Search, fit: Fit, refit: Fit, candidate: Candidate) ->
     gained = 0.5 * sum(
         o.effective * float(np.sum(np.square(a)) - np.sum(np.square(b))) / fit.scale[o.data_type]
         for o, a, b in zip(search.case.observations, fit.white, refit.white)
-        if o.data_type == candidate.required_data_type
+        if o.data_type == candidate.naming.required_data_type
     )
-    supported = not candidate.required_data_type or gained > search.settings.margin
+    supported = not candidate.naming.required_data_type or gained > search.settings.margin
     return supported and not _is_opposed(search.case, fit, refit, candidate)
 
 
@@ -102,15 +104,13 @@ def _is_opposed(case: Case, fit: Fit, refit: Fit, candidate: Candidate) -> bool:
     They do so if they put its masking parameter, with a prior as wide as the effect's, nearer to its value without the
     effect than to its value with it.
     """
-    data_types = {o.data_type for o in case.observations if o.name in candidate.must_not_oppose}
+    data_types = {o.data_type for o in case.observations if o.name in candidate.naming.must_not_oppose}
     if not data_types or not fit.jacobian:
         return False
     size = refit.psi[refit.part(candidate).start] - candidate.neutral[0]
-    mean = next(n.mean for n in case.nuisances if n.name == candidate.masking_parameter)
-    return any(
-        (single_type_estimate(case, fit, k, candidate.masking_parameter, candidate.masking_sd) - mean) / size < 0.5
-        for k in data_types
-    )
+    name, sd = candidate.site.masking_parameter, candidate.site.masking_sd
+    mean = next(n.mean for n in case.nuisances if n.name == name)
+    return any((single_type_estimate(case, fit, k, name, sd) - mean) / size < 0.5 for k in data_types)
 
 
 def is_within_spread(case: Case, refit: Fit, candidate: Candidate) -> bool:
@@ -133,9 +133,9 @@ def is_within_spread(case: Case, refit: Fit, candidate: Candidate) -> bool:
     bool
         False if there are too few similar components.
     """
-    if not candidate.masking_parameter or candidate.from_masking:
+    if not candidate.site.masking_parameter or candidate.site.from_masking:
         return False
-    masking = next((n for n in case.nuisances if n.name == candidate.masking_parameter), None)
+    masking = next((n for n in case.nuisances if n.name == candidate.site.masking_parameter), None)
     if masking is None or masking.index is None:  # the common value of all components, or of one without its like
         return False
     siblings = [

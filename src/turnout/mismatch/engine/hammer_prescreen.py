@@ -73,7 +73,7 @@ class _Prescreen:
         """
         candidates = (*self.accepted, candidate)
         psi, n = np.concatenate([self.broad_fit.psi, start]), self.broad_fit.psi.size
-        max_cost = self.broad_fit.cost - 2.0 * self.settings.promise if candidate.prescreen_group else np.inf
+        max_cost = self.broad_fit.cost - 2.0 * self.settings.promise if candidate.refit.prescreen_group else np.inf
         try:
             broad_fit = _fit_cheaply(self.broad_case, candidates, psi, _prior_means(self.broad_case))
             if broad_fit.cost > max_cost:
@@ -81,7 +81,7 @@ class _Prescreen:
             refit = _fit_cheaply(self.cheap_case, candidates, broad_fit.psi, broad_fit.values)
         except SimulationError:
             return None
-        gain = refit.evidence - self.base.evidence - np.log(candidate.n_scanned)
+        gain = refit.evidence - self.base.evidence - np.log(candidate.site.n_scanned)
         values = informed_values(self.cheap_case, refit, candidate)
         level, before = (max(f.level.values()) for f in (refit, self.base))
         return PrescreenFit(gain, candidate, refit.psi[n:], values, level, before)
@@ -95,7 +95,7 @@ class _Prescreen:
         """
         ranked = sorted(starts, key=lambda s: s.gain)
         best_starts = {s.candidate.key: s for s in ranked}
-        group = next(iter(best_starts.values())).candidate.prescreen_group
+        group = next(iter(best_starts.values())).candidate.refit.prescreen_group
         if group and len(best_starts) == 1:
             return [self._best_of_track(ranked)]
         if group:
@@ -187,7 +187,7 @@ def informed_values(case: Case, fit: Fit, candidate: Candidate) -> dict[str, flo
     """
     sd = np.sqrt(np.diag(fit.covariance))
     is_informed = {
-        n.name: s < THRESHOLDS.uninformed_sd_share * n.sd or n.name == candidate.masking_parameter
+        n.name: s < THRESHOLDS.uninformed_sd_share * n.sd or n.name == candidate.site.masking_parameter
         for n, s in zip(case.nuisances, sd)
     }
     return {name: fit.values[name] for name, informed in is_informed.items() if informed}

@@ -92,7 +92,7 @@ class Fit:
         for candidate in self.candidates:
             if candidate.parameters:
                 size = self.psi[first] - candidate.parameters[0].neutral
-                errors[first] = np.hypot(errors[first], candidate.model_error_share * size)
+                errors[first] = np.hypot(errors[first], candidate.effect.model_error_share * size)
             first += len(candidate.parameters)
         return errors
 

@@ -220,8 +220,8 @@ def correct_for_leader(search: Search, fit: Fit, ranked: list[Score]) -> list[Sc
     gain_left = (
         max(f.evidence for f in fits)
         - leader_fit.evidence
-        + rival.candidate.external_evidence
-        - np.log(rival.candidate.n_scanned)
+        + rival.candidate.naming.external_evidence
+        - np.log(rival.candidate.site.n_scanned)
     )
     return sorted((replace(s, gain=min(s.gain, gain_left)) if s is rival else s for s in ranked), key=lambda s: -s.gain)
 
@@ -248,7 +248,7 @@ def _score_task(search: Search, fit: Fit, task: RefitTask, best_gain: float = 0.
     score = score_of(search, fit, refit, candidate)
     if not search.case.expensive:
         return score
-    whole_track = candidate.n_scanned == 1 and candidate.start_from_base
+    whole_track = candidate.site.n_scanned == 1 and candidate.refit.from_base
     if whole_track and score.gain < threshold:
         score = max(score, _score_from_farther(search, fit, task, score, key), key=lambda s: s.gain)
     min_cheap_gain = max(threshold, THRESHOLDS.min_held_share * best_gain if is_channel else 0.0)
@@ -313,11 +313,11 @@ def _refit(search: Search, fit: Fit, task: RefitTask, is_far: bool) -> Fit | Non
     psi = np.concatenate([fit.psi, task.start])
     candidates = (*fit.candidates, candidate)
     values = {**fit.values, **task.values}
-    if not candidate.start_from_base and not task.values:  # nuisances that can mask an effect return to their priors
+    if not candidate.refit.from_base and not task.values:  # nuisances that can mask an effect return to their priors
         values |= search.prior_values()
     try:
         psi = _best_start(case, candidates, psi, values)
-        if candidate.start_from_base and not task.values:
+        if candidate.refit.from_base and not task.values:
             psi = _backtrack(case, candidates, psi, fit)
         jacobian = _start_jacobian(case, fit, candidates, psi, values, is_far)
         refit = search.fit(candidates, psi, values, jacobian)
@@ -348,10 +348,10 @@ def _best_start(case: Case, candidates: tuple[Candidate, ...], psi: np.ndarray, 
     The expensive observations decide what the cheap ones cannot see.
     """
     candidate = candidates[-1]
-    if candidate.start_from_base and not candidate.sign_ambiguous:
+    if candidate.refit.from_base and not candidate.refit.sign_ambiguous:
         return psi
     n, costs = psi.size - len(candidate.parameters), []
-    alternatives = (candidate.mirror_image(psi[n:]),) if candidate.sign_ambiguous else candidate.starts
+    alternatives = (candidate.mirror_image(psi[n:]),) if candidate.refit.sign_ambiguous else candidate.starts
     for start in (psi[n:], *alternatives):
         trial = np.concatenate([psi[:n], np.asarray(start, dtype=float)])
         try:

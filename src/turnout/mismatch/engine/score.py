@@ -52,13 +52,13 @@ class Score:
         """Whether it is so large that somebody would act."""
         if self.is_ordinary:
             return False
-        parameters, n_size = self.candidate.parameters, self.candidate.n_size_parameters
-        change = self.estimates[0][:n_size] - self.candidate.neutral[:n_size] if parameters else np.array([np.inf])
+        rules, n_size = self.candidate.naming, self.candidate.naming.n_size_parameters
+        change = np.array([np.inf])
+        if self.candidate.parameters:
+            change = self.estimates[0][:n_size] - self.candidate.neutral[:n_size]
         size = float(np.linalg.norm(change))
-        uncertainty = (
-            self.candidate.min_significance * float(self.estimates[1][0]) if self.candidate.min_significance else 0.0
-        )
-        return size - uncertainty >= self.candidate.smallest_reportable
+        uncertainty = rules.min_significance * float(self.estimates[1][0]) if rules.min_significance else 0.0
+        return size - uncertainty >= rules.smallest_reportable
 
     def exemption_reason(self, settings: MismatchSettings) -> str:
         """Reason, in words, why the residual of the fit does not count against it, "" if there is none.
@@ -66,10 +66,10 @@ class Score:
         Either external evidence alone is enough, and the fit becomes worse by no more than a margin. Or conditions
         support it in which no earlier effect shows, whose shape may be the residual elsewhere.
         """
-        position_cost = np.log(self.candidate.n_scanned)
-        evidence = self.candidate.external_evidence - position_cost
+        position_cost = np.log(self.candidate.site.n_scanned)
+        evidence = self.candidate.naming.external_evidence - position_cost
         if (
-            self.candidate.evidence_suffices
+            self.candidate.naming.evidence_suffices
             and evidence > settings.threshold
             and self.gain > evidence - settings.margin
         ):
@@ -84,21 +84,21 @@ class Score:
     @property
     def is_unbounded(self) -> bool:
         """Whether only a lower limit of its size is known, and beyond it is its ``unbounded_form``."""
-        if not self.candidate.unbounded_form:
+        if not self.candidate.effect.unbounded_form:
             return False
         sizes, errors = self.estimates
         return bool(errors[0] > THRESHOLDS.max_bounded_error * abs(sizes[0] - self.candidate.neutral[0]))
 
     def is_limit_of(self, rival: Score) -> bool:
         """Whether ``rival`` at the same site is at its bound, within a standard error, where it looks like this one."""
-        if rival.candidate.limit_form != self.family or rival.candidate.where != self.candidate.where:
+        if rival.candidate.effect.limit_form != self.family or rival.candidate.where != self.candidate.where:
             return False
         sizes, errors = rival.estimates
         return float(sizes[0] - errors[0]) <= rival.candidate.parameters[0].bounds[0]
 
     def is_simpler_form_of(self, rival: Score) -> bool:
         """Whether ``rival`` at the same site is the same effect with one more parameter: the sizes agree."""
-        family, k = rival.candidate.simpler_form or ("", 0)
+        family, k = rival.candidate.effect.simpler_form or ("", 0)
         if family != self.family or rival.candidate.where != self.candidate.where:
             return False
         (own_sizes, error), (rival_sizes, errors) = self.estimates, rival.estimates
@@ -112,6 +112,6 @@ class Score:
         """
         trains = {s.candidate.where.get("train") for s in (self, rival)}
         is_related = self.family == rival.family or (
-            self.candidate.component and self.candidate.part == rival.candidate.part
+            self.candidate.effect.component and self.candidate.part == rival.candidate.part
         )
         return not is_related or (len(trains) == 2 and None not in trains)

@@ -77,7 +77,7 @@ class SecondEvidence:
     def shape_error_evidence(self) -> float:
         """Evidence that an error in the shape of the first effect may leave to another name. [nats]"""
         first, second = self.first.scores[0], self.named
-        if first.candidate.exact or second.gain >= THRESHOLDS.shape_error_share * first.gain:
+        if first.candidate.effect.exact or second.gain >= THRESHOLDS.shape_error_share * first.gain:
             return 0.0
         overlap = signature_overlap(self.search.case, second.fit, first.candidate, second.candidate)
         return THRESHOLDS.shape_error_share * first.gain * overlap
@@ -345,4 +345,4 @@ def settle_pair(findings: Findings) -> Findings:
 
 def _evidence_gain(fit: Fit, without: Fit, candidate: Candidate) -> float:
     """Evidence for a candidate by the fits with and without it. [nats]"""
-    return fit.evidence - without.evidence + candidate.external_evidence - np.log(candidate.n_scanned)
+    return fit.evidence - without.evidence + candidate.naming.external_evidence - np.log(candidate.site.n_scanned)

@@ -65,7 +65,7 @@ class Verdict:
 
     def as_choice(self, reason: str, settings: MismatchSettings) -> Verdict:
         """The answer "a or b" in place of a name: it, or the form that looks the same beyond the limit of its size."""
-        names, probabilities = (self.names[0], self.scores[0].candidate.unbounded_form), dict(self.posterior)
+        names, probabilities = (self.names[0], self.scores[0].candidate.effect.unbounded_form), dict(self.posterior)
         probability = calibrate(probabilities, names, settings.certainty("a_or_b"), settings)
         reason = "; ".join(filter(None, [reason, self.reason]))
         changes: dict[str, Any] = {"answer": "a_or_b", "names": names, "grade": "", "probability": probability}

@@ -9,6 +9,10 @@ rail and how deep it falls depend on its profile, new or hollow worn (Palsson an
 50), and the shape in the file is only approximate.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy.linalg import eigh
 
@@ -17,9 +21,36 @@ from turnout.mismatch.turnout.priors import WHEELS
 from turnout.mismatch.turnout.rail_roughness import amplitude_sd
 from turnout.mismatch.turnout.wave_response import WaveTransfer
 
+if TYPE_CHECKING:
+    from typing import Any
 
-def profile_modes(predictor, values, aligned, transfer):
-    """(n_sensor * n_time, n_mode) signals of one standard deviation of each wheel's path over each component."""
+    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.turnout.case import TrackCase
+    from turnout.mismatch.turnout.passage_observation import AlignedPassage
+    from turnout.mismatch.turnout.prediction import Predictor, Values
+    from turnout.mismatch.turnout.rail_roughness import Waves
+    from turnout.simulate.wheel_path import PathPart
+
+
+def profile_modes(predictor: Predictor, values: Values, aligned: AlignedPassage, transfer: WaveTransfer) -> np.ndarray:
+    """Signals of one standard deviation of each wheel's path over each component.
+
+    Parameters
+    ----------
+    predictor : Predictor
+        Predicts the recordings of the site.
+    values : mapping
+        All nuisances of the site, by name.
+    aligned : AlignedPassage
+        The passage.
+    transfer : WaveTransfer
+        Of the passage.
+
+    Returns
+    -------
+    (n_sensor * n_time, n_mode) array of float
+        [m/s²]
+    """
     grid = transfer.fine_grid
     paths = [path for component in _components(predictor, values, aligned) for path in _deviations(component, grid)]
     if not paths:
@@ -29,7 +60,7 @@ def profile_modes(predictor, values, aligned, transfer):
     )
 
 
-def _components(predictor, values, aligned):
+def _components(predictor: Predictor, values: Values, aligned: AlignedPassage) -> list[PathPart]:
     """Components of a passage's route except waves, which are the same for all wheels."""
     components = [
         component
@@ -39,7 +70,7 @@ def _components(predictor, values, aligned):
     return [component for component in components if not hasattr(component, "wavelength")]
 
 
-def _deviations(component, grid):
+def _deviations(component: PathPart, grid: np.ndarray) -> list[np.ndarray]:
     """Standard deviations of a surface component at ``grid`` (n,) [m]: deeper, further, longer, sharper.
 
     A height step between its ends is the same for all wheels.
@@ -62,11 +93,27 @@ def _deviations(component, grid):
     ]
 
 
-def wheel_modes(predictor, values, aligned, sigma):
-    """(n_sensor * n_time, n_mode) signals of one standard deviation of the roughness and profile of all wheels.
+def wheel_modes(predictor: Predictor, values: Values, aligned: AlignedPassage, sigma: np.ndarray) -> np.ndarray:
+    """Signals of one standard deviation of the roughness and profile of all wheels.
 
     ``sigma`` (n,) is the error of the observation. In single precision: a long train over many sensors has a thousand
     modes of ten thousand samples each.
+
+    Parameters
+    ----------
+    predictor : Predictor
+        Predicts the recordings of the site.
+    values : mapping
+        All nuisances of the site, by name.
+    aligned : AlignedPassage
+        The passage.
+    sigma : (n_sensor * n_time,) array of float
+        Error of the observation. [m/s²]
+
+    Returns
+    -------
+    (n_sensor * n_time, n_mode) array of float
+        In single precision. [m/s²]
     """
     waves, scale = predictor.waves, sigma[:, None].astype(np.float32)
     radii, transfer = (
@@ -74,22 +121,23 @@ def wheel_modes(predictor, values, aligned, sigma):
         WaveTransfer(predictor, values, aligned, beyond=WHEELS.roughness_margin),
     )
     treads = {radius: _wave_sds(waves, radius) for radius in radii}
-    modes = [profile_modes(predictor, values, aligned, transfer).astype(np.float32)]
-    for envelope, rail in zip(_envelopes(waves, transfer.node), (0.0, waves.sd[::2], waves.sd[::2])):
+    blocks = [profile_modes(predictor, values, aligned, transfer).astype(np.float32)]
+    rail_sds: tuple[Any, ...] = (0.0, waves.sd[::2], waves.sd[::2])
+    for envelope, rail in zip(_envelopes(waves, transfer.node), rail_sds):
         spectra = transfer.spectra(waves.lengths, envelope)
         for w, radius in enumerate(radii):
             sd = np.hypot(treads[radius], rail)
             columns = (transfer.signals_from(spectra, transfer.wheel(w)) * np.repeat(sd, 2)).astype(np.float32)
-            modes.append(
+            blocks.append(
                 columns[:, np.sum((columns / scale) ** 2, axis=0) > WHEELS.faint_share * WHEELS.min_mode_variance]
             )
-    modes = np.concatenate(modes, axis=1)
+    modes = np.concatenate(blocks, axis=1)
     scaled = modes / scale
     power, vectors = eigh(scaled.T @ scaled, driver="evd", overwrite_a=True)  # scipy's: half the time of numpy's
     return modes @ vectors[:, power > WHEELS.min_mode_variance]
 
 
-def _wave_sds(waves, radius):
+def _wave_sds(waves: Waves, radius: float) -> np.ndarray:
     """(n_length,) standard deviation of the waves of a wheel [m]."""
     sd, circumference = amplitude_sd(waves.lengths, waves.length, WHEELS.level), 2.0 * np.pi * radius
     # out of round: the variance of an harmonic is spread over the waves up to half an order beside it
@@ -100,7 +148,7 @@ def _wave_sds(waves, radius):
     return sd
 
 
-def _envelopes(waves, node):
+def _envelopes(waves: Waves, node: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Envelopes (n_node,) of the region with free rail waves, of that before and of that behind it.
 
     In the latter two the roughness of the rail is an error of each wheel as well.
@@ -110,12 +158,24 @@ def _envelopes(waves, node):
     return inside.astype(float), outside * ahead, outside * ~ahead
 
 
-def log_mass_ratios(case, fit):
+def log_mass_ratios(case: TrackCase, fit: Fit) -> dict[str, float]:
     """Logarithm of each train's unsprung mass in ``fit`` over that of the file, dict train -> float.
 
     Where it is a nuisance, the value is that without its narrow prior in the base model.
+
+    Parameters
+    ----------
+    case : TrackCase
+        The case.
+    fit : Fit
+        A fit of the case.
+
+    Returns
+    -------
+    dict
+        Train -> logarithm of the ratio.
     """
-    masked = {c.masking_parameter: start for _, c, start, _ in masked_candidates(case, fit)}
+    masked = {c.site.masking_parameter: start for _, c, start, _ in masked_candidates(case, fit)}
     log_ratios = {}
     for aligned in case.aligned_passages.values():
         conditions = aligned.conditions

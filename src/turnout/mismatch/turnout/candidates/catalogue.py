@@ -8,12 +8,12 @@ mass make the fit worse, and the derivative points the wrong way.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from turnout import physics
-from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.engine.candidate import Candidate, Effect, EffectSite, NamingRules, RefitStarts
 from turnout.mismatch.turnout.priors import SATURATION
 from turnout.physics.hypothesis import (
     ChannelSite,
@@ -71,43 +71,54 @@ def candidate_of(effect: type[physics.PhysicsTerm], hypothesis: Hypothesis) -> C
     -------
     Candidate
     """
-    size = hypothesis.smallest_reportable
+    size, masking = hypothesis.smallest_reportable, hypothesis.masking
     return Candidate(
-        family=effect.name,
-        parameters=effect.parameters if hypothesis.parameters is None else hypothesis.parameters,
-        make=lambda psi: effect(**hypothesis.fixed, **psi),
-        starts=hypothesis.starts,
-        where=hypothesis.where,
-        frame=effect.frame,
-        n_scanned=hypothesis.n_scanned,
-        start_from_base=effect.start_from_base,
-        prescreen_group=effect.prescreen_group,
-        smallest_reportable=effect.smallest_reportable if size is None else size,
-        sign_ambiguous=effect.sign_ambiguous,
-        masking_parameter=hypothesis.masking.parameter,
-        masking_sd=hypothesis.masking.sd,
-        from_masking=hypothesis.masking.size,
-        promise=hypothesis.promise,
-        start_nuisances=hypothesis.start_nuisances,
-        external_evidence=hypothesis.external_evidence,
-        evidence_suffices=effect.evidence_suffices,
-        model_error_share=effect.model_error_share,
-        exact=effect.exact,
-        required_data_type=effect.required_data_type,
-        must_not_oppose=hypothesis.must_not_oppose,
-        component=effect.component,
-        limit_form=effect.limit_form,
-        simpler_form=effect.simpler_form,
-        unbounded_form=effect.unbounded_form,
-        nonlinear_in_size=effect.nonlinear_in_size,
-        must_reach_control_level=effect.must_reach_control_level,
-        n_size_parameters=effect.n_size_parameters,
-        min_significance=effect.min_significance,
+        Effect(
+            effect.name,
+            effect.parameters if hypothesis.parameters is None else hypothesis.parameters,
+            make=lambda psi: effect(**hypothesis.fixed, **psi),
+            component=effect.component,
+            exact=effect.exact,
+            model_error_share=effect.model_error_share,
+            limit_form=effect.limit_form,
+            simpler_form=effect.simpler_form,
+            unbounded_form=effect.unbounded_form,
+        ),
+        RefitStarts(
+            hypothesis.starts,
+            from_base=effect.start_from_base,
+            prescreen_group=effect.prescreen_group,
+            promise=hypothesis.promise,
+            nuisances=hypothesis.start_nuisances,
+            sign_ambiguous=effect.sign_ambiguous,
+            nonlinear_in_size=effect.nonlinear_in_size,
+        ),
+        EffectSite(hypothesis.where, effect.frame, hypothesis.n_scanned, masking.parameter, masking.sd, masking.size),
+        NamingRules(
+            smallest_reportable=effect.smallest_reportable if size is None else size,
+            n_size_parameters=effect.n_size_parameters,
+            min_significance=effect.min_significance,
+            must_reach_control_level=effect.must_reach_control_level,
+            external_evidence=hypothesis.external_evidence,
+            evidence_suffices=effect.evidence_suffices,
+            required_data_type=effect.required_data_type,
+            must_not_oppose=hypothesis.must_not_oppose,
+        ),
     )
 
 
 def sites_of(data: CaseData) -> Iterator[Site]:
-    """Every site at which a case can test effects: supports, track, channels, contact of the wheels, trains."""
+    """Every site at which a case can test effects: supports, track, channels, contact of the wheels, trains.
+
+    Parameters
+    ----------
+    data : CaseData
+        Observations and site of a case.
+
+    Yields
+    ------
+    Site
+    """
     yield from _support_sites(data)
     yield TrackSite(data.site.nominal.turnout.track.rail, bool(data.aligned_passages))
     yield from channel_sites(data)
@@ -126,7 +137,17 @@ def _support_sites(data: CaseData) -> Iterator[SupportSite]:
 
 
 def channel_sites(data: CaseData) -> Iterator[ChannelSite | SaturatedChannelSite]:
-    """Every channel in use, and after these every one that is saturated."""
+    """Every channel in use, and after these every one that is saturated.
+
+    Parameters
+    ----------
+    data : CaseData
+        Observations and site of a case.
+
+    Yields
+    ------
+    ChannelSite or SaturatedChannelSite
+    """
     for sensor in data.campaign.sensors:
         name = sensor.name
         pairs = tuple(pair.name for pair in data.frf_pairs.values() if pair.channel == name)
@@ -161,13 +182,25 @@ def has_required_range(data: CaseData, candidate: Candidate) -> bool:
     if not required:
         return True
     name, least = required
-    recordings = (*data.frf_pairs.values(), *data.aligned_passages.values())
-    values = [recording.conditions.get(name) for recording in recordings]
+    values: list[Any] = [pair.conditions.get(name) for pair in data.frf_pairs.values()]
+    values += [aligned.conditions.get(name) for aligned in data.aligned_passages.values()]
     return None not in values and max(values) - min(values) >= least
 
 
 def distant_starts(case: TrackCase, fit: Fit) -> list[tuple[Candidate, tuple[float, ...]]]:
-    """(candidate, start) of sizes to simulate, for trains whose residual exceeds the control level."""
+    """Sizes to simulate, for trains whose residual exceeds the control level.
+
+    Parameters
+    ----------
+    case : TrackCase
+        The case.
+    fit : Fit
+        Base fit of the case.
+
+    Returns
+    -------
+    list of (Candidate, tuple of float)
+    """
     level, effects = case.control_level["passage"], physics.effects_by_name()
     sizes = [(c, effects[c.family].distant_starts) for c in case.candidates if c.family in effects]
     excessive = [(c, s) for c, s in sizes if s and residual_of_train(case, fit, str(c.where["train"])) > level]
@@ -175,7 +208,22 @@ def distant_starts(case: TrackCase, fit: Fit) -> list[tuple[Candidate, tuple[flo
 
 
 def residual_of_train(case: TrackCase, fit: Fit, train: str) -> float:
-    """Weighted mean square residual of ``fit`` in the passages of a train; 0 without one."""
+    """Weighted mean square residual of ``fit`` in the passages of a train; 0 without one.
+
+    Parameters
+    ----------
+    case : TrackCase
+        The case.
+    fit : Fit
+        A fit of the case.
+    train : str
+        Type or number of the train.
+
+    Returns
+    -------
+    float
+        [-]
+    """
     squares = [
         (o.n_effective, o.effective * float(np.sum(np.square(w))))
         for o, w in zip(case.observations, fit.white)
