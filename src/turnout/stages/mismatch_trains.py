@@ -10,6 +10,7 @@ from turnout.constants import KMH, NEWTON_PER_TONNE
 from turnout.errors import ConfigError, SimulationError
 from turnout.mismatch.turnout.priors import TRACK
 from turnout.simulate import load_vehicle
+from turnout.simulate.vehicle import Vehicle
 from turnout.stages.common import number
 
 MAX_AXLE_RMS = 0.4  # m rms between measured axles and the vehicle file's: half a short bogie is 0.9
@@ -26,7 +27,7 @@ class IdentifiedTrain:
     """
 
     name: str
-    vehicle: object
+    vehicle: Vehicle
     speed: float
     direction: str
     route: str

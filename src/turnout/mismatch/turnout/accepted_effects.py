@@ -126,7 +126,20 @@ NO_EFFECTS = AcceptedEffects()
 
 
 def effects_on(track: Track, accepted: Iterable[AcceptedEffect]) -> AcceptedEffects:
-    """Those accepted effects that lie on ``track`` and have a parameter."""
+    """Those accepted effects that lie on ``track`` and have a parameter.
+
+    Parameters
+    ----------
+    track : Track
+        The main track of the zone.
+    accepted : iterable of AcceptedEffect
+        Effects of the track's file.
+
+    Returns
+    -------
+    AcceptedEffects
+        ``NO_EFFECTS`` where there are none.
+    """
     effects = tuple(effect for effect in accepted if effect.term(track) is not None and effect.values)
     return AcceptedEffects(effects, track) if effects else NO_EFFECTS
 

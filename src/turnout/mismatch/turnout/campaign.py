@@ -1,13 +1,18 @@
 """Input data of one turnout: hammer tests, train passages, sensors and the nominal model they are compared with."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.errors import SimulationError
 from turnout.mismatch.turnout.priors import TRACK
 from turnout.records import Recording
 from turnout.simulate.sensor import Sensor
+from turnout.simulate.turnout_track import TurnoutTrack
+from turnout.simulate.vehicle import Vehicle
 
 
 @dataclass(frozen=True)
@@ -24,7 +29,7 @@ class HammerInput:
     recordings: tuple[Recording, ...]
     force: str = "hammer"
     visit: str = ""
-    conditions: Mapping = field(default_factory=dict)
+    conditions: Mapping[str, Any] = field(default_factory=dict)
     impact_settings: ReceptanceSettings | None = None
 
 
@@ -38,12 +43,12 @@ class PassageInput:
 
     name: str
     recording: Recording
-    vehicle: object
+    vehicle: Vehicle
     speed: float
     train: str = ""
     direction: str = "facing"
     route: str = "main"
-    conditions: Mapping = field(default_factory=dict)
+    conditions: Mapping[str, Any] = field(default_factory=dict)
     load_sd: float = TRACK.load_sd
 
 
@@ -54,16 +59,16 @@ class CampaignInput:
     ``reserved`` names the tests and passages that no fit reads. They may confirm a named effect or withdraw it.
     """
 
-    turnout: object
+    turnout: TurnoutTrack
     sensors: tuple[Sensor, ...]
     hammer: tuple[HammerInput, ...] = ()
     passages: tuple[PassageInput, ...] = ()
     reserved: tuple[str, ...] = ()
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not self.hammer and not self.passages:
             raise SimulationError("nothing to diagnose: neither a hammer test nor a passage was given.")
-        names = [item.name for item in (*self.hammer, *self.passages)]
+        names = [test.name for test in self.hammer] + [passage.name for passage in self.passages]
         if len(set(names)) < len(names):
             twice = next(n for n in names if names.count(n) > 1)
             raise SimulationError(f"the name {twice!r} stands for two recordings; give each its own.")
@@ -79,11 +84,11 @@ class CampaignInput:
             if name not in names:
                 raise SimulationError(f"reserved {name!r} is no recording; there are {', '.join(names)}.")
 
-    def sensors_of(self, passage):
+    def sensors_of(self, passage: PassageInput) -> tuple[Sensor, ...]:
         """The sensors that recorded a passage."""
         names = {c.name for c in passage.recording.channels}
         return tuple(s for s in self.sensors if s.name in names)
 
-    def positions(self):
+    def positions(self) -> list[float]:
         """Positions of sensors and impacts [m]."""
         return [s.place for s in self.sensors] + [t.place for t in self.hammer]

@@ -32,7 +32,20 @@ PredictionCache: TypeAlias = Callable[[Predictor, bool], Predictions]
 
 
 def no_cache(predictor: Predictor, is_cheap: bool) -> Predictions:
-    """The predictor itself."""
+    """The predictor itself.
+
+    Parameters
+    ----------
+    predictor : Predictor
+        Predicts the recordings of the site.
+    is_cheap : bool
+        Whether a prediction is cheap.
+
+    Returns
+    -------
+    Predictions
+        The predictor.
+    """
     return predictor
 
 
@@ -237,7 +250,26 @@ def hammer_case(
     accepted: AcceptedEffects,
     cache: PredictionCache,
 ) -> HammerCase:
-    """Case of the fitted hammer tests alone."""
+    """Case of the fitted hammer tests alone.
+
+    Parameters
+    ----------
+    data : CaseData
+        Observations and site.
+    predictor : Predictor
+        Predicts the recordings of the site.
+    candidates : sequence of Candidate
+        Effects that have columns in hammer tests.
+    accepted : AcceptedEffects
+        Part of every prediction.
+    cache : callable
+        Makes the cache around the predictor.
+
+    Returns
+    -------
+    HammerCase
+        It has the start values of its own fits, the means of its nuisances.
+    """
     observations = [o for o in data.observations if o.name in data.frf_pairs]
     nuisances = data.site.shared_nuisances()
     return HammerCase(predictor, observations, nuisances, candidates, accepted, cache(predictor, True))

@@ -5,12 +5,20 @@ that the ratio of one passage to the others follows Fisher's F. Half of the sens
 is another matter.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.stats import binom, f
 
 from turnout.mismatch.turnout.priors import DISTURBANCE
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from turnout.mismatch.turnout.passage_observation import AlignedPassage
 
 
 @dataclass(frozen=True)
@@ -26,12 +34,27 @@ class Disturbance:
     p: float
 
 
-def disturbances(passages, unmatched=None):
+def disturbances(
+    passages: Mapping[str, AlignedPassage], unmatched: Mapping[str, AlignedPassage] | None = None
+) -> list[Disturbance]:
     """Disturbance of every passage in which another source shook the sensors; ``passages`` by name.
 
     ``unmatched`` passages do not match their vehicle file, maybe for that reason. Their trains may be longer by a car.
+
+    Parameters
+    ----------
+    passages : mapping
+        Passages that match their vehicle file, by name.
+    unmatched : mapping or None
+        Passages that do not, maybe for that reason.
+
+    Returns
+    -------
+    list of Disturbance
+        Passages in which another source shook the sensors.
     """
-    events, segments = [], {"before": {}, "after": {}}
+    events: list[Disturbance] = []
+    segments: dict[str, dict[str, tuple[dict[str, float], float]]] = {"before": {}, "after": {}}
     for aligned in (*passages.values(), *(unmatched or {}).values()):
         for when, (start, stop) in _quiet_segments(aligned).items():
             if when == "after" and aligned.name in (unmatched or {}):
@@ -47,7 +70,7 @@ def disturbances(passages, unmatched=None):
     return events
 
 
-def _quiet_segments(aligned):
+def _quiet_segments(aligned: AlignedPassage) -> dict[str, tuple[float, float]]:
     """(start, stop) of the segments with every wheel far from every sensor [s]."""
     train = np.ptp([s.place for s in aligned.sensors]) + aligned.passage.vehicle.wheel_positions[-1]
     clear_time = DISTURBANCE.min_wheel_distance / aligned.speed
@@ -58,7 +81,9 @@ def _quiet_segments(aligned):
     }
 
 
-def _shared_levels(levels, name):
+def _shared_levels(
+    levels: Mapping[str, tuple[dict[str, float], float]], name: str
+) -> tuple[tuple[np.ndarray, float], list[tuple[np.ndarray, float]]]:
     """Level of a passage and those of the others, for the sensors that it shares; nan where another lacks one."""
     own_levels, freedom = levels[name]
     remaining = [level for passage, level in levels.items() if passage != name]
@@ -67,7 +92,7 @@ def _shared_levels(levels, name):
     return (np.array([own_levels[s] for s in sensors]), freedom), reference
 
 
-def _level(aligned, start, stop):
+def _level(aligned: AlignedPassage, start: float, stop: float) -> tuple[dict[str, float], float]:
     """Mean square in the band by sensor, and its degrees of freedom."""
     recording = aligned.passage.recording
     rows = [recording.index(s.name) for s in aligned.sensors]
@@ -76,11 +101,25 @@ def _level(aligned, start, stop):
     return {s.name: float(v) for s, v in zip(aligned.sensors, level)}, freedom
 
 
-def band_level(samples, rate):
+def band_level(samples: np.ndarray, rate: float) -> tuple[np.ndarray, float]:
     """Mean square of rows of ``samples`` within ``DISTURBANCE.band`` per line (n,), and its degrees of freedom.
 
     A Hann window keeps the strong low frequencies at the end of the segment out. It correlates neighbouring lines by
     2/3 and 1/6, so that two degrees per line become 2 / (1 + 2 (4/9 + 1/36)) (Welch 1967).
+
+    Parameters
+    ----------
+    samples : (n, n_sample) array of float
+        Signals of a segment, one per row.
+    rate : float
+        Samples per second. [Hz]
+
+    Returns
+    -------
+    level : (n,) array of float
+        Mean square per line, of each row.
+    freedom : float
+        Its degrees of freedom.
     """
     n = samples.shape[1]
     window = np.hanning(n)
@@ -91,11 +130,25 @@ def band_level(samples, rate):
     return level, 2.0 * inside.sum() / DISTURBANCE.hann_correlation
 
 
-def excess_over(level, reference):
-    """(dB, probability) of the excess of a segment over others.
+def excess_over(level: tuple[np.ndarray, float], reference: Sequence[tuple[np.ndarray, float]]) -> tuple[float, float]:
+    """Excess of a segment over others, and the probability of that by chance.
 
     The excess is the lower median over the sensors of the ratio to the median of the others. The probability is
     binomial, that as many sensors exceed the F ratio at that rank.
+
+    Parameters
+    ----------
+    level : ((n,) array of float, float)
+        Mean square of each sensor, and its degrees of freedom.
+    reference : sequence of the same
+        The other segments.
+
+    Returns
+    -------
+    excess : float
+        Over the others. [dB]
+    p : float
+        Probability of that by chance.
     """
     power, freedom = level
     if power.size < 2:  # one channel alone may be noisy

@@ -1,5 +1,9 @@
 """Reconstruction of an unknown force at a support from the residuals of passages, by regularised deconvolution."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from turnout.mismatch.turnout import passage_band
@@ -7,11 +11,30 @@ from turnout.mismatch.turnout.priors import PASSAGE, SIMULATION
 from turnout.mismatch.turnout.pseudo_forces import green_functions, support_motion
 from turnout.mismatch.turnout.wave_response import channel_responses
 
+if TYPE_CHECKING:
+    from typing import Any
 
-def latent_force(case, fit):
+    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.turnout.case import TrackCase
+    from turnout.mismatch.turnout.passage_observation import AlignedPassage
+
+
+def latent_force(case: TrackCase, fit: Fit) -> dict[str, Any] | None:
     r"""Force on the sleeper that explains most of the residual, with its covariates; None without passages.
 
     .. math:: \hat f_j = \frac{\sum_s G_{sj}^* r_s}{\sum_s |G_{sj}|^2 + \lambda}
+
+    Parameters
+    ----------
+    case : TrackCase
+        The case.
+    fit : Fit
+        A fit of the case.
+
+    Returns
+    -------
+    dict or None
+        Name of a covariate -> (n,), with ``force`` [N], ``unit`` and ``sleeper``; None without passages.
     """
     passages = [(o, r) for o, r in zip(case.observations, fit.residuals) if o.name in case.aligned_passages]
     if not passages:
@@ -31,7 +54,9 @@ def latent_force(case, fit):
     for k in range(len(case.predictor.zone.supports)):
         gains.append(sum(_explained_power(r, g[:, :, k]) for _, r, g, _, _ in spectra))
     best_support = int(np.argmax(gains))
-    series = {name: [] for name in ("force", "displacement", "velocity", "position", "time", "temperature")}
+    series: dict[str, list[np.ndarray]] = {
+        name: [] for name in ("force", "displacement", "velocity", "position", "time", "temperature")
+    }
     for aligned, r, g, inside, size in spectra:
         _append_series(
             case, fit, aligned, series, _force(r, g[:, :, best_support], inside, size, aligned.time.size), best_support
@@ -46,25 +71,27 @@ def latent_force(case, fit):
     }
 
 
-def _power_and_ridge(g):
+def _power_and_ridge(g: np.ndarray) -> tuple[np.ndarray, float]:
     power = np.sum(np.abs(g) ** 2, axis=1)
     return power, PASSAGE.ridge_share * float(np.max(power))
 
 
-def _explained_power(r, g):
+def _explained_power(r: np.ndarray, g: np.ndarray) -> float:
     power, ridge = _power_and_ridge(g)
     projected = np.sum(g.conj() * r, axis=1)
     return float(np.sum(np.abs(projected) ** 2 / (power + ridge)))
 
 
-def _force(r, g, inside, size, n):
+def _force(r: np.ndarray, g: np.ndarray, inside: np.ndarray, size: int, n: int) -> np.ndarray:
     power, ridge = _power_and_ridge(g)
     spectrum = np.zeros(size // 2 + 1, dtype=complex)
     spectrum[inside] = np.sum(g.conj() * r, axis=1) / (power + ridge)
     return np.fft.irfft(spectrum, size)[:n]
 
 
-def _append_series(case, fit, aligned, series, force, k):
+def _append_series(
+    case: TrackCase, fit: Fit, aligned: AlignedPassage, series: dict[str, list[np.ndarray]], force: np.ndarray, k: int
+) -> None:
     _, sleeper = support_motion(case.predictor, fit.values, case.all_terms(fit), aligned)
     rate = case.predictor.solver.rate
     time = aligned.time - aligned.reference - fit.values[f"time@{aligned.name}"] + SIMULATION.lead_time

@@ -1,7 +1,10 @@
 """Cached matrices of tracks that differ in their support values alone: rails, rows and bandwidth are computed once."""
 
+from __future__ import annotations
+
 from collections import OrderedDict
 from dataclasses import replace
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -10,6 +13,12 @@ from turnout.physics.term import PhysicsTerm
 from turnout.simulate.links import links_of
 from turnout.simulate.matrices import TrackMatrices, add_rails, assemble, link_matrices, link_vector
 
+if TYPE_CHECKING:
+    from collections.abc import Callable, Hashable, Iterable, Sequence
+
+    from turnout.simulate.links import Link
+    from turnout.simulate.track import Track
+
 SUPPORT_FIELDS = (  # field of a Track, quantity of the link, tag
     ("pad_stiffness", "stiffness", "pad"),
     ("pad_damping", "damping", "pad"),
@@ -17,11 +26,25 @@ SUPPORT_FIELDS = (  # field of a Track, quantity of the link, tag
     ("ballast_damping", "damping", "ballast"),
     ("sleeper_mass", "mass", "sleeper"),
 )
-_templates = OrderedDict()
+_templates: OrderedDict[Hashable, MatrixTemplate] = OrderedDict()
+_Value = TypeVar("_Value")
 
 
-def matrices_of(track, terms=()):
-    """``assemble(track, terms)`` for a track of two layers, in a twentieth of the time once a template is cached."""
+def matrices_of(track: Track, terms: Sequence[PhysicsTerm] = ()) -> TrackMatrices:
+    """``assemble(track, terms)`` for a track of two layers, in a twentieth of the time once a template is cached.
+
+    Parameters
+    ----------
+    track : Track
+        Of two layers; others are assembled in full.
+    terms : sequence of PhysicsTerm
+        Their links are added.
+
+    Returns
+    -------
+    TrackMatrices
+        Those of ``assemble(track, terms)`` to rounding.
+    """
     for term in terms:
         track = term.rail(track)
     links = links_of(terms, track)
@@ -36,7 +59,7 @@ def matrices_of(track, terms=()):
     return _cached(_templates, key, lambda: MatrixTemplate(track, links)).fill(track, links)
 
 
-def _cached(cache, key, compute):
+def _cached(cache: OrderedDict[Hashable, _Value], key: Hashable, compute: Callable[[], _Value]) -> _Value:
     """``compute()``, cached under ``key`` among the last ``SIMULATION.template_cache_size``."""
     if key not in cache:
         cache[key] = compute()
@@ -48,10 +71,10 @@ def _cached(cache, key, compute):
 class FixedLinks(PhysicsTerm):
     """A term that only adds given links to the matrices."""
 
-    def __init__(self, links):
+    def __init__(self, links: Sequence[Link]):
         self._links = links
 
-    def links(self, track):
+    def links(self, track: Track) -> Sequence[Link]:
         """The links, for any track."""
         return self._links
 
@@ -62,7 +85,7 @@ class MatrixTemplate:
     So rounding errors do not depend on the track that came first.
     """
 
-    def __init__(self, track, links):
+    def __init__(self, track: Track, links: Sequence[Link]):
         zero_links = [replace(k, stiffness=0.0, damping=0.0, mass=0.0, loss_factor=0.0) for k in links]
         track = track.with_(**{name: np.ones(track.support.size) for name, *_ in SUPPORT_FIELDS})
         self.base = link_matrices(track, [*track.links(), *zero_links])
@@ -71,9 +94,10 @@ class MatrixTemplate:
             tag: self._matrix_entries([(j, k) for j, k in support_links if k.tag == tag])
             for _, _, tag in SUPPORT_FIELDS
         }
-        self.rail_bases, self.link_entries = OrderedDict(), OrderedDict()
+        self.rail_bases: OrderedDict[Hashable, TrackMatrices] = OrderedDict()
+        self.link_entries: OrderedDict[Hashable, tuple[np.ndarray, ...]] = OrderedDict()
 
-    def _matrix_entries(self, links):
+    def _matrix_entries(self, links: Iterable[tuple[int, Link]]) -> tuple[np.ndarray, ...]:
         """Diagonal, row, product of weights and owner of every entry of ``links`` [(owner, link)]."""
         entries = []
         for owner, link in links:
@@ -83,16 +107,16 @@ class MatrixTemplate:
             ]
         return tuple(map(np.array, zip(*entries)))
 
-    def _base_with_rail(self, track):
+    def _base_with_rail(self, track: Track) -> TrackMatrices:
         """``base`` with the rail of ``track``, cached."""
         key = track.rail, track.stretches, track.end_length, track.end_damping
         return _cached(self.rail_bases, key, lambda: add_rails(self.base, track))
 
-    def _link_entries(self, links):
+    def _link_entries(self, links: Sequence[Link]) -> tuple[np.ndarray, ...]:
         """Matrix entries of ``links`` of terms, cached."""
         return _cached(self.link_entries, tuple(k.ends for k in links), lambda: self._matrix_entries(enumerate(links)))
 
-    def fill(self, track, links):
+    def fill(self, track: Track, links: Sequence[Link]) -> TrackMatrices:
         """TrackMatrices with the values of ``track`` and of additional links."""
         base = self._base_with_rail(track)
         matrices = {what: getattr(base, what).copy() for what in ("stiffness", "damping", "mass")}

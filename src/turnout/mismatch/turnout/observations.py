@@ -322,7 +322,24 @@ def _observe_passage(
 
 
 def with_errors(predictor: Predictor, values: Values, aligned: AlignedPassage, observation: Observation) -> Observation:
-    """The observation with the error modes of its passage: track and wheels as ``values`` give them."""
+    """The observation with the error modes of its passage: track and wheels as ``values`` give them.
+
+    Parameters
+    ----------
+    predictor : Predictor
+        Predicts the recordings of the site.
+    values : mapping
+        All nuisances, with those that the passage owns.
+    aligned : AlignedPassage
+        The passage.
+    observation : Observation
+        Of that passage.
+
+    Returns
+    -------
+    Observation
+        With the modes of wheels and amplifiers.
+    """
     modes = (
         passage_observation.coupling_modes(aligned, observation.data).astype(np.float32),
         wheel_modes(predictor, values, aligned, observation.sigma),

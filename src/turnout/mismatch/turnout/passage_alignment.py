@@ -17,16 +17,31 @@ from turnout.mismatch.turnout.passage_band import band_signals, limit_band, read
 from turnout.mismatch.turnout.prediction import Predictor, Values
 from turnout.mismatch.turnout.priors import ALIGNMENT, SIMULATION
 from turnout.mismatch.turnout.running_surface import POSITION_FIELDS
+from turnout.records import Recording
+from turnout.simulate.sensor import Sensor
 
 
-def low_pass(recording, sensors):
-    """(n_sensor, n) signals of the sensors below ``ALIGNMENT.band_end``, every ``ALIGNMENT.sample_step``."""
+def low_pass(recording: Recording, sensors: Sequence[Sensor]) -> np.ndarray:
+    """Signals of the sensors below ``ALIGNMENT.band_end``, every ``ALIGNMENT.sample_step``.
+
+    Parameters
+    ----------
+    recording : Recording
+        The recording.
+    sensors : sequence of Sensor
+        The sensors.
+
+    Returns
+    -------
+    (n_sensor, n) array of float
+        Signals below the end of the alignment band. [m/s²]
+    """
     grid = np.arange(0.0, recording.duration, ALIGNMENT.sample_step)
     return read_at(band_signals(recording, sensors, ALIGNMENT.band_end), recording.rate, grid)
 
 
-def align(passage, data, simulated, rate):
-    """(reference time [s], speed [m/s], correlation) of the best alignment of a recording with its simulation.
+def align(passage: PassageInput, data: np.ndarray, simulated: np.ndarray, rate: float) -> tuple[float, float, float]:
+    """Best alignment of a recording with its simulation.
 
     ``data`` are signals of ``low_pass``. All lags are searched, and speeds within 1.5 % of the recorded one; the
     simulation is stretched in time about the arrival of the first wheel. Roughness and dips have no influence in this
@@ -35,6 +50,26 @@ def align(passage, data, simulated, rate):
     If no alignment reaches the least correlation with all sensors, the one that correlates least is left out, where
     three or more are there: its fault is left to the fit. Failing that, samples are clipped at the largest value of the
     simulation. The impacts of a long flat are many times larger than any axle's response.
+
+    Parameters
+    ----------
+    passage : PassageInput
+        The passage.
+    data : (n_sensor, n) array of float
+        Signals of ``low_pass``.
+    simulated : (n_sensor, n_simulated) array of float
+        Simulated signals.
+    rate : float
+        Of the simulated signals. [Hz]
+
+    Returns
+    -------
+    reference : float
+        Time of the first wheel at the first sensor. [s]
+    speed : float
+        [m/s]
+    correlation : float
+        Mean over the sensors. [-]
     """
     low = limit_band(simulated, rate, high=ALIGNMENT.band_end)
     best_fit = _best_alignment(data, low, rate)
@@ -45,7 +80,7 @@ def align(passage, data, simulated, rate):
     return lag * ALIGNMENT.sample_step + SIMULATION.lead_time, passage.speed * (1.0 + stretch), correlation
 
 
-def _best_alignment(data, low, rate):
+def _best_alignment(data: np.ndarray, low: np.ndarray, rate: float) -> tuple[float, int, float]:
     """(correlation, lag in steps, stretch) of the best alignment of the simulation ``low`` with ``data``."""
     n_sensor, model_time = len(data), np.arange(0.0, low.shape[-1] / rate, ALIGNMENT.sample_step)
     size = 1 << int(np.ceil(np.log2(data.shape[1] + model_time.size)))
@@ -67,7 +102,7 @@ def _best_alignment(data, low, rate):
     return correlation, k if k < size - model_time.size else k - size, stretch
 
 
-def _peak_alignment(score, stretch):
+def _peak_alignment(score: np.ndarray, stretch: float) -> tuple[float, int, float]:
     """(correlation, lag in steps, stretch) at the largest score."""
     k = int(np.argmax(score))
     return float(score[k]), k, float(stretch)

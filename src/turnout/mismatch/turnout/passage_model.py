@@ -1,6 +1,9 @@
 """Fast simulation of passages for fits: coarse in time and mesh, with one factorised track for many trains."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -8,6 +11,18 @@ from turnout.mismatch.turnout.matrix_cache import matrices_of
 from turnout.mismatch.turnout.priors import SIMULATION
 from turnout.simulate.preparation import prepare
 from turnout.simulate.run import Drive, run
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from turnout.mismatch.turnout.campaign import PassageInput
+    from turnout.physics.term import PhysicsTerm
+    from turnout.simulate.run import Probe
+    from turnout.simulate.sensor import Sensor
+    from turnout.simulate.track import Track
+    from turnout.simulate.turnout_track import TurnoutTrack
+    from turnout.simulate.vehicle import Vehicle
+    from turnout.simulate.wheel_path import Surfaces
 
 
 @dataclass(frozen=True)
@@ -22,7 +37,7 @@ class Track1D:
 class PassageSimulator:
     """Simulates passages on one track with one set of terms; they share one factorisation."""
 
-    def __init__(self, turnout, track, terms, settings):
+    def __init__(self, turnout: TurnoutTrack, track: Track, terms: Sequence[PhysicsTerm], settings: Track1D):
         self.turnout, self.terms, self.settings = turnout, tuple(terms), settings
         if settings.elements and not track.pad_width:  # a wide pad needs the nodes beside its support
             track = track.with_(elements_per_bay=settings.elements)
@@ -32,10 +47,41 @@ class PassageSimulator:
             track, 1.0 / settings.rate, settings.scheme, self.terms, SIMULATION.decay_exponent, matrices
         )
 
-    def __call__(self, passage, vehicle, speed, sensors, probes=(), surfaces=None, described=None):
+    def __call__(
+        self,
+        passage: PassageInput,
+        vehicle: Vehicle,
+        speed: float,
+        sensors: Sequence[Sensor],
+        probes: Sequence[Probe] = (),
+        surfaces: Surfaces | None = None,
+        described: Sequence[Sensor] | None = None,
+    ) -> np.ndarray:
         """(n_sensor + n_probe, n) signals over ``surfaces``, by default those of the file.
 
         At time 0 the first wheel is ``SIMULATION.lead_time`` before the first sensor, at its position in ``described``.
+
+        Parameters
+        ----------
+        passage : PassageInput
+            Its direction and route.
+        vehicle : Vehicle
+            The vehicle.
+        speed : float
+            Speed. [m/s]
+        sensors : sequence of Sensor
+            The sensors.
+        probes : sequence of Probe
+            Further signals.
+        surfaces : tuple of tuple or None
+            Running surfaces; None: those of the track file.
+        described : sequence of Sensor or None
+            Sensors at the positions of the file, which define time 0; None: ``sensors``.
+
+        Returns
+        -------
+        (n_sensor + n_probe, n) array of float
+            Signals at the rate of the simulation. [m/s², or as the probe]
         """
         for term in self.terms:
             vehicle = term.vehicle(vehicle)
@@ -53,8 +99,20 @@ class PassageSimulator:
         return outcome.signals
 
 
-def place_sensor(sensor, terms):
-    """The sensor at the position that the terms give."""
+def place_sensor(sensor: Sensor, terms: Sequence[PhysicsTerm]) -> Sensor:
+    """The sensor at the position that the terms give.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        The sensor.
+    terms : sequence of PhysicsTerm
+        Some may move a sensor.
+
+    Returns
+    -------
+    Sensor
+    """
     for term in terms:
         sensor = term.sensor(sensor)
     return sensor

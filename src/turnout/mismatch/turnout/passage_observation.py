@@ -1,7 +1,10 @@
 """Passages as observations: aligned accelerations below 112 Hz at a low sampling rate."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +15,9 @@ from turnout.mismatch.turnout.campaign import PassageInput
 from turnout.mismatch.turnout.passage_band import band_end, band_signals, limit_band, read_at, sample_rate_of, upsample
 from turnout.mismatch.turnout.priors import PASSAGE, SIMULATION, TRACK
 from turnout.simulate.sensor import Sensor
+
+if TYPE_CHECKING:
+    from turnout.records import Recording
 
 
 @dataclass(frozen=True)
@@ -30,16 +36,16 @@ class AlignedPassage:
     speed: float
 
     @property
-    def high(self):
+    def high(self) -> float:
         """Upper end of the band [Hz]: at low speed the modelled waves of the rail end there."""
         return band_end(self.speed)
 
     @property
-    def clock(self):
+    def clock(self) -> float:
         """Samples per second of the observation [Hz]."""
         return sample_rate_of(self.speed)
 
-    def limit_band(self, samples, rate):
+    def limit_band(self, samples: np.ndarray, rate: float) -> np.ndarray:
         """Rows of ``samples`` within the band of the passage."""
         return limit_band(samples, rate, high=self.high)
 
@@ -54,7 +60,7 @@ class AlignedPassage:
         loads = tuple(2.0 * load for load in self.passage.vehicle.static_loads)
         return {"axle_loads": loads, "train": self.train, "name": self.name, **self.passage.conditions}
 
-    def positions(self):
+    def positions(self) -> np.ndarray:
         """(n_wheel, n) position of every wheel [m]."""
         sign = 1.0 if self.passage.direction == "facing" else -1.0
         first = sign * min(sign * s.place for s in self.sensors)
@@ -62,14 +68,55 @@ class AlignedPassage:
         return first + sign * (distance[None, :] - self.passage.vehicle.wheel_positions[:, None])
 
 
-def duration_of(passage, speed, sensors):
-    """Time from the first wheel at the first sensor to the last wheel at the last sensor [s]."""
+def duration_of(passage: PassageInput, speed: float, sensors: Sequence[Sensor]) -> float:
+    """Time from the first wheel at the first sensor to the last wheel at the last sensor [s].
+
+    Parameters
+    ----------
+    passage : PassageInput
+        The passage.
+    speed : float
+        Speed of the train. [m/s]
+    sensors : sequence of Sensor
+        The sensors.
+
+    Returns
+    -------
+    float
+        [s]
+    """
     places = [s.place for s in sensors]
     return (np.ptp(places) + float(passage.vehicle.wheel_positions[-1])) / speed
 
 
-def observe_passage(passage, sensors, reference, speed, tolerance):
-    """(AlignedPassage, Observation) of a passage."""
+def observe_passage(
+    passage: PassageInput, sensors: Sequence[Sensor], reference: float, speed: float, tolerance: float
+) -> tuple[AlignedPassage, Observation]:
+    """The aligned passage, and its observation without error modes.
+
+    Parameters
+    ----------
+    passage : PassageInput
+        The passage.
+    sensors : sequence of Sensor
+        The sensors.
+    reference : float
+        Time of the first wheel at the first sensor. [s]
+    speed : float
+        Speed of the train. [m/s]
+    tolerance : float
+        Share of the local amplitude below which a difference does not matter. [-]
+
+    Returns
+    -------
+    aligned : AlignedPassage
+    observation : Observation
+
+    Raises
+    ------
+    SimulationError
+        The train lies outside the recording, or the recording has too few samples per second.
+    """
     recording = passage.recording
     signals = band_signals(recording, sensors, band_end(speed))
     stop = reference + duration_of(passage, speed, sensors) + SIMULATION.edge_time
@@ -91,7 +138,7 @@ def observe_passage(passage, sensors, reference, speed, tolerance):
     return aligned, observation_of(aligned, data, noise, tolerance, _clipped_samples(recording, sensors, time))
 
 
-def _wheel_free_times(aligned):
+def _wheel_free_times(aligned: AlignedPassage) -> tuple[tuple[float, float], tuple[float, float]]:
     """(start, end) [s] before and after the train, with no wheel within ``PASSAGE.clear_distance`` of a sensor."""
     clear_time, passage = PASSAGE.clear_distance / aligned.speed, aligned.passage
     end = aligned.reference + duration_of(passage, aligned.speed, aligned.sensors) + clear_time
@@ -101,7 +148,7 @@ def _wheel_free_times(aligned):
     )
 
 
-def _clipped_samples(recording, sensors, time):
+def _clipped_samples(recording: Recording, sensors: Sequence[Sensor], time: np.ndarray) -> np.ndarray:
     """(n_sensor, n) whether the channel reached its range within ``PASSAGE.clipping_blur`` of each time.
 
     The samples that were cut off disturb the whole band there.
@@ -118,10 +165,27 @@ def _clipped_samples(recording, sensors, time):
     return clipped
 
 
-def observation_of(aligned, data, noise, tolerance, clipped=None):
-    """Observation of (n_sensor, n) samples with ``noise`` (n_sensor,) and a materiality floor.
+def observation_of(
+    aligned: AlignedPassage, data: np.ndarray, noise: np.ndarray, tolerance: float, clipped: np.ndarray | None = None
+) -> Observation:
+    """Observation of the samples of a passage; their errors are noise, a materiality floor and clipping.
 
-    ``clipped`` samples have an error as large as the largest sample of their channel.
+    Parameters
+    ----------
+    aligned : AlignedPassage
+        The passage.
+    data : (n_sensor, n) array of float
+        Samples at the times of the passage. [m/s²]
+    noise : (n_sensor,) array of float
+        Standard deviation of each channel's noise. [m/s²]
+    tolerance : float
+        Share of the local amplitude below which a difference does not matter. [-]
+    clipped : (n_sensor, n) array of bool or None
+        Samples whose error is as large as the largest sample of their channel.
+
+    Returns
+    -------
+    Observation
     """
     width = min(PASSAGE.amplitude_window, data.shape[1])
     mean_square = np.array([np.convolve(row**2, np.ones(width) / width, mode="same") for row in data])
@@ -152,10 +216,22 @@ def observation_of(aligned, data, noise, tolerance, clipped=None):
     )
 
 
-def coupling_modes(aligned, data):
-    r"""(n_sensor * n_time, n_sensor) error modes of amplifiers whose lower corner frequency is uncertain.
+def coupling_modes(aligned: AlignedPassage, data: np.ndarray) -> np.ndarray:
+    r"""Error modes of amplifiers whose lower corner frequency is uncertain.
 
     Well above its corner a high-pass adds :math:`-2 \pi f_c \int a\,dt`; f_c is known to 0.7 Hz.
+
+    Parameters
+    ----------
+    aligned : AlignedPassage
+        The passage.
+    data : (n_sensor * n_time,) array of float
+        Samples, one sensor after the other. [m/s²]
+
+    Returns
+    -------
+    (n_sensor * n_time, n_sensor) array of float
+        One mode per channel. [m/s²]
     """
     rows = data.reshape(len(aligned.sensors), -1)
     velocity = np.cumsum(rows - rows.mean(axis=1, keepdims=True), axis=1) / aligned.clock
@@ -167,14 +243,16 @@ def coupling_modes(aligned, data):
     return modes
 
 
-def _cells(aligned):
+def _cells(aligned: AlignedPassage) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Cells of one axle within 3 m of a sensor, one sleeper bay long.
 
     Their labels are what a cause may be bound to: sensor, train, wheel, position, condition.
     """
     passage, position = aligned.passage, aligned.positions()
-    train, speed = passage.train or passage.name, f"{passage.speed * KMH:.0f} km/h"
-    index, cell_index, n = [], {}, aligned.time.size
+    train, speed = aligned.train, f"{passage.speed * KMH:.0f} km/h"
+    index: list[int] = []
+    cell_index: dict[tuple[str, int, int], int] = {}
+    n = aligned.time.size
     for sensor in aligned.sensors:
         distance = np.abs(position - sensor.place)
         axle = np.argmin(distance, axis=0)
@@ -193,8 +271,19 @@ def _cells(aligned):
     return np.array(index, dtype=np.int64), {k: np.array(v, dtype=object) for k, v in labels.items()}
 
 
-def passage_nuisances(passage):
-    """Time, speed and load of one passage. They are named after the passage, since all its sensors share them."""
+def passage_nuisances(passage: PassageInput) -> list[Nuisance]:
+    """Time, speed and load of one passage. They are named after the passage, since all its sensors share them.
+
+    Parameters
+    ----------
+    passage : PassageInput
+        The passage.
+
+    Returns
+    -------
+    list of Nuisance
+        In this order.
+    """
     reach = np.inf if passage.load_sd <= TRACK.load_sd else TRACK.load_bound_sds * passage.load_sd
     priors = (
         ("time", "s", PASSAGE.time_sd, np.inf),

@@ -5,8 +5,9 @@ It serves to compute which effects a campaign can distinguish, and to make simul
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,7 +31,11 @@ from turnout.simulate.sensor import Sensor
 from turnout.simulate.track import PER_SUPPORT, uniform_track
 from turnout.simulate.train import couple
 from turnout.simulate.turnout_track import TurnoutTrack
-from turnout.simulate.vehicle import car
+from turnout.simulate.vehicle import Vehicle, car
+
+if TYPE_CHECKING:
+    from turnout.physics.term import PhysicsTerm
+    from turnout.simulate.track import Track
 
 NOISE_SHARE = 0.02  # standard deviation of a sensor's noise over its own rms
 PLANNED_LEAD = 0.45  # s from the start of a planned or simulated recording to the first wheel at the first sensor
@@ -145,7 +150,7 @@ def _planned_passage(passage: PassageInput, sensors: tuple[Sensor, ...]) -> Alig
 class Train:
     """A planned passage: vehicle, its name, speed [m/s], rail temperature [°C]."""
 
-    vehicle: object
+    vehicle: Vehicle
     name: str
     speed: float
     temperature: float | None = 15.0
@@ -170,11 +175,32 @@ class Plan:
     n_impacts: int = 4
     noise: float = 0.02
     rate: float = 10e3
-    options: dict = field(default_factory=dict)
+    options: dict[str, Any] = field(default_factory=dict)
 
 
-def small_plan(temperatures=(5.0, 25.0), speeds=(28.0, 40.0), hammer_positions=(20.4, 24.0, 27.6), passages=True):
-    """Three hammer points, eight passages of a light and a heavy car, four sensors on 48 m of track."""
+def small_plan(
+    temperatures: Sequence[float] = (5.0, 25.0),
+    speeds: Sequence[float] = (28.0, 40.0),
+    hammer_positions: Sequence[float] = (20.4, 24.0, 27.6),
+    passages: bool = True,
+) -> Plan:
+    """Three hammer points, eight passages of a light and a heavy car, four sensors on 48 m of track.
+
+    Parameters
+    ----------
+    temperatures : sequence of float
+        Rail temperatures. [°C]
+    speeds : sequence of float
+        Speeds. [m/s]
+    hammer_positions : sequence of float
+        Positions of impacts. [m]
+    passages : bool
+        Whether there are passages.
+
+    Returns
+    -------
+    Plan
+    """
     turnout = TurnoutTrack(uniform_track(48.0), {"main": ((),)})
     sensors = (Sensor("S1", 21.0), Sensor("S2", 23.4, "sleeper"), Sensor("S3", 24.6), Sensor("S4", 27.3))
     light = car("light", body_mass=8000.0, half_pivot=5.0)
@@ -187,8 +213,22 @@ def small_plan(temperatures=(5.0, 25.0), speeds=(28.0, 40.0), hammer_positions=(
     return Plan(turnout, sensors, hammer_points, trains if passages else (), reserved)
 
 
-def turnout_plan(temperatures=(5.0, 25.0), speeds=(22.0, 25.0, 28.0, 32.0, 36.0)):
-    """A whole turnout: eight hammer points, twenty passages of two coupled cars each, twelve sensors over 27 m."""
+def turnout_plan(
+    temperatures: Sequence[float] = (5.0, 25.0), speeds: Sequence[float] = (22.0, 25.0, 28.0, 32.0, 36.0)
+) -> Plan:
+    """A whole turnout: eight hammer points, twenty passages of two coupled cars each, twelve sensors over 27 m.
+
+    Parameters
+    ----------
+    temperatures : sequence of float
+        Rail temperatures. [°C]
+    speeds : sequence of float
+        Speeds. [m/s]
+
+    Returns
+    -------
+    Plan
+    """
     turnout = TurnoutTrack(uniform_track(72.0), {"main": ((),)})
     positions = np.round(21.6 + 2.4 * np.arange(12) + 0.3 * (np.arange(12) % 3), 3)
     sensors = tuple(Sensor(f"S{k + 1}", float(x), "rail" if k % 4 else "sleeper") for k, x in enumerate(positions))
@@ -202,17 +242,31 @@ def turnout_plan(temperatures=(5.0, 25.0), speeds=(22.0, 25.0, 28.0, 32.0, 36.0)
     return Plan(turnout, sensors, hammer_points, trains, ("light 3", "heavy 8"))
 
 
-def measured_campaign(plan, terms=(), seed=0):
+def measured_campaign(plan: Plan, terms: Sequence[PhysicsTerm] = (), seed: int = 0) -> CampaignInput:
     """Simulated ``CampaignInput`` of a ``plan`` with ``terms`` in the track, the wheels or the sensors.
 
     Supports scatter, the rail is rough, speeds and loads have errors, sensors have wrong gains and noise.
+
+    Parameters
+    ----------
+    plan : Plan
+        The plan.
+    terms : sequence of PhysicsTerm
+        Effects that the track, the wheels or the sensors have.
+    seed : int
+        Of all random numbers.
+
+    Returns
+    -------
+    CampaignInput
     """
     rng = np.random.default_rng([seed, 7])
     true = _scatter_supports(plan, rng)
     gains = 1.0 + 0.01 * rng.normal(size=len(plan.sensors))
     sensors = tuple(replace(s, gain=s.gain * g, noise=plan.noise) for s, g in zip(plan.sensors, gains))
     hammer = tuple(_hammer_test(plan, true, sensors, terms, k, seed) for k in range(len(plan.hammer_points)))
-    count, passages = {}, []
+    count: dict[str, int] = {}
+    passages = []
     for k, planned in enumerate(plan.trains):
         count[planned.name] = count.get(planned.name, 0) + 1
         name = f"{planned.name} {count[planned.name]}"
@@ -220,8 +274,8 @@ def measured_campaign(plan, terms=(), seed=0):
     return CampaignInput(plan.turnout, plan.sensors, hammer, tuple(passages), plan.reserved)
 
 
-def _scatter_supports(plan, rng):
-    def scatter(track):
+def _scatter_supports(plan: Plan, rng: np.random.Generator) -> TurnoutTrack:
+    def scatter(track: Track) -> Track:
         values = {}
         for name in ("pad_stiffness", "ballast_stiffness"):
             values[name] = getattr(track, name) * np.exp(plan.scatter * rng.normal(size=track.support.size))
@@ -234,7 +288,9 @@ def _scatter_supports(plan, rng):
     return replace(base, track=scatter(base.track), tracks={k: scatter(t) for k, t in base.tracks.items()})
 
 
-def _hammer_test(plan, true, sensors, terms, k, seed):
+def _hammer_test(
+    plan: Plan, true: TurnoutTrack, sensors: tuple[Sensor, ...], terms: Sequence[PhysicsTerm], k: int, seed: int
+) -> HammerInput:
     position, temperature = plan.hammer_points[k]
     conditions = {"rail_temperature": temperature}
     under = tuple(t.under_conditions(conditions) for t in terms)
@@ -247,7 +303,17 @@ def _hammer_test(plan, true, sensors, terms, k, seed):
     return HammerInput(f"blows {k + 1}", position, recordings, "hammer", visit, conditions)
 
 
-def _simulated_passage(plan, true, sensors, terms, planned, name, seed, k, rng):
+def _simulated_passage(
+    plan: Plan,
+    true: TurnoutTrack,
+    sensors: tuple[Sensor, ...],
+    terms: Sequence[PhysicsTerm],
+    planned: Train,
+    name: str,
+    seed: int,
+    k: int,
+    rng: np.random.Generator,
+) -> PassageInput:
     conditions = {} if planned.temperature is None else {"rail_temperature": planned.temperature}
     loads = tuple(2.0 * load for load in planned.vehicle.static_loads)
     term_conditions = {"axle_loads": loads, "train": planned.name, "name": name, **conditions}

@@ -35,6 +35,7 @@ from turnout.mismatch.turnout.track_parameters import (
 from turnout.physics.term import PhysicsTerm
 from turnout.simulate.sensor import Sensor
 from turnout.simulate.track import Track
+from turnout.simulate.wheel_path import Surfaces
 
 Values: TypeAlias = Mapping[str, float]  # nuisance parameters by name
 Terms: TypeAlias = Sequence[PhysicsTerm]
@@ -326,7 +327,9 @@ class Predictor:
         vehicle = vehicle_with(aligned.passage.vehicle, values, aligned.train, load)
         simulator, path = self.passage_simulator(values, passage_terms, aligned.passage), self.waves.path(values)
         sensors = [replace(s, place=s.place + values.get(f"seat_{s.name}", 0.0)) for s in aligned.sensors]
-        surfaces = tuple((*surface, *path) for surface in self.surface.surfaces(aligned.passage.route, values))
+        surfaces: Surfaces = tuple(
+            (*surface, *path) for surface in self.surface.surfaces(aligned.passage.route, values)
+        )
         probe_points = probes(self, values, terms, aligned)
         signals = simulator(
             aligned.passage, vehicle, aligned.speed * (1.0 + speed), sensors, probe_points, surfaces, aligned.sensors

@@ -497,7 +497,12 @@ GROUPS = (
 
 
 def prior_rows() -> list[tuple[str, str, Any, str, str, str]]:
-    """(group, name, value, unit, reason, source) of every constant, in the order of the code."""
+    """Group, name, value, unit, reason and source of every constant, in the order of the code.
+
+    Returns
+    -------
+    list of tuple
+    """
     return [
         (type(group).__name__, f.name, f.default, f.metadata["unit"], f.metadata["reason"], f.metadata["source"])
         for group in GROUPS

@@ -4,7 +4,10 @@ The free track carries the force to the sensors and to the wheels. The wheels re
 them as to a wave of its surface (``wave_response``).
 """
 
+from __future__ import annotations
+
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,12 +19,37 @@ from turnout.mismatch.turnout.wave_response import WaveTransfer
 from turnout.simulate.frequency_response import responses
 from turnout.simulate.run import Probe
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import Any, TypeAlias
+
+    from turnout.mismatch.turnout.passage_observation import AlignedPassage
+    from turnout.mismatch.turnout.prediction import Predictor, Terms, Values
+
+    Force: TypeAlias = tuple[int, int, np.ndarray]  # support, target, (n,) force at the rate of the simulation [N]
+
 RAIL, SLEEPER, PAD = range(3)  # targets; the force of a pad acts on the rail and reversed on the sleeper
 
 
-def probes(predictor, values, terms, aligned):
+def probes(predictor: Predictor, values: Values, terms: Terms, aligned: AlignedPassage) -> list[Probe]:
     """Probes of rail and sleeper at every support of the zone, for pseudo-forces, and of sensors moved by
     ``RECEPTANCE.seat_step``.
+
+    Parameters
+    ----------
+    predictor : Predictor
+        Predicts the recordings of the site.
+    values : mapping
+        All nuisances of the site, by name.
+    terms : sequence of PhysicsTerm
+        Effects beside the base model.
+    aligned : AlignedPassage
+        The passage.
+
+    Returns
+    -------
+    list of Probe
+        Rail and sleeper of each support in turn, then the sensors.
     """
     sensors = [predictor.seat(s, values, terms) for s in aligned.sensors]
     track = predictor.track(aligned.passage.route)
@@ -29,15 +57,57 @@ def probes(predictor, values, terms, aligned):
     return [Probe((layer, j), 0) for j in predictor.zone.supports for layer in ("rail", "sleeper")] + shifted
 
 
-def support_motion(predictor, values, terms, aligned):
-    """Displacement of rail and sleeper at the zone's supports, each (n_support, n) at the simulation's rate [m]."""
+def support_motion(
+    predictor: Predictor, values: Values, terms: Terms, aligned: AlignedPassage
+) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement of rail and sleeper at the zone's supports, each (n_support, n) at the simulation's rate [m].
+
+    Parameters
+    ----------
+    predictor : Predictor
+        Predicts the recordings of the site.
+    values : mapping
+        All nuisances of the site, by name.
+    terms : sequence of PhysicsTerm
+        Effects beside the base model.
+    aligned : AlignedPassage
+        The passage.
+
+    Returns
+    -------
+    rail : (n_support, n) array of float
+        Displacement of the rail. [m]
+    sleeper : (n_support, n) array of float
+        Displacement of the sleepers. [m]
+    """
     signals = predictor.signals_with_probes(values, terms, aligned)[len(aligned.sensors) :]
     last = 2 * len(predictor.zone.supports)
     return signals[0:last:2], signals[1:last:2]
 
 
-def green_functions(predictor, values, terms, aligned):
-    """(frequency (m,), G (m, n_sensor, n_support, 2)) acceleration per force on rail seat and sleeper [m/s²/N]."""
+def green_functions(
+    predictor: Predictor, values: Values, terms: Terms, aligned: AlignedPassage
+) -> tuple[np.ndarray, np.ndarray]:
+    """Transfer functions from forces on rail seats and sleepers to the acceleration of the sensors.
+
+    Parameters
+    ----------
+    predictor : Predictor
+        Predicts the recordings of the site.
+    values : mapping
+        All nuisances of the site, by name.
+    terms : sequence of PhysicsTerm
+        Effects beside the base model.
+    aligned : AlignedPassage
+        The passage.
+
+    Returns
+    -------
+    frequency : (m,) array of float
+        [Hz]
+    g : (m, n_sensor, n_support, 2) array of complex
+        Acceleration per force on rail seat and sleeper. [m/s²/N]
+    """
     under = [t.under_conditions(aligned.conditions) for t in terms]
     track = track_with(predictor.track(aligned.passage.route, under), predictor.zone, values)
     matrices = linear_matrices(track, under)
@@ -49,7 +119,9 @@ def green_functions(predictor, values, terms, aligned):
     return frequency, -omega2[:, None, None, None] * h.reshape(*h.shape[:2], -1, 2)
 
 
-def _static_deflection(predictor, values, terms, aligned, positions):
+def _static_deflection(
+    predictor: Predictor, values: Values, terms: Terms, aligned: AlignedPassage, positions: np.ndarray
+) -> np.ndarray:
     """(n_support, 2, n_x) static deflection of the rail at ``positions`` per force on rail seat and sleeper [m/N]."""
     under = [t.under_conditions(aligned.conditions) for t in terms]
     track = track_with(predictor.track(aligned.passage.route, under), predictor.zone, values)
@@ -60,11 +132,35 @@ def _static_deflection(predictor, values, terms, aligned, positions):
     return np.array(inside).reshape(-1, 2, positions.size)
 
 
-def force_responses(predictor, values, terms, aligned, forces):
+def force_responses(
+    predictor: Predictor,
+    values: Values,
+    terms: Terms,
+    aligned: AlignedPassage,
+    forces: Mapping[Any, Force | list[Force]],
+) -> dict[Any, np.ndarray]:
     """Response of the sensors to force histories, key -> (n_sensor * n_time,) at the times of the observation.
 
     ``forces`` maps a key to (support, target, (n,) force at the rate of the simulation), or to a list of such that act
     together.
+
+    Parameters
+    ----------
+    predictor : Predictor
+        Predicts the recordings of the site.
+    values : mapping
+        All nuisances of the site, by name.
+    terms : sequence of PhysicsTerm
+        Effects beside the base model.
+    aligned : AlignedPassage
+        The passage.
+    forces : mapping
+        Key -> (support, target, (n,) force [N]), or a list of such.
+
+    Returns
+    -------
+    dict
+        Key -> (n_sensor * n_time,) [m/s²].
     """
     transfer = WaveTransfer(predictor, values, aligned, terms)
     _, g = green_functions(predictor, values, terms, aligned)
@@ -88,15 +184,40 @@ def force_responses(predictor, values, terms, aligned, forces):
     return dict(zip(forces, columns.T))
 
 
-def support_columns(predictor, values, terms, aligned, histories):
+def support_columns(
+    predictor: Predictor,
+    values: Values,
+    terms: Terms,
+    aligned: AlignedPassage,
+    histories: tuple[np.ndarray, np.ndarray],
+) -> dict[str, np.ndarray]:
     """Derivatives of a passage by support values.
 
     By the logarithm of each support's own pad and ballast stiffness, and by the values that all supports have in
     common. Of the latter the contribution of supports beyond the zone is left out.
+
+    Parameters
+    ----------
+    predictor : Predictor
+        Predicts the recordings of the site.
+    values : mapping
+        All nuisances of the site, by name.
+    terms : sequence of PhysicsTerm
+        Effects beside the base model.
+    aligned : AlignedPassage
+        The passage.
+    histories : tuple of (n_support, n) array of float
+        Those of ``support_motion``. [m]
+
+    Returns
+    -------
+    dict
+        Nuisance -> (n_sensor * n_time,) per unit of the logarithm. [m/s²]
     """
     rail, sleeper = histories
     track = track_with(predictor.track(aligned.passage.route), predictor.zone, values)
-    zone, forces = predictor.zone.supports, {}
+    zone = predictor.zone.supports
+    forces: dict[str, Force | list[Force]] = {}
     for k, j in enumerate(zone):
         forces[f"pad_{j}"] = j, PAD, -track.pad_stiffness[j] * (rail[k] - sleeper[k])
         forces[f"ballast_{j}"] = j, SLEEPER, -track.ballast_stiffness[j] * sleeper[k]
@@ -108,5 +229,5 @@ def support_columns(predictor, values, terms, aligned, histories):
         forces[name] = [(j, target, -getattr(track, name)[j] * motion[k]) for k, j in enumerate(zone)]
     columns = force_responses(predictor, values, terms, aligned, forces)
     for name in ("pad", "ballast"):
-        columns[f"{name}_stiffness"] = sum(columns[f"{name}_{j}"] for j in zone)
+        columns[f"{name}_stiffness"] = np.asarray(sum(columns[f"{name}_{j}"] for j in zone))
     return columns

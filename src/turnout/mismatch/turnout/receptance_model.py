@@ -4,7 +4,10 @@ Links that are added, or whose values change, change the receptances without ano
 exact, for small changes of values it is exact to first order.
 """
 
+from __future__ import annotations
+
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import csr_array, lil_array
@@ -19,9 +22,36 @@ from turnout.simulate.frequency_response import responses
 from turnout.simulate.links import Link, links_of, ports_of, with_links
 from turnout.simulate.matrices import link_vector
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+    from typing import Any
 
-def tangent_links(terms, track):
-    """Links that replace the nonlinear ports of terms: secant stiffness over 1 µm, and damping at the sliding rate."""
+    from turnout.mismatch.engine.candidate import Candidate
+    from turnout.mismatch.engine.case import Observation
+    from turnout.mismatch.turnout.prediction import Predictor, Terms, Values
+    from turnout.mismatch.turnout.receptance_observation import FrfPair
+    from turnout.mismatch.turnout.receptance_sensitivity import ReceptanceSensitivity
+    from turnout.simulate.force_laws import ForceLaw
+    from turnout.simulate.matrices import TrackMatrices
+    from turnout.simulate.sensor import Sensor
+    from turnout.simulate.track import Track
+
+
+def tangent_links(terms: Sequence[PhysicsTerm], track: Track) -> list[Link]:
+    """Links that replace the nonlinear ports of terms: secant stiffness over 1 µm, and damping at the sliding rate.
+
+    Parameters
+    ----------
+    terms : sequence of PhysicsTerm
+        Terms with ports.
+    track : Track
+        The track.
+
+    Returns
+    -------
+    list of Link
+        One per port.
+    """
     links = []
     for port in ports_of(terms, track):
         law, d = port.law, -port.gap
@@ -36,17 +66,29 @@ def tangent_links(terms, track):
     return links
 
 
-def linear_matrices(track, terms):
-    """Matrices of a track with ``terms``, their ports replaced by ``tangent_links``."""
+def linear_matrices(track: Track, terms: Sequence[PhysicsTerm]) -> TrackMatrices:
+    """Matrices of a track with ``terms``, their ports replaced by ``tangent_links``.
+
+    Parameters
+    ----------
+    track : Track
+        The track.
+    terms : sequence of PhysicsTerm
+        Effects on the track.
+
+    Returns
+    -------
+    TrackMatrices
+    """
     return matrices_of(track, (*terms, FixedLinks(tangent_links(terms, track))))
 
 
-def _friction_force(law, d, rate):
+def _friction_force(law: ForceLaw, d: float, rate: float) -> float:
     """Half the change of a port's force when its rate reverses [N]."""
     return 0.5 * (float(law.force(d, rate)) - float(law.force(d, -rate)))
 
 
-def _file_shear_share(track, terms):
+def _file_shear_share(track: Track, terms: Sequence[PhysicsTerm]) -> float:
     """Share of the file's value in the shear flexibility of the rail; ``terms`` add the rest."""
     if track.rail.beam == "euler":
         return 0.0
@@ -59,54 +101,60 @@ def _file_shear_share(track, terms):
 class ReceptanceModel:
     """Receptances of one track with terms at given conditions on ``LINES``."""
 
-    def __init__(self, track, terms):
+    def __init__(self, track: Track, terms: Sequence[PhysicsTerm]):
         self.track, self.terms = track, terms
         self.matrices = linear_matrices(track, terms)
         self.file_shear_share = _file_shear_share(track, terms)
-        self.by_position, self.weight = {}, {}
+        self.by_position: dict[float | tuple, np.ndarray] = {}
+        self.weight: dict[float | tuple, tuple[np.ndarray, np.ndarray]] = {}
 
-    def solve(self, positions):
+    def solve(self, positions: Iterable[float | tuple]) -> None:
         """Compute and keep the displacements under unit forces at these positions, with one factorisation."""
         new = [p for p in dict.fromkeys(positions) if p not in self.by_position]
         if new:
             displacements = responses(self.matrices, SHIFTED_LINES, new)
             self.by_position |= {p: displacements[:, k] for k, p in enumerate(new)}
 
-    def displacement(self, position):
+    def displacement(self, position: float | tuple) -> np.ndarray:
         """(n_line, n) displacement of all degrees of freedom under a unit force at a position."""
         self.solve([position])
         return self.by_position[position]
 
-    def nodal_motion(self, excited, measured):
+    def nodal_motion(self, excited: float | tuple, measured: float | tuple) -> np.ndarray:
         """(n_line,) displacement at one position under a unit force at another, from nodal motion alone. [m/N]"""
         if measured not in self.weight:
             self.weight[measured] = self.matrices.weights(measured)
         rows, weights = self.weight[measured]
         return self.displacement(excited)[:, rows] @ weights
 
-    def position_of(self, sensor):
+    def position_of(self, sensor: Sensor) -> float | tuple:
         """Position of a sensor on the model."""
         return sensor.probe(self.track).place
 
-    def receptance(self, excited, measured):
+    def receptance(self, excited: float | tuple, measured: float | tuple) -> np.ndarray:
         """(n_line,) complex [m/N]."""
         h = self.nodal_motion(excited, measured)
-        return h if isinstance(measured, tuple) else h + self.matrices.compliance(float(excited), float(measured))
+        if isinstance(measured, tuple) or isinstance(excited, tuple):
+            return h
+        return h + self.matrices.compliance(float(excited), float(measured))
 
-    def seat_gradient(self, excited, measured, step=RECEPTANCE.seat_step):
+    def seat_gradient(
+        self, excited: float | tuple, measured: float | tuple, step: float = RECEPTANCE.seat_step
+    ) -> np.ndarray:
         """Derivative by the position of the sensor on the rail, (n_line,) [1/N]; 0 on a sleeper."""
         if isinstance(measured, tuple):
             return np.zeros(LINES.size, dtype=complex)
         return (self.receptance(excited, measured + step) - self.receptance(excited, measured - step)) / (2.0 * step)
 
     @cached_property
-    def rows(self):
+    def rows(self) -> tuple[np.ndarray, np.ndarray]:
         """Rows of the rail and of the sleeper at every support, each (n_support,)."""
         index, supports = self.matrices.index, range(self.track.support.size)
-        return tuple(np.array([index[layer, j] for j in supports]) for layer in ("rail", "sleeper"))
+        rail, sleeper = (np.array([index[layer, j] for j in supports]) for layer in ("rail", "sleeper"))
+        return rail, sleeper
 
     @cached_property
-    def following_links(self):
+    def following_links(self) -> list[tuple[str, int, np.ndarray, np.ndarray, tuple[float, ...]]]:
         """Links of the terms that depend on a value of their support.
 
         List of (field, support, rows, weights, (k, c, m) per logarithm of the value). Soft ballast has a share of the
@@ -128,7 +176,7 @@ class ReceptanceModel:
                     links.append((field, a.ends[0][0][1], *link_vector(a, self.matrices.index), change))
         return links
 
-    def links(self, terms, track=None):
+    def links(self, terms: Sequence[PhysicsTerm], track: Track | None = None) -> list[Link]:
         """Links of ``terms`` on this track or another, followed by the tangents of their ports."""
         track = track or self.track
         return [*links_of(terms, track), *tangent_links(terms, track)]
@@ -140,11 +188,11 @@ class AddedLinks:
     The response of the added links is computed once for all pairs under the same conditions.
     """
 
-    def __init__(self, predictor, values, terms, chosen):
+    def __init__(self, predictor: Predictor, values: Values, terms: Terms, chosen: Sequence[tuple[Candidate, int]]):
         self.predictor, self.values, self.terms, self.chosen = predictor, values, terms, chosen
-        self.link_responses = {}
+        self.link_responses: dict[tuple, tuple[csr_array, np.ndarray, np.ndarray, np.ndarray]] = {}
 
-    def changes(self, pair):
+    def changes(self, pair: FrfPair) -> dict[tuple[str, int], np.ndarray]:
         r"""(key, start) -> (n,) change of the observation of a pair.
 
         One link w with impedance z changes a receptance by :math:`-z\,u_w v_w / (1 + z\,g_w)`. Here u and v are the
@@ -168,27 +216,31 @@ class AddedLinks:
         return {(c.key, k): column for (c, k), column in zip(chosen, columns.T)}
 
 
-def _link_responses(model, conditions, chosen):
+def _link_responses(
+    model: ReceptanceModel, conditions: Mapping[str, Any], chosen: Sequence[tuple[Candidate, int]]
+) -> tuple[csr_array, np.ndarray, np.ndarray, np.ndarray]:
     """(ends (n_end, n), end of each link, z / (1 + z g) of each (n_line, n_link), candidate of each link)."""
-    omega, end_index, index, impedance, owner = 2.0 * np.pi * receptance_observation.SHIFTED_LINES, {}, [], [], []
+    omega = 2.0 * np.pi * receptance_observation.SHIFTED_LINES
+    end_index: dict[tuple, int] = {}
+    link_ends, impedance, owner = [], [], []
     track = with_links(model.track, links_of(model.terms, model.track))
     for i, (c, k) in enumerate(chosen):
         for ends, z in _impedances(track, c.term(c.starts[k]).under_conditions(conditions), omega):
-            index.append(end_index.setdefault(ends, len(end_index)))
+            link_ends.append(end_index.setdefault(ends, len(end_index)))
             impedance.append(z)
             owner.append(i)
     weights = lil_array((len(end_index), model.matrices.n))
-    end_receptance = np.empty((omega.size, len(end_index)), dtype=complex)
+    end_receptance = np.empty((omega.size, len(end_index)), dtype=np.complex128)
     for ends, k in end_index.items():
-        motion = sum(weight * model.displacement(name) for name, weight in ends)
+        motion = np.asarray(sum(weight * model.displacement(name) for name, weight in ends))
         end_receptance[:, k] = sum(weight * motion[:, model.matrices.index[name]] for name, weight in ends)
         for name, weight in ends:
             weights[k, model.matrices.index[name]] += weight
-    index, z = np.array(index, dtype=int), np.array(impedance).reshape(-1, omega.size).T
+    index, z = np.array(link_ends, dtype=int), np.array(impedance).reshape(-1, omega.size).T
     return weights.tocsr(), index, z / (1.0 + z * end_receptance[:, index]), np.array(owner, dtype=int)
 
 
-def _impedances(track, term, omega):
+def _impedances(track: Track, term: PhysicsTerm, omega: np.ndarray) -> list[tuple[tuple, np.ndarray]]:
     """(ends, impedance (n_line,)) of every link that a term adds."""
     condensed = term.condensed_links(receptance_observation.SHIFTED_LINES)
     if condensed is not None:
@@ -200,10 +252,37 @@ def _impedances(track, term, omega):
 LINK_VALUES = ("stiffness", "damping", "mass")
 
 
-def predict_near(predictor, values, terms, new, observations, predictions):
+def predict_near(
+    predictor: Predictor,
+    values: Values,
+    terms: Terms,
+    new: Terms,
+    observations: Sequence[Observation],
+    predictions: Sequence[np.ndarray],
+) -> list[np.ndarray]:
     """Predictions of a ``Predictor`` with ``new`` terms, a small step from ``terms``.
 
     Passages are simulated. Receptances follow the links where these differ by their values alone.
+
+    Parameters
+    ----------
+    predictor : Predictor
+        Predicts the recordings of the site.
+    values : mapping
+        All nuisances of the site, by name.
+    terms : sequence of PhysicsTerm
+        Effects beside the base model.
+    new : sequence of PhysicsTerm
+        The terms a small step away.
+    observations : sequence of Observation
+        Those that are predicted.
+    predictions : sequence of (n,) array
+        Predictions with ``terms``.
+
+    Returns
+    -------
+    list of (n,) array
+        One per observation.
     """
     predicted, sensitivity_of, differences = [], predictor.pair_sensitivities(values, terms), {}
     channel_changed = any(a != b and b.effect_type == "channel" for a, b in zip(terms, new))
@@ -215,8 +294,9 @@ def predict_near(predictor, values, terms, new, observations, predictions):
                 differences[conditions] = changed_links(
                     sensitivity.model, receptance_observation.track_terms(new, pair.conditions)
                 )
-            if differences[conditions] is not None:
-                change = receptance_change(sensitivity, pair, *differences[conditions])
+            difference = differences[conditions]
+            if difference is not None:
+                change = receptance_change(sensitivity, pair, *difference)
                 predicted.append(
                     old
                     + receptance_observation.split_complex(
@@ -230,10 +310,23 @@ def predict_near(predictor, values, terms, new, observations, predictions):
     return predicted
 
 
-def changed_links(model, terms):
-    """Ends (n_link, n) and impedances (n_link, n_line) by which links of ``terms`` differ from those of the model.
+def changed_links(model: ReceptanceModel, terms: Sequence[PhysicsTerm]) -> tuple[csr_array, np.ndarray] | None:
+    """Links by which ``terms`` differ from those of the model.
 
-    None where more than values differ: another rail, or a link that the model has not.
+    Parameters
+    ----------
+    model : ReceptanceModel
+        Model with the old terms.
+    terms : sequence of PhysicsTerm
+        The new terms.
+
+    Returns
+    -------
+    ends : (n_link, n) sparse array
+        Weights of the degrees of freedom at the ends of each link.
+    impedance : (n_link, n_line) array of complex
+        Their change. [N/m] The whole is None where more than values differ: another rail, or a link that the model
+        has not.
     """
     pairs = list(zip(model.terms, terms))
     if any(type(a) is not type(b) or (a != b and type(b).rail is not PhysicsTerm.rail) for a, b in pairs):
@@ -254,10 +347,28 @@ def changed_links(model, terms):
     return csr_array((weights, rows, first), shape=(len(differs), model.matrices.n)), impedance
 
 
-def receptance_change(sensitivity, pair, ends, impedance):
-    r"""(n_line,) complex change of a pair's receptance [m/N] by links whose impedance changes by z.
+def receptance_change(
+    sensitivity: ReceptanceSensitivity, pair: FrfPair, ends: csr_array, impedance: np.ndarray
+) -> np.ndarray:
+    r"""Complex change of a pair's receptance [m/N] by links whose impedance changes by z.
 
     It is :math:`-\sum z\,u_w v_w` with u and v the motion of their ends under unit forces at impact and sensor.
+
+    Parameters
+    ----------
+    sensitivity : ReceptanceSensitivity
+        Receptances and their derivatives.
+    pair : FrfPair
+        Response channel of a hammer test.
+    ends : (n_link, n) sparse array
+        Weights of the degrees of freedom at the ends of each link.
+    impedance : (n_link, n_line) array of complex
+        Change of each link. [N/m]
+
+    Returns
+    -------
+    (n_line,) array of complex
+        [m/N]
     """
     u, v = sensitivity.motion(ends, pair)
     return -np.sum(impedance * u * v, axis=0)

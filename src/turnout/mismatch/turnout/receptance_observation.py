@@ -1,13 +1,23 @@
 """Hammer tests as observations: receptances of accepted impacts, their errors and their cells in frequency."""
 
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from turnout.hammer_test import find_impacts
 from turnout.mismatch.engine.case import Observation
+from turnout.mismatch.turnout.campaign import HammerInput
 from turnout.mismatch.turnout.priors import RECEPTANCE
+from turnout.simulate.sensor import Sensor
+
+if TYPE_CHECKING:
+    from turnout.physics.term import PhysicsTerm
+    from turnout.records import Impact
 
 LINES = np.geomspace(RECEPTANCE.lowest_line, RECEPTANCE.highest_line, RECEPTANCE.n_lines)  # [Hz]
 LINES = np.unique(np.round(LINES / RECEPTANCE.line_step) * RECEPTANCE.line_step)
@@ -22,29 +32,43 @@ class FrfPair:
     """
 
     name: str
-    test: object
+    test: HammerInput
     channel: str
-    sensor: object
+    sensor: Sensor
     frequency: np.ndarray
     size: np.ndarray
-    conditions: dict
+    conditions: dict[str, Any]
 
     @property
-    def seat(self):
+    def seat(self) -> tuple[str, float, str]:
         """Identity of the sensor: a channel may have been moved during the test, or from the rail to a sleeper."""
         return self.channel, self.sensor.place, self.sensor.mounting
 
     @cached_property
-    def lines(self):
+    def lines(self) -> np.ndarray:
         """(n,) index of its lines in ``LINES``."""
         return np.searchsorted(LINES, self.frequency)
 
 
-def pairs_of_test(test, sensors, tolerance):
-    """(FrfPair, Observation) of every response channel of a test; channels without accepted impacts are left out.
+def pairs_of_test(test: HammerInput, sensors: Sequence[Sensor], tolerance: float) -> list[tuple[FrfPair, Observation]]:
+    """Every response channel of a test with its observation; channels without accepted impacts are left out.
 
     The observation is Re and Im of the receptance over its own magnitude, so that all lines have equal weight. Its
     sigma combines the scatter between impacts and ``tolerance``.
+
+    Parameters
+    ----------
+    test : HammerInput
+        The hammer test.
+    sensors : sequence of Sensor
+        The sensors.
+    tolerance : float
+        Relative error of a receptance by hammer, calibration and mounting. [-]
+
+    Returns
+    -------
+    list of (FrfPair, Observation)
+        In the order of the sensors.
     """
     pairs = []
     for sensor in sensors:
@@ -69,19 +93,16 @@ def pairs_of_test(test, sensors, tolerance):
 
 
 @lru_cache(maxsize=4)
-def _transform_kernel(n, rate):
+def _transform_kernel(n: int, rate: float) -> np.ndarray:
     """(n_line, n) Fourier kernel at ``SHIFTED_LINES``."""
     return np.exp(-2j * np.pi * SHIFTED_LINES[:, None] * np.arange(n) / rate)
 
 
-def _receptance_and_error(impacts):
+def _receptance_and_error(impacts: Sequence[Impact]) -> tuple[np.ndarray, np.ndarray]:
     """H1 estimate over the accepted impacts and its standard error from their scatter, both (n_line,)."""
-    force, response = [], []
-    for i in impacts:
-        kernel = _transform_kernel(i.force.size, i.rate)
-        force.append(kernel @ i.force)
-        response.append(kernel @ i.acceleration)
-    force, response = np.array(force), np.array(response)
+    kernels = [_transform_kernel(i.force.size, i.rate) for i in impacts]
+    force = np.array([kernel @ i.force for kernel, i in zip(kernels, impacts)])
+    response = np.array([kernel @ i.acceleration for kernel, i in zip(kernels, impacts)])
     power = np.sum(np.abs(force) ** 2, axis=0)
     h = np.sum(response * force.conj(), axis=0) / power
     residual = np.sum(np.abs(response - h * force) ** 2, axis=0) / max(len(impacts) - 1, 1)
@@ -89,13 +110,42 @@ def _receptance_and_error(impacts):
     return -h / omega2, np.sqrt(residual / power) / np.abs(omega2)
 
 
-def with_magnitude(pair, size):
-    """The pair with another magnitude ``size`` of its receptance."""
+def with_magnitude(pair: FrfPair, size: np.ndarray) -> FrfPair:
+    """The pair with another magnitude ``size`` of its receptance.
+
+    Parameters
+    ----------
+    pair : FrfPair
+        Response channel of a hammer test.
+    size : (n,) array of float
+        Magnitude on the lines of the pair. [m/N]
+
+    Returns
+    -------
+    FrfPair
+    """
     return replace(pair, size=size)
 
 
-def observation_of(pair, h, spread, tolerance):
-    """Observation of a receptance (n,) with standard error ``spread`` (n,)."""
+def observation_of(pair: FrfPair, h: np.ndarray, spread: np.ndarray, tolerance: float) -> Observation:
+    """Observation of a receptance (n,) with standard error ``spread`` (n,).
+
+    Parameters
+    ----------
+    pair : FrfPair
+        Response channel of a hammer test.
+    h : (n,) array of complex
+        Receptance on the lines of the pair. [m/N]
+    spread : (n,) array of float
+        Standard error. [m/N]
+    tolerance : float
+        Relative error of a receptance by hammer, calibration and mounting. [-]
+
+    Returns
+    -------
+    Observation
+        Re and Im over the magnitude of the pair.
+    """
     sigma = np.sqrt(
         (spread / pair.size) ** 2 / 2.0 + (RECEPTANCE.line_share * tolerance * _local_magnitude_ratio(pair)) ** 2
     )
@@ -122,7 +172,7 @@ def observation_of(pair, h, spread, tolerance):
     )
 
 
-def _local_magnitude_ratio(pair):
+def _local_magnitude_ratio(pair: FrfPair) -> np.ndarray:
     """(n,) rms magnitude over a third of an octave about each line, over the magnitude of the line; at least 1.
 
     Model errors fill the antiresonances.
@@ -131,12 +181,26 @@ def _local_magnitude_ratio(pair):
     return np.maximum(np.sqrt(near @ pair.size**2 / near.sum(axis=1)) / pair.size, 1.0)
 
 
-def error_modes(pair, h, tolerance):
-    r"""(2n, m) modes of errors of a receptance that no effect explains.
+def error_modes(pair: FrfPair, h: np.ndarray, tolerance: float) -> np.ndarray:
+    r"""Modes of errors of a receptance that no effect explains.
 
     Gain, tilt over frequency and delay of the pair come from hammer, calibration and mounting. The model has an error
     that is smooth over :math:`\ell = 0.3` octaves: :math:`\epsilon h` with complex normal ε of covariance :math:`\tau^2
     (1 + d^2 / d_0^2) \exp(-\Delta^2 / 2 \ell^2)`, Δ in octaves, d the distance from impact to sensor.
+
+    Parameters
+    ----------
+    pair : FrfPair
+        Response channel of a hammer test.
+    h : (n,) array of complex
+        Receptance on the lines of the pair. [m/N]
+    tolerance : float
+        Relative error of a receptance by hammer, calibration and mounting. [-]
+
+    Returns
+    -------
+    (2n, m) array of float
+        In units of the observation.
     """
     octave = np.log2(pair.frequency)
     position = getattr(pair.sensor, "place", pair.test.place)
@@ -152,29 +216,79 @@ def error_modes(pair, h, tolerance):
     return np.concatenate([columns.real, columns.imag])
 
 
-def track_terms(terms, conditions):
-    """Those of ``terms`` that act in receptances of the track, as they are under ``conditions``."""
+def track_terms(terms: Sequence[PhysicsTerm], conditions: Mapping[str, Any]) -> tuple[PhysicsTerm, ...]:
+    """Those of ``terms`` that act in receptances of the track, as they are under ``conditions``.
+
+    Parameters
+    ----------
+    terms : sequence of PhysicsTerm
+        The effects.
+    conditions : mapping
+        Conditions of a recording.
+
+    Returns
+    -------
+    tuple of PhysicsTerm
+    """
     return tuple(t.under_conditions(conditions) for t in terms if t.effect_type in ("matrix", "port"))
 
 
-def channel_factor(terms, sensor, frequency):
-    """(n,) complex factor by which linear channel terms change a spectrum."""
+def channel_factor(terms: Sequence[PhysicsTerm], sensor: Sensor, frequency: np.ndarray) -> np.ndarray:
+    """Complex factor by which linear channel terms change a spectrum.
+
+    Parameters
+    ----------
+    terms : sequence of PhysicsTerm
+        The effects.
+    sensor : Sensor
+        The sensor.
+    frequency : (n,) array
+        Lines, complex for decaying signals. [Hz]
+
+    Returns
+    -------
+    (n,) array of complex
+    """
     factor = np.ones(frequency.size, dtype=complex)
     for term in terms:
-        if hasattr(term, "transfer") and term.channel_name == sensor.name:
+        if hasattr(term, "transfer") and getattr(term, "channel_name", "") == sensor.name:
             factor = factor * term.transfer(frequency)
     return factor
 
 
-def split_complex(value):
-    """Re and Im one after the other, along the first axis."""
+def split_complex(value: np.ndarray) -> np.ndarray:
+    """Re and Im one after the other, along the first axis.
+
+    Parameters
+    ----------
+    value : (n, ...) array of complex
+        Any values.
+
+    Returns
+    -------
+    (2n, ...) array of float
+    """
     return np.concatenate([value.real, value.imag])
 
 
-def scale_lines(pair, h, channel_response=None):
+def scale_lines(pair: FrfPair, h: np.ndarray, channel_response: np.ndarray | None = None) -> np.ndarray:
     """A receptance on ``LINES`` at the lines of a pair, over its measured magnitude; complex (n,) or (n, k).
 
     ``channel_response`` (n_line,) multiplies it.
+
+    Parameters
+    ----------
+    pair : FrfPair
+        Response channel of a hammer test.
+    h : (n_line,) or (n_line, k) array of complex
+        Values on ``LINES``. [m/N]
+    channel_response : (n_line,) array of complex or None
+        Factor of the channel.
+
+    Returns
+    -------
+    (n,) or (n, k) array of complex
+        On the lines of the pair.
     """
     size = 1.0 / pair.size if channel_response is None else channel_response[pair.lines] / pair.size
     return h[pair.lines] * (size if h.ndim == 1 else size[:, None])

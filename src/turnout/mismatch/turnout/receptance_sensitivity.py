@@ -3,8 +3,11 @@
 The derivatives are sums of products of strains under two unit forces; those over the rail's elements are compiled.
 """
 
+from __future__ import annotations
+
 from dataclasses import replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -14,14 +17,38 @@ from turnout.mismatch.turnout.track_parameters import COMMON_PARAMETERS, SUPPORT
 from turnout.simulate.kernel_cache import kernel
 from turnout.simulate.rail import element_mass
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from turnout.mismatch.turnout.receptance_model import ReceptanceModel
+    from turnout.mismatch.turnout.receptance_observation import FrfPair
+    from turnout.mismatch.turnout.track_parameters import Zone
+    from turnout.simulate.track import RailStretch
+
 
 @kernel
-def rail_derivatives(displacements, pairs, row, length, weights):
-    """(n_pair, n_line, 2) derivatives of receptances by the logarithms of bending and shear stiffness of the rail.
+def rail_derivatives(
+    displacements: np.ndarray, pairs: np.ndarray, row: np.ndarray, length: np.ndarray, weights: np.ndarray
+) -> np.ndarray:
+    """Derivatives of receptances by the logarithms of bending and shear stiffness of the rail.
 
-    ``displacements`` (n_place, n_line, n) are those under unit forces, ``pairs`` (2, n_pair) the positions of impact
-    and sensor, ``row`` (n_node,) the row of a node's deflection, ``length`` (n_element,). ``weights`` (3, n_element)
-    are those of bending, of shear, and of shear by the shear stiffness alone.
+    Parameters
+    ----------
+    displacements : (n_place, n_line, n) array of complex
+        Those under unit forces. [m/N]
+    pairs : (2, n_pair) array of int
+        Positions of impact and sensor, as indices.
+    row : (n_node,) array of int
+        Row of each node's deflection.
+    length : (n_element,) array of float
+        [m]
+    weights : (3, n_element) array of float
+        Of bending, of shear, and of shear by the shear stiffness alone.
+
+    Returns
+    -------
+    (n_pair, n_line, 2) array of complex
+        [m/N]
     """
     n_place, n_line, n_element = displacements.shape[0], displacements.shape[1], length.size
     derivatives = np.zeros((pairs.shape[1], n_line, 2), dtype=np.complex128)
@@ -62,47 +89,53 @@ class ReceptanceSensitivity:
     The supports of ``zone`` have values of their own.
     """
 
-    def __init__(self, model, pairs, seats, zone):
+    def __init__(
+        self,
+        model: ReceptanceModel,
+        pairs: Iterable[tuple[float, tuple]],
+        seats: Mapping[tuple, float | tuple],
+        zone: Zone,
+    ):
         self.model, self.seats, self.zone = model, seats, zone
         self.row = {pair: k for k, pair in enumerate(dict.fromkeys(pairs))}
 
-    def _row_of(self, pair):
+    def _row_of(self, pair: FrfPair) -> int:
         return self.row[pair.test.place, pair.seat]
 
-    def receptance(self, pair):
+    def receptance(self, pair: FrfPair) -> np.ndarray:
         """(n_line,) complex [m/N]."""
         return self.model.receptance(pair.test.place, self.seats[pair.seat])
 
-    def seat_gradient(self, pair):
+    def seat_gradient(self, pair: FrfPair) -> np.ndarray:
         """Derivative by the position of the sensor on the rail, (n_line,) [1/N]; 0 on a sleeper."""
         return self.model.seat_gradient(pair.test.place, self.seats[pair.seat])
 
-    def rail_gradient(self, pair):
+    def rail_gradient(self, pair: FrfPair) -> np.ndarray:
         """Derivatives by the logarithms of the uncertain rail values (``rail_sds``), (n_line, n)."""
         return np.concatenate([self._by_rail[self._row_of(pair)], self._by_castings[self._row_of(pair)]], axis=-1)
 
-    def gradient(self, pair):
+    def gradient(self, pair: FrfPair) -> np.ndarray:
         """Derivatives by the logarithms of common and support values, (n_line, n) in order of ``track_value_names``."""
         return self._by_supports[self._row_of(pair)]
 
-    def motion(self, ends, pair):
+    def motion(self, ends: csr_array, pair: FrfPair) -> tuple[np.ndarray, np.ndarray]:
         """((n_link, n_line), the same) motion of ``ends`` (n_link, n) under unit forces at impact and sensor."""
         return tuple(ends @ self._displacements[position].T for position in self._positions[1][:, self._row_of(pair)])
 
     @cached_property
-    def _positions(self):
+    def _positions(self) -> tuple[dict[float | tuple, int], np.ndarray]:
         """Index of the position of every impact and sensor, and (2, n_pair) indices of each pair."""
         ends = [(position, self.seats[seat]) for position, seat in self.row]
         index = {position: k for k, position in enumerate(dict.fromkeys(p for pair in ends for p in pair))}
         return index, np.array([[index[p] for p in pair] for pair in ends]).T
 
     @cached_property
-    def _displacements(self):
+    def _displacements(self) -> np.ndarray:
         """(n_place, n_line, n) displacement of all degrees of freedom under unit forces at the positions."""
         return np.array([self.model.displacement(position) for position in self._positions[0]])
 
     @cached_property
-    def _by_rail(self):
+    def _by_rail(self) -> np.ndarray:
         r"""(n_pair, n_line, 2) of
 
         .. math:: -\sum_e \frac{EI}{h} s_u s_v + \frac{12 EI}{h (1+P)^2} a_u a_v, \quad
@@ -118,7 +151,7 @@ class ReceptanceSensitivity:
         return rail_derivatives(self._displacements, self._positions[1], matrices.node_index, h, weights)
 
     @cached_property
-    def _by_castings(self):
+    def _by_castings(self) -> np.ndarray:
         r"""(n_pair, n_line, 2 n_casting) by the logarithms of bending stiffness and mass of each casting.
 
         The same sums over the elements that it covers, and :math:`\omega^2 \sum_e u^T M_e v` with their masses. Each
@@ -147,7 +180,7 @@ class ReceptanceSensitivity:
             derivatives += [bending[..., None], (OMEGA**2 * np.sum(u[first] * inertia[second], axis=(2, 3)))[..., None]]
         return np.concatenate(derivatives, axis=-1)
 
-    def _casting_shares(self, piece, elements, shares):
+    def _casting_shares(self, piece: RailStretch, elements: np.ndarray, shares: np.ndarray) -> np.ndarray:
         """(2, n) share of a piece in flexibility and mass of the elements, of whose length it covers ``shares``.
 
         It is 0 where a term has replaced the rail.
@@ -164,7 +197,7 @@ class ReceptanceSensitivity:
         return casting_shares
 
     @cached_property
-    def _by_supports(self):
+    def _by_supports(self) -> np.ndarray:
         """(n_pair, n_line, n) derivatives by all common and support values."""
         zone, track = self.zone, self.model.track
         inside, n = slice(zone.first, zone.last + 1), zone.last + 1 - zone.first
@@ -183,12 +216,12 @@ class ReceptanceSensitivity:
             derivatives += self._following_gradient(derivatives.shape, n)
         return derivatives
 
-    def _at_supports(self, u):
+    def _at_supports(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Compression of every pad and motion of every sleeper, each (..., n_support)."""
         rail, sleeper = self.model.rows
         return u[..., rail] - u[..., sleeper], u[..., sleeper]
 
-    def _following_gradient(self, shape, n):
+    def _following_gradient(self, shape: tuple[int, ...], n: int) -> np.ndarray:
         """Contribution of those links of terms that depend on a value of their support."""
         fields, supports, rows, weights, changes = zip(*self.model.following_links)
         first = np.cumsum([0, *(r.size for r in rows)])

@@ -5,6 +5,10 @@ tests a change at x adds :math:`q(f)\,H_{bx}(f)\,H_{xs}(f)`, by reciprocity, wit
 sensors s. This holds for a change of a support, a mass or a loose fastening alike.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from turnout.mismatch.engine.localization import ResidualSpace
@@ -14,9 +18,33 @@ from turnout.mismatch.turnout.pseudo_forces import green_functions
 from turnout.mismatch.turnout.rail_roughness import amplitude_sd
 from turnout.mismatch.turnout.wave_response import WaveTransfer, channel_responses
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from typing import Any
 
-def source_spaces(case, fit):
-    """Spaces of all passages and of the hammer tests of a TrackCase."""
+    from turnout.mismatch.engine.case import Observation
+    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.turnout.case import TrackCase
+    from turnout.mismatch.turnout.passage_observation import AlignedPassage
+    from turnout.mismatch.turnout.receptance_observation import FrfPair
+    from turnout.mismatch.turnout.receptance_sensitivity import ReceptanceSensitivity
+
+
+def source_spaces(case: TrackCase, fit: Fit) -> Iterator[ResidualSpace]:
+    """Spaces of all passages and of the hammer tests of a TrackCase.
+
+    Parameters
+    ----------
+    case : TrackCase
+        The case.
+    fit : Fit
+        A fit of the case.
+
+    Yields
+    ------
+    ResidualSpace
+        Those of one passage after the other, then those of the hammer tests.
+    """
     for o in case.observations:
         if o.name in case.aligned_passages:
             aligned = case.aligned_passages[o.name]
@@ -27,7 +55,7 @@ def source_spaces(case, fit):
         yield from _change_spaces(case, fit, pairs)
 
 
-def _force_space(case, fit, aligned):
+def _force_space(case: TrackCase, fit: Fit, aligned: AlignedPassage) -> ResidualSpace:
     """Harmonics of each sensor over a passage.
 
     They are combined as a force at each support, a channel's fault, or freely.
@@ -41,7 +69,8 @@ def _force_space(case, fit, aligned):
     frequency, g = green_functions(case.predictor, fit.values, case.all_terms(fit), aligned)
     g = g * channel_responses(fit.values, case.all_terms(fit), aligned, frequency)[:, :, None, None]
     g = g[np.clip(np.searchsorted(frequency, lines), 0, frequency.size - 1), :, :, 0]
-    subspaces, size = {("clock", aligned.name): None}, harmonics.shape[1]
+    subspaces: dict[tuple[str, Any], np.ndarray | None] = {("clock", aligned.name): None}
+    size = harmonics.shape[1]
     for k, j in enumerate(case.predictor.zone.supports if n_sensor > 1 else ()):  # one sensor cannot locate a force
         transfer = g[:, :, k] / np.sqrt(np.mean(np.abs(g[:, :, k]) ** 2, axis=1))[:, None]
         subspaces["place", _position_of(case, j)] = np.concatenate([_real_blocks(row) for row in transfer.T])
@@ -50,7 +79,7 @@ def _force_space(case, fit, aligned):
     return ResidualSpace((aligned.name,), columns, subspaces)
 
 
-def _real_blocks(transfer):
+def _real_blocks(transfer: np.ndarray) -> np.ndarray:
     """(2n, 2n) real matrix by which a complex transfer (n,) acts on cosines and sines."""
     blocks = np.zeros((2 * transfer.size, 2 * transfer.size))
     k = 2 * np.arange(transfer.size)
@@ -59,7 +88,7 @@ def _real_blocks(transfer):
     return blocks
 
 
-def _wheel_space(case, fit, aligned):
+def _wheel_space(case: TrackCase, fit: Fit, aligned: AlignedPassage) -> ResidualSpace:
     """Waves of each wheel, which are errors of ordinary size in the model of the passage."""
     waves, transfer = case.predictor.waves, WaveTransfer(case.predictor, fit.values, aligned, case.all_terms(fit))
     sd = np.repeat(amplitude_sd(waves.lengths, waves.length, WHEELS.level), 2)
@@ -73,7 +102,7 @@ def _wheel_space(case, fit, aligned):
     return ResidualSpace((aligned.name,), np.concatenate(blocks, axis=1), subspaces)
 
 
-def _change_spaces(case, fit, pairs):
+def _change_spaces(case: TrackCase, fit: Fit, pairs: Sequence[tuple[Observation, FrfPair]]) -> Iterator[ResidualSpace]:
     """A change at each support, of each channel, of all supports; in all tests or in those of one visit."""
     names = tuple(o.name for o, _ in pairs)
     sensitivity_of, supports = (
@@ -83,6 +112,7 @@ def _change_spaces(case, fit, pairs):
     through = [_through_support(case, fit, pair, sensitivity_of(pair), supports) for _, pair in pairs]
     at = {j: [h[:, k] for h in through] for k, j in enumerate(supports)}
     track_change = [h.sum(axis=1) for h in through]
+    hypotheses: dict[tuple[str, Any], list[np.ndarray]]
     hypotheses = {("place", _position_of(case, j)): at[j] for j in case.predictor.zone.supports}
     hypotheses["frequency", "track"] = track_change
     order = {o.name: k for k, o in enumerate(case.observations)}
@@ -98,7 +128,9 @@ def _change_spaces(case, fit, pairs):
         yield ResidualSpace(names, columns[:, size > 0.0] / size[size > 0.0], {key: None})
 
 
-def _through_support(case, fit, pair, sensitivity, supports):
+def _through_support(
+    case: TrackCase, fit: Fit, pair: FrfPair, sensitivity: ReceptanceSensitivity, supports: range
+) -> np.ndarray:
     """(n_line, n_support) receptance from impact to support times that from support to sensor, with the channel."""
     rows = [sensitivity.model.matrices.index["rail", j] for j in supports]
     u, v = (
@@ -108,14 +140,14 @@ def _through_support(case, fit, pair, sensitivity, supports):
     return u * v * case.predictor.channel_response(fit.values, case.all_terms(fit), pair)[:, None]
 
 
-def _receptance(pair, predicted):
+def _receptance(pair: FrfPair, predicted: np.ndarray) -> np.ndarray:
     """The predicted receptance on ``LINES``, 0 where it was not measured."""
     n, h = pair.lines.size, np.zeros(receptance_observation.LINES.size, dtype=complex)
     h[pair.lines] = (predicted[:n] + 1j * predicted[n:]) * pair.size
     return h
 
 
-def _line_columns(pair, change):
+def _line_columns(pair: FrfPair, change: np.ndarray) -> np.ndarray:
     """(2n, 2 n_line) columns: change of a pair's observation per real and imaginary part of q on each line."""
     n, scaled = pair.lines.size, change[pair.lines] / pair.size
     columns, k = np.zeros((2 * n, 2 * receptance_observation.LINES.size)), np.arange(n)
@@ -124,7 +156,7 @@ def _line_columns(pair, change):
     return columns
 
 
-def _extended_supports(case):
+def _extended_supports(case: TrackCase) -> range:
     """Supports of the zone and some beyond."""
     last = case.predictor.track().support.size
     return range(
@@ -133,5 +165,5 @@ def _extended_supports(case):
     )
 
 
-def _position_of(case, support):
+def _position_of(case: TrackCase, support: int) -> float:
     return round(float(case.predictor.track().support[support]), 3)

@@ -3,13 +3,27 @@
 The depth of a nose may only be an estimate, for example. Its error must not count as evidence for an effect.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.mismatch.engine.case import Nuisance
 from turnout.mismatch.engine.cross_validation import jackknife_errors
 from turnout.mismatch.turnout.priors import SURFACE, TRACK, WHEELS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from typing import Any
+
+    from turnout.mismatch.engine.case import Case
+    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.turnout.prediction import Values
+    from turnout.mismatch.turnout.rail_roughness import Waves
+    from turnout.simulate.turnout_track import TurnoutTrack
+    from turnout.simulate.wheel_path import PathPart, Surfaces
 
 POSITION_FIELDS = ("place", "start", "end")  # their spread is a share of the distance from the origin
 LENGTH_FIELDS = ("length", "wavelength")
@@ -23,12 +37,12 @@ class SurfaceParameter:
     """
 
     name: str
-    component: object
+    component: PathPart
     field: str
     spread: float
 
     @property
-    def nuisance(self):
+    def nuisance(self) -> Nuisance:
         """The nuisance with its prior."""
         description = (
             f"{self.field} of the {type(self.component).__name__.lower()} at {_position_of(self.component):.2f} m"
@@ -60,7 +74,7 @@ class SurfaceParameter:
             self.name, "-", 0.0, self.spread, None, bounds, f"ln {description}", can_mask=False, group="surface"
         )
 
-    def value_at(self, by):
+    def value_at(self, by: float) -> float | tuple[float, ...]:
         """Its value with deviation ``by``; of a profile all values."""
         value = getattr(self.component, self.field)
         if self.field in POSITION_FIELDS:
@@ -68,12 +82,11 @@ class SurfaceParameter:
         factor = float(np.exp(by))
         return tuple(factor * v for v in value) if isinstance(value, tuple) else factor * value
 
-    def estimate(self, by, error):
+    def estimate(self, by: float, error: float) -> dict[str, Any]:
         """Dict with its value for a deviation ``by`` with standard ``error``; of a profile its factor."""
         profile = isinstance(getattr(self.component, self.field), tuple)
-        value, file_value = (
-            (float(np.exp(by)), 1.0) if profile else (self.value_at(by), getattr(self.component, self.field))
-        )
+        file_value: Any = 1.0 if profile else getattr(self.component, self.field)
+        value: Any = float(np.exp(by)) if profile else self.value_at(by)
         return {
             "term": f"running_surface_{type(self.component).__name__.lower()}",
             "place": _position_of(self.component),
@@ -93,7 +106,7 @@ class RunningSurface:
     those of their nuisances.
     """
 
-    def __init__(self, turnout, waves, routes):
+    def __init__(self, turnout: TurnoutTrack, waves: Waves, routes: Iterable[str]):
         x = np.arange(waves.start - WHEELS.roughness_margin, waves.end + WHEELS.roughness_margin, SURFACE.grid_step)
         route_components = [
             component for route in routes for components in turnout.surfaces(route) for component in components
@@ -116,11 +129,11 @@ class RunningSurface:
         ]
         self.names = tuple(u.name for u in self.parameters)
 
-    def nuisances(self):
+    def nuisances(self) -> list[Nuisance]:
         """Nuisances of every number that may be off."""
         return [u.nuisance for u in self.parameters]
 
-    def surfaces(self, route, values):
+    def surfaces(self, route: str, values: Values) -> Surfaces:
         """Surfaces of ``route``, each a tuple of components, with the numbers of ``values``."""
         changes: dict = {}
         for u in self.parameters:
@@ -132,7 +145,7 @@ class RunningSurface:
             for components in self.turnout.surfaces(route)
         )
 
-    def estimate(self, case, fit):
+    def estimate(self, case: Case, fit: Fit) -> Iterator[dict[str, Any]]:
         r"""Yield a dict for each number that ``fit`` determines better than the file, or that contradicts the file.
 
         The errors include the scatter between trains, and errors of the model that are the same at every axle.
@@ -157,7 +170,7 @@ class RunningSurface:
                 yield u.estimate(by, error)
 
 
-def _component_spreads(turnout, component):
+def _component_spreads(turnout: TurnoutTrack, component: PathPart) -> Mapping[str, float]:
     """Relative spreads of the numbers of a component; the shape of an estimated nose is an estimate as well."""
     spreads = turnout.spreads[component]
     return (
@@ -167,14 +180,14 @@ def _component_spreads(turnout, component):
     )
 
 
-def _can_be_off(component, field):
+def _can_be_off(component: PathPart, field: str) -> bool:
     """Whether a number with a prior can be off: the spread of a position is a share, which is 0 at the origin."""
     return field != "places" and (field not in POSITION_FIELDS or getattr(component, field) != 0.0)
 
 
-def _position_of(component):
+def _position_of(component: PathPart) -> float:
     return (*_field_values(component, POSITION_FIELDS), *getattr(component, "places", ()))[0]
 
 
-def _field_values(component, fields):
+def _field_values(component: PathPart, fields: Sequence[str]) -> list[float]:
     return [getattr(component, f) for f in fields if hasattr(component, f)]

@@ -3,23 +3,47 @@
 The limit is found from peaks of hammer tests and from peaks of passages, and both are combined.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.hammer_test import find_impacts
 from turnout.mismatch.turnout.priors import PASSAGE, SATURATION
 
+if TYPE_CHECKING:
+    from collections.abc import Container, Sequence
 
-def limit_under_impacts(hammer, sensor):
-    """(limit [m/s²], gain [nats]) of the channel of a sensor in the tests ``hammer``; (nan, 0.0) without evidence.
+    from turnout.mismatch.turnout.campaign import CampaignInput, HammerInput
+    from turnout.records import Recording
+    from turnout.simulate.sensor import Sensor
+
+
+def limit_under_impacts(hammer: Sequence[HammerInput], sensor: Sensor) -> tuple[float, float]:
+    """Limit of the channel of a sensor, and the evidence for it.
 
     Each side of an amplifier is tested by itself; the limit is the mean of those with a positive gain. Near the impact
     peaks grow with the force, and the larger gain counts. Elsewhere waves of all lengths meet. They may limit the peaks
     of one side as the pulse gets shorter, but not of both: the smaller gain counts.
+
+    Parameters
+    ----------
+    hammer : sequence of HammerInput
+        All hammer tests.
+    sensor : Sensor
+        The sensor.
+
+    Returns
+    -------
+    limit : float
+        nan without evidence. [m/s²]
+    gain : float
+        0 without evidence. [nats]
     """
-    tests = [(test.place, _peaks(test, sensor.name)) for test in hammer]
-    tests = [(x, peaks) for x, peaks in tests if peaks is not None]
+    all_tests = [(test.place, _peaks(test, sensor.name)) for test in hammer]
+    tests = [(x, peaks) for x, peaks in all_tests if peaks is not None]
     if not tests:
         return float("nan"), 0.0
     sides = [common_limit([(force, side[k]) for _, (force, side) in tests]) for k in (0, 1)]
@@ -33,7 +57,7 @@ def limit_under_impacts(hammer, sensor):
     return float(np.mean([limit for limit, side_gain in sides if side_gain > 0.0])), gain
 
 
-def _peaks(test, name):
+def _peaks(test: HammerInput, name: str) -> tuple[np.ndarray, np.ndarray] | None:
     """(ln force peaks (n,), ln channel peaks (2, n), upward and downward) of the accepted impacts of a test.
 
     None where they are too few. Impacts that reach the range stated in the file are not accepted.
@@ -46,8 +70,8 @@ def _peaks(test, name):
     return np.log([i.peak for i in impacts]), np.log(np.maximum(sides, 1e-12))
 
 
-def common_limit(tests):
-    r"""(limit, gain [nats]) of one limit over all ``tests``, pairs (ln forces (n,), ln peaks (n,)).
+def common_limit(tests: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[float, float]:
+    r"""One limit over all ``tests``.
 
     .. math:: y = \min(c,\, a_t + b_t x) + e \quad\text{against}\quad y = a_t + b_t x + e,\ b_t \ge 1, \qquad
               g = \tfrac n2 \ln\frac{s_0^2 + f^2}{s_1^2 + f^2} - \tfrac12 \ln n
@@ -55,6 +79,18 @@ def common_limit(tests):
     with the mean squares s² of the residuals and the least scatter f. The tip of a hammer stiffens under a harder
     impact, which gets shorter: peaks of a linear track grow at least as the force. At least two impacts must reach the
     limit.
+
+    Parameters
+    ----------
+    tests : sequence of ((n,) array, (n,) array)
+        Logarithms of the peaks of force and of channel, by test.
+
+    Returns
+    -------
+    limit : float
+        [m/s²]
+    gain : float
+        [nats]
     """
     n, top = sum(x.size for x, _ in tests), max(y.max() for _, y in tests)
     free = sum(_fit_line(x, y)[1] for x, y in tests) / n
@@ -74,14 +110,14 @@ def common_limit(tests):
     return float(np.exp(best_fit[1])), float(best_fit[0] - 0.5 * np.log(n))
 
 
-def _fit_line(x, y):
+def _fit_line(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
     """(slope, residual sum of squares) of a line through peaks that grow at least as the force."""
     x, y = x - x.mean(), y - y.mean()
     slope = max(1.0, float(x @ y) / max(float(x @ x), 1e-12))
     return slope, float(np.sum((y - slope * x) ** 2))
 
 
-def _fit_capped(x, y, c):
+def _fit_capped(x: np.ndarray, y: np.ndarray, c: float) -> tuple[float, int]:
     """(residual sum of squares, impacts at the limit) of the best split of the impacts.
 
     The peaks of the weaker ones grow up to ``c``, those of the harder ones stay there.
@@ -105,10 +141,22 @@ class SaturationLimit:
     gain: float
 
 
-def saturated_channels(campaign, threshold):
+def saturated_channels(campaign: CampaignInput, threshold: float) -> dict[str, SaturationLimit]:
     """SaturationLimit of every sensor, by name, with evidence beyond ``threshold`` [nats] from passages and impacts.
 
     Reserved recordings count as well: whether a channel is usable is no prediction, and applies to them, too.
+
+    Parameters
+    ----------
+    campaign : CampaignInput
+        The campaign.
+    threshold : float
+        Least evidence. [nats]
+
+    Returns
+    -------
+    dict
+        Sensor -> SaturationLimit; {} if it were all of them.
     """
     by_passages, saturated = _limits_in_passages(campaign), {}
     for sensor in campaign.sensors:
@@ -122,7 +170,7 @@ def saturated_channels(campaign, threshold):
     return saturated if len(saturated) < len(campaign.sensors) else {}
 
 
-def _combine_limits(by_passages, by_impacts):
+def _combine_limits(by_passages: SaturationLimit, by_impacts: SaturationLimit) -> SaturationLimit:
     """The limit with more evidence; the sum of both gains where they agree on the limit."""
     stronger = max(by_passages, by_impacts, key=lambda c: c.gain)
     if by_passages is by_impacts or min(by_passages.gain, by_impacts.gain) <= 0.0:
@@ -131,7 +179,7 @@ def _combine_limits(by_passages, by_impacts):
     return replace(stronger, gain=by_passages.gain + by_impacts.gain) if same_limit else stronger
 
 
-def _limits_in_passages(campaign):
+def _limits_in_passages(campaign: CampaignInput) -> dict[str, SaturationLimit]:
     """SaturationLimit of every sensor, by name, for which passages give evidence."""
     names = [s.name for s in campaign.sensors]
     recordings = [p.recording for p in campaign.passages]
@@ -147,19 +195,31 @@ def _limits_in_passages(campaign):
     return limits
 
 
-def _is_at_range(recording):
+def _is_at_range(recording: Recording) -> bool:
     """Whether a channel reaches the range stated in its file, beyond which it is known to be clipped."""
     limits = [np.inf if c.limit is None else PASSAGE.range_share * c.limit for c in recording.channels]
     return bool(np.any(np.max(np.abs(recording.samples), axis=1) >= limits))
 
 
-def saturation_gain(peaks, reference):
+def saturation_gain(peaks: np.ndarray, reference: np.ndarray) -> float:
     r"""Gain [nats] of a limit over peaks that follow ``reference``; both (n,) logarithms of peaks, one per passage.
 
     .. math:: y_k = \min(c,\, a + x_k) + e_k \quad\text{against}\quad y_k = a + x_k + e_k, \qquad
               g = \tfrac n2 \ln\frac{s_0^2 + f^2}{s_1^2 + f^2} - \tfrac12 \ln n
 
     with the mean squares s² of the residuals and the least scatter f. At least two passages must reach the limit.
+
+    Parameters
+    ----------
+    peaks : (n,) array of float
+        Logarithms of the peaks of a channel, one per passage.
+    reference : (n,) array of float
+        The same of the other channels, their mean.
+
+    Returns
+    -------
+    float
+        [nats]
     """
     order = np.argsort(reference)
     y, x = np.asarray(peaks)[order], np.asarray(reference)[order]
@@ -175,7 +235,7 @@ def saturation_gain(peaks, reference):
     )
 
 
-def _dwell_limit(sizes):
+def _dwell_limit(sizes: Sequence[np.ndarray]) -> float | None:
     """Median of the samples near the peak, in the passage that spends most of its time there [m/s²].
 
     None where that passage is not among the loudest. A clipped channel stays at its limit; a flat or a nose gives
@@ -187,15 +247,39 @@ def _dwell_limit(sizes):
     return float(np.median(dwelling[dwelling > SATURATION.top_share * dwelling.max()]))
 
 
-def without_saturated(campaign, saturated):
-    """The campaign without the ``saturated`` sensors, whose signals are no response of the track."""
+def without_saturated(campaign: CampaignInput, saturated: Container[str]) -> CampaignInput:
+    """The campaign without the ``saturated`` sensors, whose signals are no response of the track.
+
+    Parameters
+    ----------
+    campaign : CampaignInput
+        The campaign.
+    saturated : container of str
+        Names of the sensors.
+
+    Returns
+    -------
+    CampaignInput
+    """
     return replace(campaign, sensors=tuple(s for s in campaign.sensors if s.name not in saturated))
 
 
-def raw_peak(campaign, name):
+def raw_peak(campaign: CampaignInput, name: str) -> float:
     """Largest value of a channel in any passage at its full rate, reserved ones included; 0 where none has it. [m/s²]
 
     The channel cannot be clipped below that value.
+
+    Parameters
+    ----------
+    campaign : CampaignInput
+        The campaign.
+    name : str
+        Of the channel.
+
+    Returns
+    -------
+    float
+        [m/s²]
     """
     recordings = [p.recording for p in campaign.passages]
     signals = [r.samples[r.index(name)] for r in recordings if name in {c.name for c in r.channels}]

@@ -35,9 +35,23 @@ FIRST_ORDER_TYPES = ("support", "path", "channel")  # column types whose changes
 
 
 def screen_columns(case: PredictedCase, fit: Fit, observations: Sequence[Observation]) -> Columns:
-    """(key, start) -> list of (n,) per observation: change of the prediction when a candidate takes that start.
+    """Change of the predictions when a candidate takes one of its starts.
 
     ``fit`` is of ``observations``, all of the case or some. In single precision; zero columns share one array.
+
+    Parameters
+    ----------
+    case : PredictedCase
+        The case, its accepted effects fixed.
+    fit : Fit
+        Of ``observations``.
+    observations : sequence of Observation
+        All of the case, or some.
+
+    Returns
+    -------
+    dict
+        (key of the candidate, number of the start) -> list of (n,) array, one per observation.
     """
     chosen = _starts_by_column_type(case)
     supports, paths, channels = (chosen[column_type] for column_type in FIRST_ORDER_TYPES)
@@ -177,4 +191,7 @@ def _support_changes(case: PredictedCase, fit: Fit, aligned: AlignedPassage, cho
                 target, force = terms[c.key, start].pseudo_force(motion)
                 forces[c.family, c.starts[start], j] = j, TARGETS[target], force
     columns = force_responses(case.predictor, fit.values, case.all_terms(fit), aligned, forces)
-    return {(c.key, k): sum(columns[c.family, c.starts[k], j] for j in terms[c.key, k].supports) for c, k in chosen}
+    return {
+        (c.key, k): np.asarray(sum(columns[c.family, c.starts[k], j] for j in terms[c.key, k].supports))
+        for c, k in chosen
+    }

@@ -1,5 +1,9 @@
 """Derivatives of receptances and passages by the nuisances of a turnout: analytic where possible, else differences."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from turnout.errors import SimulationError
@@ -8,12 +12,48 @@ from turnout.mismatch.turnout.priors import RECEPTANCE, SIMULATION
 from turnout.mismatch.turnout.pseudo_forces import support_columns, support_motion
 from turnout.mismatch.turnout.rail_roughness import wave_columns
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
 
-def nuisance_jacobian(predictor, nuisances, values, terms, observations, base):
+    from turnout.mismatch.engine.case import Nuisance, Observation
+    from turnout.mismatch.turnout.passage_observation import AlignedPassage
+    from turnout.mismatch.turnout.prediction import Predictor, Terms, Values
+    from turnout.mismatch.turnout.receptance_observation import FrfPair
+    from turnout.mismatch.turnout.receptance_sensitivity import ReceptanceSensitivity
+
+
+def nuisance_jacobian(
+    predictor: Predictor,
+    nuisances: Sequence[Nuisance],
+    values: Values,
+    terms: Terms,
+    observations: Sequence[Observation],
+    base: Sequence[np.ndarray],
+) -> list[np.ndarray]:
     """Derivatives of ``observations`` by all ``nuisances``.
 
     Exact for receptances, gains and times. Of passages, those by support values come from pseudo-forces, those by
     wheels and running surface from differences.
+
+    Parameters
+    ----------
+    predictor : Predictor
+        Predicts the recordings of the site.
+    nuisances : sequence of Nuisance
+        Those of the track first, in the order of ``track_value_names``.
+    values : mapping
+        All nuisances of the site, by name.
+    terms : sequence of PhysicsTerm
+        Effects beside the base model.
+    observations : sequence of Observation
+        Those that are predicted.
+    base : sequence of (n,) array
+        Predictions at ``values``.
+
+    Returns
+    -------
+    list of (n, n_nuisance) array of float
+        One per observation.
     """
     index = {n.name: k for k, n in enumerate(nuisances)}
     jacobians = [np.zeros((o.data.size, len(nuisances))) for o in observations]
@@ -34,8 +74,37 @@ def nuisance_jacobian(predictor, nuisances, values, terms, observations, base):
     return jacobians
 
 
-def fill_pair_columns(predictor, values, terms, pair, sensitivity, predicted, jacobian, index):
-    """Fill the columns of a pair; the values of the track come first among the nuisances."""
+def fill_pair_columns(
+    predictor: Predictor,
+    values: Values,
+    terms: Terms,
+    pair: FrfPair,
+    sensitivity: ReceptanceSensitivity,
+    predicted: np.ndarray,
+    jacobian: np.ndarray,
+    index: dict[str, int],
+) -> None:
+    """Fill the columns of a pair; the values of the track come first among the nuisances.
+
+    Parameters
+    ----------
+    predictor : Predictor
+        Predicts the recordings of the site.
+    values : mapping
+        All nuisances of the site, by name.
+    terms : sequence of PhysicsTerm
+        Effects beside the base model.
+    pair : FrfPair
+        Response channel of a hammer test.
+    sensitivity : ReceptanceSensitivity
+        Receptances and their derivatives.
+    predicted : (2n,) array of float
+        Prediction of the pair.
+    jacobian : (2n, n_nuisance) array of float
+        It is filled.
+    index : dict
+        Nuisance -> column.
+    """
     channel_response = predictor.channel_response(values, terms, pair)
     block = receptance_observation.scale_lines(pair, sensitivity.gradient(pair), channel_response)
     n, width = block.shape
@@ -54,8 +123,16 @@ def fill_pair_columns(predictor, values, terms, pair, sensitivity, predicted, ja
         )
 
 
-def _fill_common_columns(predictor, values, terms, passages, index):
-    parameters = [(f"wheels_{train}", SIMULATION.log_step, train) for train in predictor.site.trains]
+def _fill_common_columns(
+    predictor: Predictor,
+    values: Values,
+    terms: Terms,
+    passages: Sequence[tuple[Observation, np.ndarray, np.ndarray]],
+    index: dict[str, int],
+) -> None:
+    parameters: list[tuple[str, float, str | None]] = [
+        (f"wheels_{train}", SIMULATION.log_step, train) for train in predictor.site.trains
+    ]
     parameters += [(name, SIMULATION.surface_step, None) for name in predictor.surface.names]
     for name, step, train in parameters:
         for o, predicted, jacobian in passages:
@@ -64,7 +141,15 @@ def _fill_common_columns(predictor, values, terms, passages, index):
                 jacobian[:, index[name]] = _difference(predictor, values, terms, aligned, predicted, name, step)
 
 
-def _difference(predictor, values, terms, aligned, predicted, name, step):
+def _difference(
+    predictor: Predictor,
+    values: Values,
+    terms: Terms,
+    aligned: AlignedPassage,
+    predicted: np.ndarray,
+    name: str,
+    step: float,
+) -> np.ndarray:
     """Derivative of a passage by one value, to the side that can be simulated."""
     try:
         return (predictor.predict_passage({**values, name: values[name] + step}, terms, aligned) - predicted) / step
@@ -72,8 +157,30 @@ def _difference(predictor, values, terms, aligned, predicted, name, step):
         return (predicted - predictor.predict_passage({**values, name: values[name] - step}, terms, aligned)) / step
 
 
-def own_columns(predictor, values, terms, aligned, predicted):
-    """Yield (name, column) of the derivatives of a passage by its own time, speed and load."""
+def own_columns(
+    predictor: Predictor, values: Values, terms: Terms, aligned: AlignedPassage, predicted: np.ndarray
+) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield (name, column) of the derivatives of a passage by its own time, speed and load.
+
+    Parameters
+    ----------
+    predictor : Predictor
+        Predicts the recordings of the site.
+    values : mapping
+        All nuisances of the site, by name.
+    terms : sequence of PhysicsTerm
+        Effects beside the base model.
+    aligned : AlignedPassage
+        The passage.
+    predicted : (n_sensor * n_time,) array of float
+        Prediction of the passage. [m/s²]
+
+    Returns
+    -------
+    name : str
+        Of the nuisance.
+    column : (n_sensor * n_time,) array of float
+    """
     n = aligned.time.size
     moment = f"time@{aligned.name}"
     later = predictor.predict_passage(
@@ -86,7 +193,9 @@ def own_columns(predictor, values, terms, aligned, predicted):
     yield load, _difference(predictor, values, terms, aligned, predicted, load, SIMULATION.load_step)
 
 
-def _seat_columns(predictor, values, terms, aligned, predicted):
+def _seat_columns(
+    predictor: Predictor, values: Values, terms: Terms, aligned: AlignedPassage, predicted: np.ndarray
+) -> Iterator[tuple[str, np.ndarray]]:
     shifted = predictor.signals_with_probes(values, terms, aligned)[
         len(aligned.sensors) + 2 * len(predictor.zone.supports) :
     ]
@@ -101,7 +210,9 @@ def _seat_columns(predictor, values, terms, aligned, predicted):
             yield f"seat_{sensor.name}", column.ravel()
 
 
-def _passage_columns(predictor, values, terms, aligned, predicted):
+def _passage_columns(
+    predictor: Predictor, values: Values, terms: Terms, aligned: AlignedPassage, predicted: np.ndarray
+) -> Iterator[tuple[str, np.ndarray]]:
     yield from own_columns(predictor, values, terms, aligned, predicted)
     rows = predicted.reshape(-1, aligned.time.size)
     for k, sensor in enumerate(aligned.sensors):

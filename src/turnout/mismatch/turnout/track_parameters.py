@@ -1,15 +1,27 @@
 """Free parameters of the base model of a turnout, their priors, and the track for given values."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
 from operator import itemgetter
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.mismatch.engine.case import Nuisance
 from turnout.mismatch.turnout.priors import TRACK
 from turnout.simulate.track import NODE_TOLERANCE, PER_SUPPORT, RailStretch
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from turnout.mismatch.turnout.prediction import Values
+    from turnout.simulate.rail import Rail
+    from turnout.simulate.track import Track
+    from turnout.simulate.turnout_track import TurnoutTrack
+    from turnout.simulate.vehicle import Vehicle
 
 # Common logarithmic factor on a value of all supports: field, tag of its links, quantity of the link, prior sd.
 # Priors: spread of published values, Knothe and Grassie 1993, tables 1 to 3.
@@ -71,23 +83,35 @@ class Zone:
     Supports of ``effect_supports`` may have an effect; ``castings`` are pieces of other rail there.
     """
 
-    turnout: object
+    turnout: TurnoutTrack
     first: int
     last: int
     effect_supports: range
-    castings: tuple = ()
+    castings: tuple[Casting, ...] = ()
 
     @property
-    def supports(self):
+    def supports(self) -> range:
         """Indices of the supports of the zone."""
         return range(self.first, self.last + 1)
 
 
-def zone_of(turnout, positions):
-    """The relevant part of a turnout, with absorbing ends as they are."""
+def zone_of(turnout: TurnoutTrack, positions: Sequence[float]) -> Zone:
+    """The relevant part of a turnout, with absorbing ends as they are.
+
+    Parameters
+    ----------
+    turnout : TurnoutTrack
+        The whole turnout.
+    positions : sequence of float
+        Of sensors and impacts. [m]
+
+    Returns
+    -------
+    Zone
+    """
     low, high = min(positions), max(positions)
 
-    def cut(track):
+    def cut(track: Track) -> Track:
         keep = (track.support >= low - TRACK.track_margin) & (track.support <= high + TRACK.track_margin)
         values = {name: getattr(track, name)[keep] for name in PER_SUPPORT}
         section = tuple(s for s, k in zip(track.section, keep) if k)
@@ -107,11 +131,25 @@ def zone_of(turnout, positions):
     )
 
 
-def castings_of(track, low, high):
+def castings_of(track: Track, low: float, high: float) -> tuple[Casting, ...]:
     """Pieces of other rail, and of what lies within ``TRACK.section_ramp`` of it, between ``low`` and ``high`` [m].
 
     Cuts are at all ends, at ``TRACK.section_ramp`` from them, where a section grows from that of the rail, and every
     metre or so.
+
+    Parameters
+    ----------
+    track : Track
+        The track.
+    low : float
+        [m]
+    high : float
+        [m]
+
+    Returns
+    -------
+    tuple of Casting
+        In order of position.
     """
     cuts = {
         x for s in track.stretches for x in (s.start - TRACK.section_ramp, s.start, s.end, s.end + TRACK.section_ramp)
@@ -134,14 +172,38 @@ def castings_of(track, low, high):
     return tuple(castings)
 
 
-def rail_sds(zone):
-    """{name: standard deviation} of uncertain rail values: its stiffness, stiffness and mass of castings."""
+def rail_sds(zone: Zone) -> dict[str, float]:
+    """{name: standard deviation} of uncertain rail values: its stiffness, stiffness and mass of castings.
+
+    Parameters
+    ----------
+    zone : Zone
+        The supports with values of their own.
+
+    Returns
+    -------
+    dict
+        Name -> standard deviation of the logarithm.
+    """
     cast = [(f"{name}_{k}", sds[not c.inner]) for k, c in enumerate(zone.castings) for name, *sds in CASTING_SDS]
     return dict([*RAIL_SDS, *cast])
 
 
-def casting_elements(zone, node):
-    """[((n,) elements, (n,) shares of their length)] that each casting covers; nodes (n_element + 1,) [m]."""
+def casting_elements(zone: Zone, node: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Elements that each casting covers.
+
+    Parameters
+    ----------
+    zone : Zone
+        The supports with values of their own.
+    node : (n_element + 1,) array of float
+        Nodes. [m]
+
+    Returns
+    -------
+    list of ((n,) array of int, (n,) array of float)
+        By casting: elements, and the covered shares of their length.
+    """
     length, elements = np.diff(node), []
     for c in zone.castings:
         covered = np.minimum(node[1:], c.piece.end) - np.maximum(node[:-1], c.piece.start)
@@ -150,11 +212,23 @@ def casting_elements(zone, node):
     return elements
 
 
-def with_rail(zone, values):
-    """The zone with rail stiffness and casting mass multiplied by the exponentials of ``values``."""
+def with_rail(zone: Zone, values: Mapping[str, float]) -> Zone:
+    """The zone with rail stiffness and casting mass multiplied by the exponentials of ``values``.
+
+    Parameters
+    ----------
+    zone : Zone
+        The supports with values of their own.
+    values : mapping
+        Logarithms of the factors, by the names of ``rail_sds``.
+
+    Returns
+    -------
+    Zone
+    """
     factor = {name: float(np.exp(value)) for name, value in values.items()}
 
-    def changed(rail, bending=1.0, mass=1.0):
+    def changed(rail: Rail, bending: float = 1.0, mass: float = 1.0) -> Rail:
         return replace(
             rail,
             bending_stiffness=rail.bending_stiffness * factor["rail_bending"] * bending,
@@ -162,7 +236,7 @@ def with_rail(zone, values):
             mass=rail.mass * mass,
         )
 
-    def with_factors(track):
+    def with_factors(track: Track) -> Track:
         stretches = [replace(s, rail=changed(s.rail)) for s in track.stretches]
         for k, c in enumerate(zone.castings):
             if c.stretch in track.stretches:
@@ -175,13 +249,39 @@ def with_rail(zone, values):
     return replace(zone, turnout=replace(zone.turnout, track=with_factors(zone.turnout.track), tracks=tracks))
 
 
-def rail_on_grid(values, names):
-    """Rail values rounded to a grid: models are made there and are linear from there to ``values``."""
+def rail_on_grid(values: Values, names: Iterable[str]) -> dict[str, float]:
+    """Rail values rounded to a grid: models are made there and are linear from there to ``values``.
+
+    Parameters
+    ----------
+    values : mapping
+        Nuisances by name.
+    names : iterable of str
+        Of rail values.
+
+    Returns
+    -------
+    dict
+        Name -> value on the grid.
+    """
     return {name: TRACK.rail_step * round(values[name] / TRACK.rail_step) for name in names}
 
 
-def track_nuisances(zone, trains):
-    """Nuisances of track and vehicles, all as logarithms of a factor on the value of the file."""
+def track_nuisances(zone: Zone, trains: Iterable[str]) -> list[Nuisance]:
+    """Nuisances of track and vehicles, all as logarithms of a factor on the value of the file.
+
+    Parameters
+    ----------
+    zone : Zone
+        The supports with values of their own.
+    trains : iterable of str
+        Types or numbers of the trains.
+
+    Returns
+    -------
+    list of Nuisance
+        First those of ``track_value_names``, then rail and wheelsets.
+    """
     nuisances = [
         Nuisance(
             name, "-", 0.0, sd, bounds=(-TRACK.common_bound, TRACK.common_bound), meaning=f"ln {name}", group="track"
@@ -222,10 +322,22 @@ def track_nuisances(zone, trains):
     return nuisances
 
 
-def steps_of(values):
-    """(n,) largest step of the logarithm to a neighbour: where sections meet, a support may belong to either, since a
-    track file has their border to a bay.
+def steps_of(values: np.ndarray) -> np.ndarray:
+    """Largest step of the logarithm to a neighbour.
 
+    Where sections meet, a support may belong to either, since a track file has their border to a bay.
+
+    Parameters
+    ----------
+    values : (n,) array of float
+        Values of the supports.
+
+    Returns
+    -------
+    (n,) array of float
+
+    Examples
+    --------
     >>> [round(float(s), 3) for s in steps_of(np.array([2.0, 2.0, 1.0, 1.0]))]
     [0.0, 0.693, 0.693, 0.0]
     """
@@ -233,8 +345,22 @@ def steps_of(values):
     return np.maximum(np.append(step, 0.0), np.append(0.0, step))
 
 
-def track_with(track, zone, values):
-    """The track with the factors of ``values`` on its supports."""
+def track_with(track: Track, zone: Zone, values: Values) -> Track:
+    """The track with the factors of ``values`` on its supports.
+
+    Parameters
+    ----------
+    track : Track
+        The track.
+    zone : Zone
+        The supports with values of their own.
+    values : mapping
+        Nuisances by name.
+
+    Returns
+    -------
+    Track
+    """
     changes = {name: getattr(track, name) * np.exp(values[name]) for name, *_ in COMMON_PARAMETERS}
     for parameter in SUPPORT_PARAMETERS:
         for j in zone.supports:
@@ -242,25 +368,64 @@ def track_with(track, zone, values):
     return track.with_(**changes)
 
 
-def track_value_names(zone):
-    """Names of all values that ``track_with`` reads, first among the nuisances of a case."""
+def track_value_names(zone: Zone) -> list[str]:
+    """Names of all values that ``track_with`` reads, first among the nuisances of a case.
+
+    Parameters
+    ----------
+    zone : Zone
+        The supports with values of their own.
+
+    Returns
+    -------
+    list of str
+        Common values, then each field of all supports.
+    """
     return _names_of(zone.supports)
 
 
 @lru_cache(maxsize=8)
-def _names_of(supports):
+def _names_of(supports: range) -> list[str]:
     return [n for n, *_ in COMMON_PARAMETERS] + [
         f"{parameter.tag}_{j}" for parameter in SUPPORT_PARAMETERS for j in supports
     ]
 
 
-def track_value_key(zone, values):
-    """All values that ``track_with`` reads as bytes: a cache key."""
+def track_value_key(zone: Zone, values: Values) -> bytes:
+    """All values that ``track_with`` reads as bytes: a cache key.
+
+    Parameters
+    ----------
+    zone : Zone
+        The supports with values of their own.
+    values : mapping
+        Nuisances by name.
+
+    Returns
+    -------
+    bytes
+    """
     return np.array(itemgetter(*track_value_names(zone))(values)).tobytes()
 
 
-def vehicle_with(vehicle, values, train, load):
-    """The vehicle with another wheel mass and load; ``load`` is relative, on all that is sprung."""
+def vehicle_with(vehicle: Vehicle, values: Values, train: str, load: float) -> Vehicle:
+    """The vehicle with another wheel mass and load; ``load`` is relative, on all that is sprung.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        The vehicle.
+    values : mapping
+        Nuisances by name.
+    train : str
+        Type or number of the train.
+    load : float
+        Change of all sprung masses, as a share of them.
+
+    Returns
+    -------
+    Vehicle
+    """
     factor, wheels = float(np.exp(values.get(f"wheels_{train}", 0.0))), set(vehicle.wheels)
     bodies = tuple(
         replace(b, mass=b.mass * (factor if i in wheels else 1.0 + load)) for i, b in enumerate(vehicle.bodies)

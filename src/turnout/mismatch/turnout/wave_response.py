@@ -10,6 +10,10 @@ Here :math:`\tau_n` is the time at the node and T the distance between nodes ove
 rail about the node: its receptance is averaged over 2.4 m, since a wheel rings on for a few bays.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from turnout.mismatch.turnout import passage_band
@@ -19,6 +23,15 @@ from turnout.mismatch.turnout.receptance_observation import channel_factor
 from turnout.mismatch.turnout.track_parameters import track_with, vehicle_with
 from turnout.simulate.frequency_response import responses
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from typing import Any
+
+    from turnout.mismatch.turnout.passage_observation import AlignedPassage
+    from turnout.mismatch.turnout.prediction import Predictor, Terms, Values
+    from turnout.simulate.matrices import TrackMatrices
+    from turnout.simulate.vehicle import Vehicle
+
 
 class WaveTransfer:
     """Transfer from waves to the sensors of one passage, on the track that ``values`` and ``terms`` give.
@@ -26,7 +39,9 @@ class WaveTransfer:
     ``node`` (n,) are positions of the forces, up to ``beyond`` the ends of the free waves [m].
     """
 
-    def __init__(self, predictor, values, aligned, terms=(), beyond=0.0):
+    def __init__(
+        self, predictor: Predictor, values: Values, aligned: AlignedPassage, terms: Terms = (), beyond: float = 0.0
+    ):
         terms = [t.under_conditions(aligned.conditions) for t in terms]
         self.aligned, waves, vehicle = aligned, predictor.waves, _vehicle(values, aligned, terms)
         lines, transfer, point, self.node = _transfers(predictor, values, aligned, terms, beyond)
@@ -53,15 +68,15 @@ class WaveTransfer:
         channels = channel_responses(values, terms, aligned, self.grid)
         self.clock = (gate * self.rate * np.exp(2j * np.pi * self.grid * start_time))[:, None] * channels
 
-    def train(self):
+    def train(self) -> np.ndarray:
         """(f,) sum over all wheels of their delays."""
         return np.exp(-2j * np.pi * self.grid[:, None] * self.wheel_delays).sum(axis=1)
 
-    def wheel(self, w):
+    def wheel(self, w: int) -> np.ndarray:
         """(f,) delay of one wheel."""
         return np.exp(-2j * np.pi * self.grid * self.wheel_delays[w])
 
-    def spectra(self, lengths, envelope):
+    def spectra(self, lengths: np.ndarray | Sequence[float], envelope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(f, sensor, wave) for cosines exp(i 2 pi x / length), positive and negative frequency."""
         f0 = self.speed / np.asarray(lengths)
         force = -0.5 / _interpolate(np.clip(f0, self.lines[0], self.lines[-1]), self.lines, self.compliance).T
@@ -71,29 +86,30 @@ class WaveTransfer:
             phase = envelope[:, None] * amount * np.exp(sign * 2j * np.pi * self.node_times[:, None] * f0)
             hat = self.step * np.sinc((self.grid[:, None] - sign * f0) * self.step) ** 2
             spectra.append((self.node_transfer @ phase) * hat[:, None, :])
-        return spectra
+        plus, minus = spectra
+        return plus, minus
 
-    def signals(self, lengths, envelope, delay):
+    def signals(self, lengths: np.ndarray, envelope: np.ndarray, delay: np.ndarray) -> np.ndarray:
         """(n_sensor * n_time, 2 n_wave) response to cosine and sine of each length, one metre high."""
         return self.signals_from(self.spectra(lengths, envelope), delay)
 
-    def signals_from(self, spectra, delay):
+    def signals_from(self, spectra: tuple[np.ndarray, np.ndarray], delay: np.ndarray) -> np.ndarray:
         """(n_sensor * n_time, 2 n_wave) signals of ``spectra`` at the times of the observation."""
         plus, minus = spectra
         cosine_and_sine = np.stack([plus + minus, (plus - minus) * (-1j * self.sign)], axis=-1)
         return self._on_clock(cosine_and_sine.reshape(*cosine_and_sine.shape[:2], -1) * delay[:, None, None])
 
-    def train_response(self, paths):
+    def train_response(self, paths: np.ndarray) -> np.ndarray:
         """(n_sensor * n_time, n_key) response when every wheel follows paths (n_key, n_x) [m] over one period."""
         plus, minus, a = self._harmonics(paths)
         return self._on_clock((plus @ a.T + minus @ a.T.conj()) * self.train()[:, None, None])
 
-    def wheel_response(self, w, paths):
+    def wheel_response(self, w: int, paths: np.ndarray) -> np.ndarray:
         """The same for wheel ``w`` alone."""
         plus, minus, a = self._harmonics(paths)
         return self._on_clock((plus @ a.T + minus @ a.T.conj()) * self.wheel(w)[:, None, None])
 
-    def _harmonics(self, paths):
+    def _harmonics(self, paths: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Spectra of the waves of ``path_grid``, and amplitudes (..., n_wave) of paths (..., n_x) in them."""
         n_x = paths.shape[-1]
         orders = np.arange(1, min(n_x // 2, int(self.period / PASSAGE.shortest_wave)) + 1)
@@ -103,39 +119,39 @@ class WaveTransfer:
             amplitude = amplitude.conj()
         return *self.spectra(self.period / orders, np.ones(self.node.size)), amplitude
 
-    def reactions(self, paths):
+    def reactions(self, paths: np.ndarray) -> np.ndarray:
         """(n_sensor * n_time, n_key) response when each wheel follows a path of its own.
 
         ``paths`` (n_key, n_wheel, n_x) [m] are at ``path_grid``: how wheels respond to motion of the rail under them.
         """
         plus, minus, amplitude = self._harmonics(paths)
-        total = 0.0
+        total: Any = 0.0
         for w in range(self.wheel_delays.size):
             a = amplitude[:, w].T
             total = total + (plus @ a + minus @ a.conj()) * self.wheel(w)[:, None, None]
         return self._on_clock(total)
 
     @property
-    def path_grid(self):
+    def path_grid(self) -> np.ndarray:
         """(n_x,) positions of the paths of ``reactions``: one period, so that its ends have no effect."""
         return self._period_grid(2 * int(np.ceil(self.period / PASSAGE.shortest_wave)) + 2)
 
     @property
-    def fine_grid(self):
+    def fine_grid(self) -> np.ndarray:
         """The same for paths of ``train_response`` and ``wheel_response`` with waves shorter than those modelled.
 
         Sampled as coarsely as ``path_grid``, a kink would alias to longer waves.
         """
         return self._period_grid(int(self.period / SIMULATION.path_step))
 
-    def _period_grid(self, n):
+    def _period_grid(self, n: int) -> np.ndarray:
         return self.start + self.period * np.arange(n) / n
 
-    def times(self, w, lead):
+    def times(self, w: int, lead: float) -> np.ndarray:
         """(n_x,) time of wheel ``w`` at ``path_grid``, in the time of the simulation [s]."""
         return lead + self.sign * (self.path_grid - self.first) / self.speed + self.wheel_delays[w]
 
-    def force_response(self, histories, transfer, first):
+    def force_response(self, histories: np.ndarray, transfer: np.ndarray, first: np.ndarray) -> np.ndarray:
         """(n_sensor * n_time, n_key) response of the free track to forces (n_force, n) at the rate of the simulation.
 
         The forces from ``first`` (n_key,) of each key on act together. ``transfer`` (n_line, n_sensor, n_force) are
@@ -151,14 +167,14 @@ class WaveTransfer:
         response = _interpolate(self.grid, self.lines, transfer) * spectrum.T[:, None, :]
         return self._on_clock(np.add.reduceat(response, first, axis=-1))
 
-    def _on_clock(self, spectrum):
+    def _on_clock(self, spectrum: np.ndarray) -> np.ndarray:
         full = np.zeros((self.size // 2 + 1, *spectrum.shape[1:]), dtype=complex)
         full[self.inside] = spectrum * self.clock[:, :, None]
         n = self.aligned.time.size
         return np.fft.irfft(full, self.size, axis=0)[:n].transpose(1, 0, 2).reshape(n * len(self.aligned.sensors), -1)
 
 
-def _vehicle(values, aligned, terms):
+def _vehicle(values: Values, aligned: AlignedPassage, terms: Terms) -> Vehicle:
     """The vehicle as ``values`` and ``terms`` have it."""
     passage = aligned.passage
     vehicle = vehicle_with(passage.vehicle, values, aligned.train, values[f"load@{aligned.name}"])
@@ -167,13 +183,31 @@ def _vehicle(values, aligned, terms):
     return vehicle
 
 
-def channel_responses(values, terms, aligned, frequency):
-    """(m, n_sensor) complex factor of each channel: linear channel terms and gains."""
+def channel_responses(values: Values, terms: Terms, aligned: AlignedPassage, frequency: np.ndarray) -> np.ndarray:
+    """Complex factor of each channel: linear channel terms and gains.
+
+    Parameters
+    ----------
+    values : mapping
+        All nuisances of the site, by name.
+    terms : sequence of PhysicsTerm
+        Effects beside the base model.
+    aligned : AlignedPassage
+        The passage.
+    frequency : (m,) array of float
+        Lines. [Hz]
+
+    Returns
+    -------
+    (m, n_sensor) array of complex
+    """
     factors = [channel_factor(terms, s, frequency) * (1.0 + values[f"gain_{s.name}"]) for s in aligned.sensors]
     return np.column_stack(factors)
 
 
-def _transfers(predictor, values, aligned, terms, beyond):
+def _transfers(
+    predictor: Predictor, values: Values, aligned: AlignedPassage, terms: Terms, beyond: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Lines, acceleration of the sensors per force on rail nodes (m, n_sensor, n_node), receptance of the rail about
     each node (m, n_node), and nodes.
     """
@@ -190,10 +224,30 @@ def _transfers(predictor, values, aligned, terms, beyond):
     return frequency, -((2.0 * np.pi * frequency) ** 2)[:, None, None] * h, mean_receptance, matrices.node[near]
 
 
-def rail_receptances(matrices, frequency, near, positions):
-    """(m, n_place, n) receptances between positions and nodes ``near``, and (m, n) rail receptance at these nodes.
+def rail_receptances(
+    matrices: TrackMatrices, frequency: np.ndarray, near: np.ndarray, positions: Sequence[float | tuple]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Receptances between positions and nodes, and of the rail about these nodes.
 
-    The latter is averaged over ``SIMULATION.averaging_length``. [m/N]
+    The latter are averaged over 2.4 m.
+
+    Parameters
+    ----------
+    matrices : TrackMatrices
+        Of the track.
+    frequency : (m,) array of float
+        Lines. [Hz]
+    near : (n,) array of int
+        Nodes.
+    positions : sequence
+        Positions [m] or degrees of freedom.
+
+    Returns
+    -------
+    h : (m, n_place, n) array of complex
+        [m/N]
+    mean_receptance : (m, n) array of complex
+        [m/N]
     """
     node = matrices.node[near]
     h = responses(matrices, frequency, [*positions, *node.tolist()], matrices.node_index[near])
@@ -202,8 +256,21 @@ def rail_receptances(matrices, frequency, near, positions):
     return h[:, : len(positions)], mean_receptance
 
 
-def wheel_and_contact_receptance(vehicle, frequency):
-    """(m,) receptance of the first wheel under the vehicle, and of its contact [m/N]."""
+def wheel_and_contact_receptance(vehicle: Vehicle, frequency: np.ndarray) -> np.ndarray:
+    """Receptance of the first wheel under the vehicle, and of its contact [m/N].
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        The vehicle.
+    frequency : (m,) array of float
+        Lines. [Hz]
+
+    Returns
+    -------
+    (m,) array of complex
+        [m/N]
+    """
     omega = 2.0 * np.pi * frequency
     contact = vehicle.wheel_values("contact")[0].tangent(float(np.mean(vehicle.static_loads)))
     mass, damping, stiffness, _ = vehicle.matrices
@@ -214,7 +281,7 @@ def wheel_and_contact_receptance(vehicle, frequency):
     return np.array(wheel) + 1.0 / contact
 
 
-def _interpolate(grid, frequency, values):
+def _interpolate(grid: np.ndarray, frequency: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Linear interpolation between lines, along the first axis."""
     index = np.interp(grid, frequency, np.arange(frequency.size))
     low = np.minimum(index.astype(int), frequency.size - 2)

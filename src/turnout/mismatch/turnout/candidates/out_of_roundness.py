@@ -48,7 +48,20 @@ AMPLITUDES = np.geomspace(*POLYGONS.amplitudes)  # m, prior sd of cosine and sin
 
 
 def polygon_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, ...]:
-    """The likeliest polygonal wheel as a candidate, () where a round one is likelier."""
+    """The likeliest polygonal wheel as a candidate, () where a round one is likelier.
+
+    Parameters
+    ----------
+    case : TrackCase
+        The case.
+    fit : Fit
+        A fit of the case.
+
+    Returns
+    -------
+    tuple of Candidate
+        One or none.
+    """
     wheel_fits = [s for train in case.trains for s in wheel_evidence(case, fit, train)]
     if not wheel_fits:
         return ()
@@ -63,7 +76,24 @@ def polygon_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, ...]:
 def wheel_evidence(
     case: TrackCase, fit: Fit, train: str, wavelengths: np.ndarray = WAVELENGTHS
 ) -> Iterator[WheelEvidence]:
-    """(nats, train, wheel, wavelength, [(recording, cosine, sine)]) of each wheel, 0 first."""
+    """Evidence of a polygonal wheel, for each wheel of a train.
+
+    Parameters
+    ----------
+    case : TrackCase
+        The case.
+    fit : Fit
+        A fit of the case.
+    train : str
+        Type or number of the train.
+    wavelengths : (n,) array of float
+        Trial wavelengths. [m]
+
+    Yields
+    ------
+    tuple
+        (nats, train, wheel, wavelength [m], [(recording, cosine, sine)]) of each wheel, 0 first.
+    """
     members = [(o, w) for o, w in zip(case.observations, fit.white) if o.name in case.aligned_passages]
     members = [(o, w) for o, w in members if case.aligned_passages[o.name].conditions["train"] == train]
     if not members:
@@ -157,7 +187,20 @@ class WheelSpectra:
 
 
 def short_polygon_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, ...]:
-    """The likeliest wheel with short waves as a candidate, () where all may be round."""
+    """The likeliest wheel with short waves as a candidate, () where all may be round.
+
+    Parameters
+    ----------
+    case : TrackCase
+        The case.
+    fit : Fit
+        A fit of the case.
+
+    Returns
+    -------
+    tuple of Candidate
+        One or none.
+    """
     passages = sorted(case.fitted_passages(), key=lambda m: m.speed)
     if not passages:
         return ()
@@ -193,7 +236,18 @@ def _is_repeatable(levels: Sequence[float]) -> bool:
 
 
 def bin_wavelengths(passages: Sequence[AlignedPassage]) -> np.ndarray:
-    """(n,) centres of the bins, longest first; those at both ends serve as background. [m]"""
+    """Centres of the bins, longest first; those at both ends serve as background. [m]
+
+    Parameters
+    ----------
+    passages : sequence of AlignedPassage
+        The passages.
+
+    Returns
+    -------
+    (n,) array of float
+        [m]
+    """
     shortest = max(
         [
             CORRUGATION.min_wavelength * np.exp(-SHORT_POLYGONS.far_offset),
@@ -205,7 +259,19 @@ def bin_wavelengths(passages: Sequence[AlignedPassage]) -> np.ndarray:
 
 
 def wheel_spectra(aligned: AlignedPassage, lengths: np.ndarray) -> WheelSpectra:
-    """``WheelSpectra`` of a passage."""
+    """``WheelSpectra`` of a passage.
+
+    Parameters
+    ----------
+    aligned : AlignedPassage
+        The passage.
+    lengths : (n_bin,) array of float
+        Centres of the bins. [m]
+
+    Returns
+    -------
+    WheelSpectra
+    """
     recording, speed = aligned.passage.recording, aligned.speed
     n = round(2.0 * SHORT_POLYGONS.wheel_reach / speed * recording.rate)
     window, size = np.hanning(n), 1 << int(np.ceil(np.log2(8 * n)))
@@ -245,7 +311,24 @@ def _background(level: np.ndarray, k: int, lengths: np.ndarray) -> np.ndarray:
 def wheel_excess(
     spectra: Sequence[WheelSpectra], bins: Sequence[int] | np.ndarray, lengths: np.ndarray
 ) -> tuple[np.ndarray, int]:
-    """(n_wheel, n_tried) mean of z over sensors and passages, and the number of spectra per wheel."""
+    """Mean level of each wheel over its background, less that of the other wheels.
+
+    Parameters
+    ----------
+    spectra : sequence of WheelSpectra
+        Of the passages of a train.
+    bins : (n_tried,) array of int
+        Bins that are tested.
+    lengths : (n_bin,) array of float
+        Centres of the bins. [m]
+
+    Returns
+    -------
+    z : (n_wheel, n_tried) array of float
+        Mean over sensors and passages.
+    n_slots : int
+        Number of spectra per wheel.
+    """
     excess = [np.stack([s.level[..., k] - _background(s.level, k, lengths) for k in bins], axis=-1) for s in spectra]
     centred = [a - np.nanmedian(a, axis=1, keepdims=True) for a in excess if not np.isnan(a).all()]
     z = np.concatenate([*centred, np.full((0, *excess[0].shape[1:]), np.nan)])
@@ -255,7 +338,20 @@ def wheel_excess(
 
 
 def polygon_evidence(z: float, n_slots: int) -> float:
-    """Nats for a polygonal wheel over a round one, from its mean z over so many spectra."""
+    """Nats for a polygonal wheel over a round one, from its mean z over so many spectra.
+
+    Parameters
+    ----------
+    z : float
+        Mean level of the wheel.
+    n_slots : int
+        Number of spectra.
+
+    Returns
+    -------
+    float
+        [nats]
+    """
     spread = SHORT_POLYGONS.wheel_sd**2 + SHORT_POLYGONS.sensor_sd**2 / n_slots
     wide = spread + SHORT_POLYGONS.polygon_sd**2
     z = max(float(z), 0.0)

@@ -70,7 +70,22 @@ class RailScan:
 
 
 def scan_rail(case: TrackCase, fit: Fit, families: Collection[str] | None = None) -> tuple[Candidate, ...]:
-    """The likeliest dip and the likeliest corrugation as candidates."""
+    """The likeliest dip and the likeliest corrugation as candidates.
+
+    Parameters
+    ----------
+    case : TrackCase
+        The case.
+    fit : Fit
+        A fit of the case.
+    families : collection of str or None
+        Effects that are searched for; None: all.
+
+    Returns
+    -------
+    tuple of Candidate
+        At most one of each effect.
+    """
     scan = RailScan(case, fit)
     scans = ((physics.SurfaceDip, _dip), (physics.RailCorrugation, _corrugation))
     chosen = [(effect, find) for effect, find in scans if families is None or effect.name in families]
@@ -155,7 +170,21 @@ SCANS = (
 
 
 def scan_geometry(case: TrackCase, fit: Fit, families: Collection[str] | None = None) -> tuple[Candidate, ...]:
-    """Candidates of ``families`` (None: all) for the residual of ``fit``."""
+    """Candidates of ``families`` (None: all) for the residual of ``fit``.
+
+    Parameters
+    ----------
+    case : TrackCase
+        The case.
+    fit : Fit
+        A fit of the case.
+    families : collection of str or None
+        Effects that are searched for; None: all.
+
+    Returns
+    -------
+    tuple of Candidate
+    """
     candidates = list(scan_rail(case, fit, families))
     for effect, find in SCANS:
         if families is None or effect.name in families:

@@ -60,7 +60,18 @@ class BandPower:
 
 
 def bin_wavelengths(passages: Sequence[AlignedPassage]) -> np.ndarray:
-    """(n,) wavelengths that every passage covers, longest first [m]."""
+    """Wavelengths that every passage covers, longest first [m].
+
+    Parameters
+    ----------
+    passages : sequence of AlignedPassage
+        The passages.
+
+    Returns
+    -------
+    (n,) array of float
+        [m]
+    """
     shortest = max(
         [
             CORRUGATION.min_wavelength,
@@ -74,7 +85,21 @@ def bin_wavelengths(passages: Sequence[AlignedPassage]) -> np.ndarray:
 
 
 def band_power(case: TrackCase, aligned: AlignedPassage, wavelengths: np.ndarray) -> BandPower:
-    """``BandPower`` of a passage."""
+    """``BandPower`` of a passage.
+
+    Parameters
+    ----------
+    case : TrackCase
+        The case.
+    aligned : AlignedPassage
+        The passage.
+    wavelengths : (n_bin,) array of float
+        Centres of the bins. [m]
+
+    Returns
+    -------
+    BandPower
+    """
     recording = aligned.passage.recording
     rows = [recording.index(s.name) for s in aligned.sensors]
     first, last = (round(t * recording.rate) for t in (aligned.time[0], aligned.time[-1]))
@@ -98,7 +123,17 @@ def band_power(case: TrackCase, aligned: AlignedPassage, wavelengths: np.ndarray
 
 
 def passage_groups(passages: Sequence[BandPower]) -> list[list[BandPower]]:
-    """Passages of each train, the slower and the faster ones: corrugation must show in all groups."""
+    """Passages of each train, the slower and the faster ones: corrugation must show in all groups.
+
+    Parameters
+    ----------
+    passages : sequence of BandPower
+        Power of the passages.
+
+    Returns
+    -------
+    list of list of BandPower
+    """
     trains = sorted({p.train for p in passages})
     middle = np.sqrt(min(p.speed for p in passages) * max(p.speed for p in passages))
     by_train = [[p for p in passages if p.train == t] for t in trains]
@@ -106,9 +141,19 @@ def passage_groups(passages: Sequence[BandPower]) -> list[list[BandPower]]:
 
 
 def corrugation_evidence(passages: Sequence[BandPower], n_sensors: float) -> np.ndarray:
-    """(n_bin,) nats for a line that all trains show at all speeds, over roughness alone.
+    """Evidence for a line that all trains show at all speeds, over roughness alone.
 
-    ``n_sensors`` is the number of sensors on different rail.
+    Parameters
+    ----------
+    passages : sequence of BandPower
+        Power of the passages.
+    n_sensors : float
+        Number of sensors on different rail.
+
+    Returns
+    -------
+    (n_bin,) array of float
+        [nats]
     """
     z = np.min([np.mean([p.excess.mean(axis=0) for p in group], axis=0) for group in passage_groups(passages)], axis=0)
     z, spread = np.maximum(z, 0.0), CORRUGATION.sensor_sd**2 / n_sensors
@@ -117,7 +162,20 @@ def corrugation_evidence(passages: Sequence[BandPower], n_sensors: float) -> np.
 
 
 def short_corrugation_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, ...]:
-    """The likeliest short corrugation as a candidate, () where intact rail is likelier or the data cannot tell."""
+    """The likeliest short corrugation as a candidate, () where intact rail is likelier or the data cannot tell.
+
+    Parameters
+    ----------
+    case : TrackCase
+        The case.
+    fit : Fit
+        A fit of the case.
+
+    Returns
+    -------
+    tuple of Candidate
+        One or none.
+    """
     passages = sorted((m for m in case.fitted_passages() if m.passage.train), key=lambda m: m.speed)
     if any(c.family == physics.RailCorrugation.name for c in fit.candidates) or not _can_distinguish(passages):
         return ()
@@ -248,9 +306,25 @@ def _unit_energy(
 
 
 def response_energy(case: TrackCase, fit: Fit, aligned: AlignedPassage, length: float) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes (n,) [m], and squared acceleration (n_sensor, n) [1/s^4] at each sensor for one wheel at the node.
+    """Squared acceleration of each sensor for one wheel that rolls over a wave one metre high.
 
-    The wheel rolls over a wave of this length, one metre high.
+    Parameters
+    ----------
+    case : TrackCase
+        The case.
+    fit : Fit
+        A fit of the case.
+    aligned : AlignedPassage
+        The passage.
+    length : float
+        Wavelength. [m]
+
+    Returns
+    -------
+    node : (n,) array of float
+        Positions of the wheel. [m]
+    energy : (n_sensor, n) array of float
+        [1/s⁴]
     """
     track = track_with(case.predictor.track(aligned.passage.route), case.predictor.zone, fit.values)
     matrices, frequency = matrices_of(track), np.array([aligned.speed / length])

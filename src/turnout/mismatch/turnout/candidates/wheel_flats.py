@@ -57,7 +57,26 @@ class FlatEvidence:
 
 
 def robust_band_level(samples: np.ndarray, rate: float, start: float, stop: float) -> tuple[np.ndarray, np.ndarray]:
-    """(time (n,) [s], (n_channel, n)) loudest moment around each time, in robust deviations from the background."""
+    """Loudest moment around each time, in robust deviations from the background.
+
+    Parameters
+    ----------
+    samples : (n_channel, n_sample) array of float
+        Signals.
+    rate : float
+        Samples per second. [Hz]
+    start : float
+        [s]
+    stop : float
+        [s]
+
+    Returns
+    -------
+    time : (n,) array of float
+        [s]
+    level : (n_channel, n) array of float
+        [deviations]
+    """
     fold = max(1, round(FLATS.bin_time * rate))
     power = (
         limit_band(
@@ -93,7 +112,20 @@ def _shifted_copies(rows: np.ndarray, steps: np.ndarray) -> np.ndarray:
 
 
 def log_likelihood_ratio(deviations: np.ndarray, expected: np.ndarray | float) -> np.ndarray:
-    """Log likelihood ratio of ``deviations`` for an impact of ``expected`` deviations against none. [nats]"""
+    """Log likelihood ratio of ``deviations`` for an impact of ``expected`` deviations against none. [nats]
+
+    Parameters
+    ----------
+    deviations : array of float
+        Recorded levels. [deviations]
+    expected : array of float
+        Levels of an impact there. [deviations]
+
+    Returns
+    -------
+    array of float
+        [nats]
+    """
     noise, impact = (_normal_density(deviations - m, 1.0 + FLATS.impact_scatter * m) for m in (0.0, expected))
     return np.log((1.0 - FLATS.outlier_share) * impact + FLATS.outlier_share * FLATS.outlier_density) - np.log(
         (1.0 - FLATS.outlier_share) * noise + FLATS.outlier_share * FLATS.outlier_density
@@ -105,7 +137,20 @@ def _normal_density(off: np.ndarray, spread: np.ndarray | float) -> np.ndarray:
 
 
 def band_excess(aligned: AlignedPassage) -> tuple[np.ndarray, np.ndarray]:
-    """(time, band level) of the sensors of an ``AlignedPassage``, without the level that all wheels share."""
+    """Band level of the sensors, without the level that all wheels share.
+
+    Parameters
+    ----------
+    aligned : AlignedPassage
+        The passage.
+
+    Returns
+    -------
+    time : (n,) array of float
+        [s]
+    excess : (n_sensor, n) array of float
+        [deviations]
+    """
     recording = aligned.passage.recording
     rows = [recording.index(s.name) for s in aligned.sensors]
     time, excess = robust_band_level(recording.samples[rows], recording.rate, aligned.time[0], aligned.time[-1])
@@ -139,7 +184,26 @@ def _common_excess(aligned: AlignedPassage, time: np.ndarray, excess: np.ndarray
 def best_flat_on_wheel(
     passages: Sequence[AlignedPassage], excesses: Sequence[tuple[np.ndarray, np.ndarray]], wheel: int
 ) -> tuple[float, float, Phases]:
-    """(nats, radius, phases) of the flat on one wheel that explains the band levels of one train best."""
+    """The flat on one wheel that explains the band levels of one train best.
+
+    Parameters
+    ----------
+    passages : sequence of AlignedPassage
+        Those of the train.
+    excesses : sequence of ((n,) array, (n_sensor, n) array)
+        Their ``band_excess``.
+    wheel : int
+        0 first.
+
+    Returns
+    -------
+    nats : float
+        Its evidence.
+    radius : float
+        Of the wheel. [m]
+    phases : tuple
+        (recording, rolling distance to the first impact [m]).
+    """
     radius, fits = passages[0].passage.vehicle.wheel_values("radius")[wheel], []
     for share in 1.0 + RADIUS_CHANGES:
         circumference = 2.0 * np.pi * radius * share
@@ -187,7 +251,18 @@ def _log_ratios(
 
 
 def flat_evidence(case: TrackCase) -> list[FlatEvidence]:
-    """``FlatEvidence`` of every wheel of every train of a case, the likeliest first."""
+    """``FlatEvidence`` of every wheel of every train of a case, the likeliest first.
+
+    Parameters
+    ----------
+    case : TrackCase
+        The case.
+
+    Returns
+    -------
+    list of FlatEvidence
+        The likeliest first.
+    """
     evidence = []
     for train in case.trains:
         names = [o.name for o in case.observations if o.name in case.aligned_passages]
@@ -205,7 +280,20 @@ PHASE_OFFSETS = np.arange(*FLATS.phase_offsets)  # m, trial phases about that of
 
 
 def flat_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, ...]:
-    """Candidates of the wheels that most likely have a flat."""
+    """Candidates of the wheels that most likely have a flat.
+
+    Parameters
+    ----------
+    case : TrackCase
+        The case.
+    fit : Fit
+        A fit of the case.
+
+    Returns
+    -------
+    tuple of Candidate
+        The likeliest first.
+    """
     evidence, explained_trains = (
         flat_evidence(case),
         {c.where.get("train") for c in fit.candidates if "axle" in c.where},
