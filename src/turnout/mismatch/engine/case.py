@@ -187,7 +187,16 @@ class Case:
     measured_range = (-np.inf, np.inf)
 
     def is_cheap(self, observation: Observation) -> bool:
-        """Whether derivatives of this observation cost next to nothing."""
+        """Whether derivatives of an observation cost next to nothing.
+
+        Parameters
+        ----------
+        observation : Observation
+
+        Returns
+        -------
+        bool
+        """
         return False
 
     def predict(self, values: Values, terms: Terms, observations: Sequence[Observation]) -> list[np.ndarray]:
@@ -343,11 +352,30 @@ class Case:
         return {}
 
     def residual_candidates(self, fit: Fit) -> Sequence[Candidate]:
-        """Candidates that only the residual of ``fit`` suggests."""
+        """Candidates that only the residual of a fit suggests.
+
+        Parameters
+        ----------
+        fit : Fit
+
+        Returns
+        -------
+        sequence of Candidate
+            They are tested beside ``candidates``.
+        """
         return ()
 
     def distant_starts(self, fit: Fit) -> Iterable[tuple[Candidate, tuple[float, ...]]]:
-        """(candidate, start) too far from neutral for a column: predicted, with the masking parameter at its mean."""
+        """Starts too far from neutral for a column: predicted, with the masking parameter at its mean.
+
+        Parameters
+        ----------
+        fit : Fit
+
+        Returns
+        -------
+        iterable of (Candidate, tuple of float)
+        """
         return ()
 
     def with_broad_errors(self) -> Case:
@@ -359,7 +387,17 @@ class Case:
         return {}
 
     def with_updated_errors(self, fit: Fit) -> Case:
-        """The same case with errors of its observations as the model of ``fit`` gives them. Itself if unchanged."""
+        """The same case with errors of its observations as the model of a fit gives them.
+
+        Parameters
+        ----------
+        fit : Fit
+
+        Returns
+        -------
+        Case
+            Itself if nothing changes.
+        """
         return self
 
     def cheap_case(self) -> Case | None:
@@ -367,7 +405,18 @@ class Case:
         return None
 
     def residual_spaces(self, fit: Fit) -> Iterable[ResidualSpace]:
-        """``ResidualSpace`` objects: subspaces of the observations to which a cause may be fixed. None by default."""
+        """Subspaces of the observations to which a cause may be fixed.
+
+        Parameters
+        ----------
+        fit : Fit
+            The fit whose residual is to be located.
+
+        Returns
+        -------
+        iterable of ResidualSpace
+            None by default.
+        """
         return ()
 
     def latent_covariates(self, fit: Fit) -> dict[str, Any] | None:
@@ -385,5 +434,15 @@ class Case:
         return None
 
     def numerical_error(self, fit: Fit) -> list[np.ndarray] | None:
-        """Numerical error of each observation's prediction, list of (n,), or None if it is exact."""
+        """Numerical error of each observation's prediction.
+
+        Parameters
+        ----------
+        fit : Fit
+
+        Returns
+        -------
+        list of (n,) array of float, or None
+            In the unit of the data; None if predictions are exact.
+        """
         return None

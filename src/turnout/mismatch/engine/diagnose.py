@@ -10,11 +10,11 @@ import numpy as np
 
 from turnout.mismatch.engine.decision import (
     NUMERICS_RULES,
-    NumericalError,
     confirm,
     first_applicable,
     grade_name,
 )
+from turnout.mismatch.engine.decision_facts import NumericalError
 from turnout.mismatch.engine.evidence import assess, excess_ratio, latent_force_of, worst_excess
 from turnout.mismatch.engine.localization import Location, locate
 from turnout.mismatch.engine.map_fit import fit_jointly
@@ -158,7 +158,7 @@ def _seek_effects(search: Search, base: Fit) -> Findings:
 
 def _seek_effect(findings: Findings, effect: int) -> tuple[Findings, bool]:
     """The findings after one more effect was sought, and whether a further one may be."""
-    search, settings = findings.search.labelled(str(effect)), findings.search.settings
+    search, settings = findings.search.with_label(str(effect)), findings.search.settings
     promising = None if findings.is_unknown else {s.family for s in findings.scores if s.gain > settings.threshold}
     scores, fit = score_candidates(search, findings.fit, promising)
     findings = replace(findings, search=search, scores=scores, fit=fit, base=findings.base if effect else fit)

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.mismatch.engine.cross_validation import held_out_score, single_type_estimate, weighted_mean_square
-from turnout.mismatch.engine.decision import is_contradicted, judge, likeliest
+from turnout.mismatch.engine.decision import judge
+from turnout.mismatch.engine.decision_facts import is_contradicted, likeliest
 from turnout.mismatch.engine.latent_force import LatentForce, latent_law
 from turnout.mismatch.engine.reserved_data import is_significantly_worse, reserved_fit
 from turnout.mismatch.engine.score import Score
@@ -150,18 +151,49 @@ def is_within_spread(case: Case, refit: Fit, candidate: Candidate) -> bool:
 
 
 def excess_ratio(search: Search, fit: Fit) -> float:
-    """Weighted mean square over the control level, the largest of the data types."""
+    """Weighted mean square over the control level, the largest of the data types.
+
+    Parameters
+    ----------
+    search : Search
+    fit : Fit
+
+    Returns
+    -------
+    float
+    """
     control = _control_levels(search, fit)
     return max(fit.level[data_type] / control[data_type] for data_type in fit.level)
 
 
 def worst_excess(search: Search, fit: Fit) -> float:
-    """Largest excess ratio of ``fit``: of a data type, or of one channel of one recording."""
+    """Largest excess ratio of a fit: of a data type, or of one channel of one recording.
+
+    Parameters
+    ----------
+    search : Search
+    fit : Fit
+
+    Returns
+    -------
+    float
+    """
     return max(excess_ratio(search, fit), worst_channel_excess(search.case, fit))
 
 
 def worst_channel_excess(case: Case, fit: Fit) -> float:
-    """Largest mean square of one channel in one recording over that of controls, for data types with such a level."""
+    """Largest mean square of one channel in one recording over that of controls.
+
+    Parameters
+    ----------
+    case : Case
+    fit : Fit
+
+    Returns
+    -------
+    float
+        0 if no data type has such a control level.
+    """
     ratios = [0.0]
     for o, white in zip(case.observations, fit.white):
         if o.data_type not in case.cell_level or o.cells is None or "sensor" not in o.labels:
@@ -211,7 +243,18 @@ def assess(search: Search, fit: Fit, scores: Sequence[Score]) -> tuple[Verdict, 
 
 
 def residual_structure(case: Case, fit: Fit) -> float:
-    """Share of the residual of ``fit`` that a free force law of the state still explains."""
+    """Share of the residual that a free force law of the state still explains.
+
+    Parameters
+    ----------
+    case : Case
+    fit : Fit
+
+    Returns
+    -------
+    float
+        0 if the case has no such view.
+    """
     latent = latent_force_of(case, fit)
     return max(latent.r2.values(), default=0.0) if latent else 0.0
 
@@ -220,7 +263,7 @@ def predicts_reserved(search: Search, base: Fit, score: Score) -> bool:
     """Whether reserved conditions are predicted no worse than without the effect.
 
     Worse means: twice the mean square, or a lower fit that costs more evidence than one condition may lose
-    (``decision.is_contradicted``), or no prediction at all.
+    (``decision_facts.is_contradicted``), or no prediction at all.
 
     Parameters
     ----------
@@ -250,7 +293,18 @@ def predicts_reserved(search: Search, base: Fit, score: Score) -> bool:
 
 
 def latent_force_of(case: Case, fit: Fit) -> LatentForce | None:
-    """``LatentForce`` that ``fit`` lacks. None if the case has no such view."""
+    """Force that a fit lacks, as a free function of covariates.
+
+    Parameters
+    ----------
+    case : Case
+    fit : Fit
+
+    Returns
+    -------
+    LatentForce or None
+        None if the case has no such view.
+    """
     latent_data = case.latent_covariates(fit)
     if not latent_data:
         return None

@@ -82,7 +82,17 @@ class DampedSteps:
         return joint.sd * np.clip(step, -reach, reach)
 
     def predicted_decrease(self, step: np.ndarray) -> float:
-        """Decrease of the cost if the problem were linear."""
+        """Decrease of the cost if the problem were linear.
+
+        Parameters
+        ----------
+        step : (n,) array of float
+            In the units of the parameters.
+
+        Returns
+        -------
+        float
+        """
         step = step / self.joint.sd
         return float(2.0 * step @ self.right - step @ self.normal @ step)
 

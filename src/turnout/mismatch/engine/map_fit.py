@@ -58,7 +58,16 @@ class Fit:
         return replace(self, jacobian=[])
 
     def with_candidates(self, candidates: Iterable[Candidate]) -> Fit:
-        """The same fit with these candidates, which carry functions and are not stored on disk."""
+        """The same fit with other candidates, which carry functions and are not stored on disk.
+
+        Parameters
+        ----------
+        candidates : iterable of Candidate
+
+        Returns
+        -------
+        Fit
+        """
         return replace(self, candidates=tuple(candidates))
 
     def part(self, candidate: Candidate) -> slice:
@@ -98,7 +107,18 @@ class Fit:
 
 
 def terms_of(candidates: Sequence[Candidate], psi: np.ndarray) -> tuple[Any, ...]:
-    """Terms of several candidates from their stacked parameters."""
+    """Terms of several candidates from their stacked parameters.
+
+    Parameters
+    ----------
+    candidates : sequence of Candidate
+    psi : (n_term,) array of float
+
+    Returns
+    -------
+    tuple of terms
+        As ``Case.predict`` takes them.
+    """
     terms, first = [], 0
     for candidate in candidates:
         last = first + len(candidate.parameters)
@@ -133,28 +153,89 @@ class JointProblem:
         self.reach = np.array([n.max_step_sd * n.sd for n in case.nuisances] + [_max_step(p) for p in self.parameters])
 
     def split(self, theta: np.ndarray) -> tuple[dict[str, float], np.ndarray]:
-        """Nuisances by name, and the term parameters."""
+        """Parameters of the fit, taken apart.
+
+        Parameters
+        ----------
+        theta : (n,) array of float
+            Nuisances, then parameters of the effects.
+
+        Returns
+        -------
+        values : dict
+            Nuisance parameter -> value.
+        psi : (n_term,) array of float
+            Parameters of the effects.
+        """
         return {n.name: float(v) for n, v in zip(self.case.nuisances, theta)}, np.asarray(theta[self.n :])
 
     def predict(self, theta: np.ndarray) -> list[np.ndarray]:
-        """Predictions at ``theta``; SimulationError if the model cannot be simulated there."""
+        """Predictions with these parameters.
+
+        Parameters
+        ----------
+        theta : (n,) array of float
+            Nuisances, then parameters of the effects.
+
+        Returns
+        -------
+        list of (n,) array of float
+            By observation.
+
+        Raises
+        ------
+        SimulationError
+            If the model cannot be simulated there.
+        """
         values, psi = self.split(theta)
         self.evaluations += 1
         return self.case.predict(values, terms_of(self.candidates, psi), self.observations)
 
     def predict_or_none(self, theta: np.ndarray) -> list[np.ndarray] | None:
-        """Predictions at ``theta``, None if the simulation fails."""
+        """Predictions with these parameters.
+
+        Parameters
+        ----------
+        theta : (n,) array of float
+            Nuisances, then parameters of the effects.
+
+        Returns
+        -------
+        list of (n,) array of float, or None
+            None if the simulation fails.
+        """
         try:
             return self.predict(theta)
         except SimulationError:
             return None
 
     def residuals(self, predictions: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """Data minus prediction, whitened."""
+        """Data minus prediction, whitened.
+
+        Parameters
+        ----------
+        predictions : sequence of (n,) array of float
+            By observation.
+
+        Returns
+        -------
+        list of (n,) array of float
+        """
         return [o.whiten(o.data - p) for o, p in zip(self.observations, predictions)]
 
     def level(self, residuals: Sequence[np.ndarray]) -> dict[str, float]:
-        """Mean square of whitened residuals, by data type."""
+        """Mean square of whitened residuals.
+
+        Parameters
+        ----------
+        residuals : sequence of (n,) array of float
+            By observation.
+
+        Returns
+        -------
+        dict
+            Data type -> weighted mean square.
+        """
         total: dict[str, float] = {}
         count: dict[str, float] = {}
         for o, r in zip(self.observations, residuals):
@@ -246,7 +327,26 @@ class JointProblem:
     def with_new_cheap_columns(
         self, theta: np.ndarray, predictions: Sequence[np.ndarray], jacobian: list[np.ndarray]
     ) -> list[np.ndarray]:
-        """The Jacobian with new derivatives of cheap observations."""
+        """The Jacobian with new derivatives of cheap observations.
+
+        Parameters
+        ----------
+        theta : (n,) array of float
+            Nuisances, then parameters of the effects.
+        predictions : sequence of (n,) array of float
+            Those at ``theta``.
+        jacobian : list of (n, p) array of float
+            By observation.
+
+        Returns
+        -------
+        list of (n, p) array of float
+
+        Raises
+        ------
+        SimulationError
+            If the model cannot be simulated on either side of a parameter.
+        """
         chosen = [i for i, o in enumerate(self.observations) if self.case.is_cheap(o)]
         if not chosen:
             return jacobian

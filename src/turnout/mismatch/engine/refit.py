@@ -103,7 +103,7 @@ def score_candidates(search: Search, fit: Fit, promising: Collection[str] | None
     ranked = _rank_families(search, fit, promising)
     continued = _base_from_leader(search, fit, ranked)
     if continued is not None and continued.evidence - fit.evidence > search.settings.threshold:
-        fit, search = continued, search.labelled(f"{search.label}:again")
+        fit, search = continued, search.with_label(f"{search.label}:again")
         ranked = _rank_families(search, fit, promising)
         continued = _base_from_leader(search, fit, ranked)
     if continued is not None:  # the shortfall of the base fit is no evidence
@@ -174,7 +174,7 @@ def _refit_equivalent_forms(search: Search, fit: Fit, ranked: list[Score]) -> li
     Equivalent are families that cannot be distinguished from the leader as fitted: its ``limit_form`` and
     ``simpler_form``.
     """
-    leader, beside = ranked[0], search.labelled(f"{search.label}:beside")
+    leader, beside = ranked[0], search.with_label(f"{search.label}:beside")
     for k, score in enumerate(ranked[1:], 1):
         is_equivalent = score.is_limit_of(leader) or score.is_simpler_form_of(leader)
         if leader.gain > search.settings.threshold and is_equivalent:

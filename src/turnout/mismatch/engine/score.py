@@ -61,10 +61,19 @@ class Score:
         return size - uncertainty >= rules.smallest_reportable
 
     def exemption_reason(self, settings: MismatchSettings) -> str:
-        """Reason, in words, why the residual of the fit does not count against it, "" if there is none.
+        """Reason why the residual of the fit does not count against the candidate.
 
         Either external evidence alone is enough, and the fit becomes worse by no more than a margin. Or conditions
         support it in which no earlier effect shows, whose shape may be the residual elsewhere.
+
+        Parameters
+        ----------
+        settings : MismatchSettings
+
+        Returns
+        -------
+        str
+            In words, "" if there is none.
         """
         position_cost = np.log(self.candidate.site.n_scanned)
         evidence = self.candidate.naming.external_evidence - position_cost
@@ -78,7 +87,18 @@ class Score:
         return "seen where the effect named before does not show" if is_unmasked else ""
 
     def explains_too_little(self, excess: float, settings: MismatchSettings) -> bool:
-        """Whether it explains too little of an ``excess`` over controls to be its cause."""
+        """Whether it explains too little of an excess over controls to be its cause.
+
+        Parameters
+        ----------
+        excess : float
+            Weighted mean square of the base model over the control level.
+        settings : MismatchSettings
+
+        Returns
+        -------
+        bool
+        """
         return excess > 1.0 and self.explained < settings.explained
 
     @property
@@ -90,14 +110,32 @@ class Score:
         return bool(errors[0] > THRESHOLDS.max_bounded_error * abs(sizes[0] - self.candidate.neutral[0]))
 
     def is_limit_of(self, rival: Score) -> bool:
-        """Whether ``rival`` at the same site is at its bound, within a standard error, where it looks like this one."""
+        """Whether a rival at the same site is at its bound, within a standard error, where it looks like this one.
+
+        Parameters
+        ----------
+        rival : Score
+
+        Returns
+        -------
+        bool
+        """
         if rival.candidate.effect.limit_form != self.family or rival.candidate.where != self.candidate.where:
             return False
         sizes, errors = rival.estimates
         return float(sizes[0] - errors[0]) <= rival.candidate.parameters[0].bounds[0]
 
     def is_simpler_form_of(self, rival: Score) -> bool:
-        """Whether ``rival`` at the same site is the same effect with one more parameter: the sizes agree."""
+        """Whether a rival at the same site is the same effect with one more parameter: the sizes agree.
+
+        Parameters
+        ----------
+        rival : Score
+
+        Returns
+        -------
+        bool
+        """
         family, k = rival.candidate.effect.simpler_form or ("", 0)
         if family != self.family or rival.candidate.where != self.candidate.where:
             return False
@@ -109,6 +147,14 @@ class Score:
 
         Two of one family, or of one component, do not: together they can correct nearly any shape. Those of two trains
         do: no recording shows both.
+
+        Parameters
+        ----------
+        rival : Score
+
+        Returns
+        -------
+        bool
         """
         trains = {s.candidate.where.get("train") for s in (self, rival)}
         is_related = self.family == rival.family or (

@@ -57,19 +57,52 @@ class Search:
         report: Callable[[int, int, str], Any] | None = None,
         store: MutableMapping[str, Any] | None = None,
     ) -> Search:
-        """A search with the default for each argument that is None. Fits of a cheap case have more steps."""
+        """A search with the default for each argument that is None. Fits of a cheap case have more steps.
+
+        Parameters
+        ----------
+        case : Case
+        settings : MismatchSettings or None
+        report : callable or None
+            Called with (number done, total, key of the candidate).
+        store : mutable mapping or None
+            Fits by key.
+
+        Returns
+        -------
+        Search
+        """
         settings = settings or MismatchSettings()
         if not case.expensive:
             steps = THRESHOLDS.max_cheap_steps
             settings = replace(settings, base_iterations=steps, iterations=steps)
         return cls(case, settings, {} if store is None else store, report or _report_nothing)
 
-    def labelled(self, label: str) -> Search:
-        """The same search, for the fits of one effect."""
+    def with_label(self, label: str) -> Search:
+        """The same search, for the fits of one effect.
+
+        Parameters
+        ----------
+        label : str
+            First part of the keys of these fits.
+
+        Returns
+        -------
+        Search
+        """
         return replace(self, label=label)
 
     def control_level(self, data_type: str) -> float:
-        """Weighted mean square that controls reach in observations of a data type."""
+        """Weighted mean square that controls reach in observations of one data type.
+
+        Parameters
+        ----------
+        data_type : str
+
+        Returns
+        -------
+        float
+        """
         return self.case.control_level.get(data_type, self.settings.control_level)
 
     def fit(
@@ -107,11 +140,37 @@ class Search:
         )
 
     def continue_fit(self, fit: Fit, stall: float = THRESHOLDS.stall) -> Fit:
-        """The fit continued from where it is, with new derivatives. SimulationError as ``fit`` raises it."""
+        """The fit continued from where it is, with new derivatives.
+
+        Parameters
+        ----------
+        fit : Fit
+        stall : float
+            Gain per sample that ends the fit of an expensive case.
+
+        Returns
+        -------
+        Fit
+
+        Raises
+        ------
+        SimulationError
+            If the model cannot be simulated close to it.
+        """
         return self.fit(fit.candidates, fit.psi, fit.values, stall=stall)
 
     def converge(self, fit: Fit) -> Fit:
-        """The fit, continued until a round of steps gains less than a name needs. Each round has new derivatives."""
+        """The fit, continued until a round of steps gains less than a name needs. Each round has new derivatives.
+
+        Parameters
+        ----------
+        fit : Fit
+
+        Returns
+        -------
+        Fit
+            The last one that could be simulated.
+        """
         for _ in range(THRESHOLDS.max_rounds):
             try:
                 before, fit = fit, self.continue_fit(fit, THRESHOLDS.fine_stall)
@@ -122,7 +181,17 @@ class Search:
         return fit
 
     def with_jacobian(self, fit: Fit) -> Fit:
-        """The fit, continued if it has no Jacobian; unchanged if the simulation fails close to it."""
+        """The fit, continued if it has no Jacobian.
+
+        Parameters
+        ----------
+        fit : Fit
+
+        Returns
+        -------
+        Fit
+            Unchanged if the simulation fails close to it.
+        """
         try:
             return fit if fit.jacobian else self.continue_fit(fit)
         except SimulationError:
@@ -152,7 +221,21 @@ class Search:
         return None if stored is None else stored.with_candidates(candidates)
 
     def key_of(self, purpose: str, score: Score, fit: Fit) -> str:
-        """Key of a further fit of the candidate of ``score`` on top of ``fit``."""
+        """Key of a further fit of a candidate.
+
+        Parameters
+        ----------
+        purpose : str
+            What the fit is for.
+        score : Score
+            Of the candidate.
+        fit : Fit
+            Without the candidate.
+
+        Returns
+        -------
+        str
+        """
         psi = tuple(np.round(score.fit.psi, 12))
         return f"{self.label}:{purpose}:{score.candidate.key}:{len(fit.candidates)}:{psi}"
 
@@ -161,9 +244,17 @@ class Search:
         return {n.name: n.mean for n in self.case.nuisances if n.owner is None and n.can_mask}
 
     def with_updated_errors(self, fit: Fit) -> tuple[Search, Fit]:
-        """(search, fit) with errors of the observations as the model of ``fit`` gives them, and fitted again.
+        """Search and fit with errors of the observations as the model of the fit gives them, and fitted again.
 
-        Both as they are if the case does not change, or if the simulation fails.
+        Parameters
+        ----------
+        fit : Fit
+
+        Returns
+        -------
+        search : Search
+        fit : Fit
+            Both as they are if the case does not change, or if the simulation fails.
         """
         updated = self.case.with_updated_errors(fit)
         if updated is self.case:
@@ -215,7 +306,19 @@ class Findings:
         return len(self.verdicts) == 2 and all(v.is_single_effect for v in self.verdicts)
 
     def after(self, rule: Rule, **changes: Any) -> Findings:
-        """The findings with these changes, and the rule in the trail of the first verdict."""
+        """The findings with some changes, and a rule in the trail of the first verdict.
+
+        Parameters
+        ----------
+        rule : Rule
+            The rule that asks for the changes.
+        **changes :
+            Fields of the findings.
+
+        Returns
+        -------
+        Findings
+        """
         changed = replace(self, **changes)
         first, *further = changed.verdicts
         return replace(changed, verdicts=(first.after(rule), *further))

@@ -18,7 +18,22 @@ GUIDE = "mismatch.md"
 
 
 def threshold(value: Any, unit: str, reason: str, source: str) -> Any:
-    """Dataclass field with the default ``value`` and metadata ``unit``, ``reason`` and ``source``."""
+    """Field of a dataclass with unit, reason and source.
+
+    Parameters
+    ----------
+    value : number or tuple
+        The default.
+    unit : str
+    reason : str
+        What it limits, and why there.
+    source : str
+        Page below ``docs``, publication, "convention" or "numerical".
+
+    Returns
+    -------
+    dataclasses.Field
+    """
     return field(default=value, metadata={"unit": unit, "reason": reason, "source": source})
 
 

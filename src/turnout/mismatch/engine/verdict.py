@@ -52,11 +52,31 @@ class Verdict:
         return self.answer == "named" or (self.answer == "a_or_b" and self.independent_rival is None)
 
     def after(self, rule: Rule) -> Verdict:
-        """The verdict with ``rule`` at the end of its trail."""
+        """The verdict with a rule at the end of its trail.
+
+        Parameters
+        ----------
+        rule : Rule
+
+        Returns
+        -------
+        Verdict
+        """
         return replace(self, trail=(*self.trail, rule.name))
 
     def as_unknown(self, reason: str, settings: MismatchSettings) -> Verdict:
-        """The answer "unknown" in place of this one."""
+        """The answer "unknown" in place of this one.
+
+        Parameters
+        ----------
+        reason : str
+            In words.
+        settings : MismatchSettings
+
+        Returns
+        -------
+        Verdict
+        """
         probabilities = dict(self.posterior)
         swap_with_unknown(probabilities)
         probability = calibrate(probabilities, ("unknown",), settings.certainty("unknown"), settings)
@@ -64,7 +84,18 @@ class Verdict:
         return replace(self, **changes, posterior=probabilities, reason=reason)
 
     def as_choice(self, reason: str, settings: MismatchSettings) -> Verdict:
-        """The answer "a or b" in place of a name: it, or the form that looks the same beyond the limit of its size."""
+        """The answer "a or b" in place of a name: it, or the form that looks the same beyond the limit of its size.
+
+        Parameters
+        ----------
+        reason : str
+            In words.
+        settings : MismatchSettings
+
+        Returns
+        -------
+        Verdict
+        """
         names, probabilities = (self.names[0], self.scores[0].candidate.effect.unbounded_form), dict(self.posterior)
         probability = calibrate(probabilities, names, settings.certainty("a_or_b"), settings)
         reason = "; ".join(filter(None, [reason, self.reason]))
@@ -119,7 +150,13 @@ def posterior(scores: Sequence[Score], excess: float, settings: MismatchSettings
 
 
 def swap_with_unknown(probabilities: dict[str, float]) -> None:
-    """A test beyond the score rejects the best name: swap the probabilities of "unknown" and the likeliest name."""
+    """Swap the probabilities of "unknown" and of the likeliest name: a test beyond the score rejects that.
+
+    Parameters
+    ----------
+    probabilities : dict
+        Name -> probability. Changed in place.
+    """
     top = max(probabilities, key=lambda name: probabilities[name])
     probabilities[top], probabilities["unknown"] = probabilities["unknown"], probabilities[top]
 

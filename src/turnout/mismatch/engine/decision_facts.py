@@ -1,0 +1,232 @@
+"""Facts on which the rules of ``decision`` rest: of one effect, of a name and of the reserved recordings.
+
+Those of two effects are in ``two_effects``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from turnout.mismatch.engine.thresholds import THRESHOLDS
+
+if TYPE_CHECKING:
+    from turnout.config.settings.mismatch import MismatchSettings
+    from turnout.mismatch.engine.reserved_data import Verification
+    from turnout.mismatch.engine.score import Score
+    from turnout.mismatch.engine.verdict import Verdict
+
+
+def is_contradicted(worst_gain: float, gain: float, settings: MismatchSettings) -> bool:
+    """Whether a held-out condition contradicts a name.
+
+    Parameters
+    ----------
+    worst_gain : float
+        Gain of the condition that gains least. [nats]
+    gain : float
+        Gain in all. [nats]
+    settings : MismatchSettings
+
+    Returns
+    -------
+    bool
+    """
+    return worst_gain < -max(THRESHOLDS.contradiction_threshold * settings.threshold, THRESHOLDS.max_loss_share * gain)
+
+
+def likeliest(scores: Sequence[Score], excess: float, settings: MismatchSettings) -> Score:
+    """The likeliest score. If it explains too little, the likeliest that other data support, if any.
+
+    Parameters
+    ----------
+    scores : sequence of Score
+        At least one.
+    excess : float
+        Weighted mean square of the base model over the control level.
+    settings : MismatchSettings
+
+    Returns
+    -------
+    Score
+    """
+    ranked = sorted(scores, key=lambda s: -s.gain)
+    supported = [s for s in ranked if s.exemption_reason(settings)]
+    return supported[0] if supported and ranked[0].explains_too_little(excess, settings) else ranked[0]
+
+
+@dataclass(frozen=True)
+class EffectEvidence:
+    """What the answer on one effect rests on.
+
+    Attributes
+    ----------
+    scores : sequence of Score
+        Best of each family, any order.
+    excess : float
+        Weighted mean square of the base model over the control level.
+    settings : MismatchSettings
+    consistent : bool
+        The best candidate predicts reserved conditions about as well as those it was fitted to.
+    structure : float
+        Share of the residual of the best candidate that a free force law of the state still explains.
+    residual_excess : float
+        Weighted mean square of the residual of the best candidate over the control level.
+    disturbed : bool
+        Another source than a train shakes the sensors in some recordings. These are not among those fitted.
+    mismatched_trains : tuple of str
+        Trains, most recordings of which are not among those fitted, since they do not agree with the vehicle file.
+    """
+
+    scores: Sequence[Score]
+    excess: float
+    settings: MismatchSettings
+    consistent: bool = True
+    structure: float = 0.0
+    residual_excess: float = 1.0
+    disturbed: bool = False
+    mismatched_trains: tuple[str, ...] = ()
+
+    @cached_property
+    def passing(self) -> list[Score]:
+        """Reportable candidates with enough evidence for a name, the largest gain first."""
+        ranked = sorted(self.scores, key=lambda s: -s.gain)
+        return [s for s in ranked if s.gain > self.settings.threshold and s.is_reportable]
+
+    @property
+    def has_leader(self) -> bool:
+        """Whether any candidate has enough evidence for a name."""
+        return bool(self.passing)
+
+    @cached_property
+    def leader(self) -> Score:
+        """The likeliest of the passing candidates."""
+        return likeliest(self.passing, self.excess, self.settings)
+
+    @cached_property
+    def ranked(self) -> tuple[Score, ...]:
+        """All scores: the leader, if there is one, and the rest by gain."""
+        ranked = sorted(self.scores, key=lambda s: -s.gain)
+        return (self.leader, *(s for s in ranked if s is not self.leader)) if self.has_leader else tuple(ranked)
+
+    @cached_property
+    def explains_too_little(self) -> bool:
+        """Whether the leader explains too little of the excess to be its cause."""
+        return self.leader.explains_too_little(self.excess, self.settings)
+
+    @cached_property
+    def exemption(self) -> str:
+        """Reason why the residual does not count against the leader, "" if there is none."""
+        return self.leader.exemption_reason(self.settings)
+
+    @cached_property
+    def contradicted(self) -> bool:
+        """Whether held-out conditions contradict the leader."""
+        return bool(self.leader.single_witness) or is_contradicted(
+            self.leader.worst_gain, self.leader.gain, self.settings
+        )
+
+    @cached_property
+    def shows_nothing(self) -> bool:
+        """Whether no candidate passes, or only a weak one that other conditions contradict, without any excess."""
+        if not self.has_leader:
+            return True
+        is_weak = self.leader.gain < THRESHOLDS.weak_gain * self.settings.threshold
+        return (self.contradicted or not self.consistent) and is_weak and self.excess <= 1.0
+
+    @property
+    def train_names(self) -> str:
+        """Trains that do not agree with their vehicle file, in one string."""
+        return ", ".join(self.mismatched_trains)
+
+    @property
+    def largest_loss(self) -> float:
+        """Loss of the condition that loses most by the leader. [nats]"""
+        return -self.leader.worst_gain
+
+    @cached_property
+    def limit_forms(self) -> list[Score]:
+        """Passing candidates that the leader equals at its limit. Ballast without stiffness is a hanging sleeper."""
+        return [s for s in self.passing if s.is_limit_of(self.leader) and s.explained >= self.settings.explained]
+
+    @cached_property
+    def rivals(self) -> list[Score]:
+        """Reportable candidates within the margin of the leader, less those of which it is a simpler form."""
+        leads = ((s, self.leader.gain - s.gain) for s in self.ranked[1:] if s.is_reportable)
+        close = [(s, lead) for s, lead in leads if lead < self.settings.margin]
+        min_lead = THRESHOLDS.simpler_form_lead
+        return [s for s, lead in close if not (self.leader.is_simpler_form_of(s) and lead > min_lead)]
+
+    def names(self, answer: str) -> tuple[str, ...]:
+        """Families that an answer names.
+
+        Parameters
+        ----------
+        answer : str
+
+        Returns
+        -------
+        tuple of str
+            Two for "a_or_b", one for "named", none for others.
+        """
+        if answer == "a_or_b":
+            return self.leader.family, (self.limit_forms or self.rivals)[0].family
+        return (self.leader.family,) if answer == "named" else ()
+
+
+@dataclass(frozen=True)
+class NumericalError:
+    """Weighted sums of squares of the simulation's own error and of the mismatch, of ``n`` independent samples.
+
+    ``limit`` is the largest share of the mismatch at which a cause may be named.
+    """
+
+    own: float
+    mismatch: float
+    n: float
+    limit: float
+
+    @property
+    def is_material(self) -> bool:
+        """Whether the own error exceeds a third of the tolerated error."""
+        return self.own / self.n > THRESHOLDS.max_numerical_error
+
+    @property
+    def exceeds_limit(self) -> bool:
+        """Whether the own error is too large a share of the mismatch."""
+        return self.own > self.limit**2 * self.mismatch
+
+    @property
+    def share(self) -> float:
+        """Own error as a share of the mismatch."""
+        return float(np.sqrt(self.own / self.mismatch))
+
+
+@dataclass(frozen=True)
+class NameEvidence:
+    """What the grade of a name rests on: its ``score`` in the last fit, and the largest excess ratio of that fit."""
+
+    score: Score
+    excess: float
+
+
+@dataclass(frozen=True)
+class ReservedEvidence:
+    """The verdicts, and how well the last fit predicts the reserved recordings."""
+
+    verdicts: tuple[Verdict, ...]
+    verification: Verification
+
+    @property
+    def verdict(self) -> Verdict:
+        """Verdict on the first effect."""
+        return self.verdicts[0]
+
+    @property
+    def is_single_name_of_grade_b(self) -> bool:
+        """Whether there is one effect alone, named with grade B."""
+        return len(self.verdicts) == 1 and self.verdict.answer == "named" and self.verdict.grade == "B"
