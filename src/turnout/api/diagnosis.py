@@ -156,5 +156,5 @@ def diagnose(
     from turnout.stages.mismatch_results import diagnose_turnout
 
     folder = configuration.folder if isinstance(configuration, Configuration) else configuration
-    tables = diagnose_turnout(case, folder, raw, work, visit, track, tuple(sections))
+    tables = diagnose_turnout(case, os.fspath(folder), os.fspath(raw), os.fspath(work), visit, track, tuple(sections))
     return TurnoutFindings(case, tables)

@@ -4,12 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import MISSING, Field, dataclass, fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from turnout import physics
 from turnout.config.parameters import Number
 from turnout.errors import SimulationError
 from turnout.simulate.links import SUPPORT_FIELDS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    import numpy as np
+
+    from turnout.config.parameters import ParameterSet
+    from turnout.mismatch.engine.candidate import Candidate
+    from turnout.physics.term import Parameter
+    from turnout.simulate import TurnoutTrack
+    from turnout.simulate.track import Track
 
 SUPPORT_KEYS = SUPPORT_FIELDS  # a file gives the support's position [m] instead of its number
 ENTRY_METADATA = ("term", "accepted", "finding", "route")
@@ -35,7 +46,7 @@ class AcceptedEffect:
         return physics.effects_by_name()[self.family]
 
     @property
-    def parameters(self):
+    def parameters(self) -> tuple[Parameter, ...]:
         """Fitted parameters of its term, with units, neutral values and bounds."""
         return tuple(p for p in self._effect.parameters if p.name in self.values)
 
@@ -58,11 +69,11 @@ class AcceptedEffect:
         """The entry as plain values: effect, fixed fields (positions in m), parameters in their own units."""
         return {"term": self.family, **self.fixed, **{name: value for name, (value, _) in self.values.items()}}
 
-    def is_on(self, route) -> bool:
+    def is_on(self, route: str) -> bool:
         """Whether the effect applies to ``route``."""
         return self.route in ("", route)
 
-    def is_of(self, family, where) -> bool:
+    def is_of(self, family: str, where: Mapping[str, Any]) -> bool:
         """Whether it is the effect ``family`` at the position, sensor or train in ``where``."""
         if family != self.family:
             return False
@@ -72,7 +83,7 @@ class AcceptedEffect:
         carriers = {"sensor": self.fixed.get("channel_name"), "train": self.fixed.get("train")}
         return all(where.get(k) in (None, v) for k, v in carriers.items())
 
-    def term(self, track, values: Mapping[str, float] | None = None):
+    def term(self, track: Track, values: Mapping[str, float] | None = None) -> Any:
         """The physics term on a track of ``turnout.simulate``; None if no part of it lies on that track."""
         chosen = {name: value for name, (value, _) in self.values.items()} | dict(values or {})
         fixed_values: dict[str, Any] = {}
@@ -82,7 +93,7 @@ class AcceptedEffect:
             fixed_values[name] = int(track.nearest_support(value)) if name in SUPPORT_KEYS else value
         return self._effect(**fixed_values, **chosen)
 
-    def _reaches(self, track):
+    def _reaches(self, track: Track) -> bool:
         """Whether at least one support of the effect is on the track."""
         low, high = float(track.support[0]) - MAX_SUPPORT_DISTANCE, float(track.support[-1]) + MAX_SUPPORT_DISTANCE
         if "first" in self.fixed and "last" in self.fixed:
@@ -91,12 +102,27 @@ class AcceptedEffect:
         return all(abs(float(track.support[track.nearest_support(x)]) - x) <= MAX_SUPPORT_DISTANCE for x in positions)
 
 
-def accepted_of(entries) -> tuple[AcceptedEffect, ...]:
-    """Accepted effects of ``TurnoutTrack.terms``; SimulationError for an unknown effect or field."""
+def accepted_of(entries: Iterable[ParameterSet]) -> tuple[AcceptedEffect, ...]:
+    """Accepted effects of ``TurnoutTrack.terms``.
+
+    Parameters
+    ----------
+    entries : iterable of ParameterSet
+        Entries of ``terms``.
+
+    Returns
+    -------
+    tuple of AcceptedEffect
+
+    Raises
+    ------
+    SimulationError
+        An entry has an unknown effect, field or route, or lacks a field.
+    """
     return tuple(_effect_of_entry(entry) for entry in entries)
 
 
-def _effect_of_entry(entry) -> AcceptedEffect:
+def _effect_of_entry(entry: ParameterSet) -> AcceptedEffect:
     family, where = str(entry["term"]), f"{entry.place.path}, {entry.place.entry}"
     effects = physics.effects_by_name()
     if family not in effects:
@@ -128,7 +154,7 @@ def _effect_of_entry(entry) -> AcceptedEffect:
     return AcceptedEffect(family, fixed, values, route)
 
 
-def _fixed_value(entry, name):
+def _fixed_value(entry: ParameterSet, name: str) -> Any:
     """Value of a field that is not fitted: a position in m, or any other value unchanged."""
     entry_value = entry[name]
     if name in (*SUPPORT_KEYS, "place", "start", "end"):
@@ -137,17 +163,47 @@ def _fixed_value(entry, name):
     return entry_value.value if isinstance(entry_value, Number) else entry_value
 
 
-def terms_on(turnout, track, conditions: Mapping | None = None, route: str = "main") -> tuple:
-    """Accepted terms of ``turnout``, a TurnoutTrack, on ``track``, under the conditions of a recording.
+def terms_on(turnout: TurnoutTrack, track: Track, conditions: Mapping | None = None, route: str = "main") -> tuple:
+    """Accepted terms of a turnout on a track, under the conditions of a recording.
 
-    ``track`` is the track of ``route`` or a stretch of it.
+    Parameters
+    ----------
+    turnout : TurnoutTrack
+        With the entries of its file.
+    track : Track
+        The track of ``route``, or a stretch of it.
+    conditions : mapping or None
+        Of the recording.
+    route : str
+        Name of the route.
+
+    Returns
+    -------
+    tuple of PhysicsTerm
     """
     terms = (entry.term(track) for entry in accepted_of(turnout.terms) if entry.is_on(route))
     return tuple(term.under_conditions(conditions or {}) for term in terms if term is not None)
 
 
-def describe_term(term, candidate, standard_errors, track) -> dict:
-    """A fitted term as plain data: effect, fixed fields (positions in m), parameters with errors and units."""
+def describe_term(term: Any, candidate: Candidate, standard_errors: Sequence[float] | np.ndarray, track: Track) -> dict:
+    """A fitted term as plain data: effect, fixed fields (positions in m), parameters with errors and units.
+
+    Parameters
+    ----------
+    term : PhysicsTerm
+        The fitted term.
+    candidate : Candidate
+        The effect it tests.
+    standard_errors : (n,) array of float
+        Of the fitted parameters.
+    track : Track
+        The main track.
+
+    Returns
+    -------
+    dict
+        ``term``, ``fixed`` and ``parameters``.
+    """
     fitted = {p.name: p for p in candidate.parameters}
     errors = dict(zip(fitted, standard_errors))
     fixed: dict[str, Any] = {}

@@ -1,9 +1,11 @@
 """Stage mismatch: compare the hammer tests and passages of one visit with the simulation."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +23,11 @@ from turnout.stages.mismatch_groups import Group, groups, members_of
 from turnout.stages.mismatch_inputs import digest_of_model, gather_inputs, track_of
 from turnout.stages.mismatch_rows import finding_tables
 from turnout.workflow.scan import scan
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from turnout.stages.accepted_effects import AcceptedEffect
 
 FITS_FOLDER = "work/mismatch-fits"
 TABLES = ("mismatch_findings", "mismatch_parameters", "mismatch_curves", "quarantine")
@@ -42,11 +49,35 @@ class Options:
     progress: Callable | None = None
 
 
-def mismatch_unit(unit: Unit, turnout: TurnoutConfig, raw_root, context=None, algo: str = "") -> dict[str, list[dict]]:
+def mismatch_unit(
+    unit: Unit,
+    turnout: TurnoutConfig,
+    raw_root: str | Path,
+    context: Mapping[str, dict[str, Any]] | None = None,
+    algo: str = "",
+) -> dict[str, list[dict]]:
     """Rows by table (findings, parameters, curves, quarantine) for one visit, for the workflow.
 
     There is one finding per group of neighbouring sections. Sections that cannot be diagnosed are quarantine rows with
     the reason.
+
+    Parameters
+    ----------
+    unit : Unit
+        The files of a visit.
+    turnout : TurnoutConfig
+        Configuration of the turnout.
+    raw_root : path
+        Folder of all recordings.
+    context : mapping or None
+        Tables of the passage stage by unit.
+    algo : str
+        Fingerprint of the code.
+
+    Returns
+    -------
+    dict
+        Table -> rows.
     """
     try:
         return diagnose_visit(unit, turnout, raw_root, context or {}, algo)
@@ -57,13 +88,42 @@ def mismatch_unit(unit: Unit, turnout: TurnoutConfig, raw_root, context=None, al
 
 
 def diagnose_visit(
-    unit, turnout, raw_root, passage_tables, algo="", options: Options | None = None
+    unit: Unit,
+    turnout: TurnoutConfig,
+    raw_root: str | Path,
+    passage_tables: Mapping[str, dict[str, Any]],
+    algo: str = "",
+    options: Options | None = None,
 ) -> dict[str, list[dict]]:
     """Rows by table of one visit.
 
-    ``passage_tables`` are the tables of the passage stage by unit; passages without one are analysed here.
-    SimulationError if the turnout has no track. BudgetSpentError, with the rows of the finished groups, if the time is
-    spent before the last group.
+    Passages without a table of the passage stage are analysed here.
+
+    Parameters
+    ----------
+    unit : Unit
+        The files of a visit.
+    turnout : TurnoutConfig
+        Configuration of the turnout.
+    raw_root : path
+        Folder of all recordings.
+    passage_tables : mapping
+        Tables of the passage stage by unit.
+    algo : str
+        Fingerprint of the code.
+    options : Options or None
+        None: the defaults.
+
+    Returns
+    -------
+    dict
+        Table -> rows.
+
+    Raises
+    ------
+    SimulationError
+        The turnout has no track. BudgetSpentError, with the rows of the finished groups, if the time is spent
+        before the last one.
     """
     options = options or Options()
     track, accepted = track_of(turnout, options.track)
@@ -92,19 +152,26 @@ def diagnose_visit(
     return _sort_by_severity(rows)
 
 
-def _sort_by_severity(rows):
+def _sort_by_severity(rows: dict[str, list[dict[str, Any]]]) -> dict[str, list[dict[str, Any]]]:
     rows["mismatch_findings"].sort(key=lambda r: (SEVERITY_ORDER.index(r["verdict"]), -(r["probability"] or 0.0)))
     return rows
 
 
-def _content_hash(path):
+def _content_hash(path: Path) -> str:
     try:
         return sha256_of(path)
     except OSError:  # deleted since it was planned: the notes say so
         return ""
 
 
-def _diagnose_group(group: Group, turnout, accepted, about, options, number) -> dict[str, list[dict]]:
+def _diagnose_group(
+    group: Group,
+    turnout: TurnoutConfig,
+    accepted: Iterable[AcceptedEffect],
+    about: Mapping[str, Any],
+    options: Options,
+    number: tuple[int, int],
+) -> dict[str, list[dict]]:
     """Rows of one group, read from the store if an earlier run computed them."""
     name = f"{turnout.id}-{about['visit']}-{'+'.join(group.labels)}"
     store = Checkpoint(Path(options.fits), name, (about["identity"],))
@@ -126,7 +193,9 @@ def _diagnose_group(group: Group, turnout, accepted, about, options, number) -> 
     return rows
 
 
-def _undiagnosed_row(unit, turnout, reason, group=None) -> dict[str, Any]:
+def _undiagnosed_row(
+    unit: Unit | None, turnout: TurnoutConfig, reason: str, group: Group | None = None
+) -> dict[str, Any]:
     """Quarantine row with the reason why sections cannot be diagnosed."""
     sections = f"sections {', '.join(group.labels)}" if group else "all sections"
     remedy = "See docs/mismatch.md: what a diagnosis needs"

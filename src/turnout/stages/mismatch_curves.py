@@ -1,12 +1,25 @@
 """Curves of a diagnosis as rows: waveform, spectrum, receptance and latent force, before and after."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.signal import welch
 
 from turnout.constants import Z95
 from turnout.mismatch.engine.reserved_data import reserved_fit
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from typing import Any
+
+    from turnout.mismatch.engine.case import Observation
+    from turnout.mismatch.engine.diagnose import Diagnosis
+    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.turnout.case import TrackCase
+    from turnout.mismatch.turnout.receptance_observation import FrfPair
 
 SHOWN_DURATION = 0.8  # s of waveform in a row
 WELCH_SEGMENT = 0.5  # s: segment of Welch's estimate, 2 Hz lines
@@ -40,33 +53,50 @@ class ChannelComparison:
     held_out: bool
 
     @property
-    def gain(self):
+    def gain(self) -> np.ndarray:
         """(n,) squared error before minus squared error after."""
         return (self.measured - self.before) ** 2 - (self.measured - self.after) ** 2
 
 
-def channel_comparisons(case, diagnosis) -> list[ChannelComparison]:
-    """Comparison of every passage at every sensor, held out passages first."""
+def channel_comparisons(case: TrackCase, diagnosis: Diagnosis) -> list[ChannelComparison]:
+    """Comparison of every passage at every sensor, held out passages first.
+
+    Parameters
+    ----------
+    case : TrackCase
+        The case.
+    diagnosis : Diagnosis
+        Result of the engine.
+
+    Returns
+    -------
+    list of ChannelComparison
+        Held out passages first.
+    """
     rival = _rival_fit(diagnosis)
     comparisons: list[ChannelComparison] = []
     if case.reserved:
-        sets = [reserved_fit(case, fit)[0] for fit in _fits(diagnosis, rival)]
-        sets = [predictions or sets[0] for predictions in sets]
-        comparisons += _comparisons(case, case.reserved, sets, True) if sets[0] else []
-    sets = [fit.predictions for fit in _fits(diagnosis, rival)]
-    return comparisons + _comparisons(case, case.observations, sets, False)
+        before, *further = (reserved_fit(case, fit)[0] for fit in _fits(diagnosis, rival))
+        if before:
+            comparisons += _comparisons(
+                case, case.reserved, [before, *(predictions or before for predictions in further)], True
+            )
+    fitted = [fit.predictions for fit in _fits(diagnosis, rival)]
+    return comparisons + _comparisons(case, case.observations, fitted, False)
 
 
-def _rival_fit(diagnosis):
+def _rival_fit(diagnosis: Diagnosis) -> Fit | None:
     names = diagnosis.verdict.names[:1]
     return next((s.fit for s in diagnosis.verdict.scores if s.family not in names), None)
 
 
-def _fits(diagnosis, rival):
+def _fits(diagnosis: Diagnosis, rival: Fit | None) -> tuple[Fit, Fit, Fit]:
     return diagnosis.base, diagnosis.fit, rival or diagnosis.base
 
 
-def _comparisons(case, observations, sets, held_out):
+def _comparisons(
+    case: TrackCase, observations: Sequence[Observation], sets: Sequence[Sequence[np.ndarray]], held_out: bool
+) -> list[ChannelComparison]:
     comparisons = []
     for k, o in enumerate(observations):
         aligned = case.aligned_passages.get(o.name)
@@ -84,8 +114,25 @@ def _comparisons(case, observations, sets, held_out):
     return comparisons
 
 
-def best_comparison(comparisons, case, diagnosis):
-    """The comparison to draw: held out if possible, at the position or sensor of the finding, with the largest gain."""
+def best_comparison(
+    comparisons: Sequence[ChannelComparison], case: TrackCase, diagnosis: Diagnosis
+) -> ChannelComparison | None:
+    """The comparison to draw: held out if possible, at the position or sensor of the finding, with the largest gain.
+
+    Parameters
+    ----------
+    comparisons : sequence of ChannelComparison
+        Every passage at every sensor.
+    case : TrackCase
+        The case.
+    diagnosis : Diagnosis
+        Result of the engine.
+
+    Returns
+    -------
+    ChannelComparison or None
+        None without passages.
+    """
     if not comparisons:
         return None
     where = diagnosis.fit.candidates[0].where if diagnosis.fit.candidates else {}
@@ -100,12 +147,25 @@ def best_comparison(comparisons, case, diagnosis):
     return max(pool, key=lambda s: _relative_gain(s.gain if changed else (s.measured - s.before) ** 2, s.measured))
 
 
-def _relative_gain(gain, measured):
+def _relative_gain(gain: np.ndarray, measured: np.ndarray) -> float:
     return float(np.sum(gain) / max(float(np.sum(measured**2)), 1e-30))
 
 
-def spectra(comparison):
-    """(frequency, measured, before, after, rival) one-sided power spectral density [(m/s²)²/Hz] by Welch's method."""
+def spectra(comparison: ChannelComparison) -> tuple[np.ndarray, ...]:
+    """One-sided power spectral densities by Welch's method.
+
+    Parameters
+    ----------
+    comparison : ChannelComparison
+        The recording and sensor that are drawn.
+
+    Returns
+    -------
+    frequency : (n,) array of float
+        [Hz]
+    measured, before, after, rival : (n,) array of float
+        [(m/s²)²/Hz]
+    """
     rate = 1.0 / float(np.mean(np.diff(comparison.time)))
     size = min(comparison.time.size, round(WELCH_SEGMENT * rate))
     signals = (comparison.measured, comparison.before, comparison.after, comparison.rival)
@@ -113,8 +173,21 @@ def spectra(comparison):
     return densities[0][0], *(d[1] for d in densities)
 
 
-def band_of(comparison, changed):
-    """(low, high) [Hz] of four fifths of the explained (else missing) power, None without a passage."""
+def band_of(comparison: ChannelComparison | None, changed: bool) -> tuple[float, float] | None:
+    """Band of four fifths of the explained power, else of the missing one.
+
+    Parameters
+    ----------
+    comparison : ChannelComparison or None
+        The recording and sensor that are drawn.
+    changed : bool
+        Whether an effect was fitted: then its gain counts, else the whole residual.
+
+    Returns
+    -------
+    (float, float) or None
+        Lowest and highest frequency [Hz]; None without a passage.
+    """
     if comparison is None:
         return None
     rate = 1.0 / float(np.mean(np.diff(comparison.time)))
@@ -125,8 +198,21 @@ def band_of(comparison, changed):
     return _core_range(f, density)
 
 
-def band_of_impacts(case, diagnosis):
-    """The same from the hammer tests, None if they gain less than the passages."""
+def band_of_impacts(case: TrackCase, diagnosis: Diagnosis) -> tuple[float, float] | None:
+    """The same band from the hammer tests.
+
+    Parameters
+    ----------
+    case : TrackCase
+        The case.
+    diagnosis : Diagnosis
+        Result of the engine.
+
+    Returns
+    -------
+    (float, float) or None
+        Lowest and highest frequency [Hz]; None if they gain less than the passages.
+    """
     lines, weights, passage_gain = [], [], 0.0
     for k, o in enumerate(case.observations):
         gain = _gain_in_sigma(o, diagnosis, k)
@@ -143,7 +229,7 @@ def band_of_impacts(case, diagnosis):
     return _core_range(f[order], weight[order])
 
 
-def _gain_in_sigma(o, diagnosis, k):
+def _gain_in_sigma(o: Observation, diagnosis: Diagnosis, k: int) -> np.ndarray:
     """(n,) squared errors in units of sigma: explained by the term, else missing."""
     squares = ((o.data - diagnosis.base.predictions[k]) / o.sigma) ** 2
     if diagnosis.fit is diagnosis.base:
@@ -151,8 +237,21 @@ def _gain_in_sigma(o, diagnosis, k):
     return squares - ((o.data - diagnosis.fit.predictions[k]) / o.sigma) ** 2
 
 
-def reach_of(comparison, changed):
-    """Distance of the nearest wheel [m] within which four fifths of the gain (else of the error) occur."""
+def reach_of(comparison: ChannelComparison | None, changed: bool) -> float | None:
+    """Distance of the nearest wheel [m] within which four fifths of the gain (else of the error) occur.
+
+    Parameters
+    ----------
+    comparison : ChannelComparison or None
+        The recording and sensor that are drawn.
+    changed : bool
+        Whether an effect was fitted: then its gain counts, else the whole residual.
+
+    Returns
+    -------
+    float or None
+        [m]; None without a passage, or without a gain.
+    """
     if comparison is None:
         return None
     gain = np.maximum(comparison.gain if changed else (comparison.measured - comparison.before) ** 2, 0.0)
@@ -163,7 +262,7 @@ def reach_of(comparison, changed):
     return float(comparison.wheel[order][np.searchsorted(total, 0.8 * total[-1])])
 
 
-def _core_range(x, weight):
+def _core_range(x: np.ndarray, weight: np.ndarray) -> tuple[float, float] | None:
     total = np.cumsum(weight)
     if not total[-1] > 0.0:
         return None
@@ -171,8 +270,26 @@ def _core_range(x, weight):
     return low, high
 
 
-def curve_rows(case, diagnosis, comparison, identity) -> list[dict]:
-    """Rows of ``mismatch_curves``."""
+def curve_rows(
+    case: TrackCase, diagnosis: Diagnosis, comparison: ChannelComparison | None, identity: Mapping[str, Any]
+) -> list[dict]:
+    """Rows of ``mismatch_curves``.
+
+    Parameters
+    ----------
+    case : TrackCase
+        The case.
+    diagnosis : Diagnosis
+        Result of the engine.
+    comparison : ChannelComparison or None
+        The recording and sensor that are drawn.
+    identity : mapping
+        Columns that all rows have.
+
+    Returns
+    -------
+    list of dict
+    """
     rows = []
     if comparison is not None:
         window = _window(comparison, diagnosis.fit is not diagnosis.base)
@@ -190,7 +307,7 @@ def curve_rows(case, diagnosis, comparison, identity) -> list[dict]:
     return [{**identity, "curve_no": k, **r} for k, r in enumerate(rows)]
 
 
-def _window(comparison, changed):
+def _window(comparison: ChannelComparison, changed: bool) -> slice:
     """Slice of ``SHOWN_DURATION`` with the largest gain."""
     gain = comparison.gain if changed else (comparison.measured - comparison.before) ** 2
     n = min(comparison.time.size, round(SHOWN_DURATION / float(np.mean(np.diff(comparison.time)))))
@@ -199,7 +316,14 @@ def _window(comparison, changed):
     return slice(start, start + n)
 
 
-def _curve_row(curve, label, x, unit, lists, comparison=None):
+def _curve_row(
+    curve: str,
+    label: str,
+    x: tuple[str, str],
+    unit: str,
+    lists: Sequence[np.ndarray],
+    comparison: ChannelComparison | None = None,
+) -> dict[str, Any]:
     names = ("x", "measured", "before", "after", "rival")
     values = {name: np.asarray(v, dtype=np.float32) for name, v in zip(names, lists)}
     values = {name: v for name, v in values.items() if v.size}
@@ -215,7 +339,7 @@ def _curve_row(curve, label, x, unit, lists, comparison=None):
     }
 
 
-def _receptance_rows(case, diagnosis):
+def _receptance_rows(case: TrackCase, diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """Receptance magnitude of the pair that the term improves most, else that fits worst."""
     chosen, largest_gain = None, -1.0
     for k, o in enumerate(case.observations):
@@ -236,12 +360,12 @@ def _receptance_rows(case, diagnosis):
     return [_curve_row("receptance", label, ("frequency", "Hz"), "m/N", [pair.frequency, *sizes])]
 
 
-def _magnitude(value, pair):
+def _magnitude(value: np.ndarray, pair: FrfPair) -> np.ndarray:
     n = pair.frequency.size
     return np.hypot(value[:n], value[n:]) * pair.size
 
 
-def _latent_rows(diagnosis):
+def _latent_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """Latent force against the covariate that explains most of it."""
     if diagnosis.latent is None or not diagnosis.latent.best_covariate:
         return []

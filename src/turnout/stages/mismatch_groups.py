@@ -4,6 +4,8 @@ A visit is a campaign with the passages around it. Neighbouring sections are one
 respond to the same effect.
 """
 
+from __future__ import annotations
+
 import json
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
@@ -12,6 +14,7 @@ from datetime import date
 from itertools import zip_longest
 from pathlib import Path
 from re import search
+from typing import TYPE_CHECKING
 
 from turnout.config import Configuration
 from turnout.config.merge import digest
@@ -21,6 +24,12 @@ from turnout.records import Unit
 from turnout.simulate import Sensor, TurnoutTrack
 from turnout.stages.mismatch_inputs import Note, VisitInputs, digest_of_model
 from turnout.workflow.plan import PlannedUnit, read_plan
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    from turnout.config.turnout import Section
+    from turnout.mismatch.turnout import HammerInput, PassageInput
 
 MAX_SECTION_GAP = 6.0  # m: sections further apart do not respond to the same sleeper
 MAX_PASSAGES = 8  # of a case: each is simulated hundreds of times, and more alike add little
@@ -41,7 +50,23 @@ class Group:
 def groups(
     turnout: TurnoutConfig, track: TurnoutTrack, inputs: VisitInputs, only: Sequence[str] = ()
 ) -> Iterator[Group]:
-    """Groups of a visit in order of position; sections without a recording are left out."""
+    """Groups of a visit in order of position; sections without a recording are left out.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+        Configuration of the turnout.
+    track : TurnoutTrack
+        Its track file.
+    inputs : VisitInputs
+        Recordings of the visit; notes are added.
+    only : sequence of str
+        Labels of the sections, () for all.
+
+    Yields
+    ------
+    Group
+    """
     for route, labels in _neighbouring_sections(turnout, only):
         campaign = _campaign(turnout, track, inputs, route, labels)
         if campaign is not None and route not in ("main", *track.routes):
@@ -50,7 +75,7 @@ def groups(
             yield Group(_measured_labels(turnout, inputs, campaign, labels), route, campaign)
 
 
-def _neighbouring_sections(turnout, only):
+def _neighbouring_sections(turnout: TurnoutConfig, only: Sequence[str]) -> Iterator[tuple[str, tuple[str, ...]]]:
     """(route, labels) of sections with gaps up to ``MAX_SECTION_GAP``, or of all sections in ``only``."""
     for route in ("main", "diverging"):
         sections = [s for s in turnout.sections if _route(s) == route and (not only or s.label in only)]
@@ -65,18 +90,22 @@ def _neighbouring_sections(turnout, only):
             yield route, tuple(s.label for s in members)
 
 
-def _measured_labels(turnout, inputs, campaign, labels):
+def _measured_labels(
+    turnout: TurnoutConfig, inputs: VisitInputs, campaign: CampaignInput, labels: Sequence[str]
+) -> tuple[str, ...]:
     """Labels of sections with a recording in the campaign."""
     tested = {inputs.sections[t.name] for t in campaign.hammer}
     monitored = {turnout.passages.sections[s.name] for s in campaign.sensors} if turnout.passages else set()
     return tuple(label for label in labels if label in tested | monitored)
 
 
-def _route(section):
+def _route(section: Section) -> str:
     return "diverging" if section.track == "diverging" else "main"
 
 
-def _campaign(turnout, track, inputs, route, labels):
+def _campaign(
+    turnout: TurnoutConfig, track: TurnoutTrack, inputs: VisitInputs, route: str, labels: Sequence[str]
+) -> CampaignInput | None:
     tests = tuple(t for t in inputs.tests if inputs.sections[t.name] in labels)
     sensors = _sensors(turnout, labels)
     names = {s.name for s in sensors}
@@ -94,19 +123,21 @@ def _campaign(turnout, track, inputs, route, labels):
     return CampaignInput(track, sensors, tests, tuple(passages), reserved_names(passages, tests))
 
 
-def _sensors(turnout, labels):
+def _sensors(turnout: TurnoutConfig, labels: Sequence[str]) -> tuple[Sensor, ...]:
     if turnout.passages is None:
         return ()
     sensors = []
     for channel in turnout.passages.description.channels:
         label = turnout.passages.sections.get(channel.name)
-        if label in labels and channel.quantity == "acceleration":
+        if label is not None and label in labels and channel.quantity == "acceleration":
             position = channel.position if channel.position is not None else turnout.section(label).position
             sensors.append(Sensor(channel.name, float(position), channel.mounting or "rail head"))
     return tuple(sensors)
 
 
-def _with_main_route(track, route, passages):
+def _with_main_route(
+    track: TurnoutTrack, route: str, passages: Sequence[PassageInput]
+) -> tuple[TurnoutTrack, list[PassageInput]]:
     """(track, passages) with the track of ``route`` as the main one."""
     route_track = track.track_of(route)
     turnout_track = replace(
@@ -115,8 +146,18 @@ def _with_main_route(track, route, passages):
     return turnout_track, [replace(p, route="main") for p in passages]
 
 
-def split_by_length(passages):
-    """Passages with a separate train name for each number of axles of one type."""
+def split_by_length(passages: Sequence[PassageInput]) -> list[PassageInput]:
+    """Passages with a separate train name for each number of axles of one type.
+
+    Parameters
+    ----------
+    passages : sequence of PassageInput
+        The passages.
+
+    Returns
+    -------
+    list of PassageInput
+    """
     axles = {id(p): len(p.vehicle.wheels) for p in passages}
     lengths: dict[str, set] = {}
     for p in passages:
@@ -125,10 +166,26 @@ def split_by_length(passages):
     return [replace(p, train=f"{p.train}, {axles[id(p)]} axles") if p.train in several else p for p in passages]
 
 
-def select_passages(passages, max_passages=MAX_PASSAGES, max_axles=MAX_AXLES):
+def select_passages(
+    passages: Sequence[PassageInput], max_passages: int = MAX_PASSAGES, max_axles: int = MAX_AXLES
+) -> list[PassageInput]:
     """At most ``max_passages`` passages with ``max_axles`` axles in all.
 
     One train of each type in turn, short trains first, and in each type the extremes of speed first.
+
+    Parameters
+    ----------
+    passages : sequence of PassageInput
+        The passages.
+    max_passages : int
+        Of a case.
+    max_axles : int
+        Of all its passages.
+
+    Returns
+    -------
+    list of PassageInput
+        In the order of ``passages``.
     """
     by_train: dict[str, list] = {}
     for p in sorted(passages, key=lambda p: (len(p.vehicle.wheels), p.train, p.speed)):
@@ -143,18 +200,30 @@ def select_passages(passages, max_passages=MAX_PASSAGES, max_axles=MAX_AXLES):
     return [p for p in passages if any(p is c for c in chosen)]
 
 
-def _extremes_first(members):
+def _extremes_first(members: Sequence[PassageInput]) -> list[PassageInput]:
     """Slowest, fastest, second slowest, second fastest ... of passages sorted by speed."""
     n = len(members)
     return [members[k // 2 if k % 2 == 0 else n - 1 - k // 2] for k in range(n)]
 
 
-def reserved_names(passages, tests) -> tuple[str, ...]:
+def reserved_names(passages: Sequence[PassageInput], tests: Sequence[HammerInput]) -> tuple[str, ...]:
     """Names of the held out recordings: every fifth passage in order of speed, else every fifth test.
 
     The only passage of a train is not held out if another passage, the nearest in speed, can be.
+
+    Parameters
+    ----------
+    passages : sequence of PassageInput
+        The passages.
+    tests : sequence of HammerInput
+        The hammer tests.
+
+    Returns
+    -------
+    tuple of str
+        () with fewer than ``MIN_TO_RESERVE`` recordings.
     """
-    items = sorted(passages, key=lambda p: p.speed) or sorted(tests, key=lambda t: t.place)
+    items: list[Any] = [*sorted(passages, key=lambda p: p.speed)] or [*sorted(tests, key=lambda t: t.place)]
     if len(items) < MIN_TO_RESERVE:
         return ()
     remaining, chosen = Counter(_train(item) for item in items), []
@@ -165,7 +234,7 @@ def reserved_names(passages, tests) -> tuple[str, ...]:
     return tuple(items[k].name for k in sorted(chosen))
 
 
-def _train(item):
+def _train(item: PassageInput | HammerInput) -> str:
     """Train type of a passage, "" for all hammer tests."""
     return getattr(item, "train", "")
 
@@ -177,6 +246,18 @@ N_NEWEST_VISITS = 1  # visits per turnout in the workflow: older ones were diagn
 def visits(units: Iterable[Unit]) -> dict[str, list[Unit]]:
     """Units by visit, oldest first: a campaign's day with the passages nearest to it, else a month.
 
+    Parameters
+    ----------
+    units : iterable of Unit
+        Units of the scan.
+
+    Returns
+    -------
+    dict
+        Visit -> units.
+
+    Examples
+    --------
     >>> def at(kind, label, campaign=None):
     ...     return Unit("t", kind, label, (), "", None, campaign)
     >>> found = visits([at("hammer", "A7/2026-07-25", "2026-07-25"), at("passage", "20260722T084238Z.h5"),
@@ -206,14 +287,38 @@ def _visit_of(label: str, days: Sequence[date]) -> str:
 
 
 def enabled_visit(plan: Path, configuration: Configuration) -> Iterator[PlannedUnit]:
-    """Newest visits, as units, of the turnouts with the setting ``mismatch: enabled: true``."""
+    """Newest visits, as units, of the turnouts with the setting ``mismatch: enabled: true``.
+
+    Parameters
+    ----------
+    plan : Path
+        Plan file of a shard.
+    configuration : Configuration
+        Configuration of the fleet.
+
+    Yields
+    ------
+    PlannedUnit
+    """
     for planned in every_visit(plan, configuration):
         if configuration.turnout(planned.unit.turnout).settings["mismatch"].enabled:
             yield planned
 
 
 def every_visit(plan: Path, configuration: Configuration) -> Iterator[PlannedUnit]:
-    """Newest visits of all turnouts of a plan; their note changes with notes, track and vehicle files."""
+    """Newest visits of all turnouts of a plan; their note changes with notes, track and vehicle files.
+
+    Parameters
+    ----------
+    plan : Path
+        Plan file of a shard.
+    configuration : Configuration
+        Configuration of the fleet.
+
+    Yields
+    ------
+    PlannedUnit
+    """
     by_turnout: dict[str, list[PlannedUnit]] = {}
     for planned in read_plan(plan):
         by_turnout.setdefault(planned.unit.turnout, []).append(planned)
@@ -227,13 +332,41 @@ def every_visit(plan: Path, configuration: Configuration) -> Iterator[PlannedUni
 
 
 def unit_of(turnout: str, label: str, units: Sequence[Unit], config_hash: str) -> Unit:
-    """Unit of all files of a visit."""
+    """Unit of all files of a visit.
+
+    Parameters
+    ----------
+    turnout : str
+        Id of the turnout.
+    label : str
+        The visit.
+    units : sequence of Unit
+        Its hammer tests and passages.
+    config_hash : str
+        Hash of the configuration of this stage.
+
+    Returns
+    -------
+    Unit
+    """
     files = tuple(sorted(f for u in units for f in u.files))
     return Unit(turnout, "mismatch", label, files, config_hash)
 
 
 def members_of(unit: Unit, scanned: Iterable[Unit]) -> list[Unit]:
-    """Scanned hammer tests and passages whose files belong to the unit of a visit."""
+    """Scanned hammer tests and passages whose files belong to the unit of a visit.
+
+    Parameters
+    ----------
+    unit : Unit
+        The files of a visit.
+    scanned : iterable of Unit
+        Units of the scan.
+
+    Returns
+    -------
+    list of Unit
+    """
     wanted = {f[0] for f in unit.files}
     members = []
     for u in scanned:

@@ -3,12 +3,14 @@
 Recordings that cannot be used are noted with the reason.
 """
 
+from __future__ import annotations
+
 import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from turnout.config.parameters import read_parameters
 from turnout.config.turnout import TurnoutConfig
@@ -29,6 +31,13 @@ from turnout.stages.passage import PassageContext, passage_unit, sensors_of, tra
 from turnout.stages.passage_context import known_patterns
 from turnout.workflow.current_results import current_results
 from turnout.workflow.scan import unit_id
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from turnout.records import RawDescription
+    from turnout.simulate import TurnoutTrack
+    from turnout.stages.accepted_effects import AcceptedEffect
 
 MID_SPAN_OFFSET = 0.3  # m: distance of a "mid-span" accelerometer from the sleeper of the impact
 MAX_CLIPPED_SHARE = 0.002  # share of clipped samples that leaves the band of the diagnosis unchanged
@@ -66,11 +75,32 @@ class VisitInputs:
 
 
 def gather_inputs(
-    units: Iterable[Unit], turnout: TurnoutConfig, raw_root, track, passage_tables: Mapping[str, dict]
+    units: Iterable[Unit],
+    turnout: TurnoutConfig,
+    raw_root: str | Path,
+    track: TurnoutTrack,
+    passage_tables: Mapping[str, dict],
 ) -> VisitInputs:
     """Read all units of a visit.
 
     ``track`` is the TurnoutTrack, ``passage_tables`` are the tables of the passage stage by unit.
+
+    Parameters
+    ----------
+    units : iterable of Unit
+        Hammer tests and passages of the visit.
+    turnout : TurnoutConfig
+        Configuration of the turnout.
+    raw_root : path
+        Folder of all recordings.
+    track : TurnoutTrack
+        Its track file.
+    passage_tables : mapping
+        Tables of the passage stage by unit.
+
+    Returns
+    -------
+    VisitInputs
     """
     inputs = VisitInputs()
     for unit in units:
@@ -82,7 +112,9 @@ def gather_inputs(
     return inputs
 
 
-def _recordings(unit, description, raw_root, notes, longest=None):
+def _recordings(
+    unit: Unit, description: RawDescription, raw_root: str | Path, notes: list[Note], longest: float | None = None
+) -> Iterator[Recording | LongRecording]:
     """Recordings of a unit, long ones included; read errors are added to ``notes``."""
     for path, *_ in unit.files:
         try:
@@ -95,26 +127,31 @@ def _recordings(unit, description, raw_root, notes, longest=None):
         yield from sorted(records, key=lambda r: r.record)
 
 
-def _add_test(unit, turnout, raw_root, track, inputs):
-    recordings = tuple(_recordings(unit, turnout.hammer.descriptions[unit.section], raw_root, inputs.notes))
+def _add_test(
+    unit: Unit, turnout: TurnoutConfig, raw_root: str | Path, track: TurnoutTrack, inputs: VisitInputs
+) -> None:
+    section, day, hammer = str(unit.section), str(unit.campaign), turnout.hammer
+    assert hammer is not None
+    records = _recordings(unit, hammer.descriptions[section], raw_root, inputs.notes)
+    recordings = tuple(r for r in records if isinstance(r, Recording))  # without a limit none is a long one
     if not recordings:
         return
-    position = float(turnout.section(unit.section).position)
-    if fault := position_fault(unit.section, position, track):
+    position = float(turnout.section(section).position)
+    if fault := position_fault(section, position, track):
         inputs.notes.append(Note(fault))
         return
-    campaign = turnout.campaigns[unit.campaign]
+    campaign = turnout.campaigns[day]
     temperature = rail_temperature(recordings) if campaign.rail_temperature is None else campaign.rail_temperature
     conditions = {} if temperature is None else {"rail_temperature": temperature}
-    name = f"{unit.section} {unit.campaign}"
-    force = turnout.hammer.force[unit.section]
+    name = f"{section} {day}"
+    force = hammer.force[section]
     positioned = tuple(_with_positions(r, position) for r in recordings)
     receptance_settings = turnout.settings["receptance"]
-    inputs.tests.append(HammerInput(name, position, positioned, force, unit.campaign, conditions, receptance_settings))
-    inputs.sections[name] = unit.section
+    inputs.tests.append(HammerInput(name, position, positioned, force, day, conditions, receptance_settings))
+    inputs.sections[name] = section
 
 
-def _with_positions(recording, position):
+def _with_positions(recording: Recording, position: float) -> Recording:
     """The recording with positions for accelerometers that have none: at the impact, or half a bay further."""
     channels = tuple(
         c
@@ -125,7 +162,7 @@ def _with_positions(recording, position):
     return replace(recording, channels=channels)
 
 
-def _analyse_passages(unit, turnout, raw_root) -> dict[str, list[dict]]:
+def _analyse_passages(unit: Unit, turnout: TurnoutConfig, raw_root: str | Path) -> dict[str, list[dict]]:
     """Tables that the passage stage would compute."""
     path = Path(turnout.settings["passage"].axle_patterns)
     if not path.is_file():
@@ -134,7 +171,14 @@ def _analyse_passages(unit, turnout, raw_root) -> dict[str, list[dict]]:
     return passage_unit(unit, turnout, raw_root, PassageContext(patterns=patterns))
 
 
-def _add_passages(unit, turnout, raw_root, track, tables, inputs):
+def _add_passages(
+    unit: Unit,
+    turnout: TurnoutConfig,
+    raw_root: str | Path,
+    track: TurnoutTrack,
+    tables: Mapping[str, list[dict]],
+    inputs: VisitInputs,
+) -> None:
     """Add the trains of a unit, each with its row of the passage stage.
 
     If the numbers of trains and rows differ, the rows are not used, with a note: they cannot be assigned.
@@ -153,11 +197,18 @@ def _add_passages(unit, turnout, raw_root, track, tables, inputs):
         _thin_out(inputs.passages)
 
 
-def _passage_name(unit):
+def _passage_name(unit: Unit) -> str:
     return unit_id(unit).split("/", 2)[-1]
 
 
-def _read_passages(unit, turnout, raw_root, track, rows, quarantine):
+def _read_passages(
+    unit: Unit,
+    turnout: TurnoutConfig,
+    raw_root: str | Path,
+    track: TurnoutTrack,
+    rows: Sequence[Mapping[str, Any]],
+    quarantine: Sequence[Mapping[str, Any]],
+) -> tuple[VisitInputs, int]:
     """(VisitInputs of a unit's trains, number of trains); a long recording is never loaded as a whole."""
     inputs, n = VisitInputs(), 0
     for recording in _trains(unit, turnout, raw_root, inputs.notes):
@@ -172,7 +223,15 @@ def _read_passages(unit, turnout, raw_root, track, rows, quarantine):
     return inputs, n
 
 
-def _passage_input(name, recording, row: Mapping[str, Any], turnout, track, quarantine, notes):
+def _passage_input(
+    name: str,
+    recording: Recording,
+    row: Mapping[str, Any],
+    turnout: TurnoutConfig,
+    track: TurnoutTrack,
+    quarantine: Sequence[Mapping[str, Any]],
+    notes: list[Note],
+) -> PassageInput | None:
     """Passage of a train, None if it cannot be used; reasons and doubts are added to ``notes``."""
     unusable = {channel for q in quarantine if _is_unusable(q) for channel in q.get("channels") or ()}
     unusable |= _misplaced_sensors(turnout, track, notes)
@@ -198,9 +257,10 @@ def _passage_input(name, recording, row: Mapping[str, Any], turnout, track, quar
     )
 
 
-def _trains(unit, turnout, raw_root, notes):
+def _trains(unit: Unit, turnout: TurnoutConfig, raw_root: str | Path, notes: list[Note]) -> Iterator[Recording]:
     """Recordings of a unit, continuous ones cut into trains as in the passage stage."""
     settings, sensors = turnout.settings["passage"], sensors_of(turnout)
+    assert turnout.passages is not None
     for recording in _recordings(unit, turnout.passages.description, raw_root, notes, settings.longest):
         try:
             for train_recording, *_ in trains_in(recording, settings):
@@ -209,7 +269,7 @@ def _trains(unit, turnout, raw_root, notes):
             notes.append(Note(str(error)))
 
 
-def _thin_out(passages):
+def _thin_out(passages: list[PassageInput]) -> None:
     """Remove the train of middle speed if there are too many similar ones: memory is limited."""
     new = passages[-1]
     similar = [p for p in passages if _similarity_key(p) == _similarity_key(new)]
@@ -219,36 +279,36 @@ def _thin_out(passages):
         passages[:] = [p for p in passages if p is not surplus]
 
 
-def _similarity_key(passage):
+def _similarity_key(passage: PassageInput) -> tuple:
     channels = tuple(c.name for c in passage.recording.channels)
     return passage.train, passage.route, passage.direction, len(passage.vehicle.wheels), channels
 
 
-def _is_unusable(row):
+def _is_unusable(row: Mapping[str, Any]) -> bool:
     """Whether the channel of a quarantine row cannot be used; a slightly clipped one can."""
     slightly = row["reason_code"] == "clipped" and (row.get("measured_value") or 1.0) < MAX_CLIPPED_SHARE
     return row["reason_code"] in UNUSABLE_REASONS and not slightly
 
 
-def _misplaced_sensors(turnout, track, notes):
+def _misplaced_sensors(turnout: TurnoutConfig, track: TurnoutTrack, notes: list[Note]) -> set[str]:
     """Names of sensors whose position contradicts the track, with notes."""
     faults = {s.name: fault for s in sensors_of(turnout) if (fault := position_fault(s.section, s.position, track))}
     notes += [note for note in map(Note, faults.values()) if note not in notes]
     return set(faults)
 
 
-def _reasons_text(quarantine):
+def _reasons_text(quarantine: Sequence[Mapping[str, Any]]) -> str:
     codes = ", ".join(sorted({q["reason_code"] for q in quarantine if _is_unusable(q)}))
     return f" ({codes})" if codes else ""
 
 
-def _passage_conditions(row, recording):
+def _passage_conditions(row: Mapping[str, Any], recording: Recording) -> dict[str, float]:
     temperature = row.get("rail_temperature_c")
     temperature = common.temperature(recording.conditions) if temperature is None else temperature
     return {} if temperature is None else {"rail_temperature": float(temperature)}
 
 
-def _usable_channels(recording, turnout, route, unusable):
+def _usable_channels(recording: Recording, turnout: TurnoutConfig, route: str, unusable: set[str]) -> Recording:
     """The recording with the usable channels of this route only, at their positions."""
     sensors = {s.name: s for s in sensors_of(turnout) if s.track in ("both", route) and s.name not in unusable}
     indices = [i for i, c in enumerate(recording.channels) if c.name in sensors]
@@ -259,7 +319,24 @@ def _usable_channels(recording, turnout, route, unusable):
 
 
 def track_file(turnout: TurnoutConfig, name: str | None = None) -> Path:
-    """The turnout's own track file in the configuration, else that of its layout; SimulationError without one."""
+    """The turnout's own track file in the configuration, else that of its layout.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+        Configuration of the turnout.
+    name : str or None
+        Name or file of a track; None: the turnout's own, else that of its layout.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    SimulationError
+        There is no such file.
+    """
     if name and name.endswith((".yaml", ".yml")):
         return Path(name)
     folder = Path(turnout.folder) / "tracks"
@@ -273,8 +350,21 @@ def track_file(turnout: TurnoutConfig, name: str | None = None) -> Path:
     )
 
 
-def track_of(turnout: TurnoutConfig, name: str | None = None):
-    """(TurnoutTrack, accepted effects) of a turnout."""
+def track_of(turnout: TurnoutConfig, name: str | None = None) -> tuple[TurnoutTrack, tuple[AcceptedEffect, ...]]:
+    """Track of a turnout, and the effects that its file has accepted.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+        Configuration of the turnout.
+    name : str or None
+        Name or file of a track; None: the turnout's own, else that of its layout.
+
+    Returns
+    -------
+    track : TurnoutTrack
+    accepted : tuple of AcceptedEffect
+    """
     path = track_file(turnout, name)
     track = load_track(str(path), folder=path.parent)
     return track, accepted_of(track.terms)
@@ -284,6 +374,17 @@ def digest_of_model(turnout: TurnoutConfig, name: str | None = None) -> str:
     """Digest of the track and vehicle files of the configuration, "" without a track.
 
     For a track given by ``name``, all files in its folder count, since it may extend any of them.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+        Configuration of the turnout.
+    name : str or None
+        Name or file of a track; None: the turnout's own, else that of its layout.
+
+    Returns
+    -------
+    str
     """
     folder = Path(turnout.folder)
     try:
@@ -314,11 +415,24 @@ def _extended_files(path: Path) -> list[Path]:
     return paths
 
 
-def mismatch_context(turnout: str, settings=None, work="work") -> tuple[str, dict[str, dict]]:
-    """(token, tables by passage unit) from the results of the passage stage in ``work``.
+def mismatch_context(turnout: str, settings: Any = None, work: str | Path = "work") -> tuple[str, dict[str, dict]]:
+    """Results of the passage stage of a turnout.
 
-    Results of an earlier version, which do not state the codes of all reasons, are left out: the diagnosis analyses
-    those passages itself.
+    Parameters
+    ----------
+    turnout : str
+        Id of the turnout.
+    settings : object
+        Not used: all contexts have it.
+    work : path
+        Folder of intermediate results.
+
+    Returns
+    -------
+    token : str
+        It changes with the results.
+    tables : dict
+        Unit -> table -> rows.
     """
     tables = {}
     for result in current_results(work, "passage", turnout):

@@ -1,7 +1,11 @@
 """Diagnose a turnout on request, and save its result until it is accepted or computed again."""
 
+from __future__ import annotations
+
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
 
 from turnout.config import load_configuration, with_raw
 from turnout.errors import SimulationError
@@ -10,25 +14,69 @@ from turnout.fingerprint import fingerprint
 from turnout.registry.database import open_registry
 from turnout.stages.budget import Watch
 from turnout.stages.mismatch import Options, diagnose_visit
-from turnout.stages.mismatch_groups import unit_of, visits
+from turnout.stages.mismatch_groups import Group, unit_of, visits
 from turnout.stages.mismatch_inputs import mismatch_context
 from turnout.workflow.batches import decode, encode
 from turnout.workflow.scan import scan
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from typing import Any
+
+    from turnout.records import Unit
+
+
+class ProgressBar(Protocol):
+    """What a diagnosis tells of its progress."""
+
+    def group(self, group: Group, number: int, count: int) -> Callable[[int, int, str], object]:
+        """Begin a group; returns the callable that reports its joint fits."""
+
+    def simulations(self, count: int) -> None:
+        """Called at every prediction."""
+
 
 ALL_VISITS = "all"  # every visit in one case: effects of temperature or time need several
 
 
 def diagnose_turnout(
-    turnout_id, config="config", raw_root="raw", work="work", visit=None, track=None, sections=(), budget=None, bar=None
-):
+    turnout_id: str,
+    config: str | Path = "config",
+    raw_root: str | Path = "raw",
+    work: str | Path = "work",
+    visit: str | None = None,
+    track: str | None = None,
+    sections: Sequence[str] = (),
+    budget: float | None = None,
+    bar: ProgressBar | None = None,
+) -> dict[str, list[dict[str, Any]]]:
     """Rows by table of one visit of a turnout, by default the newest; "all" takes every visit as one.
 
     Parameters
     ----------
+    turnout_id : str
+        Id of the turnout.
+    config : path
+        Folder of the configuration.
+    raw_root : path
+        Folder of all recordings.
+    work : path
+        Folder of intermediate results.
+    visit : str or None
+        YYYY-MM-DD, YYYY-MM, or "all"; None: the newest.
+    track : str or None
+        Name or file of a track; None: the turnout's own.
+    sections : sequence of str
+        Labels of the sections, () for all.
     budget : float or None
         Seconds after which BudgetSpentError is raised; finished fits are stored.
     bar : object with ``group`` and ``simulations``, or None
         Called with the progress.
+
+    Returns
+    -------
+    dict
+        Table -> rows.
 
     Raises
     ------
@@ -46,7 +94,9 @@ def diagnose_turnout(
     return diagnose_visit(unit, turnout, raw_root, passage_tables, fingerprint("turnout.stages.mismatch"), options)
 
 
-def _visit(turnout_id, by_visit, requested, raw_root):
+def _visit(
+    turnout_id: str, by_visit: Mapping[str, list[Unit]], requested: str | None, raw_root: str | Path
+) -> tuple[str, list[Unit]]:
     if not by_visit:
         raise SimulationError(f"{turnout_id}: no hammer test and no passage below {raw_root}; nothing can be said.")
     if requested is None:
@@ -61,15 +111,15 @@ def _visit(turnout_id, by_visit, requested, raw_root):
 class Results:
     """The last result of a turnout, below ``work`` or in the ``registry``."""
 
-    def __init__(self, work, turnout_id, registry=None):
+    def __init__(self, work: str | Path, turnout_id: str, registry: str | Path | None = None):
         self.turnout_id, self.registry = turnout_id, registry
         self.path = Path(work) / "mismatch-fits" / f"{turnout_id}.json"
 
-    def save(self, tables):
+    def save(self, tables: dict[str, list[dict]]) -> None:
         """Write the result below ``work``."""
         write_text(self.path, encode(tables))
 
-    def finding(self, finding_id=None):
+    def finding(self, finding_id: str | None = None) -> dict[str, Any]:
         """The finding with this id, or the only one with a term; SimulationError if that is ambiguous."""
         rows = self._rows()
         if finding_id:
@@ -84,7 +134,7 @@ class Results:
         reason = "several findings carry a term" if chosen else "no such finding carries a term"
         raise SimulationError(f"{self.turnout_id}: {reason}; say which with --finding. There are {overview or 'none'}.")
 
-    def _rows(self):
+    def _rows(self) -> list[dict[str, Any]]:
         """Rows saved below ``work`` or those of the registry, whichever are of newer recordings."""
         saved, registered = self._saved_rows(), self._registry_rows()
         if not saved and not registered:
@@ -92,13 +142,13 @@ class Results:
             raise SimulationError(f"{message}: run turnout diagnose --turnout {self.turnout_id} first.")
         return registered if _newest(registered) > _newest(saved) else saved
 
-    def _saved_rows(self):
+    def _saved_rows(self) -> list[dict[str, Any]]:
         try:
             return decode(self.path.read_text(encoding="utf-8"))["mismatch_findings"]
         except FileNotFoundError:
             return []
 
-    def _registry_rows(self):
+    def _registry_rows(self) -> list[dict[str, Any]]:
         """Newest findings of the turnout in the registry, [] without a registry."""
         if self.registry is None or not (Path(self.registry) / "registry.duckdb").exists():
             return []
@@ -108,6 +158,6 @@ class Results:
             return [dict(zip(names, row)) for row in cursor.fetchall()]
 
 
-def _newest(rows):
+def _newest(rows: Sequence[Mapping[str, Any]]) -> str:
     """Time of the newest finding as sortable text, "" without any."""
     return max((str(r["found_at_utc"]).replace("T", " ")[:19] for r in rows), default="")

@@ -40,7 +40,17 @@ GENERAL_TEST = "hammer tests at the points between, and a train of another load 
 
 
 def sentence(diagnosis: Diagnosis) -> str:
-    """The verdict as sentences for a track engineer."""
+    """The verdict as sentences for a track engineer.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Result of the engine.
+
+    Returns
+    -------
+    str
+    """
     verdict = diagnosis.verdict
     if verdict.answer == "none":
         return "Simulation and recordings agree as well as those of sound turnouts do."
@@ -59,7 +69,17 @@ def sentence(diagnosis: Diagnosis) -> str:
 
 
 def location_text(diagnosis: Diagnosis) -> str:
-    """Location of the missing effect in words, else the frames in which the residual is concentrated."""
+    """Location of the missing effect in words, else the frames in which the residual is concentrated.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Result of the engine.
+
+    Returns
+    -------
+    str
+    """
     if diagnosis.where is not None:
         return str(diagnosis.where)
     frames = [f for f in diagnosis.frames if f.q < FALSE_DISCOVERY_RATE]
@@ -69,7 +89,18 @@ def location_text(diagnosis: Diagnosis) -> str:
 
 
 def recommendation(diagnosis: Diagnosis) -> str:
-    """What to check on site, or which measurement would decide."""
+    """What to check on site, or which measurement would decide.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Result of the engine.
+
+    Returns
+    -------
+    str
+        "" where nothing has to be done.
+    """
     verdict, effects = diagnosis.verdict, physics.effects_by_name()
     if verdict.answer == "named":
         return effects[verdict.names[0]].site_check if verdict.names[0] in effects else GENERAL_CHECK
@@ -80,7 +111,20 @@ def recommendation(diagnosis: Diagnosis) -> str:
 
 
 def finding_row(diagnosis: Diagnosis, identity: Mapping[str, Any]) -> dict[str, Any]:
-    """Row of ``mismatch_findings``; ``identity`` holds finding_id, turnout_id, section_id, found_at_utc, result_id."""
+    """Row of ``mismatch_findings``.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Result of the engine.
+    identity : mapping
+        finding_id, turnout_id, section_id, found_at_utc and result_id.
+
+    Returns
+    -------
+    dict
+        Column -> value.
+    """
     verdict, check = diagnosis.verdict, diagnosis.verification
     term = next(iter(diagnosis.fit.candidates), None) if verdict.answer in ("named", "a_or_b") else None
     where = term.where if term else location_fields(diagnosis.where)
@@ -113,14 +157,36 @@ def finding_row(diagnosis: Diagnosis, identity: Mapping[str, Any]) -> dict[str, 
 
 
 def train_text(where: Mapping[str, Any]) -> str | None:
-    """Train and axle of a location in words, None without a train."""
+    """Train and axle of a location in words, None without a train.
+
+    Parameters
+    ----------
+    where : mapping
+        Position, sensor, train or axle.
+
+    Returns
+    -------
+    str or None
+        None without a train.
+    """
     if not where.get("train"):
         return None
     return f"{where['train']}, axle {where['axle']}" if where.get("axle") else where["train"]
 
 
 def location_fields(location: Location | None) -> dict[str, Any]:
-    """Frame, position with standard error, sensor, train and axle of the location of a residual, {} of None."""
+    """Frame, position with standard error, sensor, train and axle of the location of a residual, {} of None.
+
+    Parameters
+    ----------
+    location : Location or None
+        Of the residual.
+
+    Returns
+    -------
+    dict
+        {} without a location.
+    """
     if location is None:
         return {}
     columns: dict[str, Any] = {"frame": location.frame, "sensor": location.sensor}
@@ -132,7 +198,17 @@ def location_fields(location: Location | None) -> dict[str, Any]:
 
 
 def fitted_parameters(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Name, value, standard error and unit of each fitted parameter."""
+    """Name, value, standard error and unit of each fitted parameter.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Result of the engine.
+
+    Returns
+    -------
+    list of dict
+    """
     fitted = [(c, p) for c in diagnosis.fit.candidates for p in c.parameters]
     values = zip(fitted, diagnosis.fit.psi, diagnosis.fit.psi_se)
     return [
@@ -178,7 +254,24 @@ MAX_NOTES = 12
 def finding_tables(
     diagnosis: Diagnosis, case: TrackCase, group: Group, about: Mapping[str, Any]
 ) -> dict[str, list[dict]]:
-    """Rows by table of one group's diagnosis; ``about`` holds turnout, visit, identity (content id), notes."""
+    """Rows by table of one group's diagnosis.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Result of the engine.
+    case : TrackCase
+        The case that was diagnosed.
+    group : Group
+        Its sections.
+    about : mapping
+        turnout, visit, identity (content id) and notes.
+
+    Returns
+    -------
+    dict
+        Table -> rows.
+    """
     identity = _identity(group, about, case)
     comparison = (
         best_comparison(channel_comparisons(case, diagnosis), case, diagnosis) if case.aligned_passages else None
@@ -308,6 +401,19 @@ def parameter_rows(diagnosis: Diagnosis, case: TrackCase, row: Mapping[str, Any]
 
     They hold the new terms, and the present estimates of the track file: accepted effects and uncertain numbers of the
     running surface.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Result of the engine.
+    case : TrackCase
+        The case that was diagnosed.
+    row : mapping
+        Its row of ``mismatch_findings``.
+
+    Returns
+    -------
+    list of dict
     """
     base = {k: row[k] for k in ("finding_id", "turnout_id", "found_at_utc")}
     rows = []
@@ -326,7 +432,20 @@ def parameter_rows(diagnosis: Diagnosis, case: TrackCase, row: Mapping[str, Any]
 
 
 def surface_estimates(case: TrackCase, fit: Fit) -> list[dict]:
-    """Estimates of uncertain numbers of the running surface in the track's file."""
+    """Estimates of uncertain numbers of the running surface in the track's file.
+
+    Parameters
+    ----------
+    case : TrackCase
+        The case.
+    fit : Fit
+        Of the case.
+
+    Returns
+    -------
+    list of dict
+        As those of ``SurfaceParameter.estimate``.
+    """
     surface = case.predictor.site.surface
     return list(surface.estimate(case, fit)) if surface else []
 

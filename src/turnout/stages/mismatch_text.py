@@ -18,6 +18,21 @@ PERCENT_UNITS = {"1/K": "% per kelvin"}
 def number_in_words(value: float, unit: str, digits: int = 2) -> str:
     """A value with its unit, small ones in mm or ms.
 
+    Parameters
+    ----------
+    value : float
+        The number.
+    unit : str
+        Its unit.
+    digits : int
+        Significant digits.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
     >>> number_in_words(0.00112, "m"), number_in_words(1.31, "-"), number_in_words(0.012, "1/K")
     ('1.1 mm', '1.3', '1.2 % per kelvin')
     """
@@ -32,6 +47,24 @@ def number_in_words(value: float, unit: str, digits: int = 2) -> str:
 def interval(term: str, name: str, value: float, se: float) -> tuple[float, float]:
     """95 % interval of a term's parameter; not below 0 if the parameter cannot be negative.
 
+    Parameters
+    ----------
+    term : str
+        Name of the effect.
+    name : str
+        Name of the parameter.
+    value : float
+        Estimate.
+    se : float
+        Its standard error.
+
+    Returns
+    -------
+    (float or None, float or None)
+        Both limits in the unit of the parameter.
+
+    Examples
+    --------
     >>> [round(interval(*what, 0.1, 0.1)[0], 3) for what in (("hanging_sleeper", "seated"), ("kink", "depth"))]
     [0.0, -0.096]
     """
@@ -43,6 +76,19 @@ def interval(term: str, name: str, value: float, se: float) -> tuple[float, floa
 def parameter_in_words(term: str, name: str) -> str:
     """Name and meaning of a term's parameter; the name only for a term outside the library.
 
+    Parameters
+    ----------
+    term : str
+        Name of the effect.
+    name : str
+        Name of the parameter.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
     >>> parameter_in_words("hanging_sleeper", "gap"), parameter_in_words("kink", "depth")
     ('gap: clearance when unloaded', 'depth')
     """
@@ -59,7 +105,17 @@ PARAMETER_NAMES = {"power": "power of the flanks (1 straight, 2 parabolas)", "sh
 
 
 def headline(finding: Mapping[str, Any]) -> str:
-    """The ``title``, followed by the reason of a named verdict."""
+    """The ``title``, followed by the reason of a named verdict.
+
+    Parameters
+    ----------
+    finding : mapping
+        Row of ``mismatch_findings``.
+
+    Returns
+    -------
+    str
+    """
     text, reason = title(finding), json.loads(finding["evidence_json"] or "{}").get("reason")
     if finding["verdict"] != "named" or not reason or not json.loads(finding["term_json"] or "[]"):
         return text
@@ -67,7 +123,17 @@ def headline(finding: Mapping[str, Any]) -> str:
 
 
 def title(finding: Mapping[str, Any]) -> str:
-    """One sentence: the effect that the simulation left out, or the verdict instead."""
+    """One sentence: the effect that the simulation left out, or the verdict instead.
+
+    Parameters
+    ----------
+    finding : mapping
+        Row of ``mismatch_findings``.
+
+    Returns
+    -------
+    str
+    """
     terms = json.loads(finding["term_json"] or "[]")
     if finding["verdict"] in ("named", "a_or_b") and terms:
         rivals = [finding["rival_term"] if finding["verdict"] == "a_or_b" else None, *(None for _ in terms[1:])]
@@ -83,6 +149,18 @@ def title(finding: Mapping[str, Any]) -> str:
 def surface_sentence(estimate: Mapping[str, Any]) -> str:
     """A sentence on a number of the running surface that differs from the track's file, "" if it agrees.
 
+    Parameters
+    ----------
+    estimate : mapping
+        One of ``surface_estimates``.
+
+    Returns
+    -------
+    str
+        "" where the file may be right.
+
+    Examples
+    --------
     >>> depth = {"term": "running_surface_kink", "place": 26.7, "name": "depth", "unit": "m", "filed": 1e-3}
     >>> surface_sentence({**depth, "value": 4e-3, "se": 1e-4, "off": 2.8})
     'The depth of the kink at 26.7 m is 4 mm (3.8 to 4.2 mm), the track file has 1 mm.'

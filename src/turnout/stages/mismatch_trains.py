@@ -1,8 +1,11 @@
 """Identify the train of a passage for the simulation: vehicle, units, load, speed, direction and route."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +15,10 @@ from turnout.mismatch.turnout.priors import TRACK
 from turnout.simulate import load_vehicle
 from turnout.simulate.vehicle import Vehicle
 from turnout.stages.common import number
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from typing import Any
 
 MAX_AXLE_RMS = 0.4  # m rms between measured axles and the vehicle file's: half a short bogie is 0.9
 MIN_SPEED_TOLERANCE = 0.03  # least share by which the axle distances may correct the speed
@@ -41,11 +48,24 @@ class TrainUnknownError(Exception):
 
 
 def train_of(row: Mapping, notes: Mapping, folder: Path) -> IdentifiedTrain:
-    """Train from the passage stage's ``row`` and the ``notes`` in the file; vehicle files are in ``folder``.
+    """Train of a passage, from the recording and the notes in its file.
 
-    The recording takes precedence over the notes. TrainUnknownError if type or speed are not known, there is no vehicle
-    file, or its axles do not match. A train noted with its speed is accepted even if its axles do not match, with a
-    doubt: flats, dips and polygonal wheels look like axles, and the simulation shows whether it is that train.
+    The recording takes precedence over the notes. A train noted with its speed is accepted even if its axles do
+    not match, with a doubt: flats, dips and polygonal wheels look like axles, and the simulation shows whether
+    it is that train.
+
+    Parameters
+    ----------
+    row : mapping
+        Row of the passage stage.
+    notes : mapping
+        Conditions noted in the file.
+    folder : Path
+        Folder of the vehicle files.
+
+    Returns
+    -------
+    IdentifiedTrain
     """
     noted_speed = KMH * (number(notes, "speed") or 0.0) or row.get("speed_listed_kmh")
     speed = row.get("speed_kmh") or noted_speed
@@ -90,7 +110,9 @@ def train_of(row: Mapping, notes: Mapping, folder: Path) -> IdentifiedTrain:
     )
 
 
-def _heading(words, name, row, notes):
+def _heading(
+    words: tuple[str, str], name: str, row: Mapping[str, Any], notes: Mapping[str, Any]
+) -> tuple[str, tuple[str, ...]]:
     """(word, doubts): the measured word, else the noted one, else the first of ``words`` with a doubt."""
     for value in (row.get(name), notes.get(name)):
         word = str(value or "").strip().lower()
@@ -100,19 +122,26 @@ def _heading(words, name, row, notes):
     return words[0], (f"{name} not known, {words[0]} assumed{consequence}",)
 
 
-def _type_names(row, notes) -> list[str]:
+def _type_names(row: Mapping[str, Any], notes: Mapping[str, Any]) -> list[str]:
     """Train types: measured, listed, noted, in this order."""
     sources = (row.get("train_type"), row.get("train_type_listed"), notes.get("train_type"))
     return [str(name).lower().replace(" ", "_") for name in sources if name and name != "unknown"]
 
 
-def _with_a_file(names, folder) -> str:
+def _with_a_file(names: Sequence[str], folder: Path) -> str:
     """The first type with a vehicle file, else the first type, "" without any."""
     available = [name for name in names if (Path(folder) / f"{name}.yaml").is_file()]
     return next(iter([*available, *names]), "")
 
 
-def _loaded_vehicle(name, n_axles_heard, row, notes, folder, is_trusted):
+def _loaded_vehicle(
+    name: str,
+    n_axles_heard: int | None,
+    row: Mapping[str, Any],
+    notes: Mapping[str, Any],
+    folder: Path,
+    is_trusted: bool,
+) -> tuple[Vehicle, float, tuple[str, ...], tuple[str, ...]]:
     """(vehicle, ``load_sd``, doubts on its load, doubts on its axles)."""
     try:
         single_unit = load_vehicle(name, 0.0, folder)
@@ -132,7 +161,7 @@ def _loaded_vehicle(name, n_axles_heard, row, notes, folder, is_trusted):
     return load_vehicle(name, share, folder, units), load_sd, doubts, axle_doubts
 
 
-def _axles_by_length(name, row, speed, folder):
+def _axles_by_length(name: str, row: Mapping[str, Any], speed: float, folder: Path) -> int:
     """Number of axles of as many units as are as long as the measured train at ``speed`` [m/s].
 
     A dip adds an impact behind every axle, but does not lengthen the train.
@@ -143,7 +172,9 @@ def _axles_by_length(name, row, speed, folder):
     return n * int(np.clip(1 + round(extra_units), 1, len(times) // n))
 
 
-def _load_share(name, row, notes, folder, units):
+def _load_share(
+    name: str, row: Mapping[str, Any], notes: Mapping[str, Any], folder: Path, units: int
+) -> tuple[float, float, tuple[str, ...]]:
     """(share of the payload that gives the measured axle load, ``load_sd``, doubts).
 
     Without an axle load it is half the payload, uniformly distributed between empty and full.
@@ -164,12 +195,12 @@ def _load_share(name, row, notes, folder, units):
     return float(np.clip(share, 0.0, 1.5)), TRACK.load_sd, doubts
 
 
-def _sprung_mass(vehicle):
+def _sprung_mass(vehicle: Vehicle) -> float:
     """Mass of all bodies but the wheelsets [kg]."""
     return sum(b.mass for k, b in enumerate(vehicle.bodies) if k not in set(vehicle.wheels))
 
 
-def _speed_from_axles(name, vehicle, row, speed):
+def _speed_from_axles(name: str, vehicle: Vehicle, row: Mapping[str, Any], speed: float) -> tuple[float, bool]:
     """(speed [m/s], whether the train is reversed), from the vehicle's axle distances and the axle times.
 
     TrainUnknownError if the axles do not match the vehicle at any speed near ``speed``.
@@ -188,7 +219,7 @@ def _speed_from_axles(name, vehicle, row, speed):
     return fitted_speed, fits[0][0] > MAX_AXLE_RMS
 
 
-def _fit_speed(times, positions, speed, tolerance):
+def _fit_speed(times: np.ndarray, positions: np.ndarray, speed: float, tolerance: float) -> tuple[float, float]:
     """(rms distance [m], speed [m/s]) of axles at ``times`` [s] fitted to ``positions`` [m].
 
     The speed stays within the relative ``tolerance``.
