@@ -149,10 +149,11 @@ def _numerics_rule(search: Search, base: Fit) -> tuple[Rule | None, NumericalErr
 
 def _seek_effects(search: Search, base: Fit) -> Findings:
     """Verdicts on effects that are sought one after the other, each on top of those before."""
-    findings, goes_on = Findings(search, base, base), True
+    findings = Findings(search, base, base)
     for effect in range(search.settings.effects):
-        if goes_on:
-            findings, goes_on = _seek_effect(findings, effect)
+        findings, goes_on = _seek_effect(findings, effect)
+        if not goes_on:
+            break
     return findings
 
 
