@@ -119,14 +119,14 @@ def test_a_rail_soft_in_shear_is_sized_against_the_rail_of_its_file(plan):
 def test_a_shear_law_is_tried_in_the_rail_that_blows_bent():
     """What a term says of the rail is said of its file; the rest stays as blows found it, for passages as well."""
     case = TrackCase(measured_campaign(small_plan((15.0,), hammer_positions=(24.0,), passages=False), (), 3))
-    predictor = case.predictor.recentred({"rail_bending": 0.03, "rail_shear": -0.2})
+    predictor = case.predictor.recentre({"rail_bending": 0.03, "rail_shear": -0.2})
     file, bent = predictor.site.nominal.turnout.track.rail, predictor.track().rail
     assert bent.shear_stiffness == pytest.approx(np.exp(-0.2) * file.shear_stiffness)
     sheared = predictor.track(terms=(physics.LocalPad(3, 2.0), physics.RailShear(2.0))).rail
     assert sheared.shear_stiffness == file.shear_stiffness
     assert sheared.bending_stiffness == pytest.approx(np.exp(0.03) * file.bending_stiffness)
     assert predictor.track(terms=(physics.LocalPad(3, 2.0),)).rail == bent
-    predictor = predictor.recentred({"rail_bending": 0.01})
+    predictor = predictor.recentre({"rail_bending": 0.01})
     assert predictor.track(terms=(physics.RailShear(2.0),)).rail.bending_stiffness < sheared.bending_stiffness
 
 

@@ -245,7 +245,7 @@ def test_passages_roll_on_the_rail_that_the_fit_has(sound):
     assert case.with_updated_errors(replace(fit, values={**fit.values, **bent})) is case
     bent["rail_shear"] -= 0.3
     softer = replace(fit, values={**fit.values, **bent})
-    new, made = case.with_updated_errors(softer), case.predictor.recentred(bent)
+    new, made = case.with_updated_errors(softer), case.predictor.recentre(bent)
     assert new.predictor.rail == bent and new.with_updated_errors(softer) is new and case.predictor.rail != bent
     seen = next(o for o in case.observations if o.name == "heavy 2")
     (before,), (found,), (exact,) = (c.predict(softer.values, (), [seen]) for c in (case, new, made))

@@ -100,7 +100,7 @@ class TrackCase(PredictedCase):
         start_values = data.start_values
         if accepted.effects and any(o.name in data.frf_pairs for o in data.observations):
             values = hammer_case(data, predictor, candidates, accepted, cache).fit_from_priors()
-            start_values, predictor = {**start_values, **values}, predictor.recentred(values)
+            start_values, predictor = {**start_values, **values}, predictor.recentre(values)
         nuisances = data.site.nuisances(a.passage for a in data.aligned_passages.values())
         super().__init__(predictor, data.observations, nuisances, candidates, accepted, cache(predictor, False))
         self.data, self.families, self.cache, self.start_values = data, families, cache, start_values
@@ -179,7 +179,7 @@ class TrackCase(PredictedCase):
         updated = copy(self)
         updated.log_mass_ratios = {**self.log_mass_ratios, **changed}
         if rail_changed:
-            updated.predictor = self.predictor.recentred(fit.values)
+            updated.predictor = self.predictor.recentre(fit.values)
             updated.predictions = self.cache(updated.predictor, False)
         values = {**fit.values, **{f"wheels_{train}": m for train, m in updated.log_mass_ratios.items()}}
 

@@ -56,10 +56,10 @@ def matrices_of(track: Track, terms: Sequence[PhysicsTerm] = ()) -> TrackMatrice
         track.support.tobytes(), track.elements_per_bay, track.pad_width, track.pad_loss_factor.tobytes(),
         track.ballast_loss_factor.tobytes(), extra, joins,
     )  # fmt: skip
-    return _cached(_templates, key, lambda: MatrixTemplate(track, links)).fill(track, links)
+    return _get_or_compute(_templates, key, lambda: MatrixTemplate(track, links)).fill(track, links)
 
 
-def _cached(cache: OrderedDict[Hashable, _Value], key: Hashable, compute: Callable[[], _Value]) -> _Value:
+def _get_or_compute(cache: OrderedDict[Hashable, _Value], key: Hashable, compute: Callable[[], _Value]) -> _Value:
     """``compute()``, cached under ``key`` among the last ``SIMULATION.template_cache_size``."""
     if key not in cache:
         cache[key] = compute()
@@ -110,11 +110,13 @@ class MatrixTemplate:
     def _base_with_rail(self, track: Track) -> TrackMatrices:
         """``base`` with the rail of ``track``, cached."""
         key = track.rail, track.stretches, track.end_length, track.end_damping
-        return _cached(self.rail_bases, key, lambda: add_rails(self.base, track))
+        return _get_or_compute(self.rail_bases, key, lambda: add_rails(self.base, track))
 
     def _link_entries(self, links: Sequence[Link]) -> tuple[np.ndarray, ...]:
         """Matrix entries of ``links`` of terms, cached."""
-        return _cached(self.link_entries, tuple(k.ends for k in links), lambda: self._matrix_entries(enumerate(links)))
+        return _get_or_compute(
+            self.link_entries, tuple(k.ends for k in links), lambda: self._matrix_entries(enumerate(links))
+        )
 
     def fill(self, track: Track, links: Sequence[Link]) -> TrackMatrices:
         """TrackMatrices with the values of ``track`` and of additional links."""

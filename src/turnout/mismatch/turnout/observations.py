@@ -141,7 +141,7 @@ def case_data(campaign: CampaignInput, settings: MismatchSettings, solver: Track
     predictor = Predictor(site, solver).with_recordings(tests.frf_pairs, {})
     fitted = [o for name, o in tests.observations if name not in campaign.reserved]
     start_values = _fit_hammer_start(predictor, fitted)
-    predictor = predictor.recentred(start_values)
+    predictor = predictor.recentre(start_values)
     passages = _observe_passages(campaign, settings.materiality, predictor, start_values)
     recordings = [*tests.observations, *passages.observations]
     notes = (*tests.notes, *passages.notes)

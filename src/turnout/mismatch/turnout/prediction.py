@@ -97,7 +97,7 @@ class Predictor:
         other.frf_pairs, other.aligned_passages = dict(frf_pairs), dict(aligned_passages)
         return other
 
-    def recentred(self, values: Values) -> Predictor:
+    def recentre(self, values: Values) -> Predictor:
         """The predictor with the track of passages about the rail that ``values`` give.
 
         Receptances are linear in deviations of the rail from a grid, so they hardly depend on it.

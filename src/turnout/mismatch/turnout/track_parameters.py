@@ -228,7 +228,7 @@ def with_rail(zone: Zone, values: Mapping[str, float]) -> Zone:
     """
     factor = {name: float(np.exp(value)) for name, value in values.items()}
 
-    def changed(rail: Rail, bending: float = 1.0, mass: float = 1.0) -> Rail:
+    def with_scales(rail: Rail, bending: float = 1.0, mass: float = 1.0) -> Rail:
         return replace(
             rail,
             bending_stiffness=rail.bending_stiffness * factor["rail_bending"] * bending,
@@ -237,13 +237,15 @@ def with_rail(zone: Zone, values: Mapping[str, float]) -> Zone:
         )
 
     def with_factors(track: Track) -> Track:
-        stretches = [replace(s, rail=changed(s.rail)) for s in track.stretches]
+        stretches = [replace(s, rail=with_scales(s.rail)) for s in track.stretches]
         for k, c in enumerate(zone.castings):
             if c.stretch in track.stretches:
                 stretches.append(
-                    replace(c.piece, rail=changed(c.piece.rail, *(factor[f"{name}_{k}"] for name, *_ in CASTING_SDS)))
+                    replace(
+                        c.piece, rail=with_scales(c.piece.rail, *(factor[f"{name}_{k}"] for name, *_ in CASTING_SDS))
+                    )
                 )
-        return track.with_(rail=changed(track.rail), stretches=tuple(stretches))
+        return track.with_(rail=with_scales(track.rail), stretches=tuple(stretches))
 
     tracks = {name: with_factors(track) for name, track in zone.turnout.tracks.items()}
     return replace(zone, turnout=replace(zone.turnout, track=with_factors(zone.turnout.track), tracks=tracks))
