@@ -245,7 +245,7 @@ def test_a_size_errs_by_the_share_its_law_is_loose_as_well():
     case = Line(lambda x: x + 0.4 * x**2)
     strict = case.candidates[0]
     fit = fit_jointly(case, (strict,), np.array([0.3]))
-    loose = fit.with_candidates((replace(strict, model_error_share=0.15),))
+    loose = fit.with_candidates((replace(strict, effect=replace(strict.effect, model_error_share=0.15)),))
     assert np.allclose(loose.psi_se**2, fit.psi_se**2 + (0.15 * fit.psi) ** 2, atol=0.0, rtol=1e-12)
 
 
