@@ -35,14 +35,14 @@ def test_what_was_left_out_is_found_or_said_to_be_unknown(shared_data):
     found = real_frfs.analyse(shared_data)
     said = {title: (d.verdict.answer, d.verdict.names) for title, (_, _, d) in found.items()}
     assert said["A1"] == ("named", ("mode",))
-    frequency, damping = real_frfs.mode_found(found["A1"][2])
+    frequency, damping = real_frfs.identified_mode(found["A1"][2])
     assert frequency == pytest.approx(477.4, abs=0.5)  # printed by the makers; half a line, blows differ by 0.4
     assert damping == pytest.approx(0.20, abs=0.02)
     assert found["A1"][2].verification.after > found["A1"][2].verification.before + 30.0
     assert said["A2"][0] == "unknown"
     most = max(found["A2"][2].frames, key=lambda f: f.share)
     assert most.frame == "frequency" and most.level in ("449 Hz", "566 Hz")  # the thirds of an octave beside 477 Hz
-    assert said["A3"] == ("named", ("mode",)) and real_frfs.mode_found(found["A3"][2])[0] < 60.0
+    assert said["A3"] == ("named", ("mode",)) and real_frfs.identified_mode(found["A3"][2])[0] < 60.0
     beam = found["A4"][2]
     assert said["A4"] == ("named", ("shear_and_rotation",)) and beam.verdict.grade == "B"
     size, half, above = real_frfs.beam_printed()  # by six frequencies, three of which lie beyond the fitted band

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from examples import niederwangen
-from examples.decay_case import CHANGES, DecayCase, whitening
+from examples.decay_case import CHANGES, DecayCase, MeasuredRates, whitening
 from examples.decay_model import BANDS, LATERAL, LINES, VERTICAL, Support, decay_rate
 
 from turnout.simulate.decay_rate import track_decay_rate
@@ -56,13 +56,13 @@ def folder(shared_data):
 @pytest.mark.slow
 def test_the_conclusions_come_out_again(folder):
     """As by the method without a model, docs/niederwangen_decay_rate.md: S1, S4, S5 changed by 2013-01, S2 did not."""
-    measured, answers = niederwangen.read(folder), niederwangen.analyse(folder, tell=lambda line: None)
+    measured, answers = niederwangen.read(folder), niederwangen.analyse(folder, report=lambda line: None)
     said = {m.section: niederwangen.conclusion(answers[m.section][1]) for m in measured}
     assert {s for s, (what, _) in said.items() if what == "changed"} == {"S1", "S4", "S5"}
     assert said["S2"] == ("not changed", ())
     assert said["S3"][0] == "left open"
     for section in ("S1", "S4", "S5"):
-        assert set(said[section][1]) <= niederwangen.DAMPS
+        assert set(said[section][1]) <= niederwangen.DAMPING_EFFECTS
         assert {max(gains, key=gains.get) for gains in answers[section][2].values()} == {"2013-01"}
         for _, diagnosis in answers[section][1].values():
             assert diagnosis.verification.after > diagnosis.verification.before
@@ -82,8 +82,8 @@ def test_a_change_of_pads_would_have_been_told_from_one_of_the_rail(folder):
     for o in everything:
         with_it, without = (case.logarithm(values, terms, o) for terms in ((change.term([-1.2]),), ()))
         log[o.data_type, o.condition] = quiet.log[o.data_type, o.condition] + with_it - without
-    planted = niederwangen.Measured("planted", log, quiet.spread, quiet.repeat, quiet.temperature, quiet.campaigns)
+    planted = MeasuredRates("planted", log, quiet.spread, quiet.repeat, quiet.temperature, quiet.campaigns)
     verdict = niederwangen.diagnose(DecayCase(planted, "2015-09", priors)).verdict
-    assert verdict.names and not set(verdict.names) & niederwangen.DAMPS
+    assert verdict.names and not set(verdict.names) & niederwangen.DAMPING_EFFECTS
     assert set(verdict.names) & {"pads", "vertical_pad", "lateral_pad"}
     assert set(verdict.names) <= set(CHANGES)

@@ -21,7 +21,7 @@ def imported_here(module):
 
 
 def test_every_kernel_that_another_one_calls_is_behind_the_name_of_the_folder():
-    with_kernels = {p.stem for p in HERE.glob("*.py") if "compiled import" in p.read_text()}
+    with_kernels = {p.stem for p in HERE.glob("*.py") if "kernel_cache import" in p.read_text()}
     assert len(with_kernels) >= 6
     called = {f"turnout.simulate.{name}" for name in with_kernels}
     behind = closure(kernel_cache.FINGERPRINTED_MODULE)
@@ -31,7 +31,7 @@ def test_every_kernel_that_another_one_calls_is_behind_the_name_of_the_folder():
 
 
 def test_no_kernel_goes_round_the_folder():
-    assert not [p.name for p in HERE.glob("*.py") if "numba" in imported_numba(p) and p.stem != "compiled"]
+    assert not [p.name for p in HERE.glob("*.py") if "numba" in imported_numba(p) and p.stem != "kernel_cache"]
 
 
 def imported_numba(path):
@@ -56,7 +56,7 @@ def test_the_users_own_setting_comes_first_and_is_used_again(tmp_path):
 def nowhere(monkeypatch, tmp_path):
     """Nothing beside the source and no user's cache can be written: both would lie below a file."""
     (tmp_path / "file").write_text("")
-    monkeypatch.setattr(kernel_cache, "__file__", str(tmp_path / "file" / "compiled.py"))
+    monkeypatch.setattr(kernel_cache, "__file__", str(tmp_path / "file" / "kernel_cache.py"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     monkeypatch.setattr(kernel_cache.config, "CACHE_DIR", "")
     kernel_cache.cache_folder.cache_clear()
@@ -83,7 +83,7 @@ def test_the_users_cache_serves_an_installation_that_cannot_be_written(nowhere, 
 def test_other_code_has_another_folder_and_the_old_one_goes(nowhere, monkeypatch):
     package = nowhere / "package"
     (package / "__pycache__" / "kernels-0123456789abcdef").mkdir(parents=True)
-    monkeypatch.setattr(kernel_cache, "__file__", str(package / "compiled.py"))
+    monkeypatch.setattr(kernel_cache, "__file__", str(package / "kernel_cache.py"))
     monkeypatch.setattr(kernel_cache, "fingerprint", lambda *_: "feedfeedfeedfeed")
     assert kernel_cache.cache_folder().name == "kernels-feedfeedfeedfeed"
     assert [p.name for p in (package / "__pycache__").iterdir()] == ["kernels-feedfeedfeedfeed"]
