@@ -384,7 +384,7 @@ def test_a_turnout_is_diagnosed_from_its_configuration(monkeypatch, repository):
     )
     configuration = turnout.load_configuration(repository / "config")
     findings = turnout.diagnose("tommerup_s1", configuration=configuration, visit="2024-05", sections=["A7"])
-    assert calls == [("tommerup_s1", repository / "config", "raw", "work", "2024-05", None, ("A7",))]
+    assert calls == [("tommerup_s1", str(repository / "config"), "raw", "work", "2024-05", None, ("A7",))]
     assert repr(findings) == "TurnoutFindings(tommerup_s1: no section)"
 
 
