@@ -117,7 +117,7 @@ def campaign_planning():
     yield Bar("pad temperature from one temperature", nats_lost(one, "pad_temperature"), 5.0, "nats")
     yield Bar("pad temperature from two", nats_lost(two, "pad_temperature"), 1000.0, "nats", ">=")
     yield Bar("frequency-dependent pads from passages alone", nats_lost(rolling, "zener_pad"), 5.0, "nats")
-    yield Bar("the same from blows", nats_lost(one, "zener_pad"), 1000.0, "nats", ">=")
+    yield Bar("the same from impacts", nats_lost(one, "zener_pad"), 1000.0, "nats", ">=")
 
 
 def development():

@@ -22,7 +22,7 @@ SETTINGS = IdentifySettings()
 N_TESTS = 3
 CASES = {
     "40 dB": {},
-    "40 dB, 3 % between blows": {"spread": 0.03},
+    "40 dB, 3 % between impacts": {"spread": 0.03},
     "26 dB, unmodelled modes, drift": {"snr_db": 26.0, "nuisance": UNMODELLED, "drift": 0.05},
 }
 

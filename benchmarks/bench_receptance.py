@@ -25,7 +25,7 @@ def bars():
 
 @cache
 def detection_rates(fault, tips=(1e-4, 3e-3), noise=(1e-3, 1e-2), reason=None):
-    """(share of faulty impacts detected, share of sound impacts with any finding, numbers of both)."""
+    """(share of faulty impacts detected, share of accepted impacts with any finding, numbers of both)."""
     rng = np.random.default_rng(17)
     n_named = n_faulty = n_alarms = n_sound = 0
     for _ in range(N_TEST):
@@ -42,14 +42,14 @@ def detection_rates(fault, tips=(1e-4, 3e-3), noise=(1e-3, 1e-2), reason=None):
 def impact_quality():
     detected, alarms, n, m = detection_rates(blows.second_impact, reason="double_hit")
     yield Bar("B6 second hits found", detected, 0.99, sense=">=", n=f"n {n}")
-    yield Bar("B6 findings on sound blows of the same tests", alarms, 0.01, n=f"n {m}")
+    yield Bar("B6 findings on accepted impacts of the same tests", alarms, 0.01, n=f"n {m}")
     for name in ("hard_clip", "analog_clip", "soft_clip"):
         fault = getattr(blows, name)
         detected, alarms, n, m = detection_rates(fault, reason="overload")
         yield Bar(f"B6 {name.replace('_', ' ')} found, tips 0.1-3 ms", detected, 0.95, sense=">=", n=f"n {n}")
         short, _, n, _ = detection_rates(fault, (1e-4, 3e-4), reason="overload")
         yield Bar("   of these tips 0.1-0.3 ms, 2 to 6 samples", short, sense="", n=f"n {n}")
-        yield Bar("   findings on sound blows of the same tests", alarms, 0.01, n=f"n {m}")
+        yield Bar("   findings on accepted impacts of the same tests", alarms, 0.01, n=f"n {m}")
     _, alarms, _, m = detection_rates(None, noise=(0.0, 0.0))
     yield Bar("B6 findings on quiet 12-bit channels without noise", alarms, 0.01, n=f"n {m}")
     rng, clipped = np.random.default_rng(3), []

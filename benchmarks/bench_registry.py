@@ -55,7 +55,7 @@ def registering(folder):
     n = int(28000 * SHARE)
     hammer_batches(folder / "work", n)
     fastest = min(_register_in_own_process(folder / "work", folder / f"registry{k}") for k in range(3))
-    yield Bar(f"R2 register {n} results", fastest[0], 5, "CPU s", n=f"{fastest[2]} units, {fastest[3]} refused")
+    yield Bar(f"R2 register {n} results", fastest[0], 5, "CPU s", n=f"{fastest[2]} units, {fastest[3]} rejected")
     per_table = {}
     for path in (folder / "registry0").rglob("batch-*.parquet"):
         table = path.relative_to(folder / "registry0").parts[0]

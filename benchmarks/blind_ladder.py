@@ -2,9 +2,9 @@
 
     python -m benchmarks.blind_ladder [--rungs 0 3 6] [--sites 2] [--kinds void flat]
 
-Prints per kind and rung: the share of the recordings that the effect makes up, in blows and in passages [%], and the
-index: that share over what a recording hides anyway - 6 % of a blow's response (gains, seats, twist: what two owners'
-models differ by) and 46 % of a passage's, mostly roughness. Below 0.3 nobody sees it, above 1 everybody should.
+Prints per kind and rung: the share of the recordings that the effect makes up, in impacts and in passages [%], and the
+index: that share over what a recording hides anyway - 6 % of an impact's response (gains, seats, twist: what two
+owners' models differ by) and 46 % of a passage's, mostly roughness. Below 0.3 nobody sees it, above 1 everybody should.
 """
 
 import argparse

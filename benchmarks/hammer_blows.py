@@ -35,7 +35,8 @@ def identity(x):
 
 
 def simulate_impact(rng, family, contact, second=None, distort=identity, noise=(1e-3, 1e-2), filling=None, peak=None):
-    """(2, N_SAMPLE) force [N] and acceleration [m/s²] of one impact. ``second``: (share, delay [s]) of a double hit."""
+    """(2, N_SAMPLE) force [N] and acceleration [m/s²] of one impact. ``second``: (share, delay [s]) of a double
+    impact."""
     peak = 8_000.0 * rng.normal(1.0, 0.1) if peak is None else peak
     start = (TRIGGER + rng.uniform()) / RATE
     force = peak * force_pulse(family, TIME - start, contact)
@@ -67,7 +68,7 @@ def second_impact(rng, contact):
 
 
 CONVERTER_RANGE = (
-    11_000.0  # limit of the converter [N], above all sound impacts: a clipped one is the strongest of its test
+    11_000.0  # limit of the converter [N], above all accepted impacts: a clipped one is the strongest of its test
 )
 
 

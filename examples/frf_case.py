@@ -87,8 +87,9 @@ class FrfCase(Case):
         centre = self.frequency[0] * 2.0 ** ((np.arange(n) + 0.5) / 3.0)
         labels = {"sensor": np.repeat([f"A{s + 1}" for s in range(self.n_sensor)], n).astype(object)}
         labels |= {"frequency": np.tile([f"{c:.0f} Hz" for c in centre], self.n_sensor).astype(object)}
-        labels |= {"condition": np.full(self.n_sensor * n, f"blow {k + 1}", dtype=object)}
-        return Observation(f"blow {k + 1}", f"blow {k + 1}", split_complex(rows), sigma, INDEPENDENT_SHARE, "response",
+        labels |= {"condition": np.full(self.n_sensor * n, f"impact {k + 1}", dtype=object)}
+        name = f"impact {k + 1}"
+        return Observation(name, name, split_complex(rows), sigma, INDEPENDENT_SHARE, "response",
                            {}, cells, labels)  # fmt: skip
 
     def _nuisances(self, peaks):

@@ -69,7 +69,7 @@ def models(case, unloaded, diagnosis):
     k = next(i for i, o in enumerate(case.observations) if o.data_type == "passage")
     curves = {
         "recorded": case.observations[k].data,
-        "calibrated on blows alone": unloaded[0],
+        "calibrated on impacts alone": unloaded[0],
         "all fitted together": diagnosis.base.predictions[k],
     }
     if diagnosis.verdict.scores:
@@ -160,9 +160,9 @@ this program says when the same thing happens for a reason that is known, and co
 
 ## The case
 The track of `config/tracks/tommerup.yaml`, sensors A1 and A4 (0.6 m and 9.0 m from
-the switch toe; places assumed), blows beside both, one car with two bogies at 160 km/h.
+the switch toe; places assumed), impacts beside both, one car with two bogies at 160 km/h.
 Concealed: the pads stiffen under load, by {slope:.0f} N/m per newton (Wu and Thompson 1999 measured such growth). A
-hammer meets the unloaded pad: however well the track is calibrated on blows, it is too soft under the car.
+hammer meets the unloaded pad: however well the track is calibrated on impacts, it is too soft under the car.
 
 {excess}
 

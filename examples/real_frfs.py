@@ -64,9 +64,9 @@ def cases(folder):
                "resonances tied to those of a free Euler-Bernoulli beam"),
         "A5": (FrfCase(peaks=MODES, rigid=2, **one), "nothing that we know of"),
         "B1": (FrfCase(peaks=PEAKS, reserved=(4,), impact_places=[1] * 5, **two),
-               "nothing on purpose; the makers overloaded blow 1"),
+               "nothing on purpose; the makers overloaded impact 1"),
         "B2": (FrfCase(peaks=without(more, 447.0), reserved=(3,), impact_places=[1] * 4, **{**two, "h": h2[1:]}),
-               "a resonance; blow 1 left away, what B1 found besides put in"),
+               "a resonance; impact 1 left away, what B1 found besides put in"),
     }  # fmt: skip
 
 
@@ -110,9 +110,9 @@ def where(diagnosis):
 
 
 def identified_mode(diagnosis):
-    """(frequency [Hz], damping ratio [%]) of the resonance named, its frequency the mean over the blows used.
+    """(frequency [Hz], damping ratio [%]) of the resonance named, its frequency the mean over the impacts used.
 
-    A common stretch of all blows and the frequencies of all resonances only show as a product.
+    A common stretch of all impacts and the frequencies of all resonances only show as a product.
     """
     v = next(t.values for t in diagnosis.fit.terms if t.effect_type == "mode")
     return float(np.exp(v["log_frequency"])) * mean_stretch(diagnosis), 100.0 * float(np.exp(v["log_damping"]))
@@ -170,15 +170,15 @@ accelerometers, published with sdypy-EMA (MIT). B: a beam, one place struck five
 
 The diagnosis is given measured frequency responses and a sum of resonances from which something is missing. The
 library: further resonances anywhere from a quarter of the band's lowest to four times its highest frequency, gain,
-delay and mounting of each sensor, gain of each blow, damping of another kind; in A4 also shear, a mass, an axial
-force and springs. One blow is read by the verification alone.
+delay and mounting of each sensor, gain of each impact, damping of another kind; in A4 also shear, a mass, an axial
+force and springs. One impact is read by the verification alone.
 
 {cases}
 
-Fit: of the blow never used [%], before → after, and with the best rival. "Near" is where the search started: a
+Fit: of the held-out impact [%], before → after, and with the best rival. "Near" is where the search started: a
 resonance found outside the band of the fit stands for all that lies beyond, and is none of the beam's own.{starred}
 
-![Responses of the blows never used](real_frfs.svg)
+![Responses of the held-out impacts](real_frfs.svg)
 
 - **A1: found.** The resonance left out is named at {f:.1f} Hz with {zeta:.2f} % damping. The makers print
   {published:.1f} Hz and {printed:.2f} %.
@@ -188,10 +188,10 @@ resonance found outside the band of the fit stands for all that lies beyond, and
   body looks like from above.
 - **A4: {a4}
 - **A5: {a5}
-- **B1: found.** Blow 1 is named as struck with a hammer of {gain:.0%} sensitivity (its gain and the tolerance of that
-  blow together): its response is that share of what its force calls for, so that the force reads too large for it or
+- **B1: found.** Impact 1 is named as struck with a hammer of {gain:.0%} sensitivity (its gain and the tolerance of that
+  impact together): its response is that share of what its force calls for, so that the force reads too large for it or
   the responses are cut. The makers say that it was overloaded on purpose; which channel suffered they do not. The
-  double hit (blow 3) is not seen: a ratio of spectra holds for two hits as well. `make real` rejects both, hits 0
+  double impact (impact 3) is not seen: a ratio of spectra holds for two hits as well. `make real` rejects both, hits 0
   and 2 as it counts, from the force itself.
 - **B2:** {b2}
 """
@@ -208,11 +208,11 @@ def control_text(d):
         return "none**: nothing is missing, it says."
     if d.verdict.answer != "named":
         return (
-            f"said to be unknown**: {reason}. The fit of the blow never used is {check.before:.1f} %, best of series A."
+            f"said to be unknown**: {reason}. The fit of the held-out impact is {check.before:.1f} %, best of series A."
         )
     text = "a false name, not withdrawn" if check.is_worse else "named, and we cannot check it"
     return (
-        f"{text}.** Nothing was left out that we know of; the fit of the blow never used goes from {check.before:.1f}\n"
+        f"{text}.** Nothing was left out that we know of; the fit of the held-out impact goes from {check.before:.1f}\n"
         f"  to {check.after:.1f} % (standard error of the difference {check.error:.1f}). Resonances above the band\n"
         f"  there are: the makers print some up to {PRINTED_FREQUENCIES[-1]:.0f} Hz."
     )
@@ -241,7 +241,7 @@ def page(results):
     f, zeta = identified_mode(results["A1"][2])
     b2 = results["B2"][2]
     gain_effect = next(t for t in results["B1"][2].fit.terms if t.effect_type == "blow_gain")
-    impact_gain = 1.0 + gain_effect.values["gain"] + results["B1"][2].fit.values["hammer@blow 1"]
+    impact_gain = 1.0 + gain_effect.values["gain"] + results["B1"][2].fit.values["hammer@impact 1"]
     head = ["", "left out", "answer", "in words", "residual is largest at", "fit", "rival"]
     b2_text = "found." if "mode" in b2.verdict.names else "said to be unknown, and placed; "
     if "mode" in b2.verdict.names:

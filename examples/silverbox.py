@@ -154,7 +154,7 @@ reads a cubic spring from the left picture (the linear spring has taken the slop
 ![Missing force against displacement](silverbox_latent.svg)
 
 Left: the library without the cubic law. Right: what is missing after the first run named it. That is even and not
-nothing: the circuit is a little stiffer to one side. With the cubic spring the fit has reached the level of controls
+nothing: the circuit is a little stiffer to one side. With the cubic spring the fit has reached the control level
 (1 % of the recording), so the diagnosis stops there and does not name it.
 
 ## What it does not show

@@ -68,7 +68,7 @@ def simulate_impacts(
     hammer_position : float
         Position of the impacts. [m]
     times : (n_impact,) array of float
-        Time of each impact; a second one is a double hit. [s]
+        Time of each impact; a second one is a double impact. [s]
     velocities : (n_impact,) array of float
         Speed of the hammer at each. [m/s]
     duration : float

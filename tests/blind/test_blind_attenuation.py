@@ -1,4 +1,4 @@
-"""How a blow fades along the marched rail, against closed forms: what a sensor metres away is worth."""
+"""How an impact fades along the marched rail, against closed forms: what a sensor metres away is worth."""
 
 import numpy as np
 import pytest
@@ -20,14 +20,15 @@ def fading(x, omega, k, c, rail):
 
 
 def lines(world, places, hit, frequency, duration, temperature=None, dt=TIME_STEP):
-    """(n_frequency, n_place) receptance of one blow at single lines."""
+    """(n_frequency, n_place) receptance of one impact at single lines."""
     force, a, _ = simulate_impacts(world, places, hit, [PRETRIGGER], [1.0], duration, temperature, dt=dt)
     kernel = np.exp(-2j * np.pi * np.asarray(frequency)[:, None] * np.arange(force.size) * dt)
     return (kernel @ a.T) / (kernel @ force)[:, None] / -((2.0 * np.pi * np.asarray(frequency)) ** 2)[:, None]
 
 
 def test_a_beam_on_a_foundation_fades_with_distance():
-    """Below the cut-on at 205 Hz to a thousandth at 4.5 m, above it by waves; 5 % and a 2000th of the blow's place."""
+    """Below the cut-on at 205 Hz to a thousandth at 4.5 m, above it by waves; 5 % and a 2000th of the impact's
+    place."""
     k, c, frequency, x = 1e8, 1.5e4, np.array([35.0, 60.0, 120.0, 300.0, 450.0]), np.array([0.0, 1.5, 3.0, 4.5, 6.0])
     found = lines(winkler(k, BENDING_ONLY, c), x, 0.0, frequency, 0.25, dt=TIME_STEP / 2)
     for f, row in zip(frequency, found):

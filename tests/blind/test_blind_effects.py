@@ -136,7 +136,7 @@ def test_a_clipped_channel_shows_its_limit_as_the_mean_of_both_sides():
     assert 0.5 * (far[0] - far[1]) == pytest.approx(limit)
     small = np.linspace(-0.73, 0.73, 9) * limit
     assert shown(small, 6e4) == pytest.approx(small)
-    assert 20.0 < limit / drawn.parameters["share"] < 1000.0  # a blow of 10 kN on a rail, within the sensor's range
+    assert 20.0 < limit / drawn.parameters["share"] < 1000.0  # an impact of 10 kN on a rail, within the sensor's range
 
 
 def test_a_saturating_amplifier_shows_no_more_than_its_limit_though_the_mounting_rings():

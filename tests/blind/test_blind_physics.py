@@ -37,7 +37,7 @@ def on_supports(world, x, xi, omega=0.0, branch=0.0):
 
 
 def receptance(world, places, hit, duration=0.2, dt=TIME_STEP):
-    """(frequency, receptance) that a blow on the marched track gives."""
+    """(frequency, receptance) that an impact on the marched track gives."""
     force, a, _ = simulate_impacts(world, places, hit, [0.002], [1.2], duration, dt=dt)
     n = 1 << int(np.ceil(np.log2(force.size)) + 1)
     f = np.fft.rfftfreq(n, dt)[1:]
@@ -96,8 +96,9 @@ def test_bending_beam_on_an_elastic_foundation(frequency):
 
 @pytest.mark.parametrize("frequency", [60.0, 120.0, 300.0])
 def test_two_rails_that_meet_on_an_elastic_foundation(frequency):
-    """A blow at the joint of two half-infinite bending beams: each end has the stiffness 4 EI b^3, 2 EI b^2 and 2 EI b
-    (Hetényi 1946), b^4 = (k + i w c - m w^2)/4EI. 1.9 times the stiffness and 2.2 the mass: 3 %, as of one rail; above
+    """An impact at the joint of two half-infinite bending beams: each end has the stiffness 4 EI b^3, 2 EI b^2 and 2
+    EI b (Hetényi 1946), b^4 = (k + i w c - m w^2)/4EI. 1.9 times the stiffness and 2.2 the mass: 3 %, as of one rail;
+    above
     300 Hz waves in the heavy rail are shorter than 2 m, and shear and rotary inertia cost them 2 % each."""
     k, c, factor, heavier = 1e8, 1.5e4, 1.9, 2.2
     world = winkler(k, BENDING_ONLY, c)
@@ -143,7 +144,7 @@ def test_moving_load_on_an_elastic_foundation():
 
 @pytest.mark.parametrize("hit", [0.0, 0.3])
 def test_receptance_of_a_track_on_sleepers(hit):
-    """Two layers, 50 to 800 Hz, at the blow and 1.2 m away, against the exact series of the same track."""
+    """Two layers, 50 to 800 Hz, at the impact and 1.2 m away, against the exact series of the same track."""
     world = uniform_world(pad_damping=3e4, ballast_damping=8e4, sponge=0.0)
     places = [hit, 1.2]
     f, h = receptance(world, places, hit)
@@ -236,7 +237,7 @@ def test_a_rider_holds_the_rail_still_at_its_own_frequency():
 
 
 def test_energy_is_kept_without_damping():
-    """Kinetic and elastic energy after the blow is what the hammer lost, to 2 %, at two times."""
+    """Kinetic and elastic energy after the impact is what the hammer lost, to 2 %, at two times."""
     rail = replace(Rail(), damping=0.0)
     world = uniform_world(36.0, pad_damping=0.0, ballast_damping=0.0, rail=rail, sponge=0.0)
     for duration in (0.02, 0.12):

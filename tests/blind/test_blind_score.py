@@ -300,7 +300,7 @@ def test_silence_closes_no_gap_and_small_oracles_ask_for_none():
 
 
 def test_a_fall_counts_wherever_a_name_was_given():
-    """Also of a false alarm, of two effects, and where the named model could not foretell anything."""
+    """Also of a false alarm, of two effects, and where the named model could not predict anything."""
     fell = {"fit_before_pct": 50.0, "fit_after_pct": 20.0}
     alarm = judge(truth("c", "control"), answers_of([{"verdict": "named", "term": "rail_shear", **fell}]))
     mute = judge(truth("d", "double", "void", "gain"), answers_of([both(4.2, "A2")[0] | {"fit_before_pct": 50.0}]))

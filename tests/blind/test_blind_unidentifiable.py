@@ -43,7 +43,7 @@ def roll_apart(site, world, other_site, other_world, k=0):
 
 
 def strike_apart(site, world, other):
-    """The same of a blow at each place."""
+    """The same of an impact at each place."""
     return _relative_difference(_impact_signals(site, other, [1]), _impact_signals(site, world, [1]), HAMMER_BAND, 3)
 
 

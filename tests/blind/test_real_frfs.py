@@ -36,7 +36,7 @@ def test_what_was_left_out_is_found_or_said_to_be_unknown(shared_data):
     said = {title: (d.verdict.answer, d.verdict.names) for title, (_, _, d) in found.items()}
     assert said["A1"] == ("named", ("mode",))
     frequency, damping = real_frfs.identified_mode(found["A1"][2])
-    assert frequency == pytest.approx(477.4, abs=0.5)  # printed by the makers; half a line, blows differ by 0.4
+    assert frequency == pytest.approx(477.4, abs=0.5)  # printed by the makers; half a line, impacts differ by 0.4
     assert damping == pytest.approx(0.20, abs=0.02)
     assert found["A1"][2].verification.after > found["A1"][2].verification.before + 30.0
     assert said["A2"][0] == "unknown"
@@ -50,5 +50,5 @@ def test_what_was_left_out_is_found_or_said_to_be_unknown(shared_data):
     assert above > 0.01  # what no law of the library holds: so B, not A
     assert beam.verification.after > beam.verification.before + 10.0
     assert said["B1"] == ("named", ("blow_gain",))
-    assert found["B1"][2].fit.terms[0].where == "blow 1"
+    assert found["B1"][2].fit.terms[0].where == "impact 1"
     assert said["B2"][0] in ("unknown", "named") and set(said["B2"][1]) <= {"mode"}

@@ -84,7 +84,7 @@ def test_function_is_covariant(name):
 
 
 def recordings(u):
-    """A hammer test with a double hit, an overload and a weak blow, in any units."""
+    """A hammer test with a double impact, an overload and a weak impact, in any units."""
     rng = np.random.default_rng(11)
     t = np.arange(2000) / 10_000.0
     response = np.real((2.0 - 1j) * np.exp((-150.0 + 2j * np.pi * 300.0) * t))

@@ -33,7 +33,7 @@ SENSORS = (Sensor("A", 12.1), Sensor("B", 12.0, "sleeper"))
 SITES = (
     SupportSite(20, 12.0, 30, 5, 35, True),
     TrackSite(TRACK.rail, True),
-    ChannelSite("A", 4, ("blows 1:A",), True, 8.0, 6.0, 0.4),
+    ChannelSite("A", 4, ("impacts 1:A",), True, 8.0, 6.0, 0.4),
     SaturatedChannelSite("A", 50.0, 1.0, 20.0),
     ContactSite((10.0, 12.1, 14.0)),
     TrainSite("heavy", 2),

@@ -19,7 +19,7 @@ def fading(x, frequency, bending, mass, k, c):
 
 @pytest.mark.parametrize("x", [1.5, 3.0, 4.5, 6.0])
 def test_a_beam_on_a_foundation_fades_with_distance(x):
-    """To 6 m and to a 5000th of the blow's place: within 0.5 % of it, and 1e-5 of the place of the force."""
+    """To 6 m and to a 5000th of the impact's place: within 0.5 % of it, and 1e-5 of the place of the force."""
     h, rail = 0.15, Rail(6.42e6, 60.21, 2.4e8, beam="euler")
     track = uniform_track(96.0, h, rail, layers=1, pad_stiffness=1e8 * h, pad_damping=3e4 * h, elements_per_bay=1)
     frequency = np.array([35.0, 60.0, 120.0, 205.0, 300.0, 500.0])

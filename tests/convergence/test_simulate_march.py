@@ -41,7 +41,7 @@ def test_a_hammer_marched_has_the_receptance_of_the_frequency_domain():
 
 
 def test_receptance_is_reciprocal():
-    """Betti: what the blow at one place does at another it also does the other way round, marched."""
+    """Betti: what the impact at one place does at another it also does the other way round, marched."""
     track = uniform_track(30.0)
     stiff = track.pad_stiffness.copy()
     stiff[20:30] *= 1.7
@@ -161,7 +161,7 @@ class Unilateral(PhysicsTerm):
 
 
 def test_sleepers_that_lift_are_those_on_ballast_that_only_presses():
-    """The term on the linear track against the unilateral track: a blow that throws the sleepers up, 1e-8."""
+    """The term on the linear track against the unilateral track: an impact that throws the sleepers up, 1e-8."""
     track = uniform_track(24.0, ballast_damping=0.0)
     outcomes = []
     for terms in ((Unilateral(),), (LiftingSleepers(15, 25, 1.0),), ()):

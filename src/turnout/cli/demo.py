@@ -1,7 +1,7 @@
 """Make a demonstration fleet, run the whole pipeline on it, and say what was found.
 
 Three turnouts with the paper's eight locations over three years: raw files in five formats below raw/,
-with double hits, overloads, a cut-off file, a dead channel, a reversed sign, a missing temperature, maintenance,
+with double impacts, overloads, a cut-off file, a dead channel, a reversed sign, a missing temperature, maintenance,
 one true drift and one sleeper that comes to hang. What is true lies below truth/, where the pipeline does not read.
 The same seed gives the same samples. The configuration that comes with the program (config/) describes these
 turnouts.

@@ -135,7 +135,7 @@ def _details(row: Mapping[str, Any]) -> Iterator[str]:
     if row["n_held_out"]:
         names = ("before", "after", "rival", "decoy")
         fits_text = ", ".join(f"{n} {row[f'fit_{n}_pct']:.1f} %" for n in names if row[f"fit_{n}_pct"] is not None)
-        yield f"fit on {row['n_held_out']} recordings never used: {fits_text}"
+        yield f"fit on {row['n_held_out']} held-out recordings: {fits_text}"
     if row["next_measurement"]:
         yield row["next_measurement"] + "."
     yield f"from {row['n_hammer_tests']} hammer tests, {row['n_passages']} passages, {row['n_sensors']} sensors"

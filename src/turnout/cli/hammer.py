@@ -3,10 +3,10 @@
   turnout hammer raw/tommerup_s1/hammer/2024-01-23/A7_*.uff --turnout tommerup_s1
   turnout hammer /media/stick/log_17.uff --turnout tommerup_s1 --section A7 --campaign 2024-05-13 --figure a7.svg
 
-Says which files and records were read, which blows are accepted and which refused and why, how far the coherence
+Says which files and records were read, which impacts are accepted and which refused and why, how far the coherence
 reaches, and frequency, damping and dynamic stiffness at the two resonances with their 95 % intervals, or why there is
-none. Blows and records are counted from 1. It computes as the nightly run does, with the same settings, so give all
-files of a section: blows are judged against each other. Files that do not lie in the raw folder need --section and
+none. Impacts and records are counted from 1. It computes as the nightly run does, with the same settings, so give all
+files of a section: impacts are judged against each other. Files that do not lie in the raw folder need --section and
 --campaign where their names and times do not say them. Nothing is written but the figure that is asked for.
 
 Exit code 1 where a test gives no resonance, 2 where the command cannot be followed.
@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--section", help="label of the section, where the file's name does not say it")
     parser.add_argument("--campaign", help="day of the campaign, YYYY-MM-DD, where neither name nor file says it")
     parser.add_argument(
-        "--figure", metavar="OUT.svg", help="draw receptance, coherence, decay and blows into this file"
+        "--figure", metavar="OUT.svg", help="draw receptance, coherence, decay and impacts into this file"
     )
     add_configuration(parser)
     add_raw(parser, help="raw root, for what was noted of the campaign (raw)", default=None)
@@ -109,7 +109,7 @@ def _draw(path: Path, rows: dict[str, list[dict]], test: RequestedUnit) -> None:
 
     drawing = hammer_figure(rows, test.unit, test.turnout)
     if not drawing:
-        print("  figure     none: no blow was read")
+        print("  figure     none: no impact was read")
         return
     replace_page(path, drawing)
     print(f"  figure     {path}")

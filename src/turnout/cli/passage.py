@@ -1,4 +1,4 @@
-"""Look at one passage file: axles, speed, type, and what the model of each section foretells.
+"""Look at one passage file: axles, speed, type, and what the model of each section predicts.
 
 Nothing is written. The models are those that the last run identified (--work); without them, or with --no-fit, only
 the train is described.

@@ -1,7 +1,7 @@
 """Run the pipeline on recordings that nobody here made, and compare with what their makers say of them.
 
 Fetches three source distributions by package name, checks their sha256, and takes the recordings out:
-a five-hit hammer test (hit 0 overloaded, hit 2 double, by its authors' word), the frequency responses of two
+a hammer test of five impacts (hit 0 overloaded, hit 2 double, by its authors' word), the frequency responses of two
 beams with published modes, and vendors' UFF files. Everything lies below real/.
 """
 
@@ -73,7 +73,7 @@ def _print_impacts(folder: Path) -> None:
     from turnout.demo.published_modes import HITS
     from turnout.registry.database import open_registry
 
-    print("\nFive-hit hammer test of pyFRF 1.1.4")
+    print("\nHammer test of five impacts of pyFRF 1.1.4")
     print(f"{'hit':>4}  {'its makers say':<24} {'found':<10} why")
     with open_registry(folder / "results" / "registry") as connection:
         rows = connection.execute("select record, status, detail from impacts_current order by record").fetchall()

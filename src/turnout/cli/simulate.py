@@ -6,7 +6,7 @@
 
 With --turnout the channels are those of the turnout's configuration and the file goes to its raw folder, where the
 pipeline finds it; what is true of it goes to a file of the same name below --truth: the track and its effects, where
-each blow fell and how hard, or the wheels' forces.
+each impact fell and how hard, or the wheels' forces.
 """
 
 import argparse
@@ -25,12 +25,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         Parser of the command.
     """
     subcommands = parser.add_subparsers(dest="kind", metavar="kind", required=True)
-    hammer = subcommands.add_parser("hammer", help="blows of a hammer at one section")
+    hammer = subcommands.add_parser("hammer", help="impacts of a hammer at one section")
     hammer.add_argument(
         "--section", required=True, help="location of the track file, or, without --turnout, a place in metres"
     )
     hammer.add_argument("--tests", type=int, default=1, help="tests, one file each; --out takes one (default 1)")
-    hammer.add_argument("--blows", type=int, default=10, help="blows per test (default 10)")
+    hammer.add_argument("--blows", type=int, default=10, help="impacts per test (default 10)")
     passage = subcommands.add_parser("passage", help="one train over the turnout")
     passage.add_argument("--vehicle", default="ic3", help="file in config/vehicles, or its path (default ic3)")
     passage.add_argument("--speed", type=float, default=160.0, help="km/h (default 160)")

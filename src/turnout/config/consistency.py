@@ -59,7 +59,7 @@ def _hammer_errors(tree: Branch, to_si: ToSi | None, min_peak_force: float) -> I
         elif role == "force" and (limit := _value(channels[leaf.value], "limit")) and limit <= min_peak_force:
             detail = f"limit is {limit} N for the hammer's force, and receptance.softest_blow is {min_peak_force} N"
             remedy = "Write the limit in N, or a lower softest_blow where the hammer is a small one"
-            yield channels[leaf.value]["limit"].place.error(f"{detail}: no blow could count", remedy)
+            yield channels[leaf.value]["limit"].place.error(f"{detail}: no impact could count", remedy)
     yield from _channel_errors(tree, to_si)
 
 

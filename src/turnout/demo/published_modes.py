@@ -131,4 +131,4 @@ def uff_contents(path: Path | str) -> str:
     lengths = sorted({len(s.data) for s in sets if not s.damage})
     contents = ", ".join(f"{n} {name}" for name, n in counts.items())
     span = f"; {' to '.join(dict.fromkeys(str(n) for n in (lengths[0], lengths[-1])))} values" if lengths else ""
-    return f"{contents or 'no sound set'}{span}" + (f"; damaged: {damaged}" if damaged else "")
+    return f"{contents or 'no intact set'}{span}" + (f"; damaged: {damaged}" if damaged else "")

@@ -133,7 +133,7 @@ def _judge_coherence(
             return
         outlier = remaining.pop(worst)
         detail = (
-            f"coherence with each other blow {medians[worst]:.3f}, among those {other_median:.3f}; of the whole test "
+            f"coherence with each other impact {medians[worst]:.3f}, among those {other_median:.3f}; of the whole test "
             f"{_test_coherence(force, acceleration, [*remaining, outlier]):.3f} with it, "
             f"{_test_coherence(force, acceleration, remaining):.3f} without"
         )
@@ -160,7 +160,7 @@ def _judge_gain(cuts: Sequence[Cut], force: np.ndarray, acceleration: np.ndarray
     for k, cut in enumerate(cuts):
         if abs(gain[k] - 1.0) > limit:
             clipped = gain[k] > 1.0 and peak[k] > MIN_CLIPPED_PEAK * np.max(np.delete(peak, k))
-            detail = f"the response is {gain[k]:.3f} of what the other blows predict from the force"
+            detail = f"the response is {gain[k]:.3f} of what the other impacts predict from the force"
             bound = 1.0 + (limit if gain[k] > 1.0 else -limit)
             if clipped:
                 channel = cut.channels[0].name

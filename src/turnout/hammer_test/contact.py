@@ -1,7 +1,7 @@
 """Measure the contact of the hammer with the rail: onset, length, peak, impulse, and the noise before it.
 
-Further contacts in the force of one impact (double hits) are found. The band edge of a hammer's tip is the frequency at
-which its force spectrum has fallen by 20 dB.
+Further contacts in the force of one impact (double impacts) are found. The band edge of a hammer's tip is the
+frequency at which its force spectrum has fallen by 20 dB.
 """
 
 from __future__ import annotations

@@ -20,9 +20,9 @@ MIN_REPEATED_SHARE, MIN_REPEATED_DELAY = 0.7, 60.0
 
 
 def judge_second_contact(cut: Cut, settings: ReceptanceSettings) -> None:
-    """Note or reject a double hit; keep the free decay on one side of the second contact, if there is enough.
+    """Note or reject a double impact; keep the free decay on one side of the second contact, if there is enough.
 
-    A double hit is a valid input of a linear system, but no free decay follows it at once. Under ``move``
+    A double impact is a valid input of a linear system, but no free decay follows it at once. Under ``move``
 
     - a second contact after the vibration has decayed has no effect: the record is cut before it;
     - otherwise the decay starts after the last contact, if its amplitude there is at least
@@ -43,7 +43,7 @@ def judge_second_contact(cut: Cut, settings: ReceptanceSettings) -> None:
     delay = 1e3 * (largest.top - cut.contact.top) / cut.rate
     text = f"further contacts: {len(further)}, the largest {largest.share:.3f} of the first and {delay:+.1f} ms from it"
     if len(further) > 1 and largest.share > MIN_REPEATED_SHARE and abs(delay) > MIN_REPEATED_DELAY:
-        text += "; where each is a blow of its own, set receptance.separation below the time between them"
+        text += "; where each is an impact of its own, set receptance.separation below the time between them"
     last = max(cut.contact.end, *(c.end for c in further))
     remaining = _decay_ratio(cut, last + 1 + round(settings.decay_gap * cut.rate), settings)
     end = min(c.onset for c in further) - round(settings.decay_gap * cut.rate)

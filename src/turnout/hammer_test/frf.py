@@ -190,8 +190,8 @@ def receptance_of(impacts: Sequence[Impact], settings: ReceptanceSettings | None
 
     >>> from turnout.records import Impact
     >>> f = np.zeros(1000); f[10:40] = np.sin(np.pi * np.arange(30) / 30)
-    >>> blow = Impact(f, f / 4.0, 1000.0, 10, 39, 40, 1.0, 0.03, 0.019, 0.0, 0.0, 40.0)
-    >>> result = receptance_of([blow, blow, blow])
+    >>> impact = Impact(f, f / 4.0, 1000.0, 10, 39, 40, 1.0, 0.03, 0.019, 0.0, 0.0, 40.0)
+    >>> result = receptance_of([impact, impact, impact])
     >>> print((result.h1 * (2 * np.pi * result.frequency) ** 2).real[:3].round(9), result.n)
     [-0.25 -0.25 -0.25] 3
     """

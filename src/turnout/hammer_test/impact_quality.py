@@ -364,7 +364,7 @@ def judge_against_median(cuts: Sequence[Cut], settings: ReceptanceSettings) -> N
             text = f"{response} answers with {largest[k]:.3g}, no more than its noise"
             _reject(cut, "dead_channel", largest[k], MIN_SIGNAL_TO_NOISE * noise_before[k], text, response)
         elif noise[k] > settings.noise:
-            text = f"rms before the blow is {noise[k]:.3f} of the peak acceleration"
+            text = f"rms before the impact is {noise[k]:.3f} of the peak acceleration"
             _reject(cut, "noisy", noise[k], settings.noise, text, response)
     if len(cuts) < 3:
         return
@@ -381,8 +381,8 @@ def judge_against_median(cuts: Sequence[Cut], settings: ReceptanceSettings) -> N
             _reject(cut, "overload", peak[k], high, f"{peak[k]:.4g} N, the test's median is {median_peak:.4g} N", force)
         limit = max(MIN_NOISE_LIMIT, settings.noise_over_median * median_noise)
         if noise[k] > limit and not cut.rejections:
-            text = f"rms before the blow is {noise[k]:.3f} of the peak acceleration"
-            _reject(cut, "noisy", noise[k], limit, f"{text}, {median_noise:.3f} in the median blow", response)
+            text = f"rms before the impact is {noise[k]:.3f} of the peak acceleration"
+            _reject(cut, "noisy", noise[k], limit, f"{text}, {median_noise:.3f} in the median impact", response)
 
 
 def _largest_response(cut: Cut) -> float:

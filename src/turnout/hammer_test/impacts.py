@@ -59,8 +59,8 @@ def find_impacts(
     >>> a = np.exp(-80.0 * (t - 0.01)) * np.sin(900.0 * (t - 0.01)) * (t > 0.01)
     >>> channels = Channel("hammer", "force"), Channel("rail", "acceleration")
     >>> noise = rng.normal(size=(2, 2000)) * [[0.1], [1e-3]]
-    >>> blow, = find_impacts([Recording(np.stack([f, a]) + noise, 10_000.0, channels)], "hammer", "rail")
-    >>> print(f"{blow.peak:.0f} N for {1e3 * blow.contact:.1f} ms, {blow.impulse:.2f} N s", blow.accepted)
+    >>> impact, = find_impacts([Recording(np.stack([f, a]) + noise, 10_000.0, channels)], "hammer", "rail")
+    >>> print(f"{impact.peak:.0f} N for {1e3 * impact.contact:.1f} ms, {impact.impulse:.2f} N s", impact.accepted)
     500 N for 1.9 ms, 0.64 N s True
     """
     settings = settings or ReceptanceSettings()
@@ -133,7 +133,7 @@ def _judge_start(cut: Cut, settings: ReceptanceSettings) -> None:
     contact, at_start = cut.contact, cut.polarity * float(cut.force[0])
     limit = max(settings.contact_level * abs(contact.peak), 5.0 * contact.noise_force)
     if contact.onset == 0 and at_start > limit:
-        detail = f"the record starts with {at_start:.4g} N: the blow had begun before it"
+        detail = f"the record starts with {at_start:.4g} N: the impact had begun before it"
         cut.rejections.append(Rejection("late", at_start, limit, detail))
 
 

@@ -101,7 +101,7 @@ def _cut_recording(recording: Recording, force: str, response: str, settings: Re
     noise = MAD_TO_SD * float(np.median(np.abs(f[usable])))
     impacts, level = _find_triggers(f, noise, recording.rate, settings)
     if not impacts:
-        detail = f"the force reaches {np.max(np.abs(f)):.3g} N, a blow would exceed {level:.3g} N"
+        detail = f"the force reaches {np.max(np.abs(f)):.3g} N, an impact would exceed {level:.3g} N"
         silent = Rejection("no_impact", float(np.max(np.abs(f))), level, detail)
         record.rejections.append(_not_finite(finite, record) or silent)
         return [record]

@@ -315,7 +315,7 @@ def _band_modes(
             accepted.append((e, mode))
             continue
         del choice.modes[e.band]
-        detail = f"{e.band} mode at {mode.frequency:.0f} Hz: damping, mean over its blows"
+        detail = f"{e.band} mode at {mode.frequency:.0f} Hz: damping, mean over its impacts"
         choice.rejections.append(Rejection("not_identified", mode.damping, MIN_DAMPING, detail))
     return [e for e, _ in accepted], tuple(mode for _, mode in accepted)
 

@@ -215,14 +215,14 @@ def bias_sentence(bias: dict) -> str:
     Examples
     --------
     >>> bias_sentence({"ballast": {"frequency_percent": -10.9, "damping_percent": -10.0, "found": 1.0, "n": 12}})
-    'simulated bias of method paper at this model (12 blows): ballast f -10.9 %, zeta -10.0 %, found 100 %'
+    'simulated bias of method paper at this model (12 impacts): ballast f -10.9 %, zeta -10.0 %, found 100 %'
     """
     n = next(iter(bias.values()))["n"] if bias else 0
     clauses = [
         f"{band} f {b['frequency_percent']:+.1f} %, zeta {b['damping_percent']:+.1f} %, found {100 * b['found']:.0f} %"
         for band, b in bias.items()
     ]
-    return f"simulated bias of method paper at this model ({n} blows): " + "; ".join(clauses)
+    return f"simulated bias of method paper at this model ({n} impacts): " + "; ".join(clauses)
 
 
 def identify_paper(

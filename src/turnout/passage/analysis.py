@@ -84,7 +84,7 @@ def analyse(
     track, _ = train_track(envelopes, [s.track for s in usable])
     rows = audible_sensors(envelopes)
     if rows.size == 0:
-        return Passage("rejected", (*findings, Rejection("no_train", 0.0, None, "no sensor hears more than noise")))
+        return Passage("rejected", (*findings, Rejection("no_train", 0.0, None, "no sensor records more than noise")))
     audible = [usable[i] for i in rows]
     passage = _analyse_train(
         restrict_to(envelopes, rows), audible, track, findings, recording.duration, patterns, settings
@@ -181,7 +181,9 @@ def _axle_count_doubts(passage: Passage, envelopes: SensorEnvelopes, is_multi_se
         text = f"{passage.n_axle} axles, but the weakest peak is only {passage.contrast:.2f} times the next one"
         doubts.append(Rejection("axles_uncertain", passage.contrast, min_contrast, text))
     if is_multi_sensor and (impacts := fixed_impact_correlation(envelopes, passage.train_motion)):
-        text = f"{passage.n_axle} axles, but sensors hear blows at one moment, as of a crossing's nose or a deep dip"
+        text = (
+            f"{passage.n_axle} axles, but sensors record impacts at one moment, as of a crossing's nose or a deep dip"
+        )
         doubts.append(Rejection("axles_uncertain", *impacts, text))
     return doubts
 

@@ -276,7 +276,7 @@ def lost_sensors(
         first_silent = int(np.flatnonzero(~is_silent)[-1]) + 1
         stop = int(inside[first_silent] / step)
         lost_at = float((np.flatnonzero(level[:stop] >= MIN_RELATIVE_LEVEL * typical)[-1] + 1) * step)
-        text = f"{name}: hears nothing from {lost_at:.2f} s on, {inside.size - first_silent} axles before the last"
+        text = f"{name}: records nothing from {lost_at:.2f} s on, {inside.size - first_silent} axles before the last"
         findings.append(Rejection("sensor_lost", lost_at, None, text, name, time=lost_at))
     return findings
 
@@ -342,9 +342,9 @@ def inconsistent_channels(
     keep[list(suspects)] = False
     names, share = [sensors[i].name for i in suspects], float(best_correlation / free_correlation)
     if len(suspects) == 2:
-        text = f"{' and '.join(names)}: each hears the train in the other's place"
+        text = f"{' and '.join(names)}: each records the train at the other's position"
         return [Rejection("channels_swapped", share, MIN_CONSISTENT_SHARE, text, names[0], names[1])], keep
-    text = f"{names[0]}: hears the train at another time than its place says"
+    text = f"{names[0]}: records the train at another time than its position states"
     return [Rejection("clock_drift", share, MIN_CONSISTENT_SHARE, text, names[0])], keep
 
 

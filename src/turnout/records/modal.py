@@ -219,7 +219,7 @@ class Impact:
     ``onset``, ``contact_end`` and ``decay_start`` count from the first of these samples. ``peak`` [N],
     ``contact`` [s], ``impulse`` [N s], ``noise_force`` [N] and ``noise_acceleration`` [m/s²] (pre-trigger rms),
     ``band_edge`` [Hz] where the force spectrum has fallen by 20 dB. ``rejections`` is empty for an accepted
-    impact; ``notes`` are findings that do not reject it (a double hit whose decay starts after the last contact).
+    impact; ``notes`` are findings that do not reject it (a double impact whose decay starts after the last contact).
     """
 
     force: np.ndarray

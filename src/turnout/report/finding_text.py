@@ -158,7 +158,7 @@ def _amount(finding: Mapping[str, Any]) -> str:
 def _certainty(finding: Mapping[str, Any], evidence: Mapping[str, Any]) -> str:
     words = f"probability {finding['probability']:.2f}" if finding["probability"] is not None else ""
     if finding["grade"] == "A":
-        words += "; with it the recordings are predicted as well as a sound turnout's"
+        words += "; with it the recordings are predicted as well as an intact turnout's"
     if finding["grade"] == "B":
         words += "; some structure is left, its shape is not resolved"
     if evidence.get("reason"):

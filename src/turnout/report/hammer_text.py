@@ -211,7 +211,7 @@ def _number(value: float | None, divisor: float) -> str:
 def _impact_verdict(impact: Mapping[str, Any]) -> str:
     if impact["status"] == "accepted":
         return "accepted" + (f", {impact['detail']}" if impact["detail"] else "")
-    return f"refused, {impact['reason']}: {impact['detail']}"
+    return f"rejected, {impact['reason']}: {impact['detail']}"
 
 
 def _gate_lines(rows: Mapping[str, Sequence[Mapping[str, Any]]], settings: Mapping[str, Any]) -> list[str]:

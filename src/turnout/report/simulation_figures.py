@@ -87,7 +87,7 @@ def _receptances() -> Figure:
         exact = receptance(assemble(track), measured.frequency[inside], position, position)
         axis.semilogy(measured.frequency[inside], np.abs(exact), lw=2.5, color="0.75", label="track, frequency domain")
         axis.semilogy(
-            measured.frequency[inside], np.abs(measured.h1[inside]), lw=0.9, color="C0", label="H1 of ten blows"
+            measured.frequency[inside], np.abs(measured.h1[inside]), lw=0.9, color="C0", label="H1 of ten impacts"
         )
         for mode in modes:
             axis.axvline(mode, color="C3", lw=0.8, ls="--", label="paper, table 3" if mode == modes[0] else None)

@@ -110,19 +110,19 @@ def score_words(scores: Sequence[Mapping[str, Any]]) -> str:
     count = {status: sum(s["n"] for s in scores if s["status"] == status) for status in {s["status"] for s in scores}}
     sentences = [
         f"{n} records of single sensors were compared with the model of their section: "
-        f"in {count.get('accepted', 0)} it foretells more than random models do and the wheels act as blows on it, "
-        f"in {count.get('not_an_impulse', 0)} it foretells more although they do not, "
+        f"in {count.get('accepted', 0)} it predicts more than random models do and the wheels act as impacts on it, "
+        f"in {count.get('not_an_impulse', 0)} it predicts more although they do not, "
         f"in {count.get('null_explains', 0)} random models reach as much."
     ]
     rolling = sum(s["n_no_impulse"] for s in scores)
     if rolling:
         sentences.append(
-            f"In {rolling} the wheels did not act as single blows: they press and shake the rail all the time."
+            f"In {rolling} the wheels did not act as single impacts: they press and shake the rail all the time."
         )
     n_compared, n_best = (sum(s[k] for s in scores) for k in ("n_compared", "n_best"))
     if n_compared:
         sentences.append(
-            f"The own section's model foretells more than that of any other section in {n_best} of {n_compared}."
+            f"The own section's model predicts more than that of any other section in {n_best} of {n_compared}."
         )
     sentences.append("A score inside its null tells nothing about the track, neither good nor bad.")
     return " ".join(sentences)

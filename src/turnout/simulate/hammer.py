@@ -166,8 +166,8 @@ def simulate_hammer(  # type: ignore[misc]  # the overloads stand for any of the
     The impulse is between one and two times mass times speed, as the hammer bounces:
 
     >>> from turnout.simulate.track import uniform_track
-    >>> blow = simulate_hammer(uniform_track(30.0), 15.0, Hammer(velocity_spread=0.0), n_impacts=1)[0]
-    >>> bool(1.0 < blow.signal("hammer").sum() / blow.rate / (5.5 * 1.2) < 2.0)
+    >>> impact = simulate_hammer(uniform_track(30.0), 15.0, Hammer(velocity_spread=0.0), n_impacts=1)[0]
+    >>> bool(1.0 < impact.signal("hammer").sum() / impact.rate / (5.5 * 1.2) < 2.0)
     True
     """
     if n_blows is not None:

@@ -117,7 +117,7 @@ def calibrate_to_files(
             response_position = position + (0.3 if "mid-span" in channel.mounting else 0.0)
         impacts = [i for i in find_impacts(recordings, force, name, settings) if i.accepted]
         if len(impacts) < settings.minimum_impacts:
-            raise SimulationError(f"calibration of {section}: {len(impacts)} sound impacts in channel {name!r}.")
+            raise SimulationError(f"calibration of {section}: {len(impacts)} accepted impacts in channel {name!r}.")
         measured.append(_receptance_data(receptance_of(impacts, settings), position, response_position))
     return calibrate(track, section, measured)
 

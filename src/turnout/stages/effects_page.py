@@ -16,8 +16,8 @@ from turnout.stages.mismatch_text import number_in_words
 PAGE_HEAD = """# What a diagnosis can name
 
 Every effect that `turnout diagnose` asks for, from the catalogue (`turnout.physics`, one file each). "Least": how far
-the first number has to be from what it is in a sound track to get a name; for less nobody would go to the site. What is
-in no row is located and called "unknown". Which of them were found where they were concealed, and how small:
+the first number has to be from what it is in an intact track to get a name; for less nobody would go to the site.
+What is in no row is located and called "unknown". Which of them were found where they were concealed, and how small:
 [blind proof](blind.md).
 
 | effect | name | fixed to | numbers found | least | what to check on site |

@@ -294,7 +294,7 @@ def curve_rows(
     if comparison is not None:
         window = _window(comparison, diagnosis.fit is not diagnosis.base)
         label = f"{comparison.recording} at {comparison.sensor}" + (
-            ", never used in the fit" if comparison.held_out else ""
+            ", held out of the fit" if comparison.held_out else ""
         )
         signals = (comparison.time, comparison.measured, comparison.before, comparison.after, comparison.rival)
         rows.append(_curve_row("waveform", label, ("time", "s"), "m/s²", [v[window] for v in signals], comparison))
@@ -356,7 +356,7 @@ def _receptance_rows(case: TrackCase, diagnosis: Diagnosis) -> list[dict[str, An
     k, pair = chosen
     fits = _fits(diagnosis, _rival_fit(diagnosis))
     sizes = [_magnitude(v, pair) for v in (case.observations[k].data, *(f.predictions[k] for f in fits))]
-    label = f"blows {pair.test.name}, felt by {pair.channel}"
+    label = f"impacts {pair.test.name}, felt by {pair.channel}"
     return [_curve_row("receptance", label, ("frequency", "Hz"), "m/N", [pair.frequency, *sizes])]
 
 

@@ -249,7 +249,7 @@ def _passage_input(
     if excluded := sorted(unusable & {c.name for c in recording.channels}):
         notes.append(Note(f"channels {', '.join(excluded)} not used{_reasons_text(quarantine)}", name))
     if not usable.channels:
-        notes.append(Note(f"no sound channel on the {train.route} track", name))
+        notes.append(Note(f"no usable channel on the {train.route} track", name))
         return None
     heading = train.direction, train.route
     return PassageInput(

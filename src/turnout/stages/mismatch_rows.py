@@ -53,7 +53,7 @@ def sentence(diagnosis: Diagnosis) -> str:
     """
     verdict = diagnosis.verdict
     if verdict.answer == "none":
-        return "Simulation and recordings agree as well as those of sound turnouts do."
+        return "Simulation and recordings agree as well as those of intact turnouts do."
     if verdict.answer == "numerics":
         return f"The simulation is not fine enough to be compared: {verdict.reason}."
     if verdict.answer == "unknown":

@@ -95,7 +95,7 @@ def train_of(row: Mapping, notes: Mapping, folder: Path) -> IdentifiedTrain:
         if len(axles := vehicle.wheels) == row.get("n_axles"):
             n = _axles_by_length(type_name, row, speed, folder)
             vehicle, load_sd, doubts, axle_doubts = _loaded_vehicle(type_name, n, row, notes, folder, True)
-            further_doubts += (f"{len(axles)} axles heard over the length of {n}",) if n < len(axles) else ()
+            further_doubts += (f"{len(axles)} axles recorded over the length of {n}",) if n < len(axles) else ()
     direction, direction_doubts = _heading(("facing", "trailing"), "direction", row, notes)
     route, route_doubts = _heading(("main", "diverging"), "track", row, notes)
     return IdentifiedTrain(
@@ -151,7 +151,7 @@ def _loaded_vehicle(
     axle_doubts: tuple[str, ...] = ()
     if n_axles_heard and n_axles_heard % n:
         axle_doubts = (
-            f"{n_axles_heard} axles heard, {n} in {name}.yaml: wrong vehicle file, another train, or other sensors",
+            f"{n_axles_heard} axles recorded, {n} in {name}.yaml: wrong vehicle file, another train, or other sensors",
         )
         if not is_trusted or n_axles_heard < MIN_AXLE_SHARE * n * units:
             raise TrainUnknownError(*axle_doubts)

@@ -229,7 +229,7 @@ def write_hammer(request: Mapping[str, Any]) -> Iterator[tuple[Path, str]]:
             request, path, track, route, recordings[0], {"blows": [_impact_truth(impact) for impact in impacts]}
         )
         peak = max(float(r.samples[0].max()) for r in recordings)
-        yield path, f"{len(recordings)} blows at {position:.2f} m, highest force {peak / 1e3:.1f} kN"
+        yield path, f"{len(recordings)} impacts at {position:.2f} m, highest force {peak / 1e3:.1f} kN"
 
 
 def write_passage(request: Mapping[str, Any]) -> Iterator[tuple[Path, str]]:

@@ -135,7 +135,7 @@ def register_job(register: Callable, generation: PathLike | str, log: Any, param
     os.utime(generation)
     for batch, fault in result.faults.items():
         logging.getLogger("turnout.workflow").warning("%s: %s", batch, fault)
-    _report(f"register: {result.n_units} units, {sum(result.rows.values())} rows, {result.n_refused} refused")
+    _report(f"register: {result.n_units} units, {sum(result.rows.values())} rows, {result.n_refused} rejected")
 
 
 def _log_to(log: Any) -> None:

@@ -136,7 +136,7 @@ def case_text(truth: Mapping[str, Any], rows: Sequence[Mapping[str, Any]] | None
     visibility = truth["visible"]
     answers = " ".join(f"*{_row_text(row)}*" for row in rows) if rows else "*no answer*"
     return (
-        f"Concealed: {concealed or 'nothing'}. It makes up {visibility['hammer_pct']:.0f} % of the blows' and "
+        f"Concealed: {concealed or 'nothing'}. It makes up {visibility['hammer_pct']:.0f} % of the impacts' and "
         f"{visibility['passage_pct']:.0f} % of the passages' response at the sensor that shows it most. Said: {answers}"
     )
 
@@ -240,7 +240,7 @@ def _impact_comparison(site: Site, world: World) -> tuple[str, np.ndarray, np.nd
             yield _sensor_signals(site, w, a, "hammer")
 
     position, before, after = _most_different((x, *both_signals(x)) for x in site.hammer_positions)
-    return f"a blow at {position:.1f} m", before, after, 900.0, "boxcar"
+    return f"an impact at {position:.1f} m", before, after, 900.0, "boxcar"
 
 
 def _passage_comparison(site: Site, world: World) -> tuple[str, np.ndarray, np.ndarray, float, str]:
@@ -316,6 +316,6 @@ def _plot_fits(axis: Axes, rows: Sequence[Mapping[str, Any]] | None, oracle: flo
     fits = {label: row.get(f"fit_{name}_pct") for name, label in FIT_LABELS.items()} | {"told the truth": oracle}
     stated: dict[str, Any] = {name: value for name, value in fits.items() if value is not None}
     axis.barh(list(stated), list(stated.values()), color="C0")
-    axis.set_xlabel("fit on recordings never used [%]")
+    axis.set_xlabel("fit on held-out recordings [%]")
     if not stated:
         axis.text(0.5, 0.5, "no fit was given", ha="center", transform=axis.transAxes)

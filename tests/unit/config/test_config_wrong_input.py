@@ -82,7 +82,7 @@ WRONG = {
     ),
     "limit in kN": (
         layout("source: force, ", "source: force, limit: 22, "),
-        "line 13, column 35: limit is 22 N for the hammer's force, and receptance.softest_blow is 50.0 N: no blow "
+        "line 13, column 35: limit is 22 N for the hammer's force, and receptance.softest_blow is 50.0 N: no impact "
         "could count. Write the limit in N",
     ),
     "step as large as the limit": (

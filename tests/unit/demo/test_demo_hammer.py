@@ -1,4 +1,4 @@
-"""Blows of the demonstration fleet hold the receptance of the track that made them."""
+"""Impacts of the demonstration fleet hold the receptance of the track that made them."""
 
 import datetime
 
@@ -15,7 +15,7 @@ from turnout.simulate.turnout_track import stretch_of_track
 
 @pytest.mark.parametrize("section", ["A8", "SP"])
 def test_receptance_of_the_recordings_is_that_of_the_track(section):
-    """Below the resonances too, where a response that was cut at the blow would show a falling mass."""
+    """Below the resonances too, where a response that was cut at the impact would show a falling mass."""
     blows, truth = hammer_test(
         simulated_response(section, 1.0, 1.0), 10.0, datetime.date(2025, 1, 1), 1, np.random.default_rng(1), 60
     )
@@ -29,6 +29,6 @@ def test_receptance_of_the_recordings_is_that_of_the_track(section):
     stretch = stretch_of_track(track, place, 18.0)
     place = float(stretch.support[stretch.nearest_support(place)])
     expected = receptance(assemble(stretch), frequency[lines], place, place)
-    # Noise of 1 % of the peak is the larger part at 33 Hz; blows differ by 0.6 % in frequency.
+    # Noise of 1 % of the peak is the larger part at 33 Hz; impacts differ by 0.6 % in frequency.
     assert np.median(np.abs(recorded / expected - 1)) < 0.05
     assert np.max(np.abs(recorded / expected - 1)) < 0.4

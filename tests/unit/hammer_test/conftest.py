@@ -44,11 +44,11 @@ class HammerTest:
         return Recording(samples, rate, channels, source=source, record=record)
 
     def impacts(self, recordings, **settings):
-        """Its blows, found with settings other than the usual ones where given."""
+        """Its impacts, found with settings other than the usual ones where given."""
         return find_impacts(recordings, "hammer", "rail", ReceptanceSettings(**settings))
 
     def recordings(self, n=6, noise=(1e-4, 1e-3), **force):
-        """One sound blow each, peaks between 4 and 6 kN, starts anywhere between two samples."""
+        """One sound impact each, peaks between 4 and 6 kN, starts anywhere between two samples."""
         return [
             self.recording(self.samples(self.force(
                 peak=self.rng.uniform(4000, 6000), start=5e-3 + self.rng.uniform() / RATE, **force), noise), k)

@@ -1,4 +1,4 @@
-"""Double hits, overloads and odd blows: found when there, silent when not. Statistics are in the benchmarks."""
+"""Double hits, overloads and outlying impacts: found when there, silent when not. Statistics are in the benchmarks."""
 
 from dataclasses import replace
 
@@ -56,7 +56,7 @@ def test_policy_of_double_hits(hammer):
 
 
 def test_quick_blows_of_a_machine_are_said_to_be_separable(hammer):
-    """Six even blows 150 ms apart: one with further contacts, unless blows may follow each other so soon."""
+    """Six even impacts 150 ms apart: one with further contacts, unless impacts may follow each other so soon."""
     many = sum(hammer.force(start=5e-3 + 0.15 * k, n=round(0.9 * RATE)) for k in range(6))
     recording = [hammer.recording(hammer.samples(many))]
     (one,) = hammer.impacts(recording)
@@ -124,7 +124,7 @@ def test_a_clipped_response_and_a_known_range_are_overloads(hammer):
 
 @pytest.mark.parametrize("zero", [-60.0, -30.0, 0.0, 30.0, 60.0])
 def test_a_range_is_reached_by_what_was_recorded_not_by_what_the_zero_line_leaves(hammer, zero):
-    """Blows of 4.5 to 6.5 kN in 0.3 ms, 3 samples at the rail of 3 kN: too few to be told by their shape."""
+    """Impacts of 4.5 to 6.5 kN in 0.3 ms, 3 samples at the rail of 3 kN: too few to be told by their shape."""
 
     def recordings(peaks):
         for k, peak in enumerate(peaks):

@@ -89,7 +89,7 @@ def test_recordings_without_the_first_effect_tell_of_the_second(loud, nats):
     "apart, places, answer", [(12.5, 1, "named"), (11.5, 1, "unknown"), (15.1, 20, "named"), (14.9, 20, "unknown")]
 )
 def test_what_others_tell_need_not_explain_what_the_first_left(apart, places, answer):
-    """A tenth of an excess of twice the level of controls, which may be the shape of the effect named before; of 20
+    """A tenth of an excess of twice the control level, which may be the shape of the effect named before; of 20
     places each costs the evidence 3 nats."""
     candidate = Candidate.of("bump", (), lambda p: None, (), n_scanned=places)
     said = judge([Score(candidate, 40.0, 0.0, 0.1, None, unmasked_gain=apart)], 2.0, MismatchSettings())
@@ -99,7 +99,7 @@ def test_what_others_tell_need_not_explain_what_the_first_left(apart, places, an
 
 
 class Struck(Days):
-    """Two campaigns of blows at each of these spots [m], and a train."""
+    """Two campaigns of impacts at each of these spots [m], and a train."""
 
     def __init__(self, *spots):
         super().__init__((1.0, 1.0, 1.0))
@@ -115,16 +115,16 @@ class Struck(Days):
         (
             (0.5, -1.0, 7.0, 6.0, 1.0, 0.5, 1.5),
             16.0,
-            "all blows at 4.2 m",
+            "all impacts at 4.2 m",
         ),  # 13 against 2.5; no campaign would do alone
         ((3.5, 4.0, 7.0, 6.0, 1.0, 0.5, 4.0), 26.0, ""),  # 13 of others, of whom none would do alone
-        ((0.5, -1.0, 5.0, 6.0, 1.0, 0.5, 1.5), 14.0, "all blows at 4.2 m"),  # 11, half a name, against 2.5
+        ((0.5, -1.0, 5.0, 6.0, 1.0, 0.5, 1.5), 14.0, "all impacts at 4.2 m"),  # 11, half a name, against 2.5
         ((0.5, -1.0, 5.0, 6.0, 4.0, 1.5, 1.5), 17.0, ""),  # 11 are no name and the others say half of one
         ((0.5, -1.0, 2.5, 3.0, 1.0, 0.5, 1.5), 8.0, ""),  # nor does it hang on 5.5
         ((0.5, -1.0, 7.0, 6.0, 1.0, 0.5, 12.0), 26.0, ""),  # the train bears it out
-        ((0.5, -1.0, 7.0, 6.0, 1.0, 0.5, 1.5), 30.0, "all blows at 4.2 m"),  # 15.5 are most of 30
+        ((0.5, -1.0, 7.0, 6.0, 1.0, 0.5, 1.5), 30.0, "all impacts at 4.2 m"),  # 15.5 are most of 30
         ((0.5, -1.0, 7.0, 6.0, 1.0, 0.5, 1.5), 32.0, ""),  # and not of 32: the rest is what nuisances pay
-        ((0.5, -4.0, 7.0, 6.0, 1.0, 0.5, 1.5), 32.0, "all blows at 4.2 m"),  # yet others speak against it by 0.5
+        ((0.5, -4.0, 7.0, 6.0, 1.0, 0.5, 1.5), 32.0, "all impacts at 4.2 m"),  # yet others speak against it by 0.5
     ],
 )
 def test_blows_at_one_spot_are_one_witness(gains, gain, alone):

@@ -19,7 +19,7 @@ POLE = -250.0 + 2j * np.pi * 430.0
 
 
 def blows(place, saturated=lambda x: x, share=1.0, limit=None):
-    """A test of six blows at ``place`` on one mode; the channel A shows ``share`` of it, ``saturated``."""
+    """A test of six impacts at ``place`` on one mode; the channel A shows ``share`` of it, ``saturated``."""
     t = np.arange(4000) / RATE
     mode = np.real(np.exp(POLE * t) * (2.0 - 0.7j)) * 2e-3
     channels = (Channel("force", "force"), Channel("A", "acceleration", limit=limit))
@@ -29,7 +29,7 @@ def blows(place, saturated=lambda x: x, share=1.0, limit=None):
         shown = saturated(share * fftconvolve(force, mode)[: t.size])
         noise = rng.normal(size=(2, t.size)) * np.array([[1e-4 * peak], [0.01]])
         made.append(Recording(np.array([force, shown]) + noise, RATE, channels, source="t.uff", record=k))
-    return HammerInput(f"blows at {place}", place, tuple(made), "force")
+    return HammerInput(f"impacts at {place}", place, tuple(made), "force")
 
 
 def at(place, name="A", mounting="rail web"):
@@ -101,7 +101,7 @@ def test_noise_that_no_blow_exceeds_stays_and_is_no_limit(share):
 
 
 def test_a_range_that_the_file_states_is_no_fault():
-    """No blow below it is left."""
+    """No impact below it is left."""
     assert limit_under_impacts([blows(3.0, lambda x: np.clip(x, -24.0, 24.0), limit=24.0)], at(3.0))[1] == 0.0
 
 
@@ -115,7 +115,7 @@ def two_tests():
 
 
 def campaign(names="ABC", hammer=(), peaks=()):
-    """Sensors 3 m apart, the first where blows fall; of each passage the peak that A shows and that of all others."""
+    """Sensors 3 m apart, the first where impacts fall; of each passage the peak that A shows and that of all others."""
     sensors = [at(3.0 * (k + 1), name) for k, name in enumerate(names)]
     channels = tuple(Channel(name, "acceleration") for name in names)
     wave, passages = np.sin(np.linspace(0.0, 50.0, 1001)), []
@@ -140,7 +140,7 @@ def test_no_limit_lies_far_below_what_trains_have_shown(shown, found):
 
 @pytest.mark.parametrize("limit, share", [(30.0, 1.0), (10.0, 0.0)])
 def test_two_that_speak_for_one_limit_speak_together(limit, share):
-    """Trains of 60 to 300 m/s² of which A shows no more than ``limit``, blows of which it shows 30."""
+    """Trains of 60 to 300 m/s² of which A shows no more than ``limit``, impacts of which it shows 30."""
     peaks = [(min(limit, 0.3 * loud), loud) for loud in (60.0, 90.0, 130.0, 180.0, 240.0, 300.0)]
     rolled, struck = (
         saturated_channels(campaign(hammer=hammer, peaks=rolls), 3.0)["A"]

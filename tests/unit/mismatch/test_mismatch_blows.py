@@ -100,16 +100,16 @@ def test_channels_without_blows_are_left_out_and_said(plan):
     campaign = measured_campaign(replace(plan, hammer_points=plan.hammer_points[:2]), seed=1)
     silent = replace(campaign.hammer[0], recordings=campaign.hammer[0].recordings[:1])
     case = TrackCase(replace(campaign, hammer=(silent, campaign.hammer[1])))
-    assert any("blows 1" in note and "sound blows" in note for note in case.notes)
-    assert {o.name.split(":")[0] for o in case.observations} == {"blows 2"}
+    assert any("impacts 1" in note and "accepted impacts" in note for note in case.notes)
+    assert {o.name.split(":")[0] for o in case.observations} == {"impacts 2"}
     with pytest.raises(SimulationError, match="nothing to diagnose"):
         TrackCase(replace(campaign, hammer=(silent,)))
 
 
 @pytest.mark.slow
 def test_a_rail_soft_in_shear_is_sized_against_the_rail_of_its_file(plan):
-    """The fits start from a rail moved to where blows have it; what is named is still what the file's rail lacks, 4 per
-    GN beside its own 4.1."""
+    """The fits start from a rail moved to where impacts have it; what is named is still what the file's rail lacks,
+    4 per GN beside its own 4.1."""
     case, found = found_in(plan, physics.RailShear(4.0))
     assert case.predictor.rail["rail_shear"] < -0.05
     assert found.names[:1] == ("rail_shear",)
@@ -117,7 +117,7 @@ def test_a_rail_soft_in_shear_is_sized_against_the_rail_of_its_file(plan):
 
 
 def test_a_shear_law_is_tried_in_the_rail_that_blows_bent():
-    """What a term says of the rail is said of its file; the rest stays as blows found it, for passages as well."""
+    """What a term says of the rail is said of its file; the rest stays as impacts found it, for passages as well."""
     case = TrackCase(measured_campaign(small_plan((15.0,), hammer_positions=(24.0,), passages=False), (), 3))
     predictor = case.predictor.recentre({"rail_bending": 0.03, "rail_shear": -0.2})
     file, bent = predictor.site.nominal.turnout.track.rail, predictor.track().rail
@@ -146,7 +146,7 @@ def test_a_receptance_follows_the_rail_however_far_it_goes(plan):
 
 
 def test_a_blow_is_not_asked_of_sensors_far_from_it():
-    """At 8 m the tolerance of a model has 1 + (8 / 1.5)^2 = 29 times its variance at the blow."""
+    """At 8 m the tolerance of a model has 1 + (8 / 1.5)^2 = 29 times its variance at the impact."""
     plan = small_plan((15.0,), hammer_positions=(20.4, 30.0), passages=False)
     pairs = observe_tests(measured_campaign(plan), MismatchSettings().pair_tolerance).frf_pairs
     heard = {(p.test.place, p.channel) for p in pairs.values()}
@@ -195,5 +195,5 @@ def test_a_track_that_still_rings_when_the_record_ends_shows_the_receptance_of_i
     model = receptance(assemble(track), receptance_observation.SHIFTED_LINES[pair.lines], 30.0, 30.0)
     low = pair.frequency < 300.0
     assert low.sum() > 20 and pair.frequency[0] < 40.0
-    # 0.1 s after the blow exp(-(21 + 20) 0.1 s) = 1.7 % are left, and an amplifier of 0.4 Hz turns 36 Hz by 1.1 %
+    # 0.1 s after the impact exp(-(21 + 20) 0.1 s) = 1.7 % are left, and an amplifier of 0.4 Hz turns 36 Hz by 1.1 %
     assert np.max(np.abs(measured / model - 1.0)[low]) < 0.04

@@ -120,7 +120,7 @@ def rolled_and_struck():
 
 @pytest.mark.parametrize(("kind", "material"), [("hammer", False), ("passage", True)])
 def test_friction_is_told_by_trains(rolled_and_struck, kind, material):
-    """To blows it is a damper: a fit in which passages gain nothing gives it no name, whatever blows gain."""
+    """To impacts it is a damper: a fit in which passages gain nothing gives it no name, whatever impacts gain."""
     case, base = rolled_and_struck
     assert {c.naming.required_data_type for c in case.candidates if c.family == "dry_friction"} == {"passage"}
     friction = next(c for c in case.candidates if c.family == "dry_friction")
@@ -129,8 +129,8 @@ def test_friction_is_told_by_trains(rolled_and_struck, kind, material):
 
 
 class Heard(Case):
-    """Four blows and four trains that a sensor reads with gains of its own, noise of 0.1; its gain is known to 2 %, and
-    a support, known to 10 %, adds a ramp to blows."""
+    """Four impacts and four trains that a sensor reads with gains of its own, noise of 0.1; its gain is known to 2
+    %, and a support, known to 10 %, adds a ramp to impacts."""
 
     def __init__(self, blows, trains):
         rng = np.random.default_rng(9)
@@ -171,8 +171,9 @@ class Heard(Case):
 
 @pytest.mark.parametrize("gain", [0.76, 1.25, -1.0])
 def test_what_blows_alone_say_of_a_gain(gain):
-    """Trains hear none; with a prior of 0.02 the fit to both stands in between, blows alone stand at their own, but for
-    what the prior of 0.3 takes: a hundredth and more where the fit leaves much, so that noise counts as louder."""
+    """Trains hear none; with a prior of 0.02 the fit to both stands in between, impacts alone stand at their own,
+    but for what the prior of 0.3 takes: a hundredth and more where the fit leaves much, so that noise counts
+    as louder."""
     case = Heard(gain, 1.0)
     fit = fit_jointly(case, iterations=30)
     error = 0.1 / np.sqrt(4 * X.size * 0.5)
@@ -185,7 +186,7 @@ def test_what_blows_alone_say_of_a_gain(gain):
 @pytest.mark.parametrize(("blows", "trains", "material"), [(0.76, 0.76, True), (-1.0, -1.0, True), (1.0, 0.76, False)])
 def test_a_gain_that_blows_speak_against_is_none(blows, trains, material):
     """Ballast that softens under trains makes a sensor loud in them alone. One that both hear has its name, though the
-    fit without it has bent the gain as far as its tolerance lets it, and leaves blows no worse."""
+    fit without it has bent the gain as far as its tolerance lets it, and leaves impacts no worse."""
     case = Heard(blows, trains)
     (gain,), base = case.candidates, fit_jointly(case)
     refit = fit_jointly(case, (gain,), [trains])

@@ -1,4 +1,4 @@
-"""The standard error of what a name gains on recordings never used, against the scatter of many draws."""
+"""The standard error of what a name gains on held-out recordings, against the scatter of many draws."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Flats by their blows, dips by what the waves of the rail took in, polygonal wheels by their line: closed forms."""
+"""Flats by their impacts, dips by what the waves of the rail took in, polygonal wheels by their line: closed forms."""
 
 from types import SimpleNamespace
 
@@ -60,7 +60,8 @@ def test_a_row_of_blows_names_the_wheel_that_makes_them_its_radius_and_where_it_
     assert int(np.argmax(nats)) == 1 and nats[1] > 20.0
     _, radius, phases = found[1]
     assert radius == pytest.approx(0.446, abs=0.0046)  # one step of the scan
-    for (_, at), true in zip(phases, (1.1, 2.3)):  # blows near the sensors, on the third turn or so, lie where they did
+    # impacts near the sensors, on the third turn or so, lie where they did
+    for (_, at), true in zip(phases, (1.1, 2.3)):
         way = np.array([at + k * 2 * np.pi * radius for k in range(4)])[:, None]
         assert np.abs(way - [true + k * 2 * np.pi * 0.446 for k in range(4)]).min() < 0.2
 

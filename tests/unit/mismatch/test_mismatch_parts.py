@@ -101,7 +101,7 @@ def test_a_rival_within_the_margin_is_one_also_below_the_threshold(behind, said)
     "gain, excess, said", [(1.1, 0.9, "none"), (2.1, 0.9, "unknown"), (1.1, 1.2, "unknown"), (20.0, 0.5, "unknown")]
 )
 def test_a_weak_name_that_predicts_worse_is_nothing_where_nothing_is_left_to_explain(gain, excess, said):
-    """``gain`` in thresholds, ``excess`` over the level of controls: either by itself keeps the question open."""
+    """``gain`` in thresholds, ``excess`` over the control level: either by itself keeps the question open."""
     settings = MismatchSettings()
     found = score(candidate("rail_shear", {}), gain * settings.threshold, 2.0, 0.1)
     assert judge([found], excess, settings, consistent=False).answer == said
@@ -139,7 +139,7 @@ def test_a_name_that_one_condition_speaks_against_is_none(gain, worst, excess, s
 def test_a_name_with_evidence_of_its_own_need_not_explain_what_the_fit_leaves(
     aside, scanned, sounding, gain, said, explained
 ):
-    """Blows that come once a turn are a flat's, though the waveform in the band, which takes the angle to the
+    """Impacts that come once a turn are a flat's, though the waveform in the band, which takes the angle to the
     millimetre, stays as it was: 30 nats less ln 20 are more than a threshold of 12, and 13 less ln 20 are not. A
     channel's ceiling, or a line above the band, is no such evidence. A gain of less than 30 less ln 20, 27.004, means
     that the fit has become worse: by more than a margin of 6, which its numbers cost, that speaks against it; the
@@ -151,7 +151,7 @@ def test_a_name_with_evidence_of_its_own_need_not_explain_what_the_fit_leaves(
 
 
 def test_what_explains_too_little_leaves_the_lead_to_what_other_data_tell():
-    """A gain in a sensor that a flat keeps louder than sound turnouts: both are said, and asked together."""
+    """A gain in a sensor that a flat keeps louder than intact turnouts: both are said, and asked together."""
     flat = candidate(
         "wheel_flat", {"train": "railcar", "axle": 1}, external_evidence=43.6, n_scanned=20, evidence_suffices=True
     )

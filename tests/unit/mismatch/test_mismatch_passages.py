@@ -237,8 +237,8 @@ def test_errors_of_a_passage_are_those_of_wheels_as_heavy_as_the_fit_has_them(so
 
 @pytest.mark.slow
 def test_passages_roll_on_the_rail_that_the_fit_has(sound):
-    """Blows that an effect had bent gave the rail; with the effect in the model it is another. Passages, and errors of
-    all of them, are then those of a case that was made with that rail, and blows are as they were."""
+    """Impacts that an effect had bent gave the rail; with the effect in the model it is another. Passages, and
+    errors of all of them, are then those of a case that was made with that rail, and impacts are as they were."""
     case, values = sound
     fit = fit_jointly(case, values=values, iterations=1)
     bent = {name: at - 0.1 * (name == "rail_shear") for name, at in case.predictor.rail.items()}
@@ -292,7 +292,7 @@ def test_a_train_that_could_not_be_looked_at_is_no_train_of_another_file(sound, 
 
 @pytest.mark.parametrize(("behind", "offered"), [(2.9, [3, 1]), (3.1, [3])])
 def test_a_wheel_whose_blows_are_nearly_as_loud_is_sized_as_well(plan, monkeypatch, behind, offered):
-    """What blows cannot tell apart the band may: a wheel of three rough ones came before the one with the flat."""
+    """What impacts cannot tell apart the band may: a wheel of three rough ones came before the one with the flat."""
     case = TrackCase(measured_campaign(plan, (), 7))
     (made, *_), radius = case.aligned_passages.values(), 0.46
     train, phases = made.conditions["train"], ((made.name, 0.5),)

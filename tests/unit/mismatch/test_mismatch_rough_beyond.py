@@ -27,7 +27,7 @@ def lightly_damped():
 @pytest.mark.parametrize(("behind", "wavelength"), [(False, 0.36), (True, 0.3)])
 def test_rough_rail_beyond_the_free_waves_is_an_error_that_the_passage_knows(lightly_damped, behind, wavelength):
     """All that ISO 3095 allows in the third octave, in one line, is one standard deviation of what the errors hold: no
-    sample may stand out by two. Without them some do by more than three, with a mean square near the level of controls.
+    sample may stand out by two. Without them some do by more than three, with a mean square near the control level.
     """
     case, values, seen = lightly_damped
     allowed = np.sqrt(2.0) * 1e-6 * 10.0 ** (float(level(np.array([wavelength]), 0.0)[0]) / 20.0)

@@ -156,7 +156,7 @@ def test_a_rough_search_finds_the_nose_from_where_no_straight_step_does(campaign
     assert not set(found) & set(certain.start_values)
     standing = AcceptedEffect(
         "local_pad", {"sleeper": 24.0}, {"factor": (0.7, 0.05)}
-    )  # what blows tell of it is no nose
+    )  # what impacts tell of it is no nose
     beside = TrackCase(campaign, accepted=(standing,)).start_values
     assert {n: beside[n] for n in found} == {n: case.start_values[n] for n in found} and beside != case.start_values
 

@@ -86,7 +86,7 @@ class OneLoud(Case):
 
 
 def with_squares(square, hammer):
-    """A fit that leaves these mean squares in the loud channel and in blows."""
+    """A fit that leaves these mean squares in the loud channel and in impacts."""
     level, white = {"passage": 0.5, "hammer": hammer}, [np.full(100, np.sqrt(square))]
     psi, part = np.array([0.4]), lambda candidate: slice(0, 1)
     return SimpleNamespace(level=level, white=white, candidates=(), psi=psi, psi_se=0.1 * psi, part=part)
@@ -115,7 +115,7 @@ def test_what_a_name_leaves_in_a_channel_is_not_asked_of_a_second_effect():
 
 @pytest.mark.parametrize("place", [12.0, 12.07, 12.2])
 def test_the_receptance_under_the_hammer_is_no_other_a_micrometre_beside_it(place):
-    """The rail between two nodes gives under its own blow, wherever the sensor sits between them."""
+    """The rail between two nodes gives under its own impact, wherever the sensor sits between them."""
     model = ReceptanceModel(uniform_track(24.0), ())
     here, beside = (model.receptance(place, place + way) for way in (0.0, 1e-6))
     assert np.max(np.abs(beside / here - 1.0)) < 1e-5
@@ -214,7 +214,7 @@ def test_a_channel_is_not_cut_off_below_what_it_has_shown(whole, asked):
 
 
 def test_the_decoy_learns_from_recordings_like_those_it_has_to_predict():
-    """Passages two samples late are mended by two taps; blows that fit already must not stand in their way."""
+    """Passages two samples late are fixed by two taps; impacts that fit already must not stand in their way."""
     rng = np.random.default_rng(0)
 
     def late(k):

@@ -59,7 +59,7 @@ PAIR = SimpleNamespace(test=SimpleNamespace(place=10.7), seat=("S", 11.0))
 
 
 def heard(model, seat):
-    """Of two blows and a sensor that moved, not all of them paired, so that a pair taken for another shows."""
+    """Of two impacts and a sensor that moved, not all of them paired, so that a pair taken for another shows."""
     first, second = ("S", 8.0), ("S", 11.0)
     pairs = (9.1, first), (10.7, first), (10.7, second)
     zone = SimpleNamespace(first=18, last=19, castings=castings_of(model.track, 9.95, 11.4))
@@ -102,7 +102,7 @@ def test_derivatives_by_supports_know_what_follows_them_in_a_term(term):
 @pytest.mark.parametrize("name", ["bending_stiffness", "shear_stiffness"])
 def test_the_rails_derivative_is_that_of_a_slightly_stiffer_rail(name):
     """Closed form of the elements' two modes against differences of full solutions, to 1.5 %: what their consistent
-    mass hangs on the share of shear; blow and sensor apart, supports uneven."""
+    mass hangs on the share of shear; impact and sensor apart, supports uneven."""
     rng, track = np.random.default_rng(3), uniform_track(24.0)
     track = track.with_(pad_stiffness=track.pad_stiffness * np.exp(0.2 * rng.normal(size=track.support.size)))
 

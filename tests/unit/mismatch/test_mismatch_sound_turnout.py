@@ -10,11 +10,12 @@ from turnout.simulate import Sensor, load_track, load_vehicle, simulate_hammer, 
 from turnout.simulate.hammer import Hammer
 
 SPEEDS = (39.0, 43.0)  # m/s; the faster, the nearer to frequencies that the track carries far
-RECORD = 0.17  # s of a hammer record, 0.12 of them after the blow: some blows would be rejected as cut off with less
+# s of a hammer record, 0.12 of them after the impact: some impacts would be rejected as cut off with less
+RECORD = 0.17
 
 
 def measured(places, seed):
-    """Blows at the first place and two trains over one rail; the owner's file is the very track."""
+    """Impacts at the first place and two trains over one rail; the owner's file is the very track."""
     turnout = load_track("tommerup")
     sensors = tuple(Sensor(f"S{x:g}", x, noise=0.05) for x in places)
     blows = simulate_hammer(turnout, places[0], Hammer(position_spread=0.004), sensors, 5, seed=seed, duration=RECORD)

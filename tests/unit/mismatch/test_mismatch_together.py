@@ -44,7 +44,7 @@ class Shapes(Case):
 
 
 def test_two_effects_of_which_either_leaves_too_much_are_both_named():
-    """Alone the larger leaves twenty times the level of controls; its size and the other's are those put in."""
+    """Alone the larger leaves twenty times the control level; its size and the other's are those put in."""
     found = diagnose(Shapes(("wave", "ramp", "bowl"), wave=1.2, ripple=0.0, ramp=2.5))
     assert found.names == ("ramp", "wave") or found.names == ("wave", "ramp")
     for candidate, size in zip(found.fit.candidates, found.fit.psi):
@@ -74,7 +74,7 @@ def test_what_shows_beside_a_name_and_gets_none_is_told():
 
 
 def test_a_name_is_graded_by_what_the_last_fit_leaves():
-    """Alone the ramp leaves twice the level of controls; with the wave no more than they do."""
+    """Alone the ramp leaves twice the control level; with the wave no more than they do."""
     found = diagnose(Shapes(("wave", "ramp"), ramp=2.5, wave=0.2))
     assert [(v.names, v.grade) for v in found.verdicts] == [(("ramp",), "A"), (("wave",), "A")]
     assert found.probability == min(v.probability for v in found.verdicts)
@@ -262,8 +262,8 @@ def test_a_second_of_a_kind_two_bays_on_is_the_shape_of_the_first():
     ({"train": "a", "axle": 1}, {"train": "a", "axle": 2}, True),  # two flats
 ])  # fmt: skip
 def test_a_wheel_known_by_its_blows_is_no_shape_of_heavy_wheels(known, offered, same):
-    """A flat strikes and all wheels of its train are heavy: two parts. A wheel out of round is told by no blows of its
-    own, and may be what heavy wheels leave."""
+    """A flat strikes and all wheels of its train are heavy: two parts. A wheel out of round is told by no impacts of
+    its own, and may be what heavy wheels leave."""
 
     def of(where, sounding):
         return Candidate.of(
@@ -295,7 +295,7 @@ def test_a_rival_that_keeps_its_gain_on_top_of_the_leader_is_none(left, answer):
 
 @pytest.mark.parametrize("promised, scouted, asked", [(7.0, 7.0, 6.0), (7.0, 5.0, 12.0)])
 def test_a_second_effect_that_blows_alone_promise_half_of_is_refitted(promised, scouted, asked):
-    """What trains say of it comes on top: a soft rail of 12 nats in blows had 20 in all. What a column promises is of
+    """What trains say of it comes on top: a soft rail of 12 nats in impacts had 20 in all. What a column promises is of
     all recordings together, and has to be a name; a first effect is asked from 2 nats on."""
     settings, candidate = MismatchSettings(), Candidate.of("soft_rail", AMOUNT, tuple, ((0.5,),))
     entry, beside = Entry(promised, candidate, np.array([0.5]), {}), SimpleNamespace(candidates=("pad",))

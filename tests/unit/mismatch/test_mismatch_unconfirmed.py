@@ -1,4 +1,4 @@
-"""A name whose shape stays unresolved and that foretells recordings never used worse is no name."""
+"""A name whose shape stays unresolved and that predicts held-out recordings worse is no name."""
 
 from dataclasses import replace
 

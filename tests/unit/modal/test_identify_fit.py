@@ -1,4 +1,4 @@
-"""Variable projection and the mixed fit: exact gradients, the Cramér-Rao bound, the spread between blows."""
+"""Variable projection and the mixed fit: exact gradients, the Cramér-Rao bound, the spread between impacts."""
 
 import numpy as np
 import pytest
@@ -79,13 +79,13 @@ def test_the_bound_falls_with_the_root_of_the_number_of_blows_and_with_the_noise
 
 
 def test_the_spread_between_blows_is_recovered_and_does_not_become_damping():
-    """Thirty blows of 2 % spread: the standard deviation is known to 1/sqrt(58) = 13 %, three of that allowed."""
+    """Thirty impacts of 2 % spread: the standard deviation is known to 1/sqrt(58) = 13 %, three of that allowed."""
     test, decays = decays_of(n=30, seed=5, spread=0.02)
     model = published_model("CP A7")
     fit = fit_mixed(theta_of(model.frequency, model.damping), decays, test.rate, NO_DRIFT)
     spread = np.sqrt(fit.spread).reshape(2, 2)
     assert spread[1, 0] == pytest.approx(0.02, rel=0.4)
-    # One pole for all blows would read 3 % more damping in the railpad mode; the mean of 30 is good to 0.4 %.
+    # One pole for all impacts would read 3 % more damping in the railpad mode; the mean of 30 is good to 0.4 %.
     assert fit.mean[1, 1] == pytest.approx(test.damping[:, 1].mean(), rel=0.01)
     np.testing.assert_allclose(fit.theta[:, 1, 0], np.log(test.frequency[:, 1]), atol=2e-3)
 
@@ -164,7 +164,7 @@ def test_whitening_keeps_the_poles():
 
 
 def test_the_held_out_fit_of_a_blow_does_not_use_its_own_modes():
-    """Three blows of one mode and a fourth of another: by the others' modes the fourth is not described at all."""
+    """Three impacts of one mode and a fourth of another: by the others' modes the fourth is not described at all."""
     k = np.arange(300)
     poles = [discrete_pole(f, 0.05, 20e3) for f in (200.0, 200.0, 200.0, 600.0)]
     decays = np.array([(z**k).real for z in poles])

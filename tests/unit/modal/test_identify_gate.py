@@ -71,7 +71,7 @@ def test_residues_of_an_exact_receptance_are_found_with_a_rotated_phase(decay):
 
 
 def test_the_response_to_a_unit_impulse_does_not_depend_on_the_exponential_window():
-    """The same ten blows at 60 dB: residues and b of their model as without a window, to 1 %."""
+    """The same ten impacts at 60 dB: residues and b of their model as without a window, to 1 %."""
     test, found = hammer_test("SP", 10, 3, snr_db=60, duration=0.25, pre_trigger=5e-3), []
     channels = Channel("h", "force"), Channel("r", "acceleration")
     recordings = [

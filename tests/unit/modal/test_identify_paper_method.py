@@ -99,7 +99,7 @@ def test_one_blow_has_no_standard_error():
 
 
 def test_the_spread_of_blows_is_theirs_and_no_blow_has_an_error_of_its_own():
-    """The procedure states no error: what blows differ by is all spread, never none."""
+    """The procedure states no error: what impacts differ by is all spread, never none."""
     _, model = paper("CP A7", spread=0.02)
     for mode in model.modes:
         own = [row for row in model.per_impact if row["band"] == mode.band]

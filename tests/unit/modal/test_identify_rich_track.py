@@ -39,12 +39,13 @@ def exact(modes):
 
 @pytest.mark.parametrize("seed", [300, 301, 302])
 def test_a_weak_mode_beside_modes_that_move_between_blows_does_not_become_a_twin(seed):
-    """A hundredth of the peak at 330 Hz; a blow knows its own frequency to 0.1 %, so the mean is that of the blows."""
+    """A hundredth of the peak at 330 Hz; an impact knows its own frequency to 0.1 %, so the mean is that of the
+    impacts."""
     decays, moved = test([BALLAST, RAILPAD, (330.0, 0.05, 0.05)], seed, spread=0.02)
     mode = identify(decays, RATE, SETTINGS).mode("railpad")
     assert mode.frequency == pytest.approx(moved[:, 1].mean(), rel=2e-3)
     assert mode.damping == pytest.approx(RAILPAD[1], rel=0.03)
-    # the standard error is that of the blows' mean; a sample's standard deviation of ten is known to 24 %
+    # the standard error is that of the impacts' mean; a sample's standard deviation of ten is known to 24 %
     assert mode.frequency_se == pytest.approx(moved[:, 1].std(ddof=1) / np.sqrt(10), rel=0.25)
 
 
@@ -81,7 +82,7 @@ def test_two_modes_of_the_ballast_band_are_no_pad():
 
 @pytest.mark.parametrize(("ballast", "zeta"), [(100.0, 0.02), (150.0, 0.02), (200.0, 0.01), (250.0, 0.01)])
 def test_a_lightly_damped_mode_at_a_harmonic_of_the_mains_is_no_hum(ballast, zeta):
-    """It begins alike with every blow. Taken for both, its error bar was 10 to 45 times that of the noise."""
+    """It begins alike with every impact. Taken for both, its error bar was 10 to 45 times that of the noise."""
     decays, _ = test([(ballast, zeta, 1.0 + 0.3j), RAILPAD], 3)
     mode = identify(decays, RATE, SETTINGS).mode("ballast")
     assert mode.frequency_se < 3.0 * mode.frequency_crb

@@ -49,7 +49,7 @@ def test_unmodelled_modes_and_drift_do_not_disturb(location, snr):
 def test_a_mode_that_moves_between_blows_is_not_taken_for_two(location):
     _, model = identified(location, 1, spread=0.03)
     assert len(model.diagnostics["modes_in_fit"]) == 2
-    # Ten blows of 3 %: the spread is known to 1/sqrt(18) = 24 %.
+    # Ten impacts of 3 %: the spread is known to 1/sqrt(18) = 24 %.
     assert model.mode("railpad").frequency_sd / model.mode("railpad").frequency == pytest.approx(0.03, rel=0.7)
 
 
@@ -94,7 +94,7 @@ def test_coloured_noise_is_modelled():
         assert abs(mode.damping - test.damping[0, i]) < 6.0 * mode.damping_se
 
 
-@pytest.mark.parametrize("damage", ["noise", "second blow"])
+@pytest.mark.parametrize("damage", ["noise", "second impact"])
 def test_an_odd_blow_is_left_out_and_reported(damage):
     test = hammer_test("SP", 10, 8)
     decays = test.decays()

@@ -12,7 +12,7 @@ START = 100
 
 
 def test_of_ten_blows(section, seed, ballast=1.0, railpad=1.0):
-    """Decays of ten blows with noise of 1 % of the peak, from the end of contact on."""
+    """Decays of ten impacts with noise of 1 % of the peak, from the end of contact on."""
     rng = np.random.default_rng(seed)
     response = simulated_response(section, ballast, railpad)
     decays = []
@@ -52,7 +52,7 @@ def test_repeated_tests_find_the_same_modes_or_say_that_they_cannot(section):
     for band in ("ballast", "railpad"):
         found = [m.mode(band) for m in models if m.mode(band) is not None]
         frequency = np.array([mode.frequency for mode in found])
-        # Another mode would be off by 30 % or more; ten blows know the ballast mode to some 2 %.
+        # Another mode would be off by 30 % or more; ten impacts know the ballast mode to some 2 %.
         assert np.ptp(frequency) < 0.06 * frequency.mean()
         assert len(found) >= 2
         for model in models:
@@ -61,7 +61,7 @@ def test_repeated_tests_find_the_same_modes_or_say_that_they_cannot(section):
 
 
 def test_an_interval_holds_the_choice_among_explanations():
-    """More than one was made, and the interval is wider than the scatter of the blows alone asks for."""
+    """More than one was made, and the interval is wider than the scatter of the impacts alone asks for."""
     model = identify(test_of_ten_blows("A9", 5), RATE, SETTINGS)
     mode = model.mode("ballast")
     blows = np.array([row["frequency"] for row in model.per_impact if row["band"] == "ballast"])

@@ -58,7 +58,7 @@ def test_a_wrong_place_scores_less_and_the_forecast_says_it_loudest(settings):
 
 
 def test_the_forecast_does_not_see_its_future(settings):
-    """Data behind the training part of the last wheel doubled: what is foretold there stays, so half is missing."""
+    """Data behind the training part of the last wheel doubled: what is predicted there stays, so half is missing."""
     rng = np.random.default_rng(13)
     passage = impact_record(rng, "CP A7", offsets=IC3[:4])
     data = apply_filter(passage.samples, THROUGH)

@@ -32,7 +32,7 @@ HANGS = HangingSleeper(J, 3e-4)
 
 
 def blow(t):
-    """A blow of 5 kN and 1.2 ms."""
+    """An impact of 5 kN and 1.2 ms."""
     return np.where(t < 1.2e-3, 5e3 * np.sin(np.pi * t / 1.2e-3) ** 2, 0.0)
 
 
@@ -44,7 +44,7 @@ def form(band, x):
 
 
 def energy(prepared, duration):
-    """Of rail, supports and the terms' laws after a blow at the middle [J]."""
+    """Of rail, supports and the terms' laws after an impact at the middle [J]."""
     motion = run(prepared, duration, pulses=[(7.2, blow)]).motion
     inside = slice(prepared.arrays.pad, prepared.arrays.pad + prepared.arrays.n)
     u, v, m = motion.u[inside], motion.v[inside], prepared.matrices
@@ -71,7 +71,7 @@ def energy(prepared, duration):
     ],
 )
 def test_after_a_blow_the_energy_only_falls_until_all_is_at_rest(track, terms):
-    """Springs give back what they take, dampers take: a track at rest before a blow is at rest long after it.
+    """Springs give back what they take, dampers take: a track at rest before an impact is at rest long after it.
 
     A thousandth at 0.25 s: the slowest mode of these tracks decays with more than 1/e in 40 ms."""
     prepared = prepare(track, 1e-4, terms=terms)

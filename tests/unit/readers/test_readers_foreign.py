@@ -52,7 +52,7 @@ def test_matlab_matrix_of_columns_with_fs(by_index, tmp_path):
 
 
 def test_matlab_matrix_in_three_dimensions(by_index, tmp_path):
-    """(sample, channel, record), as MATLAB users stack their blows."""
+    """(sample, channel, record), as MATLAB users stack their impacts."""
     volts = np.column_stack([FORCE * 0.23e-3, RAIL * 87.9e-3 / 9.80665])
     scipy.io.savemat(tmp_path / "a.mat", {"y": np.stack([volts, 2 * volts], axis=2), "dt": 1 / RATE})
     first, second = read("a.mat", tmp_path, by_index).recordings
@@ -211,7 +211,7 @@ def left_in_tdms(folder, steps, starts):
         for k in range(2):  # half of what the second begins later by stands in its time stamp
             channels = [
                 nptdms.ChannelObject(
-                    f"blow {k}",
+                    f"impact {k}",
                     name,
                     samples,
                     {
@@ -266,7 +266,7 @@ def test_channels_of_one_record_that_state_different_rates_are_not_put_side_by_s
     (error,) = _raised(name, tmp_path, by_name)
     if format != "hdf5":
         both(read(name, tmp_path, by_name).recordings[0])
-        assert error.where == "record 2 of 2" + " (group 'blow 1')" * (format == "tdms")
+        assert error.where == "record 2 of 2" + " (group 'impact 1')" * (format == "tdms")
     assert error.reason == "wrong_rate" and ("20000 Hz" in error.problem or "5e-05" in error.problem)
 
 

@@ -201,7 +201,7 @@ def test_channel_after_channel_without_numbers_is_paired_by_order(hammer_test, i
 
 
 def test_a_lost_header_between_unnumbered_sets_forbids_pairing(hammer_test, in_si, tmp_path):
-    """Force of one blow and acceleration of the next would look like a sound record."""
+    """Force of one impact and acceleration of the next would look like a sound record."""
     path = write(hammer_test, tmp_path / "a.uff", "uff58")
     data = path.read_bytes()
     for k in range(4):

@@ -15,7 +15,7 @@ LIST = "select turnout_id, sections, source, state, sentence from worklist(times
 
 
 def rejected_result(section="A1", day="2026-02-09", reason="sign_reversed", turnout="t1"):
-    """Result of a hammer test all of whose six blows were rejected."""
+    """Result of a hammer test all of whose six impacts were rejected."""
     result = hammer_result(turnout, section, day)
     (model,), (recording,) = result.tables["models"], result.tables["recordings"]
     model |= {"status": "rejected", "reason": "too_few_impacts"}
@@ -41,7 +41,7 @@ def passage(k, day, status):
 
 def test_a_section_all_of_whose_blows_were_rejected_is_on_the_list(bench):
     bench.register(rejected_result(day="2026-01-05"), hammer_result(section="A2", day="2026-01-05"))
-    said = "no hammer test could be used yet (1 tried); 2026-01-05: 6 of 6 blows rejected (sign_reversed)"
+    said = "no hammer test could be used yet (1 tried); 2026-01-05: 6 of 6 impacts rejected (sign_reversed)"
     assert bench.ask(LIST) == [("t1", "A1", "hammer", "cannot tell", said)]
 
 
@@ -50,7 +50,7 @@ def test_a_section_whose_newest_test_failed_says_since_when_and_a_good_one_later
     said = "no hammer test could be used since 2026-01-05 (2 tried); 2026-03-09: 1 file in quarantine (truncated)"
     assert bench.ask(LIST) == [("t1", "A1", "hammer", "cannot tell", said)]
     earlier = LIST.replace("2027-01-01", "2026-02-10")
-    assert "(1 tried); 2026-02-09: 6 of 6 blows rejected" in bench.ask(earlier)[0][4]
+    assert "(1 tried); 2026-02-09: 6 of 6 impacts rejected" in bench.ask(earlier)[0][4]
     bench.register(hammer_result(day="2026-04-06"))
     assert bench.ask(LIST) == []
 
@@ -99,7 +99,7 @@ def test_the_command_and_the_page_show_it_before_any_chart(bench, capsys):
         {"turnout_id": "t1", "layout": "l", "config_hash": "h"}]})  # fmt: skip
     assert main(["worklist", "--registry", str(bench.registry)]) == 0
     told = capsys.readouterr().out
-    assert "CANNOT TELL: t1, A1, all" in told and "6 of 6 blows rejected (sign_reversed)" in told
+    assert "CANNOT TELL: t1, A1, all" in told and "6 of 6 impacts rejected (sign_reversed)" in told
     assert "from rejected where turnout_id = 't1'" in told and "No chart has been computed yet" in told
 
 

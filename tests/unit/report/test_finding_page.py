@@ -137,9 +137,9 @@ def test_a_named_finding_says_what_where_how_much_and_what_to_check():
 
 
 def test_what_shows_beside_a_name_stands_in_its_sentence():
-    reason = "something else shows beside it: above the level of controls, and no candidate helps"
+    reason = "something else shows beside it: above the control level, and no candidate helps"
     row = named() | {"evidence_json": json.dumps(EVIDENCE | {"reason": reason})}
-    said = "hangs 1.1 mm above its ballast. Something else shows beside it: above the level of controls"
+    said = "hangs 1.1 mm above its ballast. Something else shows beside it: above the control level"
     assert said in headline(row) and "above its ballast." in headline(named())
     heading = page(row).split("<h1>")[1].split("</h1>")[0]
     assert heading.endswith("above its ballast.")  # the rest stands under "How sure"
@@ -238,9 +238,10 @@ def test_what_was_accepted_is_shown_over_the_visits():
 
 
 def test_why_nothing_can_be_said_stands_on_the_page():
-    row = {"stage": "mismatch", "place": "sections A7", "found": "no channel with 2 sound blows", "remedy": "See docs"}
+    problem = "no channel with 2 accepted impacts"
+    row = {"stage": "mismatch", "place": "sections A7", "found": problem, "remedy": "See docs"}
     text = page(quarantine=[row])
-    assert "Nothing can be said" in text and "no channel with 2 sound blows" in text
+    assert "Nothing can be said" in text and "no channel with 2 accepted impacts" in text
 
 
 def test_numbers_read_as_engineers_write_them():
@@ -282,5 +283,5 @@ def test_a_sensor_with_the_wrong_sign_is_said_so(gain, said):
 def test_a_refused_name_is_not_offered_as_what_was_left_out():
     """An unknown may hold the term that was tried: it is said to be refused, and nobody is told to accept it."""
     shown = page(finding("unknown", term_json=json.dumps([GAP]), fit_after_pct=26.0))
-    assert "what was refused" in shown and "what was left out" not in shown and "--accept" not in shown
+    assert "what was rejected" in shown and "what was left out" not in shown and "--accept" not in shown
     assert "what was left out" in page(named()) and "--accept" in page(named())

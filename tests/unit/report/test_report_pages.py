@@ -118,7 +118,7 @@ def test_the_resonance_on_the_page_is_the_registrys_with_its_interval_and_n(page
     words = " ".join(read(folder / "turnouts" / "tommerup_s1.html").words)
     half = student.ppf(0.975, n - 1) * error
     assert f"{frequency:.1f} ± {half:.1f}" in words
-    # the paper's 99.4 Hz with its blow-to-blow spread of 0.6 %
+    # the paper's 99.4 Hz with its impact-to-impact spread of 0.6 %
     assert abs(frequency - 99.4) < 1.0
 
 

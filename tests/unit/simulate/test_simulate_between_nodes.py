@@ -55,8 +55,8 @@ def test_a_standing_load_deflects_a_sensor_by_the_influence_line(x, a):
 
 
 def test_velocity_and_acceleration_between_nodes_add_up_to_the_motion():
-    """A blow beside the sensor: summed to the middle of each step they are what is stamped there, to the 1 % by which
-    a pulse of 1 ms is no straight line over two steps of 50 µs."""
+    """An impact beside the sensor: summed to the middle of each step they are what is stamped there, to the 1 % by
+    which a pulse of 1 ms is no straight line over two steps of 50 µs."""
     dt, force = 5e-5, lambda t: 1e4 * np.sin(np.pi * np.clip(t / 1e-3, 0.0, 1.0)) ** 2
     probes = [Probe(6.04, order) for order in (0, 1, 2)]
     signals = run(prepare(uniform_track(12.0), dt), 5e-3, probes, pulses=[(6.08, force)]).signals

@@ -67,8 +67,8 @@ terms:
 
 
 def test_a_simulated_hammer_test_keeps_its_truth_apart(tmp_path, monkeypatch):
-    """Blows scatter by 1 cm and never by more than two of these. The channel's low-pass is the load cell's: a pulse of
-    1.2 ms loses less than 0.3 % of its peak, its noise is 2 N."""
+    """Impacts scatter by 1 cm and never by more than two of these. The channel's low-pass is the load cell's: a
+    pulse of 1.2 ms loses less than 0.3 % of its peak, its noise is 2 N."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "soft.yaml").write_text(SOFT)
     command = ["simulate", "hammer", "--section", "A7", "--track", "soft.yaml", "--blows", "2", "--tests", "2"]

@@ -1,4 +1,4 @@
-"""A blow: what of the track and of its terms the hammer meets."""
+"""An impact: what of the track and of its terms the hammer meets."""
 
 import numpy as np
 import pytest
@@ -41,7 +41,8 @@ def test_the_terms_of_a_prepared_track_count_in_its_channels_too():
 
 
 def test_a_term_counts_the_supports_of_the_whole_track_however_much_of_it_is_marched():
-    """Soft ballast 3 m from the blow changes what is heard above it, more than an end of the track 27 m from there."""
+    """Soft ballast 3 m from the impact changes what is heard above it, more than an end of the track 27 m from
+    there."""
     track, place = uniform_track(120.0), 60.0
     near, far = (LocalBallast(track.nearest_support(x), 0.2) for x in (place + 3.0, 8.0))
     above = [Sensor("A", place + 3.0, cutoff=None)]

@@ -1,4 +1,4 @@
-"""A turnout small enough to be diagnosed in a test: two sections on 36 m of even track, blows, a locomotive."""
+"""A turnout small enough to be diagnosed in a test: two sections on 36 m of even track, impacts, a locomotive."""
 
 import shutil
 from dataclasses import replace

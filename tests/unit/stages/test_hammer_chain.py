@@ -24,7 +24,7 @@ EXTENSIONS = {"uff58b": "uff", "tdms": "tdms", "hdf5": "h5"}
 
 
 def lay_out(raw, section="A7", file_format="hdf5", n_test=3, ballast=1.0, railpad=1.0, seed=5, change=None):
-    """Files of one section and campaign of tommerup_s1; returns its unit and configuration, and the blows' truth."""
+    """Files of one section and campaign of tommerup_s1; returns its unit and configuration, and the impacts' truth."""
     folder = raw / "tommerup_s1" / "hammer" / DAY.isoformat()
     folder.mkdir(parents=True)
     rng, truth = np.random.default_rng(seed), []
@@ -58,7 +58,7 @@ def test_modes_lie_within_five_standard_errors_of_the_truth(tmp_path, file_forma
         mode = modes[band]
         assert abs(mode["frequency_hz"] - factor * frequency) < 5 * mode["frequency_se_hz"]
         assert abs(mode["damping_ratio"] - damping) < 5 * mode["damping_se"]
-        # poles differ by 0.6 % between blows, so the mean of 30 cannot be known better than 0.1 %
+        # poles differ by 0.6 % between impacts, so the mean of 30 cannot be known better than 0.1 %
         assert 0.0005 < mode["frequency_se_hz"] / mode["frequency_hz"] < 0.005
         assert mode["rail_temperature_c"] == 12.0
 
@@ -91,7 +91,8 @@ def test_one_dead_channel_costs_one_file_and_says_what_to_do(tmp_path):
 
 
 def test_a_blow_that_the_modes_do_not_describe_is_rejected_in_its_row_and_in_all_that_is_counted(tmp_path):
-    """A resonance of 1350 Hz at half of the peak rings in one blow of ten alone: it was struck elsewhere, or loose."""
+    """A resonance of 1350 Hz at half of the peak rings in one impact of ten alone: it was struck elsewhere, or
+    loose."""
 
     def change(_, recordings):
         first = recordings[0]
@@ -209,7 +210,7 @@ def test_a_file_copied_under_another_name_counts_once(tmp_path):
 
 
 def test_a_test_exported_again_in_another_format_counts_once(tmp_path):
-    """Other bytes, the same blows, and a name that is a test of its own: every one is named with its original."""
+    """Other bytes, the same impacts, and a name that is a test of its own: every one is named with its original."""
     unit, turnout, _ = lay_out(tmp_path, n_test=2)
     once = hammer_unit(unit, turnout, tmp_path, algo="1")
     folder = tmp_path / "tommerup_s1" / "hammer" / DAY.isoformat()

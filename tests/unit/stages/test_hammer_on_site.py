@@ -31,7 +31,8 @@ def in_repository(repository, monkeypatch):
 
 
 def record(path, section="A7", test=1, seed=5, change=None, file_format="hdf5", dated=True):
-    """A file of ten blows of which none went wrong, as the layout of Tommerup promises it; ``change`` befalls them."""
+    """A file of ten impacts of which none went wrong, as the layout of Tommerup promises it; ``change`` befalls
+    them."""
     response = paper_response(section, 1.0, 1.0)
     for k in range(99):
         recordings, truth = hammer_test(response, 12.0, DAY, test, np.random.default_rng([seed, test, k]))
@@ -91,7 +92,7 @@ def test_the_published_resonances_lie_within_the_intervals_that_are_printed(tmp_
 
 
 def test_the_dynamic_stiffness_is_that_of_the_closed_form_within_its_interval(tmp_path, capsys):
-    """Poles that scatter by 0.6 % between blows move the mean of twenty by 0.1 %, which the interval holds too."""
+    """Poles that scatter by 0.6 % between impacts move the mean of twenty by 0.1 %, which the interval holds too."""
     for section in ("SP", "A7"):
         _, text, _ = say(capsys, tmp_path, *filed(tmp_path, section, (1, 2)))
         told = STIFFNESS.findall(text)
@@ -144,7 +145,7 @@ def test_nothing_is_shown_as_sound_that_the_chain_refuses(tmp_path, capsys):
     files = filed(tmp_path, "SP", (1,), change=lambda rs: [scenario.swapped_sign(r) for r in rs])
     code, text, _ = say(capsys, tmp_path, *files)
     assert code == 1 and "no resonance" in text and "0 of 10 accepted" in text
-    assert text.count("refused, sign_reversed") == 10 and not resonances(text) and "MN/m" not in text
+    assert text.count("rejected, sign_reversed") == 10 and not resonances(text) and "MN/m" not in text
     assert "too few accepted impacts" in text
 
 

@@ -199,7 +199,7 @@ def own_track(config):
 
 
 def test_an_accepted_gap_is_simulated(config):
-    """A blow on a sleeper that hangs finds no ballast: the file's term does what the term itself does."""
+    """An impact on a sleeper that hangs finds no ballast: the file's term does what the term itself does."""
     accept(finding(), config, "t1")
     track = own(config)
     short = {"n_impacts": 1, "half_length": 99.0, "duration": 0.1}

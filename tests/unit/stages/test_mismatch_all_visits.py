@@ -5,13 +5,13 @@ import pytest
 from turnout.errors import SimulationError
 from turnout.stages.mismatch_results import ALL_VISITS, _visit
 
-FOUND = {"2024-02-06": ["cold blows"], "2024-07-16": ["warm blows", "trains"]}
+FOUND = {"2024-02-06": ["cold impacts"], "2024-07-16": ["warm impacts", "trains"]}
 
 
 def test_the_newest_one_of_them_or_all_together():
-    assert _visit("t", FOUND, None, "raw") == ("2024-07-16", ["warm blows", "trains"])
-    assert _visit("t", FOUND, "2024-02-06", "raw") == ("2024-02-06", ["cold blows"])
-    assert _visit("t", FOUND, ALL_VISITS, "raw") == ("2024-07-16", ["cold blows", "warm blows", "trains"])
+    assert _visit("t", FOUND, None, "raw") == ("2024-07-16", ["warm impacts", "trains"])
+    assert _visit("t", FOUND, "2024-02-06", "raw") == ("2024-02-06", ["cold impacts"])
+    assert _visit("t", FOUND, ALL_VISITS, "raw") == ("2024-07-16", ["cold impacts", "warm impacts", "trains"])
 
 
 def test_a_visit_that_is_not_there_is_said_with_those_that_are():

@@ -31,7 +31,7 @@ def folder(tmp_path, repository, monkeypatch):
 
 @pytest.fixture(scope="module")
 def blows(tmp_path_factory, repository):
-    """Blows on a turnout with one soft pad; tests copy them."""
+    """Impacts on a turnout with one soft pad; tests copy them."""
     made = tmp_path_factory.mktemp("blows")
     small.lay_out(made, repository)
     small.strike(made, small.soft_pad)
@@ -60,7 +60,7 @@ def test_blows_alone_name_the_soft_pad_at_its_sleeper(soft):
     assert "18.0 m" in row["sentence"] and row["next_measurement"]
     assert row["n_passages"] == 0 and row["n_hammer_tests"] == 2
     (parameter,) = tables["mismatch_parameters"]
-    # true 0.3; blows on two sleepers leave the factor open by a fifth
+    # true 0.3; impacts on two sleepers leave the factor open by a fifth
     assert (
         parameter["value_low"] < small.SOFT + 0.1
         and parameter["value_low"] < parameter["value"] < parameter["value_high"]
@@ -205,7 +205,7 @@ def test_one_sensor_alone_gives_a_finding(folder):
 def test_a_wrong_vehicle_file_is_told_by_its_axles(soft):
     small.roll(soft, speeds=(100.0,), change=lambda r: replace(r, conditions={**r.conditions, "train_type": "ic3"}))
     tables = diagnose_turnout("t1")
-    assert "4 axles heard, 8 in ic3.yaml: wrong vehicle file" in said(tables)
+    assert "4 axles recorded, 8 in ic3.yaml: wrong vehicle file" in said(tables)
     assert [f["n_passages"] for f in tables["mismatch_findings"]] == [0]
 
 

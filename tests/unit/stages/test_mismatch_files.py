@@ -50,7 +50,7 @@ from turnout.workflow.scan import scan, unit_id
 
 @pytest.fixture
 def folder(tmp_path, repository, monkeypatch):
-    """Blows on an even turnout, and two families, so that a diagnosis takes a second."""
+    """Impacts on an even turnout, and two families, so that a diagnosis takes a second."""
     small.lay_out(tmp_path, repository)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(mismatch, "TrackCase", partial(TrackCase, families=("local_ballast", "sensor_gain")))
@@ -403,7 +403,7 @@ def test_results_of_an_earlier_version_without_the_codes_of_all_reasons_are_anal
 
 @pytest.mark.parametrize(("softest", "used"), [(50.0, True), (50_000.0, False)])
 def test_blows_are_judged_as_the_hammer_stage_judges_them(folder, softest, used):
-    """Its settings are the turnout's: blows too soft for the one are too soft for the other."""
+    """Its settings are the turnout's: impacts too soft for the one are too soft for the other."""
     file = folder / "config/config.yaml"
     file.write_text(file.read_text() + f"receptance: {{softest_blow: {softest:g}}}\n")
     tests = gathered(folder, "hammer").tests
@@ -420,7 +420,7 @@ def test_a_calibration_judges_blows_by_the_turnouts_settings(folder):
     file, track = folder / "config/config.yaml", folder / "config/tracks/small.yaml"
     file.write_text(file.read_text() + "receptance: {softest_blow: 50000}\n")
     files = sorted((folder / "raw/t1/hammer").rglob("A_*"))
-    with pytest.raises(SimulationError, match="calibration of A: 0 sound impacts"):
+    with pytest.raises(SimulationError, match="calibration of A: 0 accepted impacts"):
         calibrate_to_files(str(track), "A", files, "t1", folder / "config")
 
 
@@ -432,6 +432,7 @@ def test_files_that_a_calibration_cannot_use_are_said(folder, tmp_path, caplog):
         calibrate_to_files(str(track), "A", files[:1])
     damaged = tmp_path / files[0].name
     damaged.write_bytes(files[0].read_bytes()[:-200])
-    with pytest.raises(SimulationError, match="no section 'A'"):  # the blows are read, the small track has no sections
+    # the impacts are read, the small track has no sections
+    with pytest.raises(SimulationError, match="no section 'A'"):
         calibrate_to_files(str(track), "A", [*files, damaged], "t1", folder / "config")
     assert damaged.name in caplog.text and "not used" in caplog.text

@@ -1,4 +1,4 @@
-"""What is new is judged once there is enough of it; what was found wrong is said until it is mended or outlived."""
+"""What is new is judged once there is enough of it; what was found wrong is said until it is fixed or outlived."""
 
 import json
 import shutil

@@ -17,7 +17,7 @@ class MismatchSettings:
         0.03, "-", "share of a receptance that gain and slope of a hammer test may be off", 0.0, 0.5
     )
     control_level: float = setting(
-        1.6, "-", "weighted mean square above which a fit has not reached the level of controls", 1.0, 100.0
+        1.6, "-", "weighted mean square above which a fit has not reached the control level", 1.0, 100.0
     )
     hammer_control: float = setting(
         0.9, "-", "weighted mean square of receptances that controls of another generator stay below", 0.1, 100.0
@@ -37,7 +37,7 @@ class MismatchSettings:
     margin: float = setting(6.0, "nats", "runner-up within this of the best: 'a or b'", 0.0)
     explained: float = setting(0.5, "-", "share of the excess that a name must explain", 0.0, 1.0)
     leftover: float = setting(
-        4.0, "-", "mean square left over the level of controls above which even the best name is refused", 1.0
+        4.0, "-", "mean square left over the control level above which even the best name is rejected", 1.0
     )
     withdrawn_ratio: float = setting(
         2.0, "-", "mean square on reserved over calibration recordings that withdraws a name", 1.0

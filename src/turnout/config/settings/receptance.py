@@ -7,22 +7,22 @@ from turnout.config.settings.setting import setting
 
 @dataclass(frozen=True)
 class ReceptanceSettings:
-    """How blows are found and judged, and how receptance and coherence are averaged.
+    """How impacts are found and judged, and how receptance and coherence are averaged.
 
     >>> ReceptanceSettings().gate
     'limit'
     """
 
     trigger: float = setting(
-        10.0, "sd", "a blow must exceed this many standard deviations of the force noise, which itself reaches 4",
+        10.0, "sd", "an impact must exceed this many standard deviations of the force noise, which itself reaches 4",
         minimum=4.0, maximum=1000.0,
     )  # fmt: skip
     weakest_blow: float = setting(
-        0.05, "1", "in a record with many blows, less than this share of a usual peak is the hammer being handled",
+        0.05, "1", "in a record with many impacts, less than this share of a usual peak is the hammer being handled",
         minimum=0.01, maximum=0.5,
     )  # fmt: skip
     softest_blow: float = setting(
-        50.0, "N", "a test whose median blow is softer has a wrong unit (kN for N?); 0 for small hammers on beams",
+        50.0, "N", "a test whose median impact is softer has a wrong unit (kN for N?); 0 for small hammers on beams",
         minimum=0.0, maximum=1e5,
     )  # fmt: skip
     contact_level: float = setting(
@@ -32,14 +32,14 @@ class ReceptanceSettings:
         2e-4, "s", "the decay starts this long after the last contact: 4 samples at 20 kHz", minimum=0.0, maximum=0.01
     )
     separation: float = setting(
-        0.3, "s", "contacts closer than this belong to one blow; a hand needs longer to strike again",
+        0.3, "s", "contacts closer than this belong to one impact; a hand needs longer to strike again",
         minimum=0.06, maximum=5.0,
     )  # fmt: skip
     pre_trigger: float = setting(
-        0.05, "s", "at most this much of the record before a blow is kept, for its noise", minimum=1e-3, maximum=1.0
+        0.05, "s", "at most this much of the record before an impact is kept, for its noise", minimum=1e-3, maximum=1.0
     )
     window: float = setting(
-        1.0, "s", "at most this much of the record after a blow is kept", minimum=0.02, maximum=60.0
+        1.0, "s", "at most this much of the record after an impact is kept", minimum=0.02, maximum=60.0
     )
     double_hit: str = setting(
         "move", "", "'move' starts the decay after the last contact if enough of it is left, 'reject' never uses it",
@@ -71,22 +71,26 @@ class ReceptanceSettings:
     noise: float = setting(
         0.15,
         "1",
-        "rms before the blow over the largest sample: 20 dB reads 0.09, from 15 dB on the decay is noise",
+        "rms before the impact over the largest sample: 20 dB reads 0.09, from 15 dB on the decay is noise",
         minimum=0.01,
         maximum=1.0,
     )
     noise_over_median: float = setting(
-        4.0, "1", "a blow this many times noisier than its test's median, and above 2 %, is dropped",
+        4.0, "1", "an impact this many times noisier than its test's median, and above 2 %, is dropped",
         minimum=1.5, maximum=100.0,
     )  # fmt: skip
     cut_off: float = setting(
         0.01, "1", "amplitude left at the end of the record over the peak: more leaks into other lines",
         minimum=1e-4, maximum=1.0,
     )  # fmt: skip
-    agreement_low: float = setting(20.0, "Hz", "blows are compared from here", minimum=0.0, maximum=1e5)
+    agreement_low: float = setting(20.0, "Hz", "impacts are compared from here", minimum=0.0, maximum=1e5)
     agreement_high: float = setting(800.0, "Hz", "to here, or to the hammer's band edge", minimum=1.0, maximum=1e5)
     agreement_gap: float = setting(
-        0.05, "1", "an odd blow's median pairwise coherence lies this far below the others'", minimum=0.005, maximum=0.9
+        0.05,
+        "1",
+        "an outlier's median pairwise coherence lies this far below that of the other impacts",
+        minimum=0.005,
+        maximum=0.9,
     )
     agreement_factor: float = setting(
         8.0, "1", "and its incoherence is this many times theirs; half the force makes four", minimum=2.0, maximum=100.0
@@ -96,7 +100,7 @@ class ReceptanceSettings:
         minimum=0.005, maximum=1.0,
     )  # fmt: skip
     minimum_impacts: int = setting(
-        3, "", "with fewer accepted blows the limits of the coherence say nothing", minimum=2, maximum=100
+        3, "", "with fewer accepted impacts the limits of the coherence say nothing", minimum=2, maximum=100
     )
     force_window: bool = setting(False, "", "set the force to zero after the contact: for noisy force channels")
     exponential_window: float = setting(

@@ -22,7 +22,7 @@ class SimulateSettings:
     lead: float = setting(1.0, "s", "quiet time before the first wheel reaches the first sensor", 0.1, 60.0)
     tail: float = setting(1.0, "s", "time after the last wheel has left the last sensor", 0.1, 60.0)
     hammer_duration: float = setting(0.15, "s", "length of a hammer record, as in the demonstration", 0.02, 10.0)
-    hammer_pretrigger: float = setting(0.005, "s", "part of it before the blow", 0.0, 1.0)
+    hammer_pretrigger: float = setting(0.005, "s", "part of it before the impact", 0.0, 1.0)
     hammer_half_length: float = setting(
-        30.0, "m", "track marched on both sides of a blow; waves of 80-800 Hz have decayed by 40 dB", 5.0, 500.0
+        30.0, "m", "track marched on both sides of an impact; waves of 80-800 Hz have decayed by 40 dB", 5.0, 500.0
     )

@@ -319,7 +319,7 @@ def _single_hammer_position(
     if other_gain > 0.0 and gains[strongest] + other_gain < THRESHOLDS.min_held_out_share * gain:
         return ""
     return (
-        f"all blows at {strongest:g} m"
+        f"all impacts at {strongest:g} m"
         if any(gains[strongest] > s * threshold > other_gain for s in THRESHOLDS.single_position_levels)
         else ""
     )

@@ -105,9 +105,9 @@ EFFECT_RULES: tuple[Rule[EffectEvidence], ...] = (
     Rule("explains_too_little", lambda e: e.has_leader and e.explains_too_little and not e.exemption, "unknown",
          "the best candidate explains {e.leader.explained:.0%} of the excess", HOW),
     Rule("leaves_too_much", lambda e: e.has_leader and e.residual_excess > e.settings.leftover, "unknown",
-         "{e.leader.family} leaves {e.residual_excess:.0f} times the level of controls", HOW),
+         "{e.leader.family} leaves {e.residual_excess:.0f} times the control level", HOW),
     Rule("excess_without_candidate", lambda e: e.shows_nothing and e.excess > 1.0, "unknown",
-         "above the level of controls, and no candidate helps", HOW),
+         "above the control level, and no candidate helps", HOW),
     Rule("sensors_shake_without_wheel", lambda e: e.shows_nothing and e.disturbed, "unknown",
          "something shakes all sensors while no wheel is near", LOCATED, cause="clock"),
     Rule("train_unlike_its_file", lambda e: e.shows_nothing and e.mismatched_trains, "unknown",
@@ -150,7 +150,7 @@ PAIR_RULES: tuple[Rule[PairEvidence], ...] = (
          "unknown second", "the best candidate explains {e.second_score.explained:.0%} of the excess", PAIRS),
     Rule("first_adds_too_little", lambda e: e.first_is_redundant, "second", "", PAIRS),
     Rule("second_predicts_reserved_worse", lambda e: e.second_predicts_worse, "first",
-         "something else shows beside it: {e.second.names[0]}, which foretells recordings never used worse", PAIRS),
+         "something else shows beside it: {e.second.names[0]}, which predicts held-out recordings worse", PAIRS),
     Rule("both_stand", _always, "all", "", PAIRS),
 )
 
@@ -159,16 +159,16 @@ NAME_RULES: tuple[Rule[NameEvidence], ...] = (
          "the size of {e.score.family} is known from below alone", PAIRS),
     Rule("reaches_control_level", lambda e: e.excess <= 1.0, "A", "", HOW),
     Rule("must_reach_control_level", lambda e: e.score.candidate.naming.must_reach_control_level, "unknown",
-         "{e.score.family} would leave nothing, and more is left than in sound turnouts", LOCATED),
+         "{e.score.family} would leave no excess, and more is left than in intact turnouts", LOCATED),
     Rule("leaves_some_residual", _always, "B", "", HOW),
 )
 
 RESERVED_RULES: tuple[Rule[ReservedEvidence], ...] = (
     Rule("reserved_predicted_worse", lambda e: e.is_single_name_of_grade_b and e.verification.is_worse, "unknown",
-         "{e.verdict.names[0]} leaves more than sound turnouts do and foretells recordings never used worse", ENDS),
+         "{e.verdict.names[0]} leaves more than intact turnouts do and predicts held-out recordings worse", ENDS),
     Rule("reserved_not_explained",
          lambda e: e.verdict.answer == "none" and e.verification.reserved_excess > THRESHOLDS.max_reserved_excess,
-         "unknown", "recordings that were never used are not foretold as in sound turnouts", HOW),
+         "unknown", "held-out recordings are not predicted as in intact turnouts", HOW),
     Rule("not_contradicted", _always, "", "", HOW),
 )
 # fmt: on

@@ -82,7 +82,7 @@ class Score:
             and evidence > settings.threshold
             and self.gain > evidence - settings.margin
         ):
-            return "known by its blows"
+            return "known by its impacts"
         is_unmasked = self.unmasked_gain - position_cost > settings.threshold
         return "seen where the effect named before does not show" if is_unmasked else ""
 

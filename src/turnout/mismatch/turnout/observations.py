@@ -203,7 +203,7 @@ def observe_tests(
         if not pairs_of_test:
             notes.append(
                 f"hammer test {test.name}: no channel within {CASE.max_hammer_distance:g} m with "
-                f"{RECEPTANCE.min_impacts} sound blows"
+                f"{RECEPTANCE.min_impacts} accepted impacts"
             )
         for pair, observation in pairs_of_test:
             pairs[pair.name] = pair

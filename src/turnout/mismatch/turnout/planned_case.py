@@ -111,7 +111,11 @@ def _planned_campaign(plan: Plan) -> CampaignInput:
     """Hammer tests and passages of a plan without recordings."""
     tests = tuple(
         HammerInput(
-            f"blows {k + 1}", position, (), visit=f"{temperature:.0f} °C", conditions={"rail_temperature": temperature}
+            f"impacts {k + 1}",
+            position,
+            (),
+            visit=f"{temperature:.0f} °C",
+            conditions={"rail_temperature": temperature},
         )
         for k, (position, temperature) in enumerate(plan.hammer_points)
     )
@@ -300,7 +304,7 @@ def _hammer_test(
         half_length=200.0, conditions=conditions,
     )  # fmt: skip
     visit = f"{temperature:.0f} °C"
-    return HammerInput(f"blows {k + 1}", position, recordings, "hammer", visit, conditions)
+    return HammerInput(f"impacts {k + 1}", position, recordings, "hammer", visit, conditions)
 
 
 def _simulated_passage(

@@ -156,7 +156,7 @@ def observation_of(pair: FrfPair, h: np.ndarray, spread: np.ndarray, tolerance: 
     frame_levels = {"sensor": pair.channel, "place": f"{pair.test.place:.1f}", "condition": pair.test.visit}
     labels = {frame: np.array([level] * bands.size, dtype=object) for frame, level in frame_levels.items()}
     labels["frequency"] = np.array([f"{RECEPTANCE.lowest_band * 2.0**b:.0f} Hz" for b in bands], dtype=object)
-    condition = f"blows at {pair.test.place:.1f} m {pair.test.visit}".strip()
+    condition = f"impacts at {pair.test.place:.1f} m {pair.test.visit}".strip()
     return Observation(
         pair.name,
         condition,

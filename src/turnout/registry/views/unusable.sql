@@ -75,7 +75,7 @@ select
             when f.source = 'passage' then 'most often: ' || f.usual_reason
             else coalesce(strftime(f.at_utc, '%Y-%m-%d') || ': ', '') || coalesce(
                 nullif(concat_ws(', ',
-                    b.n_rejected || ' of ' || b.n || ' blows rejected (' || b.reason || ')',
+                    b.n_rejected || ' of ' || b.n || ' impacts rejected (' || b.reason || ')',
                     d.n || case when d.n = 1 then ' file' else ' files' end || ' in quarantine (' || d.reason || ')'
                 ), ''),
                 f.reason)

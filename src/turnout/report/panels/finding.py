@@ -129,7 +129,7 @@ def fit_panel(finding: Mapping[str, Any]) -> str:
     chart = Chart(
         Axis(0.4, len(entries) + 0.6, "", "names", tuple(e[0] for e in entries)),
         Axis(low, 100.0, "fit [%]"),
-        f"Fit on recordings never used, n = {finding['n_held_out']}{_gain(finding)}",
+        f"Fit on held-out recordings, n = {finding['n_held_out']}{_gain(finding)}",
         height=250,
     )
     for k, (_, value, style) in enumerate(entries, start=1):

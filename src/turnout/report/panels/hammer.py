@@ -93,7 +93,7 @@ def _grey_out(chart: Chart, frequency: np.ndarray, passed: np.ndarray, row: Mapp
     edges = np.flatnonzero(np.diff(np.concatenate([[0], (~passed).astype(int), [0]])))
     for first, last in zip(edges[::2], edges[1::2] - 1):
         half = 0.5 * (frequency[1] - frequency[0])
-        chart.span(frequency[first] - half, frequency[last] + half, "gated", "refused by the gate")
+        chart.span(frequency[first] - half, frequency[last] + half, "gated", "rejected by the gate")
     if row["valid_to_hz"]:
         chart.vertical(row["valid_to_hz"], "edge", "hammer's band edge", row=1)
 
