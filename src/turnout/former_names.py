@@ -21,6 +21,20 @@ class FormerNames:
     def find_spec(self, fullname: str, path: object = None, target: ModuleType | None = None) -> object | None:
         """Find no module but an empty package in place of a former one, so that its modules are asked for by name.
 
+        Parameters
+        ----------
+        fullname : str
+            Dotted name of the module that is imported.
+        path : any
+            Ignored; part of the protocol of finders.
+        target : ModuleType or None
+            Ignored; part of the protocol of finders.
+
+        Returns
+        -------
+        any or None
+            Specification of an empty package, None for every other name.
+
         Raises
         ------
         ModuleNotFoundError

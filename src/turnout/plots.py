@@ -26,7 +26,20 @@ BOX = {"boxstyle": "square,pad=0.25", "facecolor": "white", "edgecolor": "none",
 
 
 def plot_recording(recording: Recording, figure: Figure | SubFigure | None = None) -> np.ndarray:
-    """Draw every channel of a recording over time, (n_channel,) axes; see ``Recording.plot``."""
+    """Draw every channel of a recording over time, (n_channel,) axes; see ``Recording.plot``.
+
+    Parameters
+    ----------
+    recording : Recording
+        The recording.
+    figure : Figure or SubFigure or None
+        Figure to draw into; by default a new one.
+
+    Returns
+    -------
+    array
+        (n_channel,) axes; see ``Recording.plot``.
+    """
     n_channel = len(recording.channels)
     axes = _figure(figure, 1.0 + 1.5 * n_channel).subplots(n_channel, 1, sharex=True, squeeze=False)[:, 0]
     for one, channel, samples in zip(axes, recording.channels, recording.samples):
@@ -39,7 +52,20 @@ def plot_recording(recording: Recording, figure: Figure | SubFigure | None = Non
 
 
 def plot_receptance(receptance: Receptance, figure: Figure | SubFigure | None = None) -> np.ndarray:
-    """Draw magnitude and coherence of a receptance, (2,) axes; see ``Receptance.plot``."""
+    """Draw magnitude and coherence of a receptance, (2,) axes; see ``Receptance.plot``.
+
+    Parameters
+    ----------
+    receptance : Receptance
+        The receptance.
+    figure : Figure or SubFigure or None
+        Figure to draw into; by default a new one.
+
+    Returns
+    -------
+    array
+        (2,) axes; see ``Receptance.plot``.
+    """
     grid = {"height_ratios": (2.0, 1.0)}
     axes = _figure(figure, 5.6).subplots(2, 1, sharex=True, gridspec_kw=grid)
     magnitude, coherence = axes
@@ -62,7 +88,20 @@ def plot_receptance(receptance: Receptance, figure: Figure | SubFigure | None = 
 
 
 def plot_model(model: ModalModel, figure: Figure | SubFigure | None = None) -> np.ndarray:
-    """Draw the modes of a modal model with their errors; see ``ModalModel.plot``."""
+    """Draw the modes of a modal model with their errors; see ``ModalModel.plot``.
+
+    Parameters
+    ----------
+    model : ModalModel
+        The modal model.
+    figure : Figure or SubFigure or None
+        Figure to draw into; by default a new one.
+
+    Returns
+    -------
+    array
+        See ``ModalModel.plot``.
+    """
     rows: list[Any] = [["receptance"] * max(len(model.modes), 1)] if model.receptance is not None else []
     rows += [[mode.band for mode in model.modes]] if model.modes else []
     if not rows:

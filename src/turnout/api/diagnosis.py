@@ -34,7 +34,18 @@ class TurnoutFindings:
         return tuple(f"sections {row['sections']}: {row['sentence']}" for row in self.tables["mismatch_findings"])
 
     def frame(self, table: str = "mismatch_findings") -> pandas.DataFrame:
-        """One of the ``tables`` as a data frame, one row per finding, parameter, curve or problem."""
+        """One of the ``tables`` as a data frame, one row per finding, parameter, curve or problem.
+
+        Parameters
+        ----------
+        table : str
+            Name of a table.
+
+        Returns
+        -------
+        pandas.DataFrame
+            One of the ``tables`` as a data frame, one row per finding, parameter, curve or problem.
+        """
         import pandas
 
         return pandas.DataFrame(list(self.tables[table]))

@@ -150,7 +150,13 @@ def write_example_file(path: Path, impacts: int = 10, seed: int = 1) -> Path:
 
 
 def draw_figure(path: Path) -> None:
-    """Draw the figure of the page into ``path``."""
+    """Draw the figure of the page into ``path``.
+
+    Parameters
+    ----------
+    path : Path
+        PNG file that is written.
+    """
     with TemporaryDirectory() as folder:
         recordings = turnout.read(write_example_file(Path(folder) / "OT_1.uff"))
     model = turnout.identify_modes(turnout.find_impacts(recordings))

@@ -70,11 +70,35 @@ class AcceptedEffect:
         return {"term": self.family, **self.fixed, **{name: value for name, (value, _) in self.values.items()}}
 
     def is_on(self, route: str) -> bool:
-        """Whether the effect applies to ``route``."""
+        """Whether the effect applies to ``route``.
+
+        Parameters
+        ----------
+        route : str
+            Route through the turnout.
+
+        Returns
+        -------
+        bool
+            Whether the effect applies to ``route``.
+        """
         return self.route in ("", route)
 
     def is_of(self, family: str, where: Mapping[str, Any]) -> bool:
-        """Whether it is the effect ``family`` at the position, sensor or train in ``where``."""
+        """Whether it is the effect ``family`` at the position, sensor or train in ``where``.
+
+        Parameters
+        ----------
+        family : str
+            Name of an effect.
+        where : mapping
+            Position, sensor or train of an effect.
+
+        Returns
+        -------
+        bool
+            Whether it is the effect ``family`` at the position, sensor or train in ``where``.
+        """
         if family != self.family:
             return False
         position = where.get("place")
@@ -84,7 +108,20 @@ class AcceptedEffect:
         return all(where.get(k) in (None, v) for k, v in carriers.items())
 
     def term(self, track: Track, values: Mapping[str, float] | None = None) -> Any:
-        """The physics term on a track of ``turnout.simulate``; None if no part of it lies on that track."""
+        """The physics term on a track of ``turnout.simulate``; None if no part of it lies on that track.
+
+        Parameters
+        ----------
+        track : Track
+            A track; by default that of the case.
+        values : mapping of str to float or None
+            Values of the parameters by their name.
+
+        Returns
+        -------
+        Any
+            The physics term on a track of ``turnout.simulate``; None if no part of it lies on that track.
+        """
         chosen = {name: value for name, (value, _) in self.values.items()} | dict(values or {})
         fixed_values: dict[str, Any] = {}
         if not self._reaches(track):

@@ -30,10 +30,31 @@ class ProgressBar(Protocol):
     """What a diagnosis tells of its progress."""
 
     def group(self, group: Group, number: int, count: int) -> Callable[[int, int, str], object]:
-        """Begin a group; returns the callable that reports its joint fits."""
+        """Begin a group; returns the callable that reports its joint fits.
+
+        Parameters
+        ----------
+        group : Group
+            Recordings that are judged together.
+        number : int
+            Number of the group, from 1.
+        count : int
+            Total number.
+
+        Returns
+        -------
+        Callable[[int, int, str], object]
+            The callable that reports its joint fits.
+        """
 
     def simulations(self, count: int) -> None:
-        """Called at every prediction."""
+        """Called at every prediction.
+
+        Parameters
+        ----------
+        count : int
+            Total number.
+        """
 
 
 ALL_VISITS = "all"  # every visit in one case: effects of temperature or time need several
@@ -116,11 +137,28 @@ class Results:
         self.path = Path(work) / "mismatch-fits" / f"{turnout_id}.json"
 
     def save(self, tables: dict[str, list[dict]]) -> None:
-        """Write the result below ``work``."""
+        """Write the result below ``work``.
+
+        Parameters
+        ----------
+        tables : dict[str, list[dict]]
+            Rows of each table by its name.
+        """
         write_text(self.path, encode(tables))
 
     def finding(self, finding_id: str | None = None) -> dict[str, Any]:
-        """The finding with this id, or the only one with a term; SimulationError if that is ambiguous."""
+        """The finding with this id, or the only one with a term; SimulationError if that is ambiguous.
+
+        Parameters
+        ----------
+        finding_id : str or None
+            Id of a finding; by default the only one.
+
+        Returns
+        -------
+        dict[str, Any]
+            The finding with this id, or the only one with a term; SimulationError if that is ambiguous.
+        """
         rows = self._rows()
         if finding_id:
             chosen = [r for r in rows if r["finding_id"].startswith(finding_id)]

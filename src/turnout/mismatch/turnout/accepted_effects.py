@@ -36,10 +36,36 @@ class AcceptedEffect(Protocol):
         """Fitted parameters of its term."""
 
     def term(self, track: Track, values: Mapping[str, float] | None = None) -> Any:
-        """The term on a track at these values, None if no part of it lies on that track."""
+        """The term on a track at these values, None if no part of it lies on that track.
+
+        Parameters
+        ----------
+        track : Track
+            A track; by default that of the case.
+        values : mapping of str to float or None
+            Values of the parameters by their name.
+
+        Returns
+        -------
+        Any
+            The term on a track at these values, None if no part of it lies on that track.
+        """
 
     def is_of(self, family: str, where: Mapping[str, Any]) -> bool:
-        """Whether it is the effect ``family`` at the position, sensor or train in ``where``."""
+        """Whether it is the effect ``family`` at the position, sensor or train in ``where``.
+
+        Parameters
+        ----------
+        family : str
+            Name of an effect.
+        where : mapping
+            Position, sensor or train of an effect.
+
+        Returns
+        -------
+        bool
+            Whether it is the effect ``family`` at the position, sensor or train in ``where``.
+        """
 
 
 @dataclass(frozen=True)
@@ -60,11 +86,33 @@ class AcceptedEffects:
         return () if self.fixed is not None else tuple(n for effect in self.effects for n in _nuisances(effect))
 
     def fixed_at(self, values: Mapping[str, float]) -> AcceptedEffects:
-        """The same effects with their parameters fixed at ``values``."""
+        """The same effects with their parameters fixed at ``values``.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+
+        Returns
+        -------
+        AcceptedEffects
+            The same effects with their parameters fixed at ``values``.
+        """
         return replace(self, fixed=values) if self.effects else self
 
     def terms(self, values: Mapping[str, float]) -> tuple[PhysicsTerm, ...]:
-        """Terms of the effects at these values of their nuisances."""
+        """Terms of the effects at these values of their nuisances.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+
+        Returns
+        -------
+        tuple[PhysicsTerm, ...]
+            Terms of the effects at these values of their nuisances.
+        """
         if not self.effects:
             return ()
         assert self.track is not None
@@ -75,7 +123,18 @@ class AcceptedEffects:
         )
 
     def without(self, candidates: Iterable[Candidate]) -> tuple[Candidate, ...]:
-        """Candidates that are not accepted already."""
+        """Candidates that are not accepted already.
+
+        Parameters
+        ----------
+        candidates : iterable of Candidate
+            Candidate effects.
+
+        Returns
+        -------
+        tuple[Candidate, ...]
+            Candidates that are not accepted already.
+        """
         return tuple(c for c in candidates if not any(effect.is_of(c.family, c.where) for effect in self.effects))
 
     def difference_columns(
@@ -103,7 +162,20 @@ class AcceptedEffects:
         return [_difference_column(predict, values, base, n) for n in self.nuisances]
 
     def estimates(self, nuisances: Sequence[Nuisance], fit: Fit) -> list[dict[str, Any]]:
-        """Estimates of all parameters in a fit: dicts with accepted, name, value, se and unit."""
+        """Estimates of all parameters in a fit: dicts with accepted, name, value, se and unit.
+
+        Parameters
+        ----------
+        nuisances : sequence of Nuisance
+            Nuisance parameters, one column each.
+        fit : Fit
+            A fit of the case.
+
+        Returns
+        -------
+        list[dict[str, Any]]
+            Estimates of all parameters in a fit: dicts with accepted, name, value, se and unit.
+        """
         index = {n.name: k for k, n in enumerate(nuisances)}
         estimates = []
         for effect in self.effects:

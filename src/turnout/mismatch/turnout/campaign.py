@@ -85,7 +85,18 @@ class CampaignInput:
                 raise SimulationError(f"reserved {name!r} is no recording; there are {', '.join(names)}.")
 
     def sensors_of(self, passage: PassageInput) -> tuple[Sensor, ...]:
-        """The sensors that recorded a passage."""
+        """The sensors that recorded a passage.
+
+        Parameters
+        ----------
+        passage : PassageInput
+            A train passage.
+
+        Returns
+        -------
+        tuple[Sensor, ...]
+            The sensors that recorded a passage.
+        """
         names = {c.name for c in passage.recording.channels}
         return tuple(s for s in self.sensors if s.name in names)
 

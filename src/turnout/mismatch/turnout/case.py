@@ -145,13 +145,43 @@ class TrackCase(PredictedCase):
         return hammer_case(self.data, self.predictor, self.all_candidates, self.accepted, self.cache)
 
     def is_cheap(self, observation: Observation) -> bool:
-        """Hammer tests are cheap to predict; passages have to be simulated."""
+        """Hammer tests are cheap to predict; passages have to be simulated.
+
+        Parameters
+        ----------
+        observation : Observation
+            A receptance or passage.
+
+        Returns
+        -------
+        bool
+            Hammer tests are cheap to predict; passages have to be simulated.
+        """
         return observation.name in self.frf_pairs
 
     def own_jacobian(
         self, values: Values, terms: Terms, observation: Observation, predicted: np.ndarray, names: Sequence[str]
     ) -> np.ndarray:
-        """(n, n_name) derivatives of a passage by its own time, speed and load."""
+        """(n, n_name) derivatives of a passage by its own time, speed and load.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        observation : Observation
+            A receptance or passage.
+        predicted : array
+            (n,) prediction of the observation.
+        names : sequence of str
+            Names of the passage's own numbers.
+
+        Returns
+        -------
+        (n, n_name) array
+            Derivatives of a passage by its own time, speed and load.
+        """
         aligned = self.aligned_passages.get(observation.name)
         if aligned is None:
             return super().own_jacobian(values, terms, observation, predicted, names)
@@ -162,8 +192,19 @@ class TrackCase(PredictedCase):
     def with_updated_errors(self, fit: Fit) -> TrackCase:
         """The case with the rail under the passages and the roughness errors of the wheels as ``fit`` has them.
 
-        Returns the case itself where all changes are within ``CASE.update_threshold``. The rail was first fitted to the
+        Returns the case itself where all changes are within ``CASE.update_threshold``. The rail was first
+        fitted to the
         hammer tests alone, where it may have absorbed part of the effect that ``fit`` explains now.
+
+        Parameters
+        ----------
+        fit : Fit
+            A fit of the case.
+
+        Returns
+        -------
+        TrackCase
+            The case with the rail under the passages and the roughness errors of the wheels as ``fit`` has them.
         """
         if not self.aligned_passages:
             return self
@@ -194,7 +235,18 @@ class TrackCase(PredictedCase):
         return updated
 
     def residual_candidates(self, fit: Fit) -> tuple[Candidate, ...]:
-        """Dips, corrugation and wheel defects, as the residual and the sound level of passages suggest them."""
+        """Dips, corrugation and wheel defects, as the residual and the sound level of passages suggest them.
+
+        Parameters
+        ----------
+        fit : Fit
+            A fit of the case.
+
+        Returns
+        -------
+        tuple[Candidate, ...]
+            Dips, corrugation and wheel defects, as the residual and the sound level of passages suggest them.
+        """
         from turnout.mismatch.turnout.candidates.rail_defects import scan_geometry
 
         if not self.fitted_passages():
@@ -202,17 +254,50 @@ class TrackCase(PredictedCase):
         return self.accepted.without(scan_geometry(*self.with_fixed_effects(fit), self.families))
 
     def distant_starts(self, fit: Fit) -> list[tuple[Candidate, tuple[float, ...]]]:
-        """Wheelsets of other masses, for trains whose residual exceeds the control level."""
+        """Wheelsets of other masses, for trains whose residual exceeds the control level.
+
+        Parameters
+        ----------
+        fit : Fit
+            A fit of the case.
+
+        Returns
+        -------
+        list[tuple[Candidate, tuple[float, ...]]]
+            Wheelsets of other masses, for trains whose residual exceeds the control level.
+        """
         return distant_starts(self, fit)
 
     def residual_spaces(self, fit: Fit) -> Iterator[ResidualSpace]:
-        """Subspaces of the residual: forces at supports, faults of channels, wheels and single passages."""
+        """Subspaces of the residual: forces at supports, faults of channels, wheels and single passages.
+
+        Parameters
+        ----------
+        fit : Fit
+            A fit of the case.
+
+        Yields
+        ------
+        Iterator[ResidualSpace]
+            Subspaces of the residual: forces at supports, faults of channels, wheels and single passages.
+        """
         from turnout.mismatch.turnout.residual_spaces import source_spaces
 
         return source_spaces(self, fit)
 
     def latent_covariates(self, fit: Fit) -> dict[str, Any] | None:
-        """Missing force at the support that explains most of the residual."""
+        """Missing force at the support that explains most of the residual.
+
+        Parameters
+        ----------
+        fit : Fit
+            A fit of the case.
+
+        Returns
+        -------
+        dict[str, Any] or None
+            Missing force at the support that explains most of the residual.
+        """
         from turnout.mismatch.turnout.force_reconstruction import latent_force
 
         return latent_force(self, fit)
@@ -220,7 +305,18 @@ class TrackCase(PredictedCase):
     def numerical_error(self, fit: Fit) -> list[np.ndarray] | None:
         """Difference of each prediction to one with half the step and half the mesh; None without passages.
 
-        It is 0 for hammer tests and where the finer simulation fails. The mesh stays where pads are spread over nodes.
+        It is 0 for hammer tests and where the finer simulation fails. The mesh stays where pads are spread
+        over nodes.
+
+        Parameters
+        ----------
+        fit : Fit
+            A fit of the case.
+
+        Returns
+        -------
+        list[array] or None
+            Difference of each prediction to one with half the step and half the mesh; None without passages.
         """
         if not self.aligned_passages:
             return None

@@ -75,7 +75,18 @@ class FixedLinks(PhysicsTerm):
         self._links = links
 
     def links(self, track: Track) -> Sequence[Link]:
-        """The links, for any track."""
+        """The links, for any track.
+
+        Parameters
+        ----------
+        track : Track
+            A track; by default that of the case.
+
+        Returns
+        -------
+        sequence of Link
+            The links, for any track.
+        """
         return self._links
 
 
@@ -119,7 +130,20 @@ class MatrixTemplate:
         )
 
     def fill(self, track: Track, links: Sequence[Link]) -> TrackMatrices:
-        """TrackMatrices with the values of ``track`` and of additional links."""
+        """TrackMatrices with the values of ``track`` and of additional links.
+
+        Parameters
+        ----------
+        track : Track
+            A track; by default that of the case.
+        links : sequence of Link
+            Links that are added to those of the track.
+
+        Returns
+        -------
+        TrackMatrices
+            TrackMatrices with the values of ``track`` and of additional links.
+        """
         base = self._base_with_rail(track)
         matrices = {what: getattr(base, what).copy() for what in ("stiffness", "damping", "mass")}
         hysteresis = base.hysteresis

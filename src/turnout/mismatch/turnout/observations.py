@@ -93,7 +93,18 @@ class CaseData:
         return min(positions), max(positions)
 
     def band_peak(self, channel: str) -> float:
-        """Largest value of a channel in the fitted passages, within their band; 0 where it has none. [m/s²]"""
+        """Largest value of a channel in the fitted passages, within their band; 0 where it has none. [m/s²]
+
+        Parameters
+        ----------
+        channel : str
+            Name of a channel.
+
+        Returns
+        -------
+        float
+            Largest value of a channel in the fitted passages, within their band; 0 where it has none. [m/s²]
+        """
         peaks = [0.0]
         for o in self.observations:
             aligned = self.aligned_passages.get(o.name)
@@ -106,6 +117,16 @@ class CaseData:
         """Largest value of a channel at its full sampling rate, reserved recordings included. [m/s²]
 
         A planned campaign has no such signals: its ``band_peak``.
+
+        Parameters
+        ----------
+        channel : str
+            Name of a channel.
+
+        Returns
+        -------
+        float
+            Largest value of a channel at its full sampling rate, reserved recordings included. [m/s²]
         """
         return raw_peak(self.campaign, channel) or self.band_peak(channel)
 

@@ -116,7 +116,20 @@ class PassageAligner:
         self._low_passed: dict[str, np.ndarray] = {}
 
     def align(self, values: Values, passage: PassageInput) -> tuple[float, float, float]:
-        """``align`` of a passage with its simulation at ``values``; SimulationError if it cannot be simulated."""
+        """``align`` of a passage with its simulation at ``values``; SimulationError if it cannot be simulated.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        passage : PassageInput
+            A train passage.
+
+        Returns
+        -------
+        tuple[float, float, float]
+            ``align`` of a passage with its simulation at ``values``; SimulationError if it cannot be simulated.
+        """
         sensors = self.campaign.sensors_of(passage)
         surfaces = self.predictor.surface.surfaces(passage.route, values)
         simulator = self.predictor.passage_simulator(values, (), passage)
@@ -126,7 +139,20 @@ class PassageAligner:
         return align(passage, self._low_passed[passage.name], signals, self.predictor.solver.rate)
 
     def correlation(self, values: Values, passage: PassageInput) -> float:
-        """Correlation of a passage with its simulation, 0 if it cannot be simulated."""
+        """Correlation of a passage with its simulation, 0 if it cannot be simulated.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        passage : PassageInput
+            A train passage.
+
+        Returns
+        -------
+        float
+            Correlation of a passage with its simulation, 0 if it cannot be simulated.
+        """
         try:
             return self.align(values, passage)[2]
         except SimulationError:

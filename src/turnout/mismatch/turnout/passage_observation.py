@@ -46,7 +46,20 @@ class AlignedPassage:
         return sample_rate_of(self.speed)
 
     def limit_band(self, samples: np.ndarray, rate: float) -> np.ndarray:
-        """Rows of ``samples`` within the band of the passage."""
+        """Rows of ``samples`` within the band of the passage.
+
+        Parameters
+        ----------
+        samples : array
+            (n_channel, n) signals.
+        rate : float
+            Sampling rate [Hz].
+
+        Returns
+        -------
+        array
+            Rows of ``samples`` within the band of the passage.
+        """
         return limit_band(samples, rate, high=self.high)
 
     @property

@@ -66,11 +66,37 @@ class PredictedCase(Case):
         return self.predictor.aligned_passages
 
     def all_terms(self, fit: Fit) -> tuple:
-        """Terms of the accepted effects and of the candidates in a fit."""
+        """Terms of the accepted effects and of the candidates in a fit.
+
+        Parameters
+        ----------
+        fit : Fit
+            A fit of the case.
+
+        Returns
+        -------
+        tuple
+            Terms of the accepted effects and of the candidates in a fit.
+        """
         return (*self.accepted.terms(fit.values), *fit.terms)
 
     def predict(self, values: Values, terms: Terms, observations: Sequence[Observation]) -> list[np.ndarray]:
-        """Predictions, (n,) per observation."""
+        """Predictions, (n,) per observation.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        observations : sequence of Observation
+            Receptances and passages.
+
+        Returns
+        -------
+        list[array]
+            Predictions, (n,) per observation.
+        """
         return self.predictions.predict(values, (*self.accepted.terms(values), *terms), observations)
 
     def predict_near(
@@ -81,14 +107,50 @@ class PredictedCase(Case):
         observations: Sequence[Observation],
         predictions: Sequence[np.ndarray],
     ) -> list[np.ndarray]:
-        """Predictions a small step from ``terms``: receptances follow without solving the track again."""
+        """Predictions a small step from ``terms``: receptances follow without solving the track again.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        new : Terms
+            Terms that are added.
+        observations : sequence of Observation
+            Receptances and passages.
+        predictions : sequence of array
+            (n,) prediction of each observation with ``terms``.
+
+        Returns
+        -------
+        list[array]
+            Predictions a small step from ``terms``: receptances follow without solving the track again.
+        """
         accepted = self.accepted.terms(values)
         return self.predictions.predict_near(values, (*accepted, *terms), (*accepted, *new), observations, predictions)
 
     def nuisance_jacobian(
         self, values: Values, terms: Terms, observations: Sequence[Observation], base: Sequence[np.ndarray]
     ) -> list[np.ndarray]:
-        """Derivatives by all nuisances; those by parameters of accepted effects are difference quotients."""
+        """Derivatives by all nuisances; those by parameters of accepted effects are difference quotients.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        observations : sequence of Observation
+            Receptances and passages.
+        base : sequence of array
+            (n,) prediction of each observation at ``values``.
+
+        Returns
+        -------
+        list[array]
+            Derivatives by all nuisances; those by parameters of accepted effects are difference quotients.
+        """
         all_terms = (*self.accepted.terms(values), *terms)
         jacobians = self.predictions.nuisance_jacobian(self._site_nuisances, values, all_terms, observations, base)
         columns = self.accepted.difference_columns(lambda at: self.predict(at, terms, observations), values, base)
@@ -100,6 +162,16 @@ class PredictedCase(Case):
         """The case with its accepted effects fixed as ``fit`` has them, and the fit without their columns.
 
         Searches use it: accepted effects are part of the base model then, and no candidate is left out.
+
+        Parameters
+        ----------
+        fit : Fit
+            A fit of the case.
+
+        Returns
+        -------
+        tuple[Self, Fit]
+            The case with its accepted effects fixed as ``fit`` has them, and the fit without their columns.
         """
         n, n_accepted = len(self._site_nuisances), len(self.accepted.nuisances)
         fixed = copy(self)
@@ -111,5 +183,16 @@ class PredictedCase(Case):
         return fixed, replace(fit, jacobian=[np.delete(j, slice(n, n + n_accepted), axis=1) for j in fit.jacobian])
 
     def screen(self, fit: Fit) -> dict:
-        """Columns of all candidates that have one, (key, start) -> list of (n,) per observation."""
+        """Columns of all candidates that have one, (key, start) -> list of (n,) per observation.
+
+        Parameters
+        ----------
+        fit : Fit
+            A fit of the case.
+
+        Returns
+        -------
+        dict
+            Columns of all candidates that have one, (key, start) -> list of (n,) per observation.
+        """
         return screen_columns(*self.with_fixed_effects(fit), self.observations)

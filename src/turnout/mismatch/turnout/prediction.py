@@ -45,7 +45,22 @@ class Predictions(Protocol):
     """What a case asks of a ``Predictor``, or of a cache around it."""
 
     def predict(self, values: Values, terms: Terms, observations: Sequence[Observation]) -> list[np.ndarray]:
-        """Predictions of receptances and passages, (n,) per observation."""
+        """Predictions of receptances and passages, (n,) per observation.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        observations : sequence of Observation
+            Receptances and passages.
+
+        Returns
+        -------
+        list[array]
+            Predictions of receptances and passages, (n,) per observation.
+        """
 
     def predict_near(
         self,
@@ -55,7 +70,26 @@ class Predictions(Protocol):
         observations: Sequence[Observation],
         predictions: Sequence[np.ndarray],
     ) -> list[np.ndarray]:
-        """Predictions with ``new`` terms, a small step from ``terms`` with known ``predictions``."""
+        """Predictions with ``new`` terms, a small step from ``terms`` with known ``predictions``.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        new : Terms
+            Terms that are added.
+        observations : sequence of Observation
+            Receptances and passages.
+        predictions : sequence of array
+            (n,) prediction of each observation with ``terms``.
+
+        Returns
+        -------
+        list[array]
+            Predictions with ``new`` terms, a small step from ``terms`` with known ``predictions``.
+        """
 
     def nuisance_jacobian(
         self,
@@ -65,7 +99,26 @@ class Predictions(Protocol):
         observations: Sequence[Observation],
         base: Sequence[np.ndarray],
     ) -> list[np.ndarray]:
-        """Derivatives by ``nuisances``, (n, n_nuisance) per observation."""
+        """Derivatives by ``nuisances``, (n, n_nuisance) per observation.
+
+        Parameters
+        ----------
+        nuisances : sequence of Nuisance
+            Nuisance parameters, one column each.
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        observations : sequence of Observation
+            Receptances and passages.
+        base : sequence of array
+            (n,) prediction of each observation at ``values``.
+
+        Returns
+        -------
+        list[array]
+            Derivatives by ``nuisances``, (n, n_nuisance) per observation.
+        """
 
 
 class Predictor:
@@ -92,7 +145,20 @@ class Predictor:
     def with_recordings(
         self, frf_pairs: Mapping[str, FrfPair], aligned_passages: Mapping[str, AlignedPassage]
     ) -> Predictor:
-        """The predictor of these recordings; it shares its caches with this one."""
+        """The predictor of these recordings; it shares its caches with this one.
+
+        Parameters
+        ----------
+        frf_pairs : mapping of str to FrfPair
+            Measured receptances by their id.
+        aligned_passages : mapping of str to AlignedPassage
+            Aligned passages by their id.
+
+        Returns
+        -------
+        Predictor
+            The predictor of these recordings; it shares its caches with this one.
+        """
         other = copy(self)
         other.frf_pairs, other.aligned_passages = dict(frf_pairs), dict(aligned_passages)
         return other
@@ -101,6 +167,16 @@ class Predictor:
         """The predictor with the track of passages about the rail that ``values`` give.
 
         Receptances are linear in deviations of the rail from a grid, so they hardly depend on it.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+
+        Returns
+        -------
+        Predictor
+            The predictor with the track of passages about the rail that ``values`` give.
         """
         other = Predictor(self.site, self.solver, values)
         other.frf_pairs, other.aligned_passages = self.frf_pairs, self.aligned_passages
@@ -108,7 +184,18 @@ class Predictor:
         return other
 
     def with_solver(self, solver: Track1D) -> Predictor:
-        """The predictor with another simulation of passages, with empty caches."""
+        """The predictor with another simulation of passages, with empty caches.
+
+        Parameters
+        ----------
+        solver : Track1D
+            Simulation of passages.
+
+        Returns
+        -------
+        Predictor
+            The predictor with another simulation of passages, with empty caches.
+        """
         other = Predictor(self.site, solver, self.rail)
         other.frf_pairs, other.aligned_passages = self.frf_pairs, self.aligned_passages
         return other
@@ -131,6 +218,18 @@ class Predictor:
         """Base track of a route, cut to the zone.
 
         Rail values that ``terms`` set themselves are as in the track file.
+
+        Parameters
+        ----------
+        route : str
+            Route through the turnout.
+        terms : iterable of PhysicsTerm
+            Physics terms of the effects.
+
+        Returns
+        -------
+        Track
+            Base track of a route, cut to the zone.
         """
         file_names = tuple(sorted({t.name for t in terms} & set(self.rail)))
         if file_names and file_names not in self._zones_with_file_values:
@@ -179,7 +278,26 @@ class Predictor:
         observations: Sequence[Observation],
         predictions: Sequence[np.ndarray],
     ) -> list[np.ndarray]:
-        """Predictions a small step away: receptances follow without solving the track again."""
+        """Predictions a small step away: receptances follow without solving the track again.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        new : Terms
+            Terms that are added.
+        observations : sequence of Observation
+            Receptances and passages.
+        predictions : sequence of array
+            (n,) prediction of each observation with ``terms``.
+
+        Returns
+        -------
+        list[array]
+            Predictions a small step away: receptances follow without solving the track again.
+        """
         return receptance_model.predict_near(self, values, terms, new, observations, predictions)
 
     def nuisance_jacobian(
@@ -190,11 +308,43 @@ class Predictor:
         observations: Sequence[Observation],
         base: Sequence[np.ndarray],
     ) -> list[np.ndarray]:
-        """Derivatives by ``nuisances``, see ``sensitivity.nuisance_jacobian``."""
+        """Derivatives by ``nuisances``, see ``sensitivity.nuisance_jacobian``.
+
+        Parameters
+        ----------
+        nuisances : sequence of Nuisance
+            Nuisance parameters, one column each.
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        observations : sequence of Observation
+            Receptances and passages.
+        base : sequence of array
+            (n,) prediction of each observation at ``values``.
+
+        Returns
+        -------
+        list[array]
+            Derivatives by ``nuisances``, see ``sensitivity.nuisance_jacobian``.
+        """
         return sensitivity.nuisance_jacobian(self, nuisances, values, terms, observations, base)
 
     def pair_sensitivities(self, values: Values, terms: Terms) -> Callable[[FrfPair], ReceptanceSensitivity]:
-        """Function that gives ``pair_sensitivity`` of a pair at these values, computed once per conditions."""
+        """Function that gives ``pair_sensitivity`` of a pair at these values, computed once per conditions.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+
+        Returns
+        -------
+        Callable[[FrfPair], ReceptanceSensitivity]
+            Function that gives ``pair_sensitivity`` of a pair at these values, computed once per conditions.
+        """
         sensitivities: dict[Hashable, ReceptanceSensitivity] = {}
 
         def sensitivity_of(pair: FrfPair) -> ReceptanceSensitivity:
@@ -206,7 +356,22 @@ class Predictor:
         return sensitivity_of
 
     def pair_sensitivity(self, values: Values, terms: Terms, pair: FrfPair) -> ReceptanceSensitivity:
-        """``ReceptanceSensitivity`` of all pairs under the conditions of ``pair``, cached."""
+        """``ReceptanceSensitivity`` of all pairs under the conditions of ``pair``, cached.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        pair : FrfPair
+            Pair of impact position and sensor.
+
+        Returns
+        -------
+        ReceptanceSensitivity
+            ``ReceptanceSensitivity`` of all pairs under the conditions of ``pair``, cached.
+        """
         track_terms = receptance_observation.track_terms(terms, pair.conditions)
         rail = rail_on_grid(values, self.rail)
         pair_keys, seats = self._pairs_and_seats(values, terms, pair.conditions)
@@ -241,24 +406,86 @@ class Predictor:
         return tuple((p.test.place, p.seat) for p in pairs), seats
 
     def seat(self, sensor: Sensor, values: Values, terms: Terms) -> Sensor:
-        """The sensor at the position that ``values`` and ``terms`` give."""
+        """The sensor at the position that ``values`` and ``terms`` give.
+
+        Parameters
+        ----------
+        sensor : Sensor
+            A sensor.
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+
+        Returns
+        -------
+        Sensor
+            The sensor at the position that ``values`` and ``terms`` give.
+        """
         offset = values.get(f"seat_{sensor.name}", 0.0)
         return passage_model.place_sensor(replace(sensor, place=sensor.place + offset) if offset else sensor, terms)
 
     def channel_response(self, values: Values, terms: Terms, pair: FrfPair) -> np.ndarray:
-        """(n_line,) complex factor of the channel of a pair."""
+        """(n_line,) complex factor of the channel of a pair.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        pair : FrfPair
+            Pair of impact position and sensor.
+
+        Returns
+        -------
+        (n_line,) array
+            Complex factor of the channel of a pair.
+        """
         factor = receptance_observation.channel_factor(terms, pair.sensor, receptance_observation.SHIFTED_LINES)
         return factor * (1.0 + values.get(f"gain_{pair.channel}", 0.0))
 
     def receptance(self, values: Values, pair: FrfPair, sensitivity: ReceptanceSensitivity) -> np.ndarray:
-        """(n_line,) receptance of a pair [m/N], corrected to first order for the rail of ``values``."""
+        """(n_line,) receptance of a pair [m/N], corrected to first order for the rail of ``values``.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        pair : FrfPair
+            Pair of impact position and sensor.
+        sensitivity : ReceptanceSensitivity
+            Receptances of all pairs with their derivatives.
+
+        Returns
+        -------
+        (n_line,) array
+            Receptance of a pair [m/N], corrected to first order for the rail of ``values``.
+        """
         deviation = [values[k] - at for k, at in rail_on_grid(values, self.rail).items()]
         return sensitivity.receptance(pair) + sensitivity.rail_gradient(pair) @ deviation
 
     def predict_receptance(
         self, values: Values, terms: Terms, pair: FrfPair, sensitivity: ReceptanceSensitivity
     ) -> np.ndarray:
-        """(2n,) Re and Im of the receptance of a pair over its measured magnitude."""
+        """(2n,) Re and Im of the receptance of a pair over its measured magnitude.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        pair : FrfPair
+            Pair of impact position and sensor.
+        sensitivity : ReceptanceSensitivity
+            Receptances of all pairs with their derivatives.
+
+        Returns
+        -------
+        (2n,) array
+            Re and Im of the receptance of a pair over its measured magnitude.
+        """
         return receptance_observation.split_complex(
             receptance_observation.scale_lines(
                 pair, self.receptance(values, pair, sensitivity), self.channel_response(values, terms, pair)
@@ -266,7 +493,22 @@ class Predictor:
         )
 
     def predict_passage(self, values: Values, terms: Terms, aligned: AlignedPassage) -> np.ndarray:
-        """(n_sensor * n_time,) predicted signals of a passage, one sensor after the other [m/s²]."""
+        """(n_sensor * n_time,) predicted signals of a passage, one sensor after the other [m/s²].
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        aligned : AlignedPassage
+            A passage with its time shift, speed and load.
+
+        Returns
+        -------
+        (n_sensor * n_time,) array
+            Predicted signals of a passage, one sensor after the other [m/s²].
+        """
         signals = self.sensor_signals(values, terms, aligned)
         return np.concatenate(
             [self.channel_output(values, terms, aligned, s, row) for s, row in zip(aligned.sensors, signals)]
@@ -275,7 +517,26 @@ class Predictor:
     def channel_output(
         self, values: Values, terms: Terms, aligned: AlignedPassage, sensor: Sensor, signal: np.ndarray
     ) -> np.ndarray:
-        """Output of the channel of a sensor for the simulated signal ``signal``, at the times of the recording."""
+        """Output of the channel of a sensor for the simulated signal ``signal``, at the times of the recording.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        aligned : AlignedPassage
+            A passage with its time shift, speed and load.
+        sensor : Sensor
+            A sensor.
+        signal : array
+            (n,) simulated acceleration [m/s²].
+
+        Returns
+        -------
+        array
+            Output of the channel of a sensor for the simulated signal ``signal``, at the times of the recording.
+        """
         start = aligned.reference + values[f"time@{aligned.name}"] - SIMULATION.lead_time
         rate, time = 4.0 * self.solver.rate, aligned.time - start
         for term in terms:
@@ -286,14 +547,44 @@ class Predictor:
         )
 
     def sensor_signals(self, values: Values, terms: Terms, aligned: AlignedPassage) -> np.ndarray:
-        """Simulated signals of the sensors before their channels, at four times the rate of the simulation; cached."""
+        """Simulated signals of the sensors before their channels, at four times the rate of the simulation; cached.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        aligned : AlignedPassage
+            A passage with its time shift, speed and load.
+
+        Returns
+        -------
+        array
+            Simulated signals of the sensors before their channels, at four times the rate of the simulation; cached.
+        """
         passage_terms, key = self._terms_and_key(values, terms, aligned)
         if key not in self._signals:
             self._simulate(values, terms, aligned, passage_terms, key)
         return passage_band.upsample(self._signals[key])
 
     def signals_with_probes(self, values: Values, terms: Terms, aligned: AlignedPassage) -> np.ndarray:
-        """Simulated signals of the sensors and of ``probes`` at the rate of the simulation; the latest are cached."""
+        """Simulated signals of the sensors and of ``probes`` at the rate of the simulation; the latest are cached.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        aligned : AlignedPassage
+            A passage with its time shift, speed and load.
+
+        Returns
+        -------
+        array
+            Simulated signals of the sensors and of ``probes`` at the rate of the simulation; the latest are cached.
+        """
         passage_terms, key = self._terms_and_key(values, terms, aligned)
         if key not in self._signals_with_probes:
             self._simulate(values, terms, aligned, passage_terms, key)
@@ -339,7 +630,22 @@ class Predictor:
         _shorten(self._signals_with_probes, len(self.aligned_passages) + SIMULATION.probe_cache_spare)
 
     def passage_simulator(self, values: Values, terms: Terms, passage: PassageInput) -> PassageSimulator:
-        """``PassageSimulator`` of a passage's route with these terms, cached."""
+        """``PassageSimulator`` of a passage's route with these terms, cached.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        passage : PassageInput
+            A train passage.
+
+        Returns
+        -------
+        PassageSimulator
+            ``PassageSimulator`` of a passage's route with these terms, cached.
+        """
         key = passage.route, track_value_key(self.zone, values), repr(terms)
         if key not in self._simulators:
             track = track_with(self.track(passage.route, terms), self.zone, values)

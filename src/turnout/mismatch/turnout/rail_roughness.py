@@ -47,21 +47,65 @@ class Waves:
         return [Nuisance(n, "m", 0.0, float(sd), can_mask=False, group="wave") for n, sd in zip(self.names, self.sd)]
 
     def fade(self, x: np.ndarray) -> np.ndarray:
-        """(n,) 0 to 1: envelope that fades the waves at both ends."""
+        """(n,) 0 to 1: envelope that fades the waves at both ends.
+
+        Parameters
+        ----------
+        x : array
+            (n,) positions along the rail [m].
+
+        Returns
+        -------
+        (n,) array
+            0 to 1: envelope that fades the waves at both ends.
+        """
         edge = np.clip(np.minimum(x - self.start, self.end - x) / ROUGHNESS.fade_length, 0.0, 1.0)
         return edge * edge * (3.0 - 2.0 * edge)
 
     def shapes(self, x: np.ndarray | Sequence[float]) -> np.ndarray:
-        """(n_wave, n) waves at x, faded at both ends."""
+        """(n_wave, n) waves at x, faded at both ends.
+
+        Parameters
+        ----------
+        x : array or sequence of float]
+            (n,) positions along the rail [m].
+
+        Returns
+        -------
+        (n_wave, n) array
+            Waves at x, faded at both ends.
+        """
         x = np.asarray(x, dtype=float)
         return self.fade(x) * np.cos(2.0 * np.pi * x / self.wavelength[:, None] - self.phase_offset[:, None])
 
     def amplitudes(self, values: Values) -> np.ndarray:
-        """(n_wave,) of ``values``."""
+        """(n_wave,) of ``values``.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+
+        Returns
+        -------
+        (n_wave,) array
+            Of ``values``.
+        """
         return np.array([values[n] for n in self.names])
 
     def path(self, values: Values) -> tuple[Sampled, ...]:
-        """The waves as a component of a wheel's path; () where all are 0."""
+        """The waves as a component of a wheel's path; () where all are 0.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+
+        Returns
+        -------
+        tuple[Sampled, ...]
+            The waves as a component of a wheel's path; () where all are 0.
+        """
         amplitude = self.amplitudes(values)
         if not amplitude.any():
             return ()

@@ -109,30 +109,84 @@ class ReceptanceModel:
         self.weight: dict[float | tuple, tuple[np.ndarray, np.ndarray]] = {}
 
     def solve(self, positions: Iterable[float | tuple]) -> None:
-        """Compute and keep the displacements under unit forces at these positions, with one factorisation."""
+        """Compute and keep the displacements under unit forces at these positions, with one factorisation.
+
+        Parameters
+        ----------
+        positions : iterable of float or tuple
+            Positions on the rail [m], or degrees of freedom of sleepers.
+        """
         new = [p for p in dict.fromkeys(positions) if p not in self.by_position]
         if new:
             displacements = responses(self.matrices, SHIFTED_LINES, new)
             self.by_position |= {p: displacements[:, k] for k, p in enumerate(new)}
 
     def displacement(self, position: float | tuple) -> np.ndarray:
-        """(n_line, n) displacement of all degrees of freedom under a unit force at a position."""
+        """(n_line, n) displacement of all degrees of freedom under a unit force at a position.
+
+        Parameters
+        ----------
+        position : float or tuple
+            Position on the rail [m], or a degree of freedom of a sleeper.
+
+        Returns
+        -------
+        (n_line, n) array
+            Displacement of all degrees of freedom under a unit force at a position.
+        """
         self.solve([position])
         return self.by_position[position]
 
     def nodal_motion(self, excited: float | tuple, measured: float | tuple) -> np.ndarray:
-        """(n_line,) displacement at one position under a unit force at another, from nodal motion alone. [m/N]"""
+        """(n_line,) displacement at one position under a unit force at another, from nodal motion alone. [m/N]
+
+        Parameters
+        ----------
+        excited : float or tuple
+            Position of the impact [m], or a degree of freedom of a sleeper.
+        measured : float or tuple
+            Position of the sensor [m], or a degree of freedom of a sleeper.
+
+        Returns
+        -------
+        (n_line,) array
+            Displacement at one position under a unit force at another, from nodal motion alone. [m/N]
+        """
         if measured not in self.weight:
             self.weight[measured] = self.matrices.weights(measured)
         rows, weights = self.weight[measured]
         return self.displacement(excited)[:, rows] @ weights
 
     def position_of(self, sensor: Sensor) -> float | tuple:
-        """Position of a sensor on the model."""
+        """Position of a sensor on the model.
+
+        Parameters
+        ----------
+        sensor : Sensor
+            A sensor.
+
+        Returns
+        -------
+        float or tuple
+            Position of a sensor on the model.
+        """
         return sensor.probe(self.track).place
 
     def receptance(self, excited: float | tuple, measured: float | tuple) -> np.ndarray:
-        """(n_line,) complex [m/N]."""
+        """(n_line,) complex [m/N].
+
+        Parameters
+        ----------
+        excited : float or tuple
+            Position of the impact [m], or a degree of freedom of a sleeper.
+        measured : float or tuple
+            Position of the sensor [m], or a degree of freedom of a sleeper.
+
+        Returns
+        -------
+        (n_line,) array
+            Complex [m/N].
+        """
         h = self.nodal_motion(excited, measured)
         if isinstance(measured, tuple) or isinstance(excited, tuple):
             return h
@@ -141,7 +195,22 @@ class ReceptanceModel:
     def seat_gradient(
         self, excited: float | tuple, measured: float | tuple, step: float = RECEPTANCE.seat_step
     ) -> np.ndarray:
-        """Derivative by the position of the sensor on the rail, (n_line,) [1/N]; 0 on a sleeper."""
+        """Derivative by the position of the sensor on the rail, (n_line,) [1/N]; 0 on a sleeper.
+
+        Parameters
+        ----------
+        excited : float or tuple
+            Position of the impact [m], or a degree of freedom of a sleeper.
+        measured : float or tuple
+            Position of the sensor [m], or a degree of freedom of a sleeper.
+        step : float
+            Step of the difference quotient [m].
+
+        Returns
+        -------
+        array
+            Derivative by the position of the sensor on the rail, (n_line,) [1/N]; 0 on a sleeper.
+        """
         if isinstance(measured, tuple):
             return np.zeros(LINES.size, dtype=complex)
         return (self.receptance(excited, measured + step) - self.receptance(excited, measured - step)) / (2.0 * step)
@@ -177,7 +246,20 @@ class ReceptanceModel:
         return links
 
     def links(self, terms: Sequence[PhysicsTerm], track: Track | None = None) -> list[Link]:
-        """Links of ``terms`` on this track or another, followed by the tangents of their ports."""
+        """Links of ``terms`` on this track or another, followed by the tangents of their ports.
+
+        Parameters
+        ----------
+        terms : sequence of PhysicsTerm
+            Physics terms of the effects.
+        track : Track or None
+            A track; by default that of the case.
+
+        Returns
+        -------
+        list[Link]
+            Links of ``terms`` on this track or another, followed by the tangents of their ports.
+        """
         track = track or self.track
         return [*links_of(terms, track), *tangent_links(terms, track)]
 
@@ -198,6 +280,16 @@ class AddedLinks:
         One link w with impedance z changes a receptance by :math:`-z\,u_w v_w / (1 + z\,g_w)`. Here u and v are the
         motion of its ends under unit forces at impact and sensor, g that under unit forces at its own ends. Several
         links of one candidate are treated as independent.
+
+        Parameters
+        ----------
+        pair : FrfPair
+            Pair of impact position and sensor.
+
+        Returns
+        -------
+        (key, start) dict[tuple[str, int], array]
+            -> (n,) change of the observation of a pair.
         """
         predictor, chosen = self.predictor, self.chosen
         if not chosen:

@@ -103,23 +103,80 @@ class ReceptanceSensitivity:
         return self.row[pair.test.place, pair.seat]
 
     def receptance(self, pair: FrfPair) -> np.ndarray:
-        """(n_line,) complex [m/N]."""
+        """(n_line,) complex [m/N].
+
+        Parameters
+        ----------
+        pair : FrfPair
+            Pair of impact position and sensor.
+
+        Returns
+        -------
+        (n_line,) array
+            Complex [m/N].
+        """
         return self.model.receptance(pair.test.place, self.seats[pair.seat])
 
     def seat_gradient(self, pair: FrfPair) -> np.ndarray:
-        """Derivative by the position of the sensor on the rail, (n_line,) [1/N]; 0 on a sleeper."""
+        """Derivative by the position of the sensor on the rail, (n_line,) [1/N]; 0 on a sleeper.
+
+        Parameters
+        ----------
+        pair : FrfPair
+            Pair of impact position and sensor.
+
+        Returns
+        -------
+        array
+            Derivative by the position of the sensor on the rail, (n_line,) [1/N]; 0 on a sleeper.
+        """
         return self.model.seat_gradient(pair.test.place, self.seats[pair.seat])
 
     def rail_gradient(self, pair: FrfPair) -> np.ndarray:
-        """Derivatives by the logarithms of the uncertain rail values (``rail_sds``), (n_line, n)."""
+        """Derivatives by the logarithms of the uncertain rail values (``rail_sds``), (n_line, n).
+
+        Parameters
+        ----------
+        pair : FrfPair
+            Pair of impact position and sensor.
+
+        Returns
+        -------
+        array
+            Derivatives by the logarithms of the uncertain rail values (``rail_sds``), (n_line, n).
+        """
         return np.concatenate([self._by_rail[self._row_of(pair)], self._by_castings[self._row_of(pair)]], axis=-1)
 
     def gradient(self, pair: FrfPair) -> np.ndarray:
-        """Derivatives by the logarithms of common and support values, (n_line, n) in order of ``track_value_names``."""
+        """Derivatives by the logarithms of common and support values, (n_line, n) in order of ``track_value_names``.
+
+        Parameters
+        ----------
+        pair : FrfPair
+            Pair of impact position and sensor.
+
+        Returns
+        -------
+        array
+            Derivatives by the logarithms of common and support values, (n_line, n) in order of ``track_value_names``.
+        """
         return self._by_supports[self._row_of(pair)]
 
     def motion(self, ends: csr_array, pair: FrfPair) -> tuple[np.ndarray, np.ndarray]:
-        """((n_link, n_line), the same) motion of ``ends`` (n_link, n) under unit forces at impact and sensor."""
+        """((n_link, n_line), the same) motion of ``ends`` (n_link, n) under unit forces at impact and sensor.
+
+        Parameters
+        ----------
+        ends : sparse array
+            (n_link, n) ends of links in degrees of freedom.
+        pair : FrfPair
+            Pair of impact position and sensor.
+
+        Returns
+        -------
+        tuple[array, array]
+            ((n_link, n_line), the same) motion of ``ends`` (n_link, n) under unit forces at impact and sensor.
+        """
         return tuple(ends @ self._displacements[position].T for position in self._positions[1][:, self._row_of(pair)])
 
     @cached_property

@@ -75,7 +75,18 @@ class SurfaceParameter:
         )
 
     def value_at(self, by: float) -> float | tuple[float, ...]:
-        """Its value with deviation ``by``; of a profile all values."""
+        """Its value with deviation ``by``; of a profile all values.
+
+        Parameters
+        ----------
+        by : float
+            Deviation from the value in the file, in the parameter's own unit.
+
+        Returns
+        -------
+        float or tuple[float, ...]
+            Its value with deviation ``by``; of a profile all values.
+        """
         value = getattr(self.component, self.field)
         if self.field in POSITION_FIELDS:
             return value + by
@@ -83,7 +94,20 @@ class SurfaceParameter:
         return tuple(factor * v for v in value) if isinstance(value, tuple) else factor * value
 
     def estimate(self, by: float, error: float) -> dict[str, Any]:
-        """Dict with its value for a deviation ``by`` with standard ``error``; of a profile its factor."""
+        """Dict with its value for a deviation ``by`` with standard ``error``; of a profile its factor.
+
+        Parameters
+        ----------
+        by : float
+            Deviation from the value in the file, in the parameter's own unit.
+        error : float
+            Standard error of the deviation.
+
+        Returns
+        -------
+        dict[str, Any]
+            Dict with its value for a deviation ``by`` with standard ``error``; of a profile its factor.
+        """
         profile = isinstance(getattr(self.component, self.field), tuple)
         file_value: Any = 1.0 if profile else getattr(self.component, self.field)
         value: Any = float(np.exp(by)) if profile else self.value_at(by)
@@ -134,7 +158,20 @@ class RunningSurface:
         return [u.nuisance for u in self.parameters]
 
     def surfaces(self, route: str, values: Values) -> Surfaces:
-        """Surfaces of ``route``, each a tuple of components, with the numbers of ``values``."""
+        """Surfaces of ``route``, each a tuple of components, with the numbers of ``values``.
+
+        Parameters
+        ----------
+        route : str
+            Route through the turnout.
+        values : mapping of str to float
+            Values of the parameters by their name.
+
+        Returns
+        -------
+        Surfaces
+            Surfaces of ``route``, each a tuple of components, with the numbers of ``values``.
+        """
         changes: dict = {}
         for u in self.parameters:
             if values[u.name]:
@@ -153,6 +190,18 @@ class RunningSurface:
         Values are those of the recordings without the prior, so that repeated visits are not all drawn to the file.
         With the fit's :math:`m, s^2` under a prior of variance :math:`\tau^2` they are :math:`m / c` of variance
         :math:`s^2 / c`, :math:`c = 1 - s^2 / \tau^2`, at least ``SURFACE.min_data_share``.
+
+        Parameters
+        ----------
+        case : Case
+            The case that was fitted.
+        fit : Fit
+            A fit of the case.
+
+        Yields
+        ------
+        Iterator[dict[str, Any]]
+            Yield a dict for each number that ``fit`` determines better than the file, or that contradicts the file.
         """
         index = {n.name: k for k, n in enumerate(case.nuisances)}
         between_trains = (

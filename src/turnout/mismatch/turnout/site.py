@@ -33,7 +33,18 @@ class Site:
         return (*track_nuisances(self.nominal, self.trains), *_sensor_nuisances(self.sensors))
 
     def nuisances(self, passages: Iterable[PassageInput] = ()) -> tuple[Nuisance, ...]:
-        """All nuisances: the shared ones, then rail roughness, running surface and each of the ``passages``."""
+        """All nuisances: the shared ones, then rail roughness, running surface and each of the ``passages``.
+
+        Parameters
+        ----------
+        passages : iterable of PassageInput
+            Train passages.
+
+        Returns
+        -------
+        tuple[Nuisance, ...]
+            All nuisances: the shared ones, then rail roughness, running surface and each of the ``passages``.
+        """
         geometry: list[Nuisance] = []
         if self.waves is not None:
             geometry += self.waves.nuisances()

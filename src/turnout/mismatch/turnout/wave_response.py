@@ -73,11 +73,35 @@ class WaveTransfer:
         return np.exp(-2j * np.pi * self.grid[:, None] * self.wheel_delays).sum(axis=1)
 
     def wheel(self, w: int) -> np.ndarray:
-        """(f,) delay of one wheel."""
+        """(f,) delay of one wheel.
+
+        Parameters
+        ----------
+        w : int
+            Index of the wheel, from 0.
+
+        Returns
+        -------
+        (f,) array
+            Delay of one wheel.
+        """
         return np.exp(-2j * np.pi * self.grid * self.wheel_delays[w])
 
     def spectra(self, lengths: np.ndarray | Sequence[float], envelope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(f, sensor, wave) for cosines exp(i 2 pi x / length), positive and negative frequency."""
+        """(f, sensor, wave) for cosines exp(i 2 pi x / length), positive and negative frequency.
+
+        Parameters
+        ----------
+        lengths : array or sequence of float]
+            (n_wave,) wavelengths [m].
+        envelope : array
+            (n_x,) weight of the wave at ``path_grid``.
+
+        Returns
+        -------
+        (f, sensor, wave) tuple[array, array]
+            For cosines exp(i 2 pi x / length), positive and negative frequency.
+        """
         f0 = self.speed / np.asarray(lengths)
         force = -0.5 / _interpolate(np.clip(f0, self.lines[0], self.lines[-1]), self.lines, self.compliance).T
         rotation = np.exp(2j * np.pi * self.sign * self.first / np.asarray(lengths))
@@ -90,22 +114,74 @@ class WaveTransfer:
         return plus, minus
 
     def signals(self, lengths: np.ndarray, envelope: np.ndarray, delay: np.ndarray) -> np.ndarray:
-        """(n_sensor * n_time, 2 n_wave) response to cosine and sine of each length, one metre high."""
+        """(n_sensor * n_time, 2 n_wave) response to cosine and sine of each length, one metre high.
+
+        Parameters
+        ----------
+        lengths : array
+            (n_wave,) wavelengths [m].
+        envelope : array
+            (n_x,) weight of the wave at ``path_grid``.
+        delay : array
+            (f,) phase factor that delays a wheel.
+
+        Returns
+        -------
+        (n_sensor * n_time, 2 n_wave) array
+            Response to cosine and sine of each length, one metre high.
+        """
         return self.signals_from(self.spectra(lengths, envelope), delay)
 
     def signals_from(self, spectra: tuple[np.ndarray, np.ndarray], delay: np.ndarray) -> np.ndarray:
-        """(n_sensor * n_time, 2 n_wave) signals of ``spectra`` at the times of the observation."""
+        """(n_sensor * n_time, 2 n_wave) signals of ``spectra`` at the times of the observation.
+
+        Parameters
+        ----------
+        spectra : tuple[array, array]
+            Responses at positive and negative frequency, (f, sensor, wave) each.
+        delay : array
+            (f,) phase factor that delays a wheel.
+
+        Returns
+        -------
+        (n_sensor * n_time, 2 n_wave) array
+            Signals of ``spectra`` at the times of the observation.
+        """
         plus, minus = spectra
         cosine_and_sine = np.stack([plus + minus, (plus - minus) * (-1j * self.sign)], axis=-1)
         return self._on_clock(cosine_and_sine.reshape(*cosine_and_sine.shape[:2], -1) * delay[:, None, None])
 
     def train_response(self, paths: np.ndarray) -> np.ndarray:
-        """(n_sensor * n_time, n_key) response when every wheel follows paths (n_key, n_x) [m] over one period."""
+        """(n_sensor * n_time, n_key) response when every wheel follows paths (n_key, n_x) [m] over one period.
+
+        Parameters
+        ----------
+        paths : array
+            (n_key, n_x) deviations of the running surface at ``path_grid`` [m].
+
+        Returns
+        -------
+        (n_sensor * n_time, n_key) array
+            Response when every wheel follows paths (n_key, n_x) [m] over one period.
+        """
         plus, minus, a = self._harmonics(paths)
         return self._on_clock((plus @ a.T + minus @ a.T.conj()) * self.train()[:, None, None])
 
     def wheel_response(self, w: int, paths: np.ndarray) -> np.ndarray:
-        """The same for wheel ``w`` alone."""
+        """The same for wheel ``w`` alone.
+
+        Parameters
+        ----------
+        w : int
+            Index of the wheel, from 0.
+        paths : array
+            (n_key, n_x) deviations of the running surface at ``path_grid`` [m].
+
+        Returns
+        -------
+        array
+            The same for wheel ``w`` alone.
+        """
         plus, minus, a = self._harmonics(paths)
         return self._on_clock((plus @ a.T + minus @ a.T.conj()) * self.wheel(w)[:, None, None])
 
@@ -123,6 +199,16 @@ class WaveTransfer:
         """(n_sensor * n_time, n_key) response when each wheel follows a path of its own.
 
         ``paths`` (n_key, n_wheel, n_x) [m] are at ``path_grid``: how wheels respond to motion of the rail under them.
+
+        Parameters
+        ----------
+        paths : array
+            (n_key, n_x) deviations of the running surface at ``path_grid`` [m].
+
+        Returns
+        -------
+        (n_sensor * n_time, n_key) array
+            Response when each wheel follows a path of its own.
         """
         plus, minus, amplitude = self._harmonics(paths)
         total: Any = 0.0
@@ -148,7 +234,20 @@ class WaveTransfer:
         return self.start + self.period * np.arange(n) / n
 
     def times(self, w: int, lead: float) -> np.ndarray:
-        """(n_x,) time of wheel ``w`` at ``path_grid``, in the time of the simulation [s]."""
+        """(n_x,) time of wheel ``w`` at ``path_grid``, in the time of the simulation [s].
+
+        Parameters
+        ----------
+        w : int
+            Index of the wheel, from 0.
+        lead : float
+            Time that the simulation starts before the observation [s].
+
+        Returns
+        -------
+        (n_x,) array
+            Time of wheel ``w`` at ``path_grid``, in the time of the simulation [s].
+        """
         return lead + self.sign * (self.path_grid - self.first) / self.speed + self.wheel_delays[w]
 
     def force_response(self, histories: np.ndarray, transfer: np.ndarray, first: np.ndarray) -> np.ndarray:
@@ -156,6 +255,20 @@ class WaveTransfer:
 
         The forces from ``first`` (n_key,) of each key on act together. ``transfer`` (n_line, n_sensor, n_force) are
         accelerations per force on ``self.lines``.
+
+        Parameters
+        ----------
+        histories : array
+            (n_force, n) forces at the rate of the simulation [N].
+        transfer : array
+            (n_line, n_sensor, n_force) acceleration per force [m/s²/N].
+        first : array
+            (n_key,) index of the first force of each key.
+
+        Returns
+        -------
+        (n_sensor * n_time, n_key) array
+            Response of the free track to forces (n_force, n) at the rate of the simulation.
         """
         fold = round(self.simulation_rate / self.rate)
         n = min(histories.shape[1] // fold, self.size)

@@ -57,13 +57,35 @@ class RailScan:
         self.basis = 0.01 * 2.0 / self.waves.length * self.waves.shapes(self.x).T / self.sd
 
     def score(self, shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(slope (m,), size (m, m)) of shapes (m, n) at ``x``, with the waves free."""
+        """(slope (m,), size (m, m)) of shapes (m, n) at ``x``, with the waves free.
+
+        Parameters
+        ----------
+        shapes : array
+            (m, n) deviations of the rail surface at ``x`` [m].
+
+        Returns
+        -------
+        tuple[array, array]
+            (slope (m,), size (m, m)) of shapes (m, n) at ``x``, with the waves free.
+        """
         c = shapes @ self.basis
         across = self.gram[:, self.wave_slice] @ c.T
         return c @ self.inner, c @ self.gram[self.wave_slice, self.wave_slice] @ c.T - across.T @ self.normal @ across
 
     def waves_without(self, shape: np.ndarray) -> dict[str, float]:
-        """Wave amplitudes without ``shape`` (n,), which is an effect of its own: start of a joint fit."""
+        """Wave amplitudes without ``shape`` (n,), which is an effect of its own: start of a joint fit.
+
+        Parameters
+        ----------
+        shape : array
+            (n,) deviation of the rail surface at ``x`` [m].
+
+        Returns
+        -------
+        dict[str, float]
+            Wave amplitudes without ``shape`` (n,), which is an effect of its own: start of a joint fit.
+        """
         c = shape @ self.basis
         released = self.shift - (self.normal @ (self.gram[:, self.wave_slice] @ c))[self.wave_slice]
         return dict(zip(self.waves.names, (self.theta + self.sd * released).tolist()))
