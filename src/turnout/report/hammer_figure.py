@@ -8,8 +8,9 @@ from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from turnout.errors import REASONS
+from turnout.report import panels
 from turnout.report.hammer_text import heading, resonances, verdict
-from turnout.report.panels.hammer import coherence_panel, decay_panel, impacts_panel, receptance_panel
+from turnout.report.panels.hammer import HammerTest, impacts_panel
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -23,7 +24,7 @@ HEIGHT_PATTERN = re.compile(r' height="(\d+)"')
 
 
 def hammer_figure(rows: Mapping[str, Sequence[Mapping[str, Any]]], unit: Unit, turnout: TurnoutConfig) -> str:
-    """SVG: receptance between H1 and H2, coherence with its limits, measured and modelled decay, and the impacts.
+    """SVG with every panel of ``panels.HAMMER_PANELS``, two in a row.
 
     Parameters
     ----------
@@ -39,13 +40,13 @@ def hammer_figure(rows: Mapping[str, Sequence[Mapping[str, Any]]], unit: Unit, t
     str
         SVG, "" without an impact.
     """
-    panels = _panels(rows)
-    if not panels:
+    drawings = _panels(rows)
+    if not drawings:
         return ""
     cells, y = [], HEADER_HEIGHT
-    for row in (panels[:2], panels[2:]):
-        cells += [f'<g transform="translate({k * (WIDTH + GAP)} {y})">{panel}</g>' for k, panel in enumerate(row)]
-        y += max((int(HEIGHT_PATTERN.findall(panel)[0]) for panel in row), default=0)
+    for row in (drawings[i : i + 2] for i in range(0, len(drawings), 2)):
+        cells += [f'<g transform="translate({k * (WIDTH + GAP)} {y})">{drawing}</g>' for k, drawing in enumerate(row)]
+        y += max(int(HEIGHT_PATTERN.findall(drawing)[0]) for drawing in row)
     words = heading(unit, turnout), ": ".join([verdict(rows), *_resonance_words(rows)])
     lines = "".join(
         f'<text class="{style}" x="8" y="{18 + 20 * k}">{escape(line)}</text>'
@@ -65,11 +66,12 @@ def _resonance_words(rows: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[st
 
 
 def _panels(rows: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[str]:
-    modes, panels = rows.get("modes", ()), []
-    if rows.get("receptances"):
-        receptance, model = rows["receptances"][0], rows["models"][0]
-        panels = [receptance_panel(receptance, modes), decay_panel(receptance, model), coherence_panel(receptance)]
-    return [panel for panel in (*panels, impacts_panel(rows.get("impacts", ()))) if panel]
+    """All panels of the page; without a receptance only the impacts."""
+    model = next(iter(rows.get("models", ())), {})
+    receptance = next(iter(rows.get("receptances", ())), {})
+    test = HammerTest(receptance, model, rows.get("modes", ()), rows.get("impacts", ()))
+    chosen = panels.HAMMER_PANELS if receptance else (impacts_panel,)
+    return [drawn for panel in chosen if (drawn := panel(test))]
 
 
 def _style() -> str:

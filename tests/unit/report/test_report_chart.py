@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from turnout.report.panels.hammer import coherence_panel, receptance_panel
+from turnout.report.panels.hammer import HammerTest, coherence_panel, receptance_panel
 from turnout.report.svg import BOTTOM, LEFT, RIGHT, TOP, Axis, Chart, linear_ticks, log_ticks, reduce_points, time_ticks
 
 
@@ -118,7 +118,7 @@ def test_a_curve_behind_an_exponential_window_says_so(decay, said):
         "frequency_hz": np.linspace(0.0, 1000.0, n), "passed": np.ones(n, dtype=bool), "n_impacts": 7,
         "valid_to_hz": None, "window_decay_per_s": decay,
     }  # fmt: skip
-    assert ("exp(-25/s t)" in receptance_panel(row, [])) is said
+    assert ("exp(-25/s t)" in receptance_panel(HammerTest(row, {}, [], []))) is said
 
 
 @pytest.mark.parametrize(("required", "drawn_at"), [(0.9, "M62.0 40.6L448.0 40.6"), (None, "")])
@@ -129,6 +129,6 @@ def test_the_limit_of_the_coherence_is_that_of_the_settings(required, drawn_at):
         "frequency_hz": np.linspace(20.0, 1600.0, n), "passed": np.ones(n, dtype=bool), "n_impacts": 7,
         "valid_to_hz": None, "gate": "limit", "gate_required": required,
     }  # fmt: skip
-    svg = coherence_panel(row)
+    svg = coherence_panel(HammerTest(row, {}, [], []))
     limits = re.findall(r'<path class="limit" d="([^"]*)"><title>required ([\d.]+)', svg)
     assert limits == ([(drawn_at, "0.9")] if required else [])

@@ -9,6 +9,7 @@ import duckdb
 import numpy as np
 import pytest
 
+from turnout.report import panels
 from turnout.report.pages.turnout import turnout_page
 from turnout.report.site import page_environment, replace_page, shared_by_pages
 from turnout.report.source import ROWS
@@ -44,6 +45,17 @@ def test_the_curves_of_the_latest_test_are_shown():
     used = REJECTED | {"model_id": "old", "measured_at_utc": datetime(2026, 5, 1, 9), "status": "accepted"}
     text = page(models=[used | {"reason": None, "detail": None}], receptances=[RECEPTANCE])
     assert "Latest hammer test, 2026-05-01: receptance" in text and "n = 30 impacts" in text
+
+
+def test_a_new_panel_is_a_function_and_one_line(monkeypatch):
+    def count_panel(test):
+        return f"<svg><text>{len(test.impacts)} impacts in a new panel</text></svg>"
+
+    monkeypatch.setattr(panels, "HAMMER_PANELS", (*panels.HAMMER_PANELS, count_panel))
+    model = REJECTED | {"model_id": "old", "status": "accepted", "reason": None, "detail": None}
+    impact = {"section_id": "t/A7", "status": "accepted", "reason": None, "record": 0, "test": 1, "peak_n": 4e3}
+    text = page(models=[model], receptances=[RECEPTANCE], impacts=[impact | {"path": "A7_1.uff"}] * 3)
+    assert "3 impacts in a new panel" in text
 
 
 def test_a_section_that_the_configuration_does_not_know_spoils_no_page():

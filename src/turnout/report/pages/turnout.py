@@ -5,15 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING
 
+from turnout.report import panels
 from turnout.report.formatting import badge, day, with_interval
 from turnout.report.panels.diagram import diagram
-from turnout.report.panels.hammer import (
-    coherence_panel,
-    decay_panel,
-    impacts_panel,
-    receptance_panel,
-    stabilisation_panel,
-)
+from turnout.report.panels.hammer import HammerTest
 from turnout.report.panels.history import history_panel
 from turnout.report.trains import trains_part
 
@@ -195,15 +190,8 @@ def _panels(
     modes: Sequence[Mapping[str, Any]],
 ) -> str:
     current = [m for m in modes if m["model_id"] == model["model_id"]]
-    return "".join(
-        [
-            receptance_panel(receptance, current),
-            coherence_panel(receptance),
-            decay_panel(receptance, model),
-            stabilisation_panel(receptance, current),
-            impacts_panel(_rows_of(rows, "impacts", section)),
-        ]
-    )
+    test = HammerTest(receptance, model, current, _rows_of(rows, "impacts", section))
+    return "".join(panel(test) for panel in panels.HAMMER_PANELS)
 
 
 def _worst_states(charts: Sequence[Mapping[str, Any]]) -> dict[str, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,24 +14,34 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from typing import Any
 
+
+@dataclass(frozen=True)
+class HammerTest:
+    """Rows of the registry that the panels of one section and campaign draw."""
+
+    receptance: Mapping[str, Any]
+    model: Mapping[str, Any]
+    modes: Sequence[Mapping[str, Any]]
+    impacts: Sequence[Mapping[str, Any]]
+
+
 FREQUENCY_RANGE = (30.0, 1600.0)  # Hz, frequency axis of the panels
 
 
-def receptance_panel(row: Mapping[str, Any], modes: Sequence[Mapping[str, Any]]) -> str:
+def receptance_panel(test: HammerTest) -> str:
     """Magnitude of the receptance over frequency; lines that fail the gate are grey.
 
     Parameters
     ----------
-    row : mapping
-        Row of ``receptances``.
-    modes : sequence of mapping
-        Rows of ``modes`` of the same model.
+    test : HammerTest
+        Rows of a hammer test.
 
     Returns
     -------
     str
         SVG, "" without a value above 0.
     """
+    row = test.receptance
     frequency = np.asarray(row["frequency_hz"], dtype=float)
     inside = (frequency >= FREQUENCY_RANGE[0]) & (frequency <= FREQUENCY_RANGE[1])
     h1 = np.hypot(row["h1_real_m_n"], row["h1_imag_m_n"])
@@ -49,24 +60,25 @@ def receptance_panel(row: Mapping[str, Any], modes: Sequence[Mapping[str, Any]])
     chart.band(frequency, h1, h2, "bracket", "between H1 and H2")
     chart.line(frequency, h1, "curve failed", "H1, fails the gate")
     chart.line(frequency, np.where(passed, h1, np.nan), "curve", "H1")
-    for mode in modes:
+    for mode in test.modes:
         chart.vertical(mode["frequency_hz"], "mode", f"{mode['band']} {mode['frequency_hz']:.0f} Hz")
     return chart.svg()
 
 
-def coherence_panel(row: Mapping[str, Any]) -> str:
+def coherence_panel(test: HammerTest) -> str:
     """Coherence with its 95 % limits and the required level of the gate.
 
     Parameters
     ----------
-    row : mapping
-        Row of ``receptances``.
+    test : HammerTest
+        Rows of a hammer test.
 
     Returns
     -------
     str
         SVG.
     """
+    row = test.receptance
     frequency = np.asarray(row["frequency_hz"], dtype=float)
     chart = Chart(
         Axis(*FREQUENCY_RANGE, "frequency [Hz]", "log"),
@@ -102,21 +114,20 @@ def _grey_out(chart: Chart, frequency: np.ndarray, passed: np.ndarray, row: Mapp
 MAX_DECAY_POINTS = 300
 
 
-def decay_panel(row: Mapping[str, Any], model: Mapping[str, Any]) -> str:
+def decay_panel(test: HammerTest) -> str:
     """Measured and modelled free decay of one impact, 30 ms.
 
     Parameters
     ----------
-    row : mapping
-        Row of ``receptances``.
-    model : mapping
-        Row of ``models``.
+    test : HammerTest
+        Rows of a hammer test.
 
     Returns
     -------
     str
         SVG, "" without a decay.
     """
+    row, model = test.receptance, test.model
     if row["decay_ms2"] is None or row["decay_model_ms2"] is None:
         return ""
     measured = np.asarray(row["decay_ms2"], dtype=float)
@@ -144,22 +155,20 @@ def _is_number(value: float | None) -> bool:
     return value is not None and np.isfinite(value)
 
 
-def stabilisation_panel(row: Mapping[str, Any], modes: Sequence[Mapping[str, Any]]) -> str:
+def stabilisation_panel(test: HammerTest) -> str:
     """Stabilisation diagram: poles over model order.
 
     Parameters
     ----------
-    row : mapping
-        Row of ``receptances``.
-    modes : sequence of mapping
-        Rows of ``modes`` of the same model.
+    test : HammerTest
+        Rows of a hammer test.
 
     Returns
     -------
     str
         SVG, "" without a pole.
     """
-    poles = json.loads(row["stabilisation_json"] or "[]")
+    poles = json.loads(test.receptance["stabilisation_json"] or "[]")
     if not poles:
         return ""
     orders = [p["order"] for p in poles]
@@ -168,7 +177,7 @@ def stabilisation_panel(row: Mapping[str, Any], modes: Sequence[Mapping[str, Any
         Axis(min(orders) - 1, max(orders) + 3, "model order"),  # room for words
         "Stabilisation: poles over model order",
     )
-    for mode in modes:
+    for mode in test.modes:
         chart.vertical(mode["frequency_hz"], "mode", mode["band"])
     for status, style, radius in (("unstable", "pole-unstable", 2.0), ("stable", "pole-stable", 3.0)):
         chosen = [p for p in poles if (p["status"] == "stable") == (status == "stable")]
@@ -182,19 +191,20 @@ def stabilisation_panel(row: Mapping[str, Any], modes: Sequence[Mapping[str, Any
     return chart.svg()
 
 
-def impacts_panel(rows: Sequence[Mapping[str, Any]]) -> str:
+def impacts_panel(test: HammerTest) -> str:
     """Peak force of the impacts, used and rejected.
 
     Parameters
     ----------
-    rows : sequence of mapping
-        Rows of ``impacts`` of one section and campaign, in order of test and record.
+    test : HammerTest
+        Rows of a hammer test.
 
     Returns
     -------
     str
         SVG, "" without an impact.
     """
+    rows = test.impacts
     if not rows:
         return ""
     peaks = [abs(r["peak_n"] or 0.0) / 1e3 for r in rows]
