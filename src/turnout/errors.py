@@ -103,33 +103,16 @@ class RegistryError(TurnoutError):
     """The registry rejects rows or cannot be used; the message names table, row, column and value."""
 
 
-# errno codes of the machine, not of the data. Transient ones concern one file: the next run tries it again.
-# The others concern every file and end the job.
-TRANSIENT_ERRNOS = {errno.EIO, errno.ESTALE, errno.EREMOTEIO, errno.ETIMEDOUT, errno.ENOMEM, errno.EACCES}
-SYSTEM_ERRNOS = {errno.ENOSPC, errno.EDQUOT, errno.EMFILE, errno.ENFILE}
+# errno codes that damaged data may cause (a seek to an impossible byte, a name that is no file), whatever the machine.
+# Every other one is a fault of the machine. It concerns the file at which it occurred: the next run tries it again.
+DATA_ERRNOS = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EINVAL, errno.EOVERFLOW}
 
 
 def is_infrastructure(error: BaseException) -> bool:
     """Whether an exception is a fault of the machine or the network, not of the data of the unit.
 
-    Parameters
-    ----------
-    error : BaseException
-        Any exception.
-
-    Returns
-    -------
-    bool
-        True also for faults that end the whole job, such as a full disk.
-    """
-    return is_transient(error) or (isinstance(error, OSError) and error.errno in SYSTEM_ERRNOS)
-
-
-def is_transient(error: BaseException) -> bool:
-    """Whether an exception is a transient fault: its unit is left for the next run while the other units continue.
-
-    Examples are a bad sector, a server that does not answer, a file without read permission, and too little free
-    memory.
+    Examples are a bad sector, a damaged file system, a server that does not answer, a file without read permission, and
+    too little free memory. The unit is left for the next run while the other units continue.
 
     Parameters
     ----------
@@ -139,20 +122,24 @@ def is_transient(error: BaseException) -> bool:
     Returns
     -------
     bool
-        True for a fault that concerns one file.
+        True for MemoryError and for any OSError whose errno damaged data cannot cause.
 
     Examples
     --------
-    >>> [is_transient(OSError(code, "")) for code in (errno.EIO, errno.ENOSPC)]
-    [True, False]
+    >>> [is_infrastructure(OSError(code, "")) for code in (errno.EIO, errno.EUCLEAN, errno.ENXIO, errno.EINVAL)]
+    [True, True, True, False]
     """
-    return isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno in TRANSIENT_ERRNOS)
+    if isinstance(error, OSError):
+        return error.errno is not None and error.errno not in DATA_ERRNOS
+    return isinstance(error, MemoryError)
 
 
 # All reasons of a quarantine row or of a rejected impact, with their meaning.
 REASONS = {
     "unreadable": "the file is not of its format",
     "empty": "the file has no bytes or no records",
+    "no_file": "the name stands for a device, pipe or socket, not for a file with bytes",
+    "too_large": "the memory of the machine did not suffice for it in two runs",
     "truncated": "fewer samples or records than configured or declared",
     "wrong_length": "more samples or records than configured",
     "vanished": "the file was there when planned and is gone",

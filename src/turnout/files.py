@@ -4,6 +4,7 @@ A full disk, a power failure or an interrupted copy may still truncate a file. `
 detect that.
 """
 
+import errno
 import json
 import logging
 import os
@@ -86,6 +87,63 @@ def changed_at(path: Path) -> int:
         return path.stat().st_mtime_ns
     except (FileNotFoundError, NotADirectoryError):
         return 0
+
+
+SPECIAL_FILES = (
+    (stat.S_ISDIR, "folder"),
+    (stat.S_ISFIFO, "pipe"),
+    (stat.S_ISSOCK, "socket"),
+    (stat.S_ISCHR, "character device"),
+    (stat.S_ISBLK, "block device"),
+)
+
+
+def special_kind(mode: int) -> str:
+    """What a name stands for if it is no regular file; opening a pipe waits for ever, a device may have no end.
+
+    Parameters
+    ----------
+    mode : int
+        ``st_mode`` of its status.
+
+    Returns
+    -------
+    str
+        "pipe", "socket" and the like; "" for a regular file.
+
+    Examples
+    --------
+    >>> special_kind(os.stat(os.devnull).st_mode), special_kind(os.stat("/").st_mode)
+    ('character device', 'folder')
+    """
+    if stat.S_ISREG(mode):
+        return ""
+    return next((kind for is_kind, kind in SPECIAL_FILES if is_kind(mode)), "special file")
+
+
+def read_regular(path: os.PathLike | str) -> bytes:
+    """All bytes of a regular file; what else the name may stand for is not opened.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+
+    Returns
+    -------
+    bytes
+        Its content.
+
+    Raises
+    ------
+    OSError
+        If it is absent, not readable, or no regular file.
+    """
+    if kind := special_kind(os.stat(path).st_mode):
+        if kind == "folder":
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+        raise OSError(errno.EINVAL, f"it is a {kind}, not a file", str(path))
+    return Path(path).read_bytes()
 
 
 def write_text(path: os.PathLike | str, text: str) -> None:

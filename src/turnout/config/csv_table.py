@@ -9,6 +9,7 @@ from pathlib import Path
 
 from turnout.config.document import Place
 from turnout.config.schema import suggestion
+from turnout.files import read_regular
 
 EXTRA_CELLS = "cells beyond the header"
 BROKEN_LINE = "a line that is no row"
@@ -168,7 +169,7 @@ def header_of(path: Path, name: str) -> tuple[str, ...]:
 def _numbered_lines(path: Path, name: str) -> list[tuple[int, str]]:
     """(number, text) of the lines of a file that are not blank; TableError if it is not UTF-8 or cannot be read."""
     try:
-        data = Path(path).read_bytes()
+        data = read_regular(path)
     except OSError as error:
         if not os.path.lexists(path):
             raise

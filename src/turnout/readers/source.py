@@ -20,6 +20,7 @@ import numpy as np
 
 from turnout.content import sha256_of
 from turnout.errors import ReadError, TurnoutError, is_infrastructure
+from turnout.files import special_kind
 from turnout.records import EMPTY_MAPPING
 
 if TYPE_CHECKING:
@@ -256,6 +257,8 @@ def load(path: PathLike | str, root: PathLike | str) -> Source:
     if not resolved.is_relative_to(base):
         raise ReadError(name, "the path", "it leads outside the raw root", remedy, reason="outside_root")
     try:
+        if kind := special_kind(resolved.stat().st_mode):
+            raise ReadError(name, "the path", f"it is a {kind}", "Put a file there, or remove it", reason="no_file")
         with resolved.open("rb") as file:
             head, size = file.read(HEAD_SIZE), os.fstat(file.fileno()).st_size
     except (FileNotFoundError, NotADirectoryError) as error:

@@ -105,6 +105,31 @@ def death_rows(unit: Unit, *_: Any, **__: Any) -> dict[str, list[dict]]:
     }
 
 
+def memory_rows(unit: Unit, *_: Any, **__: Any) -> dict[str, list[dict]]:
+    """Rows of a unit for which the memory did not suffice in two runs.
+
+    Parameters
+    ----------
+    unit : Unit
+        The unit.
+    *_ : any
+        Not used: the arguments of a function of a stage.
+    **__ : any
+        Not used.
+
+    Returns
+    -------
+    dict of str to list of dict
+        One quarantine row.
+    """
+    finding = "its computation needed more memory than the machine gave, in two runs"
+    remedy = (
+        "Copy its files again if their size is not what the logger writes; else give the job more memory and touch one "
+        "of them, so that the unit is tried again"
+    )
+    return {"quarantine": [quarantine_row(unit, _first_of(unit), "too_large", "the unit", finding, remedy)]}
+
+
 def _compute(
     compute: Callable, *args: Any, **extra: Any
 ) -> tuple[dict[str, list[dict]], Sequence[tuple[str, int, Exception]]]:

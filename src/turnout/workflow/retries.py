@@ -132,7 +132,24 @@ def read_postponed(state: Path) -> tuple[int, dict[str, str]]:
     return content["jobs"], content["units"]
 
 
-def note_postponed(state: Path, units: Mapping[str, str]) -> None:
+def first_postponed(state: Path) -> dict[str, str]:
+    """The run that first postponed each postponed unit.
+
+    Parameters
+    ----------
+    state : Path
+        State file of the shard.
+
+    Returns
+    -------
+    dict of str to str
+        Unit -> start time of the run, "" outside a run.
+    """
+    content = read_json(_postponed_path(state), {})
+    return {unit: content.get("runs", {}).get(unit, "") for unit in content.get("units", ())}
+
+
+def note_postponed(state: Path, units: Mapping[str, str], run: str = "") -> None:
     """Write the postponed units of a shard; no file if there are none and were none before.
 
     Parameters
@@ -141,10 +158,13 @@ def note_postponed(state: Path, units: Mapping[str, str]) -> None:
         State file of the shard.
     units : mapping of str to str
         Unit -> fault.
+    run : str
+        Start time of the run, "" outside a run; a unit that was postponed before keeps its run.
     """
     jobs, before = read_postponed(state)
     if units or before:
-        _write(state, jobs + bool(units), units)
+        runs = dict.fromkeys(units, run) | {u: r for u, r in first_postponed(state).items() if u in units}
+        _write(state, jobs + bool(units), units, runs)
 
 
 def request_rerun(state: Path) -> None:
@@ -156,11 +176,12 @@ def request_rerun(state: Path) -> None:
         State file of the shard.
     """
     jobs, units = read_postponed(state)
-    _write(state, jobs + 1, units)
+    _write(state, jobs + 1, units, first_postponed(state))
 
 
-def _write(state: Path, jobs: int, units: Mapping[str, str]) -> None:
-    write_text(_postponed_path(state), json.dumps({"jobs": jobs, "units": dict(units)}, indent=1) + "\n")
+def _write(state: Path, jobs: int, units: Mapping[str, str], runs: Mapping[str, str]) -> None:
+    content = {"jobs": jobs, "units": dict(units), "runs": dict(runs)}
+    write_text(_postponed_path(state), json.dumps(content, indent=1) + "\n")
 
 
 def _postponed_path(state: Path) -> Path:

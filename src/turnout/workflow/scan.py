@@ -12,6 +12,7 @@ from re import Match, Pattern
 from turnout.config import TurnoutConfig
 from turnout.config.filename_pattern import compile_pattern
 from turnout.errors import ReadError
+from turnout.files import special_kind
 from turnout.records import Unit
 
 NOTE_FILES = ("campaigns.csv", "trains.csv")
@@ -63,6 +64,9 @@ class RawFolder:
             return None
         except OSError as error:
             self._note_unreadable(inside, "file", error)
+            return None
+        if kind := special_kind(status.st_mode):
+            self._leave_out(inside, "file", f"is a {kind}", "Put a file there, or remove it", "no_file")
             return None
         # allowing to read it changes neither size nor time, so until then the file is not part of a unit
         if status.st_mode & 0o444 != 0o444 and not os.access(entry.path, os.R_OK):

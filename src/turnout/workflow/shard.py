@@ -5,14 +5,13 @@ import sys
 import time
 import traceback
 from collections import Counter
-from collections.abc import Callable, Collection, Container, Sequence
+from collections.abc import Callable, Collection, Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any, TextIO
 
 from turnout.config import Configuration
-from turnout.errors import is_transient
 from turnout.workflow.batches import UnitResult
 from turnout.workflow.duplicate_files import (
     copies,
@@ -23,11 +22,19 @@ from turnout.workflow.duplicate_files import (
     withdrawal,
     without_copies,
 )
-from turnout.workflow.guard import compute_guarded, death_rows
+from turnout.workflow.guard import compute_guarded, death_rows, memory_rows
 from turnout.workflow.ledger import Ledger
 from turnout.workflow.plan import PlannedUnit, read_plan
 from turnout.workflow.pool import LostTask, map_in_order, map_in_processes
-from turnout.workflow.retries import Postponed, clear_mark, mark_started, note_postponed, read_postponed, started_units
+from turnout.workflow.retries import (
+    Postponed,
+    clear_mark,
+    first_postponed,
+    mark_started,
+    note_postponed,
+    read_postponed,
+    started_units,
+)
 from turnout.workflow.scan import unit_id
 from turnout.workflow.state import state_lock
 from turnout.workflow.tasks import Stage, Task, Tasks, contents_of, key_of, load_function, short_contents
@@ -171,6 +178,7 @@ class _Run:
         self.state = self.ledger.state
         self.tasks = Tasks(self.state, stage, configuration, raw_root)
         self.postponed: dict[str, str] = {}
+        self.faults_before, self.postponed_since = read_postponed(path)[1], first_postponed(path)
         self.suspects = started_units(path)
 
     def bring_up(self, planned: list[PlannedUnit], only: Sequence[str] | None) -> Summary:
@@ -211,7 +219,7 @@ class _Run:
                 if isinstance(computed, LostTask):
                     tasks_alone.append(computed.task)
                 else:
-                    self._keep(computed)
+                    self._keep(self._second_want_of_memory(computed, tasks_by_name))
             self.ledger.checkpoint()
             for task in tasks_alone:
                 self._compute_alone(task)
@@ -230,7 +238,7 @@ class _Run:
         LOG.warning("%s: a process or a job died while it was computed: it is computed by itself", name)
         (computed,) = map_in_processes(self._compute, [task], 1)
         if not isinstance(computed, LostTask):
-            self._keep(computed)
+            self._keep(self._second_want_of_memory(computed, {name: task}))
         elif self.strict:
             raise RuntimeError(f"{name}: {PROCESS_DIED}")
         elif name not in self.suspects or (self.launched and self.suspects[name] == self.launched):
@@ -240,6 +248,17 @@ class _Run:
             self.ledger.checkpoint()  # before its mark is cleared
             if not isinstance(computed, Postponed):
                 clear_mark(self.path, name)
+
+    def _second_want_of_memory(self, computed: Computed | Postponed, tasks: Mapping[str, Task]) -> Computed | Postponed:
+        """``computed``, or a quarantine row for a unit that an earlier run postponed for the same want of memory."""
+        if not isinstance(computed, Postponed) or not computed.fault.startswith(MemoryError.__name__):
+            return computed
+        first_run = self.postponed_since.get(computed.unit)
+        if first_run is None or (self.launched and first_run == self.launched):
+            return computed
+        if not self.faults_before.get(computed.unit, "").startswith(MemoryError.__name__):
+            return computed
+        return _provisional(self._compute_with_guard(tasks[computed.unit], memory_rows))
 
     def _keep(self, computed: Computed | Postponed) -> None:
         if isinstance(computed, Postponed):
@@ -267,7 +286,7 @@ class _Run:
                 compute, own_unit, task.turnout, self.raw_root, key, self.stage.algo, self.strict, **extra
             )
         except (OSError, MemoryError) as error:
-            if self.strict or not is_transient(error):
+            if self.strict:
                 raise
             LOG.warning("%s: left for the next run\n%s", unit_id(unit), traceback.format_exc())
             return Postponed(unit_id(unit), f"{type(error).__name__}: {error}")
@@ -278,7 +297,7 @@ class _Run:
         """Write the postponed units and return their number; those of turnouts that did not take part stay."""
         before = read_postponed(self.path)[1]
         postponed = {unit: fault for unit, fault in before.items() if unit in wanted and unit not in tried}
-        note_postponed(self.path, postponed | self.postponed)
+        note_postponed(self.path, postponed | self.postponed, self.launched)
         return len(self.postponed)
 
     def _set_copies_aside(self, wanted: dict[str, PlannedUnit], only: Sequence[str] | None) -> None:

@@ -16,6 +16,7 @@ from turnout.config import Configuration, TurnoutConfig, with_raw
 from turnout.config.merge import digest
 from turnout.content import sha256_of
 from turnout.errors import ConfigError
+from turnout.files import special_kind
 from turnout.records import Unit
 from turnout.workflow.duplicate_files import Original, originals_of
 from turnout.workflow.plan import PlannedUnit
@@ -108,9 +109,10 @@ def short_contents(contents: Sequence[str | None], elsewhere: Container[int] = (
 
 
 def _content(path: str) -> str | None:
+    """sha256 of a file; None if it is gone or was replaced by something that is no regular file."""
     try:
-        return sha256_of(path)
-    except (FileNotFoundError, IsADirectoryError):
+        return None if special_kind(os.stat(path).st_mode) else sha256_of(path)
+    except (FileNotFoundError, NotADirectoryError, IsADirectoryError):
         return None
 
 

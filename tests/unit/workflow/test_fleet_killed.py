@@ -122,9 +122,9 @@ def test_one_that_ends_its_job_every_night_keeps_no_other_waiting_that_was_begun
 
 
 def test_a_fault_that_ends_the_job_costs_none_of_what_waited_for_a_checkpoint(fleet):
-    fleet.put("t4/2024-05-13/A_1.txt", "full")
-    with pytest.raises(OSError, match="No space left"):
-        fleet.run()
+    fleet.put("t4/2024-05-13/A_1.txt", "bug")
+    with pytest.raises(ZeroDivisionError):
+        fleet.run(strict=True)
     assert statuses(fleet) == dict.fromkeys(UNITS[:4], "ok")
     assert not list(fleet.state.with_suffix("").glob("begun-*"))
 

@@ -1,0 +1,150 @@
+"""A name that stands for no file, and any error code of one file, concerns that file; all other units are computed."""
+
+import errno
+import json
+import os
+import re
+import socket
+import stat
+from datetime import datetime
+
+import pytest
+from length_fleet import Fleet, length
+
+from turnout.errors import DATA_ERRNOS, ReadError, is_infrastructure
+from turnout.readers import read
+from turnout.records import RawDescription
+from turnout.workflow import tasks
+from turnout.workflow.plan import read_plan, read_problems
+from turnout.workflow.retries import read_postponed
+from turnout.workflow.tasks import Stage
+
+OTHERS = {"t0/hammer/A/2024-05-13", "t2/hammer/A/2024-05-13"}
+UNIT = "t1/hammer/A/2024-05-13"
+
+
+def put_socket(path):
+    folder = os.getcwd()
+    os.chdir(path.parent)  # the name of a socket has at most 107 bytes
+    try:
+        with socket.socket(socket.AF_UNIX) as end:
+            end.bind(path.name)
+    finally:
+        os.chdir(folder)
+
+
+def put_device(path):
+    try:
+        os.mknod(path, stat.S_IFCHR | 0o666, os.makedev(1, 5))  # /dev/zero: it has no end
+    except PermissionError:
+        pytest.skip("only root may make a device file")
+
+
+SPECIAL = {"socket": put_socket, "pipe": os.mkfifo, "character device": put_device, "folder": os.mkdir}
+
+
+@pytest.mark.parametrize("kind", [kind for kind in SPECIAL if kind != "folder"])
+def test_what_is_no_file_is_named_by_the_plan_and_all_others_are_computed_every_night(fleet, kind):
+    path = fleet.raw / "t1/2024-05-13/A_1.txt"
+    path.unlink()
+    SPECIAL[kind](path)
+    for _ in range(3):
+        fleet.run()
+        assert set(fleet.lengths()) == OTHERS and read_postponed(fleet.state)[1] == {}
+        ((turnout, problem), *_) = read_problems(fleet.plan)
+        assert (turnout, problem["path"], problem["found"], problem["reason"]) == (
+            "t1", "t1/2024-05-13/A_1.txt", f"is a {kind}", "no_file",
+        )  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", SPECIAL)
+def test_a_reader_names_it_without_opening_it(tmp_path, kind):
+    SPECIAL[kind](tmp_path / "A7_1.uff")
+    with pytest.raises(ReadError, match=f"A7_1.uff, the path: it is a {kind}"):
+        read("A7_1.uff", tmp_path, RawDescription(channels=()))
+
+
+@pytest.mark.parametrize("kind", SPECIAL)
+def test_a_file_that_became_something_else_after_the_plan_holds_back_nothing(fleet, kind):
+    fleet.run()
+    path = fleet.raw / "t1/2024-05-13/A_1.txt"
+    (planned,) = [p for p in read_plan(fleet.plan) if p.unit.turnout == "t1"]
+    path.unlink()
+    SPECIAL[kind](path)
+    assert tasks.contents_of(planned, fleet.raw) == [None]
+
+
+@pytest.mark.parametrize("name", ["campaigns.csv", "trains.csv"])
+def test_notes_that_are_a_pipe_do_not_stop_the_plan(fleet, name):
+    os.mkfifo(fleet.raw / "t1" / name)
+    fleet.run()
+    assert set(fleet.lengths()) >= OTHERS
+    problems = [problem["found"] for turnout, problem in read_problems(fleet.plan) if turnout == "t1"]
+    assert problems == ["it is a pipe, not a file"]
+
+
+CODES = dict(enumerate(sorted(errno.errorcode), 1))  # turnout -> every code of this platform; t0 is intact
+
+
+def code_of(path):
+    """The code that the file of a turnout fails with, 0 for t0."""
+    return CODES.get(int(re.search(r"\bt(\d+)", str(path))[1]), 0)
+
+
+def test_any_error_code_of_one_file_leaves_its_unit_and_no_other(tmp_path, monkeypatch):
+    """The first night each file but one fails with a code of its own when it is hashed; the second night none does."""
+    fleet, hashed = Fleet(tmp_path, len(CODES) + 1), tasks.sha256_of
+
+    def failing(path):
+        if code := code_of(path):
+            raise OSError(code, os.strerror(code), str(path))
+        return hashed(path)
+
+    monkeypatch.setattr(tasks, "sha256_of", failing)
+    fleet.run()
+    waiting = read_postponed(fleet.state)[1]
+    assert "t0/hammer/A/2024-05-13" in fleet.lengths()
+    assert {code_of(unit) for unit in (*waiting, *fleet.lengths())} == {0, *CODES.values()}
+    assert all(f"[Errno {code_of(unit)}]" in fault for unit, fault in waiting.items())
+    monkeypatch.undo()
+    fleet.run()
+    assert len(fleet.lengths()) == len(CODES) + 1 and read_postponed(fleet.state)[1] == {}
+
+
+def test_any_error_code_while_computing_is_said_by_unit(tmp_path):
+    """Damaged data may cause a few of them: these are rows of quarantine, all others faults of the machine."""
+    fleet = Fleet(tmp_path, len(CODES) + 1)
+
+    def failing(unit, turnout, raw_root, algo=""):
+        if code := code_of(unit.turnout):
+            raise OSError(code, os.strerror(code))
+        return length(unit, turnout, raw_root, algo)
+
+    fleet.run(stage=Stage("hammer", failing, "1"))
+    waiting = {code_of(unit) for unit in read_postponed(fleet.state)[1]}
+    rows = {code_of(unit) for unit, tables in fleet.rows().items() if tables["quarantine"]}
+    assert rows == DATA_ERRNOS and waiting == set(CODES.values()) - DATA_ERRNOS
+    assert all(is_infrastructure(OSError(code, "")) for code in waiting)
+
+
+def test_a_want_of_memory_is_a_quarantine_row_the_second_night(fleet):
+    """So the night does not fail for ever; touching the file tries it again."""
+    fleet.put("t1/2024-05-13/A_1.txt", "too large")
+    assert str(fleet.run()) == "hammer 00of01: 3 known, 2 processed, 0 quarantined, 1 postponed"
+    summary = fleet.run()
+    assert (summary.processed, summary.quarantined, summary.postponed, summary.internal_errors) == (1, 1, 0, 0)
+    (row,) = fleet.rows()[UNIT]["quarantine"]
+    assert (row["reason_code"], row["path"]) == ("too_large", "t1/2024-05-13/A_1.txt")
+    assert fleet.run().processed == 0 and read_postponed(fleet.state)[1] == {}
+    fleet.put("t1/2024-05-13/A_1.txt", "smaller")
+    assert fleet.run().processed == 1
+    assert fleet.rows()[UNIT]["quarantine"] == []
+
+
+def test_an_attempt_of_the_same_run_is_no_second_night(fleet):
+    fleet.put("t1/2024-05-13/A_1.txt", "too large")
+    first, second = datetime(2026, 11, 22, 2), datetime(2026, 11, 23, 2)
+    for _ in range(3):
+        assert fleet.run(launched=first).postponed == 1
+    assert json.loads((fleet.state.with_suffix("") / "postponed.json").read_text())["runs"] == {UNIT: first.isoformat()}
+    assert fleet.run(launched=second).quarantined == 1
