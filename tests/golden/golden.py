@@ -1,7 +1,7 @@
 """Record the results of a state of the program, or compare two recordings. See README.md.
 
-python tests/golden/golden.py record /work/golden/after [--tier quick|full] [--src /work/main/src] [--only fleet]
-python tests/golden/golden.py compare /work/golden/base /work/golden/after
+python tests/golden/golden.py record golden/after [--tier quick|full] [--src src] [--only fleet]
+python tests/golden/golden.py compare golden/base golden/after
 """
 
 import argparse
@@ -19,7 +19,7 @@ from pathlib import Path
 import duckdb
 
 HERE = Path(__file__).resolve().parent
-INPUTS = Path(os.environ.get("TURNOUT_GOLDEN_INPUTS", "/work/golden/inputs"))
+INPUTS = Path(os.environ.get("TURNOUT_GOLDEN_INPUTS", "golden/inputs"))
 DAY = "2026-08-01"
 MAIN = """
 import sys
