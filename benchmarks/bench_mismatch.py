@@ -89,7 +89,7 @@ def silverbox():
     yield Bar(
         "Silverbox: cubic law chosen of ten (1 yes)", float(diagnosis.names == ("cubic_spring",)), 1.0, sense=">="
     )
-    yield Bar("Silverbox: multisines never used", min(fits[:2]), 98.0, "%", ">=", "n=2")
+    yield Bar("Silverbox: held-out multisines", min(fits[:2]), 98.0, "%", ">=", "n=2")
     yield Bar("Silverbox: arrow, beyond the range", fits[2], 96.0, "%", ">=", "n=1", f"{watch.cpu:.1f} CPU s")
     answer_without = diagnose(case(without=("cubic_spring",))).verdict.answer
     yield Bar("Silverbox without the cubic law: unknown (1 yes)", float(answer_without == "unknown"), 1.0, sense=">=")

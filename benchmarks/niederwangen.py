@@ -221,7 +221,7 @@ changed* (0.93) and S2 *cannot tell* (0.37), the other grades were the same.
   witnesses but as {independent}, the number of independent ones among the residuals.
 - **Campaign and temperature are the same four numbers.** The slope per degree is the hot campaign against the
   others. With a free shift of every campaign in place of temperature, only differences between sections are left,
-  and then "most sections rose" and "{reference} fell while everything else rose" cannot be told apart except by
+  and then "most sections rose" and "{reference} fell while everything else rose" cannot be distinguished except by
   parsimony. Minus twice the log evidence of that model: {shared} (lower is better). What decides is the size of
   the numbers themselves: the lateral decay rate of {reference} is the same before and after within ×{low:.2f} to
   ×{high:.2f}, temperature not taken out, in all bands from 125 to 2000 Hz, while other sections rose up to

@@ -51,7 +51,7 @@ def paper_trends(runs, settings, noise=0.2) -> Iterator[Bar]:
     for t, scores in by_interval.items():
         mean_fit, median, high = np.mean(scores, axis=0)
         note = f"random models: median {median:.0f}, 95 % {high:.0f}"
-        yield Bar(f"paper's fit, state estimated anew every {1e3 * t:g} ms, A7", mean_fit, None, "%", "", n, note)
+        yield Bar(f"paper's fit, state estimated again every {1e3 * t:g} ms, A7", mean_fit, None, "%", "", n, note)
     note = f"random models reach {np.mean([r['null'] for r in rows]):.1f} (95 %)"
     yield Bar("joint fit, one amplitude per wheel, A7", np.mean([r["fit_pct"] for r in rows]), None, "%", "", n, note)
     for score, words in (("fit_pct", "joint fit"), ("reestimated", "paper's fit at 2 ms")):

@@ -14,9 +14,8 @@ def what_in_words(names):
         return "nothing"
     if set(names) <= DAMPING_EFFECTS:
         alternatives = " or ".join(texts.values())
-        return (
-            f"**added: something that damps the rail** ({alternatives}{'' if len(names) == 1 else '; not told apart'})"
-        )
+        also = "" if len(names) == 1 else "; not distinguished"
+        return f"**added: something that damps the rail** ({alternatives}{also})"
     return "open: " + " or ".join(texts.values())
 
 

@@ -149,7 +149,7 @@ def _ranking_rows(diagnosis):
         yield [score.candidate.key.replace("_", " "), f"{score.gain:+.0f}", first]
 
 
-PAGE = """# The mismatch of the publication at A4, made anew
+PAGE = """# The mismatch of the publication at A4, made again
 
 *Made by `python -m examples.paper_mismatch`; every number comes from that run. The recordings are simulated.*
 
@@ -192,9 +192,9 @@ Leaders with five:
 
 ## Why
 An effect that grows with load looks, under a single train, like anything that makes the loaded track differ from the
-struck one: free numbers that any sound turnout needs (pads, ballast, gains, speed, load, waves of the rail) take up
+struck one: free numbers that any intact turnout needs (pads, ballast, gains, speed, load, waves of the rail) take up
 most of it. One train is not enough to name anything. Other axle loads and speeds add evidence; how much, `turnout
-distinguish` says before anybody measures. Where the fit on a train never used stays low beside the answer "none",
+distinguish` says before anybody measures. Where the fit on a held-out train stays low beside the answer "none",
 thresholds hide what is there: a low fit is worth a look whatever the answer. A coarse description of the rail's
 shape, which the publication suspects, is a fault of the simulation and not of the track: that is what the answer
 "numerics" is for, and the tool looks for it first, by halving step and mesh.
@@ -233,7 +233,7 @@ def main():
     draw(case, curves, DOCS / "paper_mismatch.svg")
     more_case, _, more = study(plan_with_more_trains())
     answers = table(
-        ("campaign", "passages", "answer", "names", "probability", "because", "fit on a train never used"),
+        ("campaign", "passages", "answer", "names", "probability", "because", "fit on a held-out train"),
         [answer_row("as in the publication", case, diagnosis), answer_row("with more trains", more_case, more)],
     )
     text = PAGE.format(

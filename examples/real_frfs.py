@@ -150,7 +150,7 @@ def draw(results, path):
         axis.semilogy(case.frequency, size(case, case.reserved[0].data), color="black", lw=1.2, label="recorded")
         axis.semilogy(case.frequency, before, color="C1", lw=1, label="too simple model")
         axis.semilogy(case.frequency, after, color="C0", lw=1, ls="--", label="with what was named")
-        axis.set_title(f"{title}, {case.reserved[0].name}, never used. Left out: {left_out}", fontsize=9)
+        axis.set_title(f"{title}, {case.reserved[0].name}, held out. Left out: {left_out}", fontsize=9)
         axis.set_ylabel("rms of the sensors [m/s²/N]")
     axes[0].legend(ncols=3)
     axes[-1].set_xlabel("frequency [Hz]")

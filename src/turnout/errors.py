@@ -161,7 +161,7 @@ REASONS = {
     "out_of_scale": "a value that no such measurement has: the unit or the scale is wrong",
     "weak": "the impact is much weaker than the others of its test",
     "noisy": "the level before the impact is too high",
-    "late": "the impact is not where the trigger promises, had begun before the record, or too little decay is left",
+    "late": "the impact is not where the trigger promises, began before the record, or too little decay is left",
     "cut_off": "the record ends before the vibration has died away",
     "odd_one_out": "the response disagrees with all other impacts of the test",
     "no_impact": "no impact found in the record",

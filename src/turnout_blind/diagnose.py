@@ -88,7 +88,7 @@ def diagnose_set(
     )
     if diagnosis["tool_sha256"] != tool_sha256:
         raise BlindError(
-            record_path, "tool_sha256", "the tool has changed since the first case", "Diagnose a set made anew"
+            record_path, "tool_sha256", "the tool has changed since the first case", "Diagnose a set made again"
         )
     if diagnosis.get("command", command) != command:
         raise BlindError(
@@ -98,7 +98,7 @@ def diagnose_set(
         raise BlindError(out / "commit.json", "examines", "made for another tool than this", "Make a set for this one")
     revealed_folder = out / "revealed"
     if label is None and revealed_folder.exists():
-        raise BlindError(revealed_folder, "truth", "this set is open", "Judge a set made anew, or an ablation")
+        raise BlindError(revealed_folder, "truth", "this set is open", "Judge a set made again, or an ablation")
     diagnosis |= {"commit_sha256": digest((out / "commit.json").read_bytes()), "command": command}
     diagnosis |= {"budget": {"wall_s": timeout, "cpu_s": cpu}}
     (folder / "findings").mkdir(parents=True, exist_ok=True)
@@ -122,7 +122,7 @@ def diagnose_set(
                 raise
     _write_record(record_path, diagnosis)
     if digest_of_folder(tool) != tool_sha256:
-        raise BlindError(tool, "source", "changed while it diagnosed", "Diagnose a set made anew, tool left alone")
+        raise BlindError(tool, "source", "changed while it diagnosed", "Diagnose a set made again, tool left alone")
     return diagnosis
 
 

@@ -108,6 +108,6 @@ def read_findings(out: str | Path, label: str | None = None) -> tuple[dict[str, 
         if run and run["status"] == "answered":
             data = path.read_bytes()
             if digest(data) != run["rows_sha256"]:
-                raise BlindError(path, "line 1", "not the rows that the tool wrote", "Diagnose a set made anew")
+                raise BlindError(path, "line 1", "not the rows that the tool wrote", "Diagnose a set made again")
             rows[case] = json.loads(data)
     return rows, diagnosis

@@ -200,7 +200,7 @@ def test_rows_are_taken_from_what_the_tool_prints(copy, tmp_path):
 
 @pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
 def test_a_set_is_judged_by_one_command_with_rows_and_before_it_is_open(copy):
-    """An empty list says nothing; another command, or a judgement of an open set, is refused."""
+    """An empty list says nothing; another command, or a judgement of an open set, is rejected."""
     out, truth = copy
     one, other = (c.name for c in cases(out))
     held = diagnose_set(out, truth, "{python} -c 'print([])'", [one], report=lambda line: None)
@@ -245,7 +245,7 @@ def test_what_the_tool_writes_beside_its_files_breaks_no_seal(copy):
 
 
 def test_an_interrupted_set_goes_on(made, tmp_path, monkeypatch):
-    """The first case is there; the second, half-made, is made again; another seed or other sources are refused."""
+    """The first case is there; the second, half-made, is made again; another seed or other sources are rejected."""
     out, truth = tmp_path / "set", tmp_path / "truth"
     shutil.copytree(made[0], out)
     shutil.copytree(made[1], truth)

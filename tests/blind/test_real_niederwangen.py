@@ -38,7 +38,7 @@ def test_a_free_rail_decays_by_its_loss():
 
 
 def test_whitened_errors_have_unit_variance():
-    """C^(-1/2) C C^(-1/2) = 1 with C written down anew."""
+    """C^(-1/2) C C^(-1/2) = 1 with C written down again."""
     octave, spread, repeat = np.log2(BANDS), np.linspace(0.1, 0.3, 18), np.linspace(0.4, 0.1, 18)
     shared = np.exp(-0.5 * ((octave[:, None] - octave[None, :]) / 0.5) ** 2)
     w = whitening(spread, repeat)

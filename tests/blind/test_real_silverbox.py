@@ -12,7 +12,7 @@ def test_the_page_follows_from_the_recording(shared_data):
     assert "**named: cubic spring**" in text and "**unknown**" in text
     kept = (DOCS / "silverbox.md").read_text(encoding="utf-8")
     assert text.splitlines()[0] == kept.splitlines()[0]
-    case, told = found["told nothing"]
+    case, told = found["without prior knowledge"]
     (multisine, _), (arrow, _) = silverbox.held_out(case, told.fit)
     assert multisine >= 98.0 and arrow >= 96.0
     other, removed = found["law removed"]

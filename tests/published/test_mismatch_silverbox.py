@@ -1,7 +1,7 @@
 """A recorded oscillator whose missing physics is known: the cubic spring of the Silverbox benchmark.
 
 Wigren and Schoukens 2013, Three free data sets for development and benchmarking in nonlinear system identification.
-The engine is told nothing; its library holds ten laws. Loading: samples 0 to 40000 are the growing arrow, behind them
+The engine has no prior knowledge; its library holds ten laws. Samples 0 to 40000 are the growing arrow, behind them
 ten realisations of a multisine.
 """
 

@@ -71,7 +71,7 @@ def both_ways(patterns):
 
 
 def family(pattern):
-    """Types whose axles stand at the same places to 5 cm cannot be told apart by them: one name for all."""
+    """Types whose axles stand at the same places to 5 cm cannot be distinguished by them: one name for all."""
     return tuple(np.round(offsets(pattern.fixed_row()[1]) / 0.05).astype(int))
 
 

@@ -1,4 +1,4 @@
-"""A recorded hammer test of five impacts whose authors say which hits are bad: 0 overloaded, 2 double.
+"""A recorded hammer test of five impacts whose authors say which impacts are bad: 0 overloaded, 2 double.
 
 pyFRF 1.1.4, data/impact2_response0.lvm (MIT): LabVIEW text, five segments of 1 s at 51.2 kHz.
 """

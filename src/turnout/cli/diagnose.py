@@ -114,7 +114,7 @@ def _accept(args: argparse.Namespace, results: Results) -> int:
 
     path, words = accept(results.finding(args.finding), args.configuration, args.turnout, args.track, args.anyway)
     print(f"{path}: {words}")
-    print("From now on the simulation contains it; each visit estimates it anew, see mismatch_parameters.")
+    print("From now on the simulation contains it; each visit estimates it again, see mismatch_parameters.")
     return 0
 
 

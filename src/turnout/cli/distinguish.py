@@ -4,7 +4,7 @@ turnout distinguish --track tommerup --sensors 23.4 26.4 --blows 24.6 --temperat
 turnout distinguish --track tommerup --sensors 23.4 26.4 --trains ic3 --speeds 160 100
 
 A figure is the log evidence in nats that is lost when the effect of the row is explained by that of the column, at the
-column's best strength and with all nuisances free; "none" is the base model. Below 5 nats they cannot be told apart;
+column's best strength and with all nuisances free; "none" is the base model. Below 5 nats they cannot be distinguished;
 a name needs 12 in the column "none" and 6 against each rival: plan for that.
 """
 
@@ -62,6 +62,6 @@ def run(args: argparse.Namespace) -> int:
     for name in matrix.names:
         confused = matrix.confused_with(name)
         if confused:
-            print(f"{name} cannot be told from {', '.join(confused)}")
+            print(f"{name} cannot be distinguished from {', '.join(confused)}")
     print(advice)
     return 0

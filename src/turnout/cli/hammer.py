@@ -3,7 +3,7 @@
   turnout hammer raw/tommerup_s1/hammer/2024-01-23/A7_*.uff --turnout tommerup_s1
   turnout hammer /media/stick/log_17.uff --turnout tommerup_s1 --section A7 --campaign 2024-05-13 --figure a7.svg
 
-Says which files and records were read, which impacts are accepted and which refused and why, how far the coherence
+Says which files and records were read, which impacts are accepted and which rejected and why, how far the coherence
 reaches, and frequency, damping and dynamic stiffness at the two resonances with their 95 % intervals, or why there is
 none. Impacts and records are counted from 1. It computes as the nightly run does, with the same settings, so give all
 files of a section: impacts are judged against each other. Files that do not lie in the raw folder need --section and

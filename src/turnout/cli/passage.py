@@ -134,7 +134,7 @@ def _fit_lines(
         models = context.models.get(sensor.section, ())
         model = model_at(models, recording.started_at or datetime.max)
         if sensor.name not in passage.at_sensor or model is None:
-            reason = "does not hear the train" if models else "no model of its section"
+            reason = "does not record the train" if models else "no model of its section"
             lines.append(f"  {sensor.name:<10}{reason}")
             continue
         samples, times = recording.signal(sensor.name), passage.at_sensor[sensor.name]

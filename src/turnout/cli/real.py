@@ -1,7 +1,7 @@
 """Run the pipeline on recordings that nobody here made, and compare with what their makers say of them.
 
 Fetches three source distributions by package name, checks their sha256, and takes the recordings out:
-a hammer test of five impacts (hit 0 overloaded, hit 2 double, by its authors' word), the frequency responses of two
+a hammer test of five impacts (impact 0 overloaded, impact 2 double, its authors say), the frequency responses of two
 beams with published modes, and vendors' UFF files. Everything lies below real/.
 """
 
@@ -74,16 +74,16 @@ def _print_impacts(folder: Path) -> None:
     from turnout.registry.database import open_registry
 
     print("\nHammer test of five impacts of pyFRF 1.1.4")
-    print(f"{'hit':>4}  {'its makers say':<24} {'found':<10} why")
+    print(f"{'impact':>6}  {'its authors say':<24} {'found':<10} why")
     with open_registry(folder / "results" / "registry") as connection:
         rows = connection.execute("select record, status, detail from impacts_current order by record").fetchall()
     for record, status, detail in rows:
-        print(f"{record:>4}  {HITS[record]:<24} {status:<10} {detail or ''}")
+        print(f"{record:>6}  {HITS[record]:<24} {status:<10} {detail or ''}")
 
 
 def _print_modes(beams: Iterable[Beam]) -> None:
     for beam in beams:
-        print(f"\nModes of the {beam.name} ({beam.origin}): found without being told how many, nor where")
+        print(f"\nModes of the {beam.name} ({beam.origin}): found without prior knowledge of their number or frequency")
         print(f"{'published [Hz]':>15} {'found [Hz]':>22} {'published damping':>19} {'found damping [%]':>20} {'n':>4}")
         for f, damping, mode in beam.rows:
             published = "not published" if f is None else f"{f:.1f}"

@@ -75,7 +75,7 @@ def _compact(args: argparse.Namespace) -> int:
 def _rebuild(args: argparse.Namespace) -> int:
     from turnout.registry.compaction import rebuild
 
-    return _print_changes(rebuild(_registry_folder(args)), "written anew")
+    return _print_changes(rebuild(_registry_folder(args)), "written again")
 
 
 def _print_changes(changes: Mapping[str, tuple[int, int]], verb: str) -> int:

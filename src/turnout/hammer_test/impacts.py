@@ -133,7 +133,7 @@ def _judge_start(cut: Cut, settings: ReceptanceSettings) -> None:
     contact, at_start = cut.contact, cut.polarity * float(cut.force[0])
     limit = max(settings.contact_level * abs(contact.peak), 5.0 * contact.noise_force)
     if contact.onset == 0 and at_start > limit:
-        detail = f"the record starts with {at_start:.4g} N: the impact had begun before it"
+        detail = f"the record starts with {at_start:.4g} N: the impact began before it"
         cut.rejections.append(Rejection("late", at_start, limit, detail))
 
 

@@ -31,7 +31,9 @@ class PadPreload(PhysicsTerm):
     name = "pad_preload"
     left_out = "pads stiffen by {slope:.0f} N/m per newton of seat load"
     message = "The rail pads stiffen under load"
-    site_check = "Strike the rail beside a standing train: what an impact on unloaded track says is too soft"
+    site_check = (
+        "Do a hammer test on the rail beside a standing train: what an impact on unloaded track says is too soft"
+    )
     separating_test = "a hammer test beside a standing train, or passages of another axle load"
     effect_type = "matrix"
     frame = "condition"

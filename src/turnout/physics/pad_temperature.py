@@ -27,7 +27,7 @@ class PadTemperature(PhysicsTerm):
     name = "pad_temperature"
     left_out = "pads lose a share of {coefficient:.4f} of their stiffness per kelvin"
     message = "The rail pads soften by {coefficient} of rail temperature"
-    site_check = "Nothing to mend: compare campaigns at one temperature only"
+    site_check = "Nothing to repair: compare campaigns at one temperature only"
     separating_test = "a hammer test at another rail temperature, 15 K away"
     effect_type = "matrix"
     scales_track = True

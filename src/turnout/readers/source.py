@@ -263,7 +263,7 @@ def load(path: PathLike | str, root: PathLike | str) -> Source:
             head, size = file.read(HEAD_SIZE), os.fstat(file.fileno()).st_size
     except (FileNotFoundError, NotADirectoryError) as error:
         vanished_remedy = (
-            "Correct the path; if it was there before, start again when it is back, or plan anew without it"
+            "Correct the path; if it was there before, start again when it is back, or plan again without it"
         )
         raise ReadError(name, "the path", "there is no such file", vanished_remedy, reason="vanished") from error
     except OSError as error:

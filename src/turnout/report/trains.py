@@ -158,5 +158,5 @@ def _effect(effect: Mapping[str, Any]) -> dict[str, Any]:
         "raw": "–" if effect["raw_change_pct"] is None else f"{effect['raw_change_pct']:+.2f}",
         "held": f"{effect['change_pct']:+.2f} [{effect['low_pct']:+.2f}, {effect['high_pct']:+.2f}]",
         "fixed": effect["held_fixed"],
-        "verdict": "differs from none" if clear else "cannot be told from none",
+        "verdict": "differs from none" if clear else "cannot be distinguished from none",
     }

@@ -100,9 +100,11 @@ class Calibration:
             f"{self.section}: {self.n} numbers, chi-squared per degree of freedom {self.reduced:.2f} ({criterion})"
         ]
         for name, value in self.values.items():
-            remark = "" if self.informed[name] else "   hardly told by these tests: about what the track file says"
+            remark = (
+                "" if self.informed[name] else "   hardly determined by these tests: about what the track file says"
+            )
             lines.append(f"  {name:<18} {value:12.5g} ± {100 * self.sd[name]:.1f} %{remark}")
-        lines += [f"  {a} and {b} are told only together" for a, b in self.correlated]
+        lines += [f"  {a} and {b} are determined only together" for a, b in self.correlated]
         for (low, high), after in self.misfit.items():
             before = self.misfit_before[low, high]
             lines.append(f"  {low:.0f}-{high:.0f} Hz: misfit {100 * before:.1f} % before, {100 * after:.1f} % after")

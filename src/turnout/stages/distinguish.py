@@ -72,7 +72,7 @@ def planned_matrix(
     name, resolved, _ = cheapest_addition(matrix, extended)
     if not resolved:
         return matrix, "No single addition tells more pairs apart."
-    return matrix, f"Most would be added by {name}: {resolved} more pairs told apart."
+    return matrix, f"Most would be added by {name}: {resolved} more pairs distinguished."
 
 
 def _folder(config: str | Path | None, subfolder: str) -> Path | None:

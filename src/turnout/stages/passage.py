@@ -27,7 +27,7 @@ from turnout.stages.passage_rows import finding_rows, fit_row, passage_row
 
 # Largest time between the file's name and its content; names in local time differ by less.
 MAX_NAME_OFFSET = timedelta(days=1)
-TIME_REMEDY = "Nobody can tell which is right. Rename it, or export it anew with the right time"
+TIME_REMEDY = "Nobody can tell which is right. Rename it, or export it again with the right time"
 
 
 @dataclass(frozen=True)

@@ -119,7 +119,7 @@ def load_state(path: Path) -> State:
     except FileNotFoundError:
         return State()
     except (ValueError, KeyError, TypeError) as error:
-        remedy = f"Delete it and {mark_of(path)}: its shard is then computed anew."
+        remedy = f"Delete it and {mark_of(path)}: its shard is then recomputed."
         raise TurnoutError(f"{path}: not a state file ({error}). {remedy}") from None
 
 

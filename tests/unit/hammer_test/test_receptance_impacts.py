@@ -127,7 +127,7 @@ def test_a_blow_that_had_begun_before_its_record_is_rejected(hammer, begun):
     first = 5000.0 * np.sin(np.pi * begun / 30)
     (late,) = [r for r in impacts[-1].rejections if r.reason == "late"]
     assert late.value == pytest.approx(first, abs=30.0)
-    assert late.detail == f"the record starts with {late.value:.4g} N: the impact had begun before it"
+    assert late.detail == f"the record starts with {late.value:.4g} N: the impact began before it"
 
 
 def test_a_blow_at_the_very_start_of_its_record_is_whole(hammer):

@@ -1,4 +1,4 @@
-"""A turnout with hammer tests alone: what can still be said, and what is refused."""
+"""A turnout with hammer tests alone: what can still be said, and what is rejected."""
 
 import json
 from dataclasses import replace

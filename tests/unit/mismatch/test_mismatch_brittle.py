@@ -53,7 +53,7 @@ def test_where_nothing_kept_back_can_be_simulated_the_others_speak():
 
 
 def test_a_dear_fit_keeps_its_updated_derivatives_where_no_new_ones_can_be_made():
-    """From 3 to the data's 1.2 in steps; derivatives are refused from the second time on."""
+    """From 3 to the data's 1.2 in steps; derivatives are rejected from the second time on."""
 
     class Dear(Case):
         expensive, asked = True, 0

@@ -1,4 +1,4 @@
-"""What can be told apart is decided by the data, and known before they are taken."""
+"""What can be distinguished is decided by the data, and known before they are taken."""
 
 import numpy as np
 import pytest

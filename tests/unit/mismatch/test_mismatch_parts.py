@@ -1,4 +1,4 @@
-"""Laws of one part: refitted side by side, told apart where they can be, and odd only against their like."""
+"""Laws of one part: refitted side by side, distinguished where they can be, and odd only against their like."""
 
 from types import SimpleNamespace
 

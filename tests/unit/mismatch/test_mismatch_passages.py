@@ -147,7 +147,7 @@ def test_the_derivative_by_a_sensors_place_is_where_the_simulation_goes_when_it_
     predicted = case.predict(values, (), [observation])
     column = case.nuisance_jacobian(values, (), [observation], predicted)[0]
     moved = next(n for n in names if n.startswith("seat_"))
-    further = case.predict({**values, moved: values[moved] + 0.01}, (), [observation])[0]  # simulated anew
+    further = case.predict({**values, moved: values[moved] + 0.01}, (), [observation])[0]  # simulated again
     expected = (further - predicted[0]) / 0.01
     assert np.linalg.norm(expected) > 0.0
     # signals are solved to 1e-3 of the contact force; two runs with other probes may differ by rounding alone
@@ -251,8 +251,8 @@ def test_passages_roll_on_the_rail_that_the_fit_has(sound):
     (before,), (found,), (exact,) = (c.predict(softer.values, (), [seen]) for c in (case, new, made))
     assert np.array_equal(found, exact) and np.linalg.norm(found - before) > 0.01 * np.linalg.norm(before)
     assert power(new, "light") != power(case, "light") and power(new, "heavy") != power(case, "heavy")
-    for old, anew in zip(case.observations, new.observations):
-        assert (anew is old) is (old.name in case.frf_pairs)
+    for old, again in zip(case.observations, new.observations):
+        assert (again is old) is (old.name in case.frf_pairs)
 
 
 def test_a_train_that_looks_like_no_such_train_is_said_and_located(plan):

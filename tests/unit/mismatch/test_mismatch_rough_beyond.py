@@ -41,7 +41,7 @@ def test_rough_rail_beyond_the_free_waves_is_an_error_that_the_passage_knows(lig
 
 
 def test_no_law_is_asked_more_than_a_bay_beyond_what_was_measured(lightly_damped):
-    """What lies farther out cannot be told from all that lies beyond it; it has values of its own, no names."""
+    """What lies farther out cannot be distinguished from all that lies beyond it; it has values, no names."""
     case, _, _ = lightly_damped
     measured = case.campaign.positions()
     asked = [c.where["place"] for c in case.candidates if "sleeper" in c.where]

@@ -59,7 +59,7 @@ class Alike(Case):
 
 
 def test_a_first_effect_is_not_credited_with_what_the_second_explains():
-    """Alone it leaves most and is refused. Beside the second it is 0.0: what the pair gains is the second's."""
+    """Alone it leaves most and is rejected. Beside the second it is 0.0: what the pair gains is the second's."""
     case = Alike()
     search = Search(case)
     like, there = case.candidates

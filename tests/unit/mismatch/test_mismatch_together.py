@@ -53,7 +53,7 @@ def test_two_effects_of_which_either_leaves_too_much_are_both_named():
 
 
 def test_two_laws_of_one_part_do_not_vouch_for_one_another():
-    """The same, of laws that act on one part: two of them mend nearly any shape, so what is missing stays unknown."""
+    """The same, of laws that act on one part: two of them fit nearly any shape, so what is missing stays unknown."""
     found = diagnose(Shapes(("wave", "ramp", "bowl"), component="spring", wave=1.2, ramp=2.5))
     assert found.verdict.answer == "unknown" and not found.names
 

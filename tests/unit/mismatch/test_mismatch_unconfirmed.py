@@ -27,7 +27,7 @@ def test_a_fall_is_one_beyond_its_standard_error(after, error, fell):
 
 
 def test_a_model_that_foretells_nothing_is_left_to_the_rules_before():
-    """Without a prediction there is no error either: such a name was refused when it was judged."""
+    """Without a prediction there is no error either: such a name was rejected when it was judged."""
     assert not Verification(1, 27.6).is_worse
 
 
@@ -56,7 +56,7 @@ def test_nothing_is_missing_no_longer_where_what_was_never_used_is_not_foretold(
     settings = MismatchSettings()
     none = Verdict("none", probability=0.9, posterior={"none": 0.9, "unknown": 0.1})
     (found,) = confirm((none,), Verification(1, 27.6, reserved_excess=2.1), settings)
-    assert found.answer == "unknown" and "never used" in found.reason
+    assert found.answer == "unknown" and "held out" in found.reason
     assert found.posterior["unknown"] == pytest.approx(found.probability)
     named = Verdict("named", ("dip",), "A", 0.97)
     assert confirm((named,), Verification(1, 27.6, reserved_excess=2.1), settings)[0].answer == "named"
@@ -100,4 +100,4 @@ class Line(Case):
 def test_a_diagnosis_says_so(slope, answer):
     found = diagnose(Line(slope))
     assert found.verdict.answer == answer
-    assert ("never used" in sentence(found)) is (answer == "unknown")
+    assert ("held out" in sentence(found)) is (answer == "unknown")

@@ -72,7 +72,7 @@ def test_hum_is_modelled_and_named(hum):
     time = np.arange(600) / test.rate
     decays = [y + size * np.sin(2 * np.pi * hum * time + rng.uniform(0.0, 2 * np.pi)) for y in test.decays()]
     model = identify(decays, test.rate, SETTINGS)
-    # Half a period in the record cannot be told from a drift, and need not be.
+    # Half a period in the record cannot be distinguished from a drift, and need not be.
     as_drift = hum == 16.7 and model.diagnostics["drift_degree"] >= 2
     assert as_drift or model.diagnostics["hum"] == (hum,)
     for i, mode in enumerate(model.modes):

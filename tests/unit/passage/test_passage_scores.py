@@ -160,7 +160,7 @@ def test_amplitudes_scatter_as_their_standard_errors_say(settings):
         found.append(fit.amplitudes)
         said.append(fit.amplitudes_se)
     ratio = np.sqrt(np.mean(np.var(found, axis=0, ddof=1)) / np.mean(np.square(said)))
-    assert ratio == pytest.approx(1.0, abs=0.2)  # the filter has no sharp edges, and times are found anew
+    assert ratio == pytest.approx(1.0, abs=0.2)  # the filter has no sharp edges, and times are found again
 
 
 def test_null_band_ignores_scores_that_are_not_finite():

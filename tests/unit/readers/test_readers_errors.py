@@ -70,7 +70,7 @@ def test_a_vanished_file(tmp_path, in_si):
     error = refusal("A7_1.uff", tmp_path, in_si)
     assert error.reason == "vanished"
     found = (
-        "there is no such file. Correct the path; if it was there before, start again when it is back, or plan anew "
+        "there is no such file. Correct the path; if it was there before, start again when it is back, or plan again "
         "without it."
     )
     assert str(error) == f"A7_1.uff, the path: {found}"

@@ -1,4 +1,4 @@
-"""A day asked about is one in UTC: another zone is refused, not taken for UTC."""
+"""A day asked about is one in UTC: another zone is rejected, not taken for UTC."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What may not enter is refused by name, becomes a quarantine row, and stops nothing else."""
+"""What may not enter is rejected by name, becomes a quarantine row, and stops nothing else."""
 
 import json
 import math

@@ -70,7 +70,7 @@ def curves(row):
     kinds = [("waveform", "time", "s", "m/s²"), ("spectrum", "frequency", "Hz", "(m/s²)²/Hz"),
              ("receptance", "frequency", "Hz", "m/N"), ("latent", "displacement of the sleeper", "m", "N")]  # fmt: skip
     return [
-        base | lists | {"curve": c, "curve_no": k, "label": f"{c} of p1, never used", "x": x, "x_label": name,
+        base | lists | {"curve": c, "curve_no": k, "label": f"{c} of p1, held out", "x": x, "x_label": name,
                         "x_unit": unit, "y_unit": y}
         for k, (c, name, unit, y) in enumerate(kinds)
     ]  # fmt: skip
@@ -133,7 +133,7 @@ def test_a_named_finding_says_what_where_how_much_and_what_to_check():
         assert words in text
     for fit in ("41 %", "78 %", "50 %", "43 %"):
         assert f">{fit}</text>" in text
-    assert "--accept" in text and "never used" in text and "evidence [nats]" in text
+    assert "--accept" in text and "held out" in text and "evidence [nats]" in text
 
 
 def test_what_shows_beside_a_name_stands_in_its_sentence():
@@ -224,7 +224,7 @@ def test_what_was_accepted_is_shown_over_the_visits():
         for day in (1, 12, 25)
     ]  # fmt: skip
     text = page(finding("none"), parameters=rows)
-    assert "hanging sleeper, gap: 3 visits" in text and "In the track file, estimated anew" in text
+    assert "hanging sleeper, gap: 3 visits" in text and "In the track file, estimated again" in text
     nose = rows[-1] | {"term": "running_surface_kink", "parameter": "place", "value": 27.041, "value_low": 27.013}
     assert accepted_parameters([nose | {"value_high": 27.079}]) == [
         {

@@ -195,7 +195,7 @@ def test_a_calibration_without_a_track_file_of_the_turnout_says_so(tmp_path, rep
 def test_what_is_to_be_pasted_is_what_the_tests_told(monkeypatch, capsys):
     said, _ = calibrated(monkeypatch, capsys, [])
     told, block = said.split("paste")
-    assert "hardly told by these tests: about what the track file says" in told.splitlines()[3]
+    assert "hardly determined by these tests: about what the track file says" in told.splitlines()[3]
     assert '\n    pad_stiffness: {value: 300, unit: MN/m, source: "estimate: fitted", prior: 0.012}\n' in block
     assert "ballast_damping" not in block
 

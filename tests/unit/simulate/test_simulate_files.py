@@ -1,4 +1,4 @@
-"""Files of tracks and vehicles: what is misspelt, without its unit or impossible is refused with file and place."""
+"""Files of tracks and vehicles: what is misspelt, without its unit or impossible is rejected with file and place."""
 
 from copy import deepcopy
 

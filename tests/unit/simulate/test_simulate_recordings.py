@@ -168,7 +168,7 @@ def test_calibration_says_what_the_data_cannot_tell():
     found = calibrate(turnout, "OT", [MeasuredReceptance(frequency, h, 0.05 * np.abs(h), -12.0, -12.0)])
     assert found.informed["pad_stiffness"] and not found.informed["ballast_stiffness"]
     (line,) = (line for line in str(found).splitlines() if line.split()[0] == "ballast_stiffness")
-    assert "hardly told by these tests" in line
+    assert "hardly determined by these tests" in line
 
 
 @pytest.mark.parametrize("tone", [600.0, 700.0, 800.0])

@@ -1,4 +1,4 @@
-"""Bad input is refused with time, place and value; a run never returns NaN."""
+"""Bad input is rejected with time, place and value; a run never returns NaN."""
 
 import numpy as np
 import pytest

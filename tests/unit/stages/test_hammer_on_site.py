@@ -124,7 +124,7 @@ def test_what_is_said_is_what_the_registry_will_hold(tmp_path, capsys):
         assert f_half == pytest.approx(2.1098 * mode["frequency_se_hz"], abs=0.06)
         assert zeta == pytest.approx(mode["damping_ratio"], abs=6e-5)
         assert zeta_half == pytest.approx(2.1098 * mode["damping_se"], abs=6e-5)
-    refused = re.findall(r"A9_(\d)\.h5 +(\d+) +([\d.]+) kN +([\d.]+) ms  refused, (\w+): (.*)", text)
+    refused = re.findall(r"A9_(\d)\.h5 +(\d+) +([\d.]+) kN +([\d.]+) ms  rejected, (\w+): (.*)", text)
     wanted = [i for i in held["impacts"] if i["status"] == "rejected"]
     assert [(int(t), int(b) - 1, w, d) for t, b, _, _, w, d in refused] == [
         (i["test"], i["record"], i["reason"], i["detail"]) for i in wanted

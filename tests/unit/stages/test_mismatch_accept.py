@@ -255,7 +255,7 @@ def test_another_track_is_another_diagnosis(config):
     own_file, found = digest_of_model(turnout), [digest_of_model(turnout, "other")]
     for name in ("other", "ground"):  # the second may be what the first extends
         with open(config / f"tracks/{name}.yaml", "a", encoding="utf-8") as file:
-            file.write("# measured anew\n")
+            file.write("# measured again\n")
         found.append(digest_of_model(turnout, "other"))
     assert len({own_file, *found}) == 4
     assert digest_of_model(turnout) == own_file

@@ -170,7 +170,7 @@ def test_a_track_that_is_extended_counts(folder):
     (tracks / "t1.yaml").write_text("extends: ground\n")
     turnout, before = turnout_in(folder), digest_of_model(turnout_in(folder))
     with open(tracks / "ground.yaml", "a", encoding="utf-8") as file:
-        file.write("# measured anew\n")
+        file.write("# measured again\n")
     assert digest_of_model(turnout) != before
 
 

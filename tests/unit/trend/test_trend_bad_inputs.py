@@ -129,7 +129,7 @@ def test_a_thermometer_that_stood_still_during_the_baseline_raises_no_alarms(set
     rows.loc[stuck, "rail_temperature_c"] = 20.0 + noise[stuck]
     status, charts = status_of(rows, settings)
     assert len(alarm_rows(charts, settings)) <= 2  # of 180 charts over two years; such a fleet is promised one
-    # a slope of 0 ± 0.5 %/°C in seasons of ±15 °C: no change of 1.5 % can be told from the season
+    # a slope of 0 ± 0.5 %/°C in seasons of ±15 °C: no change of 1.5 % can be distinguished from the season
     assert set(status["state"]) == {"cannot_tell"} and set(status["reason"]) == {"too_noisy"}
     assert status["detectable_pct"].min() > 4.0
     assert not (status["drift_q"] <= settings.false_discovery).any()
@@ -162,7 +162,7 @@ def test_a_turnout_whose_sections_are_in_alarm_is_not_called_unmeasured(settings
 
 
 def test_missing_campaigns_do_not_wake_the_chart(settings):
-    # Taking a third of the campaigns of every section away must not raise alarms in a sound turnout.
+    # Taking a third of the campaigns of every section away must not raise alarms in an intact turnout.
     rows = modes(Fleet(turnouts=40, weeks=156, phi=0.2, missing=0.33), 3)
     _, charts = status_of(rows, settings)
     # 320 charts x 70 campaigns / 5600 is 4 expected; Poisson: 14 or more once in 20,000 times.

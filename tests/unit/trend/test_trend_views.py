@@ -134,7 +134,7 @@ def test_summer_before_and_winter_after_is_no_change(frames):
 
 def test_maintenance_effect_says_whether_it_helped(con):
     rows = con.execute("select * from maintenance_effect order by section_id").df()
-    lifted = rows[rows["turnout_id"] == "T00001"]  # a row of the median would say 0: its sections begin anew at 0
+    lifted = rows[rows["turnout_id"] == "T00001"]  # a row of the median would say 0: its sections begin again at 0
     assert len(lifted) == 8 and (lifted["verdict"] == "stiffer").mean() >= 0.75
     # 95 % intervals of eight sections that share their campaigns; all but one at least hold 2 %.
     assert ((lifted["gain_low_pct"] <= 2.0) & (lifted["gain_high_pct"] >= 2.0)).sum() >= 7

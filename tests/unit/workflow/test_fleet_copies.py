@@ -33,7 +33,7 @@ def test_a_copy_whose_original_is_measured_anew_counts_for_itself(fleet):
     shutil.copytree(fleet.raw / "t0/2024-05-13", fleet.raw / "t0/2024-05-31")
     fleet.run()
     assert fleet.lengths()["t0/hammer/A/2024-05-31"] == []
-    fleet.put("t0/2024-05-13/A_1.txt", "measured anew")
+    fleet.put("t0/2024-05-13/A_1.txt", "measured again")
     fleet.run()
     assert fleet.lengths()["t0/hammer/A/2024-05-13"] == [13] and fleet.lengths()["t0/hammer/A/2024-05-31"] == [9]
     fleet.put("t0/2024-05-13/A_1.txt", "turnout 0")

@@ -25,7 +25,7 @@ def cut(path, share):
 @pytest.mark.parametrize("share", PARTS)
 def test_a_state_is_made_again_from_its_batches(fleet, share, caplog):
     fleet.run()
-    fleet.put("t1/2024-05-13/A_1.txt", "measured anew")
+    fleet.put("t1/2024-05-13/A_1.txt", "measured again")
     fleet.put("t1/2024-06-13/A_1.txt", "and later")
     fleet.run()
     before, rows = fleet.state.read_bytes(), fleet.rows()
@@ -38,7 +38,7 @@ def test_a_state_is_made_again_from_its_batches(fleet, share, caplog):
 
 def test_of_a_cut_state_the_batch_of_a_unit_counts_that_was_written_last(fleet):
     fleet.run()
-    for text in ("measured anew", "measured once more", "turnout 1"):
+    for text in ("measured again", "measured once more", "turnout 1"):
         fleet.put("t1/2024-05-13/A_1.txt", text)
         fleet.run()
     cut(fleet.state, 0.5)

@@ -34,7 +34,11 @@ class IdentifySettings:
     )
     noise_order_maximum: int = setting(6, "", "highest order of the autoregressive noise; 0 for white", minimum=0)
     damping_maximum: float = setting(
-        0.5, "", "1.7 times the paper's highest; a heavier pole cannot be told from drift", minimum=0.01, maximum=0.95
+        0.5,
+        "",
+        "1.7 times the paper's highest; a heavier pole cannot be distinguished from drift",
+        minimum=0.01,
+        maximum=0.95,
     )
     presence_minimum: float = setting(
         0.4, "", "share of orders and start samples in which a mode must reappear", minimum=0.0, maximum=1.0

@@ -50,7 +50,7 @@ class PassageSettings:
     axle_level: float = setting(
         3.0, "", "peaks below this many noise deviations are not considered as axles", 1.0, 50.0
     )
-    place_error: float = setting(0.05, "m", "standard error of where along the rail a sensor hears a wheel", 0.0, 1.0)
+    place_error: float = setting(0.05, "m", "standard error of where along the rail a sensor records a wheel", 0.0, 1.0)
     acceleration_limit: float = setting(1.2, "m/s²", "service braking and traction stay below it", 0.1, 5.0)
     # train type
     type_tolerance: float = setting(

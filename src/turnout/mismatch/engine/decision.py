@@ -142,7 +142,7 @@ SECOND_RULES: tuple[Rule[SecondEvidence], ...] = (
 
 PAIR_RULES: tuple[Rule[PairEvidence], ...] = (
     Rule("choice_not_decided", lambda e: e.is_choice and not e.both_stand, "choice", "", PAIRS),
-    Rule("first_passes_beside_second", lambda e: e.first_is_unknown and e.first_passes_beside_second, "both anew",
+    Rule("first_passes_beside_second", lambda e: e.first_is_unknown and e.first_passes_beside_second, "both again",
          "", PAIRS),
     Rule("first_stays_unknown", lambda e: e.first_is_unknown, "unknown first", "", PAIRS),
     Rule("no_pair", lambda e: not e.is_pair, "all", "", PAIRS),

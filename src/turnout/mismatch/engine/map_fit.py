@@ -484,7 +484,7 @@ def _iterate(
 ) -> tuple[FitPoint, list[np.ndarray]]:
     """Steps until nothing is gained.
 
-    The Jacobian of an expensive case is updated. It is computed anew after every ``refresh_steps`` steps (0: never) and
+    The Jacobian of an expensive case is updated. It is recomputed after every ``refresh_steps`` steps (0: never) and
     before the last one, since after many updates its directions are wrong.
     """
     expensive = joint.case.expensive

@@ -56,7 +56,7 @@ def restart_leader(search: Search, fit: Fit, score: Score) -> Score:
         except SimulationError:
             return None
 
-    refit = search.stored_fit(search.key_of("anew", score, fit), compute, score.fit.candidates)
+    refit = search.stored_fit(search.key_of("again", score, fit), compute, score.fit.candidates)
     restarted = score if refit is None else score_of(search, fit, refit, score.candidate)
     return max(score, restarted, key=lambda s: s.gain)
 

@@ -122,7 +122,7 @@ class Search:
         values : mapping
             Nuisance parameter -> value. Others start at their default.
         reused_jacobian : list of array or None
-            Nuisance columns that are updated instead of computed anew.
+            Nuisance columns that are updated instead of recomputed.
         stall : float
             Gain per sample that ends the fit of an expensive case.
 

@@ -197,7 +197,7 @@ class Thresholds:
     fine_stall: float = threshold(
         1e-4, "of minus twice the log posterior per sample", "the same for fits on which the verdict rests", FITS
     )
-    n_refresh_steps: int = threshold(4, "steps", "after which the Jacobian of an expensive case is computed anew", FITS)
+    n_refresh_steps: int = threshold(4, "steps", "after which the Jacobian of an expensive case is recomputed", FITS)
     max_term_step: float = threshold(
         0.35, "share of the bounds", "largest step of a parameter of an effect", "numerical"
     )

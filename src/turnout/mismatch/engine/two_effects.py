@@ -323,7 +323,7 @@ def settle_pair(findings: Findings) -> Findings:
     if rule.answer == "choice":
         assert findings.choice is not None
         return findings.choice.after(rule)
-    if rule.answer == "both anew":
+    if rule.answer == "both again":
         first = evidence.first_beside_second
         assert first is not None
         first = replace(first, trail=(*evidence.first.trail, *first.trail))

@@ -1,4 +1,4 @@
--- One row per chart and campaign since a date: the sums that the alarms rest on, computed anew from z.
+-- One row per chart and campaign since a date: the sums that the alarms rest on, recomputed from z.
 -- S = P - min(0, min P), P the running sum of the steps within an epoch; one campaign brings at most 0.75 h.
 -- k and h NULL: those of the chart. Other values ask "what if".
 create or replace macro cusum(since, k := null, h := null) as table

@@ -1,4 +1,4 @@
--- One row per event, section and resonance that it starts anew. An event without a section concerns its whole turnout.
+-- One row per event, section and resonance that it starts again. An event without a section concerns its whole turnout.
 create or replace view reset_events as
 select s.turnout_id, s.section_id, 'ballast' as band, e.event_at_utc, e.event_id, e.kind
 from events e join sections s on s.turnout_id = e.turnout_id

@@ -1,5 +1,5 @@
 -- One row per event and section's chart that it reset: did the work help, by how much, and for how long. Several events
--- between the same two campaigns are one row, dated by the last; a turnout's median begins anew at 0 and has none.
+-- between the same two campaigns are one row, dated by the last; a turnout's median begins again at 0 and has none.
 -- gain_pct: level of the eight campaigns after the event minus that of the eight before. held_until_utc: first
 -- campaign at which the mean of eight has lost half of a gain again; empty = it holds, until last_measured_at_utc.
 -- The siblings' median is left in, for work on a whole turnout lifts them all (but not in band amplitude). The interval

@@ -1,4 +1,4 @@
--- One row per chart and campaign since a date: the residual of the chart, computed anew from modes and baselines.
+-- One row per chart and campaign since a date: the residual of the chart, recomputed from modes and baselines.
 -- corrected_pct: 100 (f / f0 - 1) - b (T - T0) - level of the epoch. residual_pct: the same minus the median of the
 -- other sections of the turnout, where the chart uses them and three are there, minus their usual difference.
 -- Sections in alarm are nobody's sibling, nor are those that learn their level, except of others that learn too.
