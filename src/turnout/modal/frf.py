@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import eigh
+from scipy.ndimage import uniform_filter1d
 from scipy.signal import find_peaks, peak_widths
 
 from turnout.modal.frf_fit import FrfFit, fit_each
+from turnout.modal.state_space import continuous_pole
 from turnout.modal.summary import Summary, summarise
 
 if TYPE_CHECKING:
@@ -100,11 +102,85 @@ MIN_LINES = 40  # frequency lines of that band
 MAX_LINES = 600
 
 
+NEIGHBOUR_SHARE = 0.75  # share of the distance to the next peak to which a band may extend
+SCALES = (1, 4, 16, 64)  # lines over which the power is averaged to find peaks that are wider
+MIN_WIDTH = 4.0  # half-power width of a peak in averages of its scale: a narrower one is found at a finer scale
+
+
+def level_responses(frequency: np.ndarray, frf: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    r"""Responses over the power of frequency that makes their level even, above 0 Hz.
+
+    .. math:: G = H f^{-p}, \qquad \ln |H| \approx c + p \ln f
+
+    Receptance, mobility and accelerance differ by a factor :math:`i\omega` each, which changes p by 1: their G are the
+    same but for a constant factor, and so is all that follows. Poles stay where they are, since the factor is smooth.
+
+    Parameters
+    ----------
+    frequency : (n_line,) array of float
+        Rising. [Hz]
+    frf : (n_frf, n_line) array of complex
+        Responses of one kind, in any unit.
+
+    Returns
+    -------
+    tuple of ((n,) array of float, (n_frf, n) array of complex, float)
+        Frequencies above 0 Hz [Hz], the levelled responses there, and the power p [-].
+
+    Examples
+    --------
+    >>> f = np.array([0.0, 1.0, 2.0, 4.0])
+    >>> _, levelled, power = level_responses(f, 3j * f[None] ** 2)
+    >>> levelled.imag.round(9), round(power, 9)
+    (array([[3., 3., 3.]]), 2.0)
+    """
+    above = frequency > 0.0
+    frequency, frf = frequency[above], frf[:, above]
+    amplitude = np.sqrt(np.mean(np.abs(frf) ** 2, axis=0))
+    usable = amplitude > 0.0
+    if np.count_nonzero(usable) < 2:
+        return frequency, frf, 0.0
+    power = float(np.polyfit(np.log(frequency[usable]), np.log(amplitude[usable]), 1)[0])
+    return frequency, frf * frequency**-power, power
+
+
+def _peaks_and_widths(power: np.ndarray, prominence: float) -> tuple[np.ndarray, np.ndarray]:
+    """Lines and half-power widths [lines] of the peaks, narrow ones first, then wider ones of averaged power.
+
+    The random error of an average over m lines falls with the root of m, and so does the prominence that is asked for.
+    A damped resonance rises less over its surroundings than a sharp one, and is found all the same.
+    """
+    found: list[tuple[int, float]] = []
+    for n_line in SCALES:
+        if 2.0 * MIN_WIDTH * n_line > len(power):
+            break
+        averaged = uniform_filter1d(power, n_line, mode="nearest")
+        level = 10.0 * np.log10(np.maximum(averaged, 1e-30 * averaged.max()))
+        peaks, _ = find_peaks(level, prominence=prominence / np.sqrt(n_line))
+        for peak, width in zip(peaks, peak_widths(averaged, peaks, rel_height=0.5)[0], strict=True):
+            is_wide = n_line == 1 or width >= MIN_WIDTH * n_line
+            if is_wide and all(abs(peak - p) > 0.5 * max(w, n_line) for p, w in found):
+                found.append((int(peak), float(width)))
+    found.sort()
+    return np.array([p for p, _ in found], dtype=int), np.array([w for _, w in found])
+
+
+def _band(peaks: np.ndarray, widths: np.ndarray, k: int, n_line: int) -> slice:
+    """Lines around peak ``k``, up to the next peak that is not a part of it."""
+    peak, width = peaks[k], widths[k]
+    half = int(np.clip(BAND_WIDTHS * width, MIN_LINES, MAX_LINES) / 2)
+    distance = np.abs(peaks - peak)
+    nearest = int(NEIGHBOUR_SHARE * distance[distance > 2.0 * width].min(initial=n_line))
+    half = max(min(half, nearest), MIN_LINES // 2)
+    return slice(max(0, peak - half), peak + half + 1)
+
+
 @dataclass(frozen=True)
 class FrfMode:
     """A mode of several responses: ``frequency`` [Hz] and ``damping`` over the responses, ``contrast`` [dB].
 
-    ``residue`` (n_frf,) complex is that of :math:`R / (i\\omega - s)`, in the unit of the response times 1/s.
+    ``residue`` (n_frf,) complex is that of :math:`R / (i\\omega - s)` in the response that was given, in its unit
+    times 1/s.
     The contrast is the height of the resonance over the residual of the fit.
     """
 
@@ -133,10 +209,11 @@ def modes_of_frf(
 ) -> FrfModes:
     """Resonances of one or several responses with common poles.
 
-    The bands are those around the peaks of the summed power. Each band is turned into a decay, and realisations of
-    several orders propose poles. Those that recur are fitted by least squares, with a local polynomial for all other
-    modes. Each response is fitted alone: a moved sensor or hammer shifts the poles by its mass. The mean and its
-    errors come from the spread between responses.
+    The responses are levelled first, so that receptance, mobility and accelerance give the same modes. The bands are
+    those around the peaks of the summed power. Each band is turned into a decay, and realisations of several orders
+    propose poles. Those that recur are fitted by least squares, with a local polynomial for all other modes. Each
+    response is fitted alone: a moved sensor or hammer shifts the poles by its mass. The mean and its errors come from
+    the spread between responses.
 
     Parameters
     ----------
@@ -147,7 +224,7 @@ def modes_of_frf(
     lowest, highest : float
         Frequency range of the peaks. [Hz]
     prominence : float
-        Smallest prominence of a peak in the summed power. [dB]
+        Smallest prominence of a sharp peak in the summed power; wide ones are found in averages of it. [dB]
     contrast : float
         Smallest height of a mode over the residual of its fit. [dB]
     damping_maximum : float
@@ -176,20 +253,16 @@ def modes_of_frf(
     frequency, frf = np.asarray(frequency, float), np.atleast_2d(np.asarray(frf))
     _check_responses(frequency, frf)
     step = frequency[1] - frequency[0]
-    power = np.mean(np.abs(frf) ** 2, axis=0)
-    level = 10.0 * np.log10(np.maximum(power, 1e-30 * power.max()))
-    peaks, _ = find_peaks(level, prominence=prominence)
-    peaks = peaks[(frequency[peaks] >= lowest) & (frequency[peaks] <= highest)]
-    widths = peak_widths(power, peaks, rel_height=0.5)[0]
+    frequency, frf, power = level_responses(frequency, frf)
+    peaks, widths = _peaks_and_widths(np.mean(np.abs(frf) ** 2, axis=0), prominence)
     modes: list[FrfMode] = []
     rejected: list[dict] = []
-    for peak, width in zip(peaks, widths, strict=True):
-        half = int(np.clip(BAND_WIDTHS * width, MIN_LINES, MAX_LINES) / 2)
-        band = slice(max(0, peak - half), peak + half + 1)
-        peak_and_width = (frequency[peak], max(width, 1.0) * step)
+    for k in np.flatnonzero((frequency[peaks] >= lowest) & (frequency[peaks] <= highest)):
+        band = _band(peaks, widths, int(k), len(frequency))
+        peak_and_width = (frequency[peaks[k]], max(widths[k], 1.0) * step)
         start = zoomed_poles(frequency[band], frf[:, band], *peak_and_width, damping_maximum)
         fits = fit_each(start, frequency[band], frf[:, band], peak_and_width)
-        _sort_modes(fits, peak_and_width, contrast, damping_maximum, modes, rejected)
+        _sort_modes(fits, peak_and_width, contrast, damping_maximum, power, modes, rejected)
     modes.sort(key=lambda m: m.frequency.mean)
     return FrfModes(tuple(_without_duplicates(modes, rejected)), tuple(rejected))
 
@@ -209,6 +282,7 @@ def _sort_modes(
     peak_and_width: tuple[float, float],
     min_contrast: float,
     damping_maximum: float,
+    power: float,
     modes: list[FrfMode],
     rejected: list[dict],
 ) -> None:
@@ -232,7 +306,8 @@ def _sort_modes(
             entry = {"frequency": frequency.mean, "damping": damping.mean, "reason": reason}
             rejected.append(entry | {"value": float(value), "limit": limit})
         else:
-            residue = np.array([fit.residue[m, 0] for fit in fits])
+            pole = continuous_pole(frequency.mean, damping.mean)
+            residue = np.array([fit.residue[m, 0] for fit in fits]) * (pole / 2j / np.pi) ** power
             modes.append(FrfMode(frequency, damping, residue, float(height[m])))
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from turnout.modal.state_space import continuous_pole
 
 POLYNOMIAL_TERMS = 3  # coefficients of the polynomial in frequency that stands for modes outside the band
+MAX_DAMPING = 0.95  # damping ratio at which a step of the fit ends: at 1 there is no oscillation
 MIN_SINGLE_CONTRAST = 30.0  # dB over the residual from which on one mode is enough for a peak
 
 
@@ -121,7 +122,7 @@ def fit_frf(theta: np.ndarray, frequency: np.ndarray, frf: np.ndarray, iteration
         step = np.clip(step, -limit, limit)
         better = None
         for _ in range(6):
-            trial = linearise_frf(fit.theta + step, frequency, frf, fit.noise)
+            trial = linearise_frf(_below_critical(fit.theta + step), frequency, frf, fit.noise)
             if trial.cost <= fit.cost:
                 better = trial
                 break
@@ -133,6 +134,11 @@ def fit_frf(theta: np.ndarray, frequency: np.ndarray, frf: np.ndarray, iteration
         if converged:
             return fit
     return fit
+
+
+def _below_critical(theta: np.ndarray) -> np.ndarray:
+    """``theta`` with the damping ratios inside the range of oscillating modes."""
+    return np.stack([theta[:, 0], np.clip(theta[:, 1], -MAX_DAMPING, MAX_DAMPING)], axis=1)
 
 
 def fit_each(

@@ -35,6 +35,43 @@ def test_two_close_modes_are_told_apart():
     assert [m.frequency.mean for m in found] == pytest.approx([100.0, 103.0], abs=0.02)
 
 
+def damped_modes(seed):
+    """Frequencies [Hz], damping ratios, receptance and its lines: eight modes of 1 to 5 % damping, 60 to 1600 Hz."""
+    rng = np.random.default_rng(seed)
+    zeta = rng.uniform(0.3, 1.0, 8) * (0.01, 0.03, 0.05)[seed % 3]
+    fn = np.array([60.0])
+    while len(fn) < 8:
+        step = 6.0 * max(zeta[len(fn) - 1 : len(fn) + 1]) * fn[-1]  # three half-power widths of the wider neighbour
+        fn = np.append(fn, fn[-1] + step * rng.uniform(1.2, 2.0) + 30.0)
+    f = np.arange(0.5, 1.3 * fn[-1], 0.5)
+    weight = rng.uniform(0.5, 1.5, 8) * fn
+    terms = weight / (fn**2 - f[:, None] ** 2 + 2j * zeta * fn * f[:, None])
+    return fn, zeta, weight, f, terms.sum(axis=1)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_receptance_mobility_and_accelerance_give_the_same_modes(seed):
+    fn, zeta, weight, f, receptance = damped_modes(seed)
+    omega = 2j * np.pi * f
+    found = [modes_of_frf(f, receptance * omega**k).modes for k in (0, 1, 2)]
+    for modes in found:
+        assert [m.frequency.mean for m in modes] == pytest.approx(fn, rel=2e-3)
+        assert [m.damping.mean for m in modes] == pytest.approx(zeta, rel=0.15)
+        assert [m.frequency.mean for m in modes] == pytest.approx([m.frequency.mean for m in found[0]], rel=1e-7)
+    # Near its pole s, w / (fn² - f² + 2j zeta fn f) is R / (i omega - s) with R = -j pi w / fd and fd damped.
+    expected = -1j * np.pi * weight / (fn * np.sqrt(1.0 - zeta**2))
+    for k, modes in enumerate(found):
+        pole = 2 * np.pi * fn * (-zeta + 1j * np.sqrt(1.0 - zeta**2))
+        residue = np.array([m.residue[0] for m in modes]) / pole**k
+        assert residue == pytest.approx(expected, rel=0.3)
+
+
+def test_a_response_that_is_zero_at_zero_hertz_has_its_modes():
+    f = np.arange(0.0, 1000.0)
+    found = modes_of_frf(f, response(f, [(200.0, 0.01, 1.0)])).modes
+    assert [m.frequency.mean for m in found] == pytest.approx([200.0], rel=1e-5)
+
+
 def test_noise_has_no_modes():
     rng = np.random.default_rng(1)
     f = np.arange(1.0, 2001.0)
@@ -66,7 +103,7 @@ def test_what_cannot_be_used_says_why(frequency, frf, words):
 
 def test_the_seven_published_modes_of_a_measured_beam(shared_data):
     frequency, frf = np.load(shared_data / "frf_beam_sdypy" / "acc_data.npy", allow_pickle=True)
-    found = modes_of_frf(frequency, frf[:, 1], highest=5000.0).modes
+    found = modes_of_frf(frequency, frf[:, 1], lowest=40.0, highest=5000.0).modes
     assert len(found) == len(BEAM)
     for mode, (f, zeta) in zip(found, BEAM, strict=True):
         # Published from one response with one decimal; four t-quantiles of our error and half a printed digit.
