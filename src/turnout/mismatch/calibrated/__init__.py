@@ -1,0 +1,25 @@
+"""The calibrated model of a turnout: its parameters, estimated recursively from all visits, and what they say."""
+
+from turnout.mismatch.calibrated.belief import Belief, Innovation, StateParameter
+from turnout.mismatch.calibrated.change import ChangeEffect, OnsetEvidence, compare_onsets, drift_since
+from turnout.mismatch.calibrated.file_comparison import Deviation, deviations_from_file
+from turnout.mismatch.calibrated.history import Event, History, estimate_history, relinearized_history
+from turnout.mismatch.calibrated.information import GroupInformation, VisitInformation
+
+__all__ = [
+    "Belief",
+    "ChangeEffect",
+    "Deviation",
+    "Event",
+    "GroupInformation",
+    "History",
+    "Innovation",
+    "OnsetEvidence",
+    "StateParameter",
+    "VisitInformation",
+    "compare_onsets",
+    "deviations_from_file",
+    "drift_since",
+    "estimate_history",
+    "relinearized_history",
+]

@@ -1,0 +1,200 @@
+"""Second question: what has changed, and since when? Two tests: of the innovations, and of the drift of the belief."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnout.mismatch.calibrated.constants import CALIBRATION
+from turnout.mismatch.calibrated.history import History, Step
+
+
+@dataclass(frozen=True)
+class ChangeEffect:
+    """An effect that appears at an unknown visit.
+
+    ``direction``: parameter -> change per unit of size. ``sd`` is the prior standard deviation of the size; of one that
+    ``grows``, of its growth per year.
+    """
+
+    name: str
+    direction: Mapping[str, float]
+    sd: float
+    grows: bool = False
+
+
+@dataclass(frozen=True)
+class OnsetEvidence:
+    """Evidence for one effect by the visit at which it appears.
+
+    ``gains`` (n_visit - 1,): evidence of an onset before each visit from the second on, over no change. [nats]
+    ``sizes`` and ``size_sds`` of the same shape: size of the effect with that onset. ``times`` (n_visit,) [years].
+    """
+
+    effect: ChangeEffect
+    visits: tuple[str, ...]
+    times: np.ndarray
+    gains: np.ndarray
+    sizes: np.ndarray
+    size_sds: np.ndarray
+
+    @property
+    def gain(self) -> float:
+        """Evidence over all onsets, which are equally probable before. [nats]"""
+        top = float(self.gains.max())
+        return top + float(np.log(np.mean(np.exp(self.gains - top))))
+
+    @property
+    def posterior(self) -> np.ndarray:
+        """(n_visit - 1,) probability of each onset, given that the effect appears."""
+        weights = np.exp(self.gains - self.gains.max())
+        return weights / weights.sum()
+
+    @property
+    def onset(self) -> str:
+        """First visit with the effect, the most probable one."""
+        return self.visits[1 + int(np.argmax(self.gains))]
+
+    def interval(self, probability: float = CALIBRATION.interval_probability) -> tuple[float, float]:
+        """Shortest range of time that contains the onset with at least this probability.
+
+        Parameters
+        ----------
+        probability : float
+
+        Returns
+        -------
+        start : float
+            Last visit that is certainly without the effect. [years]
+        end : float
+            First visit that certainly has it. [years]
+        """
+        total = np.concatenate([[0.0], np.cumsum(self.posterior)])
+        n = total.size - 1
+        ranges = [(i, j) for i in range(n) for j in range(i + 1, n + 1) if total[j] - total[i] >= probability - 1e-12]
+        i, j = min(ranges, key=lambda r: (self.times[r[1]] - self.times[r[0]], total[r[0]] - total[r[1]]))
+        return float(self.times[i]), float(self.times[j])
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Size, or growth per year, and its standard deviation over all onsets."""
+        p = self.posterior
+        mean = float(p @ self.sizes)
+        return mean, float(np.sqrt(p @ (self.size_sds**2 + (self.sizes - mean) ** 2)))
+
+
+def compare_onsets(history: History, effects: Sequence[ChangeEffect]) -> list[OnsetEvidence]:
+    r"""Evidence of each effect and onset against no change but the random walk, the strongest effect first.
+
+    With an effect of size a from visit j on, the innovation of visit v has the mean :math:`\Lambda_v e_v a`, where
+    :math:`e_v = c_v f - u_v`, :math:`c_v` is 1 or the time since the onset, f the direction, and :math:`u_v` what the
+    belief has already absorbed: :math:`u_{v+1} = u_v + P_v \Lambda_v e_v`. With the prior :math:`N(0, s^2)` of a
+
+    .. math:: g = \frac{b^2}{2 (A + s^{-2})} - \frac12 \ln(1 + s^2 A), \quad
+              A = \sum_v e_v^T (\Lambda_v - \Lambda_v P_v \Lambda_v) e_v, \quad
+              b = \sum_v e_v^T (\nu_v - \Lambda_v P_v \nu_v)
+
+    which equals the logarithm of the ratio of the probabilities of all data with and without the effect.
+
+    Parameters
+    ----------
+    history : History
+        Its visits must all have been used (``accepted=None``), so that a change is not hidden by rejecting it, and
+        errors of the model must count within visits alone (``repeats_between_visits=False``).
+    effects : sequence of ChangeEffect
+
+    Returns
+    -------
+    list of OnsetEvidence
+        [] with fewer than two visits.
+
+    Raises
+    ------
+    ValueError
+        If an effect has a parameter that is not in the history.
+
+    References
+    ----------
+    Willsky and Jones 1976, A generalized likelihood ratio approach to the detection and estimation of jumps.
+    """
+    steps = history.steps
+    if len(steps) < 2 or not effects:
+        return []
+    directions = np.column_stack([_direction(history, e) for e in effects])
+    grows = np.array([e.grows for e in effects])
+    information, score = (np.zeros((len(steps) - 1, len(effects))) for _ in range(2))
+    for j in range(1, len(steps)):
+        absorbed = np.zeros_like(directions)
+        start = steps[j - 1].time
+        for step in steps[j:]:
+            elapsed = np.where(grows, step.time - start, 1.0)
+            missing = elapsed * directions - absorbed
+            seen = step.matrix @ missing
+            nu = step.vector - step.matrix @ step.predicted.mean
+            gained = step.belief.covariance @ seen if step.is_used else _updated_covariance(step) @ seen
+            information[j - 1] += np.sum(missing * seen, axis=0) - np.sum(seen * gained, axis=0)
+            score[j - 1] += nu @ missing - nu @ gained
+            if step.is_used:
+                absorbed = absorbed + gained
+    precision = np.array([e.sd**-2 for e in effects])
+    sizes = score / (information + precision)
+    gains = 0.5 * score * sizes - 0.5 * np.log1p(information / precision)
+    sds = 1.0 / np.sqrt(information + precision)
+    visits, times = tuple(s.visit for s in steps), np.array([s.time for s in steps])
+    evidence = [OnsetEvidence(e, visits, times, gains[:, k], sizes[:, k], sds[:, k]) for k, e in enumerate(effects)]
+    return sorted(evidence, key=lambda e: -e.gain)
+
+
+def _updated_covariance(step: Step) -> np.ndarray:
+    return step.predicted.update(step.matrix, step.vector).covariance
+
+
+def _direction(history: History, effect: ChangeEffect) -> np.ndarray:
+    names = [p.name for p in history.parameters]
+    if unknown := [name for name in effect.direction if name not in names]:
+        raise ValueError(f"effect {effect.name!r}: {unknown[0]!r} is no parameter of this model")
+    return np.array([effect.direction.get(name, 0.0) for name in names])
+
+
+def drift_since(history: History, reference: str) -> tuple[np.ndarray, np.ndarray]:
+    r"""Change of all parameters since a reference visit, by all visits up to the last.
+
+    .. math:: d = m_v - m_{ref|v}, \quad \mathrm{cov}\, d = P_v + P_{ref|v} - C - C^T
+
+    C is the covariance of the present parameters with those at the reference. Both are estimated from all visits.
+    A slow change that the random walk follows leaves no innovation, but this drift. The drift lags behind the
+    change, since the random walk expects less: the size of an effect that ``grows`` does not.
+
+    Parameters
+    ----------
+    history : History
+    reference : str
+        A visit of the history at which the track was intact.
+
+    Returns
+    -------
+    drift : (n,) array of float
+    covariance : (n, n) array of float
+
+    Raises
+    ------
+    ValueError
+        If the reference is no visit of the history.
+    """
+    visits = [s.visit for s in history.steps]
+    if reference not in visits:
+        raise ValueError(f"{reference!r} is no visit of this history; there are {', '.join(visits) or 'none'}")
+    first = visits.index(reference)
+    start = history.steps[first].belief
+    mean, covariance, cross = start.mean, start.covariance, start.covariance  # cross: present with reference
+    for step in history.steps[first + 1 :]:
+        if not step.is_used:
+            continue
+        nu, posterior = step.vector - step.matrix @ step.predicted.mean, step.belief.covariance
+        mean = mean + cross.T @ (nu - step.matrix @ (posterior @ nu))
+        covariance = covariance - cross.T @ (step.matrix - step.matrix @ posterior @ step.matrix) @ cross
+        cross = cross - posterior @ (step.matrix @ cross)
+    drift_covariance = history.belief.covariance + covariance - cross - cross.T
+    return history.belief.mean - mean, 0.5 * (drift_covariance + drift_covariance.T)

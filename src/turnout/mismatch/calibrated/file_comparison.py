@@ -1,0 +1,113 @@
+"""First question: what of the calibrated model differs from the file of the track? Runs of supports are one answer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from turnout.mismatch.calibrated.belief import Belief, StateParameter
+from turnout.mismatch.calibrated.constants import CALIBRATION
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """A parameter, or adjacent ones of one group, whose values differ from the file.
+
+    ``size`` is the mean difference over ``names`` and ``sd`` its standard deviation. ``ordinary_sd`` is the standard
+    deviation of that difference where all components scatter as the file says. ``positions`` [m] are those of the
+    first and last component, None without positions.
+    """
+
+    group: str
+    names: tuple[str, ...]
+    size: float
+    sd: float
+    ordinary_sd: float
+    positions: tuple[float, float] | None
+    unit: str
+
+    @property
+    def deviates(self) -> float:
+        """Size in standard deviations of what is ordinary."""
+        return self.size / self.ordinary_sd
+
+
+def deviations_from_file(
+    belief: Belief,
+    parameters: Sequence[StateParameter],
+    least_sizes: Mapping[str, float],
+    sds: float = CALIBRATION.finding_sds,
+) -> list[Deviation]:
+    r"""Deviations from the file, the clearest first. Adjacent components of a group are one deviation.
+
+    With the difference :math:`d = m - m_0` of the belief from the file, the mean over a run of components is tested
+    three times. It must be as large as the least size of the group. It must be ``sds`` times its posterior standard
+    deviation. And it must be larger than intact components leave: there :math:`d` has the covariance
+    :math:`P_0 - P`, with the two-sided chance of ``sds`` standard deviations over all runs of the group.
+
+    Parameters
+    ----------
+    belief : Belief
+        After all visits.
+    parameters : sequence of StateParameter
+        Those of the belief, in its order.
+    least_sizes : mapping
+        Group -> least size that causes any action, in the unit of the group. Other groups are not compared.
+    sds : float
+        Standard deviations beyond which a difference is stated.
+
+    Returns
+    -------
+    list of Deviation
+        No component is in two of them.
+    """
+    prior = Belief.of_file(parameters)
+    ordinary = prior.covariance - belief.covariance
+    difference = belief.mean - prior.mean
+    deviations: list[Deviation] = []
+    for group, least_size in least_sizes.items():
+        runs = _runs([k for k, p in enumerate(parameters) if p.group == group], parameters)
+        means = np.zeros((len(runs), len(parameters)))  # each row takes the mean over a run
+        for row, run in zip(means, runs):
+            row[run] = 1.0 / len(run)
+        limit = float(stats.norm.isf(stats.norm.sf(sds) / max(len(runs), 1)))
+        size, sd = means @ difference, _sds(means, belief.covariance)
+        floor = np.sqrt(CALIBRATION.min_prior_share) * _sds(means, prior.covariance)
+        ordinary_sd = np.maximum(_sds(means, ordinary), floor)
+        is_clear = (abs(size) >= least_size) & (abs(size) >= sds * sd) & (abs(size) > limit * ordinary_sd)
+        taken: set[int] = set()
+        for r in sorted(np.flatnonzero(is_clear), key=lambda r: -abs(size[r]) / ordinary_sd[r]):
+            if taken.isdisjoint(runs[r]):
+                taken.update(runs[r])
+                members = [parameters[k] for k in runs[r]]
+                deviations.append(_deviation(members, float(size[r]), float(sd[r]), float(ordinary_sd[r])))
+    return sorted(deviations, key=lambda d: -abs(d.deviates))
+
+
+def _runs(members: Sequence[int], parameters: Sequence[StateParameter]) -> list[list[int]]:
+    """All runs of adjacent components: single ones, and those whose indices follow each other."""
+    indexed = sorted((k for k in members if parameters[k].index is not None), key=lambda k: parameters[k].index or 0)
+    runs = [[k] for k in members if parameters[k].index is None]
+    for first in range(len(indexed)):
+        for last in range(first, len(indexed)):
+            if (
+                last > first
+                and (parameters[indexed[last]].index or 0) != (parameters[indexed[last - 1]].index or 0) + 1
+            ):
+                break
+            runs.append(indexed[first : last + 1])
+    return runs
+
+
+def _sds(means: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """(n_run,) standard deviations of the means over runs."""
+    return np.sqrt(np.maximum(np.sum((means @ covariance) * means, axis=1), 0.0))
+
+
+def _deviation(run: Sequence[StateParameter], size: float, sd: float, ordinary_sd: float) -> Deviation:
+    positions = [p.position for p in run if p.position is not None]
+    ends = (min(positions), max(positions)) if positions else None
+    return Deviation(run[0].group, tuple(p.name for p in run), size, sd, ordinary_sd, ends, run[0].unit)

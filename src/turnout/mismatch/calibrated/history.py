@@ -1,0 +1,225 @@
+"""Recursive estimate of the parameters of one turnout from all of its visits, in the order of time.
+
+The estimate is computed from the information that is stored per visit. It therefore does not depend on the order in
+which recordings arrived, and a withdrawn visit leaves no trace.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from turnout.mismatch.calibrated.belief import Belief, Innovation, StateParameter
+from turnout.mismatch.calibrated.constants import CALIBRATION
+from turnout.mismatch.calibrated.information import VisitInformation, repeated_error_weights
+
+
+@dataclass(frozen=True)
+class Event:
+    """Maintenance or a change of the measurement at ``time`` [years], which makes these parameters uncertain again.
+
+    ``opened``: parameter -> standard deviation of the change. Tamping opens the ballast of its stretch, for example.
+    """
+
+    time: float
+    opened: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Step:
+    """One visit in the history: information (``matrix``, ``vector``), belief before and after, and its test.
+
+    ``is_used`` is False if the innovation was too large; the belief after the visit is then that before it.
+    """
+
+    visit: str
+    time: float
+    matrix: np.ndarray
+    vector: np.ndarray
+    predicted: Belief
+    belief: Belief
+    innovation: Innovation
+    is_used: bool
+    n_recordings: int
+
+
+@dataclass(frozen=True)
+class History:
+    """The ``steps`` of all visits in the order of time, and the ``parameters``."""
+
+    parameters: tuple[StateParameter, ...]
+    steps: tuple[Step, ...]
+
+    @property
+    def belief(self) -> Belief:
+        """Belief after the last visit; that of the file without any."""
+        return self.steps[-1].belief if self.steps else Belief.of_file(self.parameters)
+
+    @property
+    def used_steps(self) -> tuple[Step, ...]:
+        """Steps of the visits that were used."""
+        return tuple(s for s in self.steps if s.is_used)
+
+
+def estimate_history(
+    parameters: Sequence[StateParameter],
+    visits: Iterable[VisitInformation],
+    events: Sequence[Event] = (),
+    repeated_share: float = CALIBRATION.repeated_error_share,
+    repeats_between_visits: bool = True,
+    accepted: Collection[str] | None = (),
+) -> History:
+    """Belief after each visit, from the belief of the file.
+
+    Parameters
+    ----------
+    parameters : sequence of StateParameter
+        All parameters that the visits inform on, and others.
+    visits : iterable of VisitInformation
+        In any order.
+    events : sequence of Event
+        In any order.
+    repeated_share : float
+        Share of the error variance that repeats in the recordings of a group, see ``repeated_error_weights``.
+    repeats_between_visits : bool
+        Whether the error of a group is the same in all visits. It then limits what all visits together say of the
+        values, as is right for a comparison with the file. False: it counts within each visit alone. That is right
+        for changes, in which a constant error cancels.
+    accepted : collection of str or None
+        Visits that are used whatever their innovation. None: all.
+
+    Returns
+    -------
+    History
+
+    Raises
+    ------
+    ValueError
+        If two visits have the same name, or a visit or an event has a parameter that is not among ``parameters``.
+    """
+    ordered = _in_order(visits)
+    weights, tested = None, {}
+    if repeats_between_visits:  # whether a visit is used depends on what has changed, not on the error of the model
+        alone = estimate_history(parameters, ordered, events, repeated_share, False, accepted)
+        tested = {s.visit: s for s in alone.steps}
+        weights = repeated_error_weights([v for v in ordered if tested[v.visit].is_used], repeated_share)
+    names = tuple(p.name for p in parameters)
+    noise, steps = _ProcessNoise(parameters, events), list[Step]()
+    belief, time = Belief.of_file(parameters), ordered[0].time if ordered else 0.0
+    for visit in ordered:
+        predicted = belief.with_variance(noise.variance(time, visit.time)) if steps else belief
+        own_weights = repeated_error_weights([visit], repeated_share)
+        matrix, vector = visit.total(names, {**own_weights, **(weights or {})})
+        test = tested.get(visit.visit)
+        innovation = test.innovation if test else predicted.innovation(matrix, vector)
+        is_used = test.is_used if test else accepted is None or visit.visit in accepted or innovation.is_expected
+        belief, time = predicted.update(matrix, vector) if is_used else predicted, visit.time
+        n = visit.n_recordings
+        steps.append(Step(visit.visit, time, matrix, vector, predicted, belief, innovation, is_used, n))
+    return History(tuple(parameters), tuple(steps))
+
+
+def relinearized_history(
+    parameters: Sequence[StateParameter],
+    linearizers: Mapping[str, tuple[float, Callable[[Mapping[str, float]], VisitInformation]]],
+    events: Sequence[Event] = (),
+    stored: dict[tuple[str, tuple[int, ...]], VisitInformation] | None = None,
+    **options: bool | float | Collection[str] | None,
+) -> History:
+    """``estimate_history`` of a nonlinear model, linear about a point near the belief before each visit.
+
+    The point is the mean before the visit, rounded to a grid of ``CALIBRATION.relinearization_step`` prior standard
+    deviations about the file. It depends on earlier visits alone and not on the order of arrival. A visit is
+    linearized again only if the mean has moved to another point of the grid.
+
+    Parameters
+    ----------
+    parameters : sequence of StateParameter
+    linearizers : mapping
+        Visit -> its time [years], and a callable that gives its information about a point (parameter -> value).
+    events : sequence of Event
+    stored : dict or None
+        Information by visit and point of the grid from earlier calls; filled by this one.
+    **options
+        Further arguments of ``estimate_history``.
+
+    Returns
+    -------
+    History
+    """
+    known = {} if stored is None else stored
+    step = CALIBRATION.relinearization_step * np.array([p.sd for p in parameters])
+    origin = np.array([p.mean for p in parameters])
+    names = [p.name for p in parameters]
+    visits: list[VisitInformation] = []
+    mean = origin
+    for visit, (_, linearize) in sorted(linearizers.items(), key=lambda item: (item[1][0], item[0])):
+        cell = tuple(int(k) for k in np.rint((mean - origin) / step))
+        if (visit, cell) not in known:
+            known[visit, cell] = linearize(dict(zip(names, origin + step * np.array(cell))))
+        visits.append(known[visit, cell])
+        mean = estimate_history(parameters, visits, events, **options).belief.mean  # type: ignore[arg-type]
+    return estimate_history(parameters, visits, events, **options)  # type: ignore[arg-type]
+
+
+def visits_to_linearize(history: History, visits: Iterable[VisitInformation]) -> list[str]:
+    """Visits whose model was linear about a point that the belief has left.
+
+    Parameters
+    ----------
+    history : History
+        Of these visits.
+    visits : iterable of VisitInformation
+
+    Returns
+    -------
+    list of str
+        Those of which the mean after the visit is ``CALIBRATION.relinearization_step`` prior standard deviations or
+        more from the ``point`` of the visit, in a parameter that the visit informs on.
+    """
+    parameters = {p.name: p for p in history.parameters}
+    after = {s.visit: s.belief for s in history.used_steps}
+    moved = []
+    for visit in _in_order(visits):
+        informed = {name for g in visit.groups for name in g.names}
+        if visit.visit in after and any(
+            abs(after[visit.visit].value(name) - visit.point.get(name, parameters[name].mean))
+            >= CALIBRATION.relinearization_step * parameters[name].sd
+            for name in informed
+        ):
+            moved.append(visit.visit)
+    return moved
+
+
+def _in_order(visits: Iterable[VisitInformation]) -> list[VisitInformation]:
+    ordered = sorted(visits, key=lambda v: (v.time, v.visit))
+    names = [v.visit for v in ordered]
+    if len(set(names)) < len(names):
+        raise ValueError(f"visit {next(n for n in names if names.count(n) > 1)} is given twice")
+    return ordered
+
+
+class _ProcessNoise:
+    """Variance that each parameter gains from one time to another: its random walk and the events between them."""
+
+    def __init__(self, parameters: Sequence[StateParameter], events: Sequence[Event]):
+        self.rate = np.array([p.walk_sd**2 for p in parameters])
+        number = {p.name: k for k, p in enumerate(parameters)}
+        self.events = []
+        for event in sorted(events, key=lambda e: e.time):
+            if unknown := [name for name in event.opened if name not in number]:
+                raise ValueError(f"event at {event.time:g} years: {unknown[0]!r} is no parameter of this model")
+            variance = np.zeros(len(parameters))
+            for name, sd in event.opened.items():
+                variance[number[name]] = sd**2
+            self.events.append((event.time, variance))
+
+    def variance(self, start: float, end: float) -> np.ndarray:
+        """(n,) variances gained after ``start`` up to ``end`` [years]."""
+        gained = (end - start) * self.rate
+        for time, variance in self.events:
+            if start < time <= end:
+                gained = gained + variance
+        return gained
