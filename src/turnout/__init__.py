@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from turnout.api.registry import open_registry
     from turnout.api.simulation import load_track, load_vehicle, simulate_hammer, simulate_passage
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 __all__ = [
     "analyse_passage",
     "diagnose",

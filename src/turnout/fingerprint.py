@@ -7,7 +7,8 @@ from pathlib import Path
 
 PACKAGE = "turnout"
 ROOT = Path(__file__).parent
-WITHOUT_RESULTS = frozenset({"turnout.plots"})  # drawings for people: no result of a stage depends on them
+# drawings for people, and where the program lies: no result of a stage depends on them
+WITHOUT_RESULTS = frozenset({"turnout.plots", "turnout.installation"})
 
 
 def fingerprint(*modules: str) -> str:

@@ -4,7 +4,7 @@ import ast
 
 import pytest
 
-LOWEST = {"constants", "content", "errors", "files", "plots", "records", "threads", "units"}
+LOWEST = {"constants", "content", "errors", "files", "installation", "plots", "records", "threads", "units"}
 FLOOR = {"config", "readers", "signal", "registry", "fingerprint"}
 PARTS = {"hammer_test", "modal", "passage", "simulate"}
 ALLOWED = {
@@ -13,6 +13,7 @@ ALLOWED = {
     "errors": set(),
     "files": {"errors"},
     "former_names": set(),
+    "installation": set(),
     "plots": {"units"},
     "records": {"errors", "plots"},
     "threads": set(),

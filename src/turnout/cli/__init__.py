@@ -13,6 +13,7 @@ COMMANDS: tuple[str, ...] = (
     "diagnose",
     "distinguish",
     "hammer",
+    "init",
     "nightly",
     "passage",
     "plan",

@@ -43,16 +43,19 @@ def run(args: argparse.Namespace) -> int:
         Exit code.
     """
     import os
+    from pathlib import Path
 
     from turnout.demo.fleet import make_fleet, run_pipeline
     from turnout.demo.scenario import campaign_days
     from turnout.demo.summary import print_summary
     from turnout.errors import ConfigError
+    from turnout.workflow.project import use_demonstration
 
     for option, minimum in (("campaigns", 1), ("passages", 0)):
         if getattr(args, option) < minimum:
             observation = f"{getattr(args, option)}, and the fewest are {minimum}"
             raise ConfigError(f"--{option}", "number", observation, f"Write {minimum} or more")
+    use_demonstration(Path())
     cores = args.cores or os.cpu_count() or 1
     print("1. Raw files of the demonstration fleet", flush=True)
     n = make_fleet("raw", "truth", seed=args.seed, n_campaign=args.campaigns, n_passage=args.passages, workers=cores)

@@ -27,7 +27,7 @@ def build_parser() -> argparse.ArgumentParser:
         prog="turnout",
         description="Watch railway switches and crossings from hammer tests and train passages.",
     )
-    parser.add_argument("--version", action="version", version=__version__)
+    parser.add_argument("--version", action="version", version=f"turnout {__version__}")
     subparsers = parser.add_subparsers(dest="command", metavar="command", required=True)
     for name in COMMANDS:
         module = import_module(f"turnout.cli.{name}")

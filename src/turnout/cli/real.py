@@ -51,11 +51,12 @@ def run(args: argparse.Namespace) -> int:
     from turnout.demo.fleet import run_pipeline
     from turnout.demo.others import fetch_all
     from turnout.demo.published_modes import beam_modes
+    from turnout.installation import shipped_path
     from turnout.report.beams import write_beams
 
     folder = Path(args.folder)
     fetch_all(folder / "raw")
-    examples = Path("examples/recordings_of_others").resolve()
+    examples = shipped_path("examples/recordings_of_others")
     code = run_pipeline(args.cores, "--directory", str(folder), "--config", f"configuration={examples}")
     if code:
         return code

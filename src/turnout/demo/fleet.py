@@ -23,6 +23,7 @@ from turnout.demo.hammer import hammer_test, simulated_response
 from turnout.demo.passages import make_passage, make_passages
 from turnout.demo.scenario import FLEET, SECTIONS, campaign_days, gap_under, rail_temperature, stiffness_factors
 from turnout.readers.writing import write
+from turnout.workflow.project import snakefile_options
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -185,5 +186,5 @@ def run_pipeline(cores: int, *options: str) -> int:
     int
         Its exit code.
     """
-    command = [sys.executable, "-m", "snakemake", "--cores", str(cores), *options]
+    command = [sys.executable, "-m", "snakemake", *snakefile_options(Path()), "--cores", str(cores), *options]
     return subprocess.run(command).returncode

@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING
 
 from turnout.config.parameters import ParameterSet, read_parameters
 from turnout.errors import ConfigError, SimulationError
+from turnout.installation import shipped_path
 from turnout.simulate.track_file import entries_of_routes, turnout_track
 from turnout.simulate.train import couple, train
 
 if TYPE_CHECKING:
     from turnout.simulate.turnout_track import TurnoutTrack
     from turnout.simulate.vehicle import Vehicle
-
-REPOSITORY = Path(__file__).resolve().parents[3]
 
 
 def load_track(name: str | Path, seed: int = 0, folder: str | Path | None = None) -> TurnoutTrack:
@@ -33,7 +32,7 @@ def load_track(name: str | Path, seed: int = 0, folder: str | Path | None = None
     seed : int
         Seed of the scatter along the track.
     folder : str, Path or None
-        Folder of the files; None: ``config`` in the working folder, then that of the repository.
+        Folder of the files; None: ``config`` in the working folder, then that of the program.
 
     Returns
     -------
@@ -58,7 +57,7 @@ def track_path(name: str | Path, folder: str | Path | None = None) -> Path:
     name : str or Path
         Name of the track, or path of its file.
     folder : str, Path or None
-        Folder of the files; None: ``config`` in the working folder, then that of the repository.
+        Folder of the files; None: ``config`` in the working folder, then that of the program.
 
     Returns
     -------
@@ -81,7 +80,7 @@ def track_parameters(path: Path, folder: str | Path | None, visited: tuple[Path,
     path : Path
         The track file.
     folder : str, Path or None
-        Folder of the files; None: ``config`` in the working folder, then that of the repository.
+        Folder of the files; None: ``config`` in the working folder, then that of the program.
     visited : tuple of Path
         Files that extend this one, to detect a circle.
 
@@ -115,7 +114,7 @@ def base_track_file(parameters: ParameterSet, path: Path, folder: str | Path | N
     path : Path
         File of the parameters.
     folder : str, Path or None
-        Folder of the files; None: ``config`` in the working folder, then that of the repository.
+        Folder of the files; None: ``config`` in the working folder, then that of the program.
 
     Returns
     -------
@@ -138,7 +137,7 @@ def load_vehicle(name: str | Path, load: float = 0.5, folder: str | Path | None 
     load : float
         Share of the payload. [-]
     folder : str, Path or None
-        Folder of the files; None: ``config`` in the working folder, then that of the repository.
+        Folder of the files; None: ``config`` in the working folder, then that of the program.
     units : int
         Number of coupled units.
 
@@ -170,7 +169,7 @@ def load_vehicle(name: str | Path, load: float = 0.5, folder: str | Path | None 
 def _find_file(name: str | Path, folder: str | Path | None, subfolder: str) -> Path:
     if str(name).endswith((".yaml", ".yml")):
         return Path(name)
-    folders = [Path(folder)] if folder else [Path.cwd() / "config" / subfolder, REPOSITORY / "config" / subfolder]
+    folders = [Path(folder)] if folder else [Path.cwd() / "config" / subfolder, shipped_path(f"config/{subfolder}")]
     for candidate in folders:
         if (candidate / f"{name}.yaml").is_file():
             return candidate / f"{name}.yaml"

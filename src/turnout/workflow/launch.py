@@ -1,5 +1,7 @@
 """Prepare the workflow before its first job: options, shards, plan files."""
 
+import shlex
+import sys
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, date, datetime
@@ -96,6 +98,7 @@ def launch(options: Mapping, scan: bool, formats: Collection[str] | None = None,
     ConfigError
         If an option is invalid, or so many files are missing that a disk is probably not mounted.
     """
+    _quote_interpreter()
     for name in options:
         if name not in OPTIONS:
             raise ConfigError("--config", "option", f"unknown option {name!r}", suggestion(name, OPTIONS))
@@ -122,6 +125,12 @@ def launch(options: Mapping, scan: bool, formats: Collection[str] | None = None,
     diagnosis = _diagnosis_scope(options, configuration)
     learned = _learned_files(configuration)
     return Launch(names, shard_names(shards), turnouts, fleet_hash(configuration), job, diagnosis, chains, learned, day)
+
+
+def _quote_interpreter() -> None:
+    """Quote the path of the interpreter: Snakemake writes it into shell commands as it is, and it may have spaces."""
+    if " " in sys.executable and Path(sys.executable).exists():
+        sys.executable = shlex.quote(sys.executable)
 
 
 def _learned_files(configuration: Configuration) -> tuple[str, ...]:

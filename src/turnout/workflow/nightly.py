@@ -18,6 +18,7 @@ from filelock import FileLock, Timeout
 from turnout.errors import TurnoutError
 from turnout.files import changed_at
 from turnout.workflow.plan import is_cut_plan, read_plan
+from turnout.workflow.project import profile_folder, snakefile_options
 from turnout.workflow.run_report import failure_reason, rejected_units, unused_turnouts
 from turnout.workflow.scan import unit_id
 from turnout.workflow.state import load_state, states_below
@@ -101,6 +102,7 @@ def nightly(options: Sequence[str], profile: str, limit: float | None = None, wo
     TurnoutError
         If there is no such profile, or another run is active.
     """
+    profile = profile_folder(profile)
     _require_profile(Path(profile))
     work.mkdir(exist_ok=True)
     lock = FileLock(work / ".nightly.lock")
@@ -189,7 +191,9 @@ def _run(options: Sequence[str], limit: float | None, work: Path) -> int:
 
 def _snakemake(options: Sequence[str], limit: float | None) -> int:
     """Exit code of Snakemake, run in its own process group so that the limit or a signal ends its jobs, too."""
-    process = subprocess.Popen([sys.executable, "-m", "snakemake", *options], start_new_session=True)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "snakemake", *snakefile_options(Path()), *options], start_new_session=True
+    )
     try:
         return process.wait(limit)
     except subprocess.TimeoutExpired:

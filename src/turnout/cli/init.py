@@ -1,0 +1,44 @@
+"""Make a project: a folder with a commented configuration, one layout, a place for recordings and a short README.
+
+turnout init my_turnouts
+
+All other commands run in this folder. Nothing that is there is changed.
+"""
+
+import argparse
+
+HELP = "make a folder with configuration and a place for recordings"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The folder.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command.
+    """
+    parser.add_argument("folder", help="folder of the project, made if it does not exist")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Make the project and say what comes next.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
+    from pathlib import Path
+
+    from turnout.workflow.project import create_project
+
+    folder = Path(args.folder)
+    written = create_project(folder)
+    print(f"{folder}: {len(written)} files. Its README.md says in seven steps how to go on; first: cd {folder}")
+    return 0
