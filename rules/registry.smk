@@ -1,6 +1,13 @@
 """The registry: one job takes in what all shards have computed, then the run is judged."""
 
+from turnout.workflow.registry_damage import damage_stamp
+
 TARGETS += ["results/registry/_generation.json", "work/verdict.json"]
+
+
+def damaged_files(wildcards):
+    """Files of the registry that have changed on the disk: they make the job run that restores their rows."""
+    return damage_stamp("results/registry")
 
 
 rule register:
@@ -19,6 +26,7 @@ rule register:
     params:
         code=fingerprint("turnout.registry.job"),
         again=attempts("register"),
+        damage=damaged_files,
         stages=STAGES,
         shards=RUN.every_shard,
         configuration=RUN.fleet_hash,

@@ -69,20 +69,28 @@ def _check(args: argparse.Namespace) -> int:
 def _compact(args: argparse.Namespace) -> int:
     from turnout.registry.compaction import compact
 
-    return _print_changes(compact(_registry_folder(args), args.at_least), "merged")
+    folder = _registry_folder(args)
+    return _print_changes(compact(folder, args.at_least), "merged", folder)
 
 
 def _rebuild(args: argparse.Namespace) -> int:
     from turnout.registry.compaction import rebuild
 
-    return _print_changes(rebuild(_registry_folder(args)), "written again")
+    folder = _registry_folder(args)
+    return _print_changes(rebuild(folder), "written again", folder)
 
 
-def _print_changes(changes: Mapping[str, tuple[int, int]], verb: str) -> int:
+def _print_changes(changes: Mapping[str, tuple[int, int]], verb: str, registry: Path) -> int:
+    """Print the changes; exit code 1 if damaged files were found, which the log names."""
+    from turnout.registry.generation import load
+
     for folder, (files, rows) in sorted(changes.items()):
         print(f"{folder}: {files} files with {rows} rows {verb}")
     if not changes:
         print("Nothing to do.")
+    if incomplete := load(registry).incomplete:
+        print(f"Damaged files of {', '.join(incomplete)} count no longer. Run the workflow, which restores their rows.")
+        return 1
     return 0
 
 

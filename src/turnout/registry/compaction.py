@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from turnout.errors import RegistryError
+from turnout.registry.damage import take_off_damage
 from turnout.registry.database import build_database
 from turnout.registry.generation import (
     DataFile,
@@ -33,7 +34,8 @@ if TYPE_CHECKING:
 def compact(registry_dir: PathLike, at_least: int = 2, patience: float = 600.0) -> dict[str, tuple[int, int]]:
     """Merge the files of every table and year that has many.
 
-    Readers may continue meanwhile: the old files stay for two more generations.
+    Readers may continue meanwhile: the old files stay for two more generations. A damaged file is not merged: it is
+    logged and taken off the list (``turnout.registry.damage``).
 
     Parameters
     ----------
@@ -56,13 +58,15 @@ def compact(registry_dir: PathLike, at_least: int = 2, patience: float = 600.0) 
     """
     root = Path(registry_dir)
     with registry_lock(root, patience):
-        before = load(root)
+        before = take_off_damage(root, load(root))
         groups = {g: files for g, files in _groups(before).items() if _is_worth_merging(files, max(2, at_least))}
         return _rewrite(root, before, groups, lambda table, files: read_list(root, table, [f.path for f in files]))
 
 
 def rebuild(registry_dir: PathLike, patience: float = 600.0) -> dict[str, tuple[int, int]]:
     """Rewrite all files with the present ``columns.csv``: values are cast, new columns NULL, old columns removed.
+
+    A damaged file is logged and taken off the list.
 
     Parameters
     ----------
@@ -83,7 +87,7 @@ def rebuild(registry_dir: PathLike, patience: float = 600.0) -> dict[str, tuple[
     """
     root = Path(registry_dir)
     with registry_lock(root, patience):
-        before = load(root)
+        before = take_off_damage(root, load(root))
         groups = {g: files for g, files in _groups(before).items() if g[0] in tables()}
         merged = _rewrite(root, before, groups, lambda table, files: _cast(root, before, table, files))
         return merged
@@ -108,7 +112,7 @@ def _rewrite(
     select: Callable[[str, list[DataFile]], str],
 ) -> dict[str, tuple[int, int]]:
     """Write each group as one file, check that no row was lost, and publish."""
-    if not groups:
+    if not groups and not before.incomplete:
         build_database(root, before)
         return {}
     number, con = before.number + 1, connect(temp_directory=str(root / ".spill"))

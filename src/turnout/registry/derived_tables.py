@@ -72,7 +72,7 @@ def publish(
                 build_database(root, before)
             return before
         schemas = before.schemas | {f.schema: schema_of(f.table) for f in files if f.table in frames}
-        now = Generation(number, files, [*before.retired, *removed], schemas, before.consumed)
+        now = Generation(number, files, [*before.retired, *removed], schemas, before.consumed, before.incomplete)
         due = due_for_deletion(now)
         commit(root, now)
         build_database(root, now)

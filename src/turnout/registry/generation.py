@@ -46,7 +46,8 @@ class Generation:
 
     ``files`` are live. ``retired`` are (path, generation that removed it); they are deleted two generations later, so
     that readers of an older state still find them. ``schemas`` maps a schema hash to its columns. ``consumed`` are the
-    work batches that are already registered and may be offered again.
+    work batches that are already registered and may be offered again. ``incomplete`` are tables of which damaged files
+    were taken off the list; the next registration restores their rows.
     """
 
     number: int = 0
@@ -54,6 +55,7 @@ class Generation:
     retired: list[tuple[str, int]] = field(default_factory=list)
     schemas: dict[str, dict[str, str]] = field(default_factory=dict)
     consumed: list[str] = field(default_factory=list)
+    incomplete: list[str] = field(default_factory=list)
 
     def of(self, table: str, years: Collection[int | None] | None = None) -> list[DataFile]:
         """Live files of one table.
@@ -74,7 +76,10 @@ class Generation:
 
     def to_json(self) -> str:
         """Text of the generation file; equal generations give equal bytes."""
-        return json.dumps({"format": FORMAT_VERSION} | asdict(self), indent=1, sort_keys=True) + "\n"
+        content = {"format": FORMAT_VERSION} | asdict(self)
+        if not self.incomplete:  # an earlier version of the program does not know it
+            del content["incomplete"]
+        return json.dumps(content, indent=1, sort_keys=True) + "\n"
 
 
 def load(registry_dir: Path) -> Generation:

@@ -13,6 +13,7 @@ from turnout.registry.generation import DataFile, Generation, load
 from turnout.registry.lock import registry_lock
 from turnout.registry.schema import tables
 
+REMEDY = "Put it back from a backup, or run the workflow, which computes its rows again."
 _SCHEMA = re.compile(r"_schema-[0-9a-f]{12}\.parquet")
 
 
@@ -39,6 +40,9 @@ def check(registry_dir: PathLike, hashes: bool = True) -> list[str]:
     if is_behind(root, generation):
         wanted = f"generation {generation.number} with this program's views"
         problems.append(f"{DATABASE} is not of {wanted}: run 'turnout registry relocate'.")
+    if generation.incomplete:
+        names = ", ".join(generation.incomplete)
+        problems.append(f"Damaged files of {names} were taken off the list: the next run restores their rows.")
     lost = orphans(root, generation)
     if lost:
         problems.append(f"{len(lost)} files are on no list, the first {lost[0]}: run 'turnout registry vacuum'.")
@@ -98,13 +102,13 @@ def orphans(root: Path, generation: Generation) -> list[str]:
 def _check_file(root: Path, file: DataFile, hashes: bool) -> list[str]:
     path = root / file.path
     if not path.exists():
-        return [f"{file.path}: is gone. Put it back from a backup."]
+        return [f"{file.path}: is gone. {REMEDY}"]
     if path.stat().st_size != file.bytes:
-        return [f"{file.path}: {path.stat().st_size} bytes, the list says {file.bytes}. Put it back from a backup."]
+        return [f"{file.path}: {path.stat().st_size} bytes, the list says {file.bytes}. {REMEDY}"]
     try:
         parquet = pq.ParquetFile(path)
     except (pa.ArrowException, OSError) as error:
-        return [f"{file.path}: not a Parquet file ({str(error).splitlines()[0]}). Put it back from a backup."]
+        return [f"{file.path}: not a Parquet file ({str(error).splitlines()[0]}). {REMEDY}"]
     problems = []
     if parquet.metadata.num_rows != file.rows:
         problems.append(f"{file.path}: {parquet.metadata.num_rows} rows, the list says {file.rows}.")
@@ -115,7 +119,7 @@ def _check_file(root: Path, file: DataFile, hashes: bool) -> list[str]:
                 f"{file.path}, column {column.name}: {file_types[column.name]}, columns.csv says {column.type}."
             )
     if hashes and sha256_of(path) != file.sha256:
-        problems.append(f"{file.path}: its hash differs from the list. Put it back from a backup.")
+        problems.append(f"{file.path}: its hash differs from the list. {REMEDY}")
     return problems
 
 

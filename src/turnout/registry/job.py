@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from turnout.registry.batch_stream import chunks, existing_batches, merge_units, table_arrivals, unread_positions
+from turnout.registry.damage import take_off_damage
 from turnout.registry.generation import check_schemas, load
 from turnout.registry.lock import registry_lock
 from turnout.registry.registration import Registration, RegistrationResult
@@ -35,6 +36,9 @@ def register(
     The same results give byte-identical files, however they are divided into batches and however often a run was killed
     before; only ``runs`` contains the time of day. A row that breaks a rule becomes a quarantine row.
 
+    A live file whose bytes have changed on the disk is logged and taken off the list. Then all batches are read again,
+    and the rows that are missing are written.
+
     Parameters
     ----------
     batches : sequence of path
@@ -58,7 +62,7 @@ def register(
     """
     root, started = Path(registry_dir), started_at or datetime.now(UTC).replace(tzinfo=None)
     with registry_lock(root, patience):
-        before = load(root)
+        before = take_off_damage(root, load(root))
         check_schemas(before)
         faults: dict[str, str] = {}
         existing, tokens = existing_batches(batches, faults)

@@ -31,6 +31,7 @@ from turnout.registry.supersede import (
     latest_supersession,
     note_superseded,
     remove_known_rows,
+    remove_present_rows,
     supersede,
 )
 
@@ -154,7 +155,7 @@ class Registration:
             When a file cannot be written; then nothing is changed.
         """
         before = self.before
-        if not self.result_ids:
+        if not self.result_ids and not before.incomplete:
             if consumed != before.consumed or not (self.root / GENERATION_FILE).exists():
                 commit(self.root, replace(before, consumed=consumed))
             if is_behind(self.root, before):
@@ -163,7 +164,7 @@ class Registration:
         number = before.number + 1
         run_id = self._run_id(number)
         n_superseded = supersede(self.con, number, run_id)
-        remove_known_rows(self.con)
+        (remove_present_rows if before.incomplete else remove_known_rows)(self.con)
         self._note_run(run_id, run_info)
         now, rows = self._write(run_id, number)
         if n_superseded:
@@ -176,6 +177,8 @@ class Registration:
         return RegistrationResult(run_id, number, len(self.result_ids), rows, self.n_refused, n_superseded, faults)
 
     def _select_changed(self, arrivals: list[Arrival]) -> list[Arrival]:
+        if self.before.incomplete:  # a result that is live may have lost rows
+            return arrivals
         offered_ids = pa.table({"result_id": pa.array([a.result_id for a in arrivals], pa.string())})
         self.con.register("_asked", offered_ids)
         live = self.con.execute(

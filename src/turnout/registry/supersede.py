@@ -11,7 +11,7 @@ import duckdb
 
 from turnout.registry.generation import DataFile
 from turnout.registry.parquet import read_live
-from turnout.registry.schema import file_literal, names
+from turnout.registry.schema import WHOLE_TABLES, file_literal, key, names, tables
 from turnout.registry.staging import CHILDREN
 
 # type of row: its table, its id, and the SQL of the text that is equal in its counterpart of the new result
@@ -114,6 +114,20 @@ def remove_known_rows(con: duckdb.DuckDBPyConnection) -> None:
         for child in CHILDREN.get(table, ("", ()))[1]:
             con.execute(f"delete from new_{child} where {_known_child_condition(child, id_column)}")
         con.execute(f"delete from new_{table} where {id_column} in (from known)")
+
+
+def remove_present_rows(con: duckdb.DuckDBPyConnection) -> None:
+    """Delete from the staging tables the rows that the registry has, row by row: children may have lost their parent.
+
+    Parameters
+    ----------
+    con : DuckDB connection
+        Connection with the staging tables.
+    """
+    for table in tables():
+        if table not in WHOLE_TABLES:
+            keys = ", ".join(f'"{k}"' for k in key(table))
+            con.execute(f"delete from new_{table} where ({keys}) in (select ({keys}) from old_{table})")
 
 
 def _known_child_condition(child: str, id_column: str) -> str:
