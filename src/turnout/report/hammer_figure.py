@@ -77,6 +77,7 @@ def _panels(rows: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[str]:
 def _style() -> str:
     """Style rules for drawings, with colours written out because drawing programs know no CSS variables."""
     css = (files("turnout.report") / "templates" / "page.css").read_text(encoding="utf-8")
-    colours = dict(re.findall(r"(--\w+):([^;}]+)", css))
+    light = css[css.index(":root{") : css.index("@media")]  # dark colours follow in a rule of their own
+    colours = dict(re.findall(r"(--[\w-]+):([^;}]+)", light))
     inside = css[css.index("svg text{") : css.index("@media print")]
-    return re.sub(r"var\((--\w+)\)", lambda match: colours[match[1]], inside)
+    return re.sub(r"var\((--[\w-]+)\)", lambda match: colours[match[1]], inside)

@@ -12,6 +12,7 @@ from tqdm import tqdm
 
 from turnout import __version__
 from turnout.files import temporary_path
+from turnout.report.formatting import count_of
 from turnout.report.pages.fleet import fleet_page
 from turnout.report.pages.turnout import turnout_page
 from turnout.report.source import ROWS, FleetSource
@@ -119,11 +120,13 @@ def write_turnouts(
 
 def page_environment() -> Environment:
     """Jinja environment with the templates of the package."""
-    return Environment(loader=PackageLoader("turnout.report", "templates"), trim_blocks=True, autoescape=True)
+    environment = Environment(loader=PackageLoader("turnout.report", "templates"), trim_blocks=True, autoescape=True)
+    environment.filters["of"] = count_of
+    return environment
 
 
 def shared_by_pages(generation: str | int = "") -> dict[str, Any]:
-    """Template variables of every page: style, program version and generation.
+    """Template variables of every page: style, script of the fleet's table, program version and generation.
 
     Parameters
     ----------
@@ -133,10 +136,11 @@ def shared_by_pages(generation: str | int = "") -> dict[str, Any]:
     Returns
     -------
     dict
-        ``css``, ``version`` and ``generation``.
+        ``css``, ``script``, ``version`` and ``generation``.
     """
-    css = (files("turnout.report") / "templates" / "page.css").read_text()
-    return {"css": css, "version": __version__, "generation": generation}
+    templates = files("turnout.report") / "templates"
+    css, script = ((templates / name).read_text(encoding="utf-8") for name in ("page.css", "fleet.js"))
+    return {"css": css, "script": script, "version": __version__, "generation": generation}
 
 
 def _remove_stale(folder: Path, turnout_ids: Collection[str]) -> None:

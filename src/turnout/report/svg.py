@@ -264,7 +264,10 @@ class Axis:
         if self.scale == "names":
             return [(k, escape(name)) for k, name in enumerate(self.names, start=1)]
         if self.scale == "time":
-            return [(t, format_day(t)) for t in time_ticks(self.low, self.high)]
+            middle = (self.low + self.high) / 2
+            day = (datetime(1970, 1, 1) + timedelta(seconds=middle)).strftime("%Y-%m-%d")
+            # an axis of a few days has no start of a month: its middle is named
+            return [(t, format_day(t)) for t in time_ticks(self.low, self.high)] or [(middle, day)]
         if self.scale == "log":
             return [(v, format_number(v)) for v in log_ticks(self.low, self.high)]
         values = linear_ticks(self.low, self.high)

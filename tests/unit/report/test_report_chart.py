@@ -1,6 +1,7 @@
 """Charts put values where they belong: pixels are worked out by hand from the margins."""
 
 import re
+from datetime import UTC, datetime
 from xml.etree import ElementTree
 
 import numpy as np
@@ -132,3 +133,9 @@ def test_the_limit_of_the_coherence_is_that_of_the_settings(required, drawn_at):
     svg = coherence_panel(HammerTest(row, {}, [], []))
     limits = re.findall(r'<path class="limit" d="([^"]*)"><title>required ([\d.]+)', svg)
     assert limits == ([(drawn_at, "0.9")] if required else [])
+
+
+def test_an_axis_of_two_days_names_its_day():
+    noon = datetime(2026, 5, 13, 12, tzinfo=UTC).timestamp()
+    axis = Axis(noon - 86400, noon + 86400, "", "time")
+    assert axis.ticks() == [(noon, "2026-05-13")]

@@ -100,20 +100,36 @@ def contrast(one, other):
     return (light + 0.05) / (dark + 0.05)
 
 
-def style(selector):
+def colours(scheme):
+    """The colours of the pages by name, in the light or the dark scheme."""
+    blocks = re.findall(r":root\{([^}]*)\}", shared_by_pages(1)["css"])
+    chosen = "".join(blocks if scheme == "dark" else blocks[:1])
+    return {name: "#" + "".join(2 * c for c in value) if len(value) == 3 else "#" + value
+            for name, value in re.findall(r"--([\w-]+):#(\w+)", chosen)}  # fmt: skip
+
+
+def style(selector, scheme="light"):
     """The rule of the pages' style, with the colours that its variables stand for."""
-    css = shared_by_pages(1)["css"]
-    colours = dict(re.findall(r"(--\w+):(#\w+)", css))
-    return re.sub(r"var\((--\w+)\)", lambda m: colours[m[1]], css.partition(selector + "{")[2].partition("}")[0])
+    rule = shared_by_pages(1)["css"].partition(selector + "{")[2].partition("}")[0]
+    return re.sub(r"var\(--([\w-]+)\)", lambda m: colours(scheme)[m[1]], rule)
 
 
+@pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("state", ["inspect", "plan", "learning", "ok"])
-def test_the_white_words_of_a_badge_can_be_read(state):
+def test_the_words_of_a_badge_can_be_read(state, scheme):
     """WCAG 2.2, success criterion 1.4.3: at least 4.5 to 1."""
-    assert contrast("#ffffff", re.search("background:(#[0-9a-f]+)", style(f".badge.{state}"))[1]) >= 4.5
+    words = colours(scheme)["badge-ink"]
+    assert contrast(words, re.search("background:(#[0-9a-f]+)", style(f".badge.{state}", scheme))[1]) >= 4.5
 
 
-def test_an_alarm_is_told_from_a_sound_section_by_more_than_red_and_green():
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("name", ["ink", "soft", "blue", "orange", "red", "violet"])
+def test_words_can_be_read_on_the_page_and_on_its_panels(name, scheme):
+    table = colours(scheme)
+    assert min(contrast(table[name], table[ground]) for ground in ("ground", "panel")) >= 4.5
+
+
+def test_an_alarm_differs_from_an_intact_section_by_more_than_red_and_green():
     """One man in twelve sees them alike, and so does a printer: they differ 3 to 1 in lightness, or in an outline."""
     alarm, sound = style(".state-inspect"), style(".state-ok")
     fills = (re.search("fill:(#[0-9a-f]+)", rule)[1] for rule in (alarm, sound))

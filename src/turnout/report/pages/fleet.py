@@ -85,10 +85,14 @@ def _work(row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _line(turnout: dict[str, Any], states: Mapping[str, int]) -> dict[str, Any]:
-    position = (turnout["line"], None if turnout["km"] is None else f"{turnout['km']:.3f}")
+    urgency = next((k for k, state in enumerate(STATES) if state in states), len(STATES))
+    worst = next((state for state in STATES if state in states), "no chart yet")
     return turnout | {
+        "urgency": urgency,
+        "worst": worst,
+        "badge": badge(worst),
         "name": turnout["name"] or "",
-        "place": ", ".join(p for p in position if p),
+        "km_text": "" if turnout["km"] is None else f"{turnout['km']:.3f}",
         "latest": day(turnout["latest"]),
         "states": ", ".join(f"{states[s]} {s}" for s in STATES if s in states) or "–",
     }

@@ -91,10 +91,11 @@ def line_of(work: Mapping[str, Any]) -> dict[str, str]:
     Returns
     -------
     dict
-        ``state``, ``badge`` and ``words``.
+        ``state``, ``badge``, ``words`` and ``anchor``, the label of the section that it concerns.
     """
     of = "" if work["change_pct"] is not None else f"{work['sections']}, {work['band']}: "
-    return {"state": work["state"], "badge": badge(work["state"]), "words": of + work["sentence"]}
+    anchor = (work.get("section_id") or "").split("/")[-1].replace("*", "")
+    return {"state": work["state"], "badge": badge(work["state"]), "words": of + work["sentence"], "anchor": anchor}
 
 
 def _position_words(turnout: Mapping[str, Any]) -> str:

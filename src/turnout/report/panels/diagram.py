@@ -56,7 +56,8 @@ def diagram(
 
     curve = " ".join(f"L{px(m):.1f} {py(m, True):.1f}" for m in _steps(toe, high))
     elements = [
-        f'<svg class="diagram" viewBox="0 0 {width} {height}" width="{width}" height="{height}">'
+        f'<svg class="diagram" viewBox="0 0 {width} {height}" width="{width}" height="{height}" '
+        'role="group" aria-label="Measured sections of the turnout, coloured by state">'
         '<defs><pattern id="hatch" width="6" height="6" patternUnits="userSpaceOnUse" '
         'patternTransform="rotate(45)"><rect width="6" height="6" class="hatch-ground"/>'
         '<path d="M0 0V6" class="hatch-line"/></pattern></defs>'

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.report.formatting import student_quantile
+from turnout.report.formatting import count_of, student_quantile
 from turnout.report.svg import Axis, Chart
 
 if TYPE_CHECKING:
@@ -57,7 +57,8 @@ def history_panel(
     chart = Chart(
         Axis(time.min() - margin, time.max() + margin, "", "time"),
         Axis(lowest - pad, highest + pad, f"{band} [Hz]"),
-        f"{band}: {frequency[-1]:.1f} Hz {_interval(error[-1])}, n = {modes[-1]['n_impacts']}; {len(modes)} campaigns",
+        f"{band}: {frequency[-1]:.1f} Hz {_interval(error[-1])}, n = {modes[-1]['n_impacts']}; "
+        + count_of(len(modes), "campaign"),
         width=width,
     )
     if expected:
