@@ -24,3 +24,12 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no recordings of others: {folder} does not exist")
     return folder
+
+
+@pytest.fixture(scope="session")
+def shared_recordings() -> Path:
+    """Programs that write recordings as loggers do, beside the checkout; the test is skipped where they are absent."""
+    folder = REPOSITORY.parent / "shared" / "inputs" / "recordings"
+    if not folder.is_dir():
+        pytest.skip(f"no recordings of loggers: {folder} does not exist")
+    return folder

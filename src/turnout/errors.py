@@ -150,6 +150,8 @@ REASONS = {
     "channel_missing": "a configured channel is not in the file",
     "channel_unknown": "the file has a channel that the configuration does not name",
     "unit_unknown": "a unit that cannot be converted to the configured one",
+    "scale_unknown": "the file states a scale, and nothing says whether its numbers contain it",
+    "library_warning": "the library that reads the format warns about the file; its recordings are used",
     "not_finite": "NaN or infinity in the samples",
     "dead_channel": "a channel is constant or below its noise floor",
     "sign_reversed": "the force is negative at contact: the sign is reversed",

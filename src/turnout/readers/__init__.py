@@ -1,6 +1,7 @@
 """Readers of raw files: ``read`` converts a file of any supported format to recordings in SI units."""
 
 import logging
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -68,8 +69,11 @@ def read(
     source = load(path, root)
     source = replace(source, lazy=max_duration is not None and source.size > max_whole_file_size)
     before = source.state()
+    _reject_repeated_bytes(source)
     with _as_read_error(source):
-        raw = _format_of(source, description).read_raw(source)
+        with _collected_warnings(source) as remarks:
+            raw = _format_of(source, description).read_raw(source)
+        raw = replace(raw, remarks=(*raw.remarks, *remarks))
         digest = source.sha256()
         recordings, errors = convert_records(raw, description, source, max_duration)
     if source.state() != before:
@@ -120,6 +124,79 @@ def _as_read_error(source: Source) -> Iterator[None]:
         LOG.exception("%s: not foreseen by the reader", source.name)
         problem = f"it cannot be read ({type(error).__name__}: {' '.join(str(error).split())[:200]})"
         raise source.error("the file", problem) from error
+
+
+MAX_REPEATS = 4  # copies of a file in itself that are looked for
+
+
+def _reject_repeated_bytes(source: Source) -> None:
+    """ReadError if the file is a smaller one two to four times in a row: it was appended to itself."""
+    for n in range(2, MAX_REPEATS + 1):
+        part = source.size // n
+        if part * n != source.size or part < MIN_REPEATED_SIZE:
+            continue
+        with source.path.open("rb") as file:
+            file.seek(part)
+            if file.read(min(part, len(source.head))) != source.head[:part]:
+                continue
+        data = source.memory_map if source.lazy else source.data
+        first = data[:part]
+        if all(data[k * part : (k + 1) * part] == first for k in range(1, n)):
+            problem = f"its first {part} bytes are in it {n} times: it was appended to itself"
+            remedy = f"{COPY_AGAIN}; one copy holds all recordings"
+            raise source.error(f"byte {part}", problem, remedy, reason="duplicate")
+
+
+MIN_REPEATED_SIZE = 64  # bytes: shorter repetitions are no files
+
+
+# Warnings about the code that calls a library, not about the file.
+CODE_WARNINGS = (DeprecationWarning, PendingDeprecationWarning, FutureWarning, ImportWarning, ResourceWarning)
+LOGGING_LIBRARIES = ("nptdms", "h5py", "pymatreader")
+# Beginnings of warnings about what the readers check and report themselves.
+CHECKED_WARNINGS = ("Unsupported scale type", "Last segment")
+MAX_WARNINGS = 3  # different warnings about one file that are passed on
+
+
+class _WarningCollector(logging.Handler):
+    """Keeps the texts of the warnings that a library writes to its log."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.texts: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep the text of one entry of the log.
+
+        Parameters
+        ----------
+        record : logging.LogRecord
+            The entry.
+        """
+        self.texts.append(record.getMessage())
+
+
+@contextmanager
+def _collected_warnings(source: Source) -> Iterator[list[ReadError]]:
+    """Context in which the warnings of the libraries become remarks about the file; they are complete at its end."""
+    remarks: list[ReadError] = []
+    collector = _WarningCollector()
+    logs = [logging.getLogger(name) for name in LOGGING_LIBRARIES]
+    for log in logs:
+        log.addHandler(collector)
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            yield remarks
+    finally:
+        for log in logs:
+            log.removeHandler(collector)
+    texts = collector.texts + [str(w.message) for w in caught if not issubclass(w.category, CODE_WARNINGS)]
+    remedy = "Compare the recording with what the logger's own program shows"
+    texts = [" ".join(text.split())[:200] for text in texts if not text.startswith(CHECKED_WARNINGS)]
+    for text in list(dict.fromkeys(texts))[:MAX_WARNINGS]:
+        problem = f"the library that reads it warns: {text}"
+        remarks.append(source.error("the file", problem, remedy, reason="library_warning"))
 
 
 def _format_of(source: Source, description: RawDescription) -> Format:

@@ -13,11 +13,13 @@ Without names channels are called "0", "1" ... A head line with unknown words an
 rate is an error, unless its words are those of a filter.
 
 The text is UTF-8, or UTF-16 with a byte order mark. Head lines that are neither are read as Windows-1252.
-The last line must end with a line break: without it a truncated number looks like a complete one.
+A last line without line break may end in a truncated number: it is left out and reported, unless its last number has as
+many decimals as all others.
 """
 
 import codecs
 import io
+import re
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from mmap import mmap
@@ -29,10 +31,18 @@ import pyarrow as pa
 from pyarrow import csv
 
 from turnout.errors import ReadError
-from turnout.readers.csv_header import MISSING_VALUES, cell_errors, read_head, seconds_per_number, time_column
+from turnout.readers.csv_header import (
+    MISSING_VALUES,
+    cell_errors,
+    check_thousands,
+    read_head,
+    seconds_per_number,
+    time_column,
+)
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.named_arrays import RECORD_COUNT_NAMES, SAMPLE_COUNT_NAMES, START_DATE_NAMES, START_NAMES, Metadata
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, RawFile, RawRecord, Source
+from turnout.readers.stated_scales import scale_problem, scale_statements
 from turnout.readers.timing import TEXT_PRECISION, parse_time
 
 
@@ -57,12 +67,7 @@ def read_raw(source: Source) -> RawFile:
     is_utf16 = source.head[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
     lazy = source.lazy and not is_utf16
     data = source.memory_map if lazy else _in_utf8(source) if is_utf16 else source.data
-    if data[-1:] not in (b"\n", b"\r"):
-        problem = "the last line has no line break: its last number may be cut"
-        line = data[:].count(b"\n") + 1
-        raise source.error(
-            f"line {line}", problem, f"{COPY_AGAIN}, or add the line break if it is whole", reason="truncated"
-        )
+    data, remarks = _without_cut_row(data, source)
     head, names, units, offset, separator, unclear = read_head(data, source)
     read_columns = (
         _lazy_columns if lazy and "record" not in [name.strip().lower() for name in names] else _columns_in_memory
@@ -71,7 +76,44 @@ def read_raw(source: Source) -> RawFile:
     columns = read_columns(source, data, offset, separator, names, time)
     facts = Metadata(head, source)
     records = tuple(_records(columns, names, units, time, facts, source, unclear))
-    return RawFile(records, facts.count(RECORD_COUNT_NAMES))
+    return RawFile(records, facts.count(RECORD_COUNT_NAMES), remarks)
+
+
+N_COMPARED_ROWS = 20  # rows whose last numbers are compared with one that may be cut
+
+
+def _without_cut_row(data: bytes | mmap, source: Source) -> tuple[bytes | mmap, tuple[ReadError, ...]]:
+    """The text without its last row if that may be cut, and the remark on it.
+
+    A row without line break is complete if it has as many separators as the rows above and its last number as many
+    decimals as all of theirs. Only text in memory can be shortened: a lazy file is rejected.
+
+    Raises
+    ------
+    ReadError
+        If the file is read lazily and its last row may be cut.
+    """
+    if data[-1:] in (b"\n", b"\r"):
+        return data, ()
+    start = max(data.rfind(b"\n"), data.rfind(b"\r")) + 1
+    rows = data[max(0, start - N_COMPARED_ROWS * (len(data) - start + 80)) : start].splitlines()[-N_COMPARED_ROWS:]
+    last = data[start:]
+    if len(rows) == N_COMPARED_ROWS and all(_shape(row) == _shape(last) for row in rows) and _shape(last)[1]:
+        return data, ()
+    line = data[:].count(b"\n") + 1
+    problem = "the last line has no line break: its last number may be cut"
+    remedy = f"{COPY_AGAIN}, or add the line break if it is whole"
+    if isinstance(data, mmap) or start == 0:
+        raise source.error(f"line {line}", problem, remedy, reason="truncated")
+    left_out = source.error(f"line {line}", f"{problem}. It is left out", remedy, reason="truncated")
+    return data[:start], (left_out,)
+
+
+def _shape(row: bytes) -> tuple[int, int]:
+    """Number of separators, and of digits behind the last decimal mark, of a row of numbers."""
+    cells = re.split(rb"[;\t]" if re.search(rb"[;\t]", row) else rb",", row.strip())
+    decimals = re.fullmatch(rb' *"?[+-]?\d*[.,](\d+)(?:[eE][+-]?\d+)?"? *', cells[-1])
+    return len(cells), len(decimals[1]) if decimals else 0
 
 
 def _in_utf8(source: Source) -> bytes:
@@ -87,8 +129,34 @@ def _columns_in_memory(
     options = _options(data, offset, separator, len(names))
     line = _line_number(data, offset)
     with source.parsed_by("pyarrow", f"the numbers after line {line}"), cell_errors(source, line, names):
-        table = csv.read_csv(io.BytesIO(memoryview(data)[offset:]), **options)
-    return [column.to_numpy(zero_copy_only=False) for column in table.columns]
+        try:
+            table = csv.read_csv(io.BytesIO(memoryview(data)[offset:]), **options)
+        except pa.ArrowInvalid:
+            end = _start_of_footer(data, offset)
+            if end == len(data):
+                raise
+            table = csv.read_csv(io.BytesIO(memoryview(data)[offset:end]), **options)
+    columns = [column.to_numpy(zero_copy_only=False) for column in table.columns]
+    for i, column in enumerate(columns):
+        check_thousands(column, i, names[i], data, offset, separator, source)
+    return columns
+
+
+MAX_FOOTER_LINES = 20
+
+
+def _start_of_footer(data: bytes | mmap, offset: int) -> int:
+    """Byte at which lines of words begin that end the file, as "End of data"; its length without one."""
+    end = len(data)
+    for _ in range(MAX_FOOTER_LINES):
+        start = max(data.rfind(b"\n", offset, end - 1), offset - 1) + 1
+        line = data[start:end].strip()
+        if line and not re.match(rb'["#]*[A-Za-z\x80-\xff](?!an\b|nf)', line):
+            break
+        end = start
+        if start <= offset:
+            break
+    return end
 
 
 def _lazy_columns(
@@ -186,6 +254,8 @@ def _options(data: bytes | mmap, offset: int, separator: str, width: int) -> dic
     """Options of pyarrow for the numbers from byte ``offset`` on."""
     dot_offset = data.find(b".", offset)
     has_decimal_comma = separator != "," and data.find(b",", offset, dot_offset if dot_offset >= 0 else len(data)) >= 0
+    if separator == ",":
+        has_decimal_comma = re.match(rb'\s*"[+-]?\d*,\d+"', data[offset : offset + 200]) is not None
     decimal_mark = "," if has_decimal_comma else "."
     converting = csv.ConvertOptions(
         column_types={str(i): pa.float64() for i in range(width)},
@@ -242,6 +312,9 @@ def _records(
             conditions=facts.conditions(k, n),
             time=None if seconds is None else seconds[a:b],
             unclear=unclear,
+            undecided={
+                i: scale_problem(text) for i, text in enumerate(scale_statements(facts.lower, len(selected))) if text
+            },
         )
 
 

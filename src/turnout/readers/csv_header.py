@@ -3,12 +3,14 @@
 It also finds the time column and its unit, and explains cells that are no numbers.
 """
 
+import csv
 import re
 import unicodedata
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from mmap import mmap
 
+import numpy as np
 import pyarrow as pa
 
 from turnout.readers.interpret import MEANINGLESS_UNITS
@@ -22,6 +24,7 @@ from turnout.readers.named_arrays import (
     TIME_NAMES,
 )
 from turnout.readers.source import COPY_AGAIN, Source
+from turnout.readers.stated_scales import SCALE_WORDS, plain_word
 from turnout.units import conversion
 
 TIME_WORDS = (*TIME_NAMES, "zeit", "tid", "temps", "tempo", "tiempo", "tijd")
@@ -213,6 +216,61 @@ def cell_errors(source: Source, line: int, names: Sequence[str]) -> Iterator[Non
         raise source.error(where, problem, remedy) from error
 
 
+MIN_WHOLE_SHARE = 0.05  # of numbers printed with decimals, one in a thousand is whole by chance; three decimals
+
+
+def check_thousands(
+    column: np.ndarray, i: int, name: str, data: bytes | mmap, offset: int, separator: str, source: Source
+) -> None:
+    """Check that the marks in a column are decimal marks, and not marks for thousands.
+
+    With marks for thousands every number below 1000 is whole, and every other one has three digits behind its mark.
+
+    Parameters
+    ----------
+    column : (n,) array of float
+        Numbers of the column, with the mark read as decimal mark.
+    i : int
+        Number of the column, from 0.
+    name : str
+        Name of the column.
+    data : bytes or mmap
+        Bytes of the file.
+    offset : int
+        Byte of the first number.
+    separator : str
+        Separator of the cells.
+    source : Source
+        The text file.
+
+    Raises
+    ------
+    ReadError
+        If the column has marks for thousands.
+    """
+    if column.dtype.kind != "f":
+        return
+    broken = (column != np.rint(column)) & np.isfinite(column)
+    n_broken = int(np.count_nonzero(broken))
+    if not n_broken or column.size - n_broken < MIN_WHOLE_SHARE * column.size:
+        return
+    sizes = np.abs(column[broken])
+    if sizes.min() < 1.0 or sizes.max() >= 1000.0:
+        return
+    rows = data[offset:].splitlines()
+    cells = [
+        rows[k].split(separator.encode())[i].decode("utf-8", "replace").strip(' "')
+        for k in np.flatnonzero(broken)
+        if k < len(rows)
+    ]
+    if all(THOUSANDS.fullmatch(cell) for cell in cells):
+        first = int(np.argmax(broken))
+        line = data[:offset].count(b"\n") + first + 1
+        problem = f"{cells[0]!r} has a mark for thousands, as {n_broken} of {column.size} numbers of this column"
+        remedy = "Export all numbers with one decimal mark and without marks for thousands"
+        raise source.error(f"line {line}, column {name or str(i + 1)!r}", problem, remedy)
+
+
 HEAD_LINE = re.compile(r"^#?\s*([^\W\d][\w .'’-]*?)\s*([\[(][^\])]*[\])])?\s*[:=,;\t]\s*(.*)$")
 UNIT_SCALES = {"kHz": 1e3, "khz": 1e3, "MHz": 1e6, "ms": 1e-3, "µs": 1e-6, "\u03bcs": 1e-6, "us": 1e-6}
 TEMPERATURES = {"rail_temperature", "air_temperature"}
@@ -279,8 +337,10 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
         if plain_name not in HEAD_NAMES and (frequency := _frequency(line)) is not None:
             unclear.append((line.strip(), frequency))
         value = match[3].strip(separator + " ") if match else ""
-        is_note = plain_name in HEAD_NAMES or (
-            plain_name in NUMERIC_HEAD_NAMES and _is_number(value.split()[0] if value else "")
+        is_note = (
+            plain_name in HEAD_NAMES
+            or (plain_name in NUMERIC_HEAD_NAMES and _is_number(value.split()[0] if value else ""))
+            or _states_scale(name, value)
         )
         if plain_name in SAMPLE_COUNT_NAMES and (grouped := GROUPED_NUMBER.match(value)):
             value = re.sub(r"\D", "", grouped[0])
@@ -293,6 +353,11 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
         raise source.error("line 1", "no line of numbers follows", COPY_AGAIN, reason="empty")
     problem = f"no line of numbers; the last line reads {text_lines[-1][:60]!r}"
     raise source.error("the file", problem, "Export numbers between semicolons, tabs or commas, the time in seconds")
+
+
+def _states_scale(name: str, value: str) -> bool:
+    """Whether a line states a scale: such a word, and a number."""
+    return plain_word(name) in SCALE_WORDS and _is_number(re.split(r"[\s;,]", value)[0])
 
 
 def _plain(name: str) -> str:
@@ -319,6 +384,8 @@ def _frequency(line: str) -> float | None:
 
 
 def _cells(line: str, separator: str) -> list[str]:
+    if separator == "," and '"' in line:  # a comma between quotation marks is a decimal mark
+        return [cell.strip() for cell in next(csv.reader([line]), [])]
     return [cell.strip().strip('"') for cell in line.split(separator)]
 
 

@@ -2,9 +2,11 @@
 
 ``turnout.readers.writing`` writes the attributes ``rate``, ``n_records`` and conditions at the root, and a group
 ``record_000`` ... with ``started_at`` per record. It holds one dataset per channel with its ``unit`` and a Fletcher-32
-checksum, so that damage is limited to one record.
+checksum, so that damage is limited to one record. ``scale_factor``, ``add_offset`` and ``_FillValue`` of netCDF files
+are applied; a dataset with another gain or offset is rejected unless the layout decides.
 """
 
+from dataclasses import dataclass
 from typing import Any
 
 import h5py
@@ -14,6 +16,7 @@ from turnout.errors import ReadError
 from turnout.readers.lazy import is_large, lazy_array
 from turnout.readers.named_arrays import (
     RATE_NAMES,
+    STATED_SCALES,
     STEP_NAMES,
     TIME_NAMES,
     Alphabetical,
@@ -23,6 +26,7 @@ from turnout.readers.named_arrays import (
     vectors,
 )
 from turnout.readers.source import RawFile, Source
+from turnout.readers.stated_scales import SCALE_WORDS, apply_packing, plain_word, scale_text
 from turnout.readers.timing import check_simultaneous
 
 UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units")
@@ -66,6 +70,7 @@ def _variables(group: h5py.Group, source: Source) -> dict[str, Any]:
     variables = mapping_type({name: _attribute(value) for name, value in group.attrs.items()})
     units: dict[str, str] = {}
     clocks: dict[str, dict] = {}
+    stated: dict[str, dict] = {}
     for name, member in group.items():
         if isinstance(member, h5py.Group):
             variables[name] = _variables(member, source)
@@ -73,7 +78,8 @@ def _variables(group: h5py.Group, source: Source) -> dict[str, Any]:
         try:
             with source.parsed_by("HDF5", f"dataset {member.name!r}"):
                 large = source.lazy and is_large(member) and name.lower() not in TIME_NAMES
-                variables[name] = lazy_array(member) if large else _values(member)
+                numbers = _with_packing(member, source)
+                variables[name] = lazy_array(numbers) if large else _values(numbers)
         except ReadError as error:
             variables[name] = error
             continue
@@ -84,7 +90,13 @@ def _variables(group: h5py.Group, source: Source) -> dict[str, Any]:
                 clocks.setdefault(name, {})[key] = _attribute(value)
             elif key.lower() in ("channels", "channel_names", "units"):
                 variables.setdefault(key, _attribute(value))
+            elif plain_word(key) in SCALE_WORDS and key not in PACKING_ATTRIBUTES:
+                stated.setdefault(name, {})[key] = _attribute(value)
     _apply_clocks(variables, clocks, source)
+    for name in matrices(variables):
+        variables |= stated.pop(name, {})  # of all channels of the matrix
+    if texts := tuple((name, text) for name, facts in stated.items() if (text := scale_text(facts))):
+        variables[STATED_SCALES] = texts
     if units and not any(key.lower() == "units" for key in variables):
         variables["units"] = units
     return variables
@@ -103,7 +115,52 @@ def _apply_clocks(variables: dict[str, Any], clocks: dict[str, dict], source: So
             variables[name] = error
 
 
-def _values(dataset: h5py.Dataset) -> Any:
+PACKING_ATTRIBUTES = ("scale_factor", "add_offset")  # of the climate and forecast (CF) conventions of netCDF
+FILL_ATTRIBUTES = ("_FillValue", "missing_value")
+
+
+@dataclass(frozen=True)
+class PackedDataset:
+    """A dataset with packed numbers; it is sliced like a dataset and returns unpacked numbers."""
+
+    dataset: h5py.Dataset
+    factor: float
+    offset: float
+    fills: tuple[float, ...]
+    dtype = np.dtype(float)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the dataset."""
+        return self.dataset.shape
+
+    def __getitem__(self, selection: Any) -> np.ndarray:
+        return apply_packing(self.dataset[selection], self.factor, self.offset, self.fills)
+
+
+def _with_packing(dataset: h5py.Dataset, source: Source) -> h5py.Dataset | PackedDataset:
+    """The dataset itself, or with its attributes of packing applied; ReadError if they are no numbers."""
+    attributes = {
+        k: _attribute(dataset.attrs[k]) for k in (*PACKING_ATTRIBUTES, *FILL_ATTRIBUTES) if k in dataset.attrs
+    }
+    if not attributes or dataset.dtype.kind not in "fiu":
+        return dataset
+    try:
+        factor, offset = (float(attributes.get(k, d)) for k, d in zip(PACKING_ATTRIBUTES, (1.0, 0.0)))
+        fills = tuple(float(x) for k in FILL_ATTRIBUTES if k in attributes for x in np.ravel(attributes[k]))
+    except (TypeError, ValueError) as error:
+        problem = f"its attributes {attributes} are no numbers"
+        remedy = "Write one number each, or export the numbers unpacked"
+        raise source.error(f"dataset {dataset.name!r}", problem, remedy, reason="scale_unknown") from error
+    if not (np.isfinite(factor) and np.isfinite(offset) and factor):
+        problem = f"its scale_factor {factor:g} and add_offset {offset:g} give no numbers"
+        raise source.error(f"dataset {dataset.name!r}", problem, "Export the numbers unpacked", reason="scale_unknown")
+    return PackedDataset(dataset, factor, offset, fills)
+
+
+def _values(dataset: h5py.Dataset | PackedDataset) -> Any:
+    if isinstance(dataset, PackedDataset):
+        return dataset[()]
     if h5py.check_string_dtype(dataset.dtype) is not None:
         return dataset.asstr()[()]
     return dataset[()]

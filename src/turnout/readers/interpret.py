@@ -3,6 +3,7 @@
 It assigns the channels of a file to those of the layout, converts units and checks what the layout states.
 """
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from turnout.errors import ReadError
+from turnout.readers import stated_scales
 from turnout.readers.lazy import BlockReader, ChannelStatistics, channel_error
 from turnout.readers.source import COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
 from turnout.readers.timing import check_order, check_time, resolve_rate, start_times
@@ -20,6 +22,9 @@ from turnout.units import IGNORED, conversion, to_si
 
 # Labels that loggers write for a unit that was not configured; in lower case.
 MEANINGLESS_UNITS = ("", "-", "eu", "none", "n/a", "a.u.", "arb", "?", "unknown", "undefined", "unitless")
+
+
+FULL_SCALE_UNIT = re.compile(r"\s*[+-]?[\d.]")  # a unit with a number, as in "10 V"
 
 
 @dataclass(frozen=True)
@@ -75,7 +80,7 @@ def channel_mappings(
             reason="channel_unknown",
         )
     return tuple(
-        _channel_mapping(i, record.units[i], channel, where, source)
+        _channel_mapping(i, record, channel, where, source)
         for i, channel in zip(indices, channels)
         if channel.quantity != IGNORED
     )
@@ -141,13 +146,20 @@ def _has_channel(record: RawRecord, wanted: str | int, where: str, source: Sourc
     return True
 
 
-def _channel_mapping(index: int, file_unit: str, raw: RawChannel, where: str, source: Source) -> ChannelMapping:
+def _channel_mapping(index: int, record: RawRecord, raw: RawChannel, where: str, source: Source) -> ChannelMapping:
+    place, file_unit = f"{where}, channel {raw.name!r}", record.units[index]
     try:
         conversion_to_si = to_si(raw.quantity, resolve_unit(file_unit, raw.unit), raw.sensitivity, raw.sensitivity_unit)
     except ValueError as error:
         remedy = "Correct unit and sensitivity of this channel in the layout"
-        place = f"{where}, channel {raw.name!r}"
         raise source.error(place, str(error), remedy, reason="unit_unknown") from error
+    if (statement := record.undecided.get(index)) and not (raw.unit or "").endswith("!"):
+        raise source.error(place, statement, stated_scales.remedy(file_unit), reason="scale_unknown")
+    largest = record.above_full_scale.get(index)
+    if largest is not None and FULL_SCALE_UNIT.match(raw.unit or ""):
+        problem = f"its numbers reach {largest:.4g}, so they are no fractions of the full scale {raw.unit!r}"
+        remedy = "The logger wrote physical numbers: set the unit in the layout without a number, such as 'unit: V'"
+        raise source.error(place, problem, remedy, reason="out_of_scale")
     sign = -1 if raw.sign < 0 else 1
     channel = Channel(
         name=raw.name,
@@ -266,6 +278,7 @@ def convert_records(
         except ReadError as error:
             errors.append(error)
     errors.extend(_count_errors(raw, description, source))
+    errors.extend(raw.remarks)
     return tuple(recordings), tuple(errors)
 
 

@@ -1,9 +1,10 @@
-"""Reader of LabVIEW measurement files (.lvm): each segment is a record.
+"""Reader of LabVIEW measurement files (.lvm): each segment, or each write under one header, is a record.
 
 The package lvm_read is not used: it turns unreadable numbers into NaN, does not detect truncated segments, and needs
 some 2 µs per number. Layout: National Instruments, "Specification for the LabVIEW Measurement File".
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from datetime import datetime
 
@@ -41,19 +42,41 @@ def read_raw(source: Source) -> RawFile:
     lines = source.data[: source.data.find(END_OF_HEADER)].decode("latin-1").splitlines()
     head = _fields(lines, _separator(lines))
     if END_OF_HEADER not in source.data:
+        if not source.head.startswith(FIRST_WORDS) and _is_row(source.head.partition(b"\n")[0]):
+            problem = "it has no header: LabVIEW wrote it with the setting 'Segment headers: no headers'"
+            raise source.error("the header", problem, NO_HEADER_REMEDY)
         raise source.error("the header", "it has no end", COPY_AGAIN, reason="truncated")
     separator = _separator(lines)
     starts = _segments(source.data)
     if not starts:
+        body = source.data[source.data.find(END_OF_HEADER) + len(END_OF_HEADER) :].lstrip().partition(b"\n")[0]
+        if _is_row(body):
+            problem = (
+                "numbers follow its header without the header of a segment, so their channels and rate are not stated"
+            )
+            raise source.error("the file", problem, NO_HEADER_REMEDY)
         raise source.error("the file", "no segment of samples follows its header", COPY_AGAIN, reason="empty")
     edges = [*starts, len(source.data)]
     records: list[RawRecord | ReadError] = []
     for k, start in enumerate(starts):
         try:
-            records.append(_record(source, start, edges[k + 1], head, separator, k, len(starts)))
+            records.extend(_records(source, start, edges[k + 1], head, separator, k, len(starts)))
         except ReadError as error:
             records.append(error)
     return RawFile(tuple(records), Metadata(head, source).count(("records",)))
+
+
+FIRST_WORDS = b"LabVIEW Measurement"
+NO_HEADER_REMEDY = (
+    "Set 'Segment headers: one header per segment' in LabVIEW; to read this file, set 'format: csv' and the rate "
+    "in the layout and name its columns 0, 1 ..."
+)
+
+
+def _is_row(line: bytes) -> bool:
+    """Whether a line holds only numbers."""
+    cells = [cell.strip().replace(b",", b".") for cell in re.split(rb"[\t;]", line.strip())]
+    return any(cells) and all(re.fullmatch(rb"[+-]?[\d.]+(?:[eE][+-]?\d+)?", cell) for cell in cells if cell)
 
 
 def _separator(lines: Sequence[str]) -> str:
@@ -75,20 +98,28 @@ def _segments(data: bytes) -> list[int]:
     return offsets
 
 
-def _record(
+def _records(
     source: Source, start: int, stop: int, head: Mapping[str, str], separator: str, k: int, n: int
-) -> RawRecord:
-    """One segment: its header of one column per channel, then rows of X_Value, the channels and a comment."""
+) -> list[RawRecord]:
+    """One segment: its header of one column per channel, then rows of X_Value, the channels and a comment.
+
+    With one header for several writes the segment is cut into records of the number of samples in the header, unless a
+    time column continues.
+    """
     where = f"record {k + 1} of {n}"
     end = source.data.find(END_OF_HEADER, start, stop)
     first = source.data.find(b"\n", source.data.find(b"\nX_Value", max(end, start), stop) + 1, stop) + 1
     if end < 0 or first == 0 or b"\nX_Value" not in source.data[end:stop]:
         raise source.error(where, "its header has no end", COPY_AGAIN, reason="truncated")
     text = source.data[start:end].decode("utf-8", "replace").splitlines()
+    n_x_columns = {"No": 0, "One": 1}.get(head.get("X_Columns", "One"), 2)  # 2: one X column per channel
     fields = {cells[0].strip(): [c.strip() for c in cells[1:]] for cells in (line.split(separator) for line in text)}
+    if n_x_columns == 2:
+        fields = {name: _cells_of_channels(cells) for name, cells in fields.items()}
     decimal_mark = head.get("Decimal_Separator", ".")
     x_line = source.data[source.data.find(b"\nX_Value", end) + 1 : first].decode("utf-8", "replace")
-    names = [name for name in x_line.rstrip("\r\n").split(separator)[1:] if name and name != "Comment"]
+    titles = x_line.rstrip("\r\n").split(separator)[1 :: max(n_x_columns, 1)]
+    names = [name for name in titles if name and name != "Comment"]
     with source.parsed_by("the header", where):
         count = int(fields["Channels"][0])
         samples = [int(s) for s in fields.get("Samples", [])[:count]]
@@ -96,10 +127,18 @@ def _record(
         offsets = [float(x.replace(decimal_mark, ".") or 0.0) for x in _per_channel(fields, "X0", count)]
     if len(names) != count:
         raise source.error(where, f"it names {len(names)} of {count} channels", COPY_AGAIN, reason="truncated")
-    n_x_columns = 0 if head.get("X_Columns") == "No" else 1 if head.get("X_Columns", "One") == "One" else count
-    columns = _columns(source, source.data[first:stop], separator, decimal_mark, count, n_x_columns, where)
+    columns, x = _columns(source, source.data[first:stop], separator, decimal_mark, count, n_x_columns, where)
+    n_write, n_row = 1, len(columns[0]) if columns else 0
+    if samples and len(set(samples)) == 1 and samples[0] > 0 and n_row > samples[0]:
+        n_write, remainder = divmod(n_row, samples[0])
+        if x is not None and len(x) == n_row and np.all(np.diff(x) > 0):  # one write, continued
+            n_write, remainder, samples = 1, 0, [n_row] * count
+        if remainder:
+            problem = f"{n_row} rows follow its header of {samples[0]} samples: no whole number of writes"
+            remedy = "Set 'Segment headers: one header per segment' in LabVIEW, or copy the file again"
+            raise source.error(where, problem, remedy, reason="wrong_length")
     for name, promised, column in zip(names, samples, columns):
-        if len(column) != promised:
+        if len(column) != promised * n_write:
             place = f"{where}, channel {name!r}"
             problem = f"ends after {len(column)} of {promised} samples"
             raise source.error(place, problem, COPY_AGAIN, reason="truncated")
@@ -111,17 +150,27 @@ def _record(
     starts = [a + b for a, b in zip(start_offsets(stamps), offsets)]
     check_simultaneous(names, steps, starts, where, source)
     step = steps[0]
-    return RawRecord(
-        names=tuple(names),
-        samples=columns,
-        rate=1.0 / step if step > 0 else None,
-        rate_tolerance=max(step_precision(step), TEXT_PRECISION),
-        units=tuple(units[:count]) if len(units) >= count else ("",) * count,
-        started_at=_parse_date_and_time(
-            *(_per_channel(fields, name, 1)[0] or head.get(name, "") for name in ("Date", "Time"))
-        ),
-        conditions={name: number_or_text(head[name]) for name in CONDITIONS if name in head},
+    started_at = _parse_date_and_time(
+        *(_per_channel(fields, name, 1)[0] or head.get(name, "") for name in ("Date", "Time"))
     )
+    n_sample = n_row // n_write
+    return [
+        RawRecord(
+            names=tuple(names),
+            samples=[column[i * n_sample : (i + 1) * n_sample] for column in columns],
+            rate=1.0 / step if step > 0 else None,
+            rate_tolerance=max(step_precision(step), TEXT_PRECISION),
+            units=tuple(units[:count]) if len(units) >= count else ("",) * count,
+            started_at=started_at if i == 0 else None,  # of later writes no time is stated
+            conditions={name: number_or_text(head[name]) for name in CONDITIONS if name in head},
+        )
+        for i in range(n_write)
+    ]
+
+
+def _cells_of_channels(cells: list[str]) -> list[str]:
+    """Cells of the channels in a header line with one X column each: every second cell, if those between are empty."""
+    return cells[::2] if not any(cells[1::2]) else cells
 
 
 def _per_channel(fields: Mapping[str, list[str]], name: str, count: int) -> list[str]:
@@ -135,18 +184,19 @@ def _parse_date_and_time(date: str, clock: str) -> datetime | None:
 
 def _columns(
     source: Source, body: bytes, separator: str, decimal_mark: str, count: int, n_x_columns: int, where: str
-) -> list[np.ndarray]:
-    """One array per channel: the rows up to the blank line that ends a segment."""
+) -> tuple[list[np.ndarray], np.ndarray | None]:
+    """One array per channel, and the X column if there is one: the rows up to the blank line that ends a segment."""
     body = body.replace(b"\r", b"")
     for segment_end in (b"\n\n", b"\n" + separator.encode() + b"\n"):
         body = body.partition(segment_end)[0] + b"\n" if segment_end in body else body
     if not body.strip():
-        return [np.empty(0)] * count
+        return [np.empty(0)] * count, None
     if not body.endswith(b"\n"):
         problem = "its last line has no line break: the last number may be cut"
         raise source.error(where, problem, COPY_AGAIN, reason="truncated")
     indices = [1 + 2 * i for i in range(count)] if n_x_columns > 1 else [1 + i for i in range(count)]
     width = indices[-1] + 1
+    indices = [0, *indices] if n_x_columns else indices
     separator_bytes = separator.encode()
     with source.parsed_by("pyarrow", where):
         try:
@@ -154,7 +204,8 @@ def _columns(
         except pa.ArrowInvalid:  # a comment behind the channels: only some rows have one
             rows = [line.split(separator_bytes)[:width] for line in body.splitlines()]
             table = _table(b"\n".join(map(separator_bytes.join, rows)) + b"\n", width, separator, decimal_mark, indices)
-    return [column.to_numpy(zero_copy_only=False) for column in table.columns]
+    columns = [column.to_numpy(zero_copy_only=False) for column in table.columns]
+    return (columns[1:], columns[0]) if n_x_columns else (columns, None)
 
 
 def _table(body: bytes, width: int, separator: str, decimal_mark: str, indices: Sequence[int]) -> pa.Table:

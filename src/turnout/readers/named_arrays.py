@@ -28,6 +28,7 @@ import numpy as np
 from turnout.errors import ReadError
 from turnout.readers.lazy import ARRAYS, Array, Column
 from turnout.readers.source import CONDITIONS, RawFile, RawRecord, Source
+from turnout.readers.stated_scales import scale_problem, scale_statements
 from turnout.readers.timing import EXACT_PRECISION, SINGLE_PRECISION, is_single_precision, parse_time, step_precision
 
 RECORD_NAME = re.compile(r"^(?:record|rec|segment|impact|hit)[_ ]?(\d+)$", re.IGNORECASE)
@@ -178,6 +179,7 @@ STEP_NAMES = ("dt", "delta_t", "sample_interval", "wf_increment")
 TIME_NAMES = ("time", "t", "time_s")
 CHANNEL_NAMES = ("channels", "channel_names", "names", "labels")
 UNIT_NAMES = ("units", "unit", "channel_units")
+STATED_SCALES = "(scales)"  # pairs (channel, statement about its scale) that a reader adds to the variables
 RECORD_COUNT_NAMES = ("n_records", "n_record")
 
 
@@ -197,6 +199,10 @@ class Metadata:
     def __init__(self, variables: Mapping, source: Source, parent: "Metadata | None" = None):
         self.lower = {(k if k == "t" else k.lower()): v for k, v in variables.items() if k != "T"}
         self.parent, self.source = parent, source
+
+    def with_parents(self) -> dict[str, Any]:
+        """All variables of this group and its parent groups; those of the group itself count."""
+        return {**(self.parent.with_parents() if self.parent else {}), **self.lower}
 
     def get(self, names: Sequence[str]) -> Any:
         """The first variable of ``names``, here or in a parent group; ReadError if it is damaged.
@@ -556,4 +562,13 @@ def _raw_record(
         started_at=parse_time(facts.record_value(START_NAMES, k, n)),
         conditions=facts.conditions(k, n),
         time=time,
+        undecided=_undecided_scales(names, facts),
     )
+
+
+def _undecided_scales(names: Sequence[str], facts: Metadata) -> dict[int, str]:
+    """Statements about the scale of channels, by index: of the group, its parents and the channels themselves."""
+    texts = scale_statements(facts.with_parents(), len(names))
+    problems = {i: scale_problem(text) for i, text in enumerate(texts) if text}
+    by_name = dict(facts.get((STATED_SCALES,)) or ())
+    return problems | {i: by_name[name] for i, name in enumerate(names) if name in by_name}

@@ -15,6 +15,7 @@ from turnout.errors import ReadError
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.named_arrays import RECORD_COUNT_NAMES, START_NAMES, TIME_NAMES, Metadata
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
+from turnout.readers.stated_scales import scale_text
 from turnout.readers.timing import TEXT_PRECISION, parse_time
 
 
@@ -41,8 +42,10 @@ def read_raw(source: Source) -> RawFile:
         schema, n_row = file.schema_arrow, file.metadata.num_rows
         rows = RowGroupReader(file) if source.lazy and "record" not in schema.names else None
         columns = _columns(file, rows)
-    facts = Metadata(_notes(schema), source)
+    notes = _notes_of(schema.metadata)
+    facts = Metadata(notes, source)
     units = {field.name: _unit(field) for field in schema}
+    stated = {f.name: scale_text({**notes, **_notes_of(f.metadata)}) for f in schema}
     numbers = columns.pop("record", None)
     edges = [0, n_row]
     if numbers is not None:
@@ -67,6 +70,7 @@ def read_raw(source: Source) -> RawFile:
                 started_at=parse_time(facts.record_value(START_NAMES, k, n)),
                 conditions=facts.conditions(k, n),
                 time=None if time is None else _seconds(columns[time][span]),
+                undecided={i: stated[name] for i, name in enumerate(names) if stated[name]},
             )
         )
     return RawFile(tuple(records) if n_row else (), facts.count(RECORD_COUNT_NAMES))
@@ -132,9 +136,9 @@ class RowGroupReader:
         return self.groups[k]
 
 
-def _notes(schema: pa.Schema) -> dict[str, Any]:
-    """The metadata of the schema as variables, decoded from JSON where possible."""
-    raw = {k.decode("utf-8", "replace"): v.decode("utf-8", "replace") for k, v in (schema.metadata or {}).items()}
+def _notes_of(metadata: dict[bytes, bytes] | None) -> dict[str, Any]:
+    """The metadata of the schema or of a field as variables, decoded from JSON where possible."""
+    raw = {k.decode("utf-8", "replace"): v.decode("utf-8", "replace") for k, v in (metadata or {}).items()}
     notes = {}
     for key, text in raw.items():
         try:

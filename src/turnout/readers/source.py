@@ -191,6 +191,8 @@ class RawRecord:
     ``rate`` [Hz] is None if not stated; ``rate_tolerance`` is the relative precision with which the format can state
     it. ``started_at`` has a time zone only if the format states one. ``time`` [s] is the time column of the file.
     ``aliases`` are further names of the channels. ``unclear`` are lines with a frequency [Hz] in unknown words.
+    ``undecided`` are statements about the scale of channels, by index, of which nothing says whether it is applied.
+    ``above_full_scale`` are the largest numbers of channels of an audio file that are no fractions of full scale.
     """
 
     names: tuple[str, ...]
@@ -203,6 +205,8 @@ class RawRecord:
     time: np.ndarray | None = None
     aliases: tuple[tuple[str, ...], ...] = ()
     unclear: tuple[tuple[str, float], ...] = ()
+    undecided: Mapping[int, str] = field(default_factory=lambda: EMPTY_MAPPING)
+    above_full_scale: Mapping[int, float] = field(default_factory=lambda: EMPTY_MAPPING)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "units", tuple(self.units) or ("",) * len(self.names))
@@ -214,11 +218,13 @@ class RawRecord:
 class RawFile:
     """All records of a file in their order; a damaged record is its ReadError.
 
-    ``expected`` is the number of records that the file itself states, or None.
+    ``expected`` is the number of records that the file itself states, or None. ``remarks`` are reported although the
+    records are used.
     """
 
     records: tuple[RawRecord | ReadError, ...]
     expected: int | None = None
+    remarks: tuple[ReadError, ...] = ()
 
 
 HEAD_SIZE = 4096  # bytes, enough for every signature

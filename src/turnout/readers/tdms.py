@@ -1,11 +1,11 @@
-"""Reader of National Instruments TDMS: each group with samples is a record.
+"""Reader of National Instruments TDMS: each group with samples is a record, or the groups of one record are joined.
 
 npTDMS reads a truncated file without an error. Therefore the file size is compared with the lead-ins of the segments,
 and the length of each channel with ``wf_samples``.
 """
 
 import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from typing import Any, BinaryIO
 
@@ -15,9 +15,15 @@ from turnout.errors import ReadError
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.named_arrays import RECORD_COUNT_NAMES, START_NAMES, Metadata, natural_sort_key
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
+from turnout.readers.stated_scales import scale_text
 from turnout.readers.timing import check_simultaneous, parse_time, start_offsets, step_precision
 
-nptdms.log.log_manager.set_level("ERROR")  # find_truncation turns what it would warn of into an error
+nptdms.log.log_manager.console_handler.setLevel("ERROR")  # turnout.readers passes the warnings on
+BIG_ENDIAN = 1 << 6  # bit of the mask in the lead-in
+# Kinds of scale that npTDMS applies; of any other it only warns, and returns the raw numbers.
+KNOWN_SCALES = frozenset("Polynomial Linear RTD Strain Table Thermistor Thermocouple Add Subtract AdvancedAPI".split())
+APPLIED_PREFIXES = ("wf_", "NI_")  # properties of the time axis and of the scales that npTDMS applies
+MAX_SCALES = 64
 LEAD_IN = 28  # bytes: tag, mask, version, offset of the next segment, offset of the raw data
 UNFINISHED_SEGMENT = 0xFFFFFFFFFFFFFFFF
 
@@ -46,15 +52,57 @@ def read_raw(source: Source) -> RawFile:
         with source.parsed_by("npTDMS", reason="truncated" if truncation else "unreadable"):
             file.seek(0)
             tdms = nptdms.TdmsFile.open(file) if source.lazy else nptdms.TdmsFile.read(file)
-    groups = sorted(
-        (g for g in tdms.groups() if any(len(c) for c in g.channels())), key=lambda g: natural_sort_key(g.name)
-    )
-    names = {channel.name for group in groups for channel in group.channels()}
+    groups = _records_of_groups(tdms.groups(), source)
+    names = {channel.name for channels in groups for channel in channels}
     damaged = _damaged_paths(tdms) if truncation else set()
-    records = [_record(g, k, len(groups), names, damaged, tdms.properties, source) for k, g in enumerate(groups)]
+    records = [_record(g, k, len(groups), names, damaged, tdms, source) for k, g in enumerate(groups)]
     if truncation and not any(isinstance(r, ReadError) for r in records):
         records.append(source.error(f"record {len(records) + 1}", truncation, COPY_AGAIN, reason="truncated"))
     return RawFile(tuple(records), Metadata(tdms.properties, source).count(RECORD_COUNT_NAMES))
+
+
+def _records_of_groups(groups: Sequence[nptdms.TdmsGroup], source: Source) -> list[list[nptdms.TdmsChannel]]:
+    """The channels of each record, in the natural order of the groups' names.
+
+    A group with samples is a record. A logger with one group per task writes the channels of one record into several
+    groups, each with names of its own: these are joined if their time axes are equal. A group without a time axis
+    beside groups that have one holds information, such as the voltage of a battery.
+    """
+    filled = sorted((g for g in groups if any(len(c) for c in g.channels())), key=lambda g: natural_sort_key(g.name))
+    with_axis = [g for g in filled if any("wf_increment" in c.properties for c in g.channels())]
+    axis_names = {c.name for g in with_axis for c in g.channels()}
+    filled = [g for g in filled if g in with_axis or not with_axis or axis_names & {c.name for c in g.channels()}]
+    tasks: dict[frozenset[str], list[nptdms.TdmsGroup]] = {}
+    for group in filled:
+        tasks.setdefault(frozenset(c.name for c in group.channels()), []).append(group)
+    counts = {len(of_task) for of_task in tasks.values()}
+    is_disjoint = sum(map(len, tasks)) == len(frozenset().union(*tasks))
+    if len(tasks) < 2 or not is_disjoint:
+        return [g.channels() for g in filled]
+    names = "; ".join(f"{of_task[0].name!r}: {', '.join(sorted(task))}" for task, of_task in tasks.items())
+    problem = f"its channels lie in groups with different names ({names}), and "
+    export = "Export all channels of a record into one group"
+    if len(counts) > 1:
+        numbers = ", ".join(str(len(of_task)) for of_task in tasks.values())
+        raise source.error("the groups", f"{problem}there are {numbers} of them: they form no records", export)
+    records = list(zip(*tasks.values()))
+    for groups_of_record in records:
+        axes = [_time_axis(g.channels()[0], source) for g in groups_of_record]
+        if any(axis != axes[0] for axis in axes):
+            listed = "; ".join(f"{g.name!r}: {_axis_text(*axis)}" for g, axis in zip(groups_of_record, axes))
+            remedy = f"Start all tasks by one trigger at one rate. {export}"
+            raise source.error("the groups", f"{problem}their time axes differ ({listed})", remedy, "clock_drift")
+    return [[c for g in groups_of_record for c in g.channels()] for groups_of_record in records]
+
+
+def _time_axis(channel: nptdms.TdmsChannel, source: Source) -> tuple[int, float, Any]:
+    """Number of samples, step [s] and start of a channel, 0 and None if not stated."""
+    facts = Metadata(channel.properties, source)
+    return len(channel), facts.number(("wf_increment",)) or 0.0, facts.record_value(("wf_start_time",), 0, 1)
+
+
+def _axis_text(n_sample: int, step: float, start: Any) -> str:
+    return f"{n_sample} samples of {step:.9g} s from {start or 'no time'}"
 
 
 def find_truncation(file: BinaryIO, size: int) -> str:
@@ -78,7 +126,8 @@ def find_truncation(file: BinaryIO, size: int) -> str:
         lead_in = file.read(LEAD_IN)
         if len(lead_in) < LEAD_IN:
             return f"it ends within the lead-in of a segment, at byte {size}"
-        segment_size = struct.unpack_from("<Q", lead_in, 12)[0]
+        byte_order = ">" if struct.unpack_from("<I", lead_in, 4)[0] & BIG_ENDIAN else "<"
+        segment_size = struct.unpack_from(f"{byte_order}Q", lead_in, 12)[0]
         if lead_in[:4] != b"TDSm":
             return f"there is no segment at byte {position}"
         if segment_size == UNFINISHED_SEGMENT:
@@ -93,28 +142,29 @@ def _damaged_paths(tdms: nptdms.TdmsFile) -> set[str]:
     return {path for path, status in statuses.items() if status.read_length < status.expected_length}
 
 
-def _record(group: nptdms.TdmsGroup, *context: Any) -> RawRecord | ReadError:
-    """One group as a record, or its error."""
+def _record(channels: Sequence[nptdms.TdmsChannel], *context: Any) -> RawRecord | ReadError:
+    """The channels of one record as such, or its error."""
     try:
-        return _complete_record(group, *context)
+        return _complete_record(channels, *context)
     except ReadError as error:
         return error
 
 
 def _complete_record(
-    group: nptdms.TdmsGroup,
+    channels: Sequence[nptdms.TdmsChannel],
     k: int,
     n: int,
     names: set[str],
     damaged: set[str],
-    properties: Mapping[str, Any],
+    tdms: nptdms.TdmsFile,
     source: Source,
 ) -> RawRecord:
-    where = f"record {k + 1} of {n} (group {group.name!r})"
-    channels = group.channels()
+    groups = {c.group_name: tdms[c.group_name].properties for c in channels}
+    where = f"record {k + 1} of {n} (group {' and '.join(map(repr, groups))})"
     if missing := names - {c.name for c in channels}:
         problem = f"it lacks the channel {min(missing)!r} that other groups have"
-        raise source.error(where, problem, COPY_AGAIN, reason="truncated")
+        remedy = f"{COPY_AGAIN}; if it is so there too, export all channels of a record into one group"
+        raise source.error(where, problem, remedy, reason="truncated")
     for channel in channels:
         promised = Metadata(channel.properties, source).number(("wf_samples",))
         # for a channel written in several segments it counts the samples of the last one
@@ -126,7 +176,12 @@ def _complete_record(
     rate_fields = {"rate": 1.0 / step, "rate_tolerance": step_precision(step)} if step else None
     with source.parsed_by("npTDMS", where):
         samples = [_numbers(c, source.lazy) for c in channels]
-    facts = Metadata({**properties, **group.properties, **channels[0].properties}, source)
+    facts = Metadata({**tdms.properties, **groups[channels[0].group_name], **channels[0].properties}, source)
+    undecided = {
+        i: text
+        for i, c in enumerate(channels)
+        if (text := _scale_text(c.properties, groups[c.group_name], tdms.properties))
+    }
     return RawRecord(
         names=tuple(c.name for c in channels),
         samples=samples,
@@ -134,11 +189,26 @@ def _complete_record(
         units=tuple(str(c.properties.get("unit_string", "") or "") for c in channels),
         started_at=parse_time(facts.record_value(("wf_start_time", *START_NAMES), 0, 1)),
         conditions=facts.conditions(0, 1),
-        aliases=tuple((f"{group.name}/{c.name}",) for c in channels),
+        aliases=tuple((f"{c.group_name}/{c.name}",) for c in channels),
+        undecided=undecided,
     )
 
 
-def _common_step(channels: list[nptdms.TdmsChannel], where: str, source: Source) -> float:
+def _scale_text(*levels: Mapping[str, Any]) -> str:
+    """What the properties of a channel, its group and the file state of a scale that npTDMS does not apply."""
+    for properties in levels:
+        count = properties.get("NI_Number_Of_Scales", properties.get("NI_Number_of_Scales", 0))
+        if not str(count).isdigit() or int(count) == 0 or properties.get("NI_Scaling_Status") == "scaled":
+            continue
+        kinds = [properties.get(f"NI_Scale[{i}]_Scale_Type") for i in range(min(int(count), MAX_SCALES))]
+        if unknown := sorted({str(kind) for kind in kinds if kind is not None} - KNOWN_SCALES):
+            return f"the file states the scale {', '.join(map(repr, unknown))}, which npTDMS cannot apply"
+        break
+    merged = {k: v for level in reversed(levels) for k, v in level.items() if not k.startswith(APPLIED_PREFIXES)}
+    return scale_text(merged)
+
+
+def _common_step(channels: Sequence[nptdms.TdmsChannel], where: str, source: Source) -> float:
     """Step [s] of all channels, 0 if not stated; a channel begins at its time stamp plus ``wf_start_offset``."""
     facts = [Metadata(c.properties, source) for c in channels]
     steps = [f.number(("wf_increment",)) or 0.0 for f in facts]

@@ -72,9 +72,41 @@ def read_raw(source: Source) -> RawFile:
     sets = [s for s in all_sets if s.dataset_type in ("", "58", "58b")]
     wanted = [s for s in sets if s.damage or _is_time_response(s)]
     if not wanted or not any(s.dataset_type for s in wanted):
-        problem = wanted[0].damage if wanted else f"it holds {len(sets)} functions and no time response"
-        raise source.error(f"byte {wanted[0].offset if wanted else 0}", problem, COPY_AGAIN)
+        if damaged := [s for s in wanted if s.damage]:
+            raise source.error(f"byte {damaged[0].offset}", damaged[0].damage, COPY_AGAIN)
+        problem = f"it holds {_contents(all_sets)} and no time response"
+        raise source.error("the file", problem, _remedy_without_time(sets), reason="empty")
     return RawFile(tuple(_records(wanted, declares_si(data, all_sets), source)), _promised_count(wanted))
+
+
+# Function types of dataset 58 and other data sets that analysers export.
+FUNCTION_NAMES = {
+    0: "general function", 2: "auto spectrum", 3: "cross spectrum", 4: "frequency response", 5: "transmissibility",
+    6: "coherence", 7: "auto correlation", 8: "cross correlation", 9: "power spectral density",
+    10: "energy spectral density", 12: "spectrum", 13: "cumulative frequency distribution", 17: "impulse response",
+}  # fmt: skip
+DATASET_NAMES = {
+    "15": "set of nodes", "2411": "set of nodes", "82": "set of trace lines", "2412": "set of elements",
+    "55": "mode shape", "2414": "mode shape", "151": "header", "164": "statement of units",
+}  # fmt: skip
+
+
+def _contents(sets: Sequence[UffDataset]) -> str:
+    """What a file holds, in words: "3 x frequency response, 2 x mode shape"."""
+    words = [
+        FUNCTION_NAMES.get(s.func_type, f"function of type {s.func_type}")
+        if s.dataset_type in ("58", "58b")
+        else DATASET_NAMES.get(s.dataset_type, f"data set {s.dataset_type}")
+        for s in sets
+    ]
+    return ", ".join(f"{n} x {word}" for word, n in Counter(words).items())
+
+
+def _remedy_without_time(sets: Sequence[UffDataset]) -> str:
+    export = "Export the time responses of force and acceleration of each impact (function type 1) from the analyser"
+    if any(s.func_type == FREQUENCY_RESPONSE for s in sets):
+        return f"{export}, or get the modes of its frequency responses with turnout.modes_of_frf"
+    return export
 
 
 def _promised_count(sets: Sequence[UffDataset]) -> int | None:

@@ -2,7 +2,8 @@
 
 libsndfile reads a truncated file without an error. Therefore the file size is compared with the chunk sizes in the
 header. Integers (16, 24 bit) are read as fractions of full scale, -1 to 1: set ``unit: 10 V`` in the layout if full
-scale is 10 V. Metadata in a JSON comment are used (``channels``, ``units``, ``started_at``, conditions).
+scale is 10 V. Floating-point numbers above 1 are no fractions: a layout with such a unit rejects them. Metadata in a
+JSON comment are used (``channels``, ``units``, ``started_at``, conditions).
 """
 
 import json
@@ -16,8 +17,10 @@ import soundfile
 
 from turnout.readers.lazy import LazyMatrix
 from turnout.readers.named_arrays import CHANNEL_NAMES, START_NAMES, UNIT_NAMES, Metadata, list_of_texts
-from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
+from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, RawFile, RawRecord, Source
+from turnout.readers.stated_scales import scale_problem, scale_statements
 from turnout.readers.timing import parse_time
+from turnout.records import EMPTY_MAPPING
 
 UNKNOWN_LENGTH = 0xFFFFFFFF
 
@@ -45,7 +48,7 @@ def read_raw(source: Source) -> RawFile:
             raise source.error("the header", truncation, COPY_AGAIN, reason="truncated")
         raw.seek(0)
         with source.parsed_by("libsndfile"), soundfile.SoundFile(raw.fileno(), closefd=False) as file:
-            rate, comment = file.samplerate, file.comment
+            rate, comment, is_float = file.samplerate, file.comment, file.subtype in FLOAT_SUBTYPES
             frames = Frames(source.path, file.frames, file.channels)
             samples = (
                 LazyMatrix(frames, transposed=True) if source.lazy else file.read(dtype="float64", always_2d=True).T
@@ -64,8 +67,23 @@ def read_raw(source: Source) -> RawFile:
         started_at=parse_time(facts.record_value(START_NAMES, 0, 1)),
         conditions=facts.conditions(0, 1),
         aliases=tuple((str(i),) for i in range(n)),
+        undecided={i: scale_problem(text) for i, text in enumerate(scale_statements(facts.lower, n)) if text},
+        above_full_scale=_above_full_scale(samples) if is_float else EMPTY_MAPPING,
     )
     return RawFile((record,))
+
+
+FLOAT_SUBTYPES = ("FLOAT", "DOUBLE")
+
+
+def _above_full_scale(samples: np.ndarray | LazyMatrix) -> dict[int, float]:
+    """Largest absolute number of each channel of a file of floating-point numbers, where it exceeds 1."""
+    largest = np.zeros(len(samples))
+    for start in range(0, samples.shape[1], BLOCK_SIZE):
+        stop = min(start + BLOCK_SIZE, samples.shape[1])
+        block = samples.block(start, stop) if isinstance(samples, LazyMatrix) else samples[:, start:stop]
+        largest = np.fmax(largest, np.fmax(np.max(block, axis=1), -np.min(block, axis=1)))
+    return {i: float(x) for i, x in enumerate(largest) if x > 1.0}
 
 
 @dataclass(frozen=True)
@@ -120,7 +138,11 @@ def find_truncation(file: BinaryIO, size: int) -> str:
         if position + 8 + length > size:
             return f"its chunk {tag.decode('latin-1')!r} ends after {size - position - 8} of {length} bytes"
         has_samples = has_samples or tag == b"data"
+        if tag == b"RIFF" or not tag.decode("latin-1").isprintable() or not tag.isascii():
+            return f"at byte {position} {tag!r} is no chunk of one file: bytes were inserted or another file appended"
         position += 8 + length + length % 2
+    if 0 < size - position:
+        return f"it has {size - position} bytes behind its last chunk: inserted bytes shift the samples behind them"
     if not has_samples:
         return f"the file ends after {size} bytes, before its samples"
     expected_size = 8 + long_sizes.get(b"RIFF", struct.unpack_from("<I", head, 4)[0])

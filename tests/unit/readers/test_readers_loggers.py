@@ -1,0 +1,320 @@
+"""Recordings as loggers and analysers write them: what a file states about scale and structure is applied or named.
+
+The files are written by the programs in ``shared/inputs/recordings``. Their impacts are known exactly.
+"""
+
+import os
+import runpy
+import subprocess
+import sys
+
+import h5py
+import nptdms
+import numpy as np
+import pytest
+import soundfile
+
+from turnout.errors import ReadError
+from turnout.readers import read
+from turnout.records import RawChannel, RawDescription
+
+RATE = 20000.0
+
+
+@pytest.fixture(scope="session")
+def made(shared_recordings, tmp_path_factory):
+    """Function: name of an input -> folder with its files."""
+    folders = {}
+
+    def make(name):
+        if name not in folders:
+            folders[name] = tmp_path_factory.mktemp(name)
+            environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}
+            command = [sys.executable, str(shared_recordings / name / "make.py")]
+            subprocess.run(command, cwd=folders[name], env=environment, check=True, capture_output=True)
+        return folders[name]
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def impacts(shared_recordings):
+    """Force and acceleration of ten records, (10, 2, 3000), as the programs write them."""
+    return np.array(runpy.run_path(str(shared_recordings / "gen.py"))["hits"]())
+
+
+@pytest.fixture(scope="session")
+def stream(shared_recordings):
+    """Six impacts in one record, (2, 60000)."""
+    hits = runpy.run_path(str(shared_recordings / "gen.py"))["hits"]
+    return np.concatenate(hits(n=10000, n_hit=6, pre=2000), axis=1)
+
+
+def layout(unit_of_force=None, unit_of_rail=None, rate=RATE, force="force", rail="rail", **fields):
+    channels = (
+        RawChannel("force", force, "force", unit=unit_of_force),
+        RawChannel("rail", rail, "acceleration", unit=unit_of_rail),
+    )
+    return RawDescription(channels, rate=rate, **fields)
+
+
+def errors_of(path, description):
+    try:
+        return [str(error) for error in read(path.name, path.parent, description).errors]
+    except ReadError as error:
+        return [str(error)]
+
+
+def samples_of(path, description):
+    result = read(path.name, path.parent, description)
+    assert not result.errors, result.errors
+    return np.array([recording.samples for recording in result.recordings])
+
+
+def test_the_linear_scale_of_a_tdms_file_is_applied(made, impacts):
+    samples = samples_of(made("01_tdms_scale_kind") / "linear.tdms", layout())
+    np.testing.assert_allclose(samples[:, 0], impacts[:, 0], atol=0.126)  # half a step of 0.25 N
+    np.testing.assert_allclose(samples[:, 1], impacts[:, 1], atol=0.0021)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [("piecewise", "PiecewisePolynomial"), ("maplin", "MapRanges"), ("piecewise_force_only", "PiecewisePolynomial")],
+)
+def test_a_scale_that_cannot_be_applied_is_rejected_by_name(made, name, kind):
+    path = made("01_tdms_scale_kind") / f"{name}.tdms"
+    errors = errors_of(path, layout())
+    assert len(errors) == 10
+    assert (
+        f"record 1 of 10, channel 'force': the file states the scale '{kind}', which npTDMS cannot apply" in errors[0]
+    )
+    assert "unit: 'N!'" in errors[0]
+
+
+def test_a_unit_that_overrules_the_file_decides_about_its_scale(made, impacts):
+    path = made("01_tdms_scale_kind") / "piecewise_force_only.tdms"
+    samples = samples_of(path, layout("0.4 N!"))
+    np.testing.assert_allclose(samples[:, 0], impacts[:, 0], atol=0.21)
+
+
+@pytest.mark.parametrize("name", ["cf.nc", "cf_force.h5"])
+def test_packed_numbers_of_netcdf_are_unpacked(made, impacts, name):
+    samples = samples_of(made("05_hdf5_scale_factor") / name, layout())
+    np.testing.assert_allclose(samples[:, 0], impacts[:, 0], atol=0.21)
+    np.testing.assert_allclose(samples[:, 1], impacts[:, 1], atol=1 / 32 + 1e-3)
+
+
+def test_fill_values_of_netcdf_are_missing_samples(made):
+    path = made("05_hdf5_scale_factor") / "cf_fill.h5"
+    result = read(path.name, path.parent, layout())
+    assert [r.record for r in result.recordings] == [0, 1, 2, *range(4, 10)]
+    (error,) = result.errors
+    assert error.reason == "not_finite"
+    assert "record 4 of 10, channel 'force': 4 of 3000 samples are missing or not finite, the first is sample 1500" in (
+        str(error)
+    )
+
+
+def test_packed_numbers_that_stay_in_the_file_are_unpacked_block_by_block(tmp_path):
+    packed = np.arange(300_000, dtype="int32") % 1000
+    with h5py.File(tmp_path / "long.h5", "w") as file:
+        file.attrs["rate"] = RATE
+        for name in ("force", "rail"):
+            dataset = file.create_dataset(name, data=packed)
+            dataset.attrs.update({"scale_factor": 0.5, "add_offset": -3.0, "units": "N" if name == "force" else "m/s2"})
+    description = layout(kind="passage")
+    (recording,) = read("long.h5", tmp_path, description, 1.0, max_whole_file_size=0).long_recordings
+    np.testing.assert_array_equal(recording.read(500, 700)[1], 0.5 * packed[500:700] - 3.0)
+
+
+def test_a_gain_that_may_be_in_the_numbers_is_rejected_by_name(made):
+    errors = errors_of(made("05_hdf5_scale_factor") / "gain_offset.h5", layout())
+    assert "channel 'force': the file states gain = 0.4, and nothing says whether its numbers already" in errors[0]
+
+
+def test_a_gain_is_rejected_in_every_format_that_can_state_one(tmp_path):
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+    import scipy.io
+
+    t = np.arange(400) / RATE
+    force, rail = np.sin(900 * t), np.cos(700 * t)
+    columns = {"force": force, "rail": rail}
+    scipy.io.savemat(tmp_path / "a.mat", columns | {"fs": RATE, "gain": 0.4, "units": ["N", "m/s2"]})
+    np.savez(tmp_path / "a.npz", **columns, fs=RATE, scale=[0.4, 1.0], units=["N", "m/s2"])
+    text = "Verstärkung;0,4;1\nforce [N];rail [m/s²]\n" + "".join(f"{f};{a}\n" for f, a in zip(force, rail))
+    (tmp_path / "a.csv").write_text(text.replace(".", ","), encoding="utf-8")
+    fields = [
+        pa.field(n, pa.float64(), metadata={"unit": u} | ({"Gain": "0.4"} if n == "force" else {}))
+        for n, u in (("force", "N"), ("rail", "m/s2"))
+    ]
+    pq.write_table(pa.table(list(columns.values()), schema=pa.schema(fields)), tmp_path / "a.parquet")
+    with nptdms.TdmsWriter(tmp_path / "a.tdms") as file:
+        facts = {"wf_increment": 1 / RATE, "unit_string": "N", "Scale factor": 0.4}
+        other = facts | {"unit_string": "m/s2", "Scale factor": 1.0}
+        channels = nptdms.ChannelObject("r", "force", force, facts), nptdms.ChannelObject("r", "rail", rail, other)
+        file.write_segment(channels)
+    for name in ("a.mat", "a.npz", "a.csv", "a.parquet", "a.tdms"):
+        (error,) = errors_of(tmp_path / name, layout())
+        assert "channel 'force': the file states" in error and " = 0.4, and nothing says" in error, error
+        decided = RawChannel("rail", "rail", "acceleration", unit="m/s²!")
+        description = RawDescription((RawChannel("force", "force", "force", unit="0.4 N!"), decided), rate=RATE)
+        np.testing.assert_allclose(samples_of(tmp_path / name, description)[0, 0], 0.4 * force, atol=1e-9)
+
+
+@pytest.mark.parametrize("facts", [{"gain": 1.0, "offset": 0.0}, {"time_offset": 3.0}, {"sensitivity": 10.0}, {}])
+def test_a_neutral_scale_and_other_facts_are_no_reason_to_reject(tmp_path, facts):
+    np.savez(tmp_path / "a.npz", force=np.arange(9.0), rail=np.arange(9.0), fs=RATE, units=["N", "m/s2"], **facts)
+    assert samples_of(tmp_path / "a.npz", layout()).shape == (1, 2, 9)
+
+
+def test_the_warning_of_a_library_is_passed_on(tmp_path):
+    path = tmp_path / "version.tdms"
+    with nptdms.TdmsWriter(path) as file:
+        facts = {"wf_increment": 1 / RATE}
+        file.write_segment(
+            [nptdms.ChannelObject("r", n, np.arange(9.0), facts | {"unit_string": u}) for n, u in
+             (("force", "N"), ("rail", "m/s2"))]
+        )  # fmt: skip
+    data = bytearray(path.read_bytes())
+    data[8:12] = (4999).to_bytes(4, "little")
+    path.write_bytes(data)
+    result = read(path.name, tmp_path, layout())
+    assert len(result.recordings) == 1
+    (warning,) = result.errors
+    assert warning.reason == "library_warning" and "Unrecognised version number: 4999" in str(warning)
+
+
+def test_numbers_above_full_scale_are_no_fractions_of_it(made, stream):
+    folder = made("10_wav_float")
+    channels = (
+        RawChannel("force", 0, "force", unit="10 V", sensitivity=1.0, sensitivity_unit="mV/N"),
+        RawChannel("rail", 1, "acceleration", unit="10 V", sensitivity=10.0, sensitivity_unit="mV/(m/s²)"),
+    )
+    description = RawDescription(channels, rate=RATE)
+    for name in ("float_volts.wav", "double_volts.wav"):
+        (error,) = errors_of(folder / name, description)
+        assert "channel 'force': its numbers reach 4.946, so they are no fractions of the full scale '10 V'" in error
+    step = 10.0 / 2**15
+    pcm = samples_of(folder / "pcm16.wav", description)[0]
+    np.testing.assert_allclose(pcm[0], stream[0], atol=step / 1e-3)
+    np.testing.assert_allclose(pcm[1], stream[1], atol=step / 10e-3)
+    in_volts = RawDescription(tuple(RawChannel(c.name, c.source, c.quantity, "V", c.sensitivity, c.sensitivity_unit)
+                                    for c in channels), rate=RATE)  # fmt: skip
+    np.testing.assert_allclose(samples_of(folder / "float_volts.wav", in_volts)[0], stream, rtol=1e-6, atol=1e-3)
+
+
+@pytest.mark.parametrize("name", ["two_groups.tdms", "two_groups_info.tdms"])
+def test_the_groups_of_one_record_are_joined(made, stream, name):
+    np.testing.assert_array_equal(samples_of(made("13_tdms_groups_per_task") / name, layout()), stream[None])
+
+
+def test_groups_that_start_at_other_times_are_not_joined(tmp_path):
+    with nptdms.TdmsWriter(tmp_path / "a.tdms") as file:
+        for group, name, start in (("Hammer", "force", 0), ("Accel", "rail", 1)):
+            facts = {"wf_increment": 1 / RATE, "wf_start_time": np.datetime64(f"2026-05-13T08:00:0{start}")}
+            file.write_segment([nptdms.ChannelObject(group, name, np.arange(9.0), facts)])
+    (error,) = errors_of(tmp_path / "a.tdms", layout("N", "m/s²"))
+    assert "its channels lie in groups with different names ('Accel': rail; 'Hammer': force)" in error
+    assert "9 samples of 5e-05 s from 2026-05-13T08:00:01" in error and "Copy" not in error
+
+
+def test_a_big_endian_tdms_file_is_complete(made, impacts):
+    np.testing.assert_array_equal(samples_of(made("28_tdms_big_endian") / "big_endian.tdms", layout()), impacts)
+
+
+def test_lvm_with_one_x_column_per_channel(made, impacts):
+    np.testing.assert_allclose(samples_of(made("03_lvm_multi") / "multi.lvm", layout()), impacts, atol=5.1e-7)
+
+
+@pytest.mark.parametrize("name", ["one_header.lvm", "one_header_x.lvm"])
+def test_lvm_with_one_header_for_ten_impacts(made, impacts, name):
+    np.testing.assert_allclose(samples_of(made("04_lvm_one_header") / name, layout()), impacts, atol=5.1e-7)
+
+
+def test_lvm_with_one_header_and_continued_time_is_one_record(made, impacts, tmp_path):
+    text = (made("04_lvm_one_header") / "one_header_x.lvm").read_text()
+    head, _, body = text.partition("Comment\n")
+    rows = [row.partition("\t")[2] for row in body.splitlines()]
+    path = tmp_path / "continued.lvm"
+    path.write_text(f"{head}Comment\n" + "".join(f"{i / RATE:.6f}\t{row}\n" for i, row in enumerate(rows)))
+    np.testing.assert_allclose(samples_of(path, layout()), [np.hstack(impacts)], atol=5.1e-7)
+    path.write_text("\n".join(text.splitlines()[:-7]) + "\n")
+    (error,) = errors_of(path, layout())
+    assert "29993 rows follow its header of 3000 samples: no whole number of writes" in error
+
+
+def test_lvm_without_a_header_says_what_it_is(made):
+    (error,) = errors_of(made("04_lvm_one_header") / "no_header.lvm", layout())
+    assert "LabVIEW wrote it with the setting 'Segment headers: no headers'" in error and "Copy" not in error
+
+
+@pytest.mark.parametrize("name", ["thousands_tab.txt", "thousands_dot.txt", "thousands_only_rail.txt"])
+def test_marks_for_thousands_are_named(made, name):
+    (error,) = errors_of(made("15_csv_cells") / name, layout())
+    assert "has a mark for thousands" in error and ("column 'rail'" if "only" in name else "column 'force'") in error
+
+
+def test_decimals_are_no_marks_for_thousands(tmp_path):
+    """Temperatures in steps of a half, and numbers of three decimals of which some are whole."""
+    rows = [f"{20 + i % 2 / 2:g};{1 + (i % 7) * 0.125:g}\n" for i in range(200)]
+    (tmp_path / "a.csv").write_text("force [N];rail [m/s²]\n" + "".join(rows))
+    assert samples_of(tmp_path / "a.csv", layout())[0, :, 1].tolist() == [20.5, 1.125]
+
+
+@pytest.mark.parametrize("name", ["footer.csv", "quoted.csv", "quoted_comma.csv", "sep_line.csv"])
+def test_text_of_spreadsheets_and_loggers(made, stream, name):
+    np.testing.assert_allclose(samples_of(made("15_csv_cells") / name, layout())[0], stream, atol=5.1e-5)
+
+
+def test_the_sign_of_infinity_is_named_with_its_line(made):
+    (error,) = errors_of(made("15_csv_cells") / "infinity.csv", layout())
+    assert "column 'force': '∞' is no number" in error
+
+
+def test_text_without_its_last_line_break_is_read(tmp_path):
+    rows = "".join(f"{i * 1.0:.3f},{i * 0.5:.3f}\n" for i in range(40))
+    path = tmp_path / "a.csv"
+    path.write_text("force [N],rail [m/s²]\n" + rows[:-1])
+    assert samples_of(path, layout()).shape == (1, 2, 40)
+    path.write_text("force [N],rail [m/s²]\n" + rows[:-2])
+    result = read(path.name, tmp_path, layout())
+    assert result.recordings[0].samples.shape == (2, 39)
+    (error,) = result.errors
+    assert error.reason == "truncated" and "line 41: the last line has no line break" in str(error)
+
+
+def test_a_universal_file_without_time_responses_says_what_it_holds(shared_data):
+    folder = shared_data / "uff58_reader_samples"
+    found = []
+    for path in sorted(folder.rglob("*.uff")):
+        found += [e for e in errors_of(path, layout("N", "m/s²", rate=None)) if "no time response" in e]
+    assert found and all("it holds" in e and "Copy" not in e for e in found), found
+    assert any("x frequency response" in e and "turnout.modes_of_frf" in e for e in found)
+
+
+@pytest.mark.parametrize("copies", [2, 3])
+def test_a_file_appended_to_itself_is_named(tmp_path, copies):
+    rows = "".join(f"{i}.25,{i}.5\n" for i in range(40))
+    path = tmp_path / "a.csv"
+    path.write_text(("force [N],rail [m/s²]\n" + rows) * copies)
+    (error,) = errors_of(path, layout())
+    assert f"are in it {copies} times: it was appended to itself" in error
+    path.write_text("force [N],rail [m/s²]\n" + rows * copies)  # a periodic signal is none
+    assert samples_of(path, layout()).shape[2] == 40 * copies
+
+
+def test_bytes_inserted_into_audio_are_found(tmp_path):
+    path = tmp_path / "a.wav"
+    soundfile.write(path, np.random.default_rng(1).uniform(-1, 1, (500, 2)), 20000, "PCM_16")
+    data = path.read_bytes()
+    at = data.find(b"data") + 108
+    description = layout("10 N", "10 m/s²", force=0, rail=1)
+    for inserted in (b"\0", b"abc", bytes(8), bytes(40)):
+        path.write_bytes(data[:at] + inserted + data[at:])
+        (error,) = errors_of(path, description)
+        assert "inserted" in error or "ends after" in error
+    path.write_bytes(data + data)
+    assert "appended" in errors_of(path, description)[0]
+    path.write_bytes(data + b"LIST" + (4).to_bytes(4, "little") + b"INFO")  # a chunk that an editor appended
+    assert samples_of(path, description).shape == (1, 2, 500)
