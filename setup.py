@@ -11,6 +11,7 @@ from setuptools.command.build_py import build_py
 ROOT = Path(__file__).parent
 SHIPPED = (
     "Snakefile",
+    "docs/glossary.md",
     "rules/*.smk",
     "scripts/*.py",
     "profiles/*/config.yaml",

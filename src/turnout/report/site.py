@@ -14,6 +14,7 @@ from turnout import __version__
 from turnout.files import temporary_path
 from turnout.report.formatting import count_of
 from turnout.report.pages.fleet import fleet_page
+from turnout.report.pages.glossary import glossary_page
 from turnout.report.pages.turnout import turnout_page
 from turnout.report.source import ROWS, FleetSource
 from turnout.report.stale_pages import HASH_MARK, page_hash, page_hashes
@@ -36,7 +37,7 @@ def write_pages(
     writer: Callable[[dict[str, str]], None] | None = None,
     day: str | None = None,
 ) -> int:
-    """Write ``folder``/index.html, and ``folder``/turnouts/<id>.html where its content has changed.
+    """Write ``folder``/index.html and glossary.html, and ``folder``/turnouts/<id>.html where its content has changed.
 
     Pages of turnouts that are no longer in the registry are removed.
 
@@ -60,13 +61,14 @@ def write_pages(
     Returns
     -------
     int
-        Number of pages written.
+        Number of pages written, without the glossary.
     """
     folder = Path(folder)
     (folder / "turnouts").mkdir(parents=True, exist_ok=True)
     environment, shared = page_environment(), shared_by_pages(generation)
     source = FleetSource(connection, day)
     replace_page(folder / "index.html", fleet_page(source, environment.get_template("fleet.html"), shared))
+    replace_page(folder / "glossary.html", glossary_page(environment.get_template("glossary.html"), shared))
     content = page_hashes(source)
     if turnouts is None:
         _remove_stale(folder / "turnouts", content)
