@@ -14,6 +14,7 @@ COMMANDS: tuple[str, ...] = (
     "distinguish",
     "hammer",
     "init",
+    "inspect",
     "nightly",
     "passage",
     "plan",

@@ -99,7 +99,7 @@ def _cut_recording(recording: Recording, force: str, response: str, settings: Re
     zero = float(np.median(f[usable]))
     f = f - zero
     noise = MAD_TO_SD * float(np.median(np.abs(f[usable])))
-    impacts, level = _find_triggers(f, noise, recording.rate, settings)
+    impacts, level = find_triggers(f, noise, recording.rate, settings)
     if not impacts:
         detail = f"the force reaches {np.max(np.abs(f)):.3g} N, an impact would exceed {level:.3g} N"
         silent = Rejection("no_impact", float(np.max(np.abs(f))), level, detail)
@@ -135,13 +135,29 @@ def _not_finite(finite: np.ndarray, record: Cut, start: int = 0) -> Rejection | 
     return Rejection("not_finite", float(bad.size), 0.0, detail, channel.name, time=first / record.rate)
 
 
-def _find_triggers(
+def find_triggers(
     f: np.ndarray, noise: float, rate: float, settings: ReceptanceSettings
 ) -> tuple[list[tuple[int, int]], float]:
-    """(first, last) sample above the trigger for each impact, and the trigger [N].
+    """Samples above the trigger of each impact.
 
     The typical peak is the upper quartile of all candidates, so that neither handling noise nor one overflow shifts
     the trigger.
+
+    Parameters
+    ----------
+    f : (n_sample,) array of float
+        Force without its zero line. [N, or any unit of a force]
+    noise : float
+        Standard deviation of its noise. [unit of ``f``]
+    rate : float
+        Sampling rate. [Hz]
+    settings : ReceptanceSettings
+        Trigger and separation of impacts.
+
+    Returns
+    -------
+    tuple of (list of (int, int), float)
+        First and last sample above the trigger for each impact, and the trigger [unit of ``f``].
     """
     size = np.abs(f)
     level = max(settings.trigger * noise, settings.contact_level * size.max() / 4, np.finfo(float).tiny)

@@ -10,10 +10,10 @@ from os import PathLike
 from turnout.errors import ReadError, TurnoutError
 from turnout.readers.formats import FORMATS, Format, detect_format, reject_spreadsheet
 from turnout.readers.interpret import convert_records
-from turnout.readers.source import COPY_AGAIN, RawRecord, Source, load
+from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source, load
 from turnout.records import LongRecording, RawDescription, ReadResult, Recording
 
-__all__ = ["FORMATS", "names_and_units", "read"]
+__all__ = ["FORMATS", "names_and_units", "read", "read_unconverted"]
 
 LOG = logging.getLogger("turnout.readers")
 
@@ -83,6 +83,37 @@ def read(
     return ReadResult(recordings=recordings_in_memory, errors=errors, sha256=digest, long_recordings=long_recordings)
 
 
+def read_unconverted(
+    path: PathLike | str, root: PathLike | str, format: str = "auto", is_lazy: bool = False
+) -> tuple[Source, str, RawFile]:
+    """The records of a raw file as they are in it, without any layout.
+
+    Parameters
+    ----------
+    path, root : path-like
+        As for ``read``.
+    format : str
+        A key of ``FORMATS``, or "auto".
+    is_lazy : bool
+        Leave long columns in the file, where the format allows it, until they are sliced.
+
+    Returns
+    -------
+    tuple of (Source, str, RawFile)
+        The file, the key of its format in ``FORMATS``, and its records.
+
+    Raises
+    ------
+    ReadError
+        If the file as a whole cannot be read.
+    """
+    source = replace(load(path, root), lazy=is_lazy)
+    with _as_read_error(source):
+        found = _format_of(source, RawDescription((), format=format))
+        raw = found.read_raw(source)
+    return source, next(name for name, known in FORMATS.items() if known is found), raw
+
+
 def names_and_units(path: PathLike | str, root: PathLike | str, format: str = "auto") -> tuple[tuple[str, str], ...]:
     """Name and unit of every channel of a raw file, as the file states them in its first intact record.
 
@@ -103,9 +134,8 @@ def names_and_units(path: PathLike | str, root: PathLike | str, format: str = "a
     ReadError
         If the file cannot be read, or holds no intact record.
     """
-    source = load(path, root)
-    with _as_read_error(source):
-        records = _format_of(source, RawDescription((), format=format)).read_raw(source).records
+    source, _, raw = read_unconverted(path, root, format)
+    records = raw.records
     for record in records:
         if isinstance(record, RawRecord):
             return tuple(zip(record.names, record.units))

@@ -1,0 +1,99 @@
+"""Show what raw files contain, before any layout exists.
+
+  turnout inspect log_17.uff
+  turnout inspect /media/stick --json
+  turnout inspect A7_1.tdms --plot
+
+Of each file: format, records, rate with every place that states it, times, channels with their units and extremes,
+which channel may be the force and which the response, impacts or trains. For a folder, one line per file. --plot
+draws every channel into <name of the file>.svg in the present folder. Nothing else is written.
+
+Exit code 1 where a file cannot be read or has a problem.
+"""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+HELP = "show what raw files contain, without a layout"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Files or folders, and the form of the answer.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command.
+    """
+    parser.add_argument("file", nargs="+", help="raw files in any format that is read, or folders of them")
+    parser.add_argument("--plot", action="store_true", help="draw every channel into <name>.svg in the present folder")
+    parser.add_argument("--json", action="store_true", help="print a list of JSON objects instead of text")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the contents of every file; exit code 1 if one cannot be read or has a problem.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
+    import json
+    from pathlib import Path
+
+    from turnout.errors import ReadError
+    from turnout.report.contents_figure import contents_figure
+    from turnout.report.contents_text import contents_lines, contents_summary, contents_values
+    from turnout.report.site import replace_page
+    from turnout.stages.file_contents import file_contents
+
+    is_sound, values = True, []
+    for path, is_in_folder in _files(args.file):
+        try:
+            contents = file_contents(path)
+        except ReadError as error:
+            is_sound = False
+            values.append({"path": str(path), "problems": [f"{error.where}: {error.problem}. {error.remedy}."]})
+            if not args.json:
+                print(f"{error}" if not is_in_folder else f"{path}: not read, {error.where}: {error.problem}")
+            continue
+        is_sound = is_sound and not contents.problems
+        values.append(contents_values(contents))
+        if not args.json:
+            print(contents_summary(contents) if is_in_folder else "\n".join(contents_lines(contents)))
+        if args.plot:
+            drawing = Path(f"{path.name}.svg")
+            replace_page(drawing, contents_figure(contents))
+            if not args.json:
+                print(f"  figure     {drawing}")
+    if args.json:
+        print(json.dumps(values, indent=1, ensure_ascii=False, allow_nan=False))
+    return 0 if is_sound else 1
+
+
+def _files(names: list[str]) -> Iterator[tuple[Path, bool]]:
+    """(file, whether it was found in a folder), those of a folder in the order of their names."""
+    from pathlib import Path
+
+    from turnout.errors import ReadError
+
+    for name in names:
+        path = Path(name)
+        if not path.is_dir():
+            yield path, False
+            continue
+        inside = sorted(p for p in path.rglob("*") if p.is_file() and not p.name.startswith("."))
+        if not inside:
+            raise ReadError(path, "the path", "the folder holds no file", "Name another one", "empty")
+        yield from ((file, True) for file in inside)
