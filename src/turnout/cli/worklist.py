@@ -108,7 +108,7 @@ def as_text(
         return "\n".join(text)
     from turnout.registry.as_of import past_day_hint
 
-    exclusions = [(n_silenced, "silenced by somebody"), (n_unmeasured, "not measured for too long")]
+    exclusions = [(n_silenced, "suppressed by a user"), (n_unmeasured, "not measured for too long")]
     phrases = [f"{n} {word}" for n, word in exclusions if n]
     text.append(
         f"Of {n_charts} charts, newest campaign {newest:%Y-%m-%d}"

@@ -129,7 +129,7 @@ def _frame_words(finding: Mapping[str, Any], evidence: Mapping[str, Any]) -> str
     if finding["verdict"] in ("named", "a_or_b", "unknown") and finding["locked_to"]:
         most = f"; before, most was left at {'; '.join(words)}" if words else ""
         return f"{_owner(finding)}{most}"
-    return "; ".join(words) or "nothing in particular"
+    return "; ".join(words) or "no position, sensor or train stands out"
 
 
 def _owner(finding: Mapping[str, Any]) -> str:

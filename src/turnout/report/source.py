@@ -109,6 +109,12 @@ class FleetSource:
         sql = "select turnout_id, state, count(*) as n from chart_states_on(:today) group by all order by all"
         return self._fetch(sql) if self.has("chart_states") else []
 
+    def learning(self) -> dict[str, Any]:
+        """Number of charts without a baseline yet, and the most campaigns that one of them has; both 0 without any."""
+        sql = """select count(*) as n, coalesce(max(n_campaigns), 0) as n_campaigns
+            from chart_states_on(:today) where state = 'learning'"""
+        return self._fetch(sql)[0] if self.has("chart_states") else {"n": 0, "n_campaigns": 0}
+
     def worklist(self) -> list[dict[str, Any]]:
         """Tomorrow's worklist; empty before the first trend."""
         return self._fetch("select * from worklist(:today) order by rank") if self.has("worklist") else []

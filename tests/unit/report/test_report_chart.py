@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from turnout.report.panels.hammer import HammerTest, coherence_panel, receptance_panel
+from turnout.report.panels.phase import phase_panel
 from turnout.report.svg import BOTTOM, LEFT, RIGHT, TOP, Axis, Chart, linear_ticks, log_ticks, reduce_points, time_ticks
 
 
@@ -139,3 +140,22 @@ def test_an_axis_of_two_days_names_its_day():
     noon = datetime(2026, 5, 13, 12, tzinfo=UTC).timestamp()
     axis = Axis(noon - 86400, noon + 86400, "", "time")
     assert axis.ticks() == [(noon, "2026-05-13")]
+
+
+def test_the_phase_of_a_resonator_falls_from_0_to_minus_180_degrees():
+    """1 / (k - m w^2 + i w c): 0 far below its resonance, -90 at it, -180 far above."""
+    frequency = np.geomspace(30.0, 1600.0, 400)
+    w, w0 = 2 * np.pi * frequency, 2 * np.pi * 200.0
+    response = 1.0 / (w0**2 - w**2 + 2j * 0.05 * w0 * w)
+    row = {
+        "frequency_hz": frequency, "h1_real_m_n": response.real, "h1_imag_m_n": response.imag,
+        "passed": np.ones(400, dtype=bool),
+    }  # fmt: skip
+    path = re.search(r'<path class="curve" d="M([^"]*)"', phase_panel(HammerTest(row, {}, [], [])))[1]
+    points = np.array([pair.split() for pair in path.split("L")], dtype=float)
+    phase = 200.0 - 400.0 * (points[:, 1] - TOP) / (190 - TOP - BOTTOM)
+    assert abs(phase[0]) < 3.0 and abs(phase[-1] + 180.0) < 3.0
+    at_resonance = np.argmin(
+        np.abs(points[:, 0] - Axis(30.0, 1600.0, "", "log").share(200.0) * (462 - LEFT - RIGHT) - LEFT)
+    )
+    assert phase[at_resonance] == pytest.approx(-90.0, abs=12.0)

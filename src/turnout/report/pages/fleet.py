@@ -63,6 +63,7 @@ def fleet_page(source: FleetSource, template: Template, shared: Mapping[str, Any
         worklist=[_work(w) for w in worklist],
         n_more=worklist[0]["n_in_all"] - len(worklist) if worklist else 0,
         n_charts=counts.total(),
+        learning=source.learning(),
         turnouts=[_line(t, states.get(t["turnout_id"], {})) for t in turnouts],
         reasons=[r | {"meaning": REASONS.get(r["reason"], "")} for r in reasons],
         **shared,

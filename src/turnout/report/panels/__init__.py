@@ -13,10 +13,12 @@ from turnout.report.panels.hammer import (
     receptance_panel,
     stabilisation_panel,
 )
+from turnout.report.panels.phase import phase_panel
 
 # Each function returns SVG, "" where there is nothing to draw. Pages and figures show them in this order.
 HAMMER_PANELS: tuple[Callable[[HammerTest], str], ...] = (
     receptance_panel,
+    phase_panel,
     coherence_panel,
     decay_panel,
     stabilisation_panel,

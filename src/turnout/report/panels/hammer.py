@@ -138,7 +138,9 @@ def decay_panel(test: HammerTest) -> str:
     time = 1e3 * step * np.arange(n) / row["decay_rate_hz"]
     largest = 1.1 * float(np.max(np.abs(measured[:n])))
     fit, null = model["hammer_fit_pct"], model["hammer_fit_null_pct"]
-    score = f"fit left out {fit:.0f} % (null {null:.0f} %)" if _is_number(fit) and _is_number(null) else ""
+    score = (
+        f"fit of held-out impacts {fit:.0f} % (null model {null:.0f} %)" if _is_number(fit) and _is_number(null) else ""
+    )
     chart = Chart(
         Axis(0.0, float(time[-1]), "time after contact [ms]"),
         Axis(-largest, largest, "acceleration [m/s²]"),
