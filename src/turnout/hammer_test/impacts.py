@@ -106,7 +106,7 @@ def _measure(cut: Cut, settings: ReceptanceSettings) -> None:
     _judge_start(cut, settings)
     if abs(contact.peak) > MAX_FORCE:
         cut.rejections.append(Rejection("out_of_scale", contact.peak, MAX_FORCE, (
-            f"{contact.peak:.4g} N: no hammer strikes so hard, its unit or scale is wrong")))  # fmt: skip
+            f"{contact.peak:.4g} N: no hammer gives such a force, its unit or scale is wrong")))  # fmt: skip
     if (rejection := overload(cut, contact)) is not None:
         cut.rejections.append(rejection)
     judge_second_contact(cut, settings)

@@ -1,4 +1,4 @@
-"""Recordings with something wrong, or with something odd that is not wrong: named where it is, used as far as sound."""
+"""Recordings with something wrong, or with something odd that is not wrong: named where it is, used where intact."""
 
 from dataclasses import replace
 

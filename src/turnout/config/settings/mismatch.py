@@ -50,7 +50,7 @@ class MismatchSettings:
         100.0,
     )
     structure_left: float = setting(
-        0.4, "-", "share of what is left that a free law of the state still explains: shape unresolved", 0.0, 1.0
+        0.4, "-", "share of the residual that a free law of the state still explains: shape unresolved", 0.0, 1.0
     )
     temperature: float = setting(4.0, "-", "softens scores into probabilities; chosen by hand", 0.1)
     softmax_share: float = setting(0.2, "-", "how much the softmax says beyond the kind of answer", 0.0, 1.0)

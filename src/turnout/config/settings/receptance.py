@@ -63,7 +63,7 @@ class ReceptanceSettings:
         minimum=0.05, maximum=0.9,
     )  # fmt: skip
     out_of_range: float = setting(
-        3.0, "1", "no hand strikes this many times the test's median: the channel overflowed", minimum=1.5, maximum=50.0
+        3.0, "1", "no impact is this many times the median: the channel overflowed", minimum=1.5, maximum=50.0
     )
     deviation: float = setting(
         5.0, "sd", "and both must lie this far from the median in robust standard deviations", minimum=3.0, maximum=20.0
@@ -76,7 +76,7 @@ class ReceptanceSettings:
         maximum=1.0,
     )
     noise_over_median: float = setting(
-        4.0, "1", "an impact this many times noisier than its test's median, and above 2 %, is dropped",
+        4.0, "1", "an impact this many times noisier than its test's median, and above 2 %, is not used",
         minimum=1.5, maximum=100.0,
     )  # fmt: skip
     cut_off: float = setting(

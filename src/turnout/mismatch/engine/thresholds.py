@@ -104,7 +104,7 @@ class Thresholds:
         GUIDE,
     )  # fmt: skip
     max_fit_loss: float = threshold(
-        3.0, "points of fit", "a second name that costs more is dropped; no right pair of a sealed set lost over 1.1",
+        3.0, "points of fit", "a second name that costs more is rejected; no right pair of a sealed set lost over 1.1",
         PAIRS,
     )  # fmt: skip
     loss_errors: float = threshold(

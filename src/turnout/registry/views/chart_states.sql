@@ -1,4 +1,4 @@
--- One row per chart: what it says at the newest campaign, in the words of the worklist, on the day `asof` at or after it.
+-- One row per chart: its state at the newest campaign, in the words of the worklist, on the day `asof` at or after it.
 -- inspect this week: an open alarm. plan: an acknowledged alarm, or a drift among the discoveries of the fleet
 -- (false-discovery rate 10 %), also where the chart is too noisy to see the target within a year. suppressed: somebody
 -- silenced it, with a reason and an end, a day at which it comes back.
@@ -43,5 +43,5 @@ from chart_status_on("asof") s
 join spoken p using (turnout_id, section_id, band, source)
 where in_service(s.turnout_id) and not has_left(s.section_id);
 
--- One row per chart: what it says at the newest measurement, in the words of the worklist.
+-- One row per chart: its state at the newest measurement, in the words of the worklist.
 create or replace view chart_states as select * from chart_states_on(newest_measurement());

@@ -174,7 +174,7 @@ select
     end as sentence,
     case
         when h.raised_at_utc is not null then
-            'a sound chart does this once in '
+            'an intact chart does this once in '
             || printf('%.0f campaigns', case when h.direction = 'up' then s.run_length_up else s.run_length_down end)
             || coalesce(printf(' (%.0f years)', case when h.direction = 'up' then s.run_length_up else s.run_length_down end
                 / nullif(s.campaigns_per_year, 0)), '')

@@ -1,0 +1,79 @@
+"""README, docs, pages and messages use the terms of the glossary, and none of the words that it replaces."""
+
+import ast
+import re
+
+import pytest
+
+# Words of the last column of docs/glossary.md with another meaning, in which they may be used.
+OTHER_MEANINGS = {
+    "chain": "the Markov chain of a chart",
+    "family": "a family of processors",
+    "floor": "the noise floor of a channel",
+    "FRF": "frequency responses of other kinds",
+    "gain": "the gain of a sensor or of stiffness",
+    "hit": "a name of variables in files of others",
+    "law": "a force law",
+    "location": "a parameter of the public function simulate_hammer",
+    "place": "to take place; a column of the quarantine table",
+    "points": "points of fit, percent",
+    "sound": "the last line of a night, read by scripts of users; the sound level of a passage",
+    "twin": "the same case without its effect",
+    "what is left": "the remainder of a division",
+    "where receptance is meant": "a remark",
+}
+
+
+def replaced_words(repository):
+    """Words that the glossary replaces by its terms."""
+    for line in (repository / "docs" / "glossary.md").read_text(encoding="utf-8").splitlines():
+        if line.startswith("|") and not line.startswith(("| term", "|---")):
+            cell = re.sub(r"\([^)]*\)", "", line.strip().strip("|").split("|")[-1])
+            yield from (word.strip() for word in cell.split(",") if word.strip())
+
+
+def messages(path):
+    """Text constants of a module with a space in them, docstrings excluded."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    docs = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        if (
+            isinstance(node, ast.Constant)
+            and isinstance(node.value, str)
+            and " " in node.value
+            and id(node) not in docs
+        ):
+            yield node.value
+
+
+def texts(repository):
+    """(place, text) of README, docs, pages and messages; decision pages may speak of former words."""
+    pages = (repository / "src" / "turnout" / "report" / "templates").glob("*.html")
+    for path in [repository / "README.md", *(repository / "docs").glob("*.md"), *pages]:
+        if path.name != "glossary.md":
+            yield path.name, path.read_text(encoding="utf-8")
+    for path in sorted((repository / "src" / "turnout").rglob("*.py")):
+        yield str(path.relative_to(repository)), "\n".join(messages(path))
+
+
+def uses(words, places):
+    """Every use of one of the words: (place, word, text around it)."""
+    pattern = re.compile(r"\b(" + "|".join(map(re.escape, words)) + r")(?:s|ed)?\b", re.IGNORECASE)
+    return [
+        (place, match[0], text[max(0, match.start() - 40) : match.end() + 40])
+        for place, text in places
+        for match in pattern.finditer(text)
+    ]
+
+
+def test_replaced_words_are_not_used(repository):
+    words = set(replaced_words(repository)) - set(OTHER_MEANINGS)
+    assert {"blow", "foretell", "whereabouts", "refused"} <= words
+    # Options and names of former versions work for one release and are written in code marks or as options.
+    places = [(p, re.sub(r"`[^`]*`|--\w+", "", text)) for p, text in texts(repository)]
+    assert not (wrong := uses(words, places)), "\n".join(map(str, wrong))
+
+
+@pytest.mark.parametrize("text", ["A blow of 3 kN", "it Foretells more", "three blows"])
+def test_a_use_is_found(text):
+    assert uses(["blow", "foretell"], [("page", text)])
