@@ -157,7 +157,7 @@ REASONS = {
     "sign_reversed": "the force is negative at contact: the sign is reversed",
     "clock_backwards": "the time stamps run backwards",
     "duplicate": "the same bytes as another file, or the same impact as in another record",
-    "wrong_time": "the time of the recording contradicts its campaign",
+    "wrong_time": "the time of the recording is unreadable, implausible or ambiguous, or contradicts its campaign",
     "double_hit": "the hammer touched the rail twice",
     "overload": "a channel left its range",
     "out_of_scale": "a value that no such measurement has: the unit or the scale is wrong",

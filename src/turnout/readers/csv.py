@@ -3,14 +3,13 @@
 What is recognised:
 
 * separators: comma, semicolon or tab; a decimal comma where the separator is not a comma;
-* head lines with or without ``#``: ``rate`` (or ``fs``, ``sample rate [Hz]``, ``Abtastrate`` ...) or ``dt`` [s],
-  ``started_at``, ``n_records``, ``n_samples``, conditions, and the words of other languages listed in
-  ``named_arrays``;
+* head lines with or without ``#``: ``rate`` or ``dt`` and what ``rate_words`` recognises, ``started_at``,
+  ``n_records``, ``n_samples``, conditions, and the words of other languages listed in ``named_arrays``;
 * units in brackets after the names ("force [N]", "force (N)") or in a line of their own;
 * a column of time, and a column ``record`` that numbers the records.
 
-Without names channels are called "0", "1" ... A head line with unknown words and another frequency than the layout's
-rate is an error, unless its words are those of a filter.
+Without names channels are called "0", "1" ... All lines of the head are entries in which ``turnout.readers.statements``
+finds the sampling rate.
 
 The text is UTF-8, or UTF-16 with a byte order mark. Head lines that are neither are read as Windows-1252.
 A last line without line break may end in a truncated number: it is left out and reported, unless its last number has as
@@ -43,7 +42,8 @@ from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.named_arrays import RECORD_COUNT_NAMES, SAMPLE_COUNT_NAMES, START_DATE_NAMES, START_NAMES, Metadata
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.stated_scales import scale_problem, scale_statements
-from turnout.readers.timing import TEXT_PRECISION, parse_time
+from turnout.readers.statements import Entry
+from turnout.readers.timing import start_fields
 
 
 def read_raw(source: Source) -> RawFile:
@@ -68,14 +68,14 @@ def read_raw(source: Source) -> RawFile:
     lazy = source.lazy and not is_utf16
     data = source.memory_map if lazy else _in_utf8(source) if is_utf16 else source.data
     data, remarks = _without_cut_row(data, source)
-    head, names, units, offset, separator, unclear = read_head(data, source)
+    head, names, units, offset, separator, entries = read_head(data, source)
     read_columns = (
         _lazy_columns if lazy and "record" not in [name.strip().lower() for name in names] else _columns_in_memory
     )
     time = time_column(names, units)
     columns = read_columns(source, data, offset, separator, names, time)
     facts = Metadata(head, source)
-    records = tuple(_records(columns, names, units, time, facts, source, unclear))
+    records = tuple(_records(columns, names, units, time, facts, source, entries))
     return RawFile(records, facts.count(RECORD_COUNT_NAMES), remarks)
 
 
@@ -275,7 +275,7 @@ def _records(
     time: int | None,
     facts: Metadata,
     source: Source,
-    unclear: tuple[tuple[str, float], ...],
+    entries: tuple[Entry, ...],
 ) -> Iterator[RawRecord | ReadError]:
     """The records: one of all rows, or one per number in the column ``record``."""
     lower = [name.strip().lower() for name in names]
@@ -306,15 +306,15 @@ def _records(
         yield RawRecord(
             names=tuple(names[i] for i in selected),
             samples=[columns[i] if isinstance(columns[i], LazyColumn) else columns[i][a:b] for i in selected],
-            **facts.rate_fields(TEXT_PRECISION),
             units=tuple(units[i] for i in selected),
-            started_at=parse_time(date if start is None else start) or parse_time(f"{date} {start}"),
+            **start_fields(date if start is None else start, f"{date} {start}" if date and start else None),
             conditions=facts.conditions(k, n),
             time=None if seconds is None else seconds[a:b],
-            unclear=unclear,
             undecided={
                 i: scale_problem(text) for i, text in enumerate(scale_statements(facts.lower, len(selected))) if text
             },
+            is_time_in_seconds=time is not None and bool(units[time].strip()),
+            entries=entries,
         )
 
 

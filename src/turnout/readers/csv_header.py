@@ -8,23 +8,23 @@ import re
 import unicodedata
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from itertools import pairwise
 from mmap import mmap
 
 import numpy as np
 import pyarrow as pa
 
-from turnout.readers.interpret import MEANINGLESS_UNITS
 from turnout.readers.named_arrays import (
-    RATE_NAMES,
     RECORD_COUNT_NAMES,
     SAMPLE_COUNT_NAMES,
     START_DATE_NAMES,
     START_NAMES,
-    STEP_NAMES,
     TIME_NAMES,
 )
-from turnout.readers.source import COPY_AGAIN, Source
+from turnout.readers.rate_words import is_rate_name
+from turnout.readers.source import COPY_AGAIN, MEANINGLESS_UNITS, Source
 from turnout.readers.stated_scales import SCALE_WORDS, plain_word
+from turnout.readers.statements import Entry, entries_of_text
 from turnout.units import conversion
 
 TIME_WORDS = (*TIME_NAMES, "zeit", "tid", "temps", "tempo", "tiempo", "tijd")
@@ -274,18 +274,14 @@ def check_thousands(
 HEAD_LINE = re.compile(r"^#?\s*([^\W\d][\w .'’-]*?)\s*([\[(][^\])]*[\])])?\s*[:=,;\t]\s*(.*)$")
 UNIT_SCALES = {"kHz": 1e3, "khz": 1e3, "MHz": 1e6, "ms": 1e-3, "µs": 1e-6, "\u03bcs": 1e-6, "us": 1e-6}
 TEMPERATURES = {"rail_temperature", "air_temperature"}
-HEAD_NAMES = {*RATE_NAMES, *STEP_NAMES, *START_NAMES, *START_DATE_NAMES, *RECORD_COUNT_NAMES, "n_samples"}
+HEAD_NAMES = {*START_NAMES, *START_DATE_NAMES, *RECORD_COUNT_NAMES, "n_samples"}
 NUMERIC_HEAD_NAMES = TEMPERATURES | {
     *SAMPLE_COUNT_NAMES
 }  # a head line only if a number follows, else the name of a column
 GROUPED_NUMBER = re.compile(rf"\d{{1,3}}(?:{THOUSANDS_MARK}\d{{3}})+(?!\d)")
-# A line with one frequency and nothing else: "Vzorkovani: 10000 Hz", "taktning [kHz];10".
-FREQUENCY_LINE = re.compile(r"^#?[^\d\[(]+[\[(]?([kM]?Hz)?[\])]?[\s:=,;]*([\d.,]+)\s*([kM]?Hz)?\W*$", re.IGNORECASE)
-NO_RATE_WORDS = re.compile(r"filt|pass|paß|cut|grenz|band|coup|cort|tagli|græns|eigen|reson|netz|mains", re.IGNORECASE)
 
-
-# notes, names and units of the columns, byte of the first number, separator, unclear lines with their frequency [Hz]
-Head = tuple[dict[str, float | str], list[str], list[str], int, str, tuple[tuple[str, float], ...]]
+# notes, names and units of the columns, byte of the first number, separator, entries with their lines
+Head = tuple[dict[str, float | str], list[str], list[str], int, str, tuple[Entry, ...]]
 
 
 def _decode_line(data: bytes) -> str:
@@ -309,8 +305,8 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
     Returns
     -------
     tuple
-        Notes of the head by name; names and units of the columns; byte of the first number; separator; and (line,
-        frequency [Hz]) of the lines with a frequency in unknown words.
+        Notes of the head by name; names and units of the columns; byte of the first number; separator; and all entries
+        of the head with their lines.
 
     Raises
     ------
@@ -319,7 +315,7 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
     """
     notes: dict[str, float | str] = {}
     text_lines: list[str] = []
-    unclear: list[tuple[str, float]] = []
+    head_lines: list[str] = []
     position = 0
     while position < len(data):
         end = data.find(b"\n", position)
@@ -330,13 +326,16 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
         cells = _cells(line, separator)
         if any(cells) and all(_is_number(cell) or is_unreadable_number(cell) or cell == "" for cell in cells):
             names, units = _names([_cells(text, separator) for text in text_lines], cells)
-            return notes, names, units, position, separator, tuple(unclear)
+            return notes, names, units, position, separator, tuple(_entries(head_lines, separator, names))
         match = HEAD_LINE.match(line.strip())
         name = match[1].strip() if match else ""
         plain_name = _plain(name)
-        if plain_name not in HEAD_NAMES and (frequency := _frequency(line)) is not None:
-            unclear.append((line.strip(), frequency))
         value = match[3].strip(separator + " ") if match else ""
+        is_rate = (
+            bool(match)
+            and is_rate_name(name)
+            and (line.startswith("#") or len(cells) == 2 or _begins_with_number(value))
+        )
         is_note = (
             plain_name in HEAD_NAMES
             or (plain_name in NUMERIC_HEAD_NAMES and _is_number(value.split()[0] if value else ""))
@@ -344,7 +343,8 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
         )
         if plain_name in SAMPLE_COUNT_NAMES and (grouped := GROUPED_NUMBER.match(value)):
             value = re.sub(r"\D", "", grouped[0])
-        if match and (line.startswith("#") or is_note):
+        head_lines.append(line)
+        if match and (line.startswith("#") or is_note or is_rate):
             notes[plain_name if is_note else name] = _value(f"{value} {match[2]}" if match[2] else value)
         elif line.strip():
             text_lines.append(line)
@@ -370,17 +370,37 @@ def _plain(name: str) -> str:
     return re.sub(r"[\s'’]", "_", "".join(c for c in letters if not unicodedata.combining(c)))
 
 
-def _frequency(line: str) -> float | None:
-    """The only frequency [Hz] in a line; None if it has none, several, or that of a filter.
+def _begins_with_number(value: str) -> bool:
+    return bool(value) and _is_number(value.split()[0])
 
-    >>> _frequency("# Vzorkovací kmitočet: 10 kHz"), _frequency("Tiefpass: 4000 Hz"), _frequency("0.5-10000 Hz")
-    (10000.0, None, None)
+
+def _entries(lines: Sequence[str], separator: str, names: Sequence[str]) -> Iterator[Entry]:
+    """Entries of the head: "name: value" lines, pairs of cells, rows of names above rows of values, and free text.
+
+    The line of the names of the columns is none.
     """
-    match = FREQUENCY_LINE.match(line.strip())
-    if not match or NO_RATE_WORDS.search(line) or not (match[1] or match[3]):
-        return None
-    value = _value(f"{match[2]} {match[3] or match[1]}")
-    return value if isinstance(value, float) else None
+    table = [_cells(line, separator) for line in lines]
+    for i, (line, cells) in enumerate(zip(lines, table)):
+        place = f"line {i + 1}"
+        text = line.strip().lstrip("#%*/!'\" ").strip()
+        if not text or _is_line_of(cells, names):
+            continue
+        found = [(a, b) for a, b in pairwise(cells) if a and b and not _is_number(a)]
+        if len([cell for cell in cells if cell]) > 2 and i + 1 < len(table) and len(table[i + 1]) == len(cells):
+            found += [(a, b) for a, b in zip(cells, table[i + 1]) if a and _is_number(b)]
+        if match := HEAD_LINE.match(text):
+            name = f"{match[1]} {match[2]}" if match[2] else match[1]
+            found.append((name, match[3].strip(separator + ' "')))
+        entries = [Entry(place, name.strip('"# '), value.strip('"')) for name, value in found]
+        yield from entries or entries_of_text(text, place)
+        if found and not any(is_rate_name(entry.name) for entry in entries):
+            yield from entries_of_text(text, place)
+
+
+def _is_line_of(cells: Sequence[str], names: Sequence[str]) -> bool:
+    """Whether these cells are the names of the columns, with or without units."""
+    bare = [match[1] if (match := NAME_WITH_UNIT.match(cell)) else cell for cell in cells]
+    return len(names) > 1 and list(bare[: len(names)]) == list(names)
 
 
 def _cells(line: str, separator: str) -> list[str]:

@@ -15,19 +15,15 @@ import numpy as np
 from turnout.errors import ReadError
 from turnout.readers.lazy import is_large, lazy_array
 from turnout.readers.named_arrays import (
-    RATE_NAMES,
     STATED_SCALES,
-    STEP_NAMES,
     TIME_NAMES,
     Alphabetical,
-    Metadata,
+    Attributes,
     matrices,
     raw_file,
-    vectors,
 )
 from turnout.readers.source import RawFile, Source
 from turnout.readers.stated_scales import SCALE_WORDS, apply_packing, plain_word, scale_text
-from turnout.readers.timing import check_simultaneous
 
 UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units")
 
@@ -69,7 +65,6 @@ def _variables(group: h5py.Group, source: Source) -> dict[str, Any]:
     )  # members are in the order of creation only if it was tracked
     variables = mapping_type({name: _attribute(value) for name, value in group.attrs.items()})
     units: dict[str, str] = {}
-    clocks: dict[str, dict] = {}
     stated: dict[str, dict] = {}
     for name, member in group.items():
         if isinstance(member, h5py.Group):
@@ -83,16 +78,14 @@ def _variables(group: h5py.Group, source: Source) -> dict[str, Any]:
         except ReadError as error:
             variables[name] = error
             continue
+        variables[f"{name} (attributes)"] = Attributes(name, {k: _attribute(v) for k, v in member.attrs.items()})
         for key, value in member.attrs.items():
             if key in UNIT_ATTRIBUTES and isinstance(value := _attribute(value), str):
                 units[name] = value
-            elif key.lower() in (*RATE_NAMES, *STEP_NAMES):
-                clocks.setdefault(name, {})[key] = _attribute(value)
             elif key.lower() in ("channels", "channel_names", "units"):
                 variables.setdefault(key, _attribute(value))
             elif plain_word(key) in SCALE_WORDS and key not in PACKING_ATTRIBUTES:
                 stated.setdefault(name, {})[key] = _attribute(value)
-    _apply_clocks(variables, clocks, source)
     for name in matrices(variables):
         variables |= stated.pop(name, {})  # of all channels of the matrix
     if texts := tuple((name, text) for name, facts in stated.items() if (text := scale_text(facts))):
@@ -100,19 +93,6 @@ def _variables(group: h5py.Group, source: Source) -> dict[str, Any]:
     if units and not any(key.lower() == "units" for key in variables):
         variables["units"] = units
     return variables
-
-
-def _apply_clocks(variables: dict[str, Any], clocks: dict[str, dict], source: Source) -> None:
-    """Use the rate or step that datasets state individually as the common one; a different one is an error."""
-    for name in (*vectors(variables), *matrices(variables)):
-        try:
-            common_rate, dataset_rate = (Metadata(of, source).rate() for of in (variables, clocks.get(name, {})))
-            if common_rate is None:
-                variables |= clocks.get(name, {})
-            elif common_rate and dataset_rate:
-                check_simultaneous((), (1.0 / common_rate, 1.0 / dataset_rate), (0.0, 0.0), f"dataset {name!r}", source)
-        except ReadError as error:
-            variables[name] = error
 
 
 PACKING_ATTRIBUTES = ("scale_factor", "add_offset")  # of the climate and forecast (CF) conventions of netCDF

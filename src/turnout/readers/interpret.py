@@ -15,14 +15,12 @@ import numpy as np
 from turnout.errors import ReadError
 from turnout.readers import stated_scales
 from turnout.readers.lazy import BlockReader, ChannelStatistics, channel_error
-from turnout.readers.source import COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
-from turnout.readers.timing import check_order, check_time, resolve_rate, start_times
+from turnout.readers.source import COPY_AGAIN, MEANINGLESS_UNITS, MIN_SAMPLES, RawFile, RawRecord, Source
+from turnout.readers.statements import resolve
+from turnout.readers.time_axes import all_statements, is_axis_name
+from turnout.readers.timing import check_order, is_plausible, start_errors, start_times
 from turnout.records import Channel, LongRecording, RawChannel, RawDescription, Recording
 from turnout.units import IGNORED, conversion, to_si
-
-# Labels that loggers write for a unit that was not configured; in lower case.
-MEANINGLESS_UNITS = ("", "-", "eu", "none", "n/a", "a.u.", "arb", "?", "unknown", "undefined", "unitless")
-
 
 FULL_SCALE_UNIT = re.compile(r"\s*[+-]?[\d.]")  # a unit with a number, as in "10 V"
 
@@ -71,7 +69,8 @@ def channel_mappings(
     if len(set(indices)) < len(indices):
         twice = next(i for i in indices if indices.count(i) > 1)
         raise source.error(where, f"the layout names the channel {record.names[twice]!r} twice", "Name each once")
-    if unknown := sorted(set(range(len(record.names))) - set(indices)):
+    unknown = sorted(set(range(len(record.names))) - set(indices))
+    if unknown := [i for i in unknown if not is_axis_name(record.names[i], record.units[i])]:
         names = ", ".join(repr(record.names[i]) for i in unknown)
         raise source.error(
             where,
@@ -144,6 +143,12 @@ def _has_channel(record: RawRecord, wanted: str | int, where: str, source: Sourc
     except ReadError:
         return False
     return True
+
+
+def _sensor_rows(record: RawRecord, channels: Sequence[RawChannel], where: str, source: Source) -> set[int]:
+    """Rows that the layout assigns to a sensor; channels that are absent are judged elsewhere."""
+    wanted = [c.source for c in channels if c.quantity != IGNORED]
+    return {index_of(record, name, where, source) for name in wanted if _has_channel(record, name, where, source)}
 
 
 def _channel_mapping(index: int, record: RawRecord, raw: RawChannel, where: str, source: Source) -> ChannelMapping:
@@ -273,12 +278,16 @@ def convert_records(
                 raise order_errors[k]
             limit = max_duration if source.lazy and description.kind == "passage" else None
             recording, channel_errors = _recording(record, k, len(raw.records), description, source, limit)
-            recordings.append(replace(recording, started_at=dict(starts)[k]))
+            start = dict(starts)[k]
+            recordings.append(replace(recording, started_at=start if start and is_plausible(start) else None))
             errors.extend(channel_errors)
         except ReadError as error:
             errors.append(error)
     errors.extend(_count_errors(raw, description, source))
     errors.extend(raw.remarks)
+    unread = {k: r.unread_start for k, r in enumerate(raw.records) if isinstance(r, RawRecord) and r.unread_start}
+    kept = [(k, stamp) for k, stamp in stamps if k not in order_errors]
+    errors.extend(start_errors(kept, unread, description.time_zone, source))
     return tuple(recordings), tuple(errors)
 
 
@@ -309,9 +318,9 @@ def _recording(
     """(recording, errors of channels left out) of raw record ``k``; ReadError if the record cannot be used."""
     where = f"record {k + 1} of {n_record}"
     n_sample = _sample_count(record, where, description.n_samples, source)
-    if record.time is not None:
-        check_time(record.time, where, source)
-    rate = resolve_rate(record, description.rate, where, source)
+    sensor_rows = _sensor_rows(record, description.channels, where, source)
+    statements = all_statements(record, k, n_record, sensor_rows, where, source)
+    rate = resolve(statements, description.rate, where, source)
     channel_maps = channel_mappings(record, description.channels, where, source)
     if not channel_maps:
         raise source.error(where, "the layout wants none of its channels", "Name channels in the layout")

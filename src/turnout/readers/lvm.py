@@ -5,7 +5,7 @@ some 2 µs per number. Layout: National Instruments, "Specification for the LabV
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
 
 import numpy as np
@@ -15,7 +15,8 @@ from pyarrow import csv
 from turnout.errors import ReadError
 from turnout.readers.named_arrays import Metadata
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, Source, number_or_text
-from turnout.readers.timing import TEXT_PRECISION, check_simultaneous, parse_time, start_offsets, step_precision
+from turnout.readers.statements import Entry, entries_of, step_entry
+from turnout.readers.timing import check_simultaneous, parse_time, start_fields, start_offsets
 
 END_OF_HEADER = b"***End_of_Header***"
 SEPARATORS = {"Tab": "\t", "Comma": ",", "Semicolon": ";"}
@@ -149,19 +150,20 @@ def _records(
     ]
     starts = [a + b for a, b in zip(start_offsets(stamps), offsets)]
     check_simultaneous(names, steps, starts, where, source)
-    step = steps[0]
-    started_at = _parse_date_and_time(
+    started_text = _date_and_time(
         *(_per_channel(fields, name, 1)[0] or head.get(name, "") for name in ("Date", "Time"))
     )
+    entries = (*_entries(fields, steps[0]), *entries_of(head, "the file's header"))
+    has_x = x is not None and len(x) == n_row and bool(np.isfinite(x).all())
     n_sample = n_row // n_write
     return [
         RawRecord(
             names=tuple(names),
             samples=[column[i * n_sample : (i + 1) * n_sample] for column in columns],
-            rate=1.0 / step if step > 0 else None,
-            rate_tolerance=max(step_precision(step), TEXT_PRECISION),
+            entries=entries,
+            time=x[i * n_sample : (i + 1) * n_sample] if has_x and x is not None else None,
             units=tuple(units[:count]) if len(units) >= count else ("",) * count,
-            started_at=started_at if i == 0 else None,  # of later writes no time is stated
+            **start_fields(started_text if i == 0 else None),  # of later writes no time is stated
             conditions={name: number_or_text(head[name]) for name in CONDITIONS if name in head},
         )
         for i in range(n_write)
@@ -178,8 +180,22 @@ def _per_channel(fields: Mapping[str, list[str]], name: str, count: int) -> list
     return [*fields.get(name, []), *[""] * count][:count]
 
 
+def _entries(fields: Mapping[str, list[str]], step: float) -> Iterator[Entry]:
+    """Entries of a segment's header, one per channel where the channels differ; a ``Delta_X`` of 0 states nothing."""
+    for name, values in fields.items():
+        for i, value in enumerate(dict.fromkeys(value for value in values if value)):
+            if name != "Delta_X":
+                yield Entry(f"header of the segment: {name}", name, value)
+            elif step > 0 and i == 0:
+                yield step_entry("header of the segment: Delta_X", value)
+
+
+def _date_and_time(date: str, clock: str) -> str:
+    return f"{date.replace('/', '-')}T{clock.replace(',', '.')[:15]}" if date or clock else ""
+
+
 def _parse_date_and_time(date: str, clock: str) -> datetime | None:
-    return parse_time(f"{date.replace('/', '-')}T{clock.replace(',', '.')[:15]}")
+    return parse_time(_date_and_time(date, clock))
 
 
 def _columns(

@@ -2,8 +2,7 @@
 
 What is recognised (names in any case, except ``t``):
 
-* sampling rate [Hz]: ``rate``, ``fs``, ``sample_rate``, ``sampling_rate``, ``sampling_frequency`` ..., or the step
-  [s]: ``dt``, ``delta_t`` ..., or a vector ``time`` or ``t`` [s];
+* sampling rate or step: every name that ``rate_words`` recognises, also in nested groups, and a vector ``time``, ``t``;
 * ``channels`` (or ``channel_names``, ``names``, ``labels``) and ``units``, one per channel;
 * ``started_at`` (or ``start_time`` ...): ISO 8601 text, seconds since 1970 UTC, or a MATLAB datenum, one per file or
   per record;
@@ -27,9 +26,11 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.lazy import ARRAYS, Array, Column
+from turnout.readers.rate_words import is_rate_name
 from turnout.readers.source import CONDITIONS, RawFile, RawRecord, Source
 from turnout.readers.stated_scales import scale_problem, scale_statements
-from turnout.readers.timing import EXACT_PRECISION, SINGLE_PRECISION, is_single_precision, parse_time, step_precision
+from turnout.readers.statements import Entry, entries_of
+from turnout.readers.timing import start_fields
 
 RECORD_NAME = re.compile(r"^(?:record|rec|segment|impact|hit)[_ ]?(\d+)$", re.IGNORECASE)
 
@@ -168,14 +169,6 @@ SAMPLE_COUNT_NAMES = (
 )  # fmt: skip
 
 
-RATE_NAMES = (
-    "rate", "fs", "f_s", "rate_hz", "fs_hz", "sample_rate", "samplerate", "samplingrate", "sampling_rate",
-    "sample_frequency", "sampling_frequency", "abtastrate", "abtastfrequenz", "samplingsfrekvens", "samplingfrekvens",
-    "samplingsrate", "frequence_d_echantillonnage", "taux_d_echantillonnage", "cadence_d_echantillonnage",
-    "frecuencia_de_muestreo", "tasa_de_muestreo", "velocidad_de_muestreo", "frequenza_di_campionamento",
-    "velocita_di_campionamento",
-)  # fmt: skip
-STEP_NAMES = ("dt", "delta_t", "sample_interval", "wf_increment")
 TIME_NAMES = ("time", "t", "time_s")
 CHANNEL_NAMES = ("channels", "channel_names", "names", "labels")
 UNIT_NAMES = ("units", "unit", "channel_units")
@@ -194,11 +187,13 @@ class Metadata:
         The raw file.
     parent : Metadata or None
         Metadata of the group above.
+    place : str
+        Name of the group, for messages.
     """
 
-    def __init__(self, variables: Mapping, source: Source, parent: "Metadata | None" = None):
+    def __init__(self, variables: Mapping, source: Source, parent: "Metadata | None" = None, place: str = ""):
         self.lower = {(k if k == "t" else k.lower()): v for k, v in variables.items() if k != "T"}
-        self.parent, self.source = parent, source
+        self.variables, self.parent, self.source, self.place = variables, parent, source, place
 
     def with_parents(self) -> dict[str, Any]:
         """All variables of this group and its parent groups; those of the group itself count."""
@@ -312,36 +307,16 @@ class Metadata:
             return None if value is None else int(value)
         raise self.source.error(f"variable {names[0]!r}", f"{value!r} is no whole number above 0")
 
-    def rate(self) -> float | None:
-        """Sampling rate [Hz], None if not stated."""
-        rate = self.number(RATE_NAMES)
-        if rate is None and (step := self.number(STEP_NAMES)):
-            return 1.0 / step
-        return rate
-
-    def rate_fields(self, min_tolerance: float = EXACT_PRECISION) -> dict:
-        """Fields ``rate`` and ``rate_tolerance`` of a RawRecord.
-
-        Parameters
-        ----------
-        min_tolerance : float
-            Relative precision of numbers in this format.
-
-        Returns
-        -------
-        dict
-            The rate, from a rate or a step [Hz], None if not stated; the relative precision of its statement.
-
-        Raises
-        ------
-        ReadError
-            If rate or step is no number.
-        """
-        rate, step = self.number(RATE_NAMES), self.number(STEP_NAMES)
-        if rate is None and step:
-            return {"rate": 1.0 / step, "rate_tolerance": max(step_precision(step), min_tolerance)}
-        tolerance = SINGLE_PRECISION if rate is not None and is_single_precision(rate) else EXACT_PRECISION
-        return {"rate": rate, "rate_tolerance": max(tolerance, min_tolerance)}
+    def entries(self) -> tuple[Entry, ...]:
+        """All metadata of the group and of its parents, with their places; records beside this one take no part."""
+        samples = {*vectors(self.variables), *matrices(self.variables)}
+        own = {
+            name: value
+            for name, value in self.variables.items()
+            if not isinstance(value, Mapping) or not _holds_samples(value)
+            if not isinstance(value, Attributes) or not _is_slow(self.variables.get(value.owner), value.owner, samples)
+        }
+        return (*entries_of(own, self.place), *(self.parent.entries() if self.parent else ()))
 
     def conditions(self, k: int, n: int) -> dict[str, Any]:
         """Conditions that are stored with the samples.
@@ -409,7 +384,7 @@ def raw_file(variables: Mapping, source: Source, parent: Metadata | None = None)
     facts = Metadata(variables, source, parent)
     expected = facts.count(RECORD_COUNT_NAMES)
     numbered = numbered_names(variables)
-    groups = [name for name, value in variables.items() if isinstance(value, Mapping)]
+    groups = [name for name, value in variables.items() if isinstance(value, Mapping) and _holds_samples(value)]
     if numbered:
         entries = [(value, f"record {i + 1}") for i, value in enumerate(records_in_order(numbered, variables, source))]
     elif groups and not vectors(variables) and not matrices(variables):
@@ -422,6 +397,36 @@ def raw_file(variables: Mapping, source: Source, parent: Metadata | None = None)
         _numbered_record(value, k, len(entries), where, facts, source) for k, (value, where) in enumerate(entries)
     ]
     return RawFile(tuple(records), expected)
+
+
+class Attributes(dict):
+    """Attributes of the variable ``owner``: metadata, never a group of samples.
+
+    Parameters
+    ----------
+    owner : str
+        Name of the variable.
+    values : mapping of str to any
+        Name -> value.
+    """
+
+    def __init__(self, owner: str, values: Mapping[str, Any]):
+        super().__init__(values)
+        self.owner = owner
+
+
+def _is_slow(value: Any, name: str, samples: set[str]) -> bool:
+    """Whether a variable is an array beside the samples, for example one that is sampled at a lower rate."""
+    return isinstance(value, ARRAYS) and value.size > 1 and name not in samples and name.lower() not in TIME_NAMES
+
+
+def _holds_samples(value: Mapping) -> bool:
+    """Whether a group or one of its groups holds samples, or a variable that cannot be read."""
+    if isinstance(value, Attributes):
+        return False
+    return bool(vectors(value) or matrices(value)) or any(
+        isinstance(v, ReadError) or (isinstance(v, Mapping) and _holds_samples(v)) for v in value.values()
+    )
 
 
 def _numbered_record(value: Any, k: int, n: int, where: str, facts: Metadata, source: Source) -> RawRecord | ReadError:
@@ -515,8 +520,6 @@ def vectors(variables: Mapping[str, Any]) -> dict[str, Any]:
         Numeric vectors that are longer than half of the longest and have no name of metadata.
     """
     reserved_names = {
-        *RATE_NAMES,
-        *STEP_NAMES,
         *TIME_NAMES,
         *CHANNEL_NAMES,
         *UNIT_NAMES,
@@ -528,7 +531,7 @@ def vectors(variables: Mapping[str, Any]) -> dict[str, Any]:
         name: v
         for name, v in variables.items()
         if isinstance(v, ARRAYS) and v.ndim == 1 and v.dtype.kind in "fiu" and v.size > 1
-        if name.lower() not in reserved_names
+        if name.lower() not in reserved_names and not is_rate_name(name)
     }
     longest = max((v.size for v in candidates.values()), default=0)
     return {name: v for name, v in candidates.items() if 2 * v.size > longest}
@@ -557,9 +560,9 @@ def _raw_record(
     return RawRecord(
         names=tuple(names),
         samples=samples,
-        **facts.rate_fields(),
+        entries=facts.entries(),
         units=tuple(units),
-        started_at=parse_time(facts.record_value(START_NAMES, k, n)),
+        **start_fields(facts.record_value(START_NAMES, k, n)),
         conditions=facts.conditions(k, n),
         time=time,
         undecided=_undecided_scales(names, facts),

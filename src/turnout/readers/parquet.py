@@ -16,7 +16,8 @@ from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.named_arrays import RECORD_COUNT_NAMES, START_NAMES, TIME_NAMES, Metadata
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.stated_scales import scale_text
-from turnout.readers.timing import TEXT_PRECISION, parse_time
+from turnout.readers.statements import entries_of
+from turnout.readers.timing import start_fields
 
 
 def read_raw(source: Source) -> RawFile:
@@ -52,6 +53,9 @@ def read_raw(source: Source) -> RawFile:
         edges = [0, *(np.flatnonzero(np.diff(numbers)) + 1), n_row]
     time = next((name for name in columns if name.lower() in TIME_NAMES), None)
     names = [name for name, x in columns.items() if name != time and x.dtype.kind in "fiu"]
+    clocks = [name for name, x in columns.items() if name != time and x.dtype.kind in "mM" and _varies(x)]
+    fields = {f"column {f.name!r}": _field_notes(f) for f in schema}
+    entries = (*entries_of(_metadata(schema), "metadata"), *entries_of(fields, ""))
     n = len(edges) - 1
     records: list[RawRecord | ReadError] = []
     for k in range(n):
@@ -65,12 +69,14 @@ def read_raw(source: Source) -> RawFile:
             RawRecord(
                 names=tuple(names),
                 samples=[columns[name] if rows else columns[name][span] for name in names],
-                **facts.rate_fields(TEXT_PRECISION),
+                entries=entries,
                 units=tuple(units[name] for name in names),
-                started_at=parse_time(facts.record_value(START_NAMES, k, n)),
+                **start_fields(facts.record_value(START_NAMES, k, n)),
                 conditions=facts.conditions(k, n),
                 time=None if time is None else _seconds(columns[time][span]),
                 undecided={i: stated[name] for i, name in enumerate(names) if stated[name]},
+                is_time_in_seconds=time is not None and columns[time].dtype.kind in "mM",
+                clocks=tuple((f"column {name!r}", _seconds(columns[name][span])) for name in clocks),
             )
         )
     return RawFile(tuple(records) if n_row else (), facts.count(RECORD_COUNT_NAMES))
@@ -148,6 +154,25 @@ def _notes_of(metadata: dict[bytes, bytes] | None) -> dict[str, Any]:
     return {**notes, **notes.get("turnout", {})} if isinstance(notes.get("turnout", {}), dict) else notes
 
 
+def _metadata(schema: pa.Schema) -> dict[str, Any]:
+    """The notes without pandas' description of its own index and columns, of which only the attributes are data."""
+    notes = {
+        name: value for name, value in _notes_of(schema.metadata).items() if name not in ("ARROW:schema", "turnout")
+    }
+    pandas = notes.pop("pandas", None)
+    return {**notes, "pandas": pandas["attributes"]} if isinstance(pandas, dict) and pandas.get("attributes") else notes
+
+
+def _field_notes(field: pa.Field) -> dict[str, str]:
+    return {k.decode("utf-8", "replace"): v.decode("utf-8", "replace") for k, v in (field.metadata or {}).items()}
+
+
+def _varies(stamps: Column) -> bool:
+    """Whether time stamps differ: one that is the same in every row is no time axis."""
+    values = np.asarray(stamps[:])
+    return len(values) > 1 and bool((values != values[0]).any())
+
+
 def _unit(field: pa.Field) -> str:
     metadata = field.metadata or {}
     return next((metadata[k].decode("utf-8", "replace") for k in (b"unit", b"units") if k in metadata), "")
@@ -155,6 +180,7 @@ def _unit(field: pa.Field) -> str:
 
 def _seconds(time: np.ndarray) -> np.ndarray:
     """A time column in seconds; time stamps are counted from the first one."""
-    if time.dtype.kind == "M":
-        return (time - time[0]).astype("timedelta64[ns]").astype(float) * 1e-9
+    if time.dtype.kind in "mM":
+        seconds = (time - time[0]).astype("timedelta64[ns]").astype(float) * 1e-9
+        return np.where(np.isnat(time), np.nan, seconds)
     return np.asarray(time, dtype=float)

@@ -18,7 +18,7 @@ from turnout.errors import ReadError
 from turnout.readers.lazy import is_large, lazy_array
 from turnout.readers.named_arrays import Metadata
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
-from turnout.readers.timing import SINGLE_PRECISION
+from turnout.readers.statements import entries_of, rate_entry
 
 FREQUENCY_ATTRIBUTES = ("CommonTriggerFrequency", "CommonTriggerFreq", "CommonTriggerFrequence", "TriggerValue")
 METADATA_ATTRIBUTES = {*CONDITIONS, "RecordCount"}
@@ -105,26 +105,39 @@ def _record(group: h5py.Group, notes: dict[str, Any], source: Source) -> RawReco
             raise source.error(f"{where}, channel {name!r}", problem, COPY_AGAIN, reason="truncated")
     if len(stamps) < MIN_SAMPLES:
         raise source.error(where, f"it has {len(stamps)} samples", COPY_AGAIN, reason="empty")
-    rates = {float(c.attrs[k]) for c in channels.values() for k in set(FREQUENCY_ATTRIBUTES).intersection(c.attrs)} - {
-        0.0
-    }
-    if len(rates) > 1:
-        raise source.error(where, f"its channels name different frequencies: {sorted(rates)} Hz", reason="wrong_rate")
+    rates = [
+        rate_entry(f"{key} of {name!r}", c.attrs[key])
+        for name, c in channels.items()
+        for key in FREQUENCY_ATTRIBUTES
+        if key in c.attrs and float(c.attrs[key]) != 0.0
+    ]
     time = (stamps - stamps[0]) * 1e-9
-    rate, tolerance = rates.pop() if rates else None, SINGLE_PRECISION  # the frequency is a 32 bit float
     names = tuple(name.rpartition(".")[2] for name in channels)
     names = names if len(set(names)) == len(names) else tuple(channels)
     return RawRecord(
         names=names,
         samples=samples,
-        rate=rate,
-        rate_tolerance=tolerance,
+        entries=(*rates, *entries_of(_attributes(group, channels), "")),
         units=tuple(_text(d.attrs.get("Unit", "")) for d in data),
         started_at=EPOCH + timedelta(microseconds=int(stamps[0]) // 1000),
         conditions={name: _plain(notes[name]) for name in CONDITIONS if name in notes},
         time=time,
+        is_time_in_seconds=True,
         aliases=tuple((name,) for name in channels),
     )
+
+
+def _attributes(group: h5py.Group, channels: dict[str, h5py.Group]) -> dict[str, dict]:
+    """Attributes of a data source, of the groups above it, and of its channels and their data, by path."""
+    path, members = group.name, [group]
+    while path := path.rpartition("/")[0]:
+        members.append(group.file[path])
+    members += [member for channel in channels.values() for member in (channel, channel["data"])]
+    own = {*FREQUENCY_ATTRIBUTES, "TriggerMode"}
+    return {
+        m.name: {k: _plain(v) for k, v in m.attrs.items() if k not in own and not isinstance(v, np.ndarray)}
+        for m in members
+    }
 
 
 def _plain(value: Any) -> Any:

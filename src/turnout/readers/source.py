@@ -25,12 +25,15 @@ from turnout.records import EMPTY_MAPPING
 
 if TYPE_CHECKING:
     from turnout.readers.lazy import LazyColumn
+    from turnout.readers.statements import Entry
 
 COPY_AGAIN = "Copy the file again from the logger"
 SYSTEM_ERROR = re.compile(r"errno = (\d{1,9})\b")
 BLOCK_SIZE = 2**18  # samples of each channel that are read or checked at a time: long records need little memory
 MIN_SAMPLES = 2  # fewest samples of a record: one sample has neither rate nor spread
 MAX_COMPRESSION_RATIO = 1032  # largest ratio of unpacked to packed bytes: the bound of deflate
+# Labels that loggers write for a unit that was not configured; in lower case.
+MEANINGLESS_UNITS = ("", "-", "eu", "none", "n/a", "a.u.", "arb", "?", "unknown", "undefined", "unitless")
 # Metadata that any format may store with the samples; they become Recording.conditions.
 CONDITIONS = (
     "rail_temperature",
@@ -188,23 +191,26 @@ class RawRecord:
     """One record of simultaneous samples, as it is in the file.
 
     ``samples`` holds one (n_sample,) array or ``LazyColumn`` per name, in ``units`` ("" if not stated).
-    ``rate`` [Hz] is None if not stated; ``rate_tolerance`` is the relative precision with which the format can state
-    it. ``started_at`` has a time zone only if the format states one. ``time`` [s] is the time column of the file.
-    ``aliases`` are further names of the channels. ``unclear`` are lines with a frequency [Hz] in unknown words.
+    ``entries`` are all metadata of the record with their places: ``turnout.readers.statements`` finds the sampling rate
+    in them. ``started_at`` has a time zone only if the format states one; ``unread_start`` is a start time that cannot
+    be read, as it is written. ``time`` is the time column of the file, in seconds unless ``is_time_in_seconds`` is
+    False: then its unit is not stated. ``clocks`` are further time axes (place, seconds). ``aliases`` are further names
+    of the channels.
     ``undecided`` are statements about the scale of channels, by index, of which nothing says whether it is applied.
     ``above_full_scale`` are the largest numbers of channels of an audio file that are no fractions of full scale.
     """
 
     names: tuple[str, ...]
     samples: Sequence[np.ndarray | LazyColumn]
-    rate: float | None = None
     units: tuple[str, ...] = ()
-    rate_tolerance: float = 1e-9
+    entries: tuple[Entry, ...] = ()
     started_at: datetime | None = None
+    unread_start: str = ""
     conditions: Mapping = field(default_factory=lambda: EMPTY_MAPPING)
     time: np.ndarray | None = None
+    is_time_in_seconds: bool = False
+    clocks: tuple[tuple[str, np.ndarray], ...] = ()
     aliases: tuple[tuple[str, ...], ...] = ()
-    unclear: tuple[tuple[str, float], ...] = ()
     undecided: Mapping[int, str] = field(default_factory=lambda: EMPTY_MAPPING)
     above_full_scale: Mapping[int, float] = field(default_factory=lambda: EMPTY_MAPPING)
 

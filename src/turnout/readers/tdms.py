@@ -5,8 +5,9 @@ and the length of each channel with ``wf_samples``.
 """
 
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext
+from dataclasses import replace
 from typing import Any, BinaryIO
 
 import nptdms
@@ -16,7 +17,8 @@ from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.named_arrays import RECORD_COUNT_NAMES, START_NAMES, Metadata, natural_sort_key
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.stated_scales import scale_text
-from turnout.readers.timing import check_simultaneous, parse_time, start_offsets, step_precision
+from turnout.readers.statements import Entry, entries_of
+from turnout.readers.timing import check_simultaneous, parse_time, start_fields, start_offsets
 
 nptdms.log.log_manager.console_handler.setLevel("ERROR")  # turnout.readers passes the warnings on
 BIG_ENDIAN = 1 << 6  # bit of the mask in the lead-in
@@ -172,8 +174,7 @@ def _complete_record(
             problem = f"ends after {len(channel)}{f' of {promised:g}' if promised else ''} samples"
             place = f"{where}, channel {channel.name!r}"
             raise source.error(place, problem, COPY_AGAIN, reason="truncated")
-    step = _common_step(channels, where, source)
-    rate_fields = {"rate": 1.0 / step, "rate_tolerance": step_precision(step)} if step else None
+    _check_steps(channels, where, source)
     with source.parsed_by("npTDMS", where):
         samples = [_numbers(c, source.lazy) for c in channels]
     facts = Metadata({**tdms.properties, **groups[channels[0].group_name], **channels[0].properties}, source)
@@ -185,9 +186,9 @@ def _complete_record(
     return RawRecord(
         names=tuple(c.name for c in channels),
         samples=samples,
-        **(rate_fields or facts.rate_fields()),
+        entries=tuple(_entries(channels, groups, tdms.properties)),
         units=tuple(str(c.properties.get("unit_string", "") or "") for c in channels),
-        started_at=parse_time(facts.record_value(("wf_start_time", *START_NAMES), 0, 1)),
+        **start_fields(facts.record_value(("wf_start_time",), 0, 1), facts.record_value(START_NAMES, 0, 1)),
         conditions=facts.conditions(0, 1),
         aliases=tuple((f"{c.group_name}/{c.name}",) for c in channels),
         undecided=undecided,
@@ -208,14 +209,25 @@ def _scale_text(*levels: Mapping[str, Any]) -> str:
     return scale_text(merged)
 
 
-def _common_step(channels: Sequence[nptdms.TdmsChannel], where: str, source: Source) -> float:
-    """Step [s] of all channels, 0 if not stated; a channel begins at its time stamp plus ``wf_start_offset``."""
+def _entries(
+    channels: Sequence[nptdms.TdmsChannel], groups: Mapping[str, Mapping[str, Any]], properties: Mapping[str, Any]
+) -> Iterator[Entry]:
+    """Properties of the file, of the groups and of the channels; a ``wf_increment`` of 0 states nothing."""
+    places = [("property of the file", properties)]
+    places += [(f"property of the group {name!r}", values) for name, values in groups.items()]
+    places += [(f"property of the channel {c.name!r}", c.properties) for c in channels]
+    for place, values in places:
+        stated = {name: value for name, value in values.items() if name != "wf_increment" or value != 0}
+        yield from (replace(entry, place=f"{place}: {entry.name}") for entry in entries_of(stated, ""))
+
+
+def _check_steps(channels: Sequence[nptdms.TdmsChannel], where: str, source: Source) -> None:
+    """ReadError if steps or starts differ; a channel begins at its time stamp plus ``wf_start_offset``."""
     facts = [Metadata(c.properties, source) for c in channels]
     steps = [f.number(("wf_increment",)) or 0.0 for f in facts]
     stamps = start_offsets([parse_time(f.record_value(("wf_start_time",), 0, 1)) for f in facts])
     starts = [stamp + (f.number(("wf_start_offset",)) or 0.0) for stamp, f in zip(stamps, facts)]
     check_simultaneous([c.name for c in channels], steps, starts, where, source)
-    return steps[0]
 
 
 def _numbers(channel: nptdms.TdmsChannel, lazy: bool) -> Column:

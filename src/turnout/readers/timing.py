@@ -1,25 +1,21 @@
-"""Timing of records: sampling rate, time column, start times and the simultaneity of channels.
-
-Rates are compared to the precision with which a file can state them: double, single, or its printed digits.
-"""
+"""Timing of records: rate and evenness of a time column, start times and the simultaneity of channels."""
 
 import math
 import re
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime, timedelta
-from math import isfinite
 from typing import Any
 from zoneinfo import ZoneInfo
 
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.source import BLOCK_SIZE, RawRecord, Source
+from turnout.readers.precision import TEXT_PRECISION
+from turnout.readers.source import BLOCK_SIZE, Source
+from turnout.readers.statements import MAX_CLOCK_DRIFT
 
 STEP_SAMPLES = 2**21  # samples whose median step is the usual step
-MAX_CLOCK_DRIFT = 1e-4  # relative: two clocks of one logger with separate crystals may differ by this much
-TIME_UNITS_PER_SECOND = (1.0, 1e3, 1e6)  # a time column without unit may be in s, ms or µs
 
 
 def rate_of_time(time: np.ndarray) -> tuple[float, float, int | None]:
@@ -123,82 +119,6 @@ def _check_even(time: np.ndarray, rate: float, where: str, source: Source) -> No
             )
             remedy = "Check the logger's clock, or export the record at an even rate"
             raise source.error(where, problem, remedy, reason="wrong_rate")
-
-
-def _check_unclear_lines(unclear: Sequence[tuple[str, float]], promised: float, source: Source) -> None:
-    """ReadError if a file states frequencies in unknown words and none of them is the rate of the layout."""
-    if unclear and all(abs(frequency - promised) > 1e-3 * promised for _, frequency in unclear):
-        line = unclear[0][0][:60]
-        problem = f"{line!r} may be a sampling rate, and the layout's is {promised:.9g} Hz"
-        remedy = (
-            f"Correct the rate in the layout; if that line means something else, write 'rate: {promised:.9g}' above it"
-        )
-        raise source.error("the head", problem, remedy, reason="wrong_rate")
-
-
-def resolve_rate(record: RawRecord, promised: float | None, where: str, source: Source) -> float:
-    """The rate of the layout if that of the file agrees with it to the file's precision; without one, that of the file.
-
-    A rate printed with few digits (UFF58: 1/51200 s as 1.95312E-05) becomes the whole number of Hz with the same
-    printed digits, if there is only one.
-
-    Parameters
-    ----------
-    record : RawRecord
-        The record as it is in the file.
-    promised : float or None
-        Rate that the layout states, or None. [Hz]
-    where : str
-        The record, for the message.
-    source : Source
-        The raw file.
-
-    Returns
-    -------
-    float
-        The sampling rate. [Hz]
-
-    Raises
-    ------
-    ReadError
-        If neither states a rate, they disagree, or rate and time column disagree.
-    """
-    rate, tolerance = _stated_rate(record, where, source)
-    if rate is None:
-        if promised is None:
-            remedy = "Give the rate in the layout, or as hammer_rate_hz or passage_rate_hz in turnouts.tsv"
-            raise source.error(
-                where, "neither the file nor the layout says the sampling rate", remedy, reason="wrong_rate"
-            )
-        _check_unclear_lines(record.unclear, promised, source)
-        return float(promised)
-    if promised is not None:
-        drift = MAX_CLOCK_DRIFT if record.rate is None else 0.0  # a time column has a clock of its own
-        if abs(rate - promised) > (tolerance + drift) * promised:
-            remedy = "Correct the rate in the layout, or find out why the logger was set differently"
-            problem = f"sampled at {rate:.9g} Hz instead of {promised:.9g} Hz"
-            raise source.error(where, problem, remedy, reason="wrong_rate")
-        return float(promised)
-    whole = round(rate)
-    is_unique = rate * tolerance < 0.5
-    return float(whole) if is_unique and abs(rate - whole) <= rate * tolerance else float(rate)
-
-
-def _stated_rate(record: RawRecord, where: str, source: Source) -> tuple[float | None, float]:
-    """(rate [Hz], tolerance) that a record states, else that of its time column; ReadError if these disagree."""
-    rate, tolerance = record.rate, record.rate_tolerance
-    if rate is not None and (not isfinite(rate) or rate <= 0):
-        raise source.error(where, f"the sampling rate is {rate!r} Hz", reason="wrong_rate")
-    if record.time is None or len(record.time) <= 2:
-        return rate, tolerance
-    measured, precision, _ = rate_of_time(record.time)
-    if rate is None:
-        return measured, precision
-    if all(abs(measured * n - rate) > (tolerance + precision + MAX_CLOCK_DRIFT) * rate for n in TIME_UNITS_PER_SECOND):
-        problem = f"its time column has {measured:.9g} samples a second, its rate says {rate:.9g} Hz"
-        remedy = "Find out which of them is right and export the record again with that one alone"
-        raise source.error(where, problem, remedy, reason="wrong_rate")
-    return rate, tolerance
 
 
 TIME_FORMAT = "%Y-%m-%d %H:%M:%S.%f"
@@ -323,6 +243,138 @@ def _longest_ordered(starts: Sequence[Any]) -> list[int]:
     return ordered
 
 
+PLAUSIBLE_YEARS = (1990, 2060)  # of a digital logger; other years are epochs of counters (1904, 1970, 1980)
+CLOCK_REMEDY = "Check the logger's clock; give the campaign or the time in the file's name"
+NO_START = {"", "-", "none", "n/a", "?", "unknown", "nan", "nat", "null", "0", "0.0"}
+
+
+def start_fields(*values: Any) -> dict[str, Any]:
+    """Fields ``started_at`` and ``unread_start`` of a RawRecord.
+
+    Parameters
+    ----------
+    *values : any
+        Time stamps as a library returns them, the preferred one first.
+
+    Returns
+    -------
+    dict of str to any
+        The first time stamp that can be read; without one, the text of the first that is stated.
+
+    Examples
+    --------
+    >>> start_fields(None, "2024-02-30 10:00")
+    {'started_at': None, 'unread_start': '2024-02-30 10:00'}
+    """
+    stated = [value for value in values if _text_of(value).casefold() not in NO_START]
+    started_at = next((stamp for value in stated if (stamp := parse_time(value)) is not None), None)
+    is_unread = started_at is None and bool(stated)
+    return {"started_at": started_at, "unread_start": _text_of(stated[0])[:60] if is_unread else ""}
+
+
+def _text_of(value: Any) -> str:
+    text = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
+    return "" if text is None else " ".join(str(text).split())
+
+
+def is_plausible(stamp: datetime) -> bool:
+    """Whether a digital logger can have written a time stamp.
+
+    Parameters
+    ----------
+    stamp : datetime
+        The time stamp.
+
+    Returns
+    -------
+    bool
+        False for the epoch of a counter, such as 1904-01-01.
+    """
+    return PLAUSIBLE_YEARS[0] <= stamp.year <= PLAUSIBLE_YEARS[1]
+
+
+def clock_change(stamp: datetime, time_zone: str) -> str:
+    """What a clock change does to a time stamp without a zone.
+
+    Parameters
+    ----------
+    stamp : datetime
+        Time stamp of a file.
+    time_zone : str
+        IANA name of the zone.
+
+    Returns
+    -------
+    str
+        "twice" for the hour that comes twice in autumn, "never" for the one that is left out in spring, else "".
+
+    Examples
+    --------
+    >>> clock_change(datetime(2026, 3, 29, 2, 30), "Europe/Copenhagen")
+    'never'
+    """
+    if stamp.tzinfo is not None:
+        return ""
+    zone = ZoneInfo(time_zone)
+    try:
+        first, second = (stamp.replace(tzinfo=zone, fold=fold).utcoffset() for fold in (0, 1))
+    except OverflowError:
+        return ""
+    if first is None or second is None or first == second:
+        return ""
+    return "twice" if first > second else "never"
+
+
+def start_errors(
+    stamps: Sequence[tuple[int, datetime | None]], unread: Mapping[int, str], time_zone: str, source: Source
+) -> Iterator[ReadError]:
+    """Errors about start times that are unreadable, implausible, or in an hour of a clock change: one for each kind.
+
+    The records stay usable. An hour that comes twice is no error if the order of the records tells which is meant.
+
+    Parameters
+    ----------
+    stamps : sequence of tuple of (int, datetime or None)
+        (record, time stamp) in the order of the file.
+    unread : mapping of int to str
+        Record -> start time that cannot be read, as it is written.
+    time_zone : str
+        IANA name of the zone of time stamps without one.
+    source : Source
+        The raw file.
+
+    Yields
+    ------
+    ReadError
+        With the reason ``wrong_time``.
+    """
+    if unread:
+        yield _start_error(list(unread), f"the start time {next(iter(unread.values()))!r} cannot be read", source)
+    timed = [(k, stamp) for k, stamp in stamps if stamp is not None]
+    if strange := [(k, stamp) for k, stamp in timed if not is_plausible(stamp)]:
+        problem = (
+            f"the start time {strange[0][1]:{TIME_FORMAT}} is no time of a recording: the logger's clock was not set"
+        )
+        yield _start_error([k for k, _ in strange], problem, source)
+    never = [(k, stamp) for k, stamp in timed if clock_change(stamp, time_zone) == "never"]
+    if never:
+        problem = (
+            f"the start time {never[0][1]:%Y-%m-%d %H:%M} does not exist in {time_zone}: the clock is put forward then"
+        )
+        yield _start_error([k for k, _ in never], problem, source)
+    twice = [(k, stamp) for k, stamp in timed if clock_change(stamp, time_zone) == "twice"]
+    starts = dict(start_times(stamps, time_zone))
+    if twice and not any(starts[k] == to_utc(stamp.replace(fold=1), time_zone) for k, stamp in twice):
+        problem = f"the start time {twice[0][1]:%Y-%m-%d %H:%M} comes twice in {time_zone}: the first one is assumed"
+        yield _start_error([k for k, _ in twice], problem, source)
+
+
+def _start_error(records: Sequence[int], problem: str, source: Source) -> ReadError:
+    numbers = [k + 1 for k in records]
+    where = f"record {numbers[0]}" if len(numbers) == 1 else f"records {numbers[0]} to {numbers[-1]}"
+    return source.error(where, problem, CLOCK_REMEDY, reason="wrong_time")
+
+
 MATLAB_EPOCH = 719529  # datenum of 1970-01-01
 DOTTED_DATE = re.compile(r"(\d{1,2})\.\s?(\d{1,2})\.\s?(\d{4})[\sT,;]+(\d{1,2}):(\d{2}(?::\d{2}(?:[.,]\d{1,9})?)?)")
 MONTHS = {m: i for i, m in enumerate("jan feb mar apr may jun jul aug sep oct nov dec".split(), start=1)}
@@ -402,58 +454,26 @@ def parse_uff_time(text: str) -> datetime | None:
         return None
 
 
-EXACT_PRECISION = 1e-9
-SINGLE_PRECISION = 2.0**-23  # one unit in the last place of a 32 bit float
-TEXT_PRECISION = 1e-6
-MIN_DIGITS = 4
-
-
-def is_single_precision(value: float) -> bool:
-    """Whether a number may have been stored as a 32 bit float.
+def is_unread_uff_time(text: str) -> bool:
+    """Whether ID line 3 of a Universal File looks like a date and time and cannot be read as one.
 
     Parameters
     ----------
-    value : float
-        A finite number.
+    text : str
+        The line; it may hold any other text.
 
     Returns
     -------
     bool
-        True if conversion to 32 bit and back does not change it.
+        True for "31-Feb-24 10:00:00" and "2024-02-30".
 
     Examples
     --------
-    >>> is_single_precision(float(np.float32(1 / 44100))), is_single_precision(1 / 44100)
-    (True, False)
+    >>> is_unread_uff_time("31-Feb-24 10:00:00"), is_unread_uff_time("18-Apr-16 13:49:58"), is_unread_uff_time("NONE")
+    (True, False, False)
     """
-    with np.errstate(over="ignore"):
-        return float(np.float32(value)) == value
-
-
-def step_precision(step: float) -> float:
-    """Relative size of one unit in the last digit of a time step [s], or of single precision.
-
-    One unit, not half a unit: some exporters truncate instead of rounding. A step of fewer than four digits is taken as
-    exact: 5E-05 is not a truncated number.
-
-    Parameters
-    ----------
-    step : float
-        Time step as the file states it. [s]
-
-    Returns
-    -------
-    float
-        Relative precision.
-
-    Examples
-    --------
-    >>> print(f"{step_precision(2.267574e-05):.1e} {step_precision(5e-05):.1e} {step_precision(1 / 44100):.1e}")
-    4.4e-07 1.0e-09 1.0e-09
-    """
-    digits = repr(float(step)).partition("e")[0].replace(".", "").strip("0")
-    printed = 1.0 / int(digits) if digits.isdigit() and len(digits) >= MIN_DIGITS else 0.0
-    return max(EXACT_PRECISION, printed, SINGLE_PRECISION if is_single_precision(step) else 0.0)
+    looks_dated = re.search(r"\d{1,4}[-./](?:\d{1,2}|[A-Za-z]{3})[-./]\d{2,4}|\d{1,2}:\d{2}:\d{2}", text)
+    return bool(looks_dated) and parse_uff_time(text) is None
 
 
 def start_offsets(stamps: Sequence[datetime | None]) -> list[float]:

@@ -13,8 +13,10 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.lazy import Column, LazyColumn
+from turnout.readers.rate_words import rate_unit
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, Source, load, number_or_text
-from turnout.readers.timing import check_simultaneous, parse_uff_time
+from turnout.readers.statements import Entry, entries_of_text, step_entry
+from turnout.readers.timing import check_simultaneous, is_unread_uff_time, parse_uff_time
 from turnout.readers.uff_datasets import UffDataset, declares_si, read_datasets
 
 # ID line 1; entity, node and direction of the response; label and unit of the ordinate
@@ -207,12 +209,13 @@ def _record(
     return RawRecord(
         names=names,
         samples=[s.data for s in sets],
-        rate=1.0 / first.step if first.x is None and first.step > 0 else None,
-        rate_tolerance=_precision(first.step_text),
+        entries=tuple(_entries(sets)),
         units=tuple(_unit(s.labels[1], is_si) for s in sets),
         started_at=parse_uff_time(first.ids[2]),
+        unread_start=first.ids[2] if is_unread_uff_time(first.ids[2]) else "",
         conditions=_conditions(first.ids[3]),
-        time=first.x,
+        time=None if first.x is None else first.x * _seconds_per_x(first),
+        is_time_in_seconds=True,
         aliases=aliases,
     )
 
@@ -249,14 +252,20 @@ def _unit(axis: tuple[int, str, str], is_si: bool) -> str:
     return (SI_OF_TYPE.get(data_type, "") if is_si else "") if blank else label
 
 
-def _precision(text: str) -> float:
-    """Relative size of one unit in the last printed digit: "1.95312E-05" -> 5.1e-6.
+def _entries(sets: Sequence[UffDataset]) -> Iterator[Entry]:
+    """The step of the abscissa of each set, and the texts of its ID lines."""
+    for dataset in sets:
+        if dataset.x is None and dataset.step > 0:
+            yield step_entry("abscissa spacing (record 7)", dataset.step_text, dataset.labels[0][2])
+        for i, text in enumerate(dataset.ids, 1):
+            if i != 3 and text not in ("", "NONE"):
+                yield from entries_of_text(text, f"ID line {i}")
 
-    One unit, not half a unit: some exporters truncate instead of rounding.
-    """
-    mantissa = text.upper().replace("D", "E").partition("E")[0].lstrip("+-")
-    digits = mantissa.replace(".", "").lstrip("0")
-    return 1.0 / float(digits) if digits.isdigit() else 1e-5
+
+def _seconds_per_x(dataset: UffDataset) -> float:
+    """Seconds per unit of the abscissa, by its label."""
+    unit = rate_unit(dataset.labels[0][2])
+    return float(unit.scale) if unit is not None and unit.is_step else 1.0
 
 
 def _conditions(text: str) -> dict[str, float | str]:

@@ -8,6 +8,7 @@ JSON comment are used (``channels``, ``units``, ``started_at``, conditions).
 
 import json
 import struct
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -19,10 +20,12 @@ from turnout.readers.lazy import LazyMatrix
 from turnout.readers.named_arrays import CHANNEL_NAMES, START_NAMES, UNIT_NAMES, Metadata, list_of_texts
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.stated_scales import scale_problem, scale_statements
-from turnout.readers.timing import parse_time
+from turnout.readers.statements import Entry, entries_of, entries_of_text, rate_entry
+from turnout.readers.timing import start_fields
 from turnout.records import EMPTY_MAPPING
 
 UNKNOWN_LENGTH = 0xFFFFFFFF
+UNCOMPRESSED = (1, 3, 0xFFFE)  # PCM, float, extensible
 
 
 def read_raw(source: Source) -> RawFile:
@@ -49,6 +52,7 @@ def read_raw(source: Source) -> RawFile:
         raw.seek(0)
         with source.parsed_by("libsndfile"), soundfile.SoundFile(raw.fileno(), closefd=False) as file:
             rate, comment, is_float = file.samplerate, file.comment, file.subtype in FLOAT_SUBTYPES
+            texts = {name: text for name, text in file.copy_metadata().items() if text}
             frames = Frames(source.path, file.frames, file.channels)
             samples = (
                 LazyMatrix(frames, transposed=True) if source.lazy else file.read(dtype="float64", always_2d=True).T
@@ -56,15 +60,16 @@ def read_raw(source: Source) -> RawFile:
     if samples.shape[1] != frames.shape[0]:
         problem = f"ends after {samples.shape[1]} of {frames.shape[0]} samples"
         raise source.error("record 1 of 1", problem, COPY_AGAIN, reason="truncated")
+    byte_rate = _byte_rate_entries(source.head)
     facts = Metadata(_notes(comment), source)
     n = len(samples)
     names, units = list_of_texts(facts.get(CHANNEL_NAMES)), list_of_texts(facts.get(UNIT_NAMES))
     record = RawRecord(
         names=tuple(names) if len(names) == n else tuple(str(i) for i in range(n)),
         samples=list(samples),
-        rate=facts.rate() or float(rate),
+        entries=(rate_entry("sample rate of the header", rate), *byte_rate, *_entries(texts, comment)),
         units=tuple(units) if len(units) == n else ("",) * n,
-        started_at=parse_time(facts.record_value(START_NAMES, 0, 1)),
+        **start_fields(facts.record_value(START_NAMES, 0, 1)),
         conditions=facts.conditions(0, 1),
         aliases=tuple((str(i),) for i in range(n)),
         undecided={i: scale_problem(text) for i, text in enumerate(scale_statements(facts.lower, n)) if text},
@@ -155,6 +160,26 @@ def _long_sizes(head: bytes) -> dict[bytes, int]:
         return {}
     riff, samples = struct.unpack_from("<QQ", head, 20)
     return {b"RIFF": riff, b"data": samples}
+
+
+def _byte_rate_entries(head: bytes) -> list[Entry]:
+    """The rate by bytes per second and per frame, which the chunk "fmt " states beside the rate itself."""
+    position = head.find(b"fmt ", 12)
+    if head[:4] not in (b"RIFF", b"RF64") or position < 0 or len(head) < position + 24:
+        return []
+    tag, _, _, bytes_per_second, bytes_per_frame = struct.unpack_from("<HHIIH", head, position + 8)
+    if tag not in UNCOMPRESSED or not bytes_per_second or not bytes_per_frame:
+        return []
+    return [rate_entry("bytes per second of the header", bytes_per_second / bytes_per_frame)]
+
+
+def _entries(texts: dict[str, str], comment: str) -> Iterator[Entry]:
+    """Entries of the comment and of the other texts of the file."""
+    if notes := _notes(comment):
+        yield from entries_of(notes, "comment")
+    for name, text in texts.items():
+        if name != "comment" or not notes:
+            yield from entries_of_text(text, name)
 
 
 def _notes(comment: str) -> dict[str, Any]:

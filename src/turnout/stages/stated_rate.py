@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from turnout.errors import ReadError
+from turnout.readers.rate_words import CERTAIN
 from turnout.readers.source import RawRecord, Source
-from turnout.readers.timing import check_time, rate_of_time, resolve_rate
+from turnout.readers.statements import resolve, statements_of
+from turnout.readers.time_axes import all_statements
 
 
 @dataclass(frozen=True)
@@ -41,17 +43,14 @@ def stated_rate(record: RawRecord, k: int, n: int, source: Source) -> StatedRate
         Without a value where nothing states the rate, or statements contradict each other.
     """
     where = f"record {k + 1} of {n}"
-    statements = []
-    if record.rate is not None:
-        statements.append(f"{record.rate:.9g} Hz (head or attributes of the file)")
-    if record.time is not None and len(record.time) > 2:
-        statements.append(f"{rate_of_time(record.time)[0]:.9g} samples per second (time column)")
-    statements += [f"{line[:60]!r} (head, perhaps)" for line, _ in record.unclear]
     try:
-        if record.time is not None:
-            check_time(record.time, where, source)
-        is_stated = record.rate is not None or record.time is not None
-        value = resolve_rate(record, None, where, source) if is_stated else None
+        statements = all_statements(record, k, n, set(), where, source)
     except ReadError as error:
-        return StatedRate(None, tuple(statements), f"{error.problem}. {error.remedy}.")
-    return StatedRate(value, tuple(statements))
+        texts = tuple(map(str, statements_of(record.entries, k, n)))
+        return StatedRate(None, texts, f"{error.problem}. {error.remedy}.")
+    texts = tuple(map(str, statements))
+    try:
+        value = resolve(statements, None, where, source) if any(s.certainty == CERTAIN for s in statements) else None
+    except ReadError as error:
+        return StatedRate(None, texts, f"{error.problem}. {error.remedy}.")
+    return StatedRate(value, texts)

@@ -79,8 +79,8 @@ def test_a_vanished_file(tmp_path, in_si):
 def test_a_folder_is_no_file(tmp_path, in_si):
     (tmp_path / "A7_1.uff").mkdir()
     error = refusal("A7_1.uff", tmp_path, in_si)
-    assert error.reason == "unreadable"
-    assert "the file cannot be opened (Is a directory)" in str(error)
+    assert error.reason == "no_file"
+    assert "it is a folder" in str(error)
 
 
 def test_an_empty_file(tmp_path, in_si):
@@ -162,7 +162,8 @@ def test_a_wrong_rate(rate, tmp_path, in_si):
     error = only_error(name, tmp_path, in_si, 0)
     assert error.reason == "wrong_rate"
     remedy = "Correct the rate in the layout, or find out why the logger was set differently."
-    assert str(error) == f"a.npz, record 1 of 1: sampled at {rate:g} Hz instead of 51200 Hz. {remedy}"
+    found = f"sampled at {rate:g} Hz instead of 51200 Hz, by 'fs: {rate}' ({rate:g} Hz) in fs"
+    assert str(error) == f"a.npz, record 1 of 1: {found}. {remedy}"
 
 
 @pytest.mark.parametrize("promised", [51200.0, None])
@@ -171,7 +172,8 @@ def test_a_rate_that_the_time_column_contradicts(promised, tmp_path, in_si):
     name = archive(tmp_path, fs=51200.0, time=np.arange(100) / 25600.0, force=saw(), rail=saw(), units=["N", "m/s²"])
     error = only_error(name, tmp_path, replace(in_si, rate=promised), 0)
     assert error.reason == "wrong_rate"
-    found = "its time column has 25600 samples a second, its rate says 51200 Hz"
+    clock = "'25600 samples per unit of time' (25600 Hz) in its time column"
+    found = f"two rates: 'fs: 51200.0' (51200 Hz) in fs, and {clock}"
     remedy = "Find out which of them is right and export the record again with that one alone"
     assert str(error) == f"a.npz, record 1 of 1: {found}. {remedy}."
 
@@ -187,7 +189,8 @@ def test_a_frequency_of_rcm_dx_that_its_time_stamps_contradict_costs_that_record
         file.visititems(change)
     result = read(path.name, tmp_path, in_si)
     assert {e.reason for e in result.errors} == {"wrong_rate"} and len(result.errors) == 2
-    assert "samples a second, its rate says 25600 Hz" in result.errors[0].problem
+    assert "(25600 Hz) in CommonTriggerFrequency" in result.errors[0].problem
+    assert "(51200 Hz) in its time column" in result.errors[0].problem
 
 
 @pytest.mark.parametrize("per_second", [1.0, 1e3, 1e6])

@@ -109,9 +109,13 @@ def test_the_start_in_the_head_is_read_in_the_words_and_dates_of_its_country(hea
 
 
 @pytest.mark.parametrize("stamp", ["04/05/2024 08:30", "31.02.2024 08:30", "13.05.2024", "08:30:12"])
-def test_a_start_that_is_not_clear_is_none(stamp, tmp_path):
+def test_a_start_that_is_not_clear_is_none_and_is_reported(stamp, tmp_path):
     """Nobody can tell the 4th of May from the 5th of April; a day or a clock alone is no moment."""
-    assert sound(tmp_path, "a.csv", f"rate: 20000\nStartzeit;{stamp}\nforce;acc\n{ROWS}").started_at is None
+    (tmp_path / "a.csv").write_text(f"rate: 20000\nStartzeit;{stamp}\nforce;acc\n{ROWS}")
+    result = read("a.csv", tmp_path, NAMED)
+    assert result.recordings[0].started_at is None
+    (error,) = result.errors
+    assert error.reason == "wrong_time" and error.problem == f"the start time {stamp!r} cannot be read"
 
 
 COUNTS = ("Anzahl Messwerte", "# Anzahl Werte", "Number of samples", "Nombre d'échantillons", "Aantal samples",
@@ -148,7 +152,8 @@ def test_a_frequency_that_nobody_understood_is_no_licence_for_another_rate(line,
     text = f"{line}\nforce;acc\n{ROWS}"
     sound(tmp_path, "a.csv", text, replace(NAMED, rate=10000.0), rate=10000.0)
     (error,) = read("a.csv", tmp_path, replace(NAMED, rate=20000.0)).errors
-    assert error.reason == "wrong_rate" and line in error.problem and "20000 Hz" in error.problem
+    assert error.reason == "wrong_rate" and "10" in error.problem and "20000 Hz" in error.problem
+    assert line.split()[-2].strip("#")[:8].rstrip(":") in error.problem and "in line 1" in error.problem
     sound(tmp_path, "b.csv", f"rate: 20000\n{text}", replace(NAMED, rate=20000.0))
 
 

@@ -22,7 +22,7 @@ class RecordToWrite(RawRecord):
     """A record whose samples are arrays in memory and whose rate [Hz] is known."""
 
     samples: Sequence[np.ndarray]
-    rate: float
+    rate: float = 0.0
 
 
 def raw_records(recordings: Sequence[Recording], description: RawDescription | None, dtype: str) -> list[RecordToWrite]:

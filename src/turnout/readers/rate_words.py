@@ -1,0 +1,293 @@
+"""Words for a sampling rate, a time step and a time axis in the metadata of any format, by general rules.
+
+A name is split into words without case, accents and punctuation ("XIncrement", "wf_increment", "Fréquence
+d'échantillonnage"). Words of sampling with a word of rate or step are certain; each alone, or an unknown word with a
+frequency as its value, is possible. Names of filters, devices and counts are neither. English, German, French, Danish,
+Italian and Spanish forms are recognised, and some Dutch, Swedish and Czech ones.
+"""
+
+import re
+import unicodedata
+from dataclasses import dataclass
+from fractions import Fraction
+
+SAMPLING = re.compile(
+    r"sampl|sampel|abtast|tastrate|echantill|muestr|campion|bemonster|aftast|scan|acqui|adqui|erfass|prove"
+)
+WEAK_SAMPLING = re.compile(
+    r"mess|mesur|medi[dc]|misur|male|maling|meas|meting|meet|record|aufzeich|enregistr|registr|logg|data|daq|adc|digiti"
+)
+RATE = re.compile(r"freq|frekv|frequ|frec|kmitoc")
+RATE_TOKENS = {
+    "rate", "rates", "taux", "tasa", "cadence", "cadenza", "cadencia", "velocidad", "velocita", "vitesse", "hastighed",
+    "takt", "clock", "snelheid", "tasso", "hz",
+}  # fmt: skip
+STEP = re.compile(r"interval|inkrement|increment|period|schritt|skridt|xinc|tidstrin|tidssteg")
+STEP_TOKENS = {
+    "step",
+    "steps",
+    "stepsize",
+    "pas",
+    "passo",
+    "paso",
+    "delta",
+    "spacing",
+    "inc",
+    "trin",
+    "steg",
+    "timestep",
+}
+TIME = re.compile(r"^(?:x|t|wf|zeit\w*|time\w*|tid|tids\w*|temps|tiempo|tempo|temporal\w*|temporel\w*|tijd\w*)$")
+CERTAIN_RATES = {
+    "fs",
+    "rate",
+    "sps",
+    "fsample",
+    "fsampling",
+    "fsamp",
+    "sr",
+    "samplespersecond",
+    "fa",
+    "fabtast",
+    "abtfreq",
+}
+CERTAIN_STEPS = {
+    "dt", "deltat", "δt", "deltax", "dx", "xincrement", "xinc", "xincr", "increment", "inkrement", "timestep",
+    "xdelta", "tdelta", "ts", "tsample", "deltatime", "timedelta", "secondspersample", "timepersample", "hinterval",
+    "abtastzeit", "sampletime",
+}  # fmt: skip
+POSSIBLE = {
+    "sampling", "abtastung", "echantillonnage", "muestreo", "campionamento", "bemonstering", "vzorkovani", "timebase",
+    "zeitbasis", "samplingtime", "abtastzeitraum",
+}  # fmt: skip
+# Names of other frequencies, of settings, counts and times of day.
+OTHER = re.compile(
+    r"filt|pass(?!o)|cut|grenz|band|coup|cort|tagli|gra?en?s|eigen|reson|natur|modal|netz|mains|calib|kalib|tarat|etalonn"
+    r"|servic|wart|inspec|trigg|bit|baud|start|begin|debut|inicio|inizio|stop|date|datum|number|anzahl|count|nombre"
+    r"|antal|numero|aantal|cantidad|max|range|bereich|nyquist|carrier|refresh|update|oversampl|decim|ratio|heart|rot"
+    r"|anreg|excit|signal|sinus|sweep|mode$|source|quelle|unit|einheit|label|dimension|counter|zahler|filename|block|buffer|spectr|fft|offset"
+)
+UNIT_PER = re.compile(r"\s*(?:/|\bper\b|\bpro\b|\bpar\b|\bpor\b)\s*")
+SAMPLES = re.compile(
+    r"s|sa|samples?|smpl|pts?|points?|scans?|messwerte?|abtastwerte?|werte?|punkte?|echantillons?|campioni|muestras|count"
+)
+SECONDS = {"s", "sec", "secs", "second", "seconds", "sek", "sekunde", "sekunden", "sekunder", "seconde", "secondes",
+           "secondi", "secondo", "segundo", "segundos"}  # fmt: skip
+TIME_UNITS = {
+    **dict.fromkeys(SECONDS, Fraction(1)),
+    **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds", "millisekunden"), Fraction(1, 10**3)),
+    **dict.fromkeys(("µs", "us", "usec", "µsec", "microsecond", "microseconds", "mikrosekunden"), Fraction(1, 10**6)),
+    **dict.fromkeys(("ns", "nsec", "nanosecond", "nanoseconds"), Fraction(1, 10**9)),
+    **dict.fromkeys(("ps",), Fraction(1, 10**12)),
+    **dict.fromkeys(("min", "minute", "minutes", "minuten"), Fraction(60)),
+    **dict.fromkeys(("h", "hour", "hours", "stunden"), Fraction(3600)),
+    **dict.fromkeys(("d", "day", "days", "tage"), Fraction(86400)),
+}
+PREFIXES = {"": Fraction(1), "k": Fraction(10**3), "m": Fraction(10**6), "g": Fraction(10**9)}
+RATE_UNIT = re.compile(r"(k|m|g)?(?:hz|hertz|sps)")
+
+
+@dataclass(frozen=True)
+class RateUnit:
+    """Unit of a rate [Hz per unit] or of a step [s per unit]; ``is_sampling`` if it counts samples, as in "kS/s"."""
+
+    is_step: bool
+    scale: Fraction
+    is_sampling: bool = False
+
+
+def rate_unit(text: str) -> RateUnit | None:
+    """Unit of a sampling rate or a time step.
+
+    Parameters
+    ----------
+    text : str
+        Unit as it is written, without its number.
+
+    Returns
+    -------
+    RateUnit or None
+        None for any other unit.
+
+    Examples
+    --------
+    >>> rate_unit("kS/s").scale, rate_unit("µs/pt").is_step, rate_unit("Samples per second").scale, rate_unit("V")
+    (Fraction(1000, 1), True, Fraction(1, 1), None)
+    """
+    plain = text.strip("[](){} .").casefold().replace("\u03bc", "µ")
+    plain = re.sub(r"\s*(?:/|per\s+)\s*(?:ch|chan|channel|kanal)$", "", plain)
+    if match := RATE_UNIT.fullmatch(plain):
+        return RateUnit(False, PREFIXES[match[1] or ""], plain.endswith("sps"))
+    if plain in TIME_UNITS:
+        return RateUnit(True, TIME_UNITS[plain])
+    if re.fullmatch(r"(?:1/s|s\^?-1|s⁻¹|1/sec)", plain):
+        return RateUnit(False, Fraction(1))
+    parts = UNIT_PER.split(plain)
+    if len(parts) != 2:
+        return None
+    over, under = parts
+    if under in SECONDS:
+        for prefix, scale in PREFIXES.items():
+            if over.startswith(prefix) and SAMPLES.fullmatch(over[len(prefix) :].strip()):
+                return RateUnit(False, scale, True)
+    if SAMPLES.fullmatch(under) and over in TIME_UNITS:
+        return RateUnit(True, TIME_UNITS[over], True)
+    return None
+
+
+def words_of(name: str) -> tuple[str, ...]:
+    """Words of a name, without case, accents and punctuation.
+
+    Parameters
+    ----------
+    name : str
+        Name of an entry or column.
+
+    Returns
+    -------
+    tuple of str
+        Its words in lower case.
+
+    Examples
+    --------
+    >>> words_of("Fréquence d’échantillonnage"), words_of("XIncrement"), words_of("SampleRate_Hz")
+    (('frequence', 'd', 'echantillonnage'), ('x', 'increment'), ('sample', 'rate', 'hz'))
+    """
+    text = name.replace("ø", "o").replace("Ø", "O").replace("æ", "ae").replace("ß", "ss").replace("Δ", "delta ")
+    text = "".join(c for c in unicodedata.normalize("NFKD", text) if not unicodedata.combining(c))
+    text = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", text.replace("/", " per "))
+    return tuple(re.findall(r"[^\W\d_]+", re.sub(r"\b([kmg]) (?=hz\b)", r"\1", text.lower())))
+
+
+CERTAIN, POSSIBLY, NOT = 2, 1, 0
+
+
+@dataclass(frozen=True)
+class NameMeaning:
+    """Whether a name means a sampling rate or a time step, how sure (CERTAIN, POSSIBLY, NOT), and the unit in it."""
+
+    certainty: int
+    is_step: bool | None = None
+    unit: RateUnit | None = None
+    unknown_unit: str = ""
+
+
+NAME_WITH_UNIT = re.compile(r"^(.*?)\s*[\[({]([^\[\](){}]*)[\])}]\s*$")
+
+
+def name_meaning(name: str) -> NameMeaning:
+    """What the name of an entry says about sampling rate and time step.
+
+    Parameters
+    ----------
+    name : str
+        Name of an entry, with its unit in brackets or as its last word if it has one.
+
+    Returns
+    -------
+    NameMeaning
+        Certainty, kind and unit.
+
+    Examples
+    --------
+    >>> [name_meaning(n).certainty for n in ("Scan rate", "Abtastintervall", "Update rate", "Low pass", "Periode")]
+    [2, 2, 0, 0, 1]
+    >>> name_meaning("dt_ms").unit.scale, name_meaning("Pas de temps [µs]").is_step
+    (Fraction(1, 1000), True)
+    """
+    unit_text = ""
+    if (match := NAME_WITH_UNIT.match(name.strip())) and match[1]:
+        name, unit_text = match[1], match[2]
+    unit = rate_unit(unit_text) if unit_text else None
+    words = [word for word in words_of(name) if word not in ("wf", "the")]
+    if (
+        not unit_text
+        and len(words) > 1
+        and "per" not in words
+        and words[-1] not in ("t", "d", "h", "min")
+        and "".join(words) != "fs"
+    ):
+        unit = rate_unit(words[-1])
+        words = words[:-1] if unit else words
+    certainty, is_step = _meaning(words)
+    if unit is not None and certainty == NOT and not unit.is_step and not OTHER.search(" ".join(words)):
+        certainty, is_step = (CERTAIN if unit.is_sampling else POSSIBLY), False
+    if unit is None and unit_text and re.fullmatch(r"[a-zA-Z]\w{0,3}", unit_text.strip()) is None:
+        unit_text = ""  # an explanation, not a unit
+    return NameMeaning(certainty, is_step, unit, "" if unit else unit_text)
+
+
+def _meaning(words: list[str]) -> tuple[int, bool | None]:
+    """(certainty, whether it is a step) of the words of a name."""
+    joined, spaced = "".join(words), " ".join(words)
+    if joined in CERTAIN_RATES:
+        return CERTAIN, False
+    if joined in CERTAIN_STEPS:
+        return CERTAIN, True
+    is_rate = bool(RATE.search(joined)) or any(word in RATE_TOKENS for word in words)
+    is_rate |= any(word.endswith(("rate", "takt", "hastighed")) and SAMPLING.search(word + spaced) for word in words)
+    is_rate |= any(word.endswith(("rate", "takt")) and WEAK_SAMPLING.search(word) for word in words)
+    counted = words[words.index("per") - 1] if "per" in words[1:] else ""
+    is_rate |= len(counted) > 2 and bool(SAMPLES.fullmatch(counted)) and words[-1] in SECONDS
+    is_step = bool(STEP.search(joined)) or any(word in STEP_TOKENS for word in words)
+    is_step |= "per" in words and len(words) > 2 and words[-1] in ("sample", "samples", "point") and not is_rate
+    is_sampling = bool(SAMPLING.search(spaced)) or any(SAMPLES.fullmatch(w) and len(w) > 2 for w in words)
+    if OTHER.search(spaced) or not words:
+        return NOT, None
+    if is_step and (is_sampling or any(TIME.match(word) for word in words)):
+        return CERTAIN, True
+    is_measuring = bool(WEAK_SAMPLING.search(spaced)) and "data" not in spaced
+    if is_rate and (is_sampling or is_measuring):
+        return CERTAIN, False
+    if is_step or is_rate:
+        return POSSIBLY, (is_step if is_step != is_rate else None)
+    return (POSSIBLY if joined in POSSIBLE else NOT), None
+
+
+def is_rate_name(name: str) -> bool:
+    """Whether a name certainly means a sampling rate or a time step.
+
+    Parameters
+    ----------
+    name : str
+        Name of an entry or variable.
+
+    Returns
+    -------
+    bool
+        True for "fs", "Sample rate", "Abtastintervall" and the like.
+    """
+    return name_meaning(name).certainty == CERTAIN
+
+
+TIME_NAME = re.compile(
+    r"^(?:t|time|times|timestamps?|datetime|timeaxis|timevector|elapsed|zeit|zeiten|zeitstempel|zeitachse|uhrzeit|messzeit"
+    r"|tid|tidspunkt|tider|temps|tempo|tiempo|tijd|tijdstip|sekunden|seconds|sec|cas|horodatage)$"
+)
+
+
+def is_time_name(name: str) -> bool:
+    """Whether a column of this name is a time axis.
+
+    Parameters
+    ----------
+    name : str
+        Name of a column, without its unit.
+
+    Returns
+    -------
+    bool
+        True for "Time", "time_s", "Zeit", "timestamp" and the like.
+
+    Examples
+    --------
+    >>> [is_time_name(n) for n in ("time_s", "Zeit", "rel. time", "temperature", "T", "t")]
+    [True, True, True, False, False, True]
+    """
+    if name.strip() == "T":
+        return False
+    words = [word for word in words_of(name) if word not in TIME_UNITS or word == "t"]
+    words = [
+        word for word in words if word not in ("rel", "relative", "abs", "absolute", "sample", "utc", "stamp", "x")
+    ]
+    return (len(words) == 1 and bool(TIME_NAME.match(words[0]))) or name.strip().lower() == "x_value"

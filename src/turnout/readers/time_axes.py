@@ -1,0 +1,150 @@
+"""Time axes of a record: its time column, and every column that no sensor of the layout uses and that rises evenly."""
+
+from collections.abc import Iterator, Set
+
+import numpy as np
+
+from turnout.readers.rate_words import CERTAIN, POSSIBLY, TIME_UNITS, is_time_name, name_meaning, rate_unit, words_of
+from turnout.readers.source import MEANINGLESS_UNITS, RawRecord, Source
+from turnout.readers.statements import Entry, Statement, statements_of, time_statement
+from turnout.readers.timing import check_time, rate_of_time
+
+HEAD_SIZE = 1000  # samples from which a column is judged before all of it is read
+MIN_AXIS_SIZE = 8  # samples: fewer do not tell a time axis from a chance sequence
+MAX_HEAD_DEVIATION = 1.0  # steps: rounding to printed digits moves a time by less
+
+
+def all_statements(
+    record: RawRecord, k: int, n: int, measured: Set[int], where: str, source: Source
+) -> list[Statement]:
+    """All statements of a file about the sampling rate of a record: metadata, time axes and columns.
+
+    Parameters
+    ----------
+    record : RawRecord
+        The record as it is in the file.
+    k : int
+        Number of the record, from 0.
+    n : int
+        Number of records.
+    measured : set of int
+        Columns that the layout assigns to a sensor: they are no time axes.
+    where : str
+        The record, for the message.
+    source : Source
+        The raw file.
+
+    Returns
+    -------
+    list of Statement
+        In the order of the file.
+
+    Raises
+    ------
+    ReadError
+        If a time axis runs backwards, is not finite, jumps over missing samples, or is not even.
+    """
+    return statements_of(record.entries, k, n) + time_statements(record, measured, where, source)
+
+
+def time_statements(record: RawRecord, measured: Set[int], where: str, source: Source) -> list[Statement]:
+    """Statements of all time axes of a record, and of columns that repeat the rate in every row.
+
+    Parameters
+    ----------
+    record : RawRecord
+        The record as it is in the file.
+    measured : set of int
+        Columns that the layout assigns to a sensor: they are no time axes.
+    where : str
+        The record, for the message.
+    source : Source
+        The raw file.
+
+    Returns
+    -------
+    list of Statement
+        Their rates.
+
+    Raises
+    ------
+    ReadError
+        If a time axis runs backwards, is not finite, jumps over missing samples, or is not even.
+    """
+    statements = []
+    axes = [] if record.time is None else [("its time column", record.time, record.is_time_in_seconds, CERTAIN)]
+    axes += [(place, time, True, CERTAIN) for place, time in record.clocks]
+    axes += _columns(record, measured)
+    for place, time, is_in_seconds, certainty in axes:
+        if len(time) > 2:
+            check_time(
+                np.asarray(time, dtype=float), where if place == "its time column" else f"{where}, {place}", source
+            )
+            rate, tolerance, _ = rate_of_time(time)
+            statements.append(time_statement(place, rate, tolerance, is_in_seconds, certainty))
+    return statements + statements_of(_constant_columns(record, measured))
+
+
+def is_axis_name(name: str, unit: str) -> bool:
+    """Whether a column is a time axis by its name, so that the layout need not name it.
+
+    Parameters
+    ----------
+    name : str
+        Name of the column.
+    unit : str
+        Its unit, "" if not stated.
+
+    Returns
+    -------
+    bool
+        False if its unit is known and is no unit of time.
+    """
+    known = rate_unit(unit)
+    has_other_unit = unit.strip().casefold() not in MEANINGLESS_UNITS and (known is None or not known.is_step)
+    return (is_time_name(name) or name.startswith("__index_level_")) and not has_other_unit
+
+
+def _columns(record: RawRecord, measured: Set[int]) -> Iterator[tuple[str, np.ndarray, bool, int]]:
+    """(place, values, whether in seconds, certainty) of the columns that are time axes."""
+    for i, (name, unit, column) in enumerate(zip(record.names, record.units, record.samples)):
+        if i in measured or column.dtype.kind not in "fiu" or len(column) <= 2:
+            continue
+        known = rate_unit(unit) or next((rate_unit(w) for w in words_of(name)[1:][-1:] if w in TIME_UNITS), None)
+        is_time_unit = known is not None and known.is_step
+        has_other_unit = unit.strip().casefold() not in MEANINGLESS_UNITS and not is_time_unit
+        if has_other_unit:
+            continue
+        by_name = is_time_name(name)
+        if not by_name and not _rises_evenly(column[:HEAD_SIZE]):
+            continue
+        scale = float(known.scale) if is_time_unit and known else 1.0
+        certainty = CERTAIN if by_name or is_time_unit else POSSIBLY
+        place = f"column {name!r}" if by_name or is_time_unit else f"column {name!r}, which rises evenly"
+        yield place, np.asarray(column[:], dtype=float) * scale, is_time_unit, certainty
+
+
+def _rises_evenly(head: np.ndarray) -> bool:
+    """Whether the first samples of a column lie on a rising line; whole numbers in steps of 1 only count."""
+    head = np.asarray(head, dtype=float)
+    if len(head) < MIN_AXIS_SIZE or not np.isfinite(head).all():
+        return False
+    steps = np.diff(head)
+    step = float(np.median(steps))
+    if (steps <= 0).any() or (step == 1.0 and (steps == 1.0).all()):
+        return False
+    line = head[0] + (head[-1] - head[0]) * np.arange(len(head)) / (len(head) - 1)
+    has_gap = (np.abs(steps - step) > 0.5 * step).mean() < 2 / HEAD_SIZE
+    return bool(np.abs(head - line).max() < MAX_HEAD_DEVIATION * step or has_gap)
+
+
+def _constant_columns(record: RawRecord, measured: Set[int]) -> Iterator[Entry]:
+    """Columns that are named like a rate or a step and hold one number in every row."""
+    for i, (name, unit, column) in enumerate(zip(record.names, record.units, record.samples)):
+        full_name = f"{name} [{unit}]" if unit.strip() else name
+        if i in measured or column.dtype.kind not in "fiu" or name_meaning(full_name).certainty != CERTAIN:
+            continue
+        values = np.unique(np.asarray(column[:], dtype=float))
+        values = values[np.isfinite(values)]
+        if values.size == 1:
+            yield Entry(f"column {name!r}", full_name, float(values[0]))
