@@ -118,8 +118,8 @@ ARGUMENTS = {
 
 def _sql(call):
     name, _, parameters = call.partition("(")
-    wanted = [p.split(":=")[0].strip() for p in parameters.rstrip(")").split(",") if p.strip()]
-    return f"select count(*) from {name}" + (f"({', '.join(ARGUMENTS[p] for p in wanted)})" if wanted else "")
+    wanted = [p.strip() for p in parameters.rstrip(")").split(",") if p.strip() and ":=" not in p]
+    return f"select count(*) from {name}" + (f"({', '.join(ARGUMENTS[p] for p in wanted)})" if "(" in call else "")
 
 
 def _fails(registry, call):

@@ -70,6 +70,42 @@ def write_atomic(path: os.PathLike | str, write: Callable) -> None:
         temporary.unlink(missing_ok=True)
 
 
+def publish_file(unfinished: Path, final: Path) -> None:
+    """Give a finished temporary file its name; its content and the name survive a power cut.
+
+    Parameters
+    ----------
+    unfinished : Path
+        Temporary file in the folder of ``final``, written by this program or a library.
+    final : Path
+        Its name from now on; an existing file is replaced.
+
+    Raises
+    ------
+    OSError
+        If the disk fails.
+    """
+    with open(unfinished, "rb") as stream:
+        os.fsync(stream.fileno())
+    os.replace(unfinished, final)
+    sync_folder(final.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Wait until the names in ``folder`` are on the disk, so that they survive a power cut.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder with new names.
+    """
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
 def changed_at(path: Path) -> int:
     """Time of change of a file [ns since 1970], 0 if there is none.
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from turnout.content import sha256_of
 from turnout.errors import TurnoutError
+from turnout.files import write_atomic
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -107,10 +108,8 @@ def _extract(archive: Path, source: Source, raw: Path) -> None:
     with tarfile.open(archive) as tar:
         for member, target in source.members:
             path = raw / target
-            path.parent.mkdir(parents=True, exist_ok=True)
-            temporary = path.with_name(path.name + ".tmp")
             content = tar.extractfile(f"{root}/{member}")
             if content is None:
                 raise TurnoutError(f"{source.file} holds no file {member}: not the archive that was published")
-            temporary.write_bytes(content.read())
-            temporary.replace(path)
+            data = content.read()
+            write_atomic(path, lambda stream, data=data: stream.write(data))  # type: ignore[misc]

@@ -6,7 +6,6 @@ Views and macros are in one SQL file per question and are created in the order o
 from __future__ import annotations
 
 import csv
-import os
 import re
 from datetime import UTC, datetime
 from functools import cache
@@ -18,8 +17,8 @@ from typing import TYPE_CHECKING
 import duckdb
 
 from turnout.errors import REASONS, RegistryError
-from turnout.files import temporary_path
-from turnout.registry.generation import Generation, load, sync_folder
+from turnout.files import publish_file, temporary_path
+from turnout.registry.generation import Generation, load
 from turnout.registry.ids import content_id
 from turnout.registry.parquet import MEASUREMENT_IDS, read_live
 from turnout.registry.schema import file_literal, literal, tables, time_column
@@ -216,9 +215,9 @@ def build_database(registry_dir: Path, generation: Generation) -> None:
         _create_views(con, root, generation)
         con.execute("use memory")
         con.execute("detach registry")
-        os.replace(unfinished, root / DATABASE)
-        sync_folder(root)
-    except (duckdb.IOException, OSError) as error:
+        publish_file(unfinished, root / DATABASE)
+    except (duckdb.IOException, duckdb.TransactionException, duckdb.OutOfMemoryException, OSError) as error:
+        # DuckDB reports a full disk also as a transaction that cannot be committed
         raise RegistryError(
             f"cannot write {DATABASE}: {str(error).splitlines()[0]}. The new rows are in; make room, then "
             "'turnout registry relocate' makes the file again."

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from turnout.errors import RegistryError
-from turnout.files import write_atomic
+from turnout.files import sync_folder, write_atomic
 from turnout.registry.schema import tables
 
 if TYPE_CHECKING:
@@ -207,21 +206,6 @@ def write_durably(path: Path, content: bytes) -> None:
     """
     write_atomic(path, lambda stream: stream.write(content))
     sync_folder(path.parent)
-
-
-def sync_folder(folder: Path) -> None:
-    """Wait until the names in ``folder`` are on the disk, so that they survive a power cut.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder with new names.
-    """
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 def due_for_deletion(generation: Generation) -> list[str]:

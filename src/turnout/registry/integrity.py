@@ -11,6 +11,7 @@ from turnout.content import sha256_of
 from turnout.registry.database import DATABASE, is_behind
 from turnout.registry.generation import DataFile, Generation, load
 from turnout.registry.lock import registry_lock
+from turnout.registry.parquet import has_present_columns, schema_file
 from turnout.registry.schema import tables
 
 REMEDY = "Put it back from a backup, or run the workflow, which computes its rows again."
@@ -40,6 +41,11 @@ def check(registry_dir: PathLike, hashes: bool = True) -> list[str]:
     if is_behind(root, generation):
         wanted = f"generation {generation.number} with this program's views"
         problems.append(f"{DATABASE} is not of {wanted}: run 'turnout registry relocate'.")
+    for table in tables():
+        path = root / table / schema_file(table)
+        if not generation.of(table) and path.exists() and not has_present_columns(path, table):
+            name = path.relative_to(root).as_posix()
+            problems.append(f"{name}: not the file of an empty table. 'turnout registry relocate' writes it again.")
     if generation.incomplete:
         names = ", ".join(generation.incomplete)
         problems.append(f"Damaged files of {names} were taken off the list: the next run restores their rows.")

@@ -1,14 +1,15 @@
 """Write and read sorted Parquet files, complete or not at all; the same rows give the same bytes."""
 
-import os
 from pathlib import Path
 
 import duckdb
+import pyarrow as pa
+import pyarrow.parquet as pq
 
 from turnout.content import sha256_of
 from turnout.errors import RegistryError
-from turnout.files import temporary_path
-from turnout.registry.generation import DataFile, schema_hash, sync_folder
+from turnout.files import publish_file, temporary_path
+from turnout.registry.generation import DataFile, schema_hash
 from turnout.registry.schema import file_literal, literal, names, sort_order, tables, time_column
 
 # Rows per row group, which is read or skipped as a whole. In a year of unmerged batches one section is read three times
@@ -92,11 +93,10 @@ def write_sorted(
         rows = _copy(con, table, select, unfinished, prefix.startswith("batch"), same_source)
         if rows == 0:
             return None
-        digest = _sync_and_hash(unfinished)
+        digest = sha256_of(unfinished)
         final = folder / f"{prefix}-{digest[:12]}.parquet"
         size = unfinished.stat().st_size
-        os.replace(unfinished, final)
-        sync_folder(folder)
+        publish_file(unfinished, final)
     except (duckdb.IOException, OSError) as error:
         raise RegistryError(
             f"cannot write {folder_of(table, year)}/{prefix}: {str(error).splitlines()[0]}. Nothing was changed: "
@@ -145,19 +145,57 @@ def write_empty(con: duckdb.DuckDBPyConnection, registry_dir: Path, table: str) 
     RegistryError
         When the file cannot be written.
     """
-    path = Path(registry_dir) / table / f"_schema-{schema_hash(table)}.parquet"
-    if not path.exists():
+    path = Path(registry_dir) / table / schema_file(table)
+    if not has_present_columns(path, table):
         path.parent.mkdir(parents=True, exist_ok=True)
         unfinished = temporary_path(path)
         typed = ", ".join(f'null::{c.type} as "{c.name}"' for c in tables()[table])
         try:
             con.execute(f"copy (select {typed} limit 0) to {literal(str(unfinished))} (format parquet)")
-            os.replace(unfinished, path)
+            publish_file(unfinished, path)
         except (duckdb.IOException, OSError) as error:
             raise RegistryError(f"cannot write {path}: {str(error).splitlines()[0]}") from error
         finally:
             unfinished.unlink(missing_ok=True)
     return f"{table}/{path.name}"
+
+
+def schema_file(table: str) -> str:
+    """Name of the file of zero rows that defines the columns of an empty table.
+
+    Parameters
+    ----------
+    table : str
+        Name of the table.
+
+    Returns
+    -------
+    str
+        Name in the folder of the table.
+    """
+    return f"_schema-{schema_hash(table)}.parquet"
+
+
+def has_present_columns(path: Path, table: str) -> bool:
+    """Whether the file of zero rows is whole; one that a power cut has emptied is written again.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    table : str
+        Name of the table.
+
+    Returns
+    -------
+    bool
+        True if it has the present columns and no rows.
+    """
+    try:
+        with pq.ParquetFile(path) as parquet:
+            return tuple(parquet.schema_arrow.names) == names(table) and parquet.metadata.num_rows == 0
+    except (pa.ArrowException, OSError):
+        return False
 
 
 def read_list(registry_dir: Path, table: str, paths: list[str], same_schema: bool = False) -> str:
@@ -211,12 +249,6 @@ def read_live(con: duckdb.DuckDBPyConnection, registry_dir: Path, table: str, fi
     same_schema = all(f.schema == present for f in files)
     empty = [] if files and same_schema else [write_empty(con, registry_dir, table)]
     return read_list(registry_dir, table, [f.path for f in files] + empty, same_schema)
-
-
-def _sync_and_hash(path: Path) -> str:
-    with open(path, "rb") as stream:
-        os.fsync(stream.fileno())
-    return sha256_of(path)
 
 
 def _newest(con: duckdb.DuckDBPyConnection, table: str, path: Path) -> str | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +10,7 @@ from jinja2 import Environment, PackageLoader
 from tqdm import tqdm
 
 from turnout import __version__
-from turnout.files import temporary_path
+from turnout.files import write_text
 from turnout.report.formatting import count_of
 from turnout.report.pages.fleet import fleet_page
 from turnout.report.pages.glossary import glossary_page
@@ -162,9 +161,4 @@ def replace_page(path: Path, text: str) -> None:
     text : str
         Its whole text.
     """
-    temporary = temporary_path(path)
-    try:
-        temporary.write_text(text, encoding="utf-8")
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    write_text(path, text)

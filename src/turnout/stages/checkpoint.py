@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from turnout.files import write_atomic
 from turnout.mismatch.engine.map_fit import Fit
 
 FORMAT, VERSION = "turnout checkpoint", 2  # version 1 were pickles; they are never read
@@ -107,10 +108,8 @@ def write_value(path: Path, value: Any) -> None:
     arrays: list[np.ndarray] = []
     content = json.dumps({"format": FORMAT, "version": VERSION, "value": _pack(value, arrays)})
     members = {f"array_{k}": array for k, array in enumerate(arrays)}
-    unfinished = path.with_suffix(".tmp")
-    with open(unfinished, "wb") as file:
-        np.savez(file, **{CONTENT: np.frombuffer(content.encode(), dtype=np.uint8)}, **members)  # type: ignore[arg-type]
-    unfinished.replace(path)
+    packed = np.frombuffer(content.encode(), dtype=np.uint8)
+    write_atomic(path, lambda file: np.savez(file, **{CONTENT: packed}, **members))  # type: ignore[arg-type]
 
 
 def read_value(path: Path) -> Any:

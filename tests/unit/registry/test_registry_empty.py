@@ -4,6 +4,7 @@ import csv
 
 import duckdb
 import pytest
+from benchmarks import bench_registry
 
 from turnout.cli.main import main
 from turnout.errors import REASONS
@@ -40,6 +41,18 @@ def test_every_view_and_macro_answers_when_there_is_nothing(empty, call):
     with open_registry(empty) as connection:
         rows = connection.execute(sql_of(call)).fetchall()
     assert len(rows) == {"registry_info": 1, "reasons": len(REASONS)}.get(call, 0)
+
+
+@pytest.mark.parametrize("path", ["r.main", "memory.main,r.main"])
+def test_every_view_and_macro_answers_in_an_attached_registry_on_the_search_path(empty, path):
+    with duckdb.connect() as connection:
+        connection.execute(f"attach '{empty}/registry.duckdb' as r (read_only)")
+        for call in [c for c in views() if "(" not in c]:
+            connection.execute(sql_of(f"r.{call}")).fetchall()
+        connection.execute(f"set search_path = '{path}'")
+        for call in views():
+            connection.execute(sql_of(call)).fetchall()
+            connection.execute(bench_registry._sql(call)).fetchall()
 
 
 def test_there_are_at_least_the_views_that_users_were_promised():
