@@ -15,6 +15,7 @@ COMMANDS: tuple[str, ...] = (
     "hammer",
     "init",
     "inspect",
+    "layout",
     "nightly",
     "passage",
     "plan",

@@ -1,6 +1,8 @@
 """Check the configuration and, where the raw files are at hand, their names.
 
-Every error is one line: file, line, column, what stands there, what to write instead.
+Every error is one line: file, line, column, what stands there, what to write instead. --read opens the newest file of
+every section and of the passages, and compares all of it with the layout: rate, channels, units, counts, and whether
+stiffness and acceleration are those of a track.
 """
 
 from __future__ import annotations
@@ -30,6 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     add_configuration(parser)
     add_raw(parser, help=f"{RAW_HELP} (raw, where it is there)", default=None)
+    parser.add_argument("--read", action="store_true", help="read one file per section and compare it with the layout")
+    parser.add_argument("--turnout", help="with --read: only this one")
     parser.add_argument("--formats", action="store_true", help="list the raw formats")
 
 
@@ -72,8 +76,11 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError(args.raw, "--raw", "no such folder", "Write the folder that holds those of the turnouts")
     if not raw.is_dir():
         print(f"{raw}: no such folder, file names not checked.")
-        return 1 if faults else 0
-    return 1 if _report_left_out(configuration, raw) or faults else 0
+        return 1 if faults or args.read else 0
+    n_fault = _report_left_out(configuration, raw) + len(faults)
+    if args.read:
+        n_fault += _report_readings(configuration, raw, args.turnout)
+    return 1 if n_fault else 0
 
 
 def _faults(configuration: Configuration, formats: Collection[str], to_si: Callable[..., Conversion]) -> Iterator[str]:
@@ -118,3 +125,26 @@ def _report_left_out(configuration: Configuration, raw: Path) -> int:
     for problem in problems:
         print(f"  {problem}")
     return len(problems)
+
+
+def _report_readings(configuration: Configuration, raw: Path, only: str | None) -> int:
+    """Print what the reading of one file per section gave; returns the number of faults."""
+    from turnout.config.load import with_raw
+    from turnout.stages.layout_reading import file_readings, sections_without_files
+    from turnout.workflow.scan import scan
+
+    n_fault = 0
+    for name in [only] if only else configuration.ids:
+        turnout = with_raw(configuration.turnout(name), raw)
+        units = scan(turnout, raw).units
+        for reading in file_readings(turnout, raw, units):
+            verdict = "agrees" if not reading.faults else f"{len(reading.faults)} faults"
+            print(
+                f"{reading.turnout}, {reading.section}: {reading.path}: {verdict}{reading.text and ': '}{reading.text}"
+            )
+            for fault in reading.faults:
+                print(f"  {fault}")
+            n_fault += len(reading.faults)
+        if missing := sections_without_files(turnout, units):
+            print(f"{turnout.id}: no hammer test of {', '.join(missing)} yet.")
+    return n_fault

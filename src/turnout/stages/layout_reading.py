@@ -1,0 +1,191 @@
+"""Compare layouts with their raw files: one file of every section, and one of the passages, is read and judged."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from turnout.config import TurnoutConfig
+from turnout.errors import ReadError
+from turnout.hammer_test import find_impacts, receptance_of
+from turnout.readers import read
+from turnout.records import Impact, LongRecording, RawDescription, ReadResult, Recording, Unit
+from turnout.units import SI
+
+# Dynamic stiffness of a rail on its track, per rail, in the band of the ballast resonance. The limits are wide, for
+# soft pads, bad ballast and slabs: they show a factor of 1000, and smaller ones where the track is near a limit.
+STIFFNESS_BAND = (80.0, 300.0)  # Hz
+STIFFNESS_RANGE = (5e6, 8e8)  # N/m
+MAX_TRAIN_ACCELERATION = 5e4  # m/s²: more than any sensor on a rail withstands
+MIN_TRAIN_ACCELERATION = 0.05  # m/s²: less than the quiet trains at the farthest sensor
+SCALE_REMEDY = "Look at unit, sensitivity and sensitivity_unit of {channels}"
+
+
+@dataclass(frozen=True)
+class FileReading:
+    """What the reading of one file by its layout gave: ``faults`` is empty where both agree."""
+
+    turnout: str
+    section: str
+    path: str
+    text: str
+    faults: tuple[str, ...]
+
+
+def file_readings(turnout: TurnoutConfig, raw_root: Path, units: Sequence[Unit]) -> Iterator[FileReading]:
+    """Read the newest file of every section and of the passages, and compare it with the layout.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+        Merged configuration of the turnout.
+    raw_root : Path
+        Folder that the paths of the units start from.
+    units : sequence of Unit
+        Units of the turnout, from ``turnout.workflow.scan``.
+
+    Yields
+    ------
+    FileReading
+        One per section of hammer tests with files, and one of the passages.
+    """
+    hammer = {u.section: u for u in sorted(units, key=lambda u: str(u.campaign)) if u.kind == "hammer"}
+    for section, unit in hammer.items():
+        if section is not None and turnout.hammer is not None and section in turnout.hammer.descriptions:
+            yield _read(turnout, section, unit.files[0][0], raw_root, turnout.hammer.descriptions[section])
+    passages = [u for u in units if u.kind == "passage" and u.files]
+    if passages and turnout.passages is not None:
+        newest = max(passages, key=lambda u: u.label)
+        yield _read(turnout, "passages", newest.files[0][0], raw_root, turnout.passages.description)
+
+
+def sections_without_files(turnout: TurnoutConfig, units: Sequence[Unit]) -> list[str]:
+    """Labels of the sections of which no hammer test was found.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+        Merged configuration of the turnout.
+    units : sequence of Unit
+        Units of the turnout.
+
+    Returns
+    -------
+    list of str
+        In the order of the layout.
+    """
+    found = {u.section for u in units if u.kind == "hammer"}
+    return [label for label in (turnout.hammer.descriptions if turnout.hammer else ()) if label not in found]
+
+
+def _read(turnout: TurnoutConfig, section: str, path: str, raw_root: Path, description: RawDescription) -> FileReading:
+    try:
+        result = read(path, raw_root, description, turnout.settings["passage"].longest)
+    except ReadError as error:
+        return FileReading(turnout.id, section, path, "", (str(error),))
+    faults = _grouped_errors(result.errors)
+    text = _contents_text(result)
+    if description.kind == "hammer":
+        more, found = _hammer_faults(turnout, section, path, result.recordings)
+    else:
+        more, found = _passage_faults(path, [*result.recordings, *result.long_recordings])
+    return FileReading(turnout.id, section, path, f"{text}{found}", (*faults, *more))
+
+
+def _grouped_errors(errors: Sequence[Exception]) -> list[str]:
+    """Errors of a file as text; records with the same problem share one."""
+    groups: dict[tuple[str, str], list[ReadError]] = {}
+    texts = [str(error) for error in errors if not isinstance(error, ReadError)]
+    for error in errors:
+        if isinstance(error, ReadError):
+            groups.setdefault((error.problem, error.remedy), []).append(error)
+    for (problem, remedy), group in groups.items():
+        more = f" and {len(group) - 1} more" if len(group) > 1 else ""
+        texts.append(f"{group[0].path}, {group[0].where}{more}: {problem}. {remedy}.")
+    return texts
+
+
+def _contents_text(result: ReadResult) -> str:
+    records: list[Recording | LongRecording] = [*result.recordings, *result.long_recordings]
+    if not records:
+        return "no record"
+    channels = ", ".join(f"{c.name} [{SI.get(c.quantity, '-')}]" for c in records[0].channels)
+    return f"{len(records)} records of {records[0].n_sample} samples at {records[0].rate:g} Hz, {channels}"
+
+
+def _hammer_faults(
+    turnout: TurnoutConfig, section: str, path: str, recordings: Sequence[Recording]
+) -> tuple[list[str], str]:
+    """(faults, what was found) of a hammer test that was read."""
+    if turnout.hammer is None or not recordings:
+        return [], ""
+    force, response = turnout.hammer.force[section], turnout.hammer.response[section]
+    settings = turnout.settings["receptance"]
+    impacts = find_impacts(list(recordings), force, response, settings)
+    faults = [
+        f"{path}, impact {k}: {rejection.detail or rejection.reason}. {_remedy(force, response)}."
+        for k, impact in enumerate(impacts, 1)
+        for rejection in impact.rejections
+        if rejection.reason in ("out_of_scale", "sign_reversed", "dead_channel", "no_impact")
+    ]
+    stiffness = median_stiffness(impacts)
+    if stiffness is None:
+        return faults, f", {len(impacts)} impacts"
+    found = f", {len(impacts)} impacts, dynamic stiffness {stiffness / 1e6:.3g} MN/m"
+    if not STIFFNESS_RANGE[0] <= stiffness <= STIFFNESS_RANGE[1]:
+        low, high = (limit / 1e6 for limit in STIFFNESS_RANGE)
+        band = f"{STIFFNESS_BAND[0]:g} to {STIFFNESS_BAND[1]:g} Hz"
+        faults.append(
+            f"{path}, the response: the dynamic stiffness at {band} is {stiffness / 1e6:.3g} MN/m, that of rails on "
+            f"track {low:g} to {high:g}. {_remedy(force, response)}."
+        )
+    return faults, found
+
+
+def _remedy(force: str, response: str) -> str:
+    return SCALE_REMEDY.format(channels=f"{force!r} and {response!r}")
+
+
+def median_stiffness(impacts: Sequence[Impact]) -> float | None:
+    """Median dynamic stiffness over the band of the ballast resonance.
+
+    Parameters
+    ----------
+    impacts : sequence of Impact
+        Impacts of one section; rejected ones are left out.
+
+    Returns
+    -------
+    float or None
+        [N/m]; None without an accepted impact or a line in the band.
+    """
+    used = [impact for impact in impacts if impact.accepted]
+    if not used:
+        return None
+    receptance = receptance_of(used)
+    band = (receptance.frequency >= STIFFNESS_BAND[0]) & (receptance.frequency <= STIFFNESS_BAND[1])
+    size = np.abs(receptance.h1[band])
+    size = size[np.isfinite(size) & (size > 0.0)]
+    return float(np.median(1.0 / size)) if size.size else None
+
+
+def _passage_faults(path: str, records: Sequence[Recording | LongRecording]) -> tuple[list[str], str]:
+    """(faults, what was found) of a passage that was read."""
+    faults: list[str] = []
+    peaks: dict[str, float] = {}
+    for record in records:
+        rows = record.of_quantity("acceleration")
+        for block in record.blocks(10.0):
+            for row in rows:
+                name = record.channels[row].name
+                peaks[name] = max(peaks.get(name, 0.0), float(np.max(np.abs(block[row]), initial=0.0)))
+    for name, peak in peaks.items():
+        if not MIN_TRAIN_ACCELERATION <= peak <= MAX_TRAIN_ACCELERATION:
+            limits = f"{MIN_TRAIN_ACCELERATION:g} to {MAX_TRAIN_ACCELERATION:g}"
+            remedy = SCALE_REMEDY.format(channels=repr(name))
+            faults.append(f"{path}, channel {name!r}: its peak is {peak:.3g} m/s², trains cause {limits}. {remedy}.")
+    shown = ", ".join(f"{name} {peak:.3g}" for name, peak in peaks.items())
+    return faults, f", peaks [m/s²] {shown}" if shown else ""

@@ -1,0 +1,162 @@
+"""`turnout layout new` writes a draft that `turnout check` accepts; `check --read` compares it with the files."""
+
+import re
+
+import numpy as np
+import pytest
+
+from turnout.cli.main import main
+from turnout.config.load import load_layout
+from turnout.errors import ConfigError
+from turnout.readers.writing import write
+from turnout.records import Channel, RawChannel, RawDescription, Recording
+from turnout.stages.file_contents import file_contents
+from turnout.stages.layout_draft import decisions, layout_draft
+
+RATE = 20_000.0
+MASS, FREQUENCY, DAMPING = 250.0, 160.0, 0.08  # kg, Hz and damping ratio of the only mode
+
+
+def hammer_test(scale=1.0, rate=RATE):
+    """Four impacts of 1.2 ms on a mass on a spring; the response multiplied by ``scale``."""
+    rng = np.random.default_rng(3)
+    t = np.arange(4000) / rate
+    omega = 2.0 * np.pi * FREQUENCY
+    damped = omega * np.sqrt(1.0 - DAMPING**2)
+    unit = np.exp(-DAMPING * omega * t) * np.sin(damped * t) / (MASS * damped)
+    recordings = []
+    for peak in (4000.0, 4400.0, 3700.0, 4100.0):
+        force = peak * np.sin(np.pi * (t - 0.01) / 1.2e-3) ** 2 * ((t > 0.01) & (t < 0.0112))
+        spectrum = np.fft.rfft(force, 8000) * np.fft.rfft(unit, 8000)
+        line = 2.0 * np.pi * np.fft.rfftfreq(8000, 1.0 / rate)
+        rail = np.fft.irfft(-(line**2) * spectrum, 8000)[:4000] / rate
+        samples = np.stack([force, scale * rail]) + rng.normal(size=(2, 4000)) * [[0.5], [0.01 * scale]]
+        recordings.append(Recording(samples, rate, (Channel("force", "force"), Channel("rail", "acceleration"))))
+    return recordings
+
+
+def passage():
+    rng = np.random.default_rng(1)
+    channels = (Channel("A7 web", "acceleration"), Channel("A8 web", "acceleration"))
+    return Recording(rng.normal(size=(2, 8000)) * 5.0, 2000.0, channels, "passage")
+
+
+@pytest.fixture
+def configuration(tmp_path):
+    folder = tmp_path / "config"
+    (folder / "layouts").mkdir(parents=True)
+    (folder / "turnouts.tsv").write_text("turnout\tlayout\n")
+    return folder
+
+
+def files(tmp_path, scale=1.0, labels=("A7", "A8"), rate=RATE):
+    folder = tmp_path / "raw" / "t1" / "hammer" / "2026-05-13"
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = [folder / f"{label}_1.h5" for label in labels]
+    for path in paths:
+        write(hammer_test(scale, rate), path, "hdf5")
+    return paths
+
+
+def make_layout(configuration, *paths, name="mine"):
+    return main(["layout", "new", "--from", *map(str, paths), "--name", name, "--configuration", str(configuration)])
+
+
+def check(configuration, tmp_path, *more):
+    return main(["check", "--configuration", str(configuration), "--raw", str(tmp_path / "raw"), *more])
+
+
+def test_the_draft_of_hammer_files_is_accepted_and_reads_them(configuration, tmp_path, capsys):
+    assert make_layout(configuration, *files(tmp_path)) == 0
+    shown = capsys.readouterr().out
+    assert "section" not in shown or "position" in shown
+    layout = load_layout(configuration / "layouts" / "mine.yaml")
+    assert [s.label for s in layout.sections] == ["A7", "A8"]
+    description = layout.hammer.descriptions["A7"]
+    assert (description.rate, description.n_records, description.n_samples) == (RATE, 4, 4000)
+    assert layout.hammer.force["A7"] == "force" and layout.hammer.response["A7"] == "rail"
+    assert [(c.source, c.quantity, c.unit) for c in description.channels] == [
+        ("force", "force", "N"),
+        ("rail", "acceleration", "m/s²"),
+    ]
+    (configuration / "turnouts.tsv").write_text("turnout\tlayout\nt1\tmine\n")
+    assert check(configuration, tmp_path) == 0
+    assert check(configuration, tmp_path, "--read") == 0
+    text = capsys.readouterr().out
+    assert text.count(": agrees: 4 records of 4000 samples at 20000 Hz") == 2
+
+
+def test_the_stiffness_of_a_mass_on_a_spring_is_printed(configuration, tmp_path, capsys):
+    make_layout(configuration, *files(tmp_path))
+    (configuration / "turnouts.tsv").write_text("turnout\tlayout\nt1\tmine\n")
+    check(configuration, tmp_path, "--read", "--turnout", "t1")
+    found = float(re.search(r"dynamic stiffness (\S+) MN/m", capsys.readouterr().out)[1])
+    omega = 2.0 * np.pi * np.linspace(80.0, 300.0, 500)
+    spring = MASS * (2.0 * np.pi * FREQUENCY) ** 2
+    exact = np.abs(spring - MASS * omega**2 + 2j * DAMPING * np.sqrt(spring * MASS) * omega)
+    assert found == pytest.approx(np.median(exact) / 1e6, rel=0.1)  # the median over other lines
+
+
+@pytest.mark.parametrize("factor", [1000.0, 1e-3])
+def test_an_implausible_scale_of_the_response_is_named(factor, configuration, tmp_path, capsys):
+    make_layout(configuration, *files(tmp_path, factor))
+    (configuration / "turnouts.tsv").write_text("turnout\tlayout\nt1\tmine\n")
+    assert check(configuration, tmp_path, "--read") == 1
+    text = capsys.readouterr().out
+    assert "the dynamic stiffness at 80 to 300 Hz is" in text and "Look at unit, sensitivity" in text
+
+
+def test_a_rate_that_the_layout_contradicts_is_named(configuration, tmp_path, capsys):
+    make_layout(configuration, *files(tmp_path))
+    files(tmp_path, labels=("A8",), rate=25_600.0)
+    (configuration / "turnouts.tsv").write_text("turnout\tlayout\nt1\tmine\n")
+    assert check(configuration, tmp_path, "--read") == 1
+    text = capsys.readouterr().out
+    assert "t1, A7: t1/hammer/2026-05-13/A7_1.h5: agrees" in text
+    assert "t1, A8: t1/hammer/2026-05-13/A8_1.h5: 1 faults" in text and "25600 Hz instead of 20000 Hz" in text
+
+
+def test_what_the_files_do_not_state_is_to_be_decided_and_is_not_guessed(tmp_path, configuration):
+    volts = RawDescription((
+        RawChannel("force", "AI0", "force", "V", 1.0, "mV/N"),
+        RawChannel("rail", "AI1", "acceleration", "V", 10.0, "mV/(m/s²)"),
+    ))  # fmt: skip
+    write(hammer_test(), tmp_path / "log 17.npz", "npz", volts)
+    draft = layout_draft([file_contents(tmp_path / "log 17.npz")])
+    asked = " ".join(decisions(draft))
+    assert "file names" in asked and "sensitivity from the calibration sheet" in asked and "zone" in asked
+    path = configuration / "layouts" / "mine.yaml"
+    path.write_text(draft, encoding="utf-8")
+    channels = load_layout(path).hammer.descriptions["S1"].channels
+    assert [(c.source, c.quantity, c.unit) for c in channels] == [
+        ("AI0", "force", None),
+        ("AI1", "acceleration", None),
+    ]
+
+
+def test_a_file_of_passages_gives_a_layout_of_passages(tmp_path, configuration):
+    write([passage()], tmp_path / "20260513T100000Z.h5", "hdf5")
+    assert make_layout(configuration, tmp_path / "20260513T100000Z.h5", *files(tmp_path)) == 0
+    layout = load_layout(configuration / "layouts" / "mine.yaml")
+    assert [c.name for c in layout.passages.description.channels] == ["A7_web", "A8_web"]
+    assert layout.passages.description.rate == 2000.0 and layout.hammer is not None
+    text = (configuration / "layouts" / "mine.yaml").read_text()
+    assert re.findall(r"section: (\w+)", text) == ["A7", "A8"]
+
+
+def test_a_layout_that_is_there_stays_as_it_is(configuration, tmp_path, capsys):
+    (configuration / "layouts" / "mine.yaml").write_text("mine")
+    assert make_layout(configuration, *files(tmp_path)) == 2
+    assert "there is such a layout already" in capsys.readouterr().err
+    assert (configuration / "layouts" / "mine.yaml").read_text() == "mine"
+
+
+def test_files_of_different_wiring_make_no_layout(tmp_path):
+    first, second = files(tmp_path)
+    renamed = [
+        Recording(r.samples, r.rate, (Channel("hammer", "force"), Channel("rail", "acceleration")))
+        for r in hammer_test()
+    ]
+    write(renamed, second, "hdf5")
+    with pytest.raises(ConfigError, match=r"its channels are hammer, rail, those of A7_1\.h5 force, rail"):
+        layout_draft([file_contents(first), file_contents(second)])
