@@ -193,18 +193,11 @@ def common_length(
     index : (n_usable,) array of int
         Index of each in ``decays``.
     dropped : list of (index, Rejection)
-
-    Raises
-    ------
-    ValueError
-        For a decay that is not one-dimensional.
     """
     target_length, min_length = round(settings.duration * rate), round(settings.shortest_decay * rate)
     usable, dropped = [], []
     for i, decay in enumerate(decays):
         decay = np.asarray(decay, dtype=float)
-        if decay.ndim != 1:
-            raise ValueError(f"decay {i} has shape {decay.shape}, need (n,)")
         if len(decay) < min_length:
             dropped.append((i, Rejection("late", len(decay) / rate, settings.shortest_decay, "decay too short [s]")))
         elif not np.all(np.isfinite(decay[:target_length])):

@@ -10,6 +10,7 @@ MAX_STEP = np.array([0.2, 0.15])  # of ln f and of zeta in one iteration
 MAX_PRINCIPAL = 8  # combinations of the decays that hold the signal
 RIDGE = 1e-10  # keeps matrices of two nearly equal modes invertible; distinct modes differ by 1e-6 and more
 MIN_DAMPING, MAX_DAMPING = 1e-5, 0.95  # damping ratios during the fit
+MAX_FREQUENCY_STEP = np.log(2.0)  # of ln f in a single impact: an octave away it is another resonance
 
 
 @dataclass(frozen=True)
@@ -30,10 +31,11 @@ class MixedFit:
     sigma2: float
     linearisation: Linearisation
     converged: bool
+    is_limited: np.ndarray
 
     @property
     def shrunken_mean(self) -> np.ndarray:
-        """(n_mode, 2) mean of the shrunken modes: a safe start, as it is always underdamped, unlike ``mean``."""
+        """(n_mode, 2) mean of the shrunken modes: a safe start, as its damping is always above zero."""
         return self.theta.mean(axis=0)
 
     @property
@@ -214,22 +216,45 @@ def fit_mixed(
         linearisation = linearise(theta, decays, rate, drift)
         sigma2 = max(linearisation.rss.sum() / dof, 1e-300)
         inverse = _inverse(linearisation.information)
-        free = theta.reshape(n_decay, -1) + np.einsum("ijk,ik->ij", inverse, linearisation.score)
+        step = np.einsum("ijk,ik->ij", inverse, linearisation.score).reshape(theta.shape)
+        free, is_limited = _limit_to_domain(theta + step, theta)
+        free = free.reshape(n_decay, -1)
         covariance = sigma2 * inverse
-        variance = np.einsum("ijj->ij", covariance)
+        # Never below the variance with all other parameters known: rounding may turn that of twin poles negative.
+        known = np.maximum(np.einsum("ijj->ij", linearisation.information), 1e-300)
+        variance = np.maximum(np.einsum("ijj->ij", covariance), sigma2 / known)
         spread = between_variance(free, variance)
         weight = _inverse(covariance + np.diag(spread))
         centre = np.linalg.solve(weight.sum(axis=0), np.einsum("ijk,ik->j", weight, free))
+        centre = _limit_centre(centre, free)
         shrunken = centre + spread * np.einsum("ijk,ik->ij", weight, free - centre)
         shrunken = _limit_step(shrunken.reshape(theta.shape), theta)
         change = np.max(np.abs((shrunken - theta).reshape(n_decay, -1)) / np.sqrt(variance + spread))
         result = MixedFit(
-            centre.reshape(n_mode, 2), theta, free.reshape(theta.shape), covariance, spread, sigma2, linearisation, True
-        )
+            centre.reshape(n_mode, 2), theta, free.reshape(theta.shape), covariance, spread, sigma2, linearisation, True,
+            is_limited,
+        )  # fmt: skip
         theta = shrunken
         if change < tolerance and count > 1:
             return result
     return result if n_decay == 1 else MixedFit(**{**result.__dict__, "converged": False})
+
+
+def _limit_to_domain(free: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Values of single impacts in the domain of an underdamped mode near ``theta``; where they were limited.
+
+    A damping below zero is an estimate of a small damping, and stays. One beyond ``MAX_DAMPING`` in magnitude, a
+    frequency an octave away or a value that is not finite comes from an impact that holds no information on the mode.
+    """
+    limited = np.where(np.isfinite(free), free, theta)
+    limited[..., 0] = np.clip(limited[..., 0], theta[..., 0] - MAX_FREQUENCY_STEP, theta[..., 0] + MAX_FREQUENCY_STEP)
+    limited[..., 1] = np.clip(limited[..., 1], -MAX_DAMPING, MAX_DAMPING)
+    return limited, (limited != free).any(axis=-1)
+
+
+def _limit_centre(centre: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """The common mean, between the lowest and the highest single impact: full weight matrices may lead outside."""
+    return np.clip(np.where(np.isfinite(centre), centre, np.median(free, axis=0)), free.min(axis=0), free.max(axis=0))
 
 
 def _limit_step(theta: np.ndarray, previous: np.ndarray) -> np.ndarray:

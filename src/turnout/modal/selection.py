@@ -256,8 +256,9 @@ class Selection:
 
     @property
     def is_visible(self) -> np.ndarray:
-        """(n_decay, n_mode) bool: the mode is significant in this impact alone, at 1 %."""
-        return self.chi_squared > chi2.isf(0.01, 2)
+        """(n_decay, n_mode) bool: the mode is significant in this impact alone, at 1 %, and determined by it."""
+        visible = self.chi_squared > chi2.isf(0.01, 2)
+        return visible if self.fit is None else visible & ~self.fit.is_limited
 
 
 def select_modes(decays: np.ndarray, rate: float, settings: IdentifySettings) -> Selection:

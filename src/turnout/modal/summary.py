@@ -12,7 +12,11 @@ from turnout.records import Mode
 
 @dataclass(frozen=True)
 class Summary:
-    """``mean`` ± ``se``, interval ``low`` to ``high``, standard deviation ``spread`` between ``n`` impacts."""
+    """``mean`` ± ``se``, interval ``low`` to ``high``, standard deviation ``spread`` between ``n`` impacts.
+
+    ``se`` has two parts, added in squares: ``repeatability`` from the scatter of the estimates, and ``systematic``, the
+    error that all of them share.
+    """
 
     mean: float
     se: float
@@ -20,6 +24,8 @@ class Summary:
     high: float
     spread: float
     n: int
+    repeatability: float
+    systematic: float = 0.0
 
 
 def summarise(value: np.ndarray, se: np.ndarray, confidence: float = 0.95, shared_se: float = 0.0) -> Summary:
@@ -30,7 +36,8 @@ def summarise(value: np.ndarray, se: np.ndarray, confidence: float = 0.95, share
 
     The standard error comes from the spread of the estimates, not from their stated errors. So it is right even if
     those are wrong by a common factor. With equal errors this is the t interval. A single estimate has its stated
-    error and a normal interval.
+    error and a normal interval. The shared error has many degrees of freedom, so the interval adds the t interval of
+    the scatter and the normal interval of the shared error in squares.
 
     Parameters
     ----------
@@ -65,17 +72,20 @@ def summarise(value: np.ndarray, se: np.ndarray, confidence: float = 0.95, share
     n = len(value)
     if n == 0:
         raise ValueError("no estimates to summarise")
+    normal = norm.ppf(0.5 + confidence / 2.0)
     if n == 1:
-        error = float(np.hypot(se[0], shared_se))
-        half = norm.ppf(0.5 + confidence / 2.0) * error
-        return Summary(float(value[0]), error, float(value[0] - half), float(value[0] + half), 0.0, 1)
-    spread2 = float(between_variance(value, np.maximum(se**2, 1e-300)))
-    weight = 1.0 / (np.maximum(se**2, 1e-300) + spread2)
-    mean = float(np.sum(weight * value) / weight.sum())
-    error = float(np.sqrt(np.sum(weight * (value - mean) ** 2) / ((n - 1) * weight.sum())))
-    error = float(np.hypot(error, shared_se))
-    half = t.ppf(0.5 + confidence / 2.0, n - 1) * error
-    return Summary(mean, error, float(mean - half), float(mean + half), float(np.sqrt(spread2)), n)
+        mean, spread2, repeatability, quantile = float(value[0]), 0.0, float(se[0]), normal
+    else:
+        spread2 = float(between_variance(value, np.maximum(se**2, 1e-300)))
+        weight = 1.0 / (np.maximum(se**2, 1e-300) + spread2)
+        mean = float(np.sum(weight * value) / weight.sum())
+        repeatability = float(np.sqrt(np.sum(weight * (value - mean) ** 2) / ((n - 1) * weight.sum())))
+        quantile = t.ppf(0.5 + confidence / 2.0, n - 1)
+    half = float(np.hypot(quantile * repeatability, normal * shared_se))
+    error = float(np.hypot(repeatability, shared_se))
+    return Summary(
+        mean, error, mean - half, mean + half, float(np.sqrt(spread2)), n, repeatability, float(shared_se)
+    )
 
 
 MIN_ERROR = 1e-12  # stands for an unknown standard error: the spread between impacts then is all the error
@@ -145,8 +155,12 @@ class ImpactEstimates:
             damping_sd=zeta.spread,
             frequency_low=_none_if_nan(np.exp(log_f.low)),
             frequency_high=_none_if_nan(np.exp(log_f.high)),
-            damping_low=_none_if_nan(zeta.low),
-            damping_high=_none_if_nan(zeta.high),
+            damping_low=_none_if_nan(np.maximum(zeta.low, 0.0)),
+            damping_high=_none_if_nan(np.minimum(zeta.high, 1.0)),
+            frequency_repeatability=_none_if_nan(f * log_f.repeatability),
+            damping_repeatability=_none_if_nan(zeta.repeatability),
+            frequency_systematic=f * log_f.systematic,
+            damping_systematic=zeta.systematic,
             frequency_crb=None if self.bound is None else f * float(self.bound[0]),
             damping_crb=None if self.bound is None else float(self.bound[1]),
             energy=self.energy,

@@ -1,0 +1,102 @@
+"""No estimate leaves the domain of an underdamped mode, and no failure of the estimator costs a campaign."""
+
+import numpy as np
+import pytest
+from benchmarks.published import hammer_test
+from scipy.stats import norm, t
+
+from turnout.config.settings.identify import IdentifySettings
+from turnout.modal import identification, identify
+from turnout.modal.joint import identify_joint
+from turnout.modal.least_squares import drift_columns
+from turnout.modal.mixed_effects import MAX_DAMPING, fit_mixed
+from turnout.modal.summary import summarise
+
+SETTINGS = IdentifySettings(null_draws=10)
+
+
+def odd_impact(kind, time, frequency):
+    """A record that holds no resonance of the section, of amplitude 1."""
+    return {
+        "short": np.exp(-4000.0 * time),
+        "step": np.ones_like(time) + 0.01 * np.random.default_rng(1).standard_normal(len(time)),
+        "growing": np.exp(60.0 * time) * np.sin(2.0 * np.pi * frequency * time),
+    }[kind]
+
+
+@pytest.mark.parametrize("location", ["OT", "CP A7", "CP A9"])
+@pytest.mark.parametrize("kind", ["short", "step", "growing"])
+def test_one_odd_impact_leaves_every_estimate_in_its_domain(location, kind):
+    """Damping estimates of single impacts were up to 2.98 here, which is the damping of no vibration."""
+    test = hammer_test(location, 6, 0)
+    decays = np.array(test.decays())
+    time = np.arange(decays.shape[1]) / test.rate
+    decays[0] = odd_impact(kind, time, test.frequency[0, 0]) * np.abs(decays[1]).max()
+    start = np.stack([np.log(test.frequency[0]), test.damping[0]], axis=1)
+    fit = fit_mixed(start, decays, test.rate, drift_columns(decays.shape[1], -1))
+    assert np.all(np.abs(fit.unshrunken[..., 1]) <= MAX_DAMPING)
+    assert np.all(np.abs(fit.mean[:, 1]) <= MAX_DAMPING)
+    assert np.all(np.isfinite(fit.unshrunken))
+    assert fit.is_limited[0, 0] == (kind != "growing")
+    assert not fit.is_limited[1:].any()
+    model = identify(list(decays), test.rate, SETTINGS)
+    for i, mode in enumerate(model.modes):
+        assert abs(mode.frequency - test.frequency[1, i]) < 7.0 * mode.frequency_se
+
+
+def pink_noise(rng, n):
+    """(n,) noise with a power density proportional to 1/f, of variance 1."""
+    frequency = np.maximum(np.fft.rfftfreq(n), 1.0 / n)
+    noise = np.fft.irfft(np.fft.rfft(rng.standard_normal(n)) / np.sqrt(frequency), n)
+    return noise / noise.std()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_noise_of_one_over_f_gives_modes_in_their_domain(seed):
+    test = hammer_test("CP A7", 10, seed, snr_db=80.0)
+    rng = np.random.default_rng(seed)
+    decays = [y + 0.05 * np.abs(y).max() * pink_noise(rng, len(y)) for y in test.decays()]
+    model = identify(decays, test.rate, SETTINGS)
+    assert model.status != "rejected"
+    for mode in model.modes:
+        assert 0.0 <= mode.damping_low < mode.damping < mode.damping_high <= 1.0
+    assert all(abs(row["damping"]) <= MAX_DAMPING for row in model.per_impact)
+
+
+def test_an_impact_with_which_the_estimator_fails_is_left_out(monkeypatch):
+    test = hammer_test("CP A7", 6, 3)
+    decays = test.decays()
+
+    def fails_with_third(given, *arguments, **options):
+        if any(d is decays[2] for d in given):
+            raise np.linalg.LinAlgError("Singular matrix")
+        return identify_joint(given, *arguments, **options)
+
+    monkeypatch.setitem(identification.METHODS, "joint", fails_with_third)
+    model = identify(decays, test.rate, SETTINGS)
+    ((impact, rejection),) = model.diagnostics["dropped_impacts"]
+    assert (impact, rejection.reason) == (2, "odd_one_out")
+    assert "Singular matrix" in rejection.detail
+    assert model.status == "accepted"
+    assert model.diagnostics["impacts"] == (0, 1, 3, 4, 5)
+    assert sorted({row["impact"] for row in model.per_impact}) == [0, 1, 3, 4, 5]
+
+
+def test_an_estimator_that_always_fails_gives_a_rejected_model(monkeypatch):
+    def fails(*_, **__):
+        raise ZeroDivisionError("no scale")
+
+    monkeypatch.setitem(identification.METHODS, "joint", fails)
+    model = identify(hammer_test("OT", 5, 3).decays(), 20e3, SETTINGS)
+    assert model.status == "rejected"
+    assert [r.reason for r in model.rejections] == ["not_identified"]
+    assert "ZeroDivisionError: no scale" in model.rejections[0].detail
+
+
+def test_the_error_of_a_mean_is_reported_in_two_parts():
+    """Estimates 9 and 11: repeatability 1. The shared error of 2 has a normal interval, the scatter one of t(1)."""
+    summary = summarise(np.array([9.0, 11.0]), np.array([0.1, 0.1]), 0.95, shared_se=2.0)
+    assert (summary.repeatability, summary.systematic) == pytest.approx((1.0, 2.0))
+    assert summary.se == pytest.approx(np.sqrt(5.0))
+    half = np.hypot(t.ppf(0.975, 1), 2.0 * norm.ppf(0.975))
+    assert (summary.low, summary.high) == pytest.approx((10.0 - half, 10.0 + half))
