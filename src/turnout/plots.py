@@ -113,6 +113,7 @@ def plot_model(model: ModalModel, figure: Figure | SubFigure | None = None) -> n
     by_name = figure.subplot_mosaic(rows)
     if model.receptance is not None:
         _draw_receptance(by_name["receptance"], model.receptance)
+        _draw_fitted(by_name["receptance"], model)
         by_name["receptance"].set_xlabel("frequency [Hz]")
         by_name["receptance"].legend(frameon=False, fontsize="small", loc="lower left")
     for k, mode in enumerate(model.modes):
@@ -141,6 +142,16 @@ def _draw_receptance(axes: Axes, receptance: Receptance) -> None:
     _shade_failed(axes, receptance)
     _frequency_axis(axes)
     _tidy(axes, f"Receptance, mean of {receptance.n} impacts")
+
+
+def _draw_fitted(axes: Axes, model: ModalModel) -> None:
+    """Draw the magnitude of the receptance of the modes, where it was fitted."""
+    if model.fitted_receptance is None or model.receptance is None:
+        return
+    frequency = model.receptance.frequency
+    frequency = frequency[(frequency >= FREQUENCY_RANGE[0]) & (frequency <= FREQUENCY_RANGE[1])]
+    magnitude = np.abs(model.fitted_receptance.at(frequency))
+    axes.plot(frequency, magnitude, color=ORANGE, linewidth=1.2, label="modes of the fit")
 
 
 def _mark_mode(axes: Axes, mode: Mode) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from turnout.modal.mixed_effects import MIN_DAMPING
 from turnout.modal.selection import Selection
 from turnout.modal.state_space import continuous_pole
-from turnout.records import Rejection
+from turnout.records import FittedReceptance, Rejection
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -52,11 +52,11 @@ def passed_share(receptance: Receptance, frequency: float, damping: float) -> tu
     return float(np.mean(receptance.passed[inside])), float(np.min(receptance.gate_level[inside]))
 
 
-def residues_of_receptance(receptance: Receptance, frequency: ArrayLike, damping: ArrayLike) -> np.ndarray | None:
-    r"""Residues R of the accelerance :math:`\sum_m \frac12\left(\frac{R_m}{p - s_m} +
-    \frac{\bar R_m}{p - \bar s_m}\right) + d_0 + d_1 p^2` by least squares over the lines that passed.
+def fit_receptance(receptance: Receptance, frequency: ArrayLike, damping: ArrayLike) -> FittedReceptance | None:
+    """Residues and direct terms of modes by least squares over the lines of the accelerance that passed the gate.
 
-    :math:`p = i\omega + a`, with the decay a of the receptance's exponential window.
+    Each line has the weight of its relative error, which is nearly the same for all lines that pass the gate. With
+    equal absolute weights the high frequencies decide, and the ballast resonance is missed by a factor of two.
 
     Parameters
     ----------
@@ -68,23 +68,29 @@ def residues_of_receptance(receptance: Receptance, frequency: ArrayLike, damping
 
     Returns
     -------
-    (n_mode,) array of complex, or None
-        Of the response :math:`\mathrm{Re} \sum R e^{st}` to a unit impulse [m/s² per N s]; None if fewer than
-        two lines per unknown passed.
+    FittedReceptance or None
+        None if fewer than two lines per unknown passed.
     """
     use = receptance.passed & np.isfinite(receptance.h1)
     frequency, damping = np.asarray(frequency), np.asarray(damping)
     unknowns = 2 * len(frequency) + 2
+    within = use & (receptance.frequency <= receptance.valid_to)
+    if np.count_nonzero(within) >= 2 * unknowns:  # further modes act above the band edge of the hammer
+        use = within
     if np.count_nonzero(use) < 2 * unknowns:
         return None
     p = 2j * np.pi * receptance.frequency[use] + receptance.decay
     accelerance = p**2 * receptance.h1[use]
     s = continuous_pole(frequency, damping)
     plus, minus = 0.5 / (p[:, None] - s), 0.5 / (p[:, None] - s.conj())
-    columns = np.hstack([plus + minus, 1j * (plus - minus), np.ones((len(p), 1)), (p[:, None] / abs(p).max()) ** 2])
-    design = np.vstack([columns.real, columns.imag])
-    solution = np.linalg.lstsq(design, np.concatenate([accelerance.real, accelerance.imag]), rcond=None)[0]
-    return solution[: len(s)] + 1j * solution[len(s) : 2 * len(s)]
+    scale = float(abs(p).max()) ** 2
+    columns = np.hstack([plus + minus, 1j * (plus - minus), np.ones((len(p), 1)), p[:, None] ** 2 / scale])
+    weight = 1.0 / np.maximum(np.abs(accelerance), 1e-3 * np.abs(accelerance).max())
+    design, target = columns * weight[:, None], accelerance * weight
+    design, target = np.vstack([design.real, design.imag]), np.concatenate([target.real, target.imag])
+    solution = np.linalg.lstsq(design, target, rcond=None)[0]
+    residue = solution[: len(s)] + 1j * solution[len(s) : 2 * len(s)]
+    return FittedReceptance(s, residue, (float(solution[-2]), float(solution[-1] / scale)), receptance.decay)
 
 
 MAIN_BANDS = ("ballast", "railpad")

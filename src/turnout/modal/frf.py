@@ -314,7 +314,9 @@ def _sort_modes(
 def _from_logarithm(s: Summary) -> Summary:
     """Summary of ln f as one of f."""
     mean = float(np.exp(s.mean))
-    return Summary(mean, mean * s.se, float(np.exp(s.low)), float(np.exp(s.high)), mean * s.spread, s.n, mean * s.repeatability)
+    return Summary(
+        mean, mean * s.se, float(np.exp(s.low)), float(np.exp(s.high)), mean * s.spread, s.n, mean * s.repeatability
+    )
 
 
 def _without_duplicates(modes: Sequence[FrfMode], rejected: list[dict]) -> list[FrfMode]:

@@ -110,7 +110,7 @@ def _identify_without_one(
                 raise
             continue
         rejection = Rejection("odd_one_out", None, None, f"the identification fails with this impact ({failure})")
-        return _renumbered(model, kept, (k, rejection))
+        return _with_test_numbers(model, kept, (k, rejection))
     reason = Rejection("not_identified", None, None, f"the identification failed ({failure})")
     return no_model(rate, method, (reason,), {"dropped_impacts": ()})
 
@@ -123,7 +123,7 @@ def _least_typical_first(decays: Sequence[np.ndarray]) -> list[int]:
     return np.argsort(unit @ unit.mean(axis=0), kind="stable").tolist()
 
 
-def _renumbered(model: ModalModel, impacts: Sequence[int], dropped: tuple[int, Rejection]) -> ModalModel:
+def _with_test_numbers(model: ModalModel, impacts: Sequence[int], dropped: tuple[int, Rejection]) -> ModalModel:
     """A model of some impacts of a test, with the numbers that the impacts have in the test.
 
     Parameters

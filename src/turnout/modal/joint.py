@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from turnout.modal.bands import choose_bands, residues_of_receptance
+from turnout.modal.bands import choose_bands, fit_receptance
 from turnout.modal.mixed_effects import MIN_DAMPING
 from turnout.modal.noise import whiten
 from turnout.modal.selection import Selection, select_modes
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from turnout.config.settings.identify import IdentifySettings
     from turnout.modal.bands import BandChoice
-    from turnout.records import Mode, Receptance
+    from turnout.records import FittedReceptance, Mode, Receptance
 
 
 def stabilisation_rows(selection: Selection, tolerance: float) -> tuple[dict, ...]:
@@ -258,7 +258,7 @@ def identify_joint(
     }
     if choice.status == "rejected":
         return no_model(rate, "joint", diagnostics=diagnostics, **model_fields)
-    residues, scale = _residues(modes, choice, selection, receptance)
+    residues, scale, model_fields["fitted_receptance"] = _residues(modes, choice, selection, receptance)
     return assemble(
         estimates,
         modes,
@@ -345,15 +345,15 @@ def _estimates(
 
 def _residues(
     modes: Sequence[Mode], choice: BandChoice, selection: Selection, receptance: Receptance | None
-) -> tuple[np.ndarray, str]:
+) -> tuple[np.ndarray, str, FittedReceptance | None]:
     """Residues per unit impulse from the receptance if there is one, else those of the mean decay."""
     named = [(m.frequency, m.damping) for m in modes]
     if receptance is not None:
         for all_modes in (named + _unassigned_modes(choice, selection, receptance), named):
-            residues = residues_of_receptance(receptance, *np.transpose(all_modes))
-            if residues is not None:
-                return residues[: len(named)], "unit impulse [m/s² per N s]"
-    return selection.amplitude.mean(axis=0)[list(choice.modes.values())], "mean decay [m/s²]"
+            fitted = fit_receptance(receptance, *np.transpose(all_modes))
+            if fitted is not None:
+                return fitted.residue[: len(named)], "unit impulse [m/s² per N s]", fitted
+    return selection.amplitude.mean(axis=0)[list(choice.modes.values())], "mean decay [m/s²]", None
 
 
 def _unassigned_modes(choice: BandChoice, selection: Selection, receptance: Receptance) -> list[tuple[float, float]]:

@@ -230,10 +230,8 @@ def fit_mixed(
         shrunken = centre + spread * np.einsum("ijk,ik->ij", weight, free - centre)
         shrunken = _limit_step(shrunken.reshape(theta.shape), theta)
         change = np.max(np.abs((shrunken - theta).reshape(n_decay, -1)) / np.sqrt(variance + spread))
-        result = MixedFit(
-            centre.reshape(n_mode, 2), theta, free.reshape(theta.shape), covariance, spread, sigma2, linearisation, True,
-            is_limited,
-        )  # fmt: skip
+        mean, unshrunken = centre.reshape(n_mode, 2), free.reshape(theta.shape)
+        result = MixedFit(mean, theta, unshrunken, covariance, spread, sigma2, linearisation, True, is_limited)
         theta = shrunken
         if change < tolerance and count > 1:
             return result

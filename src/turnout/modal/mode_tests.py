@@ -12,7 +12,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from turnout.modal.least_squares import Linearisation, linearise
-from turnout.modal.mixed_effects import MixedFit, degrees_of_freedom, fit_mixed
+from turnout.modal.mixed_effects import MIN_DAMPING, MixedFit, degrees_of_freedom, fit_mixed
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -106,6 +106,40 @@ def share_of_impacts(statistic: np.ndarray, probability: float = 0.01) -> np.nda
         Share for each mode, 0 to 1.
     """
     return (statistic > chi2.isf(probability, 2)).mean(axis=0)
+
+
+# Distance of the single impacts' mean from the common mode, over the half-power half-width of the mode. One linear step
+# over this distance turns the phase by 0.25 rad within a decay time: its result is no longer that of a linear model.
+MAX_LINEAR_DISTANCE = 0.25
+MIN_DISAGREEMENT = 4.0  # the same distance over its standard error: below, it may be chance
+
+
+def disagreement(fit: MixedFit) -> np.ndarray:
+    r"""Distance between the mean of the single impacts and the common mode, where it is significant.
+
+    .. math:: d = \max\left(\frac{|\overline{\ln f_i} - \ln f|}{\zeta}, \frac{|\bar\zeta_i - \zeta|}{\zeta}\right)
+
+    Two poles that share one resonance fit all impacts together better than one pole, but no impact determines them.
+    Their estimates from single impacts then lie elsewhere than the common poles.
+
+    Parameters
+    ----------
+    fit : MixedFit
+        Fit of all modes.
+
+    Returns
+    -------
+    (n_mode,) array of float
+        In half-power half-widths; 0 where it is less than ``MIN_DISAGREEMENT`` standard errors, and for fewer than
+        three impacts.
+    """
+    n = len(fit.theta)
+    if n < 3:
+        return np.zeros(len(fit.mean))
+    distance = np.abs(fit.unshrunken.mean(axis=0) - fit.mean)
+    error = fit.unshrunken.std(axis=0, ddof=1) / np.sqrt(n)
+    significant = np.where(distance > MIN_DISAGREEMENT * error, distance, 0.0)
+    return significant.max(axis=1) / np.maximum(np.abs(fit.mean[:, 1]), MIN_DAMPING)
 
 
 MAX_SCREENING_PROBABILITY = (
@@ -366,6 +400,7 @@ def mode_failures(
     se = np.sqrt(1.0 / weight.sum(axis=0)).reshape(n_mode, 2)
     spread = np.sqrt(fit.spread).reshape(n_mode, 2)
     probability, share = common_probability(statistic), share_of_impacts(statistic)
+    distance = disagreement(fit)
     failures = []
     for m in range(n_mode):
         damping = fit.mean[m, 1]
@@ -374,6 +409,7 @@ def mode_failures(
             ("shows in too few impacts", share[m], settings.impact_share, False),
             ("damping too high", damping, max_damping or settings.damping_maximum, True),
             ("damping not above zero", damping, 1e-4, False),
+            ("single impacts disagree with their common fit", distance[m], MAX_LINEAR_DISTANCE, True),
         )
         precision_tests = (
             ("frequency too uncertain", se[m, 0], settings.frequency_se_maximum, True),

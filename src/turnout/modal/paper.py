@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.signal import butter, sosfilt, sosfiltfilt
 
-from turnout.modal.bands import passed_share
+from turnout.modal.bands import fit_receptance, passed_share
 from turnout.modal.era import era
 from turnout.modal.frf import pulse_response
 from turnout.modal.joint import common_length, fit_diagnostics, stabilisation_rows
@@ -273,6 +273,9 @@ def identify_paper(
     if not estimates:
         return no_model(rate, "paper", diagnostics=diagnostics, **model_fields)
     modes = tuple(e.mode(settings.confidence) for e in estimates)
+    if receptance is not None:
+        values = [m.frequency for m in modes], [m.damping for m in modes]
+        model_fields["fitted_receptance"] = fit_receptance(receptance, *values)
     amplitude = _amplitude(modes, records, rate)
     diagnostics |= _model_bias(selection, modes, amplitude, records.shape[1], rate, settings)
     return assemble(

@@ -83,9 +83,7 @@ def summarise(value: np.ndarray, se: np.ndarray, confidence: float = 0.95, share
         quantile = t.ppf(0.5 + confidence / 2.0, n - 1)
     half = float(np.hypot(quantile * repeatability, normal * shared_se))
     error = float(np.hypot(repeatability, shared_se))
-    return Summary(
-        mean, error, mean - half, mean + half, float(np.sqrt(spread2)), n, repeatability, float(shared_se)
-    )
+    return Summary(mean, error, mean - half, mean + half, float(np.sqrt(spread2)), n, repeatability, float(shared_se))
 
 
 MIN_ERROR = 1e-12  # stands for an unknown standard error: the spread between impacts then is all the error

@@ -1,6 +1,6 @@
 """Records that the packages of the program exchange. All values are in SI units; times are naive UTC."""
 
-from turnout.records.modal import Impact, ModalModel, Mode, Receptance
+from turnout.records.modal import FittedReceptance, Impact, ModalModel, Mode, Receptance
 from turnout.records.raw import RawChannel, RawDescription
 from turnout.records.recording import EMPTY_MAPPING, Channel, LongRecording, ReadResult, Recording
 from turnout.records.unit import Rejection, Unit
@@ -8,6 +8,7 @@ from turnout.records.unit import Rejection, Unit
 __all__ = [
     "EMPTY_MAPPING",
     "Channel",
+    "FittedReceptance",
     "Impact",
     "LongRecording",
     "ModalModel",

@@ -97,6 +97,49 @@ def _half(low: float | None, high: float | None) -> float | None:
 
 
 @dataclass(frozen=True)
+class FittedReceptance:
+    r"""Receptance of the modes of a section, as fitted to the measured one.
+
+    .. math:: H(p) = \frac{1}{p^2}\left[\sum_m \frac12\left(\frac{R_m}{p - s_m} + \frac{\bar R_m}{p - \bar s_m}\right)
+              + d_0 + d_1 p^2\right], \quad p = i 2\pi f + a
+
+    ``pole`` [1/s] and ``residue`` [m/s² per N s] are (n_mode,) complex: first those of the model's modes, in their
+    order, then those of further modes in the fit. ``direct`` holds d0 [m/s²/N] and d1 [m/N]: the acceleration follows
+    the force at once, which no free decay shows. ``decay`` [1/s] is that of the exponential window of the measurement.
+    """
+
+    pole: np.ndarray
+    residue: np.ndarray
+    direct: tuple[float, float]
+    decay: float = 0.0
+
+    def at(self, frequency: np.ndarray) -> np.ndarray:
+        """Receptance at given frequencies.
+
+        Parameters
+        ----------
+        frequency : (n,) array of float
+            Above 0. [Hz]
+
+        Returns
+        -------
+        (n,) array of complex
+            Displacement per force. [m/N]
+
+        Examples
+        --------
+        A free mass of 4 kg has a direct term only:
+
+        >>> mass = FittedReceptance(np.empty(0), np.empty(0), (0.25, 0.0))
+        >>> print((mass.at(np.array([1.0 / (2.0 * np.pi)])) * 4.0).round(9))
+        [-1.+0.j]
+        """
+        p = 2j * np.pi * np.asarray(frequency, dtype=float)[:, None] + self.decay
+        terms = 0.5 * (self.residue / (p - self.pole) + self.residue.conj() / (p - self.pole.conj()))
+        return terms.sum(axis=1) / p[:, 0] ** 2 + self.direct[0] / p[:, 0] ** 2 + self.direct[1]
+
+
+@dataclass(frozen=True)
 class ModalModel:
     """State-space model of one section: x[k+1] = A x[k], y[k] = c x[k], x[0] = b for a unit impact.
 
@@ -105,6 +148,10 @@ class ModalModel:
     ``per_impact`` holds the estimates of each impact: impact, band, frequency, damping, frequency_se, damping_se.
     ``stabilisation`` holds those of each model order: order, frequency, damping, status. ``rejected_modes`` lists the
     rejected candidates with the reason. ``receptance`` is the measured one where the caller keeps it, for ``plot``.
+
+    ``a``, ``b`` and ``c`` describe the free decay after an impact. They do not hold the part of the acceleration that
+    follows the force at once, nor modes without a name, so they alone do not give the receptance: that is
+    ``fitted_receptance``, where a receptance was measured.
     """
 
     a: np.ndarray
@@ -121,6 +168,7 @@ class ModalModel:
     fit: float | None = None
     diagnostics: Mapping = field(default_factory=dict)
     receptance: Receptance | None = None
+    fitted_receptance: FittedReceptance | None = None
 
     def __repr__(self) -> str:
         modes = [f"{mode.band} {mode.frequency_text}" for mode in self.modes]
@@ -130,7 +178,7 @@ class ModalModel:
         return f"ModalModel({self.method}, {self.status}: {words or 'no mode'})"
 
     def plot(self, figure: Figure | SubFigure | None = None) -> np.ndarray:
-        """Draw the modes with their errors, below the measured receptance if the model holds it.
+        """Draw the modes with their errors, below the measured and the fitted receptance if the model holds them.
 
         Parameters
         ----------

@@ -142,6 +142,8 @@ def test_axes_have_units_and_the_figure_shows_every_impact(example):
     receptance, ballast, railpad = model.plot()
     assert receptance.get_xlabel() == "frequency [Hz]" and receptance.get_ylabel() == "receptance [m/N]"
     assert ballast.get_ylabel() == "damping ratio [%]" and railpad.get_xlabel() == "frequency [Hz]"
+    (curve,) = (line for line in receptance.get_lines() if line.get_label() == "modes of the fit")
+    np.testing.assert_allclose(curve.get_ydata(), np.abs(model.fitted_receptance.at(curve.get_xdata())))
     means = [line for line in railpad.get_lines() if len(line.get_xdata()) == 1]
     impacts = [line for line in railpad.get_lines() if len(line.get_xdata()) == 10]
     mode = model.mode("railpad")

@@ -1,16 +1,24 @@
 """No estimate leaves the domain of an underdamped mode, and no failure of the estimator costs a campaign."""
 
+from datetime import date
+from zlib import crc32
+
 import numpy as np
 import pytest
 from benchmarks.published import hammer_test
 from scipy.stats import norm, t
 
 from turnout.config.settings.identify import IdentifySettings
+from turnout.config.settings.receptance import ReceptanceSettings
+from turnout.demo.hammer import hammer_test as simulate_test
+from turnout.demo.hammer import simulated_response
+from turnout.hammer_test import find_impacts
 from turnout.modal import identification, identify
 from turnout.modal.joint import identify_joint
 from turnout.modal.least_squares import drift_columns
 from turnout.modal.mixed_effects import MAX_DAMPING, fit_mixed
 from turnout.modal.summary import summarise
+from turnout.stages.hammer import identify_accepted
 
 SETTINGS = IdentifySettings(null_draws=10)
 
@@ -24,7 +32,7 @@ def odd_impact(kind, time, frequency):
     }[kind]
 
 
-@pytest.mark.parametrize("location", ["OT", "CP A7", "CP A9"])
+@pytest.mark.parametrize("location", ["OT", "CP A9"])
 @pytest.mark.parametrize("kind", ["short", "step", "growing"])
 def test_one_odd_impact_leaves_every_estimate_in_its_domain(location, kind):
     """Damping estimates of single impacts were up to 2.98 here, which is the damping of no vibration."""
@@ -51,7 +59,7 @@ def pink_noise(rng, n):
     return noise / noise.std()
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_noise_of_one_over_f_gives_modes_in_their_domain(seed):
     test = hammer_test("CP A7", 10, seed, snr_db=80.0)
     rng = np.random.default_rng(seed)
@@ -100,3 +108,32 @@ def test_the_error_of_a_mean_is_reported_in_two_parts():
     assert summary.se == pytest.approx(np.sqrt(5.0))
     half = np.hypot(t.ppf(0.975, 1), 2.0 * norm.ppf(0.975))
     assert (summary.low, summary.high) == pytest.approx((10.0 - half, 10.0 + half))
+
+
+def demonstration_model(section, factors, number):
+    """Receptance and model of 30 impacts at a section of the demonstration's track, with the noise of one campaign."""
+    rng = np.random.default_rng([1, crc32(f"tommerup_s1/{section}".encode()), number])
+    response = simulated_response(section, *factors)
+    recordings = [r for k in (1, 2, 3) for r in simulate_test(response, 10.0, date(2024, 9, 14), k, rng)[0]]
+    impacts = find_impacts(recordings, "force", "rail", ReceptanceSettings())
+    return identify_accepted(impacts, ReceptanceSettings(), SETTINGS)[1:]
+
+
+def check_receptance(measured, model):
+    """The fitted receptance is the measured one at both resonances; it was wrong by a factor of two to five there."""
+    at = [int(np.argmin(np.abs(measured.frequency - mode.frequency))) for mode in model.modes]
+    ratio = model.fitted_receptance.at(measured.frequency[at]) / measured.h1[at]
+    assert np.all(np.abs(ratio - 1.0) < 0.1)
+
+
+def test_two_poles_in_one_resonance_do_not_stand_for_it():
+    """Poles of 477 and 493 Hz shared the railpad resonance of one campaign: 505 Hz, and a fit of 55 %."""
+    tests = [demonstration_model("A8", (1.0, 1.012), number) for number in (0, 5)]
+    first, second = (model for _, model in tests)
+    for measured, model in tests:
+        check_receptance(measured, model)
+        assert model.status == "accepted"
+        assert model.fit > 70.0
+    a, b = first.mode("railpad"), second.mode("railpad")
+    assert abs(a.frequency - b.frequency) < 4.0 * np.hypot(a.frequency_repeatability, b.frequency_repeatability)
+    assert abs(a.damping - b.damping) < 4.0 * np.hypot(a.damping_se, b.damping_se)

@@ -8,7 +8,7 @@ from turnout.config.settings.identify import IdentifySettings
 from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.hammer_test import find_impacts, receptance_of
 from turnout.modal import identify
-from turnout.modal.bands import passed_share, residues_of_receptance
+from turnout.modal.bands import fit_receptance, passed_share
 from turnout.modal.state_space import continuous_pole
 from turnout.records import Channel, Receptance, Recording
 
@@ -66,7 +66,7 @@ def test_residues_of_an_exact_receptance_are_found_with_a_rotated_phase(decay):
     model = published_model("OT")
     residue = model.residue * np.exp(0.4j)
     exact = receptance(model, FREQUENCY < 900.0, residue, decay)
-    found = residues_of_receptance(exact, model.frequency, model.damping)
+    found = fit_receptance(exact, model.frequency, model.damping).residue
     np.testing.assert_allclose(found, residue, rtol=1e-8)
 
 
@@ -85,7 +85,7 @@ def test_the_response_to_a_unit_impulse_does_not_depend_on_the_exponential_windo
         model = identify([i.decay for i in blows], test.rate, SETTINGS, curve)
         assert model.diagnostics["scale"].startswith("unit impulse")
         modes = [m.frequency for m in model.modes], [m.damping for m in model.modes]
-        found.append((residues_of_receptance(curve, *modes), model.b))
+        found.append((fit_receptance(curve, *modes).residue, model.b))
     for residue, b in found[1:]:
         np.testing.assert_allclose(residue, found[0][0], rtol=1e-2)
         np.testing.assert_allclose(b, found[0][1], atol=1e-2 * np.abs(found[0][1]).max())
@@ -93,7 +93,7 @@ def test_the_response_to_a_unit_impulse_does_not_depend_on_the_exponential_windo
 
 def test_too_few_lines_give_no_residues():
     model = published_model("OT")
-    assert residues_of_receptance(receptance(model, FREQUENCY < 50.0), model.frequency, model.damping) is None
+    assert fit_receptance(receptance(model, FREQUENCY < 50.0), model.frequency, model.damping) is None
 
 
 def test_with_a_receptance_the_model_answers_a_unit_impulse():
