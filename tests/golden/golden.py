@@ -207,9 +207,7 @@ def blind(case):
 
     def diagnosed(rec):
         folder, name = rec.place(f"blind/{case}"), f"blind/{case}"
-        rec.command(
-            ["diagnose", "--turnout", case, "--visit", "all", "--work", "work", "--json"], folder, f"{name}/answers.txt"
-        )
+        rec.command(["diagnose", "--turnout", case, "--visit", "all", "--work", "work"], folder, f"{name}/answers.txt")
         rec.keep_files(folder / "results/pages", "**/*", f"{name}/pages")
 
     return diagnosed

@@ -23,6 +23,7 @@ OPEN_ALARMS_QUERY = """
     where closed_at_utc is null and turnout_id = $1 and section_id = coalesce($2, section_id)
         and band = coalesce($3, band) and raised_at_utc <= $4
     limit 1"""
+GROUP = "Set up"
 HELP = "say that an alarm has been seen, or silence it until a date"
 
 

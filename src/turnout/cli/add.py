@@ -7,6 +7,7 @@ import argparse
 
 from turnout.cli.options import add_configuration
 
+GROUP = "Set up"
 HELP = "add a turnout"
 
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
     from typing import Any
 
+GROUP = "Simulate and diagnose"
 HELP = "prove the diagnosis on concealed effects: make, diagnose, reveal, score"
 
 

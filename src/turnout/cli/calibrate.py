@@ -18,6 +18,7 @@ from turnout.cli.options import add_configuration, add_track, add_turnout
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+GROUP = "Simulate and diagnose"
 HELP = "fit a simulated section to measured receptances"
 PRINTED_UNITS = {
     "pad_stiffness": "MN/m",

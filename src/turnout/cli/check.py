@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import RAW_HELP, add_configuration, add_raw
+from turnout.cli.options import RAW_HELP, add_configuration, add_raw, add_result
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from turnout.config import Configuration, Event
     from turnout.units import Conversion
 
+GROUP = "Set up"
 HELP = "check configuration and file names"
 
 
@@ -62,6 +63,7 @@ def run(args: argparse.Namespace) -> int:
         return 0
     configuration = load_configuration(args.configuration, FORMATS, to_si)
     faults = [*_faults(configuration, FORMATS, to_si)]
+    add_result(args, {"turnouts": list(configuration.ids), "faults": faults})
     layouts = {row.values["layout"] for row in configuration.rows.values()}
     n_events = len(configuration.events)
     n_acks = len(configuration.acknowledgements)

@@ -9,8 +9,9 @@ turnout config generate --check    say what is out of date, change nothing
 import argparse
 import sys
 
-from turnout.cli.options import add_configuration
+from turnout.cli.options import add_configuration, add_result
 
+GROUP = "Set up"
 HELP = "show or generate configuration"
 
 
@@ -57,6 +58,7 @@ def _show(args: argparse.Namespace) -> int:
     configuration = load_configuration(args.configuration)
     configuration.turnout(args.turnout)
     entries = [entry for entry in sources(configuration, args.turnout) if args.only in entry[0]]
+    add_result(args, [{"key": key, "value": value, "source": str(source)} for key, value, source in entries])
     for key, value, source in entries:
         print(f"{key:<44} {value!s:<28} {source}")
     if not entries:

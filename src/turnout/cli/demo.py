@@ -11,6 +11,7 @@ import argparse
 
 from turnout.cli.options import add_cores
 
+GROUP = "Try"
 HELP = "make a demonstration fleet and run everything on it"
 
 

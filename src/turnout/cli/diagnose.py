@@ -17,7 +17,16 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import add_configuration, add_pages, add_raw, add_registry, add_track, add_turnout, add_work
+from turnout.cli.options import (
+    add_configuration,
+    add_pages,
+    add_raw,
+    add_registry,
+    add_result,
+    add_track,
+    add_turnout,
+    add_work,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -26,6 +35,7 @@ if TYPE_CHECKING:
     from turnout.stages.mismatch_groups import Group
     from turnout.stages.mismatch_results import Results
 
+GROUP = "Simulate and diagnose"
 HELP = "say what the simulation of a turnout leaves out"
 
 
@@ -53,7 +63,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--accept", action="store_true", help="write what was named into the turnout's track file")
     parser.add_argument("--finding", metavar="ID", help="which finding to accept, where several are named")
     parser.add_argument("--anyway", action="store_true", help="accept a finding that is not named with grade A or B")
-    parser.add_argument("--json", action="store_true", help="print the registry rows instead of words")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -87,13 +96,12 @@ def run(args: argparse.Namespace) -> int:
 
 def _save_and_print(args: argparse.Namespace, results: Results, rows: dict[str, list[dict]]) -> None:
     """Save, draw and print the rows."""
-    import json
-
     from turnout.report.finding_pages import write_diagnosis_page
 
     results.save(rows)
     page = write_diagnosis_page(rows, args.configuration, args.turnout, args.pages)
-    print(json.dumps(rows["mismatch_findings"], default=str, indent=1) if args.json else _findings_text(rows))
+    add_result(args, rows["mismatch_findings"])
+    print(_findings_text(rows))
     print(f"page: {page}")
 
 

@@ -1,6 +1,6 @@
 """Before measuring: which effects a planned campaign can tell apart, and what would add most.
 
-turnout distinguish --track tommerup --sensors 23.4 26.4 --blows 24.6 --temperatures 5 25
+turnout distinguish --track tommerup --sensors 23.4 26.4 --impacts 24.6 --temperatures 5 25
 turnout distinguish --track tommerup --sensors 23.4 26.4 --trains ic3 --speeds 160 100
 
 A figure is the log evidence in nats that is lost when the effect of the row is explained by that of the column, at the
@@ -10,8 +10,9 @@ a name needs 12 in the column "none" and 6 against each rival: plan for that.
 
 import argparse
 
-from turnout.cli.options import add_configuration, add_track
+from turnout.cli.options import add_configuration, add_former, add_track
 
+GROUP = "Simulate and diagnose"
 HELP = "which effects a planned campaign can tell apart"
 
 
@@ -25,8 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     add_track(parser, help="file in config/tracks (%(default)s)", default="tommerup")
     add_configuration(parser)
-    parser.add_argument("--sensors", nargs="+", type=float, required=True, metavar="M", help="places on the rail [m]")
-    parser.add_argument("--blows", nargs="*", type=float, default=(), metavar="M", help="places of the hammer [m]")
+    parser.add_argument("--sensors", nargs="+", type=float, required=True, metavar="M", help="positions of sensors [m]")
+    parser.add_argument("--impacts", nargs="*", type=float, default=(), metavar="M", help="positions of impacts [m]")
+    add_former(parser, "--blows", "--impacts", nargs="*", type=float)
     parser.add_argument("--temperatures", nargs="+", type=float, default=(15.0,), metavar="C", help="of the rail [°C]")
     parser.add_argument("--trains", nargs="*", default=(), help="files in config/vehicles")
     parser.add_argument("--speeds", nargs="+", type=float, default=(160.0,), metavar="KMH", help="[km/h]")
@@ -51,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     matrix, advice = planned_matrix(
         args.track,
         args.sensors,
-        args.blows,
+        args.impacts,
         args.temperatures,
         args.trains,
         args.speeds,

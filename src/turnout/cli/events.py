@@ -10,8 +10,9 @@ again. Which resonance a kind resets is the program's choice unless --resets say
 
 import argparse
 
-from turnout.cli.options import add_configuration, add_registry
+from turnout.cli.options import add_configuration, add_registry, add_result
 
+GROUP = "Set up"
 HELP = "list maintenance, or enter it"
 
 
@@ -46,13 +47,17 @@ def run(args: argparse.Namespace) -> int:
     int
         Exit code.
     """
+    from dataclasses import asdict
+
     from turnout.config import load_configuration
     from turnout.errors import ConfigError
 
     if args.effect:
         return _effect(args.registry)
     if not args.place:
-        for e in load_configuration(args.configuration).events:
+        events = load_configuration(args.configuration).events
+        add_result(args, [asdict(e) for e in events])
+        for e in events:
             where = f"{e.turnout}/{e.section}" if e.section else e.turnout
             resets = " and ".join(e.resets) or "nothing"
             print(f"{e.at:%Y-%m-%d}  {where:<28} {e.kind:<16} resets {resets}  {e.note}")

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     import duckdb
 
+GROUP = "Ask"
 HELP = "write tables and views as Parquet, CSV or Delta Lake"
 DEFAULT_TABLES = ("turnouts", "sections", "events", "campaigns", "modes_current", "charts", "baselines", "alarms",
          "chart_states", "worklist")  # fmt: skip

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from turnout.stages.hammer_adhoc import RequestedUnit
 
+GROUP = "Look at recordings"
 HELP = "analyse one hammer test and say what is in it"
 
 

@@ -7,6 +7,7 @@ All other commands run in this folder. Nothing that is there is changed.
 
 import argparse
 
+GROUP = "Set up"
 HELP = "make a folder with configuration and a place for recordings"
 
 

@@ -12,6 +12,9 @@ run goes on where this one was ended.
 
 import argparse
 
+from turnout.cli.options import add_result
+
+GROUP = "Run"
 HELP = "run the whole workflow unattended"
 INTERRUPTED = 130
 
@@ -42,12 +45,16 @@ def run(args: argparse.Namespace) -> int:
     int
         Exit code.
     """
+    from dataclasses import asdict
+
     from turnout.workflow.nightly import nightly
 
     limit = None if args.limit_hours is None else 3600.0 * args.limit_hours
     try:
-        night = nightly(args.options, args.profile, limit)
+        options = [*args.options, *(["--quiet", "all"] if args.quiet else [])]
+        night = nightly(options, args.profile, limit)
     except KeyboardInterrupt:
         return INTERRUPTED
+    add_result(args, asdict(night))
     print(night)
     return night.code

@@ -3,6 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import sys
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from typing import Any
 
 RAW_HELP = "raw root, the folder of all recordings"
 TRACK_HELP = "file in config/tracks, or its path (default: the turnout's own, else tommerup)"
@@ -164,3 +170,87 @@ def add_cores(parser: argparse.ArgumentParser, help: str, default: int | None) -
         None for all processors.
     """
     parser.add_argument("--cores", type=at_least_one, default=default, help=help)
+
+
+class _FormerOption(argparse.Action):
+    """Stores the value of the present option, and warns."""
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, option: str | None = None
+    ) -> None:
+        print(f"{parser.prog}: {option} is called {self.const} now; the former name goes away.", file=sys.stderr)
+        setattr(namespace, self.dest, values)
+
+
+def add_former(parser: argparse.ArgumentParser, former: str, present: str, **options: Any) -> None:
+    """Accept an option under its former name, with a warning; it is not in the help.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command, which has the present option.
+    former, present : str
+        Names with their dashes.
+    **options : any
+        Type and number of values, as for ``add_argument``.
+    """
+    dest = present.lstrip("-").replace("-", "_")
+    parser.add_argument(
+        former, dest=dest, action=_FormerOption, const=present, default=argparse.SUPPRESS, help=argparse.SUPPRESS,
+        **options,
+    )  # fmt: skip
+
+
+def add_common(parser: argparse.ArgumentParser, default: object = argparse.SUPPRESS) -> None:
+    """Add the options of every command: ``--json``, ``-v`` and ``-q``, as far as it has none of its own.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the program, of a command or of one of its actions.
+    default : object
+        Value without the options; those of a command leave what was given before it.
+    """
+    common = (
+        (("--json",), "print one JSON object: command, exit_code, text, result, error"),
+        (("-q", "--quiet"), "no progress and no warnings"),
+        (("-v", "--verbose"), "say what is done; the place in the program of an error"),
+    )
+    group = parser.add_argument_group("options of every command")
+    for names, text in common:
+        if not any(name in parser._option_string_actions for name in names):
+            group.add_argument(*names, action="store_true", default=default, help=text)
+
+
+def leaf_parsers(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
+    """The parsers that a command line ends in: those of the actions of a command, else its own.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of a command.
+
+    Yields
+    ------
+    argparse.ArgumentParser
+        Each once.
+    """
+    subparsers = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
+    for action in subparsers:
+        for inner in dict.fromkeys(action.choices.values()):
+            yield from leaf_parsers(inner)
+    if not subparsers:
+        yield parser
+
+
+def add_result(args: argparse.Namespace, result: object) -> None:
+    """Hand on what ``--json`` prints as ``result``.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+    result : object
+        Rows or counts; times and paths in it are printed as text.
+    """
+    args.result = result

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from turnout.records import LongRecording, Recording
     from turnout.stages.passage import PassageContext
 
+GROUP = "Look at recordings"
 HELP = "analyse one passage file and say what is in it"
 
 

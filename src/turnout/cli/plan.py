@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import RAW_HELP, add_configuration, add_raw, add_work, at_least_one
+from turnout.cli.options import RAW_HELP, add_configuration, add_raw, add_result, add_work, at_least_one
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from turnout.records import Unit
     from turnout.workflow.plan import PlannedUnit
 
+GROUP = "Run"
 HELP = "say what is new, without computing"
 STAGES = {
     "hammer": ("turnout.stages.hammer", None),
@@ -74,6 +75,7 @@ def run(args: argparse.Namespace) -> int:
     earlier = _EarlierResults(Path(args.work), shards)
     for turnout in map(configuration.turnout, args.turnout or configuration.ids):
         _print_changes(turnout, Path(args.raw or "raw"), earlier, counts)
+    add_result(args, counts)
     print(f"{counts['all']} units, {counts['new']} never computed, {counts['changed']} changed since.")
     _print_gone(configuration, Path(args.raw or "raw"), Path(args.work) / "plan", shards, args.turnout)
     return 0

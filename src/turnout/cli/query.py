@@ -15,7 +15,7 @@ import sys
 from decimal import Decimal
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import add_csv, add_registry, at_least_one
+from turnout.cli.options import add_csv, add_registry, add_result, at_least_one
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     import duckdb
 
+GROUP = "Ask"
 HELP = "ask the registry in SQL"
 
 
@@ -69,7 +70,9 @@ def run(args: argparse.Namespace) -> int:
             result = connection.sql(sql)
             if result is None:
                 return 0
-            if args.csv:
+            if args.json:
+                add_result(args, [dict(zip(result.columns, row)) for row in result.fetchall()])
+            elif args.csv:
                 _write_csv(result, args.csv)
             else:
                 print(format_table(result, args.rows))

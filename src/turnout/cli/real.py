@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from turnout.demo.published_modes import Beam
 
+GROUP = "Try"
 HELP = "run everything on recordings made by others"
 
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
+GROUP = "Ask"
 HELP = "check, compact, move or describe the registry"
 ACTIONS = ("check", "compact", "vacuum", "relocate", "rebuild", "describe")
 

@@ -9,6 +9,7 @@ import argparse
 
 from turnout.cli.options import add_cores, add_pages, add_registry
 
+GROUP = "Run"
 HELP = "write the pages of fleet and turnouts"
 
 

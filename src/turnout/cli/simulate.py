@@ -11,8 +11,9 @@ each impact fell and how hard, or the wheels' forces.
 
 import argparse
 
-from turnout.cli.options import add_configuration, add_raw, add_track, add_turnout
+from turnout.cli.options import add_configuration, add_former, add_raw, add_track, add_turnout
 
+GROUP = "Simulate and diagnose"
 HELP = "simulate a hammer test or a train passage"
 
 
@@ -30,7 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--section", required=True, help="location of the track file, or, without --turnout, a place in metres"
     )
     hammer.add_argument("--tests", type=int, default=1, help="tests, one file each; --out takes one (default 1)")
-    hammer.add_argument("--blows", type=int, default=10, help="impacts per test (default 10)")
+    hammer.add_argument("--impacts", type=int, default=10, help="impacts per test (default 10)")
+    add_former(hammer, "--blows", "--impacts", type=int)
     passage = subcommands.add_parser("passage", help="one train over the turnout")
     passage.add_argument("--vehicle", default="ic3", help="file in config/vehicles, or its path (default ic3)")
     passage.add_argument("--speed", type=float, default=160.0, help="km/h (default 160)")

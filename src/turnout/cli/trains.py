@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from turnout.passage.axle_load import LoadCalibration
     from turnout.passage.clusters import Clusters
 
+GROUP = "Run"
 HELP = "learn axle loads and clusters from the trains so far"
 
 

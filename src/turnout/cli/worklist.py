@@ -12,7 +12,7 @@ import argparse
 import csv
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import add_csv, add_registry
+from turnout.cli.options import add_csv, add_registry, add_result
 from turnout.cli.query import open_output
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     import duckdb
 
 FIRST_MEASUREMENT_QUERY = "select min(measured_at_utc) from charts where state <> 'wrong_time'"
+GROUP = "Ask"
 HELP = "tomorrow's list: what to inspect, what to plan, where nothing can be said"
 
 
@@ -66,6 +67,7 @@ def run(args: argparse.Namespace) -> int:
         names = [d[0] for d in cursor.description]
         rows = cursor.fetchall()
         counts = counts_of(con, today)
+    add_result(args, [dict(zip(names, row)) for row in rows])
     if args.csv:
         with open_output(args.csv) as stream:
             _write(stream, names, rows)

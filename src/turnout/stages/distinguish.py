@@ -59,7 +59,7 @@ def planned_matrix(
         Nothing is planned, or one of ``effects`` is no candidate in such a plan.
     """
     if not impact_positions and not trains:
-        raise SimulationError("nothing is planned: give --blows, --trains or both.")
+        raise SimulationError("nothing is planned: give --impacts, --trains or both.")
     track_folder, vehicle_folder = (_folder(config, subfolder) for subfolder in ("tracks", "vehicles"))
     turnout = load_track(track, folder=track_folder)
     impacts = tuple((x, t) for x in impact_positions for t in temperatures)

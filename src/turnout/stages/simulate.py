@@ -32,7 +32,7 @@ from turnout.stages.accepted_effects import accepted_of, terms_on
 from turnout.stages.mismatch_inputs import track_file
 
 ENDINGS = {"uff58": "uff", "uff58b": "uff", "hdf5": "h5", "mat73": "mat", "rcmdx": "rcmdx"}
-MIN_COUNTS = {"tests": 1, "blows": 1, "units": 1, "seed": 0}
+MIN_COUNTS = {"tests": 1, "impacts": 1, "units": 1, "seed": 0}
 
 
 def check_request(request: Mapping[str, Any]) -> None:
@@ -209,7 +209,7 @@ def write_hammer(request: Mapping[str, Any]) -> Iterator[tuple[Path, str]]:
             section,
             hammer,
             sensors,
-            request["blows"],
+            request["impacts"],
             terms_on(track, base, _noted_conditions(request), route),
             seed=1000 * request["seed"] + test,
             rate=rate,
@@ -323,7 +323,7 @@ def hammer_request(track: str, out: str, wildcards: Any) -> dict[str, Any]:
         "section": wildcards.location,
         "seed": int(wildcards.seed),
     }
-    return request | {"tests": 1, "blows": 10, "at": "2024-05-13T09:00:00"}
+    return request | {"tests": 1, "impacts": 10, "at": "2024-05-13T09:00:00"}
 
 
 def passage_request(files: Any, out: Any, wildcards: Any) -> dict[str, Any]:

@@ -52,8 +52,11 @@ def test_passages_below_160_hz_are_blind_to_frequency_dependent_pads_and_blows_a
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        ([], "nothing is planned: give --blows, --trains or both."),
-        (["--blows", "24.6", "--families", "hanging_slepper"], "no effect 'hanging_slepper' in such a campaign; there"),
+        ([], "nothing is planned: give --impacts, --trains or both."),
+        (
+            ["--impacts", "24.6", "--families", "hanging_slepper"],
+            "no effect 'hanging_slepper' in such a campaign",
+        ),
     ],
 )
 def test_a_plan_that_can_show_nothing_is_refused_in_a_sentence(more, said, capsys):

@@ -16,8 +16,19 @@ from turnout.simulate.calibration import Calibration
 def test_a_simulated_hammer_test_is_read_back_and_has_sound_impacts(tmp_path, repository, monkeypatch):
     monkeypatch.chdir(tmp_path)
     folder = str(repository / "config")
-    command = ["simulate", "hammer", "--section", "A7", "--turnout", "tommerup_s1", "--config", folder, "--blows", "3"]
-    assert main([*command, "--raw", "raw", "--seed", "5"]) == 0
+    command = [
+        "simulate",
+        "hammer",
+        "--section",
+        "A7",
+        "--turnout",
+        "tommerup_s1",
+        "--config",
+        folder,
+        "--impacts",
+        "3",
+    ]
+    assert main([*command, "--impacts", "3", "--raw", "raw", "--seed", "5"]) == 0
     path = tmp_path / "raw" / "tommerup_s1" / "hammer" / "2024-05-13" / "A7_1.h5"
     channels = (RawChannel("force", "force", "force"), RawChannel("rail", "rail", "acceleration"))
     result = read(path.name, path.parent, RawDescription(channels))
@@ -31,7 +42,7 @@ def test_a_simulation_never_takes_the_place_of_a_raw_file_of_a_turnout(tmp_path,
     path = tmp_path / "raw" / "tommerup_s1" / "hammer" / "2024-05-13" / "A7_1.h5"
     path.parent.mkdir(parents=True)
     path.write_bytes(b"measured")
-    command = ["simulate", "hammer", "--section", "A7", "--turnout", "tommerup_s1", "--blows", "1"]
+    command = ["simulate", "hammer", "--section", "A7", "--turnout", "tommerup_s1", "--impacts", "1"]
     assert main([*command, "--config", str(repository / "config"), "--raw", "raw"]) == 2
     assert path.read_bytes() == b"measured"
     assert "A7_1.h5 is there already and may be a measurement" in capsys.readouterr().err
@@ -71,7 +82,7 @@ def test_a_simulated_hammer_test_keeps_its_truth_apart(tmp_path, monkeypatch):
     pulse of 1.2 ms loses less than 0.3 % of its peak, its noise is 2 N."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "soft.yaml").write_text(SOFT)
-    command = ["simulate", "hammer", "--section", "A7", "--track", "soft.yaml", "--blows", "2", "--tests", "2"]
+    command = ["simulate", "hammer", "--section", "A7", "--track", "soft.yaml", "--impacts", "2", "--tests", "2"]
     assert main([*command, "--truth", "truth"]) == 0
     told = [json.loads((tmp_path / f"truth/A7_{k}.json").read_text()) for k in (1, 2)]
     assert all(t["effects"] == [{"term": "local_ballast", "sleeper": 24.6, "factor": 0.3}] for t in told)
@@ -97,10 +108,13 @@ HAMMER = ["simulate", "hammer", "--section", "A7"]
         ([*HAMMER, "--tests", "2", "--out", "a.h5"], "--out: one file for 2 tests. Write --tests 1, or leave out"),
         ([*HAMMER, "--format", "nix"], "--format: 'nix'. Allowed: csv, hdf5"),
         ([*HAMMER, "--out", "a.xlsx"], "--out: 'a.xlsx', whose ending is no format. Write one of .csv, .h5"),
-        ([*HAMMER, "--blows", "0"], "--blows: 0. Write a whole number of at least 1"),
+        ([*HAMMER, "--impacts", "0"], "--impacts: 0. Write a whole number of at least 1"),
         ([*HAMMER, "--tests", "0"], "--tests: 0. Write a whole number of at least 1"),
         ([*HAMMER, "--seed", "-1"], "--seed: -1. Write a whole number of at least 0"),
-        ([*HAMMER, "--format", "wav", "--blows", "2"], "cannot be written as wav: a WAV file holds one record, not 2"),
+        (
+            [*HAMMER, "--format", "wav", "--impacts", "2"],
+            "cannot be written as wav: a WAV file holds one record",
+        ),
         (["simulate", "passage", "--units", "0"], "--units: 0. Write a whole number of at least 1"),
         (["simulate", "hammer", "--section", "nan"], "no location 'nan'"),
         (["calibrate", "--section", "A7"], "either hammer tests or --modes"),
@@ -124,7 +138,7 @@ def test_a_place_in_metres_is_none_of_a_turnouts_sections(tmp_path, repository, 
 
 def test_a_time_in_utc_is_stored_as_it_is_said(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert main([*HAMMER, "--blows", "1", "--at", "2024-05-13T09:00:00Z", "--out", "a.h5"]) == 0
+    assert main([*HAMMER, "--impacts", "1", "--at", "2024-05-13T09:00:00Z", "--out", "a.h5"]) == 0
     (recording,) = read("a.h5", tmp_path, RawDescription(CHANNELS)).recordings
     assert recording.started_at.isoformat() == "2024-05-13T09:00:00"
 

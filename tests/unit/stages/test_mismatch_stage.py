@@ -106,7 +106,7 @@ def test_the_simulated_file_holds_the_accepted_effect(soft):
 
     turnout = load_configuration("config").turnout("t1")
     Results("work", "t1").save(diagnose_turnout("t1"))
-    request = REQUEST_DEFAULTS | {"track": None, "turnout": "t1", "section": "A", "seed": 1, "tests": 1, "blows": 1}
+    request = REQUEST_DEFAULTS | {"track": None, "turnout": "t1", "section": "A", "seed": 1, "tests": 1, "impacts": 1}
     request |= {"at": "2026-07-26T09:00:00", "config": "config"}
     recorded = []
     for name in ("before.h5", "after.h5"):

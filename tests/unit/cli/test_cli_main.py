@@ -1,0 +1,146 @@
+"""What holds for every command: groups, JSON, quiet, exit codes, messages, completion, former options."""
+
+import json
+import re
+import subprocess
+import sys
+from importlib import import_module
+
+import pytest
+
+from turnout import __version__
+from turnout.cli import COMMANDS, GROUPS
+from turnout.cli.completion import words_by_path
+from turnout.cli.main import EXIT_CODES, build_parser, main
+from turnout.cli.options import leaf_parsers
+from turnout.errors import ConfigError
+from turnout.workflow.launch import launch
+
+PARSER = build_parser()
+
+
+@pytest.fixture
+def project(tmp_path, repository, monkeypatch):
+    """A working folder with the configuration of the demonstration."""
+    (tmp_path / "config").symlink_to(repository / "config")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_version(capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["--version"])
+    assert end.value.code == 0 and capsys.readouterr().out == f"turnout {__version__}\n"
+
+
+def test_help_lists_each_command_once_in_its_group():
+    text = PARSER.format_help()
+    for name in COMMANDS:
+        assert import_module(f"turnout.cli.{name}").GROUP in GROUPS, f"give turnout.cli.{name} a GROUP"
+        assert len(re.findall(rf"^  {name} +\S", text, re.M)) == 1, name
+    assert EXIT_CODES in text
+
+
+@pytest.mark.parametrize("leaf", [*leaf_parsers(PARSER)], ids=lambda leaf: leaf.prog)
+def test_every_command_and_action_has_the_common_options(leaf):
+    assert {"--json", "-q", "--quiet", "-v", "--verbose"} <= set(leaf._option_string_actions)
+
+
+def test_json_is_one_object_with_result_text_and_exit_code(project, capsys):
+    assert main(["events", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert (said["command"], said["exit_code"], said["error"]) == ("events", 0, None)
+    assert len(said["result"]) == len(said["text"]) == 3 and said["result"][0]["kind"] in said["text"][0]
+
+
+def test_json_of_an_error(project, capsys):
+    assert main(["config", "show", "tommerup_s9", "--json"]) == 2
+    said = json.loads(capsys.readouterr().out)
+    assert said["exit_code"] == 2 and "no turnout 'tommerup_s9'" in said["error"] and said["result"] is None
+
+
+def test_json_keeps_output_of_other_programs_out_of_the_object():
+    """What a subprocess prints goes to standard error."""
+    code = (
+        "import subprocess, types, turnout.cli.init as command\n"
+        "command.run = lambda args: subprocess.run(['echo', 'from elsewhere']).returncode\n"
+        "from turnout.cli.main import main; main(['init', 'x', '--json'])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert json.loads(done.stdout)["exit_code"] == 0 and "from elsewhere" in done.stderr
+
+
+def raising(error):
+    def run(args):
+        raise error
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (ConfigError("plan", "number", "none", "Write one"), 2, "turnout plan: number: none. Write one.\n"),
+        (ConfigError("planned.csv", "line 1", "none", "Write one"), 2, "turnout plan: planned.csv, line 1: none."),
+        (FileNotFoundError(2, "No such file", "a.h5"), 2, "turnout plan: a.h5: No such file. Put that right"),
+        (ZeroDivisionError("of the program"), 3, "turnout plan: a fault of the program, ZeroDivisionError"),
+        (KeyboardInterrupt(), 130, "turnout plan: interrupted"),
+    ],
+)
+def test_exit_codes_and_messages_without_doubled_prefixes(monkeypatch, capsys, error, code, said):
+    monkeypatch.setattr("turnout.cli.plan.run", raising(error))
+    assert main(["plan"]) == code
+    assert said in capsys.readouterr().err
+
+
+def test_verbose_says_exit_code_and_place_of_an_error(monkeypatch, capsys):
+    monkeypatch.setattr("turnout.cli.plan.run", raising(ConfigError("a.yaml", "line 1", "wrong", "Change it")))
+    main(["plan", "-v"])
+    said = capsys.readouterr().err
+    assert "Traceback" in said and "turnout plan: exit code 2 after" in said
+
+
+def test_a_wrong_id_gives_the_message_that_the_workflow_gives(project, capsys):
+    assert main(["config", "show", "tommerup_s9"]) == 2
+    with pytest.raises(ConfigError) as error:
+        launch({"turnouts": "tommerup_s9"}, scan=False)
+    assert capsys.readouterr().err == f"turnout config: {error.value}\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "option", "expected"),
+    [
+        (["simulate", "hammer", "--section", "A7", "--blows", "3"], "--impacts", 3),
+        (["distinguish", "--sensors", "1", "--blows", "3", "4"], "--impacts", [3.0, 4.0]),
+    ],
+)
+def test_a_former_option_works_with_a_warning(capsys, words, option, expected):
+    assert PARSER.parse_args(words).impacts == expected
+    assert f"--blows is called {option} now" in capsys.readouterr().err
+    assert "--blows" not in " ".join(" ".join(w) for w in words_by_path(PARSER).values())
+
+
+@pytest.mark.parametrize(
+    ("typed", "expected"),
+    [
+        (["wor"], {"worklist"}),
+        (["simulate", "pass"], {"passage"}),
+        (["simulate", "hammer", "--imp"], {"--impacts"}),
+        (["query", "--re"], {"--registry"}),
+    ],
+)
+def test_bash_completes(tmp_path, capsys, typed, expected):
+    main(["completion", "bash"])
+    script = tmp_path / "completion"
+    script.write_text(capsys.readouterr().out)
+    words = " ".join(["turnout", *typed])
+    ask = f'. {script}; COMP_WORDS=({words}); COMP_CWORD={len(typed)}; _turnout; echo "${{COMPREPLY[@]}}"'
+    done = subprocess.run(["bash", "-c", ask], capture_output=True, text=True, check=True)
+    assert set(done.stdout.split()) == expected
+
+
+@pytest.mark.parametrize("shell", ["zsh", "fish"])
+def test_other_shells_get_every_command(capsys, shell):
+    assert main(["completion", shell]) == 0
+    script = capsys.readouterr().out
+    assert all(name in script for name in COMMANDS)
