@@ -9,6 +9,7 @@ GROUPS: tuple[str, ...] = ("Set up", "Look at recordings", "Run", "Ask", "Simula
 
 COMMANDS: tuple[str, ...] = (
     "add",
+    "alert",
     "calibrate",
     "check",
     "completion",

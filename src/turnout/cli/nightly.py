@@ -10,9 +10,15 @@ with what was computed until a job died or was ended. Of the limit of time the l
 run goes on where this one was ended.
 """
 
+from __future__ import annotations
+
 import argparse
+from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_result
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 GROUP = "Run"
 HELP = "run the whole workflow unattended"
@@ -57,4 +63,25 @@ def run(args: argparse.Namespace) -> int:
         return INTERRUPTED
     add_result(args, asdict(night))
     print(night)
-    return night.code
+    return night.code or (_alert(args.options) if night.published else 0)
+
+
+def _alert(options: Sequence[str]) -> int:
+    """Send new entries of the worklist if the configuration asks for it; 1 if a server does not take them."""
+    import sys
+
+    from turnout.config import load_configuration
+    from turnout.errors import TurnoutError
+    from turnout.workflow.alerts import has_channel, send_alerts, worklist_entries
+    from turnout.workflow.nightly import GENERATION
+
+    folders = [word.partition("=")[2] for word in options if word.startswith("configuration=")]
+    settings = load_configuration(*folders[:1]).settings["alerts"]
+    if not has_channel(settings):
+        return 0
+    try:
+        send_alerts(worklist_entries(GENERATION.parent), settings)
+    except TurnoutError as error:
+        print(f"turnout nightly: {error}", file=sys.stderr)
+        return 1
+    return 0

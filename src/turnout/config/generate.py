@@ -18,7 +18,7 @@ WIDTH = 112
 HEAD = """\
 # Method settings. Every key is optional: a default holds for what is left out.
 # Values may be changed here, for one layout ('settings:' in its file) or one turnout (in its override); what is used
-# once for all turnouts (fleet, trend, passage.cluster_maximum and passage.cluster_seed) is changed here alone.
+# once for all turnouts (alerts, fleet, trend, passage.cluster_maximum and passage.cluster_seed) is changed here alone.
 # The comments are made by `turnout config generate`, which keeps changed values; `turnout check` checks them.
 """
 JSON_TYPE = {"text": "string", "number": "number", "integer": "integer", "flag": "boolean"}

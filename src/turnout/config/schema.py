@@ -395,7 +395,12 @@ SECTION = {
 
 
 # Settings that hold for the whole fleet: a whole section (empty tuple), or some of its keys.
-FLEET_WIDE: dict[str, tuple[str, ...]] = {"fleet": (), "trend": (), "passage": ("cluster_maximum", "cluster_seed")}
+FLEET_WIDE: dict[str, tuple[str, ...]] = {
+    "alerts": (),
+    "fleet": (),
+    "trend": (),
+    "passage": ("cluster_maximum", "cluster_seed"),
+}
 
 
 def layout_keys(merged: bool = False) -> dict:

@@ -422,5 +422,5 @@ def test_what_holds_for_the_fleet_is_not_offered_to_a_layout(repository):
 
     schema = json.loads((repository / "config/schema/override.json").read_text())
     settings = schema["properties"]["settings"]["properties"]
-    assert "receptance" in settings and not {"trend", "fleet"} & set(settings)
+    assert "receptance" in settings and not {"alerts", "trend", "fleet"} & set(settings)
     assert "cluster_seed" not in settings["passage"]["properties"]

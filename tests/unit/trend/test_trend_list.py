@@ -17,6 +17,7 @@ from turnout.trend import candidates, chart_rows, chart_status, describe_flagged
 from turnout.trend.forecast import forecast
 from turnout.trend.tables import alarm_rows, arrow_rows, baseline_rows
 from turnout.trend.update import update
+from turnout.workflow.alerts import worklist_entries
 
 ONE = (1, 4)
 
@@ -249,6 +250,7 @@ def test_the_list_in_words_says_what_it_rests_on_and_what_it_leaves_out(tmp_path
     assert main(["worklist", "--registry", str(tmp_path)]) == 0
     told = capsys.readouterr().out
     assert "26 not measured for too long." in told  # of 2018: all but the alarm
+    assert [(e["state"], bool(e["look_at"])) for e in worklist_entries(tmp_path)] == [("inspect this week", True)]
     then = f"{newest + pd.Timedelta(days=1):%Y-%m-%d}"
     assert f"As of {datetime.now(UTC):%Y-%m-%d}; the last data are of {newest:%Y-%m-%d}: " in told
     assert told.endswith(f"turnout worklist --asof {then} shows the list of then.\n")

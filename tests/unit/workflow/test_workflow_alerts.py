@@ -1,0 +1,182 @@
+"""New entries of the worklist reach a mail server and a webhook, each once, with what to look at first."""
+
+import email
+import email.policy
+import json
+import socketserver
+import threading
+from dataclasses import replace
+from datetime import datetime
+from http.server import BaseHTTPRequestHandler, HTTPServer
+
+import pytest
+
+from turnout.cli.main import main
+from turnout.config import load_configuration
+from turnout.config.settings.alerts import AlertsSettings
+from turnout.errors import TurnoutError
+from turnout.workflow.alerts import has_channel, message_text, send_alerts, subject
+
+ALARM = {
+    "turnout_id": "W1", "sections": "A8", "band": "ballast", "source": "hammer", "state": "inspect this week",
+    "raised_at_utc": datetime(2026, 3, 1), "name": "Köln, Weiche 1", "sentence": "Lost 4 % since January",
+    "look_at": "voids and wet or fouled ballast under these sleepers",
+}  # fmt: skip
+PLAN = ALARM | {
+    "turnout_id": "W2",
+    "state": "plan",
+    "raised_at_utc": None,
+    "look_at": "worn, cracked or displaced pads",
+}
+
+
+class SmtpSink(socketserver.StreamRequestHandler):
+    """The part of RFC 5321 that a client needs to hand over one mail."""
+
+    def handle(self):
+        self.wfile.write(b"220 sink\r\n")
+        while line := self.rfile.readline():
+            verb = line[:4].upper()
+            if verb == b"DATA":
+                self.wfile.write(b"354 go on\r\n")
+                lines = iter(self.rfile.readline, b".\r\n")
+                self.server.mails.append(b"".join(lines))
+            self.wfile.write(b"221 bye\r\n" if verb == b"QUIT" else b"250 ok\r\n")
+            if verb == b"QUIT":
+                return
+
+
+class HttpSink(BaseHTTPRequestHandler):
+    def do_POST(self):
+        body = self.rfile.read(int(self.headers["Content-Length"]))
+        self.server.bodies.append(json.loads(body))
+        self.send_response(self.server.status)
+        self.end_headers()
+
+    def log_message(self, *words):
+        pass
+
+
+@pytest.fixture
+def serving():
+    """Function that starts a server in a thread and returns it; all are ended after the test."""
+    servers = []
+
+    def start(server):
+        servers.append(server)
+        threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True).start()
+        return server
+
+    yield start
+    for server in servers:
+        server.shutdown()
+        server.server_close()
+
+
+@pytest.fixture
+def mail(serving):
+    server = serving(socketserver.ThreadingTCPServer(("127.0.0.1", 0), SmtpSink))
+    server.mails = []
+    return server
+
+
+@pytest.fixture
+def hook(serving):
+    server = serving(HTTPServer(("127.0.0.1", 0), HttpSink))
+    server.bodies, server.status = [], 200
+    return server
+
+
+@pytest.fixture
+def settings(mail, hook, monkeypatch):
+    monkeypatch.delenv("TURNOUT_WEBHOOK", raising=False)
+    return AlertsSettings(
+        recipients="track@example.org, deputy@example.org", sender="turnout@example.org", smtp_host="127.0.0.1",
+        smtp_port=mail.server_address[1], webhook=f"http://127.0.0.1:{hook.server_address[1]}/", timeout=5.0,
+    )  # fmt: skip
+
+
+def test_each_entry_is_sent_once_by_each_channel(tmp_path, settings, mail, hook):
+    sent = tmp_path / "alerts.json"
+    assert send_alerts([ALARM], settings, sent) == {"mail": 1, "webhook": 1}
+    assert send_alerts([ALARM], settings, sent) == {"mail": 0, "webhook": 0}
+    assert send_alerts([ALARM, PLAN], settings, sent) == {"mail": 1, "webhook": 1}
+    assert len(mail.mails) == len(hook.bodies) == 2
+    first = email.message_from_bytes(mail.mails[0], policy=email.policy.default)
+    assert (first["From"], first["To"]) == ("turnout@example.org", "track@example.org, deputy@example.org")
+    assert first["Subject"] == "Turnout: 1 new entry: W1 A8"
+    text = first.get_content().replace("\r\n", "\n")
+    assert text == message_text([ALARM])
+    assert "INSPECT THIS WEEK: W1 (Köln, Weiche 1), A8, ballast\nLost 4 % since January\n" in text
+    assert "Look first at: voids and wet or fouled ballast under these sleepers." in text
+    (second,) = hook.bodies[1]["entries"]
+    assert second["turnout_id"] == "W2" and second["look_at"] in hook.bodies[1]["text"]
+
+
+def test_an_alarm_that_is_acknowledged_is_no_new_entry(tmp_path, settings, mail):
+    sent = tmp_path / "alerts.json"
+    send_alerts([ALARM], settings, sent)
+    assert send_alerts([ALARM | {"state": "plan"}], settings, sent) == {"mail": 0, "webhook": 0}
+    later = ALARM | {"raised_at_utc": datetime(2026, 5, 1)}
+    assert send_alerts([later], settings, sent) == {"mail": 1, "webhook": 1}
+
+
+def test_a_channel_that_fails_is_tried_again_and_the_other_is_not_repeated(tmp_path, settings, mail, hook):
+    sent = tmp_path / "alerts.json"
+    hook.status = 503
+    with pytest.raises(TurnoutError, match=r"not sent by webhook: HTTP Error 503.*tried again"):
+        send_alerts([ALARM], settings, sent)
+    hook.status = 200
+    assert send_alerts([ALARM], settings, sent) == {"mail": 0, "webhook": 1}
+    assert len(mail.mails) == 1
+
+
+@pytest.mark.parametrize("change", [{"smtp_port": 9}, {"smtp_host": "no.such.host.invalid"}])
+def test_a_mail_server_that_is_not_there_is_said(tmp_path, settings, hook, change):
+    with pytest.raises(TurnoutError, match=r"alerts were not sent by mail: .*section alerts of config.yaml"):
+        send_alerts([ALARM], replace(settings, **change), tmp_path / "alerts.json")
+    assert len(hook.bodies) == 1
+
+
+def test_a_secret_webhook_comes_from_the_environment(tmp_path, settings, hook, monkeypatch):
+    monkeypatch.setenv("TURNOUT_WEBHOOK", settings.webhook)
+    own = AlertsSettings(webhook="http://127.0.0.1:9/")
+    assert send_alerts([ALARM], own, tmp_path / "alerts.json") == {"webhook": 1} and len(hook.bodies) == 1
+
+
+def test_an_address_that_is_no_web_address_is_not_opened(tmp_path, monkeypatch):
+    monkeypatch.delenv("TURNOUT_WEBHOOK", raising=False)
+    with pytest.raises(TurnoutError, match="begins neither with https"):
+        send_alerts([ALARM], AlertsSettings(webhook="file:///etc/hostname"), tmp_path / "alerts.json")
+
+
+def test_the_subject_names_three():
+    entries = [ALARM | {"turnout_id": f"W{k}"} for k in range(5)]
+    assert subject(entries) == "Turnout: 5 new entries: W0 A8, W1 A8, W2 A8 and 2 more"
+
+
+def test_nothing_is_sent_unless_configured_and_no_result_changes(tmp_path, repository, monkeypatch, capsys):
+    monkeypatch.delenv("TURNOUT_WEBHOOK", raising=False)
+    assert not has_channel(AlertsSettings()) and send_alerts([ALARM], AlertsSettings(), tmp_path / "a.json") == {}
+    (tmp_path / "config").mkdir()
+    for name in ("turnouts.tsv", "layouts"):
+        (tmp_path / "config" / name).symlink_to(repository / "config" / name)
+    hashes = set()
+    for text in ("", "alerts: {recipients: a@b.c}\n"):
+        (tmp_path / "config/config.yaml").write_text(text)
+        hashes.add(load_configuration(tmp_path / "config").turnout("tommerup_s1").config_hash)
+    assert len(hashes) == 1
+
+
+def test_the_command_reads_the_worklist_of_a_registry(tmp_path, repository, monkeypatch, capsys, settings):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("turnout.workflow.alerts.worklist_entries", lambda registry: [ALARM])
+    (tmp_path / "config").mkdir()
+    (tmp_path / "config/turnouts.tsv").write_text("turnout\tlayout\n")
+    (tmp_path / "config/config.yaml").write_text("")
+    assert main(["alert"]) == 2
+    assert "neither recipients nor webhook" in capsys.readouterr().err
+    (tmp_path / "config/config.yaml").write_text(f"alerts: {{webhook: '{settings.webhook}'}}\n")
+    assert main(["alert", "--dry-run"]) == 0 and "Look first at: voids" in capsys.readouterr().out
+    assert main(["alert"]) == 0 and capsys.readouterr().out == "webhook: 1 new\n"
+    assert main(["alert"]) == 0 and capsys.readouterr().out == "webhook: 0 new\n"
