@@ -16,10 +16,13 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
+from turnout.cli.options import add_result
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
+GROUP = "Look at recordings"
 HELP = "show what raw files contain, without a layout"
 
 
@@ -33,7 +36,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     parser.add_argument("file", nargs="+", help="raw files in any format that is read, or folders of them")
     parser.add_argument("--plot", action="store_true", help="draw every channel into <name>.svg in the present folder")
-    parser.add_argument("--json", action="store_true", help="print a list of JSON objects instead of text")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -49,7 +51,6 @@ def run(args: argparse.Namespace) -> int:
     int
         Exit code.
     """
-    import json
     from pathlib import Path
 
     from turnout.errors import ReadError
@@ -65,20 +66,16 @@ def run(args: argparse.Namespace) -> int:
         except ReadError as error:
             is_sound = False
             values.append({"path": str(path), "problems": [f"{error.where}: {error.problem}. {error.remedy}."]})
-            if not args.json:
-                print(f"{error}" if not is_in_folder else f"{path}: not read, {error.where}: {error.problem}")
+            print(f"{error}" if not is_in_folder else f"{path}: not read, {error.where}: {error.problem}")
             continue
         is_sound = is_sound and not contents.problems
         values.append(contents_values(contents))
-        if not args.json:
-            print(contents_summary(contents) if is_in_folder else "\n".join(contents_lines(contents)))
+        print(contents_summary(contents) if is_in_folder else "\n".join(contents_lines(contents)))
         if args.plot:
             drawing = Path(f"{path.name}.svg")
             replace_page(drawing, contents_figure(contents))
-            if not args.json:
-                print(f"  figure     {drawing}")
-    if args.json:
-        print(json.dumps(values, indent=1, ensure_ascii=False, allow_nan=False))
+            print(f"  figure     {drawing}")
+    add_result(args, values)
     return 0 if is_sound else 1
 
 

@@ -130,7 +130,7 @@ def test_a_folder_has_a_line_for_each_file_and_damage_is_said(tmp_path, capsys):
 def test_json_holds_the_same(tmp_path, capsys):
     write(impact_recordings(), tmp_path / "A7_1.npz", "npz")
     code, text, _ = say(capsys, tmp_path / "A7_1.npz", "--json")
-    (values,) = json.loads(text)
+    (values,) = json.loads(text)["result"]
     assert code == 0 and values["rate_hz"] == RATE and values["kind"] == "impacts" and values["records"] == 3
     assert [c["name"] for c in values["channels"]] == ["hammer", "rail"] and values["force_candidates"] == ["hammer"]
     assert len(values["impacts"]) == 3 and values["problems"] == []
