@@ -99,7 +99,8 @@ def _unit_errors(name: str, channel: Branch, to_si: ToSi) -> Iterator[ConfigErro
     if values.get("unit") is None:
         return
     try:
-        to_si(channel["quantity"].value, values["unit"], values.get("sensitivity"), values.get("sensitivity_unit", ""))
+        unit = values["unit"].removesuffix("!")  # a unit that overrules the file
+        to_si(channel["quantity"].value, unit, values.get("sensitivity"), values.get("sensitivity_unit", ""))
     except ValueError as error:
         problem = f"unit {values['unit']!r} for the {channel['quantity'].value} of channel {name}: {error}"
         yield channel["unit"].place.error(problem, "Correct unit, sensitivity or sensitivity_unit")
