@@ -16,6 +16,7 @@ import pandas as pd
 
 from benchmarks.bar import Bar, stopwatch
 from benchmarks.trend_changes import bars as changes
+from benchmarks.trend_detectable import bars as detectable_changes
 from benchmarks.trend_fleet import Fleet, drift, modes, step
 from turnout.config.settings.trend import TrendSettings
 from turnout.trend import chart_status, evaluate
@@ -32,6 +33,7 @@ def bars():
     yield from rare_campaigns()
     yield from delays()
     yield from detectable()
+    yield from detectable_changes()
     yield from ranking()
     yield from after_reset()
     yield from dates()

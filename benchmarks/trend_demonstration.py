@@ -56,8 +56,9 @@ def chances(times, change, spread, phi, guard, allowance, threshold, n=20_000, s
     widening = np.sqrt((1 + phi) / (1 - phi))
     z = (truth[None] + spread * noise) / (spread * guard * widening)
     k = np.full(z.shape, allowance)
-    z = np.maximum(z, -(share * threshold + allowance))
-    _, opened, _ = cusum(z, k, np.full(n, threshold), np.ones(z.shape, bool), np.zeros(z.shape, bool))
+    outlier = np.full(z.shape, min(share * threshold + allowance, TrendSettings().outlier_limit))
+    chart = (k, np.full(n, threshold), outlier, np.full(n, share * threshold))
+    _, opened, _ = cusum(z, *chart, np.ones(z.shape, bool), np.zeros(z.shape, bool))
     return np.maximum.accumulate(opened, axis=1).mean(axis=0), truth
 
 

@@ -32,8 +32,10 @@ class Fleet:
     thermometer: float = 1.0
     frequency: float = 450.0
     band: str = "railpad"
-    every: int = 1
+    every: float = 1
     missing: float = 0.0
+    tails: float = np.inf
+    curvature: float = 0.0
     prefix: str = "T"
 
     @property
@@ -55,10 +57,13 @@ def histories(fleet, seed, change=None):
     temperature = rail + fleet.thermometer * rng.standard_normal(rail.shape)
     phi = fleet.phi**fleet.every
     noise = rng.standard_normal(shape)
+    if np.isfinite(fleet.tails):
+        noise *= np.sqrt((fleet.tails - 2.0) / rng.chisquare(fleet.tails, shape))  # Student's t of unit variance
     for i in range(1, week.size):
         noise[..., i] = phi * noise[..., i - 1] + np.sqrt(1 - phi**2) * noise[..., i]
     slope = fleet.coefficient + fleet.coefficient_spread * rng.standard_normal(shape[:2])[..., None]
     percent = fleet.sigma * noise + slope * (rail[:, None] - 12.0)
+    percent += fleet.curvature * (rail[:, None] - 12.0) ** 2
     percent += fleet.campaign * rng.standard_normal(rail.shape)[:, None]
     if change is not None:
         percent = percent + change
@@ -80,7 +85,7 @@ def modes(fleet, seed, change=None) -> pd.DataFrame:
             "section_id": pd.Categorical.from_codes(t * fleet.sections + s, section),
             "band": pd.Categorical.from_codes(np.zeros(t.size, np.int8), [fleet.band]),
             "source": pd.Categorical.from_codes(np.zeros(t.size, np.int8), ["hammer"]),
-            "measured_at_utc": (START + (week * 7).astype("timedelta64[D]")).astype("datetime64[us]")[c],
+            "measured_at_utc": (START + np.round(week * 7).astype("timedelta64[D]")).astype("datetime64[us]")[c],
             "frequency_hz": frequency.ravel(),
             "frequency_se_hz": np.full(t.size, 0.1),
             "rail_temperature_c": temperature[t, c],

@@ -8,15 +8,24 @@ KEYS = ["turnout_id", "section_id", "band", "source"]
 
 
 def cusum_by_loop(charts, baselines) -> pd.Series:
-    """CUSUM for a loss of stiffness at every campaign, computed in a loop as in Page's definition."""
+    """CUSUM for a loss of stiffness at every campaign, computed in a loop as in Page's definition.
+
+    An outlier waits in ``held`` until the next campaign judged is one on the same side; then both count.
+    """
     joined = charts.merge(baselines[[*KEYS, "epoch", "allowance", "threshold_down"]], on=[*KEYS, "epoch"])
     sums = {}
     for chart, cells in joined.sort_values("measured_at_utc").groupby([*KEYS, "epoch"]):
-        total = 0.0
+        total, held, side_before = 0.0, 0.0, 0
         for cell in cells.itertuples(index=False):
             if cell.state in ("ok", "alarm_down", "alarm_up") and np.isfinite(cell.z):
-                fall = min(-cell.z, 0.75 * cell.threshold_down + cell.allowance)
-                total = max(0.0, total + fall - cell.allowance)
+                limit = min(0.6 * cell.threshold_down + cell.allowance, 3.0)
+                side = 0 if abs(cell.z) <= limit else int(np.sign(cell.z))
+                fall = 0.6 * cell.threshold_down if side < 0 else -cell.z - cell.allowance
+                if side and side != side_before:
+                    held = fall
+                else:
+                    total, held = max(0.0, total + fall + (held if side else 0.0)), 0.0
+                side_before = side
             sums[(*chart[:4], cell.measured_at_utc)] = total
     index = pd.MultiIndex.from_tuples(sums, names=[*KEYS, "measured_at_utc"])
     return pd.Series(list(sums.values()), index)

@@ -108,7 +108,7 @@ def test_what_the_register_relies_on_is_there():
 
 def test_views_use_no_clock_and_no_newer_syntax():
     for name, sql in view_files().items():
-        code = re.sub(r"--.*", "", sql).lower()
+        code = re.sub(r"'[^']*'", "''", re.sub(r"--.*", "", sql)).lower()  # words in texts are no clock
         assert not re.search(r"\b(now|current_date|current_timestamp|today|random|uuid)\b", code), name
         assert not re.search(r"(^|;)\s*(install|load|attach|copy|pragma)\b", code), name
         assert not re.search(r"\bif\s*\(", code), f"{name}: DuckDB 1.5 has no if(), write case when"

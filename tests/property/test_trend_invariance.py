@@ -66,8 +66,8 @@ def test_a_pure_effect_of_temperature_is_taken_out(coefficient):
 def test_a_larger_allowance_never_raises_the_sum(seed, allowance, more):
     z = np.random.default_rng(seed).standard_normal((3, 50))
     on, h = np.ones(z.shape, bool), np.full(3, 4.0)
-    low, _, _ = cusum(z, np.full(z.shape, allowance + more), h, on, ~on)
-    high, _, _ = cusum(z, np.full(z.shape, allowance), h, on, ~on)
+    low, _, _ = cusum(z, np.full(z.shape, allowance + more), h, np.full(z.shape, np.inf), np.zeros(len(z)), on, ~on)
+    high, _, _ = cusum(z, np.full(z.shape, allowance), h, np.full(z.shape, np.inf), np.zeros(len(z)), on, ~on)
     assert (low <= high + 1e-12).all()
 
 
@@ -76,7 +76,7 @@ def test_a_larger_allowance_never_raises_the_sum(seed, allowance, more):
 def test_a_lower_value_never_lowers_the_sum(seed, place, drop):
     z = np.random.default_rng(seed).standard_normal((2, 50))
     on, h, k = np.ones(z.shape, bool), np.full(2, 4.0), np.ones((2, 50))
-    before, _, _ = cusum(z, k, h, on, ~on)
+    before, _, _ = cusum(z, k, h, np.full(z.shape, np.inf), np.zeros(len(z)), on, ~on)
     z[:, place] -= drop
-    after, _, _ = cusum(z, k, h, on, ~on)
+    after, _, _ = cusum(z, k, h, np.full(z.shape, np.inf), np.zeros(len(z)), on, ~on)
     assert (after >= before - 1e-12).all()

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from datetime import datetime
 
 BADGES = {
+    "confirm now": "confirm",
     "inspect this week": "inspect",
     "plan": "plan",
     "learning": "learning",

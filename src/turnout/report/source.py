@@ -53,7 +53,7 @@ ROWS = {
         ) <= {MAX_QUARANTINE_ROWS}
         order by path, record""",
     "charts": f"""
-        select turnout_id, section_id, band, measured_at_utc, expected_low_hz, expected_high_hz, state
+        select turnout_id, section_id, band, measured_at_utc, expected_low_hz, expected_high_hz, state, deviation_pct
         from charts where source = 'hammer' and {ID_GIVEN} order by section_id, band, measured_at_utc""",
     "chart_states": f"select * from chart_states_on(:today) where {ID_GIVEN}",
     "mismatches": f"select * from findings_newest where {ID_GIVEN} and verdict <> 'none' order by level_before desc",

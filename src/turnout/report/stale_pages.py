@@ -22,7 +22,7 @@ PAGE_CONTENT = {
     "results": "(select turnout_id, result_id from results_current)",
     "quarantine": "quarantine_open",
     "charts": """(
-        select turnout_id, section_id, band, measured_at_utc, expected_low_hz, expected_high_hz, state
+        select turnout_id, section_id, band, measured_at_utc, expected_low_hz, expected_high_hz, state, deviation_pct
         from charts where source = 'hammer')""",
     "chart_states": "chart_states_on(:today)",
     "worklist": f"(select * exclude (rank, n_in_all) from {whole_list(':today')})",

@@ -5,11 +5,12 @@ Residuals are corrected for temperature and for the median of the sibling sectio
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from turnout.trend.confirmation import far_deviations
 from turnout.trend.epochs import by_epoch, expand_epochs
 from turnout.trend.residuals import (
     Prepared,
@@ -27,11 +28,20 @@ if TYPE_CHECKING:
 
 
 def cusum(
-    z: np.ndarray, allowance: np.ndarray, threshold: np.ndarray, active: np.ndarray, fresh: np.ndarray
+    z: np.ndarray,
+    allowance: np.ndarray,
+    threshold: np.ndarray,
+    outlier: np.ndarray,
+    confirmed: np.ndarray,
+    active: np.ndarray,
+    fresh: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    r"""One-sided CUSUM for a falling mean.
+    r"""One-sided CUSUM for a falling mean, in which one campaign alone cannot raise an alarm.
 
     .. math:: S_i = \max(0, S_{i-1} - z_i - k)
+
+    A campaign with |z| beyond ``outlier`` is held: it does not count until the next campaign is beyond it on the same
+    side. Then each of them, and every further one, adds ``confirmed``. A confirmed rise counts in full.
 
     The sum starts at 0 with every epoch. It keeps its value over campaigns that are not ``active`` (learning, no value,
     no temperature). An alarm opens when S > h and closes when S is back at 0 or the epoch ends. For a rising mean pass
@@ -45,6 +55,10 @@ def cusum(
         k, in the same unit.
     threshold : (n_chart,) array of float
         H, in the same unit.
+    outlier : (n_chart, n_campaign) array of float
+        Limit of \|z\| beyond which a campaign must be confirmed, in the same unit.
+    confirmed : (n_chart,) array of float
+        What a confirmed outlier adds to the sum, in the same unit; above h / 2 two of them raise the alarm.
     active, fresh : (n_chart, n_campaign) arrays of bool
         Campaigns that count; campaigns that start an epoch.
 
@@ -57,27 +71,39 @@ def cusum(
 
     References
     ----------
-    Page, Continuous inspection schemes, Biometrika 41, 1954.
+    Page, Continuous inspection schemes, Biometrika 41, 1954. Lucas and Crosier, Robust CUSUM: a robustness study for
+    CUSUM quality control schemes, Communications in Statistics 11, 1982, for the rule of two outliers in a row.
 
     Examples
     --------
-    >>> z, on = np.array([[0.0, -3.0, -3.0, 1.0]]), np.ones((1, 4), bool)
-    >>> s, alarm, began = cusum(z, np.ones((1, 4)), np.array([3.5]), on, ~on)
-    >>> print(s[0], alarm[0], began[0])
-    [0. 2. 4. 2.] [False False  True  True] [0 0 0 0]
+    The fourth campaign alone is an outlier; the sixth confirms the fifth.
+
+    >>> z, on = np.array([[0.0, -3.0, 1.0, -9.0, 0.0, -9.0, -9.0]]), np.ones((1, 7), bool)
+    >>> s, alarm, began = cusum(z, np.ones((1, 7)), np.array([3.5]), np.full((1, 7), 4.0), np.array([3.0]), on, ~on)
+    >>> print(s[0], alarm[0].astype(int), began[0])
+    [0. 2. 0. 0. 0. 0. 6.] [0 0 0 0 0 0 1] [0 0 2 2 4 4 4]
     """
     n_chart, n_campaign = z.shape
-    gain = np.where(active & np.isfinite(z), -np.nan_to_num(z) - allowance, 0.0).T.copy()
+    use = active & np.isfinite(z)
+    value = np.where(use, z, 0.0)
+    side = np.where(value < -outlier, -1, np.where(value > outlier, 1, 0)).astype(np.int8)
+    gain = np.where(use, np.where(side < 0, confirmed[:, None], -value - allowance), 0.0).T.copy()
     counts = np.isfinite(z).T.copy()
-    fresh = fresh.T.copy()
+    fresh, use, side = fresh.T.copy(), use.T.copy(), side.T.copy()
     statistic = np.zeros((n_campaign, n_chart))
     alarm_open = np.zeros((n_campaign, n_chart), dtype=bool)
     began = np.full((n_campaign, n_chart), -1, dtype=np.int32)
     total, alarm, since = np.zeros(n_chart), np.zeros(n_chart, dtype=bool), np.full(n_chart, -1, dtype=np.int32)
+    last_side, held_gain = np.zeros(n_chart, dtype=np.int8), np.zeros(n_chart)
     for i in range(n_campaign):
-        total = np.maximum(np.where(fresh[i], 0.0, total) + gain[i], 0.0)
+        last_side, held_gain = np.where(fresh[i], 0, last_side), np.where(fresh[i], 0.0, held_gain)
+        held = (side[i] != 0) & (side[i] != last_side)
+        step = np.where(held, 0.0, gain[i] + np.where(use[i] & (side[i] == last_side), held_gain, 0.0))
+        total = np.maximum(np.where(fresh[i], 0.0, total) + step, 0.0)
+        held_gain = np.where(held, gain[i], np.where(use[i], 0.0, held_gain))
+        last_side = np.where(use[i], side[i], last_side)
         resting = total == 0.0
-        since = np.where(resting & (counts[i] | fresh[i]), i, since)
+        since = np.where(resting & (fresh[i] | (counts[i] & ~(held & (side[i] < 0)))), i, since)
         alarm = (alarm & ~resting & ~fresh[i]) | (total > threshold)
         statistic[i], alarm_open[i], began[i] = total, alarm, since
     return np.ascontiguousarray(statistic.T), np.ascontiguousarray(alarm_open.T), np.ascontiguousarray(began.T)
@@ -92,7 +118,8 @@ class Charts:
 
     (n_chart, n_campaign) arrays: ``residual`` and ``sigma`` [%], ``z``, ``down``, ``up`` (CUSUM), ``down_open``,
     ``up_open`` (alarm open), ``down_began``, ``up_began`` (last campaign before the change), ``learning``,
-    ``fitted`` (expected value, % of f0), ``extra`` (allowance for the level of a later epoch). ``is_sibling``
+    ``fitted`` (expected value, % of f0), ``extra`` (allowance for the level of a later epoch), ``deviation`` (of a
+    campaign that must be confirmed [%], else nan). ``is_sibling``
     (serves as sibling of other sections) has the sections alone. (n_chart,) arrays: ``allowance``, ``n_learning``,
     ``guard``, ``autocorrelation``, ``widening``, ``threshold_down``, ``threshold_up``. (n_chart, n_epoch) arrays:
     ``level``, ``shift``, ``n_learned``.
@@ -122,6 +149,7 @@ class Charts:
     up_open: np.ndarray
     down_began: np.ndarray
     up_began: np.ndarray
+    deviation: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
 
 def guard_factor(count: np.ndarray, small: np.ndarray, settings: TrendSettings) -> np.ndarray:
@@ -185,10 +213,12 @@ def finish(p: Prepared, phi: np.ndarray, settings: TrendSettings) -> Charts:
     joint = {k: np.vstack([getattr(sections, k), getattr(turnouts, k)]) for k in ("values", "residual", "sigma")}
     level, shift = (stack_padded(getattr(sections, k), getattr(turnouts, k)) for k in ("level", "shift"))
     n_learned = by_epoch(joint["values"], window & np.isfinite(joint["values"]), p.epoch, level.shape[1])[1]
-    return Charts(
+    charts = Charts(
         p, allowance, n_learning, guard, phi, widening, level, shift, n_learned, joint["residual"], joint["sigma"],
         fitted=joint["values"] - joint["residual"], learning=window, is_sibling=is_sibling, **sums,
     )  # fmt: skip
+    charts.deviation = far_deviations(charts, settings)
+    return charts
 
 
 def _siblings_without_alarm(
@@ -243,9 +273,10 @@ class _ChartSums:
         bands = p.charts["band"].to_numpy()[rows]
         for name, sign in (("down", 1.0), ("up", -1.0)):
             h = _thresholds(run_lengths(bands, name, settings), k)
-            limit = settings.single_share * h[:, None] + k[:, None] + extra
+            single = settings.single_share * h
+            outlier = np.minimum(single[:, None] + k[:, None] + extra, settings.outlier_limit)
             sums[f"threshold_{name}"] = h
             sums[name], sums[f"{name}_open"], sums[f"{name}_began"] = cusum(
-                np.maximum(sign * z, -limit), k[:, None] + extra, h, active, fresh
+                sign * z, k[:, None] + extra, h, outlier, single, active, fresh
             )
         return sums

@@ -1,4 +1,7 @@
-"""Decide the state of each chart today: ok, alarm, learning, cannot tell or not measured, and the reason."""
+"""Decide the state of each chart today, and the reason.
+
+States are ok, alarm, confirm now, learning, cannot tell and not measured.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from turnout.trend.detectability import detectable_shift
 from turnout.trend.drift import slopes, span
 from turnout.trend.epochs import by_epoch
 from turnout.trend.panel import WHOLE_TURNOUT, timestamps
 from turnout.trend.residuals import FREQUENCY_RESOLUTION, first_epoch, slope_variance
-from turnout.trend.threshold import detectable_shift, run_lengths
+from turnout.trend.threshold import run_lengths
 
 if TYPE_CHECKING:
     from turnout.config.settings.trend import TrendSettings
@@ -24,8 +28,9 @@ DAYS_PER_YEAR = 365.25
 def detectable_change(charts: Charts, settings: TrendSettings) -> tuple[np.ndarray, np.ndarray]:
     """Smallest change that each chart detects within a year with the set probability, and its campaigns a year.
 
-    It depends on the spread of the baseline, the unknown part of the temperature slope, the guard factor, the pooled
-    autocorrelation and the allowance of the present epoch.
+    It is simulated (``detectability``) for the number of campaigns of the baseline and of a year, the guard factor, the
+    pooled autocorrelation and the allowance of the present epoch, and scaled by the spread of the baseline with the
+    unknown part of the temperature slope.
 
     Parameters
     ----------
@@ -115,12 +120,38 @@ def detectable_in_epoch(
     (n,) array of float
         Detectable change. [%]
     """
+    p = charts.prepared
     harmful = np.minimum(charts.threshold_down, charts.threshold_up)[chart]
-    keys = np.column_stack([harmful, np.round(allowance, 2), campaigns])
+    learned = np.where(epoch > first_epoch(p)[chart], charts.n_learned[chart, epoch], 0)
+    keys = np.column_stack(
+        [
+            harmful,
+            np.round(allowance, 1),
+            _similar(campaigns),
+            _similar(p.baseline.count[chart]),
+            _similar(learned),
+            np.round(charts.guard[chart], 2),
+            np.round(charts.autocorrelation[chart], 1),
+        ]
+    )
     unique, where = np.unique(keys, axis=0, return_inverse=True)
-    shift = [detectable_shift(float(h), float(k), int(n), settings.detectable_probability) for h, k, n in unique]
+    rules = settings.single_share, settings.outlier_limit, settings.detectable_probability
+    shift = [
+        detectable_shift(h, k, int(year), int(n_base), int(n_level), guard, phi, *rules)
+        for h, k, year, n_base, n_level, guard, phi in unique.tolist()
+    ]
     spread = np.hypot(spread_in(charts, chart, epoch), temperature_spread(charts)[chart, epoch])
     return np.array(shift)[where.ravel()] * spread * (charts.guard * charts.widening)[chart]
+
+
+def _similar(count: np.ndarray) -> np.ndarray:
+    """Numbers of campaigns, those above 12 rounded to steps of a tenth, so that similar charts share a simulation.
+
+    >>> _similar(np.array([0, 12, 51, 52, 53]))
+    array([ 0, 12, 51, 51, 51])
+    """
+    steps = np.round(np.log(np.maximum(count, 12) / 12.0) / np.log(1.1))
+    return np.where(count <= 12, count, np.round(12.0 * 1.1**steps)).astype(int)
 
 
 def temperature_spread(charts: Charts) -> np.ndarray:
@@ -153,9 +184,10 @@ def temperature_spread(charts: Charts) -> np.ndarray:
 def chart_status(charts: Charts, settings: TrendSettings) -> pd.DataFrame:
     """One row per chart: its state today, the reason, the detectable change and the slope.
 
-    States in the order of decision: ``alarm``, also if no longer measured; ``not_measured`` (too long ago);
-    ``cannot_tell`` (constant values, no temperature for as long, or too few temperatures); ``learning`` (baseline or
-    level after an event not complete); ``cannot_tell`` (detectable change above the target); ``ok``.
+    States in the order of decision: ``alarm``, also if no longer measured; ``confirm_now`` (newest campaign far
+    outside); ``not_measured`` (too long ago); ``cannot_tell`` (constant values, no temperature for as long, or too few
+    temperatures); ``learning`` (baseline or level after an event not complete); ``cannot_tell`` (detectable change
+    above the target); ``ok``.
 
     Parameters
     ----------
@@ -325,6 +357,7 @@ def _states(
         (~np.isfinite(last) & whole, "cannot_tell", "too_few_sections"),
         (~np.isfinite(last), "not_measured", "never"),
         (open_now & ~p.pending & ~(p.baseline.complete & constant & ~whole), "alarm", "threshold_crossed"),
+        (_is_to_confirm(charts, present) & ~p.pending, "confirm_now", "far_outside"),
         (too_few, "cannot_tell", "too_few_sections"),
         (is_old, "not_measured", "too_long_ago"),
         (p.baseline.complete & constant & ~whole, "cannot_tell", "constant"),
@@ -339,6 +372,14 @@ def _states(
     state = np.select(conditions, [np.full(len(last), rule[1], object) for rule in rules], "ok")
     reason = np.select(conditions, [np.full(len(last), rule[2], object) for rule in rules], "")
     return state, reason
+
+
+def _is_to_confirm(charts: Charts, present: np.ndarray) -> np.ndarray:
+    """Whether the newest campaign of each chart with a value is far outside its expected value, (n_chart,)."""
+    n_section = len(charts.prepared.panel.charts)
+    measured = np.isfinite(np.vstack([charts.prepared.panel.frequency, charts.residual[n_section:]]))
+    newest = measured & (np.cumsum(measured[:, ::-1], axis=1)[:, ::-1] == 1)
+    return np.any(newest & present & np.isfinite(charts.deviation), axis=1)
 
 
 def is_constant(frequency: np.ndarray, least: int = 8) -> np.ndarray:

@@ -1,13 +1,11 @@
-"""Compute CUSUM thresholds from the allowed false-alarm rate, and the shift that a chart detects."""
+"""Compute CUSUM thresholds from the allowed false-alarm rate."""
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.special import ndtr
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,7 +16,6 @@ if TYPE_CHECKING:
     from turnout.config.settings.trend import TrendSettings
 
 OVERSHOOT = 1.166  # sd; twice Siegmund's correction of 0.583 for the excess over the threshold
-N_CELLS = 80  # cells of the Markov chain that approximates the statistic
 
 
 def run_length(threshold: ArrayLike, allowance: ArrayLike, shift: ArrayLike = 0.0) -> np.ndarray:
@@ -78,85 +75,6 @@ def threshold_for(campaigns: float, allowance: float) -> float:
     return float(
         brentq(lambda h: np.log(run_length(h, allowance)) - np.log(campaigns), 0.0, 150.0 / allowance, xtol=1e-12)
     )
-
-
-def alarm_probability(shift: float, threshold: float, allowance: float, campaigns: int) -> float:
-    r"""Probability that a CUSUM starting at 0 raises an alarm within ``campaigns`` after a ``shift`` of the mean.
-
-    The statistic is a Markov chain of ``N_CELLS`` cells of width w, cell 0 half as wide:
-    :math:`P_{ij} = \Phi(d_{ij} + w/2) - \Phi(d_{ij} - w/2)`, :math:`d_{ij} = (j - i) w + k - \delta`.
-
-    Parameters
-    ----------
-    shift : float
-        Shift of the mean. [sd]
-    threshold : float
-        Threshold h. [sd]
-    allowance : float
-        Allowance k. [sd]
-    campaigns : int
-        Number of campaigns after the shift.
-
-    Returns
-    -------
-    float
-        Probability.
-
-    References
-    ----------
-    Brook and Evans, An approach to the probability distribution of CUSUM run length, Biometrika 59, 1972.
-
-    Examples
-    --------
-    With one campaign the alarm needs z > h + k.
-
-    >>> print(f"{alarm_probability(0.0, 1.0, 0.5, 1):.4f}")
-    0.0668
-    """
-    width = 2.0 * threshold / (2 * N_CELLS - 1)
-    cell = np.arange(N_CELLS)
-    upper = (cell[None, :] - cell[:, None] + 0.5) * width + allowance - shift
-    reach = ndtr(upper)
-    stay = np.diff(reach, axis=1, prepend=0.0)
-    inside = np.zeros(N_CELLS)
-    inside[0] = 1.0
-    for _ in range(int(campaigns)):
-        inside = inside @ stay
-    return float(1.0 - inside.sum())
-
-
-@lru_cache(maxsize=4096)
-def detectable_shift(threshold: float, allowance: float, campaigns: int, probability: float = 0.9) -> float:
-    """Smallest shift, in standard deviations, that alarms within ``campaigns`` with ``probability``.
-
-    Parameters
-    ----------
-    threshold : float
-        Threshold h. [sd]
-    allowance : float
-        Allowance k. [sd]
-    campaigns : int
-        Number of campaigns.
-    probability : float
-        Probability of an alarm.
-
-    Returns
-    -------
-    float
-        Shift [sd], infinite without a campaign.
-
-    Examples
-    --------
-    >>> 1.1 < detectable_shift(3.5, 1.0, 26) < 1.25
-    True
-    """
-    if campaigns < 1:
-        return float("inf")
-
-    def shortfall(shift: float) -> float:
-        return alarm_probability(shift, threshold, allowance, campaigns) - probability
-
-    return float(brentq(shortfall, 0.0, 2.0 * (threshold + allowance) + 4.0, xtol=1e-4))
 
 
 def run_lengths(bands: Sequence[str] | np.ndarray | pd.Series, direction: str, settings: TrendSettings) -> np.ndarray:

@@ -7,7 +7,8 @@ import pytest
 
 from turnout.config.settings.trend import TrendSettings
 from turnout.trend.cusum import guard_factor
-from turnout.trend.threshold import detectable_shift, threshold_for
+from turnout.trend.detectability import detectable_shift
+from turnout.trend.threshold import threshold_for
 
 
 def seen(spread, campaigns, settings):
@@ -16,7 +17,7 @@ def seen(spread, campaigns, settings):
     allowance = settings.allowance_large if plain else settings.allowance_small
     guard = guard_factor(np.array([max(12, campaigns)]), np.array([not plain]), settings)[0]
     threshold = threshold_for(settings.run_length_loss, allowance)
-    return spread * guard * detectable_shift(threshold, allowance, campaigns, settings.detectable_probability)
+    return spread * guard * detectable_shift(threshold, allowance, campaigns, max(12, campaigns), 0, round(guard, 2))
 
 
 def test_the_table_is_what_the_charts_can_see(repository):

@@ -21,29 +21,41 @@ def test_cusum_equals_a_plain_loop_with_resets_gaps_and_learning():
     active = np.isfinite(z) & (rng.random(z.shape) < 0.9)
     fresh = rng.random(z.shape) < 0.04
     k, h = rng.uniform(0.3, 1.2, z.shape), rng.uniform(2.0, 4.0, 7)
-    statistic, opened, began = cusum(z, k, h, active, fresh)
+    outlier, confirmed = rng.uniform(0.5, 1.5, z.shape), rng.uniform(1.0, 2.0, 7)
+    statistic, opened, began = cusum(z, k, h, outlier, confirmed, active, fresh)
+    n_confirmed = 0
     for c in range(7):
-        total, alarm, since = 0.0, False, -1
+        total, alarm, since, waiting, side_before = 0.0, False, -1, 0.0, 0
         for i in range(60):
             if fresh[c, i]:
-                total, alarm = 0.0, False
+                total, alarm, waiting, side_before = 0.0, False, 0.0, 0
+            held_low = False
             if active[c, i]:
-                total = max(0.0, total - z[c, i] - k[c, i])
+                side = int(np.sign(z[c, i])) if abs(z[c, i]) > outlier[c, i] else 0
+                gain = confirmed[c] if side < 0 else -z[c, i] - k[c, i]
+                if side == 0:
+                    total, waiting = max(0.0, total + gain), 0.0
+                elif side == side_before:
+                    total, waiting, n_confirmed = max(0.0, total + gain + waiting), 0.0, n_confirmed + 1
+                else:
+                    waiting, held_low = gain, side < 0
+                side_before = side
             if total == 0.0:
                 alarm = False
-                if np.isfinite(z[c, i]) or fresh[c, i]:
+                if (np.isfinite(z[c, i]) and not held_low) or fresh[c, i]:
                     since = i
             alarm = alarm or total > h[c]
             assert statistic[c, i] == pytest.approx(total, abs=1e-12)
             assert opened[c, i] == alarm
             assert began[c, i] == since
+    assert n_confirmed > 5
 
 
 def test_cusum_is_the_running_sum_above_its_lowest_point():
     # S_i = P_i - min(0, min P): Page's other form.
     z = np.random.default_rng(2).standard_normal((3, 200))
     on = np.ones(z.shape, bool)
-    statistic, _, _ = cusum(z, np.full(z.shape, 0.5), np.full(3, 5.0), on, ~on)
+    statistic, _, _ = cusum(z, np.full(z.shape, 0.5), np.full(3, 5.0), np.full(z.shape, np.inf), np.zeros(3), on, ~on)
     running = np.cumsum(-z - 0.5, axis=1)
     assert np.allclose(statistic, running - np.minimum(0, np.minimum.accumulate(running, axis=1)), atol=1e-9)
 

@@ -55,11 +55,26 @@ class TrendSettings:
         56000.0, "", "the same for a gain of stiffness, which is rarely urgent: a tenth of the alarms", minimum=20.0
     )
     single_share: float = setting(
-        0.75,
+        0.6,
         "",
-        "largest share of the threshold that one campaign can bring: one bad campaign is no alarm",
+        "largest share of the threshold that one campaign can bring; above 0.5 two confirmed outliers are an alarm",
         minimum=0.1,
         maximum=1.0,
+    )
+    outlier_limit: float = setting(
+        3.0,
+        "",
+        "a campaign with |z| beyond this counts only if the next one confirms it: one bad campaign is no alarm",
+        minimum=2.0,
+    )
+    confirm_sd: float = setting(
+        6.0, "", "a campaign this many standard deviations from its expected value is to be confirmed now", minimum=3.0
+    )
+    confirm_percent: float = setting(
+        10.0,
+        "%",
+        "a change of frequency to be confirmed now also where the chart scatters more, from three standard deviations",
+        minimum=1.0,
     )
     detectable_probability: float = setting(
         0.9, "", "the detectable change is seen within a year with this probability", minimum=0.5, maximum=0.999

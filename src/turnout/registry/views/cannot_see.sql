@@ -9,7 +9,7 @@ create or replace macro up_to_a_tenth(pct) as (ceil(10 * pct - 1e-6) / 10);
 create or replace macro cannot_see("asof" := null) as table
 select
     turnout_id, section_id, band, source,
-    case when state in ('alarm', 'ok') then 'cannot tell' else replace(state, '_', ' ') end as state,
+    case when state in ('alarm', 'confirm_now', 'ok') then 'cannot tell' else replace(state, '_', ' ') end as state,
     case
         when reason = 'never' then 'not measured by then'
         when reason = 'too_long_ago' then 'last measured ' || strftime(last_measured_at_utc, '%Y-%m-%d')
@@ -40,7 +40,7 @@ from chart_status_at(coalesce("asof", newest_measurement())) left join (
     from charts where state = 'wrong_time' and measured_at_utc <= coalesce("asof", newest_measurement()) group by all
 ) a using (turnout_id, section_id, band, source)
 where in_service(turnout_id) and not has_left(section_id)
-    and (state not in ('alarm', 'ok') or detectable_pct is null or detectable_pct > target_pct)
+    and (state not in ('alarm', 'confirm_now', 'ok') or detectable_pct is null or detectable_pct > target_pct)
 union all by name
 select turnout_id, section_id, 'all' as band, source, 'cannot tell' as state, why, used_at_utc as last_measured_at_utc
 from unusable(coalesce("asof", newest_measurement()))

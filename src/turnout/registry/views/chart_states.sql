@@ -1,8 +1,9 @@
 -- One row per chart: its state at the newest campaign, in the words of the worklist, on the day `asof` at or after it.
--- inspect this week: an open alarm. plan: an acknowledged alarm, or a drift among the discoveries of the fleet
+-- confirm now: the newest campaign is far outside and not confirmed. inspect this week: an open alarm, unless its change
+-- is below the target. plan: an acknowledged or smaller alarm, or a drift among the discoveries of the fleet
 -- (false-discovery rate 10 %), also where the chart is too noisy to see the target within a year. suppressed: somebody
 -- silenced it, with a reason and an end, a day at which it comes back.
--- needs: chart_status_at, was_said, in_service
+-- needs: chart_status_at, was_said, in_service, is_below_target
 create or replace macro chart_states_on("asof") as table
 with open_alarms as (
     select turnout_id, section_id, band, source, max(raised_at_utc) as raised_at_utc
@@ -29,8 +30,10 @@ spoken as (
 select
     s.turnout_id, s.section_id, s.band, s.source,
     case
-        when p.suppressed is not null and s.state in ('alarm', 'ok') then 'suppressed'
-        when s.state = 'alarm' and p.acknowledged is null then 'inspect this week'
+        when p.suppressed is not null and s.state in ('alarm', 'confirm_now', 'ok') then 'suppressed'
+        when s.state = 'alarm' and p.acknowledged is null
+            and not is_below_target(s.band, s.change_low_pct, s.change_high_pct, s.target_pct)
+        then 'inspect this week'
         when s.state = 'alarm' then 'plan'
         when (s.state = 'ok' or s.reason = 'too_noisy') and s.forecast is not null then 'plan'
         else replace(s.state, '_', ' ')

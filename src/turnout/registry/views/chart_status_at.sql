@@ -32,6 +32,7 @@ with by_epoch as (
         turnout_id, section_id, band, source, epoch, count(*) as n, max(measured_at_utc) as last_at_utc,
         count(*) filter (state in ('baseline', 'learning')) as n_learned,
         count(*) filter (state = 'no_temperature') as n_cold,
+        max(measured_at_utc) filter (deviation_pct is not null) as far_at_utc,
         max(measured_at_utc) filter (z is not null) as judged_at_utc
     from charts
     where measured_at_utc <= case when "asof" < newest_charted() then "asof" end and state <> 'wrong_time'
@@ -43,7 +44,7 @@ counted as (
         min(epoch) filter (n_learned > 0) as first_epoch,
         sum(n)::integer as n_campaigns, sum(n_learned)::integer as n_baseline, sum(n_cold)::integer as n_cold,
         max_by(n_learned, epoch)::integer as n_learned, max(last_at_utc) as last_at_utc,
-        max(judged_at_utc) as judged_at_utc
+        max(judged_at_utc) as judged_at_utc, coalesce(max(far_at_utc) = max(last_at_utc), false) as is_far
     from by_epoch
     group by turnout_id, section_id, band, source
 ),
@@ -74,7 +75,7 @@ known as (
         case when p.turnout_id is null then coalesce(c.n_learned, 0) else 0 end as n_learned,
         coalesce(s.complete and s.baseline_until_utc <= "asof", false) as complete, p.turnout_id is not null as is_pending,
         a.turnout_id is not null and p.turnout_id is null as in_alarm,
-        c.epoch > c.first_epoch as is_later, b.detectable_pct, s.target_pct, s.section_id = '*' as is_whole,
+        c.is_far and p.turnout_id is null as is_far, c.epoch > c.first_epoch as is_later, b.detectable_pct, s.target_pct, s.section_id = '*' as is_whole,
         "asof" - c.last_at_utc > to_microseconds((86400e6 * s.stale_after_days)::bigint) as is_old,
         s.section_id = '*' and "asof" - max(c.last_at_utc) filter (s.section_id <> '*')
             over (partition by s.turnout_id, s.band, s.source)
@@ -103,6 +104,7 @@ judged as (
             when last_at_utc is null and is_whole then 'too_few_sections'
             when last_at_utc is null then 'never'
             when in_alarm and not (complete and is_stuck) then 'threshold_crossed'
+            when is_far then 'far_outside'
             when is_old and has_sections then 'too_few_sections'
             when is_old then 'too_long_ago'
             when complete and is_stuck then 'constant'
@@ -122,6 +124,7 @@ select
         when 'never' then 'not_measured'
         when 'too_long_ago' then 'not_measured'
         when 'threshold_crossed' then 'alarm'
+        when 'far_outside' then 'confirm_now'
         when 'baseline' then 'learning'
         when 'after_event' then 'learning'
         when '' then 'ok'

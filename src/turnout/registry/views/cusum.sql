@@ -1,5 +1,6 @@
 -- One row per chart and campaign since a date: the sums that the alarms rest on, recomputed from z.
--- S = P - min(0, min P), P the running sum of the steps within an epoch; one campaign brings at most 0.75 h.
+-- S = P - min(0, min P), P the running sum of the steps within an epoch. A campaign with |z| beyond the smaller of
+-- outlier_limit and single_share * h + k is held: it counts only if the next one is beyond it on the same side.
 -- k and h NULL: those of the chart. Other values ask "what if".
 create or replace macro cusum(since, k := null, h := null) as table
 with steps as (
@@ -8,17 +9,55 @@ with steps as (
         coalesce(k, b.allowance) as allowance,
         coalesce(h, b.threshold_down) as threshold_down,
         coalesce(h, b.threshold_up) as threshold_up,
+        coalesce(b.single_share, 0.6) as share,
+        coalesce(b.outlier_limit, 3) as outlier_limit,
         case when c.z is not null and c.state in ('ok', 'alarm_down', 'alarm_up') then 1 else 0 end as counts
     from charts c
     join baselines b using (turnout_id, section_id, band, source, epoch)
     where c.measured_at_utc >= since
 ),
-running as (
+sides as (
     select
         *,
-        sum(counts * (least(-coalesce(z, 0), 0.75 * threshold_down + allowance) - allowance)) over history as p_down,
-        sum(counts * (least(coalesce(z, 0), 0.75 * threshold_up + allowance) - allowance)) over history as p_up
+        case when counts = 0 or abs(z) <= least(share * threshold_down + allowance, outlier_limit) then 0 else sign(z)
+        end as side_down,
+        case when counts = 0 or abs(z) <= least(share * threshold_up + allowance, outlier_limit) then 0 else sign(z)
+        end as side_up
     from steps
+),
+neighbours as (
+    select
+        *,
+        coalesce(lag(side_down) over judged, 0) as before_down, coalesce(lag(side_down, 2) over judged, 0) as second_down,
+        coalesce(lag(side_up) over judged, 0) as before_up, coalesce(lag(side_up, 2) over judged, 0) as second_up,
+        lag(z) over judged as z_before
+    from sides
+    window judged as (
+        partition by turnout_id, section_id, band, source, epoch, counts order by measured_at_utc
+    )
+),
+gains as (
+    select
+        *,
+        case
+            when counts = 0 or (side_down <> 0 and side_down <> before_down) then 0
+            when side_down < 0 then share * threshold_down * (1 + (before_down <> second_down)::integer)
+            when side_down > 0 then -z - allowance
+                + case when before_down <> second_down then -z_before - allowance else 0 end
+            else -z - allowance
+        end as gain_down,
+        case
+            when counts = 0 or (side_up <> 0 and side_up <> before_up) then 0
+            when side_up > 0 then share * threshold_up * (1 + (before_up <> second_up)::integer)
+            when side_up < 0 then z - allowance
+                + case when before_up <> second_up then z_before - allowance else 0 end
+            else z - allowance
+        end as gain_up
+    from neighbours
+),
+running as (
+    select *, sum(gain_down) over history as p_down, sum(gain_up) over history as p_up
+    from gains
     window history as (
         partition by turnout_id, section_id, band, source, epoch order by measured_at_utc
         rows between unbounded preceding and current row

@@ -1,8 +1,8 @@
--- One row per thing to do: every open alarm, the largest change first (by the end of its interval nearer to none), and
--- what else there is up to `trend.worklist_rows` rows in all, or `most`; n_in_all counts what there would be without an end.
+-- One row per thing to do: every campaign that must be confirmed now, every open alarm, the largest change first (by the
+-- end of its interval nearer to none), and what else there is up to `trend.worklist_rows` rows in all, or `most`; n_in_all counts what there would be without an end.
 -- asof at or after the newest measurement uses everything; an earlier one uses only what was measured by then
 -- (change and date then come from the sums alone, and a slow drift is not among the plans).
--- needs: chart_states, cannot_see, chart_status_at, was_said, in_service
+-- needs: chart_states, cannot_see, chart_status_at, was_said, in_service, is_below_target
 create or replace macro worklist("asof", most := null) as table
 with then_status as (select * from chart_status_at("asof")),
 recent as (
@@ -46,7 +46,6 @@ spoken as (
 alarmed as (
     select
         r.turnout_id, r.section_id, r.band, r.source,
-        case when r.acknowledged is null then 'inspect this week' else 'plan' end as state,
         r.direction, r.raised_at_utc, r.ratio, r.acknowledged,
         case
             when least("asof", newest_charted()) - s.last_measured_at_utc
@@ -60,6 +59,8 @@ alarmed as (
         case when told then s.since_at_utc else r.began_at_utc end as since_at_utc,
         case when told then s.since_earliest_utc end as since_earliest_utc,
         case when told then s.since_latest_utc end as since_latest_utc,
+        is_below_target(r.band, low_pct, high_pct, c.target_pct) as is_small,
+        case when r.acknowledged is null and not is_small then 'inspect this week' else 'plan' end as state,
         null::varchar as why
     from spoken r
     left join chart_states_on("asof") s using (turnout_id, section_id, band, source)
@@ -77,6 +78,22 @@ drifting as (
             where a.turnout_id = s.turnout_id and a.section_id = s.section_id and a.band = s.band
                 and a.source = s.source
         )
+),
+confirming as (
+    select
+        n.turnout_id, n.section_id, n.band, n.source, 'confirm now' as state,
+        case when c.deviation_pct < 0 then 'down' else 'up' end as direction, c.deviation_pct as change_pct,
+        c.deviation_pct - coalesce(100 * (c.expected_high_hz / c.expected_hz - 1), 0) as low_pct,
+        c.deviation_pct + coalesce(100 * (c.expected_high_hz / c.expected_hz - 1), 0) as high_pct,
+        printf('the campaign of %s lies %.1f %%', strftime(c.measured_at_utc, '%Y-%m-%d'), abs(c.deviation_pct))
+            || coalesce(printf(' (± %.1f, 95 %%)', 100 * (c.expected_high_hz / c.expected_hz - 1)), '')
+            || case when c.deviation_pct < 0 then ' below' else ' above' end || ' its expected value; not yet confirmed'
+            as why
+    from then_status n
+    join charts c
+        on c.turnout_id = n.turnout_id and c.section_id = n.section_id and c.band = n.band and c.source = n.source
+            and c.measured_at_utc = n.last_measured_at_utc and c.deviation_pct is not null
+    where n.state = 'confirm_now'
 ),
 silent as (
     select
@@ -99,6 +116,7 @@ silent as (
 ),
 everything as (
     select * from alarmed union all by name select * from drifting union all by name select * from silent
+    union all by name select * from confirming
 ),
 heard as (
     select e.*
@@ -122,11 +140,14 @@ listed as (
         case min(section_id)
             when '*' then 'whole turnout' else string_agg(split_part(section_id, '/', -1), ', ' order by section_id)
         end as sections, band, source, state,
-        (case when count(distinct why) = 1 then '' else split_part(min(section_id), '/', -1) || ': ' end)
+        (case when count(distinct why) = 1 then ''
+            else replace(split_part(min(section_id), '/', -1), '*', 'whole turnout') || ': ' end)
             || min_by(why, section_id)
             || (case when count(distinct why) = 1 then '' else
                 '; ' || array_to_string(list(split_part(section_id, '/', -1) order by section_id)[2:], ', ') || ' alike'
-            end) as why
+            end) as why,
+        max_by(direction, abs(change_pct)) as direction, max_by(change_pct, abs(change_pct)) as change_pct,
+        max_by(low_pct, abs(change_pct)) as low_pct, max_by(high_pct, abs(change_pct)) as high_pct
     from heard
     where why is not null
     group by turnout_id, band, source, state, case band when 'all' then why end
@@ -170,6 +191,8 @@ select
             || (case when h.band in ('ballast', 'railpad') then printf('; that is about %.0f %% of stiffness',
                 abs((1 + h.change_pct / 100) ** 2 - 1) * 100) else '' end)
             || coalesce('; not measured since ' || strftime(h.not_since_utc, '%Y-%m-%d'), '')
+            || (case when h.is_small then printf('; below the target of %.1f %%: nobody needs to go there', s.target_pct)
+                else '' end)
             || coalesce('; acknowledged by ' || h.acknowledged, '')
     end as sentence,
     case
@@ -183,12 +206,24 @@ select
                 when f.alarms_per_year < 10 then printf('%.1f', f.alarms_per_year)
                 else printf('%.0f', f.alarms_per_year)
             end || ' such alarms a year'
+        when h.state = 'confirm now' then
+            'one campaign alone is no alarm: only a second one shows whether the track has changed or the measurement was wrong'
         when h.state = 'plan' then
             printf('one in ten of the drifts reported is expected to be false; this one: adjusted p = %.2g', s.drift_q)
         else 'no statement'
     end as false_alarm_words,
     m.last_work as last_maintenance,
     case
+        when h.state = 'confirm now' then
+            'repeat the hammer test today, at the marked position and with the same hammer, tip and sensor: at least ten '
+            || 'impacts with rail temperature; if the value stays: '
+            || case
+                when h.section_id = '*' then 'what all sections share'
+                when h.band = 'ballast' and h.direction = 'down' then 'voids, wet or fouled ballast'
+                when h.band = 'railpad' and h.direction = 'down' then 'broken or displaced pads, loose fastenings'
+                else 'frost, or work that is not in the events'
+            end
+        when h.is_small then 'nothing on site: the next campaigns, and the other resonance of this section'
         when h.state = 'learning' then 'nothing: measure again as planned'
         when h.why like 'the alarm of %' then 'what was corrected or entered since, and the chart of this section'
         when h.band = 'all' then 'what was rejected: turnout query "from rejected where turnout_id = ''' || h.turnout_id || '''"'
@@ -212,12 +247,14 @@ left join turnouts t on t.turnout_id = h.turnout_id
 cross join fleet f
 window importance as (
     order by
-        case h.state when 'inspect this week' then 0 when 'plan' then 1 when 'cannot tell' then 2 else 3 end,
+        case h.state
+            when 'confirm now' then 0 when 'inspect this week' then 1 when 'plan' then 2 when 'cannot tell' then 3 else 4
+        end,
         h.band = 'all' desc,
         case when h.low_pct * h.high_pct < 0 then 0 else least(abs(h.low_pct), abs(h.high_pct)) end desc nulls last,
         h.ratio desc nulls last, h.turnout_id, h.sections, h.band, h.source
 )
-qualify rank <= coalesce(most, (select max(worklist_rows) from chart_status), 20) or h.state = 'inspect this week'
+qualify rank <= coalesce(most, (select max(worklist_rows) from chart_status), 20) or h.state in ('confirm now', 'inspect this week')
 order by rank;
 
 create or replace view worklist as select * from worklist(newest_measurement());

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from turnout.report.source import FleetSource
 
 STATES = {
+    "confirm now": "confirm_now",
     "inspect this week": "inspect",
     "plan": "plan",
     "learning": "learning",
@@ -25,7 +26,7 @@ STATES = {
     "suppressed": "suppressed",
     "ok": "ok",
 }
-LISTED_STATES = ("inspect this week", "plan", "learning", "cannot tell")
+LISTED_STATES = ("confirm now", "inspect this week", "plan", "learning", "cannot tell")
 
 
 def fleet_page(source: FleetSource, template: Template, shared: Mapping[str, Any]) -> str:

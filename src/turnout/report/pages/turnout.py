@@ -151,7 +151,7 @@ def _section(
         "panel": PANELS.get(section["panel"], "panel not configured"),
         "track": TRACKS.get(section["track"], "track not configured"),
         "position": f"{section['position_m']:.1f}" if section["position_m"] is not None else "–",
-        "open": states.get(key) in ("inspect this week", "plan"),
+        "open": states.get(key) in ("confirm now", "inspect this week", "plan"),
         "when": day(model["measured_at_utc"]) if model else "none",
         "history": history or f"<p>{'No model yet' if model else 'Not measured yet, or nothing could be read'}.</p>",
         "panels": _panels(rows, section, model, receptance, modes) if model and receptance else "",
@@ -196,7 +196,7 @@ def _panels(
 
 
 def _worst_states(charts: Sequence[Mapping[str, Any]]) -> dict[str, str]:
-    order = ["inspect this week", "plan", "cannot tell", "learning", "not measured", "suppressed", "ok"]
+    order = ["confirm now", "inspect this week", "plan", "cannot tell", "learning", "not measured", "suppressed", "ok"]
     worst: dict[str, str] = {}
     for chart in charts:
         if chart["state"] in order:

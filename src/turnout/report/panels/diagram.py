@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 STYLE = {
+    "confirm now": "state-confirm",
     "inspect this week": "state-inspect",
     "plan": "state-plan",
     "learning": "state-learning",

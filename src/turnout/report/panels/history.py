@@ -73,19 +73,28 @@ def history_panel(
         f"{m['damping_ratio']:.4f}, n = {m['n_impacts']}, {_temperature(m['rail_temperature_c'])}"
         for m, e in zip(modes, error)
     ]
-    alarmed = _is_in_alarm(modes, charts)
-    for style, chosen in (("point", False), ("alarm", True)):
-        some = np.flatnonzero(alarmed == chosen)
+    styles = _point_styles(modes, charts)
+    for style in ("point", "confirm", "alarm"):
+        some = np.flatnonzero(styles == style)
         chart.points(time[some], frequency[some], style, 3.0, low[some], high[some], [labels[i] for i in some])
     return chart.svg()
 
 
-def _is_in_alarm(modes: Sequence[Mapping[str, Any]], charts: Sequence[Mapping[str, Any]]) -> np.ndarray:
-    """Whether the campaign of each value is in alarm: the last one that began before it, for one may last two days."""
+def _point_styles(modes: Sequence[Mapping[str, Any]], charts: Sequence[Mapping[str, Any]]) -> np.ndarray:
+    """Style of each value: in alarm, far outside its expected value, or neither.
+
+    The campaign of a value is the last one that began before it, for one may last two days.
+    """
     rows = sorted(charts, key=lambda c: c["measured_at_utc"])
     began = np.array([_seconds(c["measured_at_utc"]) for c in rows])
     of = np.searchsorted(began, [_seconds(m["measured_at_utc"]) for m in modes], side="right") - 1
-    return np.array([k >= 0 and rows[k]["state"].startswith("alarm") for k in of], dtype=bool)
+    return np.array([_style(rows[k]) if k >= 0 else "point" for k in of])
+
+
+def _style(row: Mapping[str, Any]) -> str:
+    if row["state"].startswith("alarm"):
+        return "alarm"
+    return "point" if row.get("deviation_pct") is None else "confirm"
 
 
 def _seconds(when: datetime) -> float:

@@ -1,0 +1,194 @@
+"""A campaign far outside is named the same day, and raises no alarm alone."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from benchmarks.trend_fleet import Fleet, modes
+from benchmarks.trend_oracle import cusum_by_loop
+from tests.oracles.trend_views import connect_views
+
+from turnout.report.formatting import badge
+from turnout.report.panels.diagram import diagram
+from turnout.report.panels.history import history_panel
+from turnout.trend import alarm_rows, baseline_rows, candidates, chart_rows, chart_status, describe_flagged, evaluate
+from turnout.trend.cusum import cusum
+
+KEYS = ("turnout_id", "section_id", "band", "source")
+
+
+def viewed(rows, settings, events=None, asof=None, **more):
+    rows = rows.astype({k: object for k in KEYS})
+    charts = evaluate(rows, events, settings)
+    status = chart_status(charts, settings)
+    frames = {
+        "modes": rows.assign(method="joint"), "charts": chart_rows(charts), "alarms": alarm_rows(charts, settings),
+        "baselines": baseline_rows(charts, settings),
+        "chart_status": describe_flagged(status, candidates(charts, status, settings), settings), **more,
+    }  # fmt: skip
+    frames |= {} if events is None else {"events": events}
+    return connect_views(frames, asof or rows["measured_at_utc"].max(), rounded=False)
+
+
+def with_loss(fleet, seed, percent, campaigns, sections=(0,)):
+    """The sections lose ``percent`` in the campaigns of the given numbers, at every turnout."""
+    week = np.arange(0, fleet.weeks, fleet.every)
+    change = np.zeros((fleet.turnouts, fleet.sections, week.size))
+    change[:, list(sections), :] = np.isin(np.arange(week.size), np.arange(week.size)[list(campaigns)]) * -percent
+    return modes(fleet, seed, change)
+
+
+def listed(con, state="confirm now"):
+    query = "select turnout_id, sections from worklist(newest_measurement(), most := 1) where state = ?"
+    return con.execute(query, [state]).fetchall()
+
+
+@pytest.mark.parametrize(
+    ("weeks", "every", "sigma", "temperature"),
+    [(60, 1, 0.6, True), (80, 4, 1.5, True), (60, 1, 0.6, False), (6, 1, 1.0, True)],
+    ids=["weekly", "28 d, noisy", "without a rail temperature", "the sixth campaign"],
+)
+def test_a_loss_of_twenty_percent_is_on_the_list_the_same_day(settings, weeks, every, sigma, temperature):
+    fleet = Fleet(turnouts=20, weeks=weeks, every=every, sigma=sigma, phi=0.4)
+    rows = with_loss(fleet, 5, 20.0, [-1])
+    rows.loc[(rows["measured_at_utc"] == rows["measured_at_utc"].max()) & (not temperature), "rail_temperature_c"] = (
+        np.nan
+    )
+    with viewed(rows, settings) as con:
+        found = listed(con)
+    assert {r[0] for r in found if "S0" in r[1].split(", ")} == {f"T{i:05d}" for i in range(20)}
+    assert len(found) <= 21  # nothing else of 160 charts; the sections of one turnout share a row
+
+
+def test_what_the_row_says_and_what_to_repeat(settings):
+    fleet = Fleet(turnouts=2, weeks=60, band="ballast", frequency=150.0)
+    with viewed(with_loss(fleet, 5, 33.0, [-1]), settings) as con:
+        row = con.execute("select * from worklist order by rank limit 1").df().iloc[0]
+        states = con.execute("select state, count(*) from chart_states group by all").fetchall()
+    assert row["state"] == "confirm now" and row["sections"] == "S0" and row["direction"] == "down"
+    assert row["change_pct"] == pytest.approx(-33.0, abs=3.0)
+    assert row["change_low_pct"] < row["change_pct"] < row["change_high_pct"] < -25
+    assert "2017-02-20" in row["sentence"] and " below its expected value; not yet confirmed" in row["sentence"]
+    assert "repeat the hammer test" in row["look_at"] and "ballast" in row["look_at"]
+    assert "one campaign alone is no alarm" in row["false_alarm_words"]
+    assert ("confirm now", 2) in states
+
+
+def test_a_loss_of_the_whole_turnout_is_named_too(settings):
+    fleet = Fleet(turnouts=2, weeks=60)
+    with viewed(with_loss(fleet, 5, 20.0, [-1], range(8)), settings) as con:
+        rows = listed(con)
+        sentences = con.execute("select sentence from worklist where state = 'confirm now'").fetchall()
+    assert sorted(rows) == [("T00000", "whole turnout"), ("T00001", "whole turnout")]
+    assert all(s.startswith("whole turnout: the campaign of") and "; S0, S1, S2" in s for (s,) in sentences)
+
+
+def test_two_campaigns_are_an_alarm_and_a_normal_one_ends_it(settings):
+    fleet = Fleet(turnouts=5, weeks=60)
+    with viewed(with_loss(fleet, 5, 20.0, [-2, -1]), settings) as con:
+        assert not listed(con) and len(listed(con, "inspect this week")) == 5
+    with viewed(with_loss(fleet, 5, 20.0, [-2]), settings) as con:
+        assert not listed(con) and not listed(con, "inspect this week")
+
+
+def test_the_day_of_the_campaign_is_remembered(settings):
+    """A list of an earlier day names what stood out then."""
+    rows = with_loss(Fleet(turnouts=3, weeks=60), 5, 20.0, [-3])
+    day = sorted(rows["measured_at_utc"].unique())[-3]
+    with viewed(rows, settings) as con:
+        then = con.execute("select turnout_id, sections from worklist(?::timestamp) where state = 'confirm now'", [day])
+        assert sorted(then.fetchall()) == [(f"T{i:05d}", "S0") for i in range(3)]
+
+
+def test_work_after_the_campaign_and_silence_take_it_off(settings):
+    rows = with_loss(Fleet(turnouts=2, weeks=60), 5, 20.0, [-1])
+    newest = rows["measured_at_utc"].max()
+    work = {"event_id": ["e"], "turnout_id": ["T00000"], "section_id": [None], "kind": ["tamping"]}
+    events = pd.DataFrame({**work, "event_at_utc": [newest], "resets_ballast": [True], "resets_railpad": [True]})
+    events["event_at_utc"] += pd.Timedelta("1h")
+    said = {
+        "acknowledgement_id": ["a"], "turnout_id": ["T00001"], "section_id": [None], "band": [None],
+        "action": ["suppress"], "by_whom": ["M. Jensen"], "at_utc": [newest], "reason": ["repeated"],
+        "until_utc": [newest + pd.Timedelta("30D")],
+    }  # fmt: skip
+    asof = newest + pd.Timedelta("1D")
+    with viewed(rows, settings, events, asof, acknowledgements=pd.DataFrame(said)) as con:
+        assert not listed(con)
+        states = con.execute("select section_id, state from chart_states where section_id like '%S0'").fetchall()
+    assert sorted(states) == [("T00000/S0", "learning"), ("T00001/S0", "suppressed")]
+
+
+@pytest.mark.parametrize(("percent", "sections"), [(4.0, [0]), (20.0, [0]), (20.0, range(8)), (-20.0, [0])])
+def test_one_bad_campaign_raises_no_alarm(settings, percent, sections):
+    """A chart with a bad campaign has the alarms that it has without that campaign; so has the whole turnout."""
+    fleet = Fleet(turnouts=40, weeks=80, phi=0.2)
+    bad = with_loss(fleet, 9, percent, [70], sections)
+    is_bad = bad["measured_at_utc"] == sorted(bad["measured_at_utc"].unique())[70]
+    missing = is_bad & bad["section_id"].astype(str).str[-1].isin([str(i) for i in sections])
+    before, after = evaluate(bad[~missing], None, settings), evaluate(bad, None, settings)
+    charts = slice(0, fleet.charts, 8) if len(sections) == 1 else slice(fleet.charts, None)
+    for name in ("down_open", "up_open"):
+        new, old = getattr(after, name)[charts], getattr(before, name)[charts]
+        assert np.array_equal(new[:, 71:], old[:, -9:]) and not new[:, 70].any()
+
+
+def test_no_single_outlier_of_ten_thousand_raises_an_alarm():
+    """Sums of standard normal values with one outlier, against the same sums without that campaign."""
+    rng = np.random.default_rng(8)
+    n, h, k = 10_000, 3.5, 1.0
+    z = rng.standard_normal((n, 40)) / 1.12
+    bad, gone = z.copy(), z.copy()
+    bad[:, 30], gone[:, 30] = -rng.uniform(3.0, 60.0, n), np.nan
+    on, off = np.ones(z.shape, bool), np.zeros(z.shape, bool)
+    limits = (np.full(z.shape, k), np.full(n, h), np.full(z.shape, 3.0), np.full(n, 0.6 * h))
+    alarms = [cusum(values, *limits, on, off)[1] for values in (bad, gone)]
+    new = (alarms[0] & ~alarms[1]).any(axis=1)
+    # Only a second outlier next to it, by chance, makes an alarm of it: 2 x P(z < -3.36 sd) = 8e-4.
+    assert (np.minimum(z[new, 29], z[new, 31]) < -3.0).all() and new.sum() < 20
+
+
+def test_outliers_in_sql_equal_the_chart_and_a_loop(settings):
+    """One, two and three in a row, alternating ones, a gap between two, ups and downs."""
+    fleet, change = Fleet(turnouts=2, weeks=90, phi=0.0), np.zeros((2, 8, 90))
+    patterns = ([60], [60, 61], [60, 61, 62], [60, 62, 64], [60, 63], [70, 71], [75], [80, 81, 82])
+    for i, where in enumerate(patterns):
+        change[0, i, where] = -6.0
+        change[1, i, where] = (-6.0) ** np.arange(1, 1 + len(where)) / 6.0 ** np.arange(len(where))
+    rows = modes(fleet, 4, change)
+    rows = rows[~((rows["section_id"] == "T00000/S4") & rows["measured_at_utc"].rank(method="dense").isin([62, 63]))]
+    with viewed(rows, settings) as con:
+        found = con.execute("select * from cusum(timestamp '2016-01-01')").df()
+        charts, baselines = con.execute("from charts").df(), con.execute("from baselines").df()
+    joined = found.merge(charts, on=[*KEYS, "measured_at_utc"], suffixes=("", "_chart"))
+    assert np.abs(joined["cusum_down"] - joined["cusum_down_chart"]).max() < 1e-8
+    assert np.abs(joined["cusum_up"] - joined["cusum_up_chart"]).max() < 1e-8
+    loop = cusum_by_loop(charts, baselines)
+    chart = charts.set_index([*KEYS, "measured_at_utc"])["cusum_down"].reindex(loop.index)
+    assert np.abs(loop - chart).max() < 1e-8 and (charts["z"].abs() > 3.0).sum() > 20
+
+
+def test_the_page_has_a_colour_of_its_own():
+    section = {"section_id": "t/S0", "label": "S0", "position_m": 1.0, "track": "main", "panel": "open_track"}
+    svg = diagram([section], {"t/S0": "confirm now"})
+    assert "state-confirm" in svg and badge("confirm now") == "confirm"
+    mode = {"frequency_hz": 100.0, "frequency_se_hz": 1.0, "n_impacts": 9, "damping_ratio": 0.1}
+    when = pd.Timestamp("2025-09-08")
+    modes_ = [mode | {"measured_at_utc": when, "rail_temperature_c": 20.0}]
+    chart = {"measured_at_utc": when, "expected_low_hz": 150.0, "expected_high_hz": 156.0, "state": "ok"}
+    assert '<circle class="confirm"' in history_panel("ballast", modes_, [chart | {"deviation_pct": -33.0}], [])
+    assert '<circle class="point"' in history_panel("ballast", modes_, [chart | {"deviation_pct": None}], [])
+
+
+@pytest.mark.parametrize(("percent", "state"), [(1.0, "plan"), (3.0, "inspect this week")])
+def test_nobody_is_sent_out_for_a_change_below_the_target(settings, percent, state):
+    """A precise chart raises an alarm for 1 %; the target is 1.5 %."""
+    fleet = Fleet(turnouts=2, weeks=110, sigma=0.1, campaign=0.1, thermometer=0.1, phi=0.0)
+    rows = with_loss(fleet, 5, percent, range(56, 110))
+    with viewed(rows, settings) as con:
+        query = "select state, look_at, sentence from worklist({}) where section_id like '%/S0'"
+        for asof in ("newest_measurement()", "newest_measurement() - interval 1 day"):
+            found = con.execute(query.format(asof)).fetchall()
+            assert [row[0] for row in found] == [state, state]
+            assert all(("nobody needs to go there" in row[2]) == (state == "plan") for row in found)
+            assert all(row[1].startswith("nothing on site") == (state == "plan") for row in found)
+        states = con.execute("select state from chart_states where section_id like '%/S0'").fetchall()
+        assert states == [(state,), (state,)]
