@@ -4,7 +4,8 @@
   turnout query "select * from section_trend('tommerup_s1/A7', 'ballast')" --csv trend.csv
   turnout query --list
 
-docs/registry.md lists every table, view and macro with its columns and units.
+docs/registry.md lists every table, view and macro with its columns and units. Only queries are allowed, and only the
+files of the registry are read. In a CSV, an apostrophe precedes text that a spreadsheet would take for a formula.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from decimal import Decimal
 from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_csv, add_registry, add_result, at_least_one
+from turnout.registry.spreadsheet import without_formula
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -58,15 +60,16 @@ def run(args: argparse.Namespace) -> int:
     import duckdb
 
     from turnout.errors import RegistryError
-    from turnout.registry.database import open_registry
+    from turnout.registry.confinement import open_confined, require_reading
     from turnout.registry.documentation import listing
 
     if args.list or not args.sql:
         print(listing())
         return 0
     sql = sys.stdin.read() if args.sql == "-" else args.sql
-    with open_registry(args.registry) as connection:
+    with open_confined(args.registry) as connection:
         try:
+            require_reading(sql)
             result = connection.sql(sql)
             if result is None:
                 return 0
@@ -84,8 +87,8 @@ def run(args: argparse.Namespace) -> int:
 def _write_csv(result: duckdb.DuckDBPyRelation, path: str) -> None:
     with open_output(path) as stream:
         writer = csv.writer(stream)
-        writer.writerow(result.columns)
-        writer.writerows(result.fetchall())
+        writer.writerow(map(without_formula, result.columns))
+        writer.writerows([without_formula(value) for value in row] for row in result.fetchall())
 
 
 def open_output(path: str) -> TextIO | _StandardOutput:

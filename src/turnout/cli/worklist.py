@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_csv, add_registry, add_result
 from turnout.cli.query import open_output
+from turnout.registry.spreadsheet import without_formula
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -137,7 +138,7 @@ def _paragraph(row: Mapping[str, Any]) -> str:
 def _write(stream: TextIO, names: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(names)
-    writer.writerows(rows)
+    writer.writerows([without_formula(value) for value in row] for row in rows)
 
 
 def _day(text: str, con: duckdb.DuckDBPyConnection) -> datetime:

@@ -9,6 +9,7 @@ from turnout.config import load_configuration
 from turnout.files import read_json, write_text
 from turnout.registry.as_of import list_day
 from turnout.registry.database import open_registry
+from turnout.registry.spreadsheet import without_formula
 from turnout.trend.update import update
 
 
@@ -44,7 +45,7 @@ def trend_job(
     with open_registry(registry) as con:
         asof = list_day(con, day)
         rows = con.execute(f"select *, {asof} as asof_utc from worklist({asof}) order by rank").df()
-    write_text(worklist, rows.to_csv(index=False, lineterminator="\n"))
+    write_text(worklist, rows.map(without_formula).to_csv(index=False, lineterminator="\n"))
     newest = result.newest.isoformat() if result.newest else None
     new_state = {"rows": result.rows, "generation": result.generation, "newest": newest, "digests": result.digests}
     new_state |= {"warnings": warnings} if warnings else {}

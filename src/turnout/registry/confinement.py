@@ -1,0 +1,75 @@
+"""Confine a connection to the registry: it reads the registry's files, writes none, and reaches nothing else."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+import duckdb
+
+from turnout.errors import RegistryError
+from turnout.registry.database import open_registry
+from turnout.registry.schema import literal
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+# Statements that only read; PIVOT is one of several steps (MULTI).
+READING = {duckdb.StatementType.SELECT, duckdb.StatementType.MULTI}
+_EXPLAIN = re.compile(r"\s*explain\b(\s+analyze\b|\s*\([^()]*\))?", re.IGNORECASE)
+
+
+def open_confined(path: str | PathLike) -> duckdb.DuckDBPyConnection:
+    """Open a registry for queries of people: no other file, no network, no extension, no change of these limits.
+
+    Parameters
+    ----------
+    path : str or PathLike
+        Folder of the registry, or its ``registry.duckdb``.
+
+    Returns
+    -------
+    DuckDB connection
+        Read-only connection.
+
+    Raises
+    ------
+    RegistryError
+        When there is none, when it cannot be opened, or when it was moved and not relocated.
+    """
+    connection = open_registry(path)
+    ((folder,),) = connection.execute("select folder from registry_info").fetchall()
+    for setting in (
+        f"allowed_directories = [{literal(folder)}]",
+        "enable_external_access = false",
+        "python_enable_replacements = false",
+        "lock_configuration = true",
+    ):
+        connection.execute(f"set {setting}")
+    return connection
+
+
+def require_reading(sql: str) -> None:
+    """Accept queries only: the files of the registry are reachable, and no statement may write them.
+
+    Parameters
+    ----------
+    sql : str
+        Statements, separated by semicolons.
+
+    Raises
+    ------
+    RegistryError
+        If one is no SELECT, FROM, DESCRIBE, SUMMARIZE, SHOW, PIVOT, or EXPLAIN of such.
+    duckdb.Error
+        If the text is no SQL.
+    """
+    for statement in duckdb.extract_statements(sql):
+        if statement.type == duckdb.StatementType.EXPLAIN and (match := _EXPLAIN.match(statement.query)):
+            require_reading(statement.query[match.end() :])
+        elif statement.type not in READING:
+            words = " ".join(statement.query.split()[:3])
+            raise RegistryError(
+                f"{words} ...: only queries are allowed (SELECT, FROM, DESCRIBE, SUMMARIZE, SHOW, PIVOT, EXPLAIN). "
+                "Write results with --csv FILE or 'turnout export'."
+            )

@@ -1,0 +1,85 @@
+"""A query reads the registry's files, writes none, and reaches nothing else of the machine."""
+
+import csv
+import io
+
+import pytest
+from registry_rows import Bench, hammer_result
+
+from turnout.cli.main import main
+from turnout.cli.worklist import _write
+
+
+@pytest.fixture(scope="module")
+def registry(tmp_path_factory):
+    root = tmp_path_factory.mktemp("confined")
+    (root / "work").mkdir()
+    (root / "secret.csv").write_text("password\nsesame\n")
+    bench = Bench(root)
+    bench.register(hammer_result(), tables={"turnouts": [{
+        "turnout_id": "t1", "name": "=HYPERLINK(1)", "line": "-1+1", "layout": "l", "config_hash": "h",
+    }]})  # fmt: skip
+    return bench.registry
+
+
+def query(registry, sql, *more):
+    return main(["query", sql, "--registry", str(registry), *more])
+
+
+@pytest.mark.parametrize(
+    "sql",
+    [
+        "copy (select 1) to '{root}/written'",
+        "copy (select 1 as x) to '{root}/registry/_generation.json'",
+        "explain analyze copy (select 1) to '{root}/registry/written'",
+        "explain (analyze) copy (select 1) to '{root}/registry/written'",
+        "select 1; copy (select 1) to '{root}/registry/written'",
+        "/* from */ copy (select 1) to '{root}/registry/written'",
+        "export database '{root}/registry/written'",
+        "from '{root}/secret.csv'",
+        "from read_csv('{root}/secret.csv')",
+        "from read_text('{root}/registry/../secret.csv')",
+        "from glob('{root}/*')",
+        "from query('copy (select 1) to ''{root}/registry/written''')",
+        "attach '{root}/written' as w",
+        "install httpfs",
+        "load httpfs",
+        "set enable_external_access = true",
+        "pragma enable_external_access",
+        "create table x (i int)",
+        "from 'http://127.0.0.1:9/x.parquet'",
+    ],
+)
+def test_a_query_that_writes_or_leaves_the_registry_is_rejected(registry, sql, capsys):
+    before = {p: p.read_bytes() for p in registry.parent.rglob("*") if p.is_file() and p.name != ".lock"}
+    assert query(registry, sql.format(root=registry.parent)) != 0
+    assert "sesame" not in capsys.readouterr().out
+    assert {p: p.read_bytes() for p in registry.parent.rglob("*") if p.is_file() and p.name != ".lock"} == before
+
+
+@pytest.mark.parametrize(
+    "sql",
+    [
+        "from modes",
+        "with m as (from modes) select count(*) from m",
+        "describe modes",
+        "summarize modes",
+        "show tables",
+        "explain from modes",
+        "explain analyze select * from modes",
+        "pivot modes on band using max(frequency_hz)",
+        "from worklist(timestamp '2026-02-01')",
+        "select 1; from registry_info",
+    ],
+)
+def test_queries_answer(registry, sql):
+    assert query(registry, sql) == 0
+
+
+def test_a_csv_has_no_formula(registry, tmp_path):
+    out = tmp_path / "out.csv"
+    assert query(registry, "select name, line, -1.5 as n, '@x' as \"=y\" from turnouts", "--csv", str(out)) == 0
+    assert list(csv.reader(out.open())) == [["name", "line", "n", "'=y"], ["'=HYPERLINK(1)", "'-1+1", "-1.5", "'@x"]]
+    stream = io.StringIO()
+    _write(stream, ["name"], [("+x",), (-2.0,)])
+    assert stream.getvalue() == "name\n'+x\n-2.0\n"
