@@ -35,4 +35,5 @@ COMMANDS: tuple[str, ...] = (
     "report",
     "simulate",
     "trains",
+    "twin",
 )

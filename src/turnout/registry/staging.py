@@ -26,7 +26,7 @@ MARK_COLUMNS = ", _unit integer, _row integer, _year integer"
 CHILDREN = {
     "models": ("model_id", ("modes", "impact_modes", "receptances")),
     "passages": ("passage_id", ("passage_fits",)),
-    "mismatch_findings": ("finding_id", ("mismatch_parameters", "mismatch_curves")),
+    "mismatch_findings": ("finding_id", ("mismatch_parameters", "mismatch_curves", "twin_states")),
 }
 
 

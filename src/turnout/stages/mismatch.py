@@ -16,6 +16,7 @@ from turnout.errors import ReadError, SimulationError, TurnoutError
 from turnout.mismatch.engine.diagnose import diagnose
 from turnout.mismatch.turnout import TrackCase
 from turnout.records import Unit
+from turnout.stages import calibrated_model
 from turnout.stages.budget import Budget, BudgetSpentError, Watch
 from turnout.stages.checkpoint import Checkpoint, Replay
 from turnout.stages.common import quarantine_row
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from turnout.stages.accepted_effects import AcceptedEffect
 
 FITS_FOLDER = "work/mismatch-fits"
-TABLES = ("mismatch_findings", "mismatch_parameters", "mismatch_curves", "quarantine")
+TABLES = ("mismatch_findings", "mismatch_parameters", "mismatch_curves", "twin_states", "quarantine")
 BUDGET_SPENT = "the time given was up with {} of {} groups done; the same command goes on from there"
 SEVERITY_ORDER = ("named", "a_or_b", "unknown", "numerics", "none")
 
@@ -134,6 +135,7 @@ def diagnose_visit(
         [unit.config_hash, contents, inputs.digest_content(), digest_of_model(turnout, options.track), algo]
     )
     about = {"turnout": turnout, "visit": unit.label, "identity": identity, "notes": inputs.notes}
+    about["version"] = calibrated_model.version_of(unit, turnout, raw_root, options.track, algo)
     rows: dict[str, list[dict]] = {name: [] for name in TABLES}
     members = list(groups(turnout, track, inputs, options.sections))
     for k, group in enumerate(members):
@@ -183,7 +185,13 @@ def _diagnose_group(
         accepted = tuple(a for a in accepted if a.is_on(group.route))
         budget = Budget(options.watch, None if options.watch.deadline is None else replay)
         case = TrackCase(group.campaign, turnout.settings["mismatch"], accepted=accepted, cache=budget)
-        rows = finding_tables(diagnose(case, turnout.settings["mismatch"], report_progress, store), case, group, about)
+        diagnosis = diagnose(case, turnout.settings["mismatch"], report_progress, store)
+        rows = finding_tables(diagnosis, case, group, about)
+        folder = calibrated_model.folder_of(options.fits)
+        calibrated_model.store_visit(folder, group, case, diagnosis.verdict.answer, about, store)
+        rows["twin_states"] = calibrated_model.state_rows(
+            folder, turnout, group, case, rows["mismatch_findings"][0], about
+        )
     except (SimulationError, np.linalg.LinAlgError) as error:
         reasons = [f"sections {', '.join(group.labels)}: {error}", *map(str, about["notes"])]
         return {"quarantine": [_undiagnosed_row(None, turnout, "; ".join(reasons)[:1000], group)]}

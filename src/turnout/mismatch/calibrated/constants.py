@@ -19,6 +19,17 @@ class CalibrationConstants:
     relinearization_step: float = threshold(
         0.5, "prior sd", "by which the mean may move from where derivatives were computed", PAGE
     )
+    speed_step: float = threshold(10.0, "km/h", "trains of one type within it share the error of the model", PAGE)
+    walk_sds: tuple[tuple[str, float], ...] = threshold(
+        (("ballast", 0.03), ("ballast_damper", 0.05), ("pad", 0.02), ("pad_damper", 0.04), ("gain", 0.003)),
+        "ln per root year", "random walk of a group of parameters: ageing of ballast, pads and sensors", PAGE,
+    )  # fmt: skip
+    default_walk_share: float = threshold(0.1, "prior sd per root year", "random walk of all other parameters", PAGE)
+    least_sizes: tuple[tuple[str, float], ...] = threshold(
+        (("ballast", 0.2), ("pad", 0.35), ("gain", 0.08), ("seat", 0.1), ("surface", 0.3)),
+        "unit of the group", "deviations from the file below which nobody would act", PAGE,
+    )  # fmt: skip
+    change_sds: float = threshold(5.0, "prior sd", "prior standard deviation of a change of a parameter", PAGE)
     finding_sds: float = threshold(3.0, "standard deviations", "beyond which a value differs from the file", PAGE)
     min_prior_share: float = threshold(
         1e-9, "share of the prior variance", "of a mean over components, below which data say nothing", "numerical"

@@ -104,7 +104,7 @@ def diagnose(
     SimulationError
         If the base model cannot be simulated.
     """
-    search, base = _fit_base(Search.of(case, settings, progress, store))
+    search, base = fit_base(Search.of(case, settings, progress, store))
     frames = tuple(attribute(*cell_energies(search.case.observations, base.residuals)))
     numerics = _assess_numerics(search, base)
     if numerics is not None:
@@ -118,8 +118,25 @@ def diagnose(
     return Diagnosis(verdicts, base, fit, frames, verification, latent, findings.scores, location)
 
 
-def _fit_base(search: Search) -> tuple[Search, Fit]:
-    """(search, fit) without any effect, with the errors of the observations as that fit gives them."""
+def fit_base(search: Search) -> tuple[Search, Fit]:
+    """Fit without any effect, with the errors of the observations as that fit gives them.
+
+    Parameters
+    ----------
+    search : Search
+        Its store may have the fit already.
+
+    Returns
+    -------
+    search : Search
+        With these errors.
+    fit : Fit
+
+    Raises
+    ------
+    SimulationError
+        If the base model cannot be simulated.
+    """
     iterations = search.settings.base_iterations
     base = search.stored_fit("base", lambda: fit_jointly(search.case, iterations=iterations))
     assert base is not None

@@ -1,0 +1,169 @@
+"""What the joint fit of one visit says of the parameters that all visits of a turnout share."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from turnout.constants import KMH
+from turnout.mismatch.calibrated.belief import StateParameter
+from turnout.mismatch.calibrated.constants import CALIBRATION
+from turnout.mismatch.calibrated.information import GroupInformation, marginalize
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from turnout.mismatch.engine.case import Nuisance, Observation
+    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.turnout.case import TrackCase
+
+
+def calibrated_parameters(case: TrackCase, route: str = "main") -> dict[str, StateParameter]:
+    """Parameters of a case that all visits share, with names that do not depend on the case.
+
+    Components are numbered and named by their position in the whole track, since a case holds only the part of the
+    track that its sensors hear.
+
+    Parameters
+    ----------
+    case : TrackCase
+    route : str
+        Route of its sections.
+
+    Returns
+    -------
+    dict
+        Nuisance of the case -> parameter, in the order of the nuisances.
+    """
+    support = case.data.site.nominal.turnout.track.support
+    whole = case.campaign.turnout.track.support
+    sensors = {s.name: float(s.place) for s in case.campaign.sensors}
+    castings = case.data.site.nominal.castings
+    waves = case.data.site.waves
+    walks = dict(CALIBRATION.walk_sds)
+    parameters: dict[str, StateParameter] = {}
+    used: Counter[str] = Counter()
+    for nuisance in _shared_nuisances(case):
+        name, position, index = nuisance.name, None, None
+        if nuisance.index is not None:
+            position = float(support[nuisance.index])
+            index = int(np.argmin(np.abs(whole - position)))
+            name = f"{nuisance.group}@{position:.2f}"
+        elif nuisance.group in ("gain", "seat"):
+            position = sensors.get(name.partition("_")[2])
+        elif name.startswith("cast_"):
+            tag, _, number = name.rpartition("_")
+            position = float(castings[int(number)].piece.start)
+            name = f"{tag}@{position:.2f}"
+        elif nuisance.group == "wave" and waves is not None:  # an amplitude has a meaning on this stretch alone
+            name = f"{name}@{waves.start:.2f}-{waves.end:.2f}"
+        elif nuisance.group == "surface":
+            name = nuisance.meaning.removesuffix(" less its file's")
+        name = name if route == "main" else f"{route} {name}"
+        used[name] += 1
+        name = name if used[name] == 1 else f"{name} #{used[name]}"
+        walk = walks.get(nuisance.group, CALIBRATION.default_walk_share * nuisance.sd)
+        parameters[nuisance.name] = StateParameter(
+            name, nuisance.mean, nuisance.sd, walk, nuisance.group, index, position, nuisance.unit
+        )
+    return parameters
+
+
+def _shared_nuisances(case: TrackCase) -> list[Nuisance]:
+    return [n for n in case.nuisances if n.owner is None]
+
+
+def visit_groups(case: TrackCase, fit: Fit, sections: str, route: str = "main") -> tuple[GroupInformation, ...]:
+    r"""Gauss-Newton information of a fit without effects, by group of recordings with the same error of the model.
+
+    Of recording r with the whitened derivatives J by shared and K by its own parameters and the residual e,
+
+    .. math:: \Lambda = J^T W J - J^T W K (K^T W K + S^{-1})^{-1} K^T W J
+
+    with the prior covariance S of its own parameters. Channels of one recording are summed before.
+
+    Parameters
+    ----------
+    case : TrackCase
+        The case that was fitted.
+    fit : Fit
+        Without terms, with its Jacobian.
+    sections : str
+        Labels of its sections, part of the names of the groups.
+    route : str
+        Route of its sections.
+
+    Returns
+    -------
+    tuple of GroupInformation
+        In the order of their names.
+
+    Raises
+    ------
+    ValueError
+        If the fit has terms or no Jacobian.
+    """
+    if fit.candidates or not fit.jacobian:
+        raise ValueError("information of a visit needs a fit without effects, with its Jacobian")
+    parameters = calibrated_parameters(case, route)
+    recordings: dict[tuple[str, str], list[int]] = {}
+    for k, observation in enumerate(case.observations):
+        recordings.setdefault(_group_of(case, observation), []).append(k)
+    names = tuple(p.name for p in parameters.values())
+    sums: dict[str, tuple[int, np.ndarray, np.ndarray]] = {}
+    for (group, _), members in sorted(recordings.items()):
+        matrix, vector = _recording_information(case, fit, members)
+        count, matrices, vectors = sums.get(group, (0, np.zeros_like(matrix), np.zeros_like(vector)))
+        sums[group] = (count + 1, matrices + matrix, vectors + vector)
+    return tuple(
+        GroupInformation(f"{sections}: {group}", count, names, matrix, vector)
+        for group, (count, matrix, vector) in sorted(sums.items())
+    )
+
+
+def _group_of(case: TrackCase, observation: Observation) -> tuple[str, str]:
+    """(group, recording) of an observation: a train type at one speed, or impacts at one position."""
+    aligned = case.aligned_passages.get(observation.name)
+    if aligned is not None:
+        step = CALIBRATION.speed_step
+        speed = step * round(aligned.speed * KMH / step)
+        return f"{aligned.conditions['train']}, {speed:.0f} km/h", observation.name
+    pair = case.frf_pairs[observation.name]
+    return f"impacts at {pair.test.place:.2f} m", pair.test.name
+
+
+def _recording_information(case: TrackCase, fit: Fit, members: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Information of the observations ``members``, of one recording, on the shared parameters."""
+    names = {case.observations[k].name for k in members}
+    columns = [c for c, n in enumerate(case.nuisances) if n.owner is None or n.owner in names]
+    order = sorted(columns, key=lambda c: case.nuisances[c].owner is not None)  # shared ones first
+    nuisances = [case.nuisances[c] for c in order]
+    n_shared = sum(n.owner is None for n in nuisances)
+    point = np.array([fit.values[n.name] - (n.mean if n.owner else 0.0) for n in nuisances])
+    matrix, vector = np.zeros((len(order), len(order))), np.zeros(len(order))
+    for k in members:
+        observation = case.observations[k]
+        weight = observation.effective / fit.scale[observation.data_type]
+        rows = np.asarray(fit.jacobian[k], dtype=float)[:, order]
+        matrix += weight * rows.T @ rows
+        vector += weight * rows.T @ (fit.white[k] + rows @ point)
+    owned = nuisances[n_shared:]
+    return marginalize(matrix, vector, range(n_shared, len(order)), np.array([n.sd**-2 for n in owned]))
+
+
+def linearization_point(case: TrackCase, fit: Fit, route: str = "main") -> Mapping[str, float]:
+    """Parameter -> value about which the model of a visit is linear.
+
+    Parameters
+    ----------
+    case : TrackCase
+    fit : Fit
+    route : str
+
+    Returns
+    -------
+    mapping
+    """
+    return {p.name: float(fit.values[n]) for n, p in calibrated_parameters(case, route).items()}

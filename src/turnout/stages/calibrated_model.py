@@ -1,0 +1,453 @@
+"""The calibrated model of a turnout: the information of each visit on disk, and the belief from all of them.
+
+Each visit is one file below the folder ``calibrated-model`` of the work folder, with the versions of its code, track
+file and recordings. A file of another version is ignored and computed again, never read as if it were of this one.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sys
+from collections.abc import Iterable, Mapping, MutableMapping, Sequence
+from dataclasses import asdict, dataclass
+from datetime import date
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from turnout.config import load_configuration, with_raw
+from turnout.config.events import read_events
+from turnout.content import sha256_of
+from turnout.errors import SimulationError
+from turnout.fingerprint import fingerprint
+from turnout.mismatch.calibrated import (
+    ChangeEffect,
+    Deviation,
+    Event,
+    GroupInformation,
+    History,
+    OnsetEvidence,
+    StateParameter,
+    VisitInformation,
+    compare_onsets,
+    deviations_from_file,
+    estimate_history,
+)
+from turnout.mismatch.calibrated.constants import CALIBRATION
+from turnout.mismatch.engine.diagnose import fit_base
+from turnout.mismatch.engine.search import Search
+from turnout.mismatch.turnout import TrackCase
+from turnout.mismatch.turnout.calibration import calibrated_parameters, linearization_point, visit_groups
+from turnout.stages.checkpoint import SUFFIX, read_value, write_value
+from turnout.stages.mismatch_groups import groups, unit_of, visits
+from turnout.stages.mismatch_inputs import digest_of_model, gather_inputs, mismatch_context, track_of
+from turnout.workflow.scan import scan
+
+if TYPE_CHECKING:
+    from turnout.config.turnout import TurnoutConfig
+    from turnout.records import Unit
+    from turnout.stages.mismatch_groups import Group
+
+FOLDER = "calibrated-model"
+DAYS_PER_YEAR = 365.25
+USED_ANSWERS = ("none", "")  # "": not diagnosed; a visit with an open finding changes nothing until it is accepted
+# Groups of parameters that a kind of work makes uncertain again
+OPENED = {
+    "tamping": ("ballast", "ballast_damper", "wave", "surface"),
+    "ballast_cleaning": ("ballast", "ballast_damper", "wave", "surface"),
+    "pad_exchange": ("pad", "pad_damper"),
+    "rail_change": ("rail", "wave", "surface", "gain", "seat"),
+    "grinding": ("wave", "surface"),
+    "sleeper_change": ("sleeper", "pad", "pad_damper", "ballast", "ballast_damper", "wave"),
+    "sensor_change": ("gain", "seat"),
+}
+EVENT_REACH = 6.0  # m from a section that work there may touch
+
+
+@dataclass(frozen=True)
+class StoredVisit:
+    """Information of one group of sections at one visit: ``answer`` of its diagnosis, "" without one."""
+
+    visit: str
+    sections: str
+    answer: str
+    groups: tuple[GroupInformation, ...]
+    parameters: tuple[StateParameter, ...]
+    point: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class CalibratedModel:
+    """The calibrated model of a turnout: belief from all visits, deviations from the file, and changes.
+
+    ``held`` are visits with an open finding, which are not used, with their answers. ``computed`` are the visits that
+    were fitted for this call, ``notes`` what could not be.
+    """
+
+    history: History
+    changes: tuple[OnsetEvidence, ...]
+    deviations: tuple[Deviation, ...]
+    held: Mapping[str, str]
+    computed: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def folder_of(fits: str | Path) -> Path:
+    """Folder of the stored visits beside that of the fits.
+
+    Parameters
+    ----------
+    fits : path
+
+    Returns
+    -------
+    Path
+    """
+    return Path(fits).parent / FOLDER
+
+
+def version_of(
+    unit: Unit, turnout: TurnoutConfig, raw_root: str | Path, track: str | None, code: str
+) -> dict[str, str]:
+    """Versions that the information of a visit depends on.
+
+    Parameters
+    ----------
+    unit : Unit
+        The files of the visit.
+    turnout : TurnoutConfig
+    raw_root : path
+    track : str or None
+        Track file, None: the turnout's own.
+    code : str
+        Fingerprint of the code.
+
+    Returns
+    -------
+    dict
+        "code", "model" (track, vehicles and settings) and "recordings" -> digest.
+    """
+    contents = [[path, sha256_of(file) if (file := Path(raw_root) / path).is_file() else ""] for path, *_ in unit.files]
+    recordings = hashlib.sha256(json.dumps(contents).encode()).hexdigest()[:16]
+    model = f"{turnout.hashes['mismatch']}/{digest_of_model(turnout, track)}"
+    return {"code": code, "model": model, "recordings": recordings}
+
+
+def store_visit(
+    folder: Path,
+    group: Group,
+    case: TrackCase,
+    answer: str,
+    about: Mapping[str, Any],
+    store: MutableMapping[str, Any] | None = None,
+) -> None:
+    """Write the information of a group of sections at one visit.
+
+    Parameters
+    ----------
+    folder : Path
+        As ``folder_of``.
+    group : Group
+        The sections.
+    case : TrackCase
+        Their case.
+    answer : str
+        Of the diagnosis, "" without one.
+    about : mapping
+        turnout, visit and version (as ``version_of``).
+    store : mapping or None
+        Fits of the diagnosis, which has the base fit.
+
+    Raises
+    ------
+    SimulationError
+        The base model cannot be simulated.
+    """
+    search, fit = fit_base(Search.of(case, about["turnout"].settings["mismatch"], None, store))
+    assert isinstance(search.case, TrackCase)
+    sections = ", ".join(group.labels)
+    information = visit_groups(search.case, fit, sections, group.route)
+    value = {
+        "version": dict(about["version"]), "visit": about["visit"], "sections": sections, "answer": answer,
+        "parameters": [asdict(p) for p in calibrated_parameters(search.case, group.route).values()],
+        "point": dict(linearization_point(search.case, fit, group.route)),
+        "groups": [
+            {"group": g.group, "n": g.n_recordings, "names": list(g.names), "matrix": g.matrix, "vector": g.vector}
+            for g in information
+        ],
+    }  # fmt: skip
+    path = _path(folder, about["turnout"].id, about["visit"], group.labels)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_value(path, value)
+
+
+def _path(folder: Path, turnout_id: str, visit: str, labels: Sequence[str]) -> Path:
+    digest = hashlib.sha256("+".join(labels).encode()).hexdigest()[:12]
+    return folder / turnout_id / f"{visit}-{digest}{SUFFIX}"
+
+
+def read_visits(folder: Path, turnout_id: str, versions: Mapping[str, Mapping[str, str]]) -> list[StoredVisit]:
+    """Stored visits of a turnout. Those of another code, track file or recordings are left out.
+
+    Parameters
+    ----------
+    folder : Path
+        As ``folder_of``.
+    turnout_id : str
+    versions : mapping
+        Visit -> its versions as they are now; those that are missing from it are not compared.
+
+    Returns
+    -------
+    list of StoredVisit
+        In the order of visit and sections.
+    """
+    stored = []
+    for path in sorted((folder / turnout_id).glob(f"*{SUFFIX}")):
+        try:
+            value = read_value(path)
+        except KeyError:  # damaged, or of another format
+            continue
+        wanted = versions.get(value["visit"])
+        if wanted is None or any(value["version"].get(k) != v for k, v in wanted.items()):
+            continue
+        information = tuple(
+            GroupInformation(g["group"], g["n"], tuple(g["names"]), g["matrix"], g["vector"]) for g in value["groups"]
+        )
+        parameters = tuple(StateParameter(**p) for p in value["parameters"])
+        stored.append(
+            StoredVisit(value["visit"], value["sections"], value["answer"], information, parameters, value["point"])
+        )
+    return sorted(stored, key=lambda s: (s.visit, s.sections))
+
+
+def years_of(visit: str) -> float:
+    """Time of a visit in years; of a month its middle.
+
+    Parameters
+    ----------
+    visit : str
+        YYYY-MM-DD or YYYY-MM.
+
+    Returns
+    -------
+    float
+    """
+    return date.fromisoformat(visit if len(visit) > 7 else f"{visit}-15").toordinal() / DAYS_PER_YEAR
+
+
+def _visits_of(stored: Iterable[StoredVisit]) -> list[VisitInformation]:
+    """One ``VisitInformation`` per visit, of all of its groups of sections."""
+    members: dict[str, list[StoredVisit]] = {}
+    for s in stored:
+        members.setdefault(s.visit, []).append(s)
+    visits_used = []
+    for visit, parts in members.items():
+        information = tuple(g for s in parts for g in s.groups)
+        point = {name: value for s in parts for name, value in s.point.items()}
+        visits_used.append(VisitInformation(visit, years_of(visit), information, point))
+    return visits_used
+
+
+def _without_findings(stored: Iterable[StoredVisit]) -> list[StoredVisit]:
+    """Stored visits without an open finding: only these change the belief."""
+    return [s for s in stored if s.answer in USED_ANSWERS]
+
+
+def _parameters_of(stored: Iterable[StoredVisit]) -> tuple[StateParameter, ...]:
+    by_name: dict[str, StateParameter] = {}
+    for s in stored:
+        for p in s.parameters:
+            by_name.setdefault(p.name, p)
+    return tuple(by_name.values())
+
+
+def events_of(turnout: TurnoutConfig, parameters: Sequence[StateParameter]) -> list[Event]:
+    """Recorded work on the turnout, as parameters that it makes as uncertain as the file.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+    parameters : sequence of StateParameter
+
+    Returns
+    -------
+    list of Event
+    """
+    recorded, _, _ = read_events(Path(turnout.folder) / "events.csv", "events.csv", None, {})
+    positions = {s.label: s.position for s in turnout.sections}
+    events = []
+    for event in recorded:
+        if event.turnout != turnout.id or event.kind not in OPENED:
+            continue
+        at = None if event.section is None else positions.get(event.section.rpartition("/")[2])
+        opened = {
+            p.name: p.sd
+            for p in parameters
+            if p.group in OPENED[event.kind]
+            and (at is None or p.position is None or abs(p.position - at) <= EVENT_REACH)
+        }
+        events.append(Event(event.at.date().toordinal() / DAYS_PER_YEAR, opened))
+    return events
+
+
+def state_rows(
+    folder: Path,
+    turnout: TurnoutConfig,
+    group: Group,
+    case: TrackCase,
+    finding: Mapping[str, Any],
+    about: Mapping[str, Any],
+) -> list[dict[str, Any]]:
+    """Rows of ``twin_states`` after a visit, of the parameters of one group of sections.
+
+    The belief rests on this visit and the stored ones before it.
+
+    Parameters
+    ----------
+    folder : Path
+        As ``folder_of``.
+    turnout : TurnoutConfig
+    group : Group
+        Its sections.
+    case : TrackCase
+        Their case.
+    finding : mapping
+        Row of ``mismatch_findings``.
+    about : mapping
+        visit and version (as ``version_of``).
+
+    Returns
+    -------
+    list of dict
+    """
+    version = {k: v for k, v in about["version"].items() if k != "recordings"}  # of other visits they may be any
+    names = {path.stem.rpartition("-")[0] for path in (folder / turnout.id).glob(f"*{SUFFIX}")}
+    earlier = {visit: version for visit in names if years_of(visit) <= years_of(about["visit"])}
+    stored = read_visits(folder, turnout.id, earlier | {about["visit"]: about["version"]})
+    parameters = _parameters_of(stored)
+    visits_used = _visits_of(_without_findings(stored))
+    history = estimate_history(parameters, visits_used, events_of(turnout, parameters))
+    belief, n = history.belief, sum(s.n_recordings for s in history.used_steps)
+    number = {p.name: k for k, p in enumerate(parameters)}
+    key = {k: finding[k] for k in ("finding_id", "turnout_id", "found_at_utc")}
+    return [
+        {
+            **key, "parameter_no": k, "visit": about["visit"], "parameter": p.name, "position_m": p.position,
+            "value": float(belief.mean[number[p.name]]), "sd": float(belief.sd[number[p.name]]),
+            "prior_sd": p.sd, "unit": p.unit, "n_visits": len(history.used_steps), "n_recordings": n,
+            "code_version": version["code"],
+        }
+        for k, p in enumerate(calibrated_parameters(case, group.route).values())
+    ]  # fmt: skip
+
+
+def calibrate_turnout(
+    turnout_id: str,
+    config: str | Path = "config",
+    raw_root: str | Path = "raw",
+    work: str | Path = "work",
+    track: str | None = None,
+) -> CalibratedModel:
+    """Calibrated model of a turnout from all visits below the raw root.
+
+    Visits without stored information of the present code, track file and recordings are fitted, and their information
+    is stored. They are not diagnosed: the test of their innovation decides whether they are used.
+
+    Parameters
+    ----------
+    turnout_id : str
+        Id of the turnout.
+    config : path
+        Folder of the configuration.
+    raw_root : path
+        Folder of all recordings.
+    work : path
+        Folder of intermediate results.
+    track : str or None
+        Name or file of a track; None: the turnout's own.
+
+    Returns
+    -------
+    CalibratedModel
+
+    Raises
+    ------
+    SimulationError
+        The turnout has no recordings, no track file, or no visit that can be fitted.
+    """
+    turnout = with_raw(load_configuration(config).turnout(turnout_id), Path(raw_root))
+    by_visit = visits(scan(turnout, Path(raw_root)).units)
+    if not by_visit:
+        raise SimulationError(
+            f"{turnout_id}: no hammer test and no passage below {raw_root}; nothing can be calibrated."
+        )
+    folder, code = Path(work) / FOLDER, fingerprint("turnout.stages.mismatch")
+    units_of_visits = {v: unit_of(turnout_id, v, units, turnout.hashes["mismatch"]) for v, units in by_visit.items()}
+    versions = {v: version_of(unit, turnout, raw_root, track, code) for v, unit in units_of_visits.items()}
+    complete = {s.visit for s in read_visits(folder, turnout_id, versions)}
+    missing, notes = [label for label in by_visit if label not in complete], []
+    for label in missing:
+        about = {"turnout": turnout, "visit": label, "version": versions[label]}
+        print(f"{turnout_id}: fit of visit {label}", file=sys.stderr, flush=True)
+        notes += _fit_visit(folder, by_visit[label], raw_root, work, track, about)
+    stored = read_visits(folder, turnout_id, versions)
+    if not stored:
+        raise SimulationError(
+            f"{turnout_id}: no visit can be fitted; {'; '.join(notes) or 'no section has recordings'}"
+        )
+    parameters = _parameters_of(stored)
+    events = events_of(turnout, parameters)
+    history = estimate_history(parameters, _visits_of(_without_findings(stored)), events)
+    changes = estimate_history(parameters, _visits_of(stored), events, repeats_between_visits=False, accepted=None)
+    deviations = deviations_from_file(history.belief, parameters, dict(CALIBRATION.least_sizes))
+    return CalibratedModel(
+        history,
+        tuple(compare_onsets(changes, change_effects(parameters))),
+        tuple(deviations),
+        {f"{s.visit} {s.sections}": s.answer for s in stored if s.answer not in USED_ANSWERS},
+        tuple(missing),
+        tuple(notes),
+    )
+
+
+def _fit_visit(
+    folder: Path,
+    units: Sequence[Unit],
+    raw_root: str | Path,
+    work: str | Path,
+    track: str | None,
+    about: Mapping[str, Any],
+) -> list[str]:
+    """Fit the groups of a visit and store their information; reasons why a group could not be fitted."""
+    turnout, notes = about["turnout"], []
+    turnout_track, accepted = track_of(turnout, track)
+    _, passage_tables = mismatch_context(turnout.id, work=work)
+    inputs = gather_inputs(units, turnout, raw_root, turnout_track, passage_tables)
+    for group in groups(turnout, turnout_track, inputs):
+        try:
+            on_route = tuple(a for a in accepted if a.is_on(group.route))
+            case = TrackCase(group.campaign, turnout.settings["mismatch"], accepted=on_route)
+            store_visit(folder, group, case, "", about)
+        except (SimulationError, np.linalg.LinAlgError) as error:
+            notes.append(f"visit {about['visit']}, sections {', '.join(group.labels)}: {error}")
+    return notes
+
+
+def change_effects(parameters: Sequence[StateParameter]) -> list[ChangeEffect]:
+    """Steps of each support and each sensor, at an unknown visit.
+
+    Parameters
+    ----------
+    parameters : sequence of StateParameter
+
+    Returns
+    -------
+    list of ChangeEffect
+    """
+    changing = {group for group, _ in CALIBRATION.least_sizes}
+    return [
+        ChangeEffect(p.name, {p.name: 1.0}, CALIBRATION.change_sds * p.sd) for p in parameters if p.group in changing
+    ]

@@ -1,0 +1,178 @@
+"""The calibrated model of a small turnout from its files: what the visits say together, and what is read again."""
+
+import shutil
+from datetime import datetime
+from functools import partial
+
+import numpy as np
+import pytest
+import small_turnout as small
+
+from turnout.cli.main import main
+from turnout.config import load_configuration, with_raw
+from turnout.errors import SimulationError
+from turnout.mismatch.calibrated import StateParameter, VisitInformation, estimate_history
+from turnout.mismatch.engine.diagnose import fit_base
+from turnout.mismatch.engine.search import Search
+from turnout.mismatch.turnout import TrackCase
+from turnout.mismatch.turnout.calibration import calibrated_parameters, visit_groups
+from turnout.stages import calibrated_model as calibrated
+from turnout.stages import mismatch
+from turnout.stages.mismatch_groups import groups, visits
+from turnout.stages.mismatch_inputs import gather_inputs, track_of
+from turnout.stages.mismatch_results import diagnose_turnout
+from turnout.workflow.scan import scan
+
+DAYS = ("2025-08-01", "2025-11-01", "2026-02-01", "2026-05-01")
+
+
+@pytest.fixture(scope="module")
+def year(tmp_path_factory, repository):
+    """Four hammer tests; the pad at 18.0 m is soft in the last one. Trains at the first visit."""
+    folder = tmp_path_factory.mktemp("year")
+    small.lay_out(folder, repository)
+    for k, day in enumerate(DAYS):
+        terms = small.soft_pad if k == 3 else None
+        small.strike(folder, terms, day=datetime.fromisoformat(f"{day}T09:00"), seed=10 * k)
+    small.roll(folder, day=datetime.fromisoformat(f"{DAYS[0]}T09:00"))
+    return folder
+
+
+@pytest.fixture
+def turnout(tmp_path, year, monkeypatch):
+    shutil.copytree(year, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    families = ("local_ballast", "local_pad", "sensor_gain")
+    monkeypatch.setattr(mismatch, "TrackCase", partial(TrackCase, families=families))
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def model(year, tmp_path_factory):
+    work = tmp_path_factory.mktemp("work")
+    return calibrated.calibrate_turnout("t1", year / "config", year / "raw", work), work
+
+
+def test_the_pad_that_became_soft_is_the_change_with_its_size_and_onset(model):
+    best, second = model[0].changes[:2]
+    assert best.effect.name == "pad@18.00" and best.gain > 100.0 > 6.0 + second.gain - best.gain
+    size, sd = best.size
+    assert abs(size - np.log(small.SOFT)) < 3.0 * sd and sd < 0.1
+    assert best.interval() == (calibrated.years_of(DAYS[2]), calibrated.years_of(DAYS[3]))
+
+
+def test_a_visit_that_differs_is_not_used_and_the_others_agree_with_the_file(model):
+    history = model[0].history
+    assert [s.is_used for s in history.steps] == [True, True, True, False]
+    assert history.steps[-1].innovation.parameter == "pad@18.00"
+    assert not model[0].deviations
+    sd = {p.name: s / p.sd for p, s in zip(history.parameters, history.belief.sd)}
+    assert sd["ballast_stiffness"] < 0.4 and sd["pad@18.00"] < 0.8 and sd["pad@16.20"] > sd["pad@18.00"]
+
+
+def test_visits_are_fitted_once_and_again_when_code_or_recordings_change(model, year, monkeypatch):
+    _, work = model
+
+    def again():
+        return calibrated.calibrate_turnout("t1", year / "config", year / "raw", work)
+
+    first = again()
+    assert first.computed == ()
+    assert first.history.belief.mean.tobytes() == model[0].history.belief.mean.tobytes()
+    files = sorted((work / "calibrated-model" / "t1").iterdir())
+    assert len(files) == 4
+    files[0].write_bytes(b"damaged")
+    repaired = again()
+    assert repaired.computed == (DAYS[0],)
+    assert repaired.history.belief.mean.tobytes() == first.history.belief.mean.tobytes()
+    versions = {d: {"code": "other", "model": "", "recordings": ""} for d in DAYS}
+    assert calibrated.read_visits(work / "calibrated-model", "t1", versions) == []
+
+
+def test_a_withdrawn_visit_is_as_if_it_had_never_been(turnout, model):
+    work = turnout / "work"
+    shutil.copytree(model[1], work)
+    shutil.rmtree(turnout / "raw" / "t1" / "hammer" / DAYS[1])
+    withdrawn = calibrated.calibrate_turnout("t1")
+    assert withdrawn.computed == ()
+    for path in (work / "calibrated-model" / "t1").glob(f"{DAYS[1]}*"):
+        path.unlink()
+    never = calibrated.calibrate_turnout("t1")
+    assert withdrawn.history.belief.covariance.tobytes() == never.history.belief.covariance.tobytes()
+    assert withdrawn.history.belief.mean.tobytes() == never.history.belief.mean.tobytes()
+    assert len(never.history.steps) == 3
+
+
+def test_the_information_of_a_visit_is_that_of_its_joint_fit(year):
+    """With independent errors: mean and covariance are those of one more Gauss-Newton step of the joint fit."""
+    turnout = with_raw(load_configuration(year / "config").turnout("t1"), year / "raw")
+    units = visits(scan(turnout, year / "raw").units)[DAYS[0]]
+    track, _ = track_of(turnout)
+    (group,) = groups(turnout, track, gather_inputs(units, turnout, year / "raw", track, {}))
+    search, fit = fit_base(
+        Search.of(TrackCase(group.campaign, turnout.settings["mismatch"]), turnout.settings["mismatch"])
+    )
+    case, names = search.case, [n.name for n in search.case.nuisances]
+    precision = np.diag([n.sd**-2 for n in case.nuisances])
+    slope = precision @ [n.mean - fit.values[n.name] for n in case.nuisances]
+    for o, j, r in zip(case.observations, fit.jacobian, fit.white):
+        foreign = [k for k, n in enumerate(case.nuisances) if n.owner not in (None, o.name)]
+        rows = np.array(j, dtype=float) * np.sqrt(o.effective / fit.scale[o.data_type])
+        rows[:, foreign] = 0.0  # updates by Broyden's formula leave traces there
+        precision = precision + rows.T @ rows
+        slope = slope + np.sqrt(o.effective / fit.scale[o.data_type]) * rows.T @ r
+    covariance = np.linalg.inv(precision)
+    mean = np.array([fit.values[n] for n in names]) + covariance @ slope
+    parameters = calibrated_parameters(case)
+    visit = VisitInformation("v", 0.0, visit_groups(case, fit, "A, B"))
+    belief = estimate_history(list(parameters.values()), [visit], repeated_share=0.0, accepted=None).belief
+    shared = [names.index(n) for n in parameters]
+    np.testing.assert_allclose(belief.covariance, covariance[np.ix_(shared, shared)], rtol=1e-6, atol=1e-16)
+    assert np.max(np.abs(belief.mean - mean[shared]) / belief.sd) < 1e-6
+    labels = [g.group for g in visit.groups]
+    assert labels[:2] == ["A, B: impacts at 18.00 m", "A, B: impacts at 18.60 m"]
+    assert sorted(labels[2:]) == ["A, B: locomotive, 110 km/h", "A, B: locomotive, 90 km/h"]
+    with pytest.raises(ValueError, match="with its Jacobian"):
+        visit_groups(case, fit.without_jacobian(), "A, B")
+
+
+def test_the_stage_writes_the_state_after_a_visit_and_a_finding_keeps_the_visit_out(turnout, capsys):
+    tables = diagnose_turnout("t1", visit=DAYS[0])
+    rows = {r["parameter"]: r for r in tables["twin_states"]}
+    assert tables["mismatch_findings"][0]["verdict"] == "none"
+    pad = rows["pad@18.00"]
+    assert pad["position_m"] == 18.0 and pad["n_visits"] == 1 and pad["n_recordings"] == 4
+    assert pad["sd"] < pad["prior_sd"] == pytest.approx(0.1) and abs(pad["value"]) < 3.0 * pad["sd"]
+    assert pad["finding_id"] == tables["mismatch_findings"][0]["finding_id"] and pad["code_version"]
+    later = diagnose_turnout("t1", visit=DAYS[3])
+    assert later["mismatch_findings"][0]["verdict"] == "named"
+    after = {r["parameter"]: r for r in later["twin_states"]}["pad@18.00"]
+    assert (after["n_visits"], after["value"], after["sd"]) == (1, pad["value"], pad["sd"])
+    assert main(["twin", "--turnout", "t1"]) == 0
+    printed = capsys.readouterr().out
+    assert f"visit {DAYS[3]} A, B is not used: its diagnosis is named, and not accepted" in printed
+    assert "(2 fitted now)" in printed and "against the file: nothing differs" in printed
+    assert "changes: pad@18.00: -1.2" in printed and f"appeared after {DAYS[2]}, at the latest at {DAYS[3]}" in printed
+
+
+def test_work_on_the_track_opens_what_it_touches(turnout):
+    (turnout / "config" / "events.csv").write_text(
+        "turnout,section,date,kind,resets,note\nt1,A,2026-01-10,tamping,,\nt1,,2026-01-11,sensor_change,,\n"
+        "t2,,2026-01-12,tamping,,\nt1,,2026-01-13,other,,\n"
+    )
+    parameters = [
+        StateParameter("ballast@18.00", 0.0, 0.1, 0.0, "ballast", 30, 18.0),
+        StateParameter("ballast@30.00", 0.0, 0.1, 0.0, "ballast", 50, 30.0),
+        StateParameter("gain_A", 0.0, 0.02, 0.0, "gain", None, 18.0),
+        StateParameter("pad@18.00", 0.0, 0.1, 0.0, "pad", 30, 18.0),
+    ]
+    tamping, sensors = calibrated.events_of(load_configuration("config").turnout("t1"), parameters)
+    assert tamping.opened == {"ballast@18.00": 0.1} and sensors.opened == {"gain_A": 0.02}
+    assert calibrated.years_of("2026-01-09") < tamping.time < calibrated.years_of("2026-01-11")
+
+
+def test_a_turnout_without_recordings_says_so(turnout, capsys):
+    shutil.rmtree(turnout / "raw")
+    with pytest.raises(SimulationError, match="no hammer test and no passage"):
+        calibrated.calibrate_turnout("t1")
+    assert main(["twin", "--turnout", "t1"]) == 2 and "nothing can be calibrated" in capsys.readouterr().err
