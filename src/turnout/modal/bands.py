@@ -90,7 +90,11 @@ def fit_receptance(receptance: Receptance, frequency: ArrayLike, damping: ArrayL
     design, target = np.vstack([design.real, design.imag]), np.concatenate([target.real, target.imag])
     solution = np.linalg.lstsq(design, target, rcond=None)[0]
     residue = solution[: len(s)] + 1j * solution[len(s) : 2 * len(s)]
-    return FittedReceptance(s, residue, (float(solution[-2]), float(solution[-1] / scale)), receptance.decay)
+    variance = np.sum((target - design @ solution) ** 2) / (len(target) - len(solution))
+    error = np.sqrt(variance * np.diag(np.linalg.pinv(design.T @ design)))
+    residue_se = error[: len(s)] + 1j * error[len(s) : 2 * len(s)]
+    direct = float(solution[-2]), float(solution[-1] / scale)
+    return FittedReceptance(s, residue, direct, residue_se, receptance.decay)
 
 
 MAIN_BANDS = ("ballast", "railpad")

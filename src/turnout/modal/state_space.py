@@ -183,6 +183,28 @@ def held_out_fit(theta: np.ndarray, decays: np.ndarray, rate: float) -> np.ndarr
     return fit_percent(decays, linearise(mean_modes, decays, rate, drift_columns(decays.shape[1], -1)).residual)
 
 
+def validation_fit(model: ModalModel, decays: Sequence[np.ndarray]) -> np.ndarray:
+    """Fit of decays of another response with the modes of a model, amplitudes refitted.
+
+    Parameters
+    ----------
+    model : ModalModel
+        Model with at least one mode.
+    decays : sequence of (n,) arrays of float
+        Free decays that took no part in the identification, at the model's rate. [m/s²]
+
+    Returns
+    -------
+    (n_decay,) array of float
+        Fit of each decay. [%]
+    """
+    n = min(len(decay) for decay in decays)
+    records = np.array([np.asarray(decay, dtype=float)[:n] for decay in decays])
+    theta = np.array([[np.log(mode.frequency), mode.damping] for mode in model.modes])
+    modes = np.broadcast_to(theta, (len(records), *theta.shape))
+    return fit_percent(records, linearise(modes, records, model.rate, drift_columns(n, -1)).residual)
+
+
 def random_mode_fits(
     decays: np.ndarray, rate: float, bands: Sequence[tuple[float, float]], draws: int, seed: int = 20171001
 ) -> np.ndarray:

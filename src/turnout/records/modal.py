@@ -105,12 +105,15 @@ class FittedReceptance:
 
     ``pole`` [1/s] and ``residue`` [m/s² per N s] are (n_mode,) complex: first those of the model's modes, in their
     order, then those of further modes in the fit. ``direct`` holds d0 [m/s²/N] and d1 [m/N]: the acceleration follows
-    the force at once, which no free decay shows. ``decay`` [1/s] is that of the exponential window of the measurement.
+    the force at once, which no free decay shows. ``residue_se`` holds the standard errors of the residues, of the real
+    part in its real and of the imaginary part in its imaginary part. ``decay`` [1/s] is that of the exponential window
+    of the measurement.
     """
 
     pole: np.ndarray
     residue: np.ndarray
     direct: tuple[float, float]
+    residue_se: np.ndarray
     decay: float = 0.0
 
     def at(self, frequency: np.ndarray) -> np.ndarray:
@@ -130,7 +133,7 @@ class FittedReceptance:
         --------
         A free mass of 4 kg has a direct term only:
 
-        >>> mass = FittedReceptance(np.empty(0), np.empty(0), (0.25, 0.0))
+        >>> mass = FittedReceptance(np.empty(0), np.empty(0), (0.25, 0.0), np.empty(0))
         >>> print((mass.at(np.array([1.0 / (2.0 * np.pi)])) * 4.0).round(9))
         [-1.+0.j]
         """

@@ -27,7 +27,15 @@ from turnout.stages.common import (
     recording_row,
     time_contradiction,
 )
-from turnout.stages.hammer_rows import impact_mode_row, impact_row, mode_row, model_row, receptance_row
+from turnout.stages.hammer_rows import (
+    density_columns,
+    impact_mode_row,
+    impact_row,
+    mode_rows,
+    model_row,
+    receptance_row,
+    validation_columns,
+)
 
 # Largest time between a recording and its campaign: it may last into the night, and a clock may show local time.
 MAX_CAMPAIGN_OFFSET = timedelta(days=2)
@@ -107,12 +115,38 @@ def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root: str | Path, algo: 
     required = turnout.settings["receptance"].gate_level
     if receptance is None:
         return rows | {"models": [model_row(model, base, identity, counts, None)], "modes": []}
+    second = _second_response(recordings, turnout.hammer, unit.section, used, settings["receptance"])
+    model_columns = model_row(model, base, identity, counts, _lowest_gate_level(receptance, model))
+    receptance_columns = receptance_row(receptance, required, model, used[0].decay, base, identity)
     return rows | {
-        "models": [model_row(model, base, identity, counts, _lowest_gate_level(receptance, model))],
-        "modes": [mode_row(mode, base, identity, temperature) for mode in model.modes],
+        "models": [model_columns | validation_columns(model, _cut(second, settings["identify"]))],
+        "modes": mode_rows(model, receptance, base, identity, temperature),
         "impact_modes": [impact_mode_row(e, base, identity, names[e["impact"]]) for e in model.per_impact],
-        "receptances": [receptance_row(receptance, required, model, used[0].decay, base, identity)],
+        "receptances": [receptance_columns | density_columns(used, receptance_columns["frequency_hz"])],
     }
+
+
+def _second_response(
+    recordings: Sequence[Recording],
+    hammer: HammerConfig,
+    section: str,
+    used: Sequence[Impact],
+    settings: ReceptanceSettings,
+) -> list[Impact]:
+    """The accepted impacts of the identification with the second response, where the layout has one."""
+    channel = hammer.validation.get(section)
+    if channel is None or any(channel not in [c.name for c in r.channels] for r in recordings):
+        return []
+    names = {(i.source, i.record) for i in used}
+    impacts = find_impacts(recordings, hammer.force[section], channel, settings)
+    return [i for i in impacts if i.accepted and (i.source, i.record) in names]
+
+
+def _cut(impacts: Sequence[Impact], settings: IdentifySettings) -> list[Impact]:
+    """The impacts whose decay is long enough, cut at the length that the identification uses."""
+    shortest = settings.shortest_decay
+    ends = [(i, i.decay_start + round(settings.duration * i.rate)) for i in impacts]
+    return [replace(i, acceleration=i.acceleration[:end]) for i, end in ends if len(i.decay) >= shortest * i.rate]
 
 
 def hammer_config(turnout: TurnoutConfig) -> HammerConfig:

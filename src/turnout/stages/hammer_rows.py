@@ -1,12 +1,16 @@
 """Impacts, receptance and model of one section and campaign as rows of the registry."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from turnout.hammer_test.dynamic_stiffness import dynamic_stiffness
+from turnout.modal.block_errors import blocks_with_errors
+from turnout.modal.state_space import validation_fit
 from turnout.records import Impact, ModalModel, Mode, Receptance
+from turnout.signal.spectra import cross_spectra, density_interval
 
 PLOT_BAND = (20.0, 1600.0)  # Hz: band of the receptances in the registry
 MAX_PLOT_LINES = 240  # lines of a receptance in the registry
@@ -105,8 +109,59 @@ def model_row(
     }
 
 
+def mode_rows(
+    model: ModalModel,
+    receptance: Receptance,
+    base: dict[str, Any],
+    identity: dict[str, Any],
+    temperature: float | None,
+) -> list[dict[str, Any]]:
+    """Rows of ``modes``: every mode with its block of the state space and the stiffness at its resonance.
+
+    Parameters
+    ----------
+    model : ModalModel
+        Model of the section.
+    receptance : Receptance
+        Receptance of the accepted impacts.
+    base : dict of str to any
+        Columns turnout_id, section_id and campaign_id.
+    identity : dict of str to any
+        Columns model_id, measured_at_utc, code_version and config_hash.
+    temperature : float or None
+        Rail temperature. [°C]
+
+    Returns
+    -------
+    list of dict
+        One row per mode.
+    """
+    return [
+        mode_row(mode, base, identity, temperature) | _block_columns(*block) | _stiffness_columns(mode, receptance)
+        for mode, block in zip(model.modes, blocks_with_errors(model), strict=True)
+    ]
+
+
+def _block_columns(entries: np.ndarray, errors: np.ndarray) -> dict[str, Any]:
+    """Columns of Tables 1 and 2 of the paper; errors that are not known are empty."""
+    known = [None if np.isnan(errors[part]).any() else errors[part] for part in (slice(0, 4), slice(4, 6))]
+    return {"a_block": entries[:4], "a_block_se": known[0], "c_block": entries[4:], "c_block_se": known[1]}
+
+
+def _stiffness_columns(mode: Mode, receptance: Receptance) -> dict[str, float | None]:
+    """Dynamic stiffness at the resonance [MN/m]; empty behind an exponential window, which changes it."""
+    names = "stiffness_mn_m", "stiffness_low_mn_m", "stiffness_high_mn_m"
+    stiffness = None
+    if not receptance.decay:
+        stiffness = dynamic_stiffness(
+            receptance.frequency, receptance.h1, receptance.coherence, receptance.passed, receptance.n, mode.frequency
+        )
+    values = stiffness or (np.inf,) * 3
+    return {name: value / 1e6 if np.isfinite(value) else None for name, value in zip(names, values, strict=True)}
+
+
 def mode_row(mode: Mode, base: dict[str, Any], identity: dict[str, Any], temperature: float | None) -> dict[str, Any]:
-    """Row of ``modes``.
+    """Row of ``modes`` without the columns of the state space and the stiffness.
 
     Parameters
     ----------
@@ -135,6 +190,10 @@ def mode_row(mode: Mode, base: dict[str, Any], identity: dict[str, Any], tempera
         "frequency_sd_hz": mode.frequency_sd,
         "damping_ratio": mode.damping,
         "damping_se": mode.damping_se,
+        "frequency_repeatability_hz": mode.frequency_repeatability,
+        "frequency_systematic_hz": mode.frequency_systematic,
+        "damping_repeatability": mode.damping_repeatability,
+        "damping_systematic": mode.damping_systematic,
         "rail_temperature_c": temperature,
         "n_impacts": mode.n,
         "source": "hammer",
@@ -229,6 +288,61 @@ def receptance_row(
         "decay_ms2": measured,
         "decay_model_ms2": predicted,
         "stabilisation_json": json.dumps([_pole_row(p) for p in model.stabilisation]),
+    }
+
+
+def density_columns(impacts: Sequence[Impact], frequency: np.ndarray) -> dict[str, Any]:
+    """Columns of ``receptances`` with the averaged spectral density of the response and its 95 % limits.
+
+    Parameters
+    ----------
+    impacts : sequence of Impact
+        Accepted impacts of one sampling rate.
+    frequency : (n_line,) array of float
+        Lines at which the density is stored. [Hz]
+
+    Returns
+    -------
+    dict of str to any
+        Density [(m/s²)²/Hz] and the factors of its limits.
+
+    References
+    ----------
+    Barkhordari et al., eq. 18, with 10 log10 and two degrees of freedom per impact.
+    """
+    n = min(len(i.acceleration) for i in impacts)
+    records = np.array([i.acceleration[:n] for i in impacts])
+    lines, density, _, _ = cross_spectra(records, records, impacts[0].rate, n)
+    low, high = density_interval(len(impacts))
+    return {
+        "response_density_m2_s3": np.interp(frequency, lines, density.real).astype(np.float32),
+        "density_low_factor": low,
+        "density_high_factor": high,
+    }
+
+
+def validation_columns(model: ModalModel, responses: Sequence[Impact]) -> dict[str, Any]:
+    """Columns of ``models`` with the fit of the modes to a response that took no part in the identification.
+
+    Frequencies and damping ratios are those of the model. Only the amplitudes are estimated, per impact.
+
+    Parameters
+    ----------
+    model : ModalModel
+        Model of the section.
+    responses : sequence of Impact
+        Accepted impacts with the second response; empty where there is none.
+
+    Returns
+    -------
+    dict of str to any
+        Median fit [%] and number of impacts; empty without modes or responses.
+    """
+    fits = validation_fit(model, [i.decay for i in responses]) if responses and model.modes else np.empty(0)
+    fits = fits[np.isfinite(fits)]
+    return {
+        "validation_fit_pct": float(np.median(fits)) if fits.size else None,
+        "n_validation": int(fits.size) if fits.size else None,
     }
 
 

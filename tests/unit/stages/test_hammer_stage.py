@@ -14,8 +14,10 @@ from turnout.config import load_configuration, with_raw
 from turnout.demo.hammer import hammer_test
 from turnout.readers import read
 from turnout.readers.writing import write
+from turnout.records import Impact
 from turnout.registry.intake import Arrival, gather
 from turnout.stages.hammer import hammer_unit
+from turnout.stages.hammer_rows import density_columns
 from turnout.workflow.guard import compute_guarded
 from turnout.workflow.scan import scan
 
@@ -262,3 +264,73 @@ def test_a_file_at_another_rate_is_left_out_and_the_campaign_goes_on(tmp_path):
     rows = hammer_unit(unit, replace(turnout, hammer=hammer), tmp_path, algo="1")
     assert [(q["reason_code"], q["path"][-7:]) for q in rows["quarantine"]] == [("wrong_rate", "A7_2.h5")]
     assert {i["test"] for i in rows["impacts"]} == {1, 3} and rows["models"][0]["status"] == "accepted"
+
+
+def test_rows_hold_tables_1_and_2_of_the_paper_with_errors_stiffness_and_density(tmp_path):
+    unit, turnout, _ = lay_out(tmp_path, "A7")
+    rows = hammer_unit(unit, turnout, tmp_path, algo="1")
+    (receptance,) = rows["receptances"]
+    for mode in rows["modes"]:
+        a11, a12, a21, a22 = mode["a_block"]
+        assert a12 == pytest.approx(-a21) and a12 < 0.0
+        pole = np.linalg.eigvals(np.reshape(mode["a_block"], (2, 2)))[0]
+        s = np.log(pole) * 20e3
+        assert abs(s) / (2.0 * np.pi) == pytest.approx(mode["frequency_hz"])
+        assert -s.real / abs(s) == pytest.approx(mode["damping_ratio"])
+        # det A = exp(-2 zeta w / rate): its error, from those of the entries as if independent, is no smaller
+        error_of_log = 2.0 / 20e3 * 2.0 * np.pi * mode["frequency_hz"] * mode["damping_se"]
+        independent = np.hypot(a22 * mode["a_block_se"][0], a11 * mode["a_block_se"][3])
+        assert 0.5 * abs(pole) ** 2 * error_of_log < np.hypot(independent, 2.0 * a12 * mode["a_block_se"][1])
+        assert np.all(np.array(mode["c_block_se"]) > 0.0)
+        line = np.argmin(np.abs(receptance["frequency_hz"] - mode["frequency_hz"]))
+        h1 = np.hypot(receptance["h1_real_m_n"][line], receptance["h1_imag_m_n"][line])
+        assert mode["stiffness_mn_m"] == pytest.approx(1e-6 / h1, rel=0.05)
+        assert mode["stiffness_low_mn_m"] < mode["stiffness_mn_m"] < mode["stiffness_high_mn_m"]
+        parts = np.hypot(mode["frequency_repeatability_hz"], mode["frequency_systematic_hz"])
+        assert mode["frequency_se_hz"] == pytest.approx(parts)
+    decibel = 10.0 * np.log10([receptance["density_low_factor"], receptance["density_high_factor"]])
+    assert receptance["n_impacts"] >= 28
+    np.testing.assert_allclose(decibel, [-1.4, 1.7], atol=0.1)  # thirty impacts, published
+    assert len(receptance["response_density_m2_s3"]) == len(receptance["frequency_hz"])
+
+
+def test_the_density_of_white_noise_is_its_variance_over_the_nyquist_frequency():
+    rng = np.random.default_rng(4)
+    samples = 3.0 * rng.standard_normal((40, 2000))
+    impacts = [Impact(x, x, 1000.0, 0, 1, 2, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0) for x in samples]
+    columns = density_columns(impacts, np.arange(20.0, 480.0, 2.0))
+    assert np.mean(columns["response_density_m2_s3"]) == pytest.approx(9.0 / 500.0, rel=0.05)
+
+
+def test_the_second_response_validates_the_modes_of_the_first(tmp_path):
+    unit, turnout, _ = lay_out(tmp_path, "A7", n_test=1, change=with_second_response)
+    description = turnout.hammer.descriptions["A7"]
+    second = replace(description.channels[1], name="rail_2", source="rail_2")
+    hammer = replace(
+        turnout.hammer, descriptions={"A7": replace(description, channels=(*description.channels, second))}
+    )
+    without, model = (
+        hammer_unit(unit, replace(turnout, hammer=replace(hammer, validation={"A7": name})), tmp_path, algo="1")[
+            "models"
+        ][0]
+        for name in (None, "rail_2")
+    )
+    assert (without["validation_fit_pct"], without["n_validation"]) == (None, None)
+    impact_count = without["n_impacts_used"]
+    assert model["n_validation"] == impact_count
+    assert 60.0 < model["validation_fit_pct"] <= 100.0
+
+
+def with_second_response(test, recordings):
+    """The same recordings with a second accelerometer that sees half of the response and its own noise."""
+    rng = np.random.default_rng(test)
+    changed = []
+    for recording in recordings:
+        second = 0.5 * recording.samples[1] + 0.005 * np.ptp(recording.samples[1]) * rng.standard_normal(
+            recording.samples.shape[1]
+        )
+        channel = replace(recording.channels[1], name="rail_2")
+        changed.append(
+            replace(recording, samples=np.vstack([recording.samples, second]), channels=(*recording.channels, channel))
+        )
+    return changed

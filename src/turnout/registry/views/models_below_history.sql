@@ -1,0 +1,27 @@
+-- One row per model whose fit lies far below the history of its section: its modes are doubtful, measure again.
+-- needs: models_current
+create or replace view models_below_history as
+with fits as (
+    select model_id, section_id, turnout_id, campaign_id, measured_at_utc, method, status, hammer_fit_pct
+    from models_current where hammer_fit_pct is not null and status <> 'rejected'
+),
+history as (
+    select f.model_id, median(h.hammer_fit_pct) as history_median_pct,
+        quantile_cont(h.hammer_fit_pct, 0.75) - quantile_cont(h.hammer_fit_pct, 0.25) as quartile_distance,
+        count(*) as n_history
+    from fits f join fits h
+        on f.section_id = h.section_id and f.method = h.method and h.measured_at_utc < f.measured_at_utc
+    group by f.model_id
+),
+judged as (
+    select f.*, h.history_median_pct,
+        -- three standard deviations by the quartiles of a normal distribution; at least five points of fit
+        h.history_median_pct - greatest(5.0, 3.0 * h.quartile_distance / 1.349) as limit_pct, h.n_history
+    from fits f join history h on f.model_id = h.model_id
+    where h.n_history >= 5
+)
+select
+    section_id, turnout_id, campaign_id, measured_at_utc, method, hammer_fit_pct, history_median_pct, limit_pct,
+    n_history, 'fit_below_history' as reason, model_id
+from judged where hammer_fit_pct < limit_pct
+order by measured_at_utc, section_id;

@@ -1,0 +1,39 @@
+"""Views of the paper's Tables 1 and 2, and of models whose fit lies far below their section's history."""
+
+from datetime import date, timedelta
+
+import pytest
+
+
+def campaign_of(hammer, number, fit, **values):
+    """Result of one campaign at A7 whose model has a given fit."""
+    day = (date(2024, 1, 10) + timedelta(days=40 * number)).isoformat()
+    result = hammer(day=day, file=day, key=f"k{number}", section="A7", **values)
+    for row in result.tables["models"]:
+        row["hammer_fit_pct"] = fit
+    return result
+
+
+@pytest.mark.parametrize(("fit", "is_doubtful"), [(79.0, False), (76.5, False), (24.0, True), (74.0, True)])
+def test_a_fit_far_below_the_history_is_a_reason(bench, hammer, fit, is_doubtful):
+    """Median of 79, 80, 80, 81, 82 is 80; quartiles 80 and 81: the limit is five points below."""
+    earlier = [campaign_of(hammer, k, value) for k, value in enumerate((80.0, 82.0, 79.0, 81.0, 80.0))]
+    bench.register(*earlier, campaign_of(hammer, 5, fit))
+    rows = bench.ask(
+        "select hammer_fit_pct, history_median_pct, limit_pct, n_history, reason from models_below_history"
+    )
+    assert rows == ([(fit, 80.0, 75.0, 5, "fit_below_history")] if is_doubtful else [])
+
+
+def test_four_campaigns_are_no_history(bench, hammer):
+    bench.register(*(campaign_of(hammer, k, fit) for k, fit in enumerate((80.0, 82.0, 79.0, 81.0, 24.0))))
+    assert bench.ask("select * from models_below_history") == []
+
+
+def test_the_matrices_of_a_section_are_columns(bench, hammer):
+    result = campaign_of(hammer, 0, 80.0)
+    for row in result.tables["modes"]:
+        row |= {"a_block": [0.99, -0.03, 0.03, 0.98], "a_block_se": [0.1, 0.2, 0.3, 0.4], "c_block": [0.4, 1.2]}
+    bench.register(result)
+    columns = "a11, a12, a21, a22, a12_se, c1, c2, c1_se"
+    assert bench.ask(f"select {columns} from section_matrices") == [(0.99, -0.03, 0.03, 0.98, 0.2, 0.4, 1.2, None)]
