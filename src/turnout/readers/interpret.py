@@ -15,6 +15,7 @@ import numpy as np
 from turnout.errors import ReadError
 from turnout.readers import stated_scales
 from turnout.readers.lazy import BlockReader, ChannelStatistics, channel_error
+from turnout.readers.rate_words import rate_unit
 from turnout.readers.source import COPY_AGAIN, MEANINGLESS_UNITS, MIN_SAMPLES, RawFile, RawRecord, Source
 from turnout.readers.statements import resolve
 from turnout.readers.time_axes import all_statements, is_axis_name
@@ -145,9 +146,15 @@ def _has_channel(record: RawRecord, wanted: str | int, where: str, source: Sourc
     return True
 
 
+def _has_other_unit(unit: str | None) -> bool:
+    """Whether a unit is stated that is no unit of time."""
+    known = rate_unit(unit) if unit else None
+    return bool(unit) and (known is None or not known.is_step)
+
+
 def _sensor_rows(record: RawRecord, channels: Sequence[RawChannel], where: str, source: Source) -> set[int]:
-    """Rows that the layout assigns to a sensor; channels that are absent are judged elsewhere."""
-    wanted = [c.source for c in channels if c.quantity != IGNORED]
+    """Rows that the layout assigns to a sensor or gives a unit that is none of time; absent ones are left out."""
+    wanted = [c.source for c in channels if c.quantity != IGNORED or _has_other_unit(c.unit)]
     return {index_of(record, name, where, source) for name in wanted if _has_channel(record, name, where, source)}
 
 

@@ -40,7 +40,7 @@ def read_raw(source: Source) -> RawFile:
     ReadError
         If the header has no end, or no segment follows.
     """
-    lines = source.data[: source.data.find(END_OF_HEADER)].decode("latin-1").splitlines()
+    lines = _decode_header(source.data[: source.data.find(END_OF_HEADER)]).splitlines()
     head = _fields(lines, _separator(lines))
     if END_OF_HEADER not in source.data:
         if not source.head.startswith(FIRST_WORDS) and _is_row(source.head.partition(b"\n")[0]):
@@ -78,6 +78,14 @@ def _is_row(line: bytes) -> bool:
     """Whether a line holds only numbers."""
     cells = [cell.strip().replace(b",", b".") for cell in re.split(rb"[\t;]", line.strip())]
     return any(cells) and all(re.fullmatch(rb"[+-]?[\d.]+(?:[eE][+-]?\d+)?", cell) for cell in cells if cell)
+
+
+def _decode_header(raw: bytes) -> str:
+    """Text of the file's header: UTF-8 if valid, else Windows-1252."""
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return raw.decode("cp1252", "replace")
 
 
 def _separator(lines: Sequence[str]) -> str:
@@ -161,6 +169,7 @@ def _records(
             names=tuple(names),
             samples=[column[i * n_sample : (i + 1) * n_sample] for column in columns],
             entries=entries,
+            is_time_in_seconds=True,
             time=x[i * n_sample : (i + 1) * n_sample] if has_x and x is not None else None,
             units=tuple(units[:count]) if len(units) >= count else ("",) * count,
             **start_fields(started_text if i == 0 else None),  # of later writes no time is stated

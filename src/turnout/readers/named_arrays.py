@@ -247,6 +247,8 @@ class Metadata:
             If the variable is damaged.
         """
         value = self.get(names)
+        if isinstance(value, np.ndarray) and value.ndim == 0:
+            value = value[()]
         if isinstance(value, (list, tuple)) or (isinstance(value, np.ndarray) and value.ndim):
             value = np.ravel(np.asarray(value))
             value = value[k if value.size == n else 0] if value.size else None

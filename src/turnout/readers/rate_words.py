@@ -153,7 +153,14 @@ def words_of(name: str) -> tuple[str, ...]:
     >>> words_of("Fréquence d’échantillonnage"), words_of("XIncrement"), words_of("SampleRate_Hz")
     (('frequence', 'd', 'echantillonnage'), ('x', 'increment'), ('sample', 'rate', 'hz'))
     """
-    text = name.replace("ø", "o").replace("Ø", "O").replace("æ", "ae").replace("ß", "ss").replace("Δ", "delta ")
+    text = (
+        name.replace("_", " ")
+        .replace("ø", "o")
+        .replace("Ø", "O")
+        .replace("æ", "ae")
+        .replace("ß", "ss")
+        .replace("Δ", "delta ")
+    )
     text = "".join(c for c in unicodedata.normalize("NFKD", text) if not unicodedata.combining(c))
     text = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", text.replace("/", " per "))
     return tuple(re.findall(r"[^\W\d_]+", re.sub(r"\b([kmg]) (?=hz\b)", r"\1", text.lower())))

@@ -160,6 +160,8 @@ def entries_of(variables: Mapping[Any, Any], place: str) -> Iterator[Entry]:
     for name, value in variables.items():
         name = str(name)
         path = f"{place}/{name}" if place else name
+        if isinstance(value, np.ndarray) and value.ndim == 0:
+            value = value[()]
         if isinstance(value, (str, bytes)):
             text = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
             value = _decode_json(text)
@@ -395,9 +397,11 @@ def resolve(statements: Sequence[Statement], promised: float | None, where: str,
     if holding is None:
         if layout is None:
             raise _no_rate_error(statements, where, source)
+        _check_axes(statements, layout, where, source)
         _check_possible(statements, layout, where, source)
         return float(layout.rate)
     statement, interval = holding
+    _check_axes(statements, interval.widen(MAX_CLOCK_DRIFT if statement.is_clock else 0.0), where, source)
     if layout is not None:
         drift = MAX_CLOCK_DRIFT if statement.is_clock else 0.0
         if not interval.widen(drift).overlaps(layout):
@@ -429,17 +433,16 @@ def _most_precise(
     if not certain:
         return None
 
-    def width(statement: Statement) -> tuple[bool, float]:
-        is_ambiguous = len(statement.intervals) > 1
-        return is_ambiguous, statement.usual.loose_width + (MAX_CLOCK_DRIFT if statement.is_clock else 0.0)
+    def width(statement: Statement) -> float:
+        return statement.usual.loose_width + (MAX_CLOCK_DRIFT if statement.is_clock else 0.0)
 
     ordered = sorted(certain, key=width)
     first = ordered[0]
-    interval = first.usual if layout is None else (first.meaning_near(layout) or first.usual)
-    if layout is None and len(first.intervals) > 1:
+    interval = first.meaning_near(layout) if layout is not None else None
+    if interval is None:
         agreeing = [i for i in first.intervals if all(s.agrees_with(i) for s in ordered[1:])]
         interval = agreeing[0] if agreeing else first.usual
-        if first.is_clock is False and len(ordered) == 1:
+        if layout is None and len(first.intervals) > 1 and not first.is_clock and len(ordered) == 1:
             problem = (
                 f"{first.text!r} in {first.place} may mean {' or '.join(f'{i.rate:.9g} Hz' for i in first.intervals)}"
             )
@@ -456,9 +459,23 @@ def _most_precise(
     return first, interval
 
 
+def _check_axes(statements: Sequence[Statement], interval: Interval, where: str, source: Source) -> None:
+    """ReadError if a column that rises evenly does so at another rate than ``interval``, in every unit of time."""
+    for statement in statements:
+        if statement.is_clock and statement.certainty == POSSIBLY and not statement.agrees_with(interval):
+            problem = (
+                f"{statement.place} may be a time axis of {statement.usual.rate:.9g} samples per unit of time, which "
+            )
+            problem += f"is {interval.rate:.9g} Hz in no unit"
+            remedy = (
+                "Correct the rate in the layout; if the column is no time, give it a unit in the layout or the file"
+            )
+            raise source.error(where, problem, remedy, reason="wrong_rate")
+
+
 def _check_possible(statements: Sequence[Statement], layout: Interval, where: str, source: Source) -> None:
     """ReadError if statements that may be about the rate exist and none of them agrees with the layout."""
-    possible = [s for s in statements if s.certainty == POSSIBLY]
+    possible = [s for s in statements if s.certainty == POSSIBLY and not s.is_clock]
     if possible and not any(s.meaning_near(layout) for s in possible):
         entry = f"{possible[0].text!r} in {possible[0].place}"
         problem = f"{entry} may be a sampling rate, and the layout's is {layout.rate:.9g} Hz"

@@ -11,6 +11,7 @@ from turnout.readers.timing import check_time, rate_of_time
 
 HEAD_SIZE = 1000  # samples from which a column is judged before all of it is read
 MIN_AXIS_SIZE = 8  # samples: fewer do not tell a time axis from a chance sequence
+MAX_JUMPS = 1  # gaps among the first samples: with more a column rises too unevenly for a time axis
 MAX_HEAD_DEVIATION = 1.0  # steps: rounding to printed digits moves a time by less
 
 
@@ -134,8 +135,8 @@ def _rises_evenly(head: np.ndarray) -> bool:
     if (steps <= 0).any() or (step == 1.0 and (steps == 1.0).all()):
         return False
     line = head[0] + (head[-1] - head[0]) * np.arange(len(head)) / (len(head) - 1)
-    has_gap = (np.abs(steps - step) > 0.5 * step).mean() < 2 / HEAD_SIZE
-    return bool(np.abs(head - line).max() < MAX_HEAD_DEVIATION * step or has_gap)
+    n_jump = np.count_nonzero(np.abs(steps - step) > 0.5 * step)
+    return bool(np.abs(head - line).max() < MAX_HEAD_DEVIATION * step or n_jump <= MAX_JUMPS)
 
 
 def _constant_columns(record: RawRecord, measured: Set[int]) -> Iterator[Entry]:

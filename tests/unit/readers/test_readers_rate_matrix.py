@@ -1,0 +1,393 @@
+"""Every format x every way to state rate, step, time axis or start time x right, wrong, missing, contradictory.
+
+The true rate is 25600 Hz. Each file is read at the true rate or rejected by name; nothing is misread without a message.
+"""
+
+import json
+import re
+import unicodedata
+from dataclasses import replace
+from datetime import datetime
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import h5py
+import nptdms
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import scipy.io
+import soundfile
+
+from turnout.errors import ReadError
+from turnout.readers import read
+from turnout.readers.writing import write
+from turnout.records import Channel, RawChannel, RawDescription, Recording
+
+TRUE, OTHER = 25600.0, 20000.0
+N_SAMPLE = 64
+SAMPLES = np.random.default_rng(37).normal(size=(2, N_SAMPLE)) * [[900.0], [30.0]]
+SENSORS = (
+    RawChannel("force", "force", "force", unit="N"),
+    RawChannel("rail", "rail", "acceleration", unit="m/s²"),
+)
+UNITS = {"force": "N", "rail": "m/s²"}
+
+
+def number(value, comma=False):
+    text = f"{value:.10g}"
+    return text.replace(".", ",") if comma else text
+
+
+# Name of the entry, and its value for a rate [Hz].
+WAYS = {
+    "Sample rate": lambda rate: rate,
+    "Sampling frequency [kHz]": lambda rate: number(rate / 1e3),
+    "fs": lambda rate: float(rate),
+    "Samples per second": lambda rate: int(rate),
+    "Scan rate": lambda rate: f"{number(rate)} S/s",
+    "XIncrement": lambda rate: 1 / rate,
+    "Sampling interval [µs]": lambda rate: number(1e6 / rate),
+    "dt_ms": lambda rate: 1e3 / rate,
+    "sample_period": lambda rate: f"{1 / rate:.6E}",
+    "Abtastrate": lambda rate: f"{number(rate / 1e3, comma=True)} kHz",
+    "Abtastintervall": lambda rate: f"{number(1e6 / rate, comma=True)} µs",
+    "Fréquence d'échantillonnage": lambda rate: f"{number(rate)} Hz",
+    "Pas de temps": lambda rate: f"{number(1 / rate)} s",
+    "Samplingsfrekvens": lambda rate: f"{number(rate / 1e3, comma=True)} kHz",
+    "Frequenza di campionamento": lambda rate: f"{number(rate)} Hz",
+    "Intervallo di campionamento": lambda rate: f"{number(1e6 / rate)} us",
+    "Frecuencia de muestreo": lambda rate: f"{number(rate)} Hz",
+    "Período de muestreo": lambda rate: f"{number(1e3 / rate)} ms",
+}
+
+
+def described(rate, *ignored):
+    return RawDescription((*SENSORS, *(RawChannel(n, n, "ignored") for n in ignored)), rate=rate)
+
+
+def recording(rate=TRUE, start=None):
+    return Recording(SAMPLES, rate, (Channel("force", "force"), Channel("rail", "acceleration")), started_at=start)
+
+
+def plain(name):
+    """A name of a MATLAB variable."""
+    ascii_name = unicodedata.normalize("NFKD", name.replace("µ", "u")).encode("ascii", "ignore").decode()
+    return re.sub(r"\W+", "_", ascii_name).strip("_")
+
+
+def write_csv(path, entries, columns=None, start=None):
+    columns = columns or {}
+    head = [f"{name};{value}" for name, value in entries] + ([f"started_at;{start}"] if start else [])
+    names = ";".join([*columns, "force [N]", "rail [m/s²]"])
+    rows = [";".join(f"{x:.17g}" for x in row) for row in zip(*columns.values(), *SAMPLES)]
+    path.write_text("\n".join([*head, names, *rows]) + "\n", encoding="utf-8")
+
+
+def write_tdms(path, entries, columns=None, start=None):
+    """The first entry is a property of the file, the others of the group."""
+    properties = {name: value for name, value in entries}
+    first = dict(list(properties.items())[:1]) | ({"started_at": start} if start else {})
+    channels = [nptdms.ChannelObject("impact", n, x, {}) for n, x in (columns or {}).items()]
+    channels += [nptdms.ChannelObject("impact", n, x, {"unit_string": UNITS[n]}) for n, x in zip(UNITS, SAMPLES)]
+    group = nptdms.GroupObject("impact", dict(list(properties.items())[1:]))
+    with nptdms.TdmsWriter(str(path)) as writer:
+        writer.write_segment([nptdms.RootObject(first), group, *channels])
+
+
+def write_parquet(path, entries, columns=None, start=None):
+    """The first entry is in the schema, the others in JSON."""
+    table = pa.table({**(columns or {}), **dict(zip(UNITS, SAMPLES))})
+    names = [name for name, _ in entries]
+    notes = {str(names[0]): str(entries[0][1])} if entries else {}
+    notes |= {"settings": json.dumps({"logger": dict(entries[1:])})} if entries[1:] else {}
+    notes |= {"started_at": start} if start else {}
+    pq.write_table(table.replace_schema_metadata(notes), path)
+
+
+def write_hdf5(path, entries, columns=None, start=None):
+    """The first entry is an attribute of a nested group, the others of the dataset of the force."""
+    with h5py.File(path, "w") as file:
+        for name, x in {**(columns or {}), **dict(zip(UNITS, SAMPLES))}.items():
+            file[name] = x
+        if entries:
+            file.create_group("about/logger").attrs[entries[0][0]] = entries[0][1]
+        for name, value in entries[1:]:
+            file["force"].attrs[name] = value
+        if start:
+            file.attrs["started_at"] = start
+
+
+def write_npz(path, entries, columns=None, start=None):
+    """The first entry is an array, the others are in JSON."""
+    arrays = {entries[0][0]: np.array(entries[0][1])} if entries else {}
+    arrays |= {"info": np.array(json.dumps(dict(entries[1:])))} if entries[1:] else {}
+    arrays |= {"started_at": np.array(start)} if start else {}
+    np.savez(path, **arrays, **(columns or {}), **dict(zip(UNITS, SAMPLES)))
+
+
+def write_mat(path, entries, columns=None, start=None):
+    """The first entry is a variable, the others are in a structure."""
+    variables = {plain(entries[0][0]): entries[0][1]} if entries else {}
+    variables |= {"setup": {plain(name): value for name, value in entries[1:]}} if entries[1:] else {}
+    variables |= {"started_at": start} if start else {}
+    scipy.io.savemat(path, variables | (columns or {}) | dict(zip(UNITS, SAMPLES)))
+
+
+def write_wav(path, entries, columns=None, start=None):
+    """The header states the true rate."""
+    notes = {"channels": list(UNITS), "units": list(UNITS.values()), **dict(entries)}
+    notes |= {"started_at": start} if start else {}
+    with soundfile.SoundFile(path, "w", int(TRUE), 2, "DOUBLE") as file:
+        file.comment = json.dumps(notes)
+        file.write(SAMPLES.T)
+
+
+@cache
+def written(format):
+    """Bytes of a file of the format with one record."""
+    with TemporaryDirectory() as folder:
+        return write([recording(start=datetime(2024, 5, 13, 10))], Path(folder) / "a", format).read_bytes()
+
+
+def write_lvm(path, entries, columns=None, start=None):
+    """Every segment states the true step."""
+    path.write_bytes(written("lvm"))
+    text = path.read_text(encoding="utf-8")
+    added = "".join(f"{name}\t{value}\n" for name, value in entries)
+    text = text.replace("Multi_Headings", added + "Multi_Headings", 1)
+    if start:
+        date, clock = start.split("T")
+        text = text.replace("2024/05/13", date.replace("-", "/")).replace("10:00:00.000000", clock)
+    path.write_text(text, encoding="utf-8")
+
+
+def write_uff(path, entries, columns=None, start=None):
+    """Every set states the true step; the entries are in ID line 2, as free text."""
+    path.write_bytes(written("uff58"))
+    lines = path.read_text(encoding="utf-8").splitlines()
+    text = "; ".join(f"{name}: {value}" for name, value in entries)
+    for i, line in enumerate(lines):
+        if line.strip() == "58" and text:
+            lines[i + 2] = f"{text:<80.80}"
+        if line.startswith("13-May-24") and start:
+            year, month, day = start[:10].split("-")
+            months = "Jan Feb Mar Apr May Jun Jul Aug Sep Oct Nov Dec".split()
+            lines[i] = f"{day}-{months[int(month) - 1]}-{year} {start[11:19]}"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def write_rcmdx(path, entries, columns=None, start=None):
+    """The time stamps state the true rate; the entries are attributes of the data source's parent."""
+    path.write_bytes(written("rcmdx"))
+    with h5py.File(path, "r+") as file:
+        for name, value in entries:
+            file["RCMDX"].attrs[name] = value
+
+
+# Writer, file name, and what the format itself states of the true rate.
+FORMATS = {
+    "csv": (write_csv, "a.csv", False),
+    "tdms": (write_tdms, "a.tdms", False),
+    "parquet": (write_parquet, "a.parquet", False),
+    "hdf5": (write_hdf5, "a.h5", False),
+    "npz": (write_npz, "a.npz", False),
+    "mat": (write_mat, "a.mat", False),
+    "wav": (write_wav, "a.wav", True),
+    "lvm": (write_lvm, "a.lvm", True),
+    "uff": (write_uff, "a.uff", True),
+    "rcmdx": (write_rcmdx, "a.rcmdx", True),
+}
+
+
+def outcome(path, description):
+    """(rate, error) of the only record."""
+    try:
+        result = read(path.name, path.parent, description)
+    except ReadError as error:
+        return None, error
+    return (result.recordings[0].rate if result.recordings else None), next(iter(result.errors), None)
+
+
+def is_true(found):
+    return found[0] is not None and abs(found[0] - TRUE) < 1e-4 * TRUE and found[1] is None
+
+
+def is_rejected(found, *words):
+    rate, error = found
+    return rate is None and error is not None and error.reason == "wrong_rate" and all(w in str(error) for w in words)
+
+
+@pytest.mark.parametrize("format", FORMATS)
+def test_every_way_to_state_the_rate_is_understood_in_every_format(format, tmp_path):
+    """Seven combinations for each way; the message on a contradiction names both rates."""
+    write_file, name, states_rate = FORMATS[format]
+    path, failures = tmp_path / name, []
+    for i, (way, value_at) in enumerate(WAYS.items()):
+        at_first = i % 2 == 0  # the place of the entry in the file
+        filler = [("operator", "N. N.")]
+        stated = [(way, value_at(TRUE))]
+        write_file(path, stated if at_first else filler + stated)
+        cases = {f"right {rate}": is_true(outcome(path, described(rate))) for rate in (TRUE, None)}
+        cases["wrong layout"] = is_rejected(outcome(path, described(OTHER)), "25600")
+        second = [] if states_rate else [("rate", TRUE)]
+        wrong = [(way, value_at(OTHER))]
+        write_file(path, wrong + second if at_first else second + wrong)
+        for rate in (TRUE, OTHER, None):
+            found = outcome(path, described(rate))
+            cases[f"contradictory {rate}"] = is_rejected(found, "25600 Hz", "20000 Hz")
+        if format != "uff":  # in free text a word without a number is no entry
+            write_file(path, [(way, "fast")])
+            cases["not understood"] = is_rejected(outcome(path, described(TRUE)), "is not understood")
+        failures += [
+            f"{way} ({'first' if at_first else 'second'} place): {case}" for case, ok in cases.items() if not ok
+        ]
+    assert failures == []
+
+
+@pytest.mark.parametrize("format", FORMATS)
+def test_without_a_statement_the_layout_tells_the_rate(format, tmp_path):
+    write_file, name, states_rate = FORMATS[format]
+    write_file(tmp_path / name, [])
+    assert is_true(outcome(tmp_path / name, described(TRUE)))
+    found = outcome(tmp_path / name, described(None))
+    assert is_true(found) if states_rate else is_rejected(found, "sampling rate")
+    assert is_rejected(outcome(tmp_path / name, described(OTHER))) or not states_rate
+
+
+AXES = {
+    "time": lambda t: t, "Time (s)": lambda t: t, "Zeit_ms": lambda t: t * 1e3, "timestamp": lambda t: 1.7e9 + t,
+    "temps": lambda t: t, "tiempo": lambda t: t, "Tid": lambda t: t, "relative time": lambda t: t,
+    "idő": lambda t: t, "column 7": lambda t: t * 1e6, "kanal": lambda t: np.round(t, 6),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("format", ["csv", "tdms", "parquet", "hdf5", "npz"])
+def test_a_time_axis_is_compared_under_any_name_also_if_the_layout_ignores_it(format, tmp_path):
+    """Right, wrong layout, contradictory entry, a gap of eight samples."""
+    write_file, name, _ = FORMATS[format]
+    path, failures = tmp_path / name, []
+    steps = np.arange(N_SAMPLE) / TRUE
+    gap = np.where(np.arange(N_SAMPLE) < 40, steps, steps + 8 / TRUE)
+    for axis, values in AXES.items():
+        column = axis.partition(" (")[0] if format == "csv" else axis
+        write_file(path, [], {axis: values(steps)})
+        cases = {"right": is_true(outcome(path, described(TRUE, column)))}
+        cases["wrong layout"] = is_rejected(outcome(path, described(OTHER, column)), "20000 Hz")
+        write_file(path, [("Sample rate", OTHER)], {axis: values(steps)})
+        found = outcome(path, described(OTHER, column))
+        cases["contradictory"] = is_rejected(found, "20000 Hz")
+        write_file(path, [], {axis: values(gap)})
+        rate, error = outcome(path, described(TRUE, column))
+        cases["gap"] = rate is None and error is not None and error.reason in ("truncated", "wrong_rate")
+        failures += [f"{axis}: {case}" for case, ok in cases.items() if not ok]
+    assert failures == []
+
+
+def test_an_index_of_pandas_is_a_time_axis(tmp_path):
+    """Unnamed and named, of dates, durations and numbers; a gap is found."""
+    steps = np.arange(N_SAMPLE) / TRUE
+    dates = pd.Timestamp("2026-05-13T08:30:12Z") + pd.to_timedelta(np.round(steps * 1e9).astype("int64"), unit="ns")
+    indices = {"dates": dates, "durations": pd.to_timedelta(steps, unit="s"), "numbers": pd.Index(steps)}
+    for label, index in indices.items():
+        for index_name in (None, "timestamp", "moment"):
+            frame = pd.DataFrame(dict(zip(UNITS, SAMPLES)), index=index.rename(index_name))
+            frame.to_parquet(tmp_path / "a.parquet")
+            ignored = () if index_name is None or label != "numbers" else (index_name,)
+            assert is_true(outcome(tmp_path / "a.parquet", described(TRUE, *ignored))), (label, index_name)
+            assert is_rejected(outcome(tmp_path / "a.parquet", described(OTHER, *ignored)), "20000"), (
+                label,
+                index_name,
+            )
+            pd.concat([frame.iloc[:30], frame.iloc[38:]]).to_parquet(tmp_path / "b.parquet")
+            rate, error = outcome(tmp_path / "b.parquet", described(TRUE, *ignored))
+            assert rate is None and error.reason == "truncated", (label, index_name)
+
+
+# Printed step of a Universal File, rate of the layout -> rate that is read, None for a rejection.
+STEPS = {
+    "0.0001": {10000: 10000, 20000: None, 12800: None, None: 10000},
+    "4e-05": {25000: 25000, 20000: None, 25600: None, None: 25000},
+    "4.0E-05": {25000: 25000, 20000: None, None: None},
+    "4.9E-05": {20408: 20408, 20000: None, None: None},
+    "6.25e-05": {16000: 16000, 20000: None, None: 16000},
+    "0.000020": {51200: 51200, 50000: 50000, 48000: None, None: None},
+    "1.95312E-05": {51200: 51200, 51201: None, 50000: None, None: 51200},
+    "3.90625E-05": {25600: 25600, 25601: None, None: 25600},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("text", STEPS)
+def test_a_printed_step_is_known_to_half_a_unit_of_its_last_digit(text, tmp_path):
+    write([recording()], tmp_path / "a.uff", "uff58")
+    content = (tmp_path / "a.uff").read_text()
+    (tmp_path / "a.uff").write_text(content.replace(f"{1 / TRUE:13.5e}", f"{text:>13}"))
+    for promised, expected in STEPS[text].items():
+        rate, error = outcome(tmp_path / "a.uff", described(promised))
+        assert rate == expected and (error is None) == (expected is not None), promised
+
+
+def test_the_x_column_of_lvm_is_more_precise_than_a_step_with_six_decimals(tmp_path):
+    """51.2 kHz, Delta_X printed as 0.000020: the X column tells the rate, and contradicts another one."""
+    head = "LabVIEW Measurement\t\nSeparator\tTab\nDecimal_Separator\t.\nX_Columns\tOne\n***End_of_Header***\t\n\t\n"
+    for true in (51200.0, 44000.0):
+        repeated = np.tile(SAMPLES, 20)
+        rows = "".join(f"{k / true:.6f}\t{f:.6f}\t{a:.6f}\n" for k, (f, a) in enumerate(repeated.T))
+        segment = (
+            f"Channels\t2\nSamples\t{20 * N_SAMPLE}\t{20 * N_SAMPLE}\nY_Unit_Label\tN\tm/s²\nX_Dimension\tTime\tTime\n"
+        )
+        segment += "X0\t0.0\t0.0\nDelta_X\t0.000020\t0.000020\n***End_of_Header***\t\t\nX_Value\tforce\trail\tComment\n"
+        (tmp_path / "a.lvm").write_text(head + segment + rows + "\n", encoding="utf-8")
+        for promised in (true, None, 25600.0, 50000.0):
+            rate, error = outcome(tmp_path / "a.lvm", described(promised))
+            if true == 51200.0 and promised in (true, None):
+                assert rate == pytest.approx(true, rel=1e-4) and error is None, error
+            else:
+                assert rate is None and error.reason == "wrong_rate", (true, promised)
+
+
+STARTS = {
+    "2024-02-30T10:00:00": "cannot be read",
+    "2026-03-29T02:30:00": "does not exist in Europe/Copenhagen",
+    "2026-10-25T02:30:00": "comes twice in Europe/Copenhagen",
+    "1904-01-01T00:00:00": "is no time of a recording",
+    "1970-01-01T00:00:00": "is no time of a recording",
+}
+
+
+@pytest.mark.parametrize("start", STARTS)
+@pytest.mark.parametrize("format", [f for f in FORMATS if f != "rcmdx"])
+def test_a_start_time_that_tells_no_moment_is_reported_in_every_format(format, start, tmp_path):
+    """The record stays; a time stamp in RCM-DX is a number since 1970 in UTC."""
+    write_file, name, _ = FORMATS[format]
+    write_file(tmp_path / name, [("rate", TRUE)], start=start)
+    description = replace(described(TRUE), time_zone="Europe/Copenhagen")
+    result = read(name, tmp_path, description)
+    (error,) = result.errors
+    assert error.reason == "wrong_time" and STARTS[start] in error.problem
+    assert len(result.recordings) == 1
+    clock_change = "Europe" in STARTS[start]
+    assert (result.recordings[0].started_at is not None) == clock_change
+    write_file(tmp_path / name, [("rate", TRUE)], start="2026-05-13T10:00:00")
+    result = read(name, tmp_path, description)
+    assert result.errors == () and result.recordings[0].started_at == datetime(2026, 5, 13, 8)
+
+
+@pytest.mark.parametrize("name", ["Filter rate", "calibration period", "Number of averages", "trigger frequency",
+                                  "Low pass [Hz]", "Baud rate", "max. sampling rate", "FFT interval"])  # fmt: skip
+@pytest.mark.parametrize("format", ["csv", "tdms", "hdf5", "npz"])
+def test_other_rates_and_periods_of_a_logger_state_nothing(format, name, tmp_path):
+    write_file, file_name, _ = FORMATS[format]
+    write_file(tmp_path / file_name, [(name, 4000.0)])
+    assert is_true(outcome(tmp_path / file_name, described(TRUE)))
+
+
+def test_a_column_with_a_unit_of_the_layout_is_no_time_axis(tmp_path):
+    """A distance that rises evenly, as an odometer at constant speed."""
+    write_csv(tmp_path / "a.csv", [("rate", TRUE)], {"odometer": np.arange(N_SAMPLE) * 0.0137})
+    assert is_rejected(outcome(tmp_path / "a.csv", described(TRUE, "odometer")), "may be a time axis", "unit")
+    distance = RawChannel("odometer", "odometer", "ignored", unit="m")
+    assert is_true(outcome(tmp_path / "a.csv", RawDescription((*SENSORS, distance), rate=TRUE)))
