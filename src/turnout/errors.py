@@ -139,6 +139,7 @@ REASONS = {
     "unreadable": "the file is not of its format",
     "empty": "the file has no bytes or no records",
     "no_file": "the name stands for a device, pipe or socket, not for a file with bytes",
+    "claims_too_much": "the file claims more samples or channels than a file of its size can hold",
     "too_large": "the memory of the machine did not suffice for it in two runs",
     "truncated": "fewer samples or records than configured or declared",
     "wrong_length": "more samples or records than configured",

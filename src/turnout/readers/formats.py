@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 
+from turnout.readers.claims import check_claims
 from turnout.readers.source import RawFile, Source
 
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -37,8 +38,9 @@ class Format:
         Raises
         ------
         ReadError
-            If the file as a whole cannot be read.
+            If the file as a whole cannot be read, claims more than it can hold, or has its samples in another file.
         """
+        check_claims(self.module, source)
         return import_module(f"turnout.readers.{self.module}").read_raw(source)
 
 

@@ -1,0 +1,204 @@
+"""Check what a raw file claims before memory is allocated for it, and that it keeps its samples in itself.
+
+A header of some bytes may claim arrays of gigabytes. What a file claims, as it is stored, may be ``MAX_EXPANSION``
+times its size plus ``FREE_CLAIM``. An HDF5 file may also name other files as the place of its samples. These are not
+read, because they may be outside the raw root and change while the hash of the file stays the same.
+"""
+
+import math
+import re
+import zipfile
+import zlib
+from collections.abc import Iterator
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from turnout.readers.source import MAX_COMPRESSION_RATIO, Source
+
+MAX_EXPANSION = 6  # claimed bytes per byte of the file: packed samples reach 2 to 4
+FREE_CLAIM = 128 * 2**20  # bytes that a file of any size may claim: a long record of zeros packs well
+MAX_COLUMNS = 4096  # columns of a text or Parquet file: each costs kilobytes, whatever it holds
+REMEDY = "Copy the file again from the logger; if it is whole, export it unpacked or in shorter records"
+ELSEWHERE_REMEDY = "Export the samples into the file itself"
+MAT_HEADER, MAT_COMPRESSED = 128, 15  # bytes; type of a compressed element in MATLAB 5
+
+
+def check_claims(format_module: str, source: Source) -> None:
+    """Stop before a reader allocates more memory than a file of this size can hold, or opens another file.
+
+    Parameters
+    ----------
+    format_module : str
+        Module of the reader.
+    source : Source
+        The raw file.
+
+    Raises
+    ------
+    ReadError
+        If the file claims too much, or its samples are in another file.
+    """
+    hdf5 = format_module in ("hdf5", "rcmdx") or (format_module == "mat" and source.head.startswith(b"MATLAB 7.3"))
+    check = _hdf5 if hdf5 else CHECKS.get(format_module)
+    if check:
+        check(source)
+
+
+def _check(n_byte: float, source: Source, where: str) -> None:
+    """ReadError if ``n_byte`` is more than a file of this size may claim."""
+    # a lazy column is read in blocks, so that only the bound of the compression counts
+    limit = (MAX_COMPRESSION_RATIO if source.lazy else MAX_EXPANSION) * source.size + FREE_CLAIM
+    if n_byte > limit:
+        problem = f"it claims {n_byte:.3g} bytes of samples, in a file of {source.size} bytes"
+        raise source.error(where, problem, REMEDY, reason="claims_too_much")
+
+
+def _npz(source: Source) -> None:
+    """The sizes in the directory of the archive, and in the header of each array."""
+    total = 0
+    with source.parsed_by("zipfile"), zipfile.ZipFile(source.path) as archive:
+        for member in archive.infolist():
+            _check(total := total + member.file_size, source, f"variable {member.filename!r}")
+            with archive.open(member) as stream:
+                shape, itemsize = _npy_claim(stream)
+            if math.prod(shape) * itemsize > member.file_size:
+                problem = f"its header claims {shape} values, in {member.file_size} bytes"
+                raise source.error(f"variable {member.filename!r}", problem, REMEDY, reason="claims_too_much")
+
+
+def _npy_claim(stream: Any) -> tuple[tuple[int, ...], int]:
+    """Shape and bytes per value of an array in NumPy's format; no values if it is none, which its reader reports."""
+    try:
+        version = np.lib.format.read_magic(stream)
+        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        shape, _, dtype = read(stream)
+    except (ValueError, OSError, EOFError, zlib.error, zipfile.BadZipFile):
+        return (0,), 0
+    return shape, 0 if dtype.hasobject else dtype.itemsize
+
+
+def _hdf5(source: Source) -> None:
+    """All datasets; links to other files, external storage and virtual datasets are found without following them."""
+    import h5py
+
+    total, seen = 0, set()
+
+    def members(group: Any) -> Iterator[tuple[str, Any]]:
+        for name in group:
+            link = group.get(name, getlink=True)
+            if isinstance(link, h5py.ExternalLink):
+                problem = f"it is a link to the file {link.filename!r}"
+                raise source.error(f"{group.name}/{name}", problem, ELSEWHERE_REMEDY, reason="outside_root")
+            if isinstance(link, h5py.HardLink):
+                yield name, link
+
+    def walk(group: Any) -> None:
+        nonlocal total
+        for name, _ in members(group):
+            if group.get(name, getclass=True) not in (h5py.Group, h5py.Dataset):
+                continue
+            try:
+                member = group[name]
+            except (KeyError, OSError, RuntimeError, ValueError):  # damaged: its reader reports it
+                continue
+            address = h5py.h5o.get_info(member.id).addr
+            if address in seen:
+                continue
+            seen.add(address)
+            if isinstance(member, h5py.Group):
+                walk(member)
+                continue
+            if problem := _elsewhere(member):
+                raise source.error(f"dataset {member.name!r}", problem, ELSEWHERE_REMEDY, reason="outside_root")
+            total += member.size * member.dtype.itemsize if member.shape is not None else 0
+            _check(total, source, f"dataset {member.name!r}")
+
+    with source.parsed_by("HDF5"), h5py.File(source.path, "r") as file:
+        seen.add(h5py.h5o.get_info(file["/"].id).addr)
+        walk(file)
+
+
+def _elsewhere(dataset: Any) -> str:
+    """Where the values of a dataset are, if not in its own file."""
+    if dataset.external:
+        return f"its values are in the file {dataset.external[0][0]!r}"
+    if dataset.is_virtual:
+        files = sorted({piece.file_name for piece in dataset.virtual_sources()} - {"."})
+        return f"its values are in the file {files[0]!r}" if files else ""
+    return ""
+
+
+def _mat(source: Source) -> None:
+    """The elements of a MATLAB 5 file: each compressed one claims its unpacked size in its first eight bytes."""
+    order = "<" if source.head[126:128] == b"IM" else ">"
+    total, position = 0, MAT_HEADER
+    with source.path.open("rb") as file:
+        while position + 8 <= source.size:
+            kind, length = _mat_tag(file, position, order)
+            if kind == MAT_COMPRESSED:
+                file.seek(position + 8)
+                first = _unpacked(file.read(min(length, 1024)))
+                length_unpacked = int(np.frombuffer(first[4:8], f"{order}u4")[0]) if len(first) == 8 else 0
+                total += length_unpacked
+                _check(total, source, f"the variable at byte {position}")
+            position += 8 + length
+
+
+def _mat_tag(file: BinaryIO, position: int, order: str) -> tuple[int, int]:
+    file.seek(position)
+    kind, length = np.frombuffer(file.read(8), f"{order}u4")
+    return int(kind), int(length)
+
+
+def _unpacked(packed: bytes) -> bytes:
+    """The first eight unpacked bytes; none if they are damaged, which the reader reports."""
+    try:
+        return zlib.decompressobj().decompress(packed, 8)
+    except zlib.error:
+        return b""
+
+
+def _parquet(source: Source) -> None:
+    """Rows and columns of the metadata: repeated values take no space in the file."""
+    import pyarrow.parquet as pq
+
+    with source.parsed_by("pyarrow"):
+        metadata = pq.read_metadata(source.path)
+    _check_columns(metadata.num_columns, source)
+    sizes = sum(metadata.row_group(k).total_byte_size for k in range(metadata.num_row_groups))
+    _check(max(sizes, 8 * metadata.num_rows * metadata.num_columns), source, "the metadata")
+
+
+def _wav(source: Source) -> None:
+    """Frames of a FLAC file: WAV is not packed, and its chunks are compared with the size of the file."""
+    if source.head[:4] == b"fLaC":
+        fields = int.from_bytes(source.head[18:26], "big")  # rate 20, channels 3, bits 5, frames 36 bits
+        n_channel, n_frame = (fields >> 41 & 7) + 1, fields & (1 << 36) - 1
+        _check(4 * n_channel * n_frame, source, "the header")
+
+
+def _lvm(source: Source) -> None:
+    """The number of channels of each segment: a channel takes at least a separator in the file."""
+    for match in re.finditer(rb"\nChannels\s+(\d+)", source.data):
+        if (count := int(match[1][:18])) > source.size:
+            where = f"byte {match.start() + 1}"
+            raise source.error(where, f"it claims {count} channels", REMEDY, reason="claims_too_much")
+
+
+def _csv(source: Source) -> None:
+    """Columns of the first lines."""
+    lines = source.head.splitlines()[:-1] or [source.head]
+    with source.path.open("rb") as file:
+        lines.append(file.readline(2**22))
+    _check_columns(max(max(line.count(c) for c in (b",", b";", b"\t")) + 1 for line in lines), source)
+
+
+def _check_columns(n_column: int, source: Source) -> None:
+    if n_column > MAX_COLUMNS:
+        remedy = "Write one column per channel, one row per sample"
+        problem = f"it has {n_column} columns, at most {MAX_COLUMNS} are read"
+        raise source.error("the file", problem, remedy, reason="claims_too_much")
+
+
+CHECKS = {"npz": _npz, "mat": _mat, "parquet": _parquet, "wav": _wav, "lvm": _lvm, "csv": _csv}
