@@ -194,11 +194,40 @@ def compose(path: Path) -> tuple[AnyNode | None, BaseConstructor]:
     ------
     MarkedYAMLError
         For wrong syntax. OSError and UnicodeDecodeError are not converted either.
+    ConfigError
+        If aliases make the file contain itself, or multiply its values beyond ``MAX_VALUES``.
     """
     from ruamel.yaml import YAML
 
     yaml = YAML(typ="safe", pure=True)
-    return yaml.compose(Path(path).read_text(encoding="utf-8")), yaml.constructor
+    root = yaml.compose(Path(path).read_text(encoding="utf-8"))
+    if root is not None:
+        _require_few_values(root, str(path))
+    return root, yaml.constructor
+
+
+MAX_VALUES = 1_000_000  # names and values of a file, each alias counted as what it stands for
+
+
+def _require_few_values(root: AnyNode, path: str) -> None:
+    """ConfigError if the values that the aliases of a file stand for are endless or too many."""
+    counts: dict[int, int | None] = {}  # None while the members of a node are counted
+
+    def count(node: AnyNode) -> int:
+        if id(node) not in counts:
+            counts[id(node)] = None
+            members = node.value if isinstance(node.value, list) else ()
+            pairs = (part for member in members for part in (member if isinstance(member, tuple) else (member,)))
+            counts[id(node)] = 1 + sum(count(part) for part in pairs)
+        n_value = counts[id(node)]
+        if n_value is None or n_value > MAX_VALUES:
+            problem = (
+                "it contains itself" if n_value is None else f"its aliases stand for more than {MAX_VALUES} values"
+            )
+            raise place_of_node(node, path).error(problem, "Write out what the alias stands for")
+        return n_value
+
+    count(root)
 
 
 def load(path: Path, name: str | None = None) -> Branch:

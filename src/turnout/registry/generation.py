@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
 from turnout.errors import RegistryError
@@ -101,11 +101,7 @@ def load(registry_dir: Path) -> Generation:
         for a folder in which DuckDB can make no database.
     """
     path = Path(registry_dir) / GENERATION_FILE
-    if forbidden := FORBIDDEN_CHARACTERS.intersection(path.resolve().as_posix()):
-        raise RegistryError(
-            f"{registry_dir}: DuckDB can make no database where a folder has {min(forbidden)} in its name. "
-            "Nothing was changed. Rename that folder, or put the registry elsewhere."
-        )
+    require_usable_folder(registry_dir)
     try:
         raw = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
@@ -116,10 +112,40 @@ def load(registry_dir: Path) -> Generation:
         if raw.pop("format", None) != FORMAT_VERSION:
             raise RegistryError(f"{path}: written by another version of the program. Install that version.")
         files = [DataFile(**f) for f in raw.pop("files")]
-        return Generation(files=files, retired=[(p, n) for p, n in raw.pop("retired")], **raw)
+        retired = [(p, n) for p, n in raw.pop("retired")]
+        for listed in (*(f.path for f in files), *(p for p, _ in retired)):
+            _require_inside(listed)
+        return Generation(files=files, retired=retired, **raw)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         message = f"{type(error).__name__}: {error}"
         raise RegistryError(f"{path}: not a generation file ({message}). Put it back from a backup.") from None
+
+
+def require_usable_folder(registry_dir: Path) -> None:
+    """Accept a folder in which DuckDB can make a database.
+
+    Parameters
+    ----------
+    registry_dir : Path
+        Folder of the registry, which need not exist.
+
+    Raises
+    ------
+    RegistryError
+        If its path has a character that DuckDB does not take as such.
+    """
+    if forbidden := FORBIDDEN_CHARACTERS.intersection(Path(registry_dir).resolve().as_posix()):
+        raise RegistryError(
+            f"{registry_dir}: DuckDB can make no database where a folder has {min(forbidden)} in its name. "
+            "Nothing was changed. Rename that folder, or put the registry elsewhere."
+        )
+
+
+def _require_inside(path: str) -> None:
+    """ValueError for a listed path that leads out of the registry, where it would be read or deleted."""
+    parts = PurePosixPath(path)
+    if parts.is_absolute() or ".." in parts.parts or parts.parts[:1] == ():
+        raise ValueError(f"the path {path!r} leads out of the registry")
 
 
 def schema_hash(table: str) -> str:

@@ -13,6 +13,7 @@ from turnout.config.consistency import ToSi
 from turnout.config.schema import suggestion
 from turnout.errors import ConfigError
 from turnout.files import write_text
+from turnout.registry.generation import require_usable_folder
 from turnout.workflow.configuration_rows import fleet_hash
 from turnout.workflow.plan import shard_names, write_plans
 from turnout.workflow.retries import request_rerun
@@ -31,6 +32,7 @@ OPTIONS = {
 }
 PLAN_FOLDER = "work/plan"
 # Start time of the newest run that reached its jobs, UTC. It is no input of a rule, so it causes no rerun.
+REGISTRY = Path("results/registry")
 LAUNCH_FILE = "work/launched"
 
 
@@ -95,6 +97,8 @@ def launch(options: Mapping, scan: bool, formats: Collection[str] | None = None,
     ------
     ConfigErrors
         If the configuration has errors.
+    RegistryError
+        If DuckDB can make no database in this folder.
     ConfigError
         If an option is invalid, or so many files are missing that a disk is probably not mounted.
     """
@@ -112,6 +116,7 @@ def launch(options: Mapping, scan: bool, formats: Collection[str] | None = None,
         "strict": _flag(options, "strict"),
     }
     if scan:
+        require_usable_folder(REGISTRY)  # before anything is computed for it
         started = datetime.now(UTC).replace(tzinfo=None)
         raw, accept = Path(job["raw"]), _flag(options, "accept_vanished")
         write_plans(configuration, raw, Path(PLAN_FOLDER), shards, turnouts, accept)
