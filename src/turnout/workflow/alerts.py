@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from turnout.config.settings.alerts import AlertsSettings
 
 SENT_FILE = Path("work/alerts.json")
-STATES = ("inspect this week", "plan", "cannot tell")  # a chart that learns needs nobody
+STATES = ("confirm now", "inspect this week", "plan", "cannot tell")  # a chart that learns needs nobody
 MAX_NAMED = 3  # entries named in the subject
 PASSWORD, WEBHOOK = "TURNOUT_SMTP_PASSWORD", "TURNOUT_WEBHOOK"  # of the environment
 

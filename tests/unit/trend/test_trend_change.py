@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import statsmodels.api as sm
+from scipy import stats
 from scipy.integrate import trapezoid
 
 from turnout.trend.change_point import find_change, fit_onsets
@@ -144,3 +145,16 @@ def test_a_change_without_scatter_is_found_exactly():
     found = find_change(time, -2.0 * (np.arange(40) >= 30), 0.0)
     assert found.shape == "step" and time[29] <= found.earliest <= found.latest <= time[30]
     assert (found.low, found.high) == pytest.approx((-2.0, -2.0), abs=1e-4)
+
+
+def test_the_size_of_a_clear_step_has_students_interval():
+    """The two-sample interval in closed form, with one degree of freedom less for the onset."""
+    values = 0.1 * np.array([1, -2, 0.5, 1.5, -1, 0, 2, -1.5, 0.5, -0.5, 1, -1.5])
+    values[6:] -= 10.0
+    found = find_change(np.arange(12) * 7.0, values, 0.0)
+    before, after = values[:6], values[6:]
+    rss = np.sum((before - before.mean()) ** 2) + np.sum((after - after.mean()) ** 2)
+    half = stats.t.isf(0.025, 9) * np.sqrt(rss / 9 * (1 / 6 + 1 / 6))
+    assert found.size == pytest.approx(after.mean() - before.mean(), abs=1e-3)
+    # the normal distribution would give an interval that is 13 % narrower
+    assert found.high - found.low == pytest.approx(2.0 * half, rel=0.01)

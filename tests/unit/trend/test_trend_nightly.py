@@ -304,4 +304,5 @@ def test_parts_with_few_and_with_many_sections_make_one_table(settings, tmp_path
     texts = {k: object for k in ("turnout_id", "section_id", "band", "source")}
     rows = pd.concat([small.astype(texts), large.astype(texts)], ignore_index=True)
     small_registry(tmp_path, rows)
-    assert update(tmp_path, settings).rows["charts"] >= len(rows)
+    # and one row per campaign of each whole turnout
+    assert update(tmp_path, settings).rows["charts"] == len(rows) + 70 + 2

@@ -180,3 +180,10 @@ def test_the_command_reads_the_worklist_of_a_registry(tmp_path, repository, monk
     assert main(["alert", "--dry-run"]) == 0 and "Look first at: voids" in capsys.readouterr().out
     assert main(["alert"]) == 0 and capsys.readouterr().out == "webhook: 1 new\n"
     assert main(["alert"]) == 0 and capsys.readouterr().out == "webhook: 0 new\n"
+
+
+def test_every_state_of_the_list_that_needs_a_person_is_sent():
+    from turnout.report.pages.fleet import LISTED_STATES
+    from turnout.workflow.alerts import STATES
+
+    assert STATES == tuple(state for state in LISTED_STATES if state != "learning")
