@@ -7,7 +7,9 @@ Says which files and records were read, which impacts are accepted and which rej
 reaches, and frequency, damping and dynamic stiffness at the two resonances with their 95 % intervals, or why there is
 none. Impacts and records are counted from 1. It computes as the nightly run does, with the same settings, so give all
 files of a section: impacts are judged against each other. Files that do not lie in the raw folder need --section and
---campaign where their names and times do not say them. Nothing is written but the figure that is asked for.
+--campaign where their names and times do not say them. Files of averaged frequency responses (UFF58 function type 4,
+text with complex columns, npz) give modes with errors; no impact can then be judged. Nothing is written but the figure
+that is asked for.
 
 Exit code 1 where a test gives no resonance, 2 where the command cannot be followed.
 """

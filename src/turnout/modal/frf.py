@@ -277,6 +277,9 @@ def _check_responses(frequency: np.ndarray, frf: np.ndarray) -> None:
         raise ValueError(f"need evenly spaced frequencies, the steps go from {gap.min():g} to {gap.max():g} Hz")
 
 
+MIN_ERROR_SHARE = 1e-3  # of the median error: a fit that states less has no curvature, and would be weighted alone
+
+
 def _sort_modes(
     fits: list[FrfFit],
     peak_and_width: tuple[float, float],
@@ -289,6 +292,7 @@ def _sort_modes(
     """Append every mode of a band to ``modes``, or to ``rejected`` with the reason."""
     theta = np.array([fit.theta for fit in fits])
     error = np.array([fit.error for fit in fits])
+    error = np.maximum(error, MIN_ERROR_SHARE * np.median(error, axis=0))
     height = np.median([fit.contrast for fit in fits], axis=0)
     for m in range(theta.shape[1]):
         log_f, damping = (summarise(theta[:, m, p], error[:, m, p]) for p in range(2))

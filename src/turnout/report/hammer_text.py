@@ -115,7 +115,11 @@ def hammer_words(
         lines.append(_line("channels", _channels(turnout.hammer, str(unit.section))))
     lines += _quarantine_lines(rows.get("quarantine", ()))
     if rows.get("models"):
-        lines += _impact_lines(rows, turnout.settings["receptance"])
+        lines += (
+            _impact_lines(rows, turnout.settings["receptance"])
+            if rows.get("impacts")
+            else [_line("impacts", "none could be judged: the files hold averaged frequency responses")]
+        )
         lines += _gate_lines(rows, turnout.settings)
         lines += [line for band in _bands(rows) for line in _resonance_lines(band, rows)]
         lines += _reason_lines(rows["models"][0])
@@ -155,6 +159,8 @@ def _names(recordings: Sequence[Mapping[str, Any]]) -> dict[str, str]:
 
 def _file(row: Mapping[str, Any], name: str) -> str:
     one = "1 record" if row["n_records"] == 1 else f"{row['n_records']} records"
+    if not row["sampling_rate_hz"]:
+        return f"{name}: {row['n_channels']} frequency responses of {row['n_samples']} lines, {row['file_format']}"
     length = row["n_samples"] / row["sampling_rate_hz"]
     return f"{name}: {one} of {length:.3g} s at {row['sampling_rate_hz']:g} Hz, {row['file_format']}"
 
@@ -258,8 +264,8 @@ def _mode(mode: Mapping[str, Any]) -> str:
 
 def _stiffness_lines(mode: Mapping[str, Any], rows: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[str]:
     """Dynamic stiffness at the line nearest to the resonance; not with an exponential window, which changes it."""
-    row = rows["receptances"][0]
-    if row["window_decay_per_s"]:
+    row = next(iter(rows.get("receptances", ())), None)
+    if row is None or row["window_decay_per_s"]:
         return []
     frequency = np.asarray(row["frequency_hz"], dtype=float)
     h1 = np.asarray(row["h1_real_m_n"], dtype=float) + 1j * np.asarray(row["h1_imag_m_n"], dtype=float)

@@ -34,7 +34,7 @@ ROWS = {
             select *, max(measured_at_utc) over (partition by section_id) as newest_utc
             from models_current where {ID_GIVEN}
         )
-        where status = 'rejected' and coalesce(method, 'joint') <> 'paper' and measured_at_utc < newest_utc
+        where status = 'rejected' and coalesce(method, 'joint') = 'joint' and measured_at_utc < newest_utc
         order by section_id, measured_at_utc desc, model_id""",
     "receptances": f"select * from receptances_current where {ID_GIVEN} {NEWEST_MODEL}",
     "impacts": f"""

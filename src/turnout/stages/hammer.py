@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from datetime import timedelta
+from datetime import datetime, timedelta
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -27,10 +27,12 @@ from turnout.stages.common import (
     recording_row,
     time_contradiction,
 )
+from turnout.stages.hammer_responses import response_model, responses_of
 from turnout.stages.hammer_rows import (
     density_columns,
     impact_mode_row,
     impact_row,
+    mode_row,
     mode_rows,
     model_row,
     receptance_row,
@@ -89,7 +91,7 @@ def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root: str | Path, algo: 
             rows["recordings"].append(recording_row(result, path, size, description, base, "hammer"))
             recordings += result.recordings
     if not rows["recordings"]:
-        return rows
+        return _response_rows(unit, turnout, Path(raw_root), algo, base, rows)
     recordings = _with_common_rate(recordings, base, rows["quarantine"], ids)
     # all impacts of the campaign at once: a fault of a whole file shows in comparison with the others
     found = find_impacts(recordings, force, response, turnout.settings["receptance"])
@@ -100,15 +102,7 @@ def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root: str | Path, algo: 
     temperature = campaign.rail_temperature
     if temperature is None:
         temperature = rail_temperature(recordings)
-    inputs = sorted(r["recording_id"] for r in rows["recordings"])
-    identity = {
-        "model_id": content_id(
-            "model", *inputs, base["section_id"], unit.config_hash, algo, campaign.started_at, temperature
-        ),
-        "measured_at_utc": campaign.started_at,
-        "code_version": algo,
-        "config_hash": unit.config_hash,
-    }
+    identity = _identity(rows, unit, base, algo, campaign.started_at, temperature)
     used = [i for i in impacts if i.accepted]
     counts = len(used), len(impacts) - len(used)
     names = [f"{ids[i.source]}:{i.record}" for i in used]
@@ -147,6 +141,42 @@ def _cut(impacts: Sequence[Impact], settings: IdentifySettings) -> list[Impact]:
     shortest = settings.shortest_decay
     ends = [(i, i.decay_start + round(settings.duration * i.rate)) for i in impacts]
     return [replace(i, acceleration=i.acceleration[:end]) for i, end in ends if len(i.decay) >= shortest * i.rate]
+
+
+def _identity(
+    rows: Mapping[str, list[dict]],
+    unit: Unit,
+    base: Mapping[str, Any],
+    algo: str,
+    started_at: datetime | None,
+    temperature: float | None,
+) -> dict[str, Any]:
+    """Columns that a model and its modes share."""
+    inputs = sorted(r["recording_id"] for r in rows["recordings"])
+    return {
+        "model_id": content_id("model", *inputs, base["section_id"], unit.config_hash, algo, started_at, temperature),
+        "measured_at_utc": started_at,
+        "code_version": algo,
+        "config_hash": unit.config_hash,
+    }
+
+
+def _response_rows(
+    unit: Unit, turnout: TurnoutConfig, raw_root: Path, algo: str, base: dict[str, Any], rows: dict[str, list[dict]]
+) -> dict[str, list[dict]]:
+    """Rows of a unit without recordings: with a model where its files hold frequency responses."""
+    files = [(path, size) for path, size, _ in unit.files]
+    responses, rows["recordings"] = responses_of(files, raw_root, base, rows["quarantine"])
+    if responses is None:
+        return rows
+    campaign = turnout.campaigns[str(unit.campaign)]
+    model, detail = response_model(responses, turnout.settings["identify"])
+    identity = _identity(rows, unit, base, algo, campaign.started_at, campaign.rail_temperature)
+    row = model_row(model, base, identity, (0, 0), None) | {"sampling_rate_hz": None, "detail": detail}
+    return rows | {
+        "models": [row],
+        "modes": [mode_row(mode, base, identity, campaign.rail_temperature) for mode in model.modes],
+    }
 
 
 def hammer_config(turnout: TurnoutConfig) -> HammerConfig:

@@ -17,6 +17,7 @@ from turnout.config.load import read_notes
 from turnout.config.schema import suggestion
 from turnout.errors import ConfigError, ReadError
 from turnout.readers import read
+from turnout.readers.frequency_responses import find_responses
 from turnout.records import EMPTY_MAPPING, RawDescription, Unit
 from turnout.stages.hammer import hammer_config, hammer_unit
 from turnout.workflow.guard import compute_guarded
@@ -192,10 +193,19 @@ def _noted_day(paths: Sequence[Path], description: RawDescription) -> str:
         n_usable += len(result.recordings)
     if times:
         return min(times).date().isoformat()
-    if faults and not n_usable:
+    if faults and not n_usable and not any(map(_has_responses, paths)):
         raise faults[0]
     observation = "neither its name nor the file says on which day it was recorded"
     raise ConfigError(paths[0], "--campaign", observation, "Write --campaign YYYY-MM-DD")
+
+
+def _has_responses(path: Path) -> bool:
+    """Whether a file holds frequency responses, which have no time."""
+    real_path = os.path.realpath(path)
+    try:
+        return find_responses(os.path.basename(real_path), os.path.dirname(real_path)) is not None
+    except ReadError:
+        return False
 
 
 def _with_path(path: str | Path, error: ReadError) -> ReadError:

@@ -111,7 +111,7 @@ def section_models(turnout: str, work: str | Path = "work") -> dict[str, tuple[S
     by_section: dict[str, list[SectionModel]] = {}
     for result in current_results(work, "hammer", turnout):
         for row in result.tables.get("models", []):
-            if row["status"] in ("accepted", "second_order_only"):
+            if row["status"] in ("accepted", "second_order_only") and row["model_order"]:
                 label = row["section_id"].removeprefix(f"{turnout}/")
                 by_section.setdefault(label, []).append(_section_model(row))
     return {label: tuple(sorted(ms, key=lambda m: (m.measured_at, m.model_id))) for label, ms in by_section.items()}

@@ -9,6 +9,6 @@ select
     max(m.frequency_hz) filter (m.band = 'railpad') as railpad_hz,
     max(m.frequency_se_hz) filter (m.band = 'railpad') as railpad_se_hz
 from models_current o left join modes_current m using (model_id) left join campaigns c on c.campaign_id = o.campaign_id
-where o.turnout_id = turnout and o.method <> 'paper'
+where o.turnout_id = turnout and o.method = 'joint'
 group by all
 order by o.measured_at_utc desc, o.section_id;

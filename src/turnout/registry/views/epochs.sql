@@ -32,4 +32,4 @@ select
 from modes_current m
     asof left join resets r
     on m.section_id = r.section_id and m.band = r.band and m.measured_at_utc >= r.event_at_utc
-where m.method is distinct from 'paper';
+where coalesce(m.method, 'joint') = 'joint';

@@ -5,7 +5,7 @@ with measured as (
     select turnout_id, count(distinct section_id) as n_sections_measured, count(distinct campaign_id) as n_campaigns,
         max(measured_at_utc) as last_campaign_utc, count(*) filter (status = 'rejected') as n_models_rejected,
         count(*) filter (status <> 'rejected') as n_models
-    from models_current where method <> 'paper' group by turnout_id
+    from models_current where method = 'joint' group by turnout_id
 ),
 passed as (
     select turnout_id, count(*) as n_passages, max(passed_at_utc) as last_passage_utc

@@ -18,7 +18,7 @@ sample as (
     from modes_current m left join present p on m.section_id = p.section_id and m.band = p.band
     where m.measured_at_utc > coalesce("asof", newest_measurement()) - to_days(days)
         and m.measured_at_utc <= coalesce("asof", newest_measurement())
-        and m.method is distinct from 'paper'
+        and coalesce(m.method, 'joint') = 'joint'
         and (p.start_utc is null or m.measured_at_utc >= p.start_utc)
 ),
 sums as (

@@ -8,5 +8,5 @@ select
 from modes_current m
     asof left join (select * from resets r where r.section_id = section and r.band = resonance) e
     on m.section_id = e.section_id and m.band = e.band and m.measured_at_utc >= e.event_at_utc
-where m.section_id = section and m.band = resonance and m.method is distinct from 'paper'
+where m.section_id = section and m.band = resonance and coalesce(m.method, 'joint') = 'joint'
 order by m.measured_at_utc, m.source;
