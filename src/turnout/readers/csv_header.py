@@ -21,7 +21,7 @@ from turnout.readers.named_arrays import (
     START_NAMES,
     TIME_NAMES,
 )
-from turnout.readers.rate_words import is_rate_name
+from turnout.readers.rate_words import is_rate_name, rate_unit
 from turnout.readers.source import COPY_AGAIN, MEANINGLESS_UNITS, Source
 from turnout.readers.stated_scales import SCALE_WORDS, plain_word
 from turnout.readers.statements import Entry, entries_of_text
@@ -386,9 +386,14 @@ def _entries(lines: Sequence[str], separator: str, names: Sequence[str]) -> Iter
         if not text or _is_line_of(cells, names):
             continue
         found = [(a, b) for a, b in pairwise(cells) if a and b and not _is_number(a)]
+        for name, second, third in zip(cells, cells[1:], cells[2:]):  # "Abtastrate;25,6;kHz", "Abtastrate;kHz;25,6"
+            if name and _is_number(second) and rate_unit(third):
+                found = [(name, f"{second} {third}"), *(pair for pair in found if pair != (name, second))]
+            elif name and rate_unit(second) and _is_number(third):
+                found = [(name, f"{third} {second}"), *(pair for pair in found if pair != (name, second))]
         if len([cell for cell in cells if cell]) > 2 and i + 1 < len(table) and len(table[i + 1]) == len(cells):
             found += [(a, b) for a, b in zip(cells, table[i + 1]) if a and _is_number(b)]
-        if match := HEAD_LINE.match(text):
+        if (match := HEAD_LINE.match(text)) and len(cells) < 3:
             name = f"{match[1]} {match[2]}" if match[2] else match[1]
             found.append((name, match[3].strip(separator + ' "')))
         entries = [Entry(place, name.strip('"# '), value.strip('"')) for name, value in found]

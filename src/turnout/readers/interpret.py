@@ -15,7 +15,7 @@ import numpy as np
 from turnout.errors import ReadError
 from turnout.readers import stated_scales
 from turnout.readers.lazy import BlockReader, ChannelStatistics, channel_error
-from turnout.readers.rate_words import rate_unit
+from turnout.readers.rate_words import is_rate_name, rate_unit
 from turnout.readers.source import COPY_AGAIN, MEANINGLESS_UNITS, MIN_SAMPLES, RawFile, RawRecord, Source
 from turnout.readers.statements import resolve
 from turnout.readers.time_axes import all_statements, is_axis_name
@@ -71,7 +71,9 @@ def channel_mappings(
         twice = next(i for i in indices if indices.count(i) > 1)
         raise source.error(where, f"the layout names the channel {record.names[twice]!r} twice", "Name each once")
     unknown = sorted(set(range(len(record.names))) - set(indices))
-    if unknown := [i for i in unknown if not is_axis_name(record.names[i], record.units[i])]:
+    if unknown := [
+        i for i in unknown if not is_axis_name(record.names[i], record.units[i]) and not is_rate_name(record.names[i])
+    ]:
         names = ", ".join(repr(record.names[i]) for i in unknown)
         raise source.error(
             where,

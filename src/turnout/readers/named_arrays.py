@@ -29,7 +29,7 @@ from turnout.readers.lazy import ARRAYS, Array, Column
 from turnout.readers.rate_words import is_rate_name
 from turnout.readers.source import CONDITIONS, RawFile, RawRecord, Source
 from turnout.readers.stated_scales import scale_problem, scale_statements
-from turnout.readers.statements import Entry, entries_of
+from turnout.readers.statements import MAX_ENTRIES, Entry, entries_of
 from turnout.readers.timing import start_fields
 
 RECORD_NAME = re.compile(r"^(?:record|rec|segment|impact|hit)[_ ]?(\d+)$", re.IGNORECASE)
@@ -533,7 +533,7 @@ def vectors(variables: Mapping[str, Any]) -> dict[str, Any]:
         name: v
         for name, v in variables.items()
         if isinstance(v, ARRAYS) and v.ndim == 1 and v.dtype.kind in "fiu" and v.size > 1
-        if name.lower() not in reserved_names and not is_rate_name(name)
+        if name.lower() not in reserved_names and not (is_rate_name(name) and v.size <= MAX_ENTRIES)
     }
     longest = max((v.size for v in candidates.values()), default=0)
     return {name: v for name, v in candidates.items() if 2 * v.size > longest}

@@ -17,6 +17,7 @@ from turnout.readers.named_arrays import RECORD_COUNT_NAMES, START_NAMES, TIME_N
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.stated_scales import scale_text
 from turnout.readers.statements import entries_of
+from turnout.readers.time_axes import seconds_since_first
 from turnout.readers.timing import start_fields
 
 
@@ -181,6 +182,5 @@ def _unit(field: pa.Field) -> str:
 def _seconds(time: np.ndarray) -> np.ndarray:
     """A time column in seconds; time stamps are counted from the first one."""
     if time.dtype.kind in "mM":
-        seconds = (time - time[0]).astype("timedelta64[ns]").astype(float) * 1e-9
-        return np.where(np.isnat(time), np.nan, seconds)
+        return seconds_since_first(time)
     return np.asarray(time, dtype=float)

@@ -10,6 +10,7 @@ import re
 import unicodedata
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 
 SAMPLING = re.compile(
     r"sampl|sampel|abtast|tastrate|echantill|muestr|campion|bemonster|aftast|scan|acqui|adqui|erfass|prove"
@@ -96,6 +97,7 @@ class RateUnit:
     is_sampling: bool = False
 
 
+@lru_cache(maxsize=4096)
 def rate_unit(text: str) -> RateUnit | None:
     """Unit of a sampling rate or a time step.
 
@@ -182,6 +184,7 @@ class NameMeaning:
 NAME_WITH_UNIT = re.compile(r"^(.*?)\s*[\[({]([^\[\](){}]*)[\])}]\s*$")
 
 
+@lru_cache(maxsize=4096)
 def name_meaning(name: str) -> NameMeaning:
     """What the name of an entry says about sampling rate and time step.
 

@@ -22,7 +22,7 @@ from turnout.readers.source import Source
 
 MAX_CLOCK_DRIFT = 1e-4  # relative: two clocks of one logger with separate crystals may differ by this much
 PLAUSIBLE_RATES = (10.0, 1e8)  # Hz: no vibration is sampled outside; a possible statement outside means something else
-USUAL_RATES = (100.0, 1e6)  # Hz: of two readings of a number, "25.600" as 25.6 or 25600, the one inside is meant
+USUAL_RATES = (100.0, 1e6)  # Hz: "25.600" is 25600 and not 25.6; a number without unit outside may have another one
 MAX_WIDTH = 1e-3  # relative: a statement of fewer digits does not tell the rate; the layout or another one must
 MAX_ENTRIES = 64  # numbers of a list: longer ones are samples
 MAX_TEXT = 4000  # characters of a text that are searched
@@ -211,7 +211,7 @@ def entries_of_text(text: str, place: str) -> Iterator[Entry]:
             continue
         words = match[3].split()
         n_unit = next((n for n in (3, 2, 1) if rate_unit(" ".join(words[:n])) and len(words) >= n), 1)
-        name = match[1].strip() or " ".join(words[n_unit:])
+        name = match[1].strip() or " ".join(words[n_unit:]) or "number"
         yield Entry(place, name, f"{match[2]} {' '.join(words[:n_unit])}".strip())
 
 
@@ -319,7 +319,7 @@ def _intervals(number: Any, unit: RateUnit | None, is_step: bool | None, certain
     elif certainty == CERTAIN and is_step is not None:
         units = (RateUnit(is_step, Fraction(1)),)
         first = [i for r in readings(number) if (i := r.interval(Fraction(1), is_step))]
-        if not any(PLAUSIBLE_RATES[0] <= i.rate <= PLAUSIBLE_RATES[1] for i in first):
+        if not any(USUAL_RATES[0] <= i.rate <= USUAL_RATES[1] for i in first):
             units = tuple(u for u in ANY_UNIT if u.is_step == is_step)
     else:
         units = tuple(u for u in ANY_UNIT if is_step is None or u.is_step == is_step)

@@ -109,7 +109,12 @@ def is_axis_name(name: str, unit: str) -> bool:
 def _columns(record: RawRecord, measured: Set[int]) -> Iterator[tuple[str, np.ndarray, bool, int]]:
     """(place, values, whether in seconds, certainty) of the columns that are time axes."""
     for i, (name, unit, column) in enumerate(zip(record.names, record.units, record.samples)):
-        if i in measured or column.dtype.kind not in "fiu" or len(column) <= 2:
+        if i in measured or column.dtype.kind not in "fiumM" or len(column) <= 2:
+            continue
+        if column.dtype.kind in "mM":
+            stamps = np.asarray(column[:])
+            if (stamps != stamps[0]).any():
+                yield f"column {name!r}", seconds_since_first(stamps), True, CERTAIN
             continue
         known = rate_unit(unit) or next((rate_unit(w) for w in words_of(name)[1:][-1:] if w in TIME_UNITS), None)
         is_time_unit = known is not None and known.is_step
@@ -123,6 +128,23 @@ def _columns(record: RawRecord, measured: Set[int]) -> Iterator[tuple[str, np.nd
         certainty = CERTAIN if by_name or is_time_unit else POSSIBLY
         place = f"column {name!r}" if by_name or is_time_unit else f"column {name!r}, which rises evenly"
         yield place, np.asarray(column[:], dtype=float) * scale, is_time_unit, certainty
+
+
+def seconds_since_first(stamps: np.ndarray) -> np.ndarray:
+    """Seconds of time stamps or durations, counted from the first one.
+
+    Parameters
+    ----------
+    stamps : (n,) array of datetime64 or timedelta64
+        Time stamps.
+
+    Returns
+    -------
+    (n,) array of float
+        NaN for a missing time stamp. [s]
+    """
+    seconds = (stamps - stamps[0]).astype("timedelta64[ns]").astype(float) * 1e-9
+    return np.where(np.isnat(stamps), np.nan, seconds)
 
 
 def _rises_evenly(head: np.ndarray) -> bool:

@@ -391,3 +391,28 @@ def test_a_column_with_a_unit_of_the_layout_is_no_time_axis(tmp_path):
     assert is_rejected(outcome(tmp_path / "a.csv", described(TRUE, "odometer")), "may be a time axis", "unit")
     distance = RawChannel("odometer", "odometer", "ignored", unit="m")
     assert is_true(outcome(tmp_path / "a.csv", RawDescription((*SENSORS, distance), rate=TRUE)))
+
+
+HEADS = {
+    "Abtastrate;25,6;kHz": TRUE, "Abtastrate;kHz;25,6": TRUE, "Sample rate;25,600": TRUE, "Sample rate;25.600 Hz": TRUE,
+    "Messrate;25'600 Hz": TRUE, "# fs=25600 Hz, n=64": TRUE, "% recorded at 25.6 kHz sampling rate": None,
+    "Sample rate;25.6": None, "dt;0.0390625": None, "Logger 3, 25600 Hz, 2 channels": None,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("head", HEADS)
+def test_a_head_in_other_forms_is_compared_with_the_layout(head, tmp_path):
+    """A number that may have several units tells the rate only beside a layout."""
+    rows = "\n".join(";".join(f"{x:.12g}" for x in row) for row in SAMPLES.T)
+    (tmp_path / "a.csv").write_text(f"{head}\nforce [N];rail [m/s²]\n{rows}\n", encoding="utf-8")
+    assert is_true(outcome(tmp_path / "a.csv", described(TRUE)))
+    assert is_rejected(outcome(tmp_path / "a.csv", described(OTHER)), "20000 Hz")
+    found = outcome(tmp_path / "a.csv", described(None))
+    assert is_true(found) if HEADS[head] else is_true(found) or is_rejected(found)
+
+
+def test_a_channel_of_time_stamps_in_tdms_is_a_time_axis(tmp_path):
+    stamps = np.datetime64("2026-05-13T08:30:12") + np.round(np.arange(N_SAMPLE) / TRUE * 1e6).astype("timedelta64[us]")
+    write_tdms(tmp_path / "a.tdms", [], {"moment": stamps})
+    assert is_true(outcome(tmp_path / "a.tdms", described(TRUE, "moment")))
+    assert is_rejected(outcome(tmp_path / "a.tdms", described(OTHER, "moment")), "'moment'")
