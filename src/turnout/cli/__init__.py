@@ -22,6 +22,7 @@ COMMANDS: tuple[str, ...] = (
     "inspect",
     "layout",
     "nightly",
+    "paper",
     "passage",
     "plan",
     "query",

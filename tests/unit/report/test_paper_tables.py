@@ -1,0 +1,76 @@
+"""Tables 1 to 4 of the paper from a registry, in three forms."""
+
+import csv
+import io
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "registry"))
+
+from registry_rows import Bench, hammer_result
+
+from turnout.cli.main import main
+
+BLOCK = {
+    "a_block": [0.9986, -0.0307, 0.0307, 0.9824], "a_block_se": [0.0001, 0.0016, 0.0016, 0.0011],
+    "c_block": [0.3642, 1.2523], "c_block_se": [0.0537, 0.0226], "frequency_se_hz": 5.2, "damping_se": 0.02,
+    "stiffness_mn_m": 61.0, "stiffness_low_mn_m": 58.0, "stiffness_high_mn_m": 64.0,
+}  # fmt: skip
+
+
+@pytest.fixture
+def registry(tmp_path):
+    """Two campaigns of a section with the numbers of the paper's A7, low frequencies."""
+    (tmp_path / "work").mkdir()
+    bench = Bench(tmp_path)
+    results = [
+        hammer_result(section="A7", day=day, file=day, key=day, frequency=frequency, **BLOCK)
+        for day, frequency in (("2017-10-02", 98.0), ("2017-11-02", 99.45))
+    ]
+    for result in results:
+        result.tables["models"][0] |= {
+            "hammer_fit_pct": 73.3, "n_impacts_used": 30, "validation_fit_pct": 70.1, "n_validation": 29,
+            "sampling_rate_hz": 20e3,
+        }  # fmt: skip
+    bench.register(*results)
+    return str(bench.registry)
+
+
+def test_the_text_names_each_value_with_error_and_number(registry, capsys):
+    assert main(["paper", "t1", "--registry", registry]) == 0
+    text = capsys.readouterr().out
+    assert [line[:8] for line in text.splitlines() if line.startswith("Table")] == [f"Table {k}:" for k in (1, 2, 3, 4)]
+    assert "0.99860 ± 0.00010  -0.0307 ± 0.0016" in " ".join(text.split("A7", 1)[1].splitlines()[:1])
+    assert "99 ± 5" in text and "73.3" in text and "70.1" in text and "98 ± 5" not in text
+    assert "61 ± 3" in text
+
+
+def test_a_campaign_is_chosen_by_its_date(registry, capsys):
+    assert main(["paper", "t1", "--campaign", "2017-10-02", "--registry", registry, "--format", "csv"]) == 0
+    rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
+    (frequency,) = (r for r in rows if r["quantity"] == "frequency [Hz]")
+    assert (frequency["table"], frequency["section"], frequency["band"]) == ("3", "A7", "ballast")
+    assert (float(frequency["value"]), float(frequency["error"]), frequency["n"]) == (98.0, 5.2, "30")
+    a12 = next(r for r in rows if r["quantity"] == "a12")
+    assert (a12["table"], float(a12["value"]), float(a12["error"])) == ("1", -0.0307, 0.0016)
+    (second,) = (r for r in rows if r["quantity"] == "second response")
+    assert (second["value"], second["n"]) == ("70.1", "29")
+
+
+def test_latex_has_four_tables_and_no_bare_sign(registry, capsys):
+    assert main(["paper", "t1", "--registry", registry, "--format", "latex"]) == 0
+    text = capsys.readouterr().out
+    assert text.count(r"\begin{tabular}") == text.count(r"\end{table}") == 4
+    assert "±" not in text and r"$\pm$" in text
+    assert not any("%" in line.replace(r"\%", "") for line in text.splitlines())
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    (["t9"], "no model of 't9'. The registry has models of t1"),
+    (["t1", "--campaign", "2018-01-01"], "the newest are 2017-10-02, 2017-11-02"),
+])  # fmt: skip
+def test_an_unknown_turnout_or_campaign_is_an_error(registry, capsys, arguments, words):
+    assert main(["paper", *arguments, "--registry", registry]) == 2
+    assert words in capsys.readouterr().err
