@@ -4,7 +4,8 @@ Each data source that samples in time is a record; those that sample by distance
 are recognised by their time stamps and channels at any level, because releases moved them in the tree. Time stamps are
 nanoseconds since 1970 UTC, one per sample, and must agree with ``CommonTriggerFrequency``.
 
-Layout: OpenRail Association, RCM-DX Specification 2.0.
+Layout: OpenRail Association, RCM-DX Specification 2.0.2 (document 1.04 of 23.11.2023) and the drafts before it. Groups
+and attributes that a later release adds are ignored.
 """
 
 from contextlib import AbstractContextManager, nullcontext
@@ -96,7 +97,7 @@ def _record(group: h5py.Group, notes: dict[str, Any], source: Source) -> RawReco
     if modes != {"TIME"}:
         return None
     where = f"data source {group.name!r}"
-    stamps = group["timestamp"][()]
+    stamps = group["timestamp"][()].astype("int64")  # unsigned from 2.0.0 on: differences would wrap around
     data = [c["data"] for c in channels.values()]
     samples: list[Any] = [lazy_array(d) if source.lazy and is_large(d) else d[()] for d in data]
     for name, x in zip(channels, samples):

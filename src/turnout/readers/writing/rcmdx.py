@@ -1,6 +1,8 @@
-"""Writer of RCM-DX 2.0: a session per record, a measuring system, one data source, a channel group per channel.
+"""Writer of RCM-DX 2.0: one session, one measuring system, a data source per record, a channel group per channel.
 
-SECTION, POSITION and TOPOLOGY are left out because they describe a moving vehicle; so is the index ``timeindex``.
+Groups, attributes and their types are those of the specification 2.0.2 of the OpenRail Association (document 1.04),
+with the groups that it requires of every file: FILE, CONFIGURATION, and SECTIONS without an entry, since a fixed
+station travels over no track. TOPOLOGY is left out, as it may be where the network is described elsewhere.
 """
 
 from collections.abc import Sequence
@@ -13,19 +15,27 @@ import numpy as np
 from turnout.readers.rcmdx import EPOCH
 from turnout.readers.writing.encode import RecordToWrite, attributes, plain_conditions
 
+VERSION = {"Major": np.int16(2), "Minor": np.int16(0), "Feature": np.int16(2)}
 CHANNEL = {
-    "Element": "CHANNEL",
+    "Element": "Channel",
     "TriggerMode": "TIME",
-    "CommonTriggerDistance": np.float32(0),
-    "ChannelBasis": "ABSOLUTE",
-    "ChannelType": "MEASURED",
+    "CommonTriggerDistance": np.float64(0),
+    "ChannelBasis": "TOTAL",
+    "MoveDirAutoInvert": np.int8(0),
+    "MeasurementType": "MEASURED_VALUE",
     "Neighbor": "",
     "PositionOffset": np.float32(0),
 }
+# Columns of the table of travelled sections, with the type of their entries.
+SECTION_COLUMNS = {
+    "direction": "S8", "startTimestamp": "u8", "endTimestamp": "u8", "firstTrackOffset": "f8", "lastTrackOffset": "f8",
+    "trackInfoOffset": "f8", "trackId": "i4", "trackStartTimestamp": "u8", "trackEndTimestamp": "u8",
+    "trackKilometrage": "S10", "trackStartCoveredDistance": "f8", "trackEndCoveredDistance": "f8",
+}  # fmt: skip
 
 
 def write_raw(records: Sequence[RecordToWrite], path: Path, station: str = "TURNOUT") -> None:
-    """Write sessions, named by their first time stamp; records without a start time are put 1 min apart.
+    """Write one session, named by its first time stamp; records without a start time are put 1 min apart.
 
     Parameters
     ----------
@@ -34,34 +44,42 @@ def write_raw(records: Sequence[RecordToWrite], path: Path, station: str = "TURN
     path : Path
         File to write.
     station : str
-        Name of the measuring station; it is a part of the names of all groups.
+        Name of the measuring station, that of the platform group.
     """
+    starts = [(record.started_at or EPOCH + timedelta(minutes=k)).astimezone(UTC) for k, record in enumerate(records)]
+    stamps = [_stamps(record, start) for record, start in zip(records, starts)]
+    first = min(starts)
     with h5py.File(path, "w") as file:
         root = file.create_group("RCMDX")
-        root.attrs.update({"Major": np.int16(2), "Minor": np.int16(0), "RecordCount": np.int32(len(records))})
+        root.attrs.update({**VERSION, "RecordCount": np.int32(len(records))})
+        root.create_group("FILE").attrs.update(attributes({"Element": "File", "StructureVersion": "1"}))
         platform = root.create_group(station)
-        platform.attrs.update(attributes({"Name": station, "VehicleNumber": "", "Element": "PLATFORM"}))
-        for k, record in enumerate(records):
-            start = record.started_at or EPOCH + timedelta(minutes=k)
-            _session(platform, record, start.astimezone(UTC), station)
+        platform.attrs.update(attributes({"Element": "Platform", "VehicleNumber": ""}))
+        session = platform.create_group(first.strftime("%Y%m%d_%H%M%S.") + f"{first.microsecond // 1000:03d}")
+        times = {"StartTime": min(s[0] for s in stamps), "EndTime": max(s[-1] for s in stamps)}
+        session.attrs.update(attributes({"Element": "Session", **times}))
+        session.create_group("CONFIGURATION")
+        sections = session.create_group("SECTIONS")
+        sections.attrs.update(attributes({"Element": "Sections"}))
+        for name, kind in SECTION_COLUMNS.items():
+            sections.create_dataset(name, shape=(0,), dtype=kind)
+        system = session.create_group("VIBRATION")
+        system.attrs.update(attributes({"Element": "System"}))
+        for k, (record, record_stamps) in enumerate(zip(records, stamps)):
+            _data_source(system.create_group(f"RECORD_{k + 1:06d}", track_order=True), record, record_stamps)
 
 
-def _session(platform: h5py.Group, record: RecordToWrite, start: datetime, station: str) -> None:
+def _stamps(record: RecordToWrite, start: datetime) -> np.ndarray:
+    """(n,) time stamps of the samples. [ns since 1970 UTC]"""
     first = int((start - EPOCH) / timedelta(microseconds=1)) * 1000
-    n = len(record.samples[0])
-    stamps = first + np.round(np.arange(n) * (1e9 / record.rate)).astype("int64")
-    name = start.strftime("%Y%m%d_%H%M%S.") + f"{start.microsecond // 1000:03d}"
-    session = platform.create_group(name)
-    times = {"StartTime": stamps[0], "EndTime": stamps[-1]}
-    session.attrs.update(attributes({"Element": "SESSION", **times, **plain_conditions(record.conditions)}))
-    system = session.create_group(f"{station}.VIBRATION")
-    system_attributes = {"Element": "MEASURINGSYSTEM", "Family": "VIBRATION", "Revision": "1", "InstanceVersion": "1"}
-    system.attrs.update(attributes(system_attributes))
-    source = system.create_group(f"{system.name.rpartition('/')[2]}.SAMPLES", track_order=True)
-    source.attrs.update(attributes({"Element": "DATASOURCE"}))
-    source.create_dataset("timestamp", data=stamps, chunks=stamps.shape, compression="gzip", fletcher32=True)
-    for channel, unit, samples in zip(record.names, record.units, record.samples):
-        group = source.create_group(f"{station}.VIBRATION.SAMPLES.{channel}")
-        group.attrs.update(attributes({**CHANNEL, "CommonTriggerFrequency": np.float32(record.rate)}))
-        data = group.create_dataset("data", data=samples, chunks=samples.shape, fletcher32=True)
+    return (first + np.round(np.arange(len(record.samples[0])) * (1e9 / record.rate)).astype("int64")).astype("uint64")
+
+
+def _data_source(group: h5py.Group, record: RecordToWrite, stamps: np.ndarray) -> None:
+    group.attrs.update(attributes({"Element": "Datasource", **plain_conditions(record.conditions)}))
+    group.create_dataset("timestamp", data=stamps, chunks=stamps.shape, compression="gzip", fletcher32=True)
+    for name, unit, samples in zip(record.names, record.units, record.samples):
+        channel = group.create_group(name)
+        channel.attrs.update(attributes({**CHANNEL, "CommonTriggerFrequency": np.float64(record.rate)}))
+        data = channel.create_dataset("data", data=samples, chunks=samples.shape, fletcher32=True)
         data.attrs.update(attributes({"Unit": unit}))
