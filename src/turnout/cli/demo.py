@@ -63,10 +63,10 @@ def run(args: argparse.Namespace) -> int:
     print(f"   {n} files below raw/. What is true of them lies below truth/, which the pipeline does not read.")
     if args.only_raw:
         return 0
-    print("2. The pipeline: plan, hammer tests, registry, trends, pages", flush=True)
+    print("2. The pipeline; all of its output is in logs/workflow.log", flush=True)
     last = max(campaign_days(args.campaigns))  # list and pages of that day, not of one years later
     code = run_pipeline(cores, "--config", f"day={last}")
     if code == 0:
         print("3. What was found\n", flush=True)
-        print_summary("results/registry", "results/pages")
+        print_summary("results/registry", "results/pages", day=last.isoformat(), truth="truth")
     return code

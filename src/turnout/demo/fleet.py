@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import os
-import subprocess
 import sys
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
@@ -21,6 +20,7 @@ import turnout.demo.scenario as faults
 from turnout.config import load_configuration
 from turnout.demo.hammer import hammer_test, simulated_response
 from turnout.demo.passages import make_passage, make_passages
+from turnout.demo.progress import run_with_progress
 from turnout.demo.scenario import FLEET, SECTIONS, campaign_days, gap_under, rail_temperature, stiffness_factors
 from turnout.readers.writing import write
 from turnout.workflow.project import snakefile_options
@@ -172,7 +172,7 @@ def _write_truth(
 
 
 def run_pipeline(cores: int, *options: str) -> int:
-    """Run Snakemake as a user would.
+    """Run Snakemake as a user would, with a line per stage; its output goes to ``logs/workflow.log``.
 
     Parameters
     ----------
@@ -187,4 +187,4 @@ def run_pipeline(cores: int, *options: str) -> int:
         Its exit code.
     """
     command = [sys.executable, "-m", "snakemake", *snakefile_options(Path()), "--cores", str(cores), *options]
-    return subprocess.run(command).returncode
+    return run_with_progress(command, Path("logs/workflow.log"))

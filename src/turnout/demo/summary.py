@@ -7,6 +7,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from turnout.demo.comparison import compare, comparison_table
+from turnout.registry.as_of import list_day, whole_list
 from turnout.registry.database import open_registry
 
 if TYPE_CHECKING:
@@ -37,8 +39,14 @@ QUARANTINE_QUERY = """
 WORKLIST_QUERY = "select coalesce(section_id, turnout_id), band, state, sentence from worklist order by rank limit 5"
 
 
-def print_summary(registry: Path | str, pages: Path | str, say: Callable[[str], object] = print) -> None:
-    """Print counts, quarantine, tomorrow's list, the folder of the pages, and three queries to try.
+def print_summary(
+    registry: Path | str,
+    pages: Path | str,
+    say: Callable[[str], object] = print,
+    day: str | None = None,
+    truth: Path | str | None = None,
+) -> None:
+    """Print counts, quarantine, tomorrow's list, found against true, the folder of the pages, and queries to try.
 
     Parameters
     ----------
@@ -48,6 +56,10 @@ def print_summary(registry: Path | str, pages: Path | str, say: Callable[[str], 
         Folder of the pages.
     say : callable
         Called with each line of text.
+    day : str or None
+        Day of the comparison with the truth, YYYY-MM-DD; None: today.
+    truth : path or None
+        Folder of the truth; None: no comparison.
     """
     with open_registry(registry) as connection:
         counts = dict(zip((d[0] for d in connection.execute(COUNTS_QUERY).description), connection.fetchall()[0]))
@@ -59,9 +71,14 @@ def print_summary(registry: Path | str, pages: Path | str, say: Callable[[str], 
         for path, reason, observation, n in connection.execute(QUARANTINE_QUERY).fetchall():
             say(f"      {path}: {reason}, {observation}" + (f" ({n} such records)" if n > 1 else ""))
         rows = connection.execute(WORKLIST_QUERY).fetchall()
+        table = ""
+        if truth is not None and Path(truth).is_dir():
+            table = comparison_table(compare(connection, Path(truth), whole_list(list_day(connection, day))))
     say("\n   Tomorrow's list, its first rows:" if rows else "\n   Tomorrow's list is empty.")
     for section, band, state, sentence in rows:
         say(f"      {section} {band}: {state}. {sentence}")
+    if table:
+        say("\n   Found against true:\n      " + table.replace("\n", "\n      "))
     say(f"\n   Pages: {Path(pages).resolve() / 'index.html'}")
     say(f"   Registry: {registry}/registry.duckdb, for any tool that speaks DuckDB. Three questions to try:")
     for question, sql in QUESTIONS:
