@@ -1,0 +1,44 @@
+"""The documentation site builds without a warning, loads nothing from elsewhere, and lists every command."""
+
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+
+from turnout.cli import COMMANDS
+from turnout.cli.main import EXIT_CODES
+
+
+def test_the_page_of_commands_lists_every_command_and_exit_code(repository):
+    text = (repository / "docs" / "commands.md").read_text(encoding="utf-8")
+    listed = re.findall(r"^\| [^|]+ \| `(\w+)` \| ", text, re.M)
+    assert sorted(listed) == sorted(COMMANDS), "one row per command in docs/commands.md, with its group and HELP"
+    codes = re.findall(r"^  (\d+) ", EXIT_CODES, re.M)
+    assert re.findall(r"^\| (\d+) \|", text, re.M) == codes
+
+
+@pytest.fixture(scope="module")
+def site(repository, tmp_path_factory):
+    missing = [name for name in ("mkdocs", "material", "mkdocstrings") if importlib.util.find_spec(name) is None]
+    if missing:
+        pytest.skip(f"the extra docs is not installed: no {', '.join(missing)}")
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
+    environment = os.environ | {"NO_MKDOCS_2_WARNING": "1"}
+    done = subprocess.run(command, cwd=repository, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+def test_the_site_has_a_search_that_needs_no_server(site):
+    assert (site / "search" / "search_index.json").stat().st_size > 100_000
+    assert "identify_modes" in (site / "modules.html").read_text(encoding="utf-8")
+
+
+def test_no_page_loads_anything_from_elsewhere(site):
+    loaded = re.compile(r"<(?:script|img|link[^>]*rel=.?stylesheet)[^>]*(?:src|href)=.?(https?://[^\s>\"']+)")
+    wrong = {(page.name, url) for page in site.rglob("*.html") for url in loaded.findall(page.read_text("utf-8"))}
+    assert not wrong
