@@ -14,6 +14,7 @@ import argparse
 
 from turnout.cli.options import add_configuration
 
+GROUP = "Set up"
 HELP = "make a layout from raw files"
 
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from turnout.mismatch.calibrated import Deviation, StateParameter
     from turnout.stages.calibrated_model import CalibratedModel
 
+GROUP = "Simulate and diagnose"
 HELP = "show the calibrated model of a turnout, from all of its visits"
 MAX_SD_RATIO = 0.95  # parameters that are hardly better known than before are counted, not listed
 

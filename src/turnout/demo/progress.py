@@ -84,13 +84,13 @@ def run_with_progress(command: Sequence[str], log: Path, say: Callable[[str], ob
             raise ValueError("the output of the process is not a pipe")
         lines = []
 
-        def logged() -> Iterable[str]:
+        def log_lines() -> Iterable[str]:
             for line in process.stdout or ():
                 stream.write(line)
                 lines.append(line.rstrip("\n"))
                 yield lines[-1]
 
-        for text in stage_lines(logged()):
+        for text in stage_lines(log_lines()):
             say(f"   {text}")
     code = process.wait()
     if code:
