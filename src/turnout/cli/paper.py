@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     import duckdb
 
+GROUP = "Simulate and diagnose"
 HELP = "print Tables 1 to 4 of the paper for a turnout and a campaign"
 
 
