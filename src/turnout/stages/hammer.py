@@ -17,6 +17,7 @@ from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.config.turnout import HammerConfig, TurnoutConfig
 from turnout.errors import ReadError
 from turnout.hammer_test import find_impacts, receptance_of
+from turnout.hammer_test.response_quality import find_track_impacts
 from turnout.modal import identify
 from turnout.records import Impact, ModalModel, Receptance, Recording, Rejection, Unit
 from turnout.registry.ids import content_id
@@ -94,7 +95,7 @@ def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root: str | Path, algo: 
         return _response_rows(unit, turnout, Path(raw_root), algo, base, rows)
     recordings = _with_common_rate(recordings, base, rows["quarantine"], ids)
     # all impacts of the campaign at once: a fault of a whole file shows in comparison with the others
-    found = find_impacts(recordings, force, response, turnout.settings["receptance"])
+    found = find_track_impacts(recordings, force, response, turnout.settings["receptance"])
     settings = turnout.settings
     impacts, receptance, model = identify_accepted(found, settings["receptance"], settings["identify"])
     tests = {path: _test_number(turnout, unit, path) for path in ids}

@@ -1,0 +1,81 @@
+"""The response of a track: factors of units, saturation before a filter, and lag are found; intact tests stay."""
+
+import runpy
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from turnout.config.settings.receptance import ReceptanceSettings
+from turnout.hammer_test.response_quality import ballast_stiffness, find_track_impacts, response_lag
+from turnout.records import Channel, Recording
+
+RATE = 20000.0
+CHANNELS = Channel("force", "force"), Channel("rail", "acceleration")
+
+
+@pytest.fixture(scope="module")
+def hits(shared_recordings):
+    """Ten impacts on modes at 160 and 560 Hz with 250 and 90 kg: (10, 2, 3000) force and acceleration."""
+    return np.array(runpy.run_path(str(shared_recordings / "gen.py"))["hits"]())
+
+
+def impacts_of(samples, settings=None):
+    recordings = [Recording(x, RATE, CHANNELS, source="a", record=k) for k, x in enumerate(samples)]
+    return find_track_impacts(recordings, "force", "rail", settings or ReceptanceSettings())
+
+
+def reasons_of(samples, settings=None):
+    return {r.reason for i in impacts_of(samples, settings) for r in i.rejections}
+
+
+def test_an_intact_test_is_accepted_with_the_stiffness_of_its_modes(hits):
+    impacts = impacts_of(hits)
+    assert all(i.accepted for i in impacts)
+    f = np.linspace(80.0, 250.0, 2000)
+    h = sum(1 / (m * (2 * np.pi) ** 2) / (f0**2 - f**2 + 2j * z * f0 * f)
+            for m, f0, z in ((250.0, 160.0, 0.08), (90.0, 560.0, 0.06)))  # fmt: skip
+    assert ballast_stiffness(impacts) == pytest.approx(1 / np.abs(h).max(), rel=0.01)
+    assert 0 <= np.median([response_lag(i) for i in impacts]) <= 5
+
+
+@pytest.mark.parametrize("factor", [9.80665, 1 / 9.80665, 1 / 4.4482, 1000.0, 0.001, 25.4, 1 / 25.4, 0.0353, 0.01])
+def test_factors_of_units_are_found(hits, factor):
+    """A response read 4.4 times too large is missing: 144 kg and 40 MN/m become those of a soft track."""
+    impacts = impacts_of(hits[:5] * [[1.0], [factor]])
+    assert {r.reason for i in impacts for r in i.rejections} == {"out_of_scale"}
+    detail = impacts[0].rejections[0].detail
+    assert (
+        "the impacts move" in detail or "the dynamic stiffness is" in detail
+    ) and "receptance.softest_blow: 0" in detail
+
+
+def test_a_small_hammer_on_a_beam_has_no_limits_of_a_track(hits):
+    assert not reasons_of(hits[:5] * [[0.01], [1.0]], ReceptanceSettings(softest_blow=0.0))
+
+
+def test_a_response_that_saturates_before_its_filter_is_found(hits):
+    sos = signal.butter(6, 0.9, output="sos")
+    rng = np.random.default_rng(3)
+    clipped = hits.copy()
+    clipped[:, 1] = signal.sosfiltfilt(sos, np.clip(hits[:, 1], -35, 35)) + rng.standard_normal((10, 3000)) * 0.05
+    impacts = impacts_of(clipped)
+    assert {r.reason for i in impacts for r in i.rejections} == {"overload"}
+    assert "whatever the force" in impacts[0].rejections[0].detail and impacts[0].rejections[0].channel == "rail"
+
+
+@pytest.mark.parametrize(("shift", "word"), [(-8, "before"), (200, "after")])
+def test_a_response_that_is_not_simultaneous_is_given_with_its_lag(hits, shift, word):
+    shifted = hits.copy()
+    shifted[:, 1] = np.roll(hits[:, 1], shift, axis=1)
+    undisturbed = np.median([response_lag(i) for i in impacts_of(hits)])
+    (rejection,) = impacts_of(shifted)[0].rejections
+    assert rejection.reason == "not_simultaneous"
+    assert rejection.value == shift + undisturbed
+    assert "rail begins" in rejection.detail and f"{word} the force" in rejection.detail
+
+
+def test_a_shift_by_the_filters_of_two_channels_is_accepted(hits):
+    shifted = hits.copy()
+    shifted[:, 1] = np.roll(hits[:, 1], 3, axis=1)
+    assert not reasons_of(shifted)
