@@ -17,7 +17,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("part", nargs="*", metavar="part", help="any of: " + ", ".join(available))
     parser.add_argument("--strict", action="store_true", help="exit code 1 where a bar is missed; 0 without it")
+    parser.add_argument("--seeds", metavar="N", help="faults: number of seeds (20)")
+    parser.add_argument("--first", metavar="SEED", help="faults: first seed (0)")
     args = parser.parse_args()
+    for name, value in (("TURNOUT_FAULT_SEEDS", args.seeds), ("TURNOUT_FIRST_SEED", args.first)):
+        if value is not None:
+            os.environ[name] = value
     names = args.part or available
     if unknown := set(names) - set(available):
         parser.error(f"no benchmark {', '.join(sorted(unknown))}; there are {', '.join(available)}")
