@@ -41,7 +41,7 @@ QUESTIONS = (
     "select path, reason_code from quarantine_open order by all",
 )
 N_TURNOUT, N_CALM = 4, 2  # turnouts; nights after the fault, the last of which must be right
-LONGEST_NIGHT = 60.0  # s; a longer night hangs
+LONGEST_NIGHT = 240.0  # s; a longer night hangs
 LAYOUT = """\
 sections: {A: {panel: CP, track: main, position: 1}}
 hammer:
