@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -241,9 +242,17 @@ def statements_of(entries: Iterable[Entry], k: int = 0, n: int = 1) -> list[Stat
     found: dict[tuple[str, str], Statement] = {}
     for entry in entries:
         for value in _values(entry.value, k, n):
-            for statement in _statements(entry, value):
+            if isinstance(value, (bool, np.bool_)) or not isinstance(value, (str, int, float, np.number)):
+                continue
+            for statement in _statements_of_value(entry.place, entry.name, value, type(value)):
                 found.setdefault((statement.place, statement.text), statement)
     return list(found.values())
+
+
+@lru_cache(maxsize=4096)
+def _statements_of_value(place: str, name: str, value: Any, kind: type) -> tuple[Statement, ...]:
+    """Statements of one value; the records of a file share most entries. Equal numbers of other types differ."""
+    return tuple(_statements(Entry(place, name, value), value))
 
 
 def _values(value: Any, k: int, n: int) -> list[Any]:
@@ -258,8 +267,6 @@ def _values(value: Any, k: int, n: int) -> list[Any]:
 
 def _statements(entry: Entry, value: Any) -> Iterator[Statement]:
     """The statements of one value of an entry."""
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (str, int, float, np.number)):
-        return
     meaning = name_meaning(entry.name)
     text = str(value).strip()
     shown = f"{entry.name}: {text[:40]}"
