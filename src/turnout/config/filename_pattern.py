@@ -1,6 +1,7 @@
 """File-name patterns such as ``hammer/{campaign}/{section}_{test}.{ext}``, which find and name raw files."""
 
 import re
+import unicodedata
 from functools import lru_cache
 
 from turnout.config.schema import suggestion
@@ -58,4 +59,4 @@ def compile_pattern(pattern: str, branch: str, sections: tuple[str, ...] = ()) -
             expression += re.escape(token)
     if missing := [f"{{{name}}}" for name in REQUIRED_FIELDS[branch] if name not in names]:
         raise ValueError(f"the pattern lacks {', '.join(missing)}")
-    return re.compile(expression)
+    return re.compile(unicodedata.normalize("NFC", expression))

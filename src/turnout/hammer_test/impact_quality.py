@@ -339,6 +339,10 @@ MIN_NOISE_LIMIT = 0.02
 MIN_SIGNAL_TO_NOISE = 5.0
 
 
+# Largest change of the peak response over the peak force between impacts of one tip on a linear track.
+MAX_RATIO_CHANGE = 1.3
+
+
 def judge_against_median(cuts: Sequence[Cut], settings: ReceptanceSettings) -> None:
     """Add to each cut the rejections that only a comparison with the whole test can show.
 
@@ -372,12 +376,15 @@ def judge_against_median(cuts: Sequence[Cut], settings: ReceptanceSettings) -> N
     # Peaks scatter by ratios: half and double the typical force are equally unusual.
     spread = MAD_TO_SD * float(np.median(np.abs(np.log(peak / median_peak))))
     median_noise = float(np.median(noise))
+    # A response that grew with the force shows that neither channel left its range: the hammer was swung harder.
+    ratio = largest / peak
+    is_proportional = np.abs(np.log(np.maximum(ratio, 1e-300) / np.median(ratio))) <= np.log(MAX_RATIO_CHANGE)
     for k, cut in enumerate(cuts):
         low = median_peak * min(settings.weak, np.exp(-settings.deviation * spread))
         high = median_peak * max(settings.out_of_range, np.exp(settings.deviation * spread))
         if peak[k] < low:
             _reject(cut, "weak", peak[k], low, f"{peak[k]:.4g} N, the test's median is {median_peak:.4g} N")
-        elif peak[k] > high:
+        elif peak[k] > high and not is_proportional[k]:
             _reject(cut, "overload", peak[k], high, f"{peak[k]:.4g} N, the test's median is {median_peak:.4g} N", force)
         limit = max(MIN_NOISE_LIMIT, settings.noise_over_median * median_noise)
         if noise[k] > limit and not cut.rejections:

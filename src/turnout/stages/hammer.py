@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import unicodedata
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -270,7 +271,9 @@ def _test_number(turnout: TurnoutConfig, unit: Unit, path: str) -> int:
     """Number of the test from the file's name; 0 if the name has no number there."""
     inside = str(PurePosixPath(path).relative_to(turnout.raw))
     labels = tuple(s.label for s in turnout.sections)
-    match = compile_pattern(hammer_config(turnout).files, "hammer", labels).fullmatch(inside)
+    match = compile_pattern(hammer_config(turnout).files, "hammer", labels).fullmatch(
+        unicodedata.normalize("NFC", inside)
+    )
     number = (match.groupdict().get("test") or "0") if match else "0"
     return int(number) if number.isdigit() and int(number) <= MAX_TEST_NUMBER else 0
 

@@ -1,6 +1,7 @@
 """Scan the raw folder of one turnout: group files into units, and report files that match no pattern."""
 
 import os
+import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -164,7 +165,7 @@ def scan(turnout: TurnoutConfig, raw_root: Path) -> Scan:
     folder = RawFolder(raw_root, turnout.raw)
     for inside, entry in folder.files:
         for kind, expression in names:
-            if match := expression.fullmatch(inside):
+            if match := expression.fullmatch(unicodedata.normalize("NFC", inside)):  # a Mac decomposes umlauts
                 matched.add(kind)
                 if wrong := _time_problem(match):
                     result.problems.append(ReadError(f"{turnout.raw}/{inside}", "file name", *wrong, "name_unknown"))

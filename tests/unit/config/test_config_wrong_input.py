@@ -7,6 +7,7 @@ import pytest
 from turnout.cli.main import main
 from turnout.config import load_configuration
 from turnout.config.campaign_notes import read_campaigns
+from turnout.config.filename_pattern import compile_pattern
 from turnout.config.turnouts_table import read_table
 from turnout.errors import ConfigError, ConfigErrors
 from turnout.readers.formats import FORMATS
@@ -256,6 +257,22 @@ HEADER = "turnout,section,date,kind\n"
 def test_a_small_hammer_may_clip_below_the_softest_blow_of_a_large_one(tmp_path):
     small = LAYOUT.replace("source: force, ", "source: force, limit: 22, ")
     assert configuration(tmp_path, layout=small, settings="receptance: {softest_blow: 0}").ids == ("t1", "t2")
+
+
+def test_a_unit_that_overrules_the_file_is_checked_without_its_mark(tmp_path):
+    """``unit: N!`` is what the reader proposes where file and layout differ."""
+    overruled = LAYOUT.replace("unit: V, sensitivity: 0.23, sensitivity_unit: mV/N", "unit: N!")
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+    assert overruled != LAYOUT and configuration(tmp_path / "a", layout=overruled).ids == ("t1", "t2")
+    with pytest.raises(ConfigErrors, match="'furlong!'"):
+        configuration(tmp_path / "b", layout=overruled.replace("N!", "furlong!"))
+
+
+def test_a_pattern_matches_names_with_composed_umlauts():
+    """A Mac writes an umlaut as a letter and a combining mark; names are composed before they are compared."""
+    decomposed = "hammer/{campaign}/Pru\u0308fung_{section}_{test}.{ext}"
+    assert compile_pattern(decomposed, "hammer", ("A7",)).fullmatch("hammer/2024-05-13/Pr\u00fcfung_A7_1.uff")
 
 
 def test_an_event_of_another_century_is_said_and_planned_work_is_no_fault(tmp_path, capsys):

@@ -79,3 +79,12 @@ def test_a_shift_by_the_filters_of_two_channels_is_accepted(hits):
     shifted = hits.copy()
     shifted[:, 1] = np.roll(hits[:, 1], 3, axis=1)
     assert not reasons_of(shifted)
+
+
+def test_a_stronger_impact_on_a_linear_track_is_used(hits):
+    """Three impacts in the ratio 3.9, 3.1 and 14, and four even ones with one of three and a half times their force."""
+    for peaks in ([3.9, 3.1, 14.0], [3.9, 3.8, 3.9, 4.0, 14.0]):
+        scaled = hits[: len(peaks)] * (np.array(peaks) * 100.0 / hits[: len(peaks), 0].max(axis=1))[:, None, None]
+        assert not reasons_of(scaled)
+    scaled[4, 1] *= 3.9 / 14.0  # the force channel overflowed: its response is that of a usual impact
+    assert "overload" in reasons_of(scaled)

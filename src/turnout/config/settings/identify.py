@@ -25,7 +25,9 @@ class IdentifySettings:
     railpad_low: float = setting(300.0, "Hz", "above the ballast band", minimum=1.0)
     railpad_high: float = setting(800.0, "Hz", "the paper's diverging sections reach 693 Hz", minimum=1.0)
     extra_bands: tuple[float, ...] = setting(
-        (), "Hz", "pairs low, high of further resonances to keep as other1, other2, ...: two more states for each"
+        (),
+        "Hz",
+        "[low, high, low, high, ...] of further resonances to keep as other1, other2 ...: two more states each",
     )
     order_maximum: int = setting(16, "", "16 states leave room for drift and eight modes", minimum=4, maximum=60)
     drift_maximum: int = setting(3, "", "highest degree of a polynomial drift of the zero; -1 for none", minimum=-1)
