@@ -76,7 +76,7 @@ def _alert(options: Sequence[str]) -> int:
     from turnout.workflow.nightly import GENERATION
 
     folders = [word.partition("=")[2] for word in options if word.startswith("configuration=")]
-    settings = load_configuration(*folders[:1]).settings["alerts"]
+    settings = load_configuration(folders[0] if folders else "config").settings["alerts"]
     if not has_channel(settings):
         return 0
     try:

@@ -115,7 +115,7 @@ def has_channel(settings: AlertsSettings) -> bool:
 
 def _channels(settings: AlertsSettings) -> dict[str, Callable[[Sequence[Mapping[str, Any]], AlertsSettings], None]]:
     """The configured channels and their functions."""
-    channels = {}
+    channels: dict[str, Callable[[Sequence[Mapping[str, Any]], AlertsSettings], None]] = {}
     if settings.recipients:
         channels["mail"] = _send_mail
     if _webhook(settings):
