@@ -18,12 +18,13 @@ LAWS = {
     "quadratic_spring": (QUADRATIC, "spring is stiffer on one side", (-3.0, 3.0)),
     "absolute_quadratic_spring": (ABSOLUTE, "spring force grows with the square of the displacement", (-3.0, 3.0)),
     "saturating_spring": (SOFTENING, "a further spring saturates", (-3.0, 3.0)),
-    "play": (PLAY, "spring is lost within a play of a tenth of the motion", (-3.0, 3.0)),
-    "dry_friction": (FRICTION, "dry friction opposes the motion", (0.0, 1.0)),
+    "play": (PLAY, "spring is lost within a play of a tenth of the motion", (0.0, 3.0)),
+    "dry_friction": (FRICTION, "dry friction opposes the motion", (0.0, 10.0)),
     "quadratic_drag": (DRAG, "drag grows with the square of the velocity", (0.0, 3.0)),
     "cubic_damping": (CUBIC_DAMPING, "damping force grows with the cube of the velocity", (-1.0, 3.0)),
     "state_damping": (STATE_DAMPING, "damping grows with the square of the displacement", (-1.0, 3.0)),
 }
+LOWEST_FREQUENCY = 1e-3  # of the prior mean
 SOURCE = "Kerschen et al. 2006, Past, present and future of nonlinear system identification in structural dynamics"
 
 
@@ -133,7 +134,10 @@ class OscillatorCase(Case):
         self.inputs = {name: (_step_inputs(u), y) for name, _, u, y in (*records, *reserved)}
         self.observations = tuple(self._observation(*r, tolerance) for r in records)
         self.reserved = tuple(self._observation(*r, tolerance) for r in reserved)
-        prior_table = [("frequency", "Hz", frequency, (0.0, np.inf)), ("damping", "-", damping, (0.0, 1.0))]
+        if not frequency[0] > 0.0:
+            raise ValueError(f"the prior mean of the frequency is {frequency[0]:g} Hz; it must be above 0")
+        lowest = LOWEST_FREQUENCY * frequency[0]  # at 0 Hz there is no spring, and laws have no scale
+        prior_table = [("frequency", "Hz", frequency, (lowest, np.inf)), ("damping", "-", damping, (0.0, 1.0))]
         prior_table += [("gain", "-", gain, (-np.inf, np.inf))]
         prior_table += [("offset", "V", (0.0, offset), (-np.inf, np.inf))] if offset else []
         self.nuisances = tuple(Nuisance(n, u, *prior, bounds=b) for n, u, prior, b in prior_table)

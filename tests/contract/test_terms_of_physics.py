@@ -87,6 +87,22 @@ class TestTerm:
             assert len(sentence.split()) >= 3 and sentence[0].isupper() and not sentence.endswith(".")
         assert term.message
         assert not term.message_negative or size.bounds[0] < 0.0, "the size cannot be negative"
+        assert not term.left_out_negative or size.bounds[0] < 0.0, "the size cannot be negative"
+
+    def test_what_it_says_follows_the_sign_of_its_size(self, term):
+        """A sentence with a direction, such as "gives more", has another one for a negative size."""
+        size = term.parameters[0]
+        if size.bounds[0] >= 0.0:
+            return
+        direction = re.compile(r"\b(more|stiffens?|soften|softens|lags?|late|dips?|yields|lose|rise|above|below)\b")
+        assert bool(direction.search(term.message)) <= bool(term.message_negative)
+        assert bool(direction.search(term.left_out)) <= bool(term.left_out_negative)
+        if term.left_out_negative:
+            amount = 0.5 * max(size.bounds[0], -size.bounds[1])
+            negative = dataclasses.replace(term.example(), **{size.name: amount}).sentence()
+            positive = dataclasses.replace(term.example(), **{size.name: -amount}).sentence()
+            assert "-" not in negative.replace("wheel-rail", "")
+            assert re.sub(r"[\d.]+", "", negative) != re.sub(r"[\d.]+", "", positive)
         assert len(term.site_check.split()) >= 4 and not term.site_check.endswith(".")
         assert not term.separating_test or term.separating_test.split()[0].islower()
 

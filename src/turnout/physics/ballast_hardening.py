@@ -35,7 +35,11 @@ class BallastHardening(PhysicsTerm):
 
     name = "ballast_hardening"
     left_out = "ballast under sleepers {first} to {last} stiffens by {hardening:.2f} at a deflection of 1 mm"
+    left_out_negative = (
+        "ballast under sleepers {first} to {last} softens by {hardening_size:.2f} at a deflection of 1 mm"
+    )
     message = "The ballast about {place} stiffens under load"
+    message_negative = "The ballast about {place} softens under load"
     site_check = "Look for fine material or frost in this ballast; compare its settlement under a heavy train"
     effect_type = "port"
     frame = "amplitude"

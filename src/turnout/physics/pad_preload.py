@@ -30,7 +30,9 @@ class PadPreload(PhysicsTerm):
 
     name = "pad_preload"
     left_out = "pads stiffen by {slope:.0f} N/m per newton of seat load"
+    left_out_negative = "pads soften by {slope_size:.0f} N/m per newton of seat load"
     message = "The rail pads stiffen under load"
+    message_negative = "The rail pads soften under load"
     site_check = (
         "Do a hammer test on the rail beside a standing train: what an impact on unloaded track says is too soft"
     )

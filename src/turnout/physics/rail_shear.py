@@ -31,7 +31,9 @@ class RailShear(PhysicsTerm):
 
     name = "rail_shear"
     left_out = "the rail yields in shear by {flexibility:.2f} per giganewton more"
+    left_out_negative = "the rail yields in shear by {flexibility_size:.2f} per giganewton less"
     message = "The rail gives more in shear than the simulation's"
+    message_negative = "The rail gives less in shear than the simulation's"
     site_check = "Check the rail profile in the track's file"
     effect_type = "matrix"
     frame = "condition"

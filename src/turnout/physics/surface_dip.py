@@ -37,7 +37,9 @@ class SurfaceDip(PhysicsTerm):
 
     name = "surface_dip"
     left_out = "the running surface dips by {depth:.5f} m over {length:.2f} m near {place:.2f} m"
+    left_out_negative = "the running surface rises by {depth_size:.5f} m over {length:.2f} m near {place:.2f} m"
     message = "The running surface has a dip of {depth} over {length} at {place}"
+    message_negative = "The running surface has a hump of {depth_size} over {length} at {place}"
     site_check = "Measure the running surface there with a straightedge; weld or grind"
     separating_test = "passages at another speed"
     effect_type = "path"
@@ -72,7 +74,7 @@ class SurfaceDip(PhysicsTerm):
 
     def sentence(self) -> str:
         """Sentence that states what was left out."""
-        return self.left_out.format(**{**vars(self), "place": self.deepest_position})
+        return self._sentence_with(place=self.deepest_position)
 
     def paths(self, track: Track | None, vehicle: Vehicle | None) -> Sequence[Callable[..., np.ndarray]]:
         """A cosine and a kink of the same length."""

@@ -77,6 +77,8 @@ class PhysicsTerm:
         What it is fixed to, one of ``FRAMES``.
     left_out : str
         Sentence that states what the base model lacked, with the fields in braces.
+    left_out_negative : str
+        The same if the first parameter is negative, with absolute values as ``<name>_size``; "" if it is the same.
     message : str
         Sentence of a finding to the person who inspects the track, without a full stop. In braces: ``place``,
         ``channel``, ``train``, ``wheel``, every parameter with its unit, and its absolute value as ``<name>_size``.
@@ -144,6 +146,7 @@ class PhysicsTerm:
     frame: ClassVar[str] = ""
 
     left_out: ClassVar[str] = ""
+    left_out_negative: ClassVar[str] = ""
     message: ClassVar[str] = ""
     message_negative: ClassVar[str] = ""
     message_unbounded: ClassVar[str] = ""
@@ -383,7 +386,14 @@ class PhysicsTerm:
 
     def sentence(self) -> str:
         """Sentence that states what was left out, with the numbers of this term."""
-        return self.left_out.format(**vars(self))
+        return self._sentence_with()
+
+    def _sentence_with(self, **fields: Any) -> str:
+        """The sentence for the sign of the first parameter, with these ``fields`` in place of those of the term."""
+        sizes = {f"{p.name}_size": abs(getattr(self, p.name)) for p in self.parameters}
+        is_negative = bool(self.parameters) and getattr(self, self.parameters[0].name) < 0.0
+        template = self.left_out_negative if self.left_out_negative and is_negative else self.left_out
+        return template.format(**{**vars(self), **sizes, **fields})
 
     def check(self) -> None:
         """Raise SimulationError if a parameter is outside its bounds."""

@@ -31,6 +31,7 @@ class TimeOffset(TransferTerm):
 
     name = "time_offset"
     left_out = "channel {channel_name} comes {delay:.5f} s late"
+    left_out_negative = "channel {channel_name} comes {delay_size:.5f} s early"
     message = "Channel {channel} lags by {delay}"
     message_negative = "Channel {channel} is early by {delay_size}"
     site_check = "Check the clock of this channel"

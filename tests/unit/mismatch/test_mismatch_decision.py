@@ -52,6 +52,7 @@ CASES = {
     "weak_and_contradicted": ([score(gain=23.0)], 0.9, {"consistent": False}),
     "reserved_not_predicted": ([score(gain=25.0)], 0.9, {"consistent": False}),
     "residual_has_structure": ([score()], 2.0, {"structure": 0.5, "residual_excess": 1.5}),
+    "value_without_meaning": ([score(size=-0.0034)], 2.0, {}),
     "single_witness": ([score(single_witness="day 2")], 2.0, {}),
     "condition_contradicts": ([score(worst=-9.0)], 2.0, {}),
     "size_at_limit": ([score(size=0.05, flags={"limit_form": "gap"}), score("gap", 20.0)], 2.0, {}),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -305,8 +305,15 @@ def is_same_site(candidate: Candidate, accepted: Candidate) -> bool:
         return False
     is_same_effect = candidate.family == accepted.family
     max_distance = THRESHOLDS.same_effect_distance if is_same_effect else THRESHOLDS.same_site_distance
-    is_near = "place" in a and "place" in b and abs(a["place"] - b["place"]) < max_distance
+    is_near = "place" in a and "place" in b and _distance(a["place"], b["place"]) < max_distance
     return is_near or any(k in a and a[k] == b.get(k) for k in ("sensor", "train"))
+
+
+def _distance(first: Any, second: Any) -> float:
+    """Distance between two positions [m]. Positions in words are equal, or infinitely far from each other."""
+    if isinstance(first, (int, float)) and isinstance(second, (int, float)):
+        return abs(first - second)
+    return 0.0 if first == second else np.inf
 
 
 def scaled_start(candidate: Candidate, k: int, share: float) -> np.ndarray:

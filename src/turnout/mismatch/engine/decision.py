@@ -119,6 +119,8 @@ EFFECT_RULES: tuple[Rule[EffectEvidence], ...] = (
          "{e.leader.family} does not hold on conditions it was not fitted to", HOW),
     Rule("residual_has_structure", lambda e: e.structure > e.settings.structure_left and e.residual_excess > 1.0,
          "unknown", "a free law still explains {e.structure:.0%} of what {e.leader.family} leaves", HOW),
+    Rule("value_without_meaning", lambda e: not e.leader.has_meaning, "unknown",
+         "{e.leader.family} would have a value that is physically impossible", HOW),
     Rule("single_witness", lambda e: e.leader.single_witness, "unknown",
          "{e.leader.family} hangs on {e.leader.single_witness} alone, which others do not confirm", ENDS),
     Rule("condition_contradicts", lambda e: e.contradicted, "unknown",
@@ -151,6 +153,9 @@ PAIR_RULES: tuple[Rule[PairEvidence], ...] = (
     Rule("first_adds_too_little", lambda e: e.first_is_redundant, "second", "", PAIRS),
     Rule("second_predicts_reserved_worse", lambda e: e.second_predicts_worse, "first",
          "something else shows beside it: {e.second.names[0]}, which predicts held-out recordings worse", PAIRS),
+    Rule("second_does_not_improve_reserved", lambda e: e.second_improves_nothing, "first",
+         "something else shows beside it: {e.second.names[0]}, with which held-out recordings are predicted no better",
+         PAIRS),
     Rule("both_stand", _always, "all", "", PAIRS),
 )
 
@@ -166,6 +171,8 @@ NAME_RULES: tuple[Rule[NameEvidence], ...] = (
 RESERVED_RULES: tuple[Rule[ReservedEvidence], ...] = (
     Rule("reserved_predicted_worse", lambda e: e.is_single_name_of_grade_b and e.verification.is_worse, "unknown",
          "{e.verdict.names[0]} leaves more than intact turnouts do and predicts held-out recordings worse", ENDS),
+    Rule("reserved_fit_falls", lambda e: e.is_single_name and e.verification.falls_clearly, "unknown",
+         "with {e.verdict.names[0]} the fit of held-out recordings falls by two standard errors", HOW),
     Rule("reserved_not_explained",
          lambda e: e.verdict.answer == "none" and e.verification.reserved_excess > THRESHOLDS.max_reserved_excess,
          "unknown", "held-out recordings are not predicted as in intact turnouts", HOW),

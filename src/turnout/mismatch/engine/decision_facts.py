@@ -227,6 +227,11 @@ class ReservedEvidence:
         return self.verdicts[0]
 
     @property
+    def is_single_name(self) -> bool:
+        """Whether there is one effect alone, with a name of any grade."""
+        return len(self.verdicts) == 1 and self.verdict.answer == "named"
+
+    @property
     def is_single_name_of_grade_b(self) -> bool:
         """Whether there is one effect alone, named with grade B."""
-        return len(self.verdicts) == 1 and self.verdict.answer == "named" and self.verdict.grade == "B"
+        return self.is_single_name and self.verdict.grade == "B"

@@ -260,6 +260,7 @@ def _credible_evidence(case: Case, witnesses: Sequence[SpaceEvidence]) -> Iterat
 def _location_of_candidate(score: Score) -> Location:
     where = score.candidate.where
     position = where.get("place")
+    position = position if isinstance(position, (int, float)) else None  # words have no coordinate
     return Location(
         score.candidate.frame, score.candidate.key, score.gain, position, position, position, where.get("sensor"),
         where.get("train"), where.get("axle"),

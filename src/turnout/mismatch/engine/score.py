@@ -60,6 +60,18 @@ class Score:
         uncertainty = rules.min_significance * float(self.estimates[1][0]) if rules.min_significance else 0.0
         return size - uncertainty >= rules.smallest_reportable
 
+    @property
+    def has_meaning(self) -> bool:
+        """Whether every parameter has a value that is physically possible: finite, and within its bounds.
+
+        A play below 0 is none, for example.
+        """
+        if not self.candidate.parameters:
+            return True
+        values, bounds = self.estimates[0], np.array([p.bounds for p in self.candidate.parameters])
+        slack = THRESHOLDS.bound_slack * (bounds[:, 1] - bounds[:, 0])
+        return bool(np.all((values >= bounds[:, 0] - slack) & (values <= bounds[:, 1] + slack)))
+
     def exemption_reason(self, settings: MismatchSettings) -> str:
         """Reason why the residual of the fit does not count against the candidate.
 

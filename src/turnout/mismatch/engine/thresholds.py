@@ -61,6 +61,9 @@ class Thresholds:
     max_ordinary_spreads: float = threshold(
         3.0, "spreads", "similar components differ by less: one in 370 intact ones is beyond", PARTS
     )
+    bound_slack: float = threshold(
+        1e-9, "share of the bounds", "by which a value at its bound may exceed it", "numerical"
+    )
     min_siblings: int = threshold(6, "components", "fewer similar ones give no spread", "convention")
     max_numerical_error: float = threshold(
         1.0 / 9.0, "of the tolerated mean square", "a third of the tolerated error is material", GUIDE

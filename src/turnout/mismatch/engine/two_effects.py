@@ -178,7 +178,7 @@ class PairEvidence:
     @property
     def both_stand(self) -> bool:
         """Whether there are two effects, of which neither is redundant."""
-        return self.is_pair and not self.first_is_redundant and not self.second_predicts_worse
+        return self.is_pair and not self.first_is_redundant and not self.second_fails_reserved
 
     @cached_property
     def second_alone(self) -> Fit | None:
@@ -266,6 +266,34 @@ class PairEvidence:
         if not self.is_pair or not self.search.case.reserved:
             return False
         return self._predicts_worse_than(self.first.scores[0].fit) and self._predicts_worse_than(self.converged_first)
+
+    @cached_property
+    def second_improves_nothing(self) -> bool:
+        """Whether the reserved recordings show the second effect, and the pair predicts them no better than the first.
+
+        They show it if its part of the prediction is large enough for the evidence that a name needs.
+        """
+        if not self.is_pair or not self.search.case.reserved:
+            return False
+        return self._improves_nothing_over(self.first.scores[0].fit) and self._improves_nothing_over(
+            self.converged_first
+        )
+
+    @property
+    def second_fails_reserved(self) -> bool:
+        """Whether the reserved recordings withdraw the second effect."""
+        return self.second_predicts_worse or self.second_improves_nothing
+
+    def _improves_nothing_over(self, first_alone: Fit) -> bool:
+        case = self.search.case
+        (before, before_percent), (after, after_percent) = (
+            reserved_fit(case, fit) for fit in (first_alone, self.findings.fit)
+        )
+        if before is None or after is None or before_percent is None or after_percent is None:
+            return False
+        changes = zip(case.reserved, before, after)
+        evidence = 0.5 * sum(o.effective * float(np.sum(o.whiten(a - b) ** 2)) for o, b, a in changes)
+        return evidence >= self.search.settings.threshold and after_percent <= before_percent
 
     def _predicts_worse_than(self, first_alone: Fit) -> bool:
         case = self.search.case
