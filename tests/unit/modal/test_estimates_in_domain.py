@@ -14,10 +14,11 @@ from turnout.demo.hammer import hammer_test as simulate_test
 from turnout.demo.hammer import simulated_response
 from turnout.hammer_test import find_impacts
 from turnout.modal import identification, identify
-from turnout.modal.joint import identify_joint
+from turnout.modal.joint import _failure_of_mean, identify_joint
 from turnout.modal.least_squares import drift_columns
 from turnout.modal.mixed_effects import MAX_DAMPING, fit_mixed
 from turnout.modal.summary import summarise
+from turnout.records import Mode
 from turnout.stages.hammer import identify_accepted
 
 SETTINGS = IdentifySettings(null_draws=10)
@@ -137,3 +138,15 @@ def test_two_poles_in_one_resonance_do_not_stand_for_it():
     a, b = first.mode("railpad"), second.mode("railpad")
     assert abs(a.frequency - b.frequency) < 4.0 * np.hypot(a.frequency_repeatability, b.frequency_repeatability)
     assert abs(a.damping - b.damping) < 4.0 * np.hypot(a.damping_se, b.damping_se)
+
+
+@pytest.mark.parametrize(("damping", "error", "is_rejected"), [
+    (0.0074, 0.0233, True), (0.067, 0.002, False), (0.067, 0.034, True), (-0.01, 0.001, True),
+])  # fmt: skip
+def test_a_mean_that_is_too_uncertain_is_no_mode(damping, error, is_rejected):
+    """A damping of 0.0074 ± 0.0233 was accepted; the limit of a damping is half its value."""
+    mode = Mode("railpad", 611.0, damping, frequency_repeatability=0.8, damping_repeatability=error)
+    failure = _failure_of_mean(mode, SETTINGS)
+    assert (failure is not None) == is_rejected
+    if is_rejected:
+        assert failure.reason == "not_identified" and "railpad mode at 611 Hz" in failure.detail

@@ -37,3 +37,21 @@ def test_the_matrices_of_a_section_are_columns(bench, hammer):
     bench.register(result)
     columns = "a11, a12, a21, a22, a12_se, c1, c2, c1_se"
     assert bench.ask(f"select {columns} from section_matrices") == [(0.99, -0.03, 0.03, 0.98, 0.2, 0.4, 1.2, None)]
+
+
+@pytest.mark.parametrize(("values", "is_listed"), [
+    ({"frequency": 611.0, "damping_ratio": 0.0680}, False),
+    ({"frequency": 611.0, "damping_ratio": 0.0074}, True),
+    ({"frequency": 580.0, "damping_ratio": 0.0670}, True),
+    ({"frequency": 611.0, "damping_ratio": 0.0074, "damping_se": 0.0233}, False),
+])  # fmt: skip
+def test_a_mode_that_leaves_the_track_of_its_section_is_listed(bench, hammer, values, is_listed):
+    """Damping .066 to .068 so far: quartiles .0665 and .0675, sd .00074; .0074 is 80 of them away."""
+    track = ((610.0, 0.066), (612.0, 0.0665), (611.0, 0.067), (613.0, 0.0675), (611.0, 0.068))
+    earlier = [campaign_of(hammer, k, 80.0, frequency=f, damping_ratio=damping) for k, (f, damping) in enumerate(track)]
+    bench.register(*earlier, campaign_of(hammer, 5, 80.0, **values))
+    rows = bench.ask(
+        "select frequency_hz, damping_ratio, frequency_track_hz, damping_track, n_history from modes_off_track"
+    )
+    expected = (values["frequency"], values["damping_ratio"], 611.0, 0.067, 5)
+    assert rows == ([pytest.approx(expected)] if is_listed else [])
