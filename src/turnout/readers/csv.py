@@ -132,7 +132,7 @@ def _columns_in_memory(
         try:
             table = csv.read_csv(io.BytesIO(memoryview(data)[offset:]), **options)
         except pa.ArrowInvalid:
-            end = _start_of_footer(data, offset)
+            end = _start_of_footer(data, offset, separator)
             if end == len(data):
                 raise
             table = csv.read_csv(io.BytesIO(memoryview(data)[offset:end]), **options)
@@ -145,13 +145,19 @@ def _columns_in_memory(
 MAX_FOOTER_LINES = 20
 
 
-def _start_of_footer(data: bytes | mmap, offset: int) -> int:
-    """Byte at which lines of words begin that end the file, as "End of data"; its length without one."""
+def _start_of_footer(data: bytes | mmap, offset: int, separator: str) -> int:
+    """Byte at which lines of words begin that end the file, as "End of data"; its length without one.
+
+    A line with a number in one of its cells is a row of samples with an error in it, never a footer.
+    """
     end = len(data)
+    number = re.compile(rb'"?[-+]?[.,]?\d[\d.,eE+-]*"?')
     for _ in range(MAX_FOOTER_LINES):
         start = max(data.rfind(b"\n", offset, end - 1), offset - 1) + 1
         line = data[start:end].strip()
         if line and not re.match(rb'["#]*[A-Za-z\x80-\xff](?!an\b|nf)', line):
+            break
+        if any(number.fullmatch(cell.strip()) for cell in line.split(separator.encode())[1:]):
             break
         end = start
         if start <= offset:

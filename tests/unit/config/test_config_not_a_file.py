@@ -58,7 +58,7 @@ def test_a_table_that_may_not_be_written_is_one_sentence(config, capsys, monkeyp
 
     monkeypatch.setattr("turnout.config.turnouts_table._write", refuse)  # we may be root
     assert main(COMMANDS["events.csv"]) == 2
-    said = "turnout events: config/events.csv: Permission denied. Put that right, or name another place"
+    said = "turnout events: config/events.csv: Permission denied. Put that right, or name another file or folder"
     assert capsys.readouterr().err.startswith(said)
 
 
@@ -108,7 +108,7 @@ def test_a_count_of_nothing_is_refused(command, capsys):
         ("x: {value: 1, unit: m, source: estimate, prior: wide}\n", "line 1, x: 'wide' is not a number"),
         ("x: {value: 1, unit: m, source: drawing, prior: -0.1}\n", "line 1, x: a prior of -0.1"),
         ("x: {value: 1, unit: m, source: estimate, prior: 0}\n", "line 1, x: a prior of 0. Give its relative"),
-        ("x: &whole\n  y: [*whole]\n", "the file: content without an end, as of an anchor that holds itself"),
+        ("x: &whole\n  y: [*whole]\n", "line 1, column 4: it contains itself. Write out what the alias stands for"),
     ],
 )
 def test_sources_and_units_of_another_kind_are_said_with_their_line(tmp_path, content, said):

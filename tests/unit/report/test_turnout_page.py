@@ -3,7 +3,6 @@
 import errno
 import re
 from datetime import datetime
-from pathlib import Path
 
 import duckdb
 import numpy as np
@@ -139,11 +138,10 @@ def test_an_alarm_differs_from_an_intact_section_by_more_than_red_and_green():
 def test_a_full_disk_leaves_the_old_page_and_nothing_beside_it(tmp_path, monkeypatch):
     (tmp_path / "t.html").write_text("old")
 
-    def full(path, text, **_):
-        path.write_bytes(b"ha")
+    def full(descriptor):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(Path, "write_text", full)
+    monkeypatch.setattr("os.fsync", full)
     with pytest.raises(OSError, match="No space left"):
         replace_page(tmp_path / "t.html", "new")
     assert [p.name for p in tmp_path.iterdir()] == ["t.html"] and (tmp_path / "t.html").read_text() == "old"

@@ -107,17 +107,19 @@ def test_without_any_temperature_the_chart_cannot_tell(settings):
 
 
 def test_a_thermometer_that_stops_after_the_baseline_leaves_charts_that_cannot_tell(settings):
-    """Fourteen months with temperatures, sixteen without, in which one section falls by a fifth: nothing was judged."""
+    """Fourteen months with temperatures, sixteen without: nothing was judged. A fall by a fifth is no temperature."""
     rows = plain(modes(FLEET, 1))
     cold = rows["measured_at_utc"] >= rows["measured_at_utc"].min() + pd.Timedelta(weeks=60)
     rows.loc[cold, "rail_temperature_c"] = np.nan
     rows.loc[cold & (rows["section_id"] == "T00000/S5"), "frequency_hz"] *= 0.8
     status, _ = status_of(rows, settings)
-    assert set(status["state"]) == {"cannot_tell"}
-    assert set(status.loc[status["section_id"] != "*", "reason"]) == {"no_temperature"}
+    fallen = status["section_id"] == "T00000/S5"
+    assert set(status.loc[fallen, "state"]) == {"confirm_now"}
+    assert set(status.loc[~fallen, "state"]) == {"cannot_tell"}
+    assert set(status.loc[~fallen & (status["section_id"] != "*"), "reason"]) == {"no_temperature"}
     # 70 days after the last temperature it is a gap like others: 90 days make a chart stale
     soon, _ = status_of(rows, settings, as_of=rows.loc[~cold, "measured_at_utc"].max() + pd.Timedelta(days=70))
-    assert set(soon.loc[soon["section_id"] != "*", "state"]) == {"ok"}
+    assert set(soon.loc[~soon["section_id"].isin(["*", "T00000/S5"]), "state"]) == {"ok"}
 
 
 def test_a_thermometer_that_stood_still_during_the_baseline_raises_no_alarms(settings):
