@@ -8,6 +8,7 @@ from benchmarks.trend_fleet import Fleet, drift, modes
 from turnout.registry.database import build_database
 from turnout.registry.generation import Generation, commit, load
 from turnout.registry.parquet import write_sorted
+from turnout.registry.schema import tables
 from turnout.registry.staging import connect
 
 EXTRA = (
@@ -66,8 +67,8 @@ def small_registry(root, rows, number=1):
     )
     with duckdb.connect() as con:
         con.register("came", rows.astype({"turnout_id": str, "section_id": str, "band": str, "source": str}))
-        columns = "frequency_sd_hz", "damping_se"
-        con.execute(f"create view all_rows as select *, {', '.join(f'null::double as {c}' for c in columns)} from came")
+        empty = [f"null::{c.type} as {c.name}" for c in tables()["modes"] if c.name not in rows.columns]
+        con.execute(f"create view all_rows as select {', '.join(['*', *empty])} from came")
         years = sorted(rows["measured_at_utc"].dt.year.unique())
         select = "select * from all_rows where year(measured_at_utc) = {}"
         files = [write_sorted(con, root, "modes", int(y), select.format(y), f"batch-{number}") for y in years]

@@ -5,11 +5,6 @@ from turnout.workflow.registry_damage import damage_stamp
 TARGETS += ["results/registry/_generation.json", "work/verdict.json"]
 
 
-def damaged_files(wildcards):
-    """Files of the registry that have changed on the disk: they make the job run that restores their rows."""
-    return damage_stamp("results/registry")
-
-
 rule register:
     input:
         done=shards_done,
@@ -26,7 +21,8 @@ rule register:
     params:
         code=fingerprint("turnout.registry.job"),
         again=attempts("register"),
-        damage=damaged_files,
+        # files that changed on the disk make the job run, which restores their rows
+        damage=lambda wildcards: damage_stamp("results/registry"),
         stages=STAGES,
         shards=RUN.every_shard,
         configuration=RUN.fleet_hash,

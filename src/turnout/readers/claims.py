@@ -138,7 +138,7 @@ def _mat(source: Source) -> None:
             kind, length = _mat_tag(file, position, order)
             if kind == MAT_COMPRESSED:
                 file.seek(position + 8)
-                first = _unpacked(file.read(min(length, 1024)))
+                first = _decompress(file.read(min(length, 1024)))
                 length_unpacked = int(np.frombuffer(first[4:8], f"{order}u4")[0]) if len(first) == 8 else 0
                 total += length_unpacked
                 _check(total, source, f"the variable at byte {position}")
@@ -151,7 +151,7 @@ def _mat_tag(file: BinaryIO, position: int, order: str) -> tuple[int, int]:
     return int(kind), int(length)
 
 
-def _unpacked(packed: bytes) -> bytes:
+def _decompress(packed: bytes) -> bytes:
     """The first eight unpacked bytes; none if they are damaged, which the reader reports."""
     try:
         return zlib.decompressobj().decompress(packed, 8)

@@ -28,14 +28,14 @@ def test_a_copy_is_said_and_counts_once_its_original_is_gone(fleet):
     assert fleet.run().processed == 0 and fleet.lengths()[second] == [9]
 
 
-def test_a_copy_whose_original_is_measured_anew_counts_for_itself(fleet):
+def test_a_copy_whose_original_is_measured_again_counts_for_itself(fleet):
     """And one that holds more than the other is no copy of it."""
     shutil.copytree(fleet.raw / "t0/2024-05-13", fleet.raw / "t0/2024-05-31")
     fleet.run()
     assert fleet.lengths()["t0/hammer/A/2024-05-31"] == []
     fleet.put("t0/2024-05-13/A_1.txt", "measured again")
     fleet.run()
-    assert fleet.lengths()["t0/hammer/A/2024-05-13"] == [13] and fleet.lengths()["t0/hammer/A/2024-05-31"] == [9]
+    assert fleet.lengths()["t0/hammer/A/2024-05-13"] == [14] and fleet.lengths()["t0/hammer/A/2024-05-31"] == [9]
     fleet.put("t0/2024-05-13/A_1.txt", "turnout 0")
     fleet.put("t0/2024-05-31/A_2.txt", "and more")
     fleet.run()
