@@ -210,8 +210,8 @@ def weekly(rng, turnout, section, phi, drop=0.0):
 def test_an_alarm_that_is_not_raised_again_is_closed_in_sight(settings, tmp_path, caplog):
     """Forty turnouts with more memory come to six with none: what was an alarm is none by the memory they share."""
     rng = np.random.default_rng(5)
-    few = pd.concat([weekly(rng, f"T{k}", s, 0.0, 0.011 * (k == 0)) for k in range(6) for s in "AB"])
-    many = pd.concat([few, *[weekly(rng, f"U{k}", s, 0.5) for k in range(40) for s in "AB"]], ignore_index=True)
+    few = pd.concat([weekly(rng, f"T{k}", s, 0.0, 0.016 * (k == 0)) for k in range(6) for s in "AB"])
+    many = pd.concat([few, *[weekly(rng, f"U{k}", s, 0.8) for k in range(40) for s in "AB"]], ignore_index=True)
     asked = "select alarm_id, closed_at_utc, closed_by from alarms where alarm_id like 'T0/%' and raised_at_utc > '{}'"
     asked = asked.format("2018-09-01")
     listed = "select section_id, state, sentence from worklist where section_id like 'T0/%'"
