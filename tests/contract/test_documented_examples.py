@@ -27,7 +27,7 @@ def queries(text):
 
 def commands(text):
     """Words behind ``turnout`` of every whole command: no comment or explanation behind it."""
-    lines = (re.split(r"\s{3,}(?![-\s])|\s+#", line)[0] for line in TYPED.findall(text.replace("\\\n", " ")))
+    lines = (re.split(r"\s{3,}(?![-\s])|\s+[#>]", line)[0] for line in TYPED.findall(text.replace("\\\n", " ")))
     return [shlex.split(line) for line in lines]
 
 

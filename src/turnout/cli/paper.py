@@ -2,7 +2,7 @@
 
   turnout paper tommerup_s1                              the newest campaign
   turnout paper tommerup_s1 --campaign 2024-09-14
-  turnout paper tommerup_s1 --format latex > tables.tex
+  turnout paper tommerup_s1 --format latex
 
 Table 1: matrices of the ballast resonance. Table 2: of the railpad resonance. Table 3: poles, frequencies and damping
 ratios. Table 4: fit of the model to hammer tests and to trains. ± is the standard error of the campaign value, in

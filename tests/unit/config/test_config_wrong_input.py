@@ -219,7 +219,7 @@ WRONG = {
     ),
     "anchor within itself": (
         {"settings": "trend: &a\n  target_percent: *a\n"},
-        "config/config.yaml, line 1, column 8: an anchor whose content holds the anchor itself. Write the values",
+        "config/config.yaml, line 1, column 8: it contains itself. Write out what the alias stands for",
     ),
 }
 
