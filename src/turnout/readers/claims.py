@@ -55,16 +55,38 @@ def _check(n_byte: float, source: Source, where: str) -> None:
 
 
 def _npz(source: Source) -> None:
-    """The sizes in the directory of the archive, and in the header of each array."""
+    """The sizes in the directory of the archive; the header of an array is checked with it, see ``check_array``."""
     total = 0
     with source.parsed_by("zipfile"), zipfile.ZipFile(source.path) as archive:
         for member in archive.infolist():
             _check(total := total + member.file_size, source, f"variable {member.filename!r}")
-            with archive.open(member) as stream:
-                shape, itemsize = _npy_claim(stream)
-            if math.prod(shape) * itemsize > member.file_size:
-                problem = f"its header claims {shape} values, in {member.file_size} bytes"
-                raise source.error(f"variable {member.filename!r}", problem, REMEDY, reason="claims_too_much")
+
+
+def check_array(archive: zipfile.ZipFile, name: str, source: Source) -> None:
+    """Stop before an array of a NumPy archive is read whose header claims more values than the array has bytes.
+
+    Parameters
+    ----------
+    archive : zipfile.ZipFile
+        The NumPy archive.
+    name : str
+        Name of the array, without its extension.
+    source : Source
+        The raw file.
+
+    Raises
+    ------
+    ReadError
+        If it does. Other arrays of the archive are not concerned.
+    """
+    member = next((m for m in archive.infolist() if m.filename.removesuffix(".npy") == name), None)
+    if member is None:  # no array in NumPy's format, which its reader reports
+        return
+    with archive.open(member) as stream:
+        shape, itemsize = _npy_claim(stream)
+    if math.prod(shape) * itemsize > member.file_size:
+        problem = f"its header claims {shape} values, in {member.file_size} bytes"
+        raise source.error(f"variable {name!r}", problem, REMEDY, reason="claims_too_much")
 
 
 def _npy_claim(stream: Any) -> tuple[tuple[int, ...], int]:

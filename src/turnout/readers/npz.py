@@ -3,6 +3,7 @@
 import numpy as np
 
 from turnout.errors import ReadError
+from turnout.readers.claims import check_array
 from turnout.readers.named_arrays import raw_file
 from turnout.readers.source import RawFile, Source
 
@@ -30,6 +31,7 @@ def read_raw(source: Source) -> RawFile:
         for name in archive.files:
             try:
                 with source.parsed_by("numpy", f"variable {name!r}"):
+                    check_array(archive.zip, name, source)
                     variables[name] = archive[name]
             except ReadError as error:
                 variables[name] = error

@@ -210,8 +210,11 @@ def test_an_array_that_no_file_of_this_size_can_hold_is_damage_and_no_want_of_me
     header = b"{'descr': '<f8', 'fortran_order': False, 'shape': (2, 5000000000000), }".ljust(117) + b"\n"
     with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
         archive.writestr("record_000.npy", b"\x93NUMPY\x01\x00v\x00" + header + bytes(800))
-    with pytest.raises(ReadError, match=r"its header claims \(2, 5000000000000\) values, in \d+ bytes"):
-        read("a.npz", tmp_path, in_si)
+    (error,) = read("a.npz", tmp_path, in_si).errors
+    assert (
+        error.reason == "claims_too_much"
+        and error.problem == "its header claims (2, 5000000000000) values, in 928 bytes"
+    )
 
 
 @pytest.mark.parametrize("text", ["errno = 22, error message = 'Invalid argument'", "errno = 2 of the wheel", "errno"])
