@@ -94,6 +94,14 @@ def test_a_weak_impact_is_rejected_and_a_strong_one_whose_response_grew_with_it_
     assert impacts[6].rejections[0].value < impacts[6].rejections[0].limit
 
 
+def test_a_force_far_above_the_median_whose_response_did_not_grow_with_it_left_its_range(hammer):
+    usual = hammer.samples(hammer.force())
+    recordings = [*hammer.recordings(6), hammer.recording(usual * np.array([[5.0], [1.0]]), 6)]
+    impacts = hammer.impacts(recordings)
+    assert [reasons(i) for i in impacts] == [[]] * 6 + [["overload"]]
+    assert "the test's median is" in impacts[6].rejections[0].detail
+
+
 def test_a_noisy_blow_is_rejected_and_an_evenly_noisy_test_is_not(hammer):
     quiet = hammer.recordings(5, noise=(1e-4, 1e-2))
     noisy = hammer.recording(hammer.samples(hammer.force(), noise=(1e-4, 0.08)), 5)
