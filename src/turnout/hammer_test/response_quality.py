@@ -147,7 +147,7 @@ def judge_saturation(impacts: Sequence[Impact], response: str) -> tuple[Impact, 
 
 
 # Share of its largest value at which a response has begun: a filter of linear phase rings before it with less.
-BEGUN = 0.1
+ONSET_SHARE = 0.1
 MAX_LEAD, MAX_LAG = 3, 5  # samples before the contact, and behind its end, that filters of two channels explain
 
 
@@ -184,7 +184,7 @@ def judge_causality(impacts: Sequence[Impact], response: str) -> tuple[Impact, .
 
 
 def response_lag(impact: Impact) -> int | None:
-    """Samples from the onset of the force to the first response of ``BEGUN`` times its largest value.
+    """Samples from the onset of the force to the first response of ``ONSET_SHARE`` times its largest value.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def response_lag(impact: Impact) -> int | None:
     8
     """
     size = np.abs(impact.acceleration)
-    level = BEGUN * float(size.max())
+    level = ONSET_SHARE * float(size.max())
     if not level > 4.0 * impact.noise_acceleration:
         return None
     return int(np.argmax(size >= level)) - impact.onset
@@ -236,8 +236,8 @@ def moved_mass(impact: Impact) -> float:
 
     >>> from turnout.records import Impact
     >>> f = np.pad(np.sin(np.pi * np.arange(40) / 40), 20) * 100.0
-    >>> hit = Impact(f, f / 5.0, 10_000.0, 20, 59, 60, 100.0, 4e-3, f.sum() / 1e4, 0.0, 0.0, 500.0)
-    >>> round(moved_mass(hit), 6)
+    >>> impact = Impact(f, f / 5.0, 10_000.0, 20, 59, 60, 100.0, 4e-3, f.sum() / 1e4, 0.0, 0.0, 500.0)
+    >>> round(moved_mass(impact), 6)
     5.0
     """
     n_contact = max(2, round(impact.contact * impact.rate))
