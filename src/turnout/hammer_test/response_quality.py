@@ -243,7 +243,7 @@ def moved_mass(impact: Impact) -> float:
     n_contact = max(2, round(impact.contact * impact.rate))
     velocity = np.cumsum(impact.acceleration[impact.onset : impact.onset + 2 * n_contact]) / impact.rate
     largest = float(np.max(np.abs(velocity))) if velocity.size else 0.0
-    return abs(impact.impulse) / largest if largest > 0.0 else float("inf")
+    return abs(float(impact.impulse)) / largest if largest > 0.0 else float("inf")
 
 
 def ballast_stiffness(impacts: Sequence[Impact]) -> float | None:
