@@ -217,8 +217,7 @@ def fit_mixed(
         sigma2 = max(linearisation.rss.sum() / dof, 1e-300)
         inverse = _inverse(linearisation.information)
         step = np.einsum("ijk,ik->ij", inverse, linearisation.score).reshape(theta.shape)
-        free, is_limited = _limit_to_domain(theta + step, theta)
-        free = free.reshape(n_decay, -1)
+        free = (theta + np.where(np.isfinite(step), step, 0.0)).reshape(n_decay, -1)
         covariance = sigma2 * inverse
         # Never below the variance with all other parameters known: rounding may turn that of twin poles negative.
         known = np.maximum(np.einsum("ijj->ij", linearisation.information), 1e-300)
@@ -226,11 +225,12 @@ def fit_mixed(
         spread = between_variance(free, variance)
         weight = _inverse(covariance + np.diag(spread))
         centre = np.linalg.solve(weight.sum(axis=0), np.einsum("ijk,ik->j", weight, free))
-        centre = _limit_centre(centre, free)
         shrunken = centre + spread * np.einsum("ijk,ik->ij", weight, free - centre)
         shrunken = _limit_step(shrunken.reshape(theta.shape), theta)
         change = np.max(np.abs((shrunken - theta).reshape(n_decay, -1)) / np.sqrt(variance + spread))
-        mean, unshrunken = centre.reshape(n_mode, 2), free.reshape(theta.shape)
+        # The steps are free, as the modes that they lead to are limited. What is reported is in its domain.
+        unshrunken, is_limited = _limit_to_domain(free.reshape(theta.shape), theta)
+        mean, _ = _limit_to_domain(centre.reshape(n_mode, 2), np.median(unshrunken, axis=0))
         result = MixedFit(mean, theta, unshrunken, covariance, spread, sigma2, linearisation, True, is_limited)
         theta = shrunken
         if change < tolerance and count > 1:
@@ -239,7 +239,7 @@ def fit_mixed(
 
 
 def _limit_to_domain(free: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Values of single impacts in the domain of an underdamped mode near ``theta``; where they were limited.
+    """Values in the domain of an underdamped mode near ``theta``, (..., 2) each; where they were limited.
 
     A damping below zero is an estimate of a small damping, and stays. One beyond ``MAX_DAMPING`` in magnitude, a
     frequency an octave away or a value that is not finite comes from an impact that holds no information on the mode.
@@ -248,11 +248,6 @@ def _limit_to_domain(free: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, n
     limited[..., 0] = np.clip(limited[..., 0], theta[..., 0] - MAX_FREQUENCY_STEP, theta[..., 0] + MAX_FREQUENCY_STEP)
     limited[..., 1] = np.clip(limited[..., 1], -MAX_DAMPING, MAX_DAMPING)
     return limited, (limited != free).any(axis=-1)
-
-
-def _limit_centre(centre: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """The common mean, between the lowest and the highest single impact: full weight matrices may lead outside."""
-    return np.clip(np.where(np.isfinite(centre), centre, np.median(free, axis=0)), free.min(axis=0), free.max(axis=0))
 
 
 def _limit_step(theta: np.ndarray, previous: np.ndarray) -> np.ndarray:
