@@ -18,12 +18,14 @@ READER = '''"""Reader of a format with one channel: the rate in the first line, 
 import numpy as np
 
 from turnout.readers.source import RawFile, RawRecord, Source
+from turnout.readers.statements import Entry
 
 
 def read_raw(source: Source) -> RawFile:
     """The only record of the file."""
     first, *lines = source.path.read_text().split()
-    return RawFile((RawRecord(("force",), (np.array(lines, dtype=float),), rate=float(first), units=("kN",)),))
+    rate = Entry("line 1", "sampling rate [Hz]", float(first))
+    return RawFile((RawRecord(("force",), (np.array(lines, dtype=float),), units=("kN",), entries=(rate,)),))
 '''
 
 VIEW = """-- A row per section: how many models it has.

@@ -170,17 +170,17 @@ def judge_causality(impacts: Sequence[Impact], response: str) -> tuple[Impact, .
     lags = [lag for i in used if (lag := response_lag(i)) is not None]
     if not lags:
         return tuple(impacts)
-    lag = float(np.median(lags))
+    median_lag = float(np.median(lags))
     latest = float(np.median([i.contact * i.rate for i in used])) + MAX_LAG
-    if -MAX_LEAD <= lag <= latest:
+    if -MAX_LEAD <= median_lag <= latest:
         return tuple(impacts)
-    bound = -float(MAX_LEAD) if lag < 0.0 else latest
-    word = "before" if lag < 0.0 else "after"
+    bound = -float(MAX_LEAD) if median_lag < 0.0 else latest
+    word = "before" if median_lag < 0.0 else "after"
     detail = (
-        f"{response} begins {abs(lag):.0f} samples ({1e3 * abs(lag) / used[0].rate:.3g} ms) {word} the force: the "
-        "channels were not sampled together, or are not of one impact"
+        f"{response} begins {abs(median_lag):.0f} samples ({1e3 * abs(median_lag) / used[0].rate:.3g} ms) {word} the "
+        "force: the channels were not sampled together, or are not of one impact"
     )
-    return _with_rejection(impacts, Rejection("not_simultaneous", lag, bound, detail, response))
+    return _with_rejection(impacts, Rejection("not_simultaneous", median_lag, bound, detail, response))
 
 
 def response_lag(impact: Impact) -> int | None:

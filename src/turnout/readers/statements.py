@@ -244,7 +244,7 @@ def statements_of(entries: Iterable[Entry], k: int = 0, n: int = 1) -> list[Stat
         for value in _values(entry.value, k, n):
             if isinstance(value, (bool, np.bool_)) or not isinstance(value, (str, int, float, np.number)):
                 continue
-            for statement in _statements_of_value(entry.place, entry.name, value, type(value)):
+            for statement in _statements_of_value(entry.place, entry.name, value, type(value).__name__):
                 found.setdefault((statement.place, statement.text), statement)
     return list(found.values())
 

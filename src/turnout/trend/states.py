@@ -148,7 +148,7 @@ def _similar(count: np.ndarray) -> np.ndarray:
     """Numbers of campaigns, those above 12 rounded to steps of a tenth, so that similar charts share a simulation.
 
     >>> _similar(np.array([0, 12, 51, 52, 53]))
-    array([ 0, 12, 51, 51, 51])
+    array([ 0, 12, 50, 50, 55])
     """
     steps = np.round(np.log(np.maximum(count, 12) / 12.0) / np.log(1.1))
     return np.where(count <= 12, count, np.round(12.0 * 1.1**steps)).astype(int)

@@ -104,8 +104,10 @@ def test_every_link_leads_somewhere_and_nothing_comes_from_the_network(pages):
 def test_no_page_shows_a_missing_value_as_none_or_nan(pages):
     folder, _ = pages
     for path in folder.rglob("*.html"):
-        text = path.read_text()
-        assert not re.search(r"\b(nan|NaN|None|null)\b", text.replace("(null ", "(")), path.name
+        text = path.read_text().replace("(null ", "(")
+        if path.name == "glossary.html":
+            text = text.replace("null model", "").replace("null hypothesis", "")
+        assert not re.search(r"\b(nan|NaN|None|null)\b", text), path.name
 
 
 def test_the_resonance_on_the_page_is_the_registrys_with_its_interval_and_n(pages):

@@ -5,11 +5,11 @@ from copy import deepcopy
 import pytest
 
 from turnout.errors import ConfigError, TurnoutError
+from turnout.installation import shipped_path
 from turnout.simulate import load_track, load_vehicle
-from turnout.simulate.parameters import REPOSITORY
 
-TRACK = (REPOSITORY / "config/tracks/tommerup.yaml").read_text(encoding="utf-8")
-VEHICLE = (REPOSITORY / "config/vehicles/ic3.yaml").read_text(encoding="utf-8")
+TRACK = shipped_path("config/tracks/tommerup.yaml").read_text(encoding="utf-8")
+VEHICLE = shipped_path("config/vehicles/ic3.yaml").read_text(encoding="utf-8")
 LEVEL = '  level: {value: 3, unit: dB, source: "estimate: a main line some years after grinding", prior: 1.0}'
 STRETCH = "stretches:\n  - {from: {value: %s, unit: m, source: x}, to: {value: %s, unit: m, source: x}, rail: *rail}\n"
 

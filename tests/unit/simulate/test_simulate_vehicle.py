@@ -7,8 +7,8 @@ from scipy.linalg import eigh
 from turnout.config.parameters import read_parameters
 from turnout.constants import GRAVITY
 from turnout.errors import SimulationError
+from turnout.installation import shipped_path
 from turnout.simulate import car, load_track, load_vehicle
-from turnout.simulate.parameters import REPOSITORY
 from turnout.simulate.ports import contact_ports
 from turnout.simulate.train import couple
 from turnout.simulate.vehicle import Body, Suspension, Vehicle, lone_wheels
@@ -22,7 +22,7 @@ AXLES = {
     "intercity": 24,
     "freight": 40,
 }
-FILES = [REPOSITORY / "config" / "vehicles" / f"{name}.yaml" for name in AXLES]
+FILES = [shipped_path("config/vehicles") / f"{name}.yaml" for name in AXLES]
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
@@ -123,9 +123,7 @@ def test_what_presses_the_wheels_of_a_vehicle_is_coupled_with_it():
         pair.with_(radius=(0.4, 0.4, 0.4))
 
 
-@pytest.mark.parametrize(
-    "path", [*FILES, *sorted((REPOSITORY / "config" / "tracks").glob("*.yaml"))], ids=lambda p: p.stem
-)
+@pytest.mark.parametrize("path", [*FILES, *sorted(shipped_path("config/tracks").glob("*.yaml"))], ids=lambda p: p.stem)
 def test_every_number_has_a_source_and_every_estimate_a_prior(path):
     numbers = list(read_parameters(path).numbers())
     assert numbers or "compose" in path.read_text()
