@@ -141,6 +141,7 @@ REASONS = {
     "no_file": "the name stands for a device, pipe or socket, not for a file with bytes",
     "claims_too_much": "the file claims more samples or channels than a file of its size can hold",
     "too_large": "the memory of the machine did not suffice for it in two runs",
+    "read_fault": "the disk or the network failed when it was read, in two runs; every run tries it again",
     "truncated": "fewer samples or records than configured or declared",
     "wrong_length": "more samples or records than configured",
     "vanished": "the file was there when planned and is gone",

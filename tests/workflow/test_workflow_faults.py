@@ -42,13 +42,16 @@ def measured(fleet):
     return {t for row in toy.rows(fleet)["recordings"] for t in row if re.fullmatch(r"T\d{5}", str(t))}
 
 
-def test_a_unit_that_cannot_be_read_is_tried_again_every_night_until_it_can(fleet):
+def test_a_unit_that_cannot_be_read_is_in_quarantine_the_second_night_and_tried_again_every_night(fleet):
     (fleet / "bad_sector").touch()
-    for _ in range(2):
-        done = run(fleet)
-        assert done.returncode != 0 and "1 units wait for the next run, first T00001/hammer/A1" in done.stdout
-        assert "1 postponed" in done.stdout
-        assert measured(fleet) == {f"T{i:05d}" for i in (0, 2, 3, 4, 5)}
+    done = run(fleet)
+    assert done.returncode != 0 and "1 units wait for the next run, first T00001/hammer/A1" in done.stdout
+    assert "1 postponed" in done.stdout
+    done = run(fleet)
+    assert done.returncode == 0 and "1 tried again in every run" in done.stdout, done.stdout
+    assert measured(fleet) == {f"T{i:05d}" for i in (0, 2, 3, 4, 5)}
+    ((fault,),) = [[v for v in row if "Input/output" in str(v)] for row in toy.rows(fleet)["quarantine"]]
+    assert fault == "OSError: [Errno 5] Input/output error"
     (fleet / "bad_sector").unlink()
     done = run(fleet)
     assert done.returncode == 0, done.stdout

@@ -2,7 +2,7 @@
 
 import logging
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -128,6 +128,31 @@ def memory_rows(unit: Unit, *_: Any, **__: Any) -> dict[str, list[dict]]:
         "of them, so that the unit is tried again"
     )
     return {"quarantine": [quarantine_row(unit, _first_of(unit), "too_large", "the unit", finding, remedy)]}
+
+
+def unreadable_rows(unit: Unit, faults: Mapping[str, str]) -> list[dict]:
+    """Quarantine rows of files that the machine could not read in two runs.
+
+    Parameters
+    ----------
+    unit : Unit
+        The unit.
+    faults : mapping of str to str
+        Path of a file -> fault; the path "" stands for the unit as a whole.
+
+    Returns
+    -------
+    list of dict
+        One row per fault.
+    """
+    remedy = (
+        "Look after the disk or the network that it lies on, or copy it again to another place there; every run tries "
+        "it again"
+    )
+    return [
+        quarantine_row(unit, path or _first_of(unit), "read_fault", "the file" if path else "the unit", fault, remedy)
+        for path, fault in sorted(faults.items())
+    ]
 
 
 def _compute(

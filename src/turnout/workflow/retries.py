@@ -7,7 +7,8 @@ That does not hold in the run that first started the unit, whose jobs may share 
 a whole never blames a unit.
 
 Postponed units have no result because of a fault of the machine. The number in their file is a parameter of the next
-job, so that it runs again.
+job, so that it runs again. A unit with files that the machine could not read in two runs gets quarantine rows, and is
+tried again by every further run.
 
 Attempts: Snakemake gives the old output of a failed job a new time and stores its parameters as if it had succeeded, so
 nothing would run it again. The number of attempts is one of these parameters. It changes until the job has succeeded.
@@ -20,6 +21,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from turnout.files import changed_at, read_json, write_text
 from turnout.workflow.state import batch_folder
@@ -132,8 +134,24 @@ def read_postponed(state: Path) -> tuple[int, dict[str, str]]:
     return content["jobs"], content["units"]
 
 
+def read_retried(state: Path) -> dict[str, str]:
+    """Units with quarantine rows about files that the machine cannot read; every run tries them again.
+
+    Parameters
+    ----------
+    state : Path
+        State file of the shard.
+
+    Returns
+    -------
+    dict of str to str
+        Unit -> fault.
+    """
+    return read_json(_postponed_path(state), {}).get("retried", {})
+
+
 def first_postponed(state: Path) -> dict[str, str]:
-    """The run that first postponed each postponed unit.
+    """The run that first postponed each postponed or retried unit.
 
     Parameters
     ----------
@@ -146,11 +164,14 @@ def first_postponed(state: Path) -> dict[str, str]:
         Unit -> start time of the run, "" outside a run.
     """
     content = read_json(_postponed_path(state), {})
-    return {unit: content.get("runs", {}).get(unit, "") for unit in content.get("units", ())}
+    units = (*content.get("units", ()), *content.get("retried", ()))
+    return {unit: content.get("runs", {}).get(unit, "") for unit in units}
 
 
-def note_postponed(state: Path, units: Mapping[str, str], run: str = "") -> None:
-    """Write the postponed units of a shard; no file if there are none and were none before.
+def note_postponed(
+    state: Path, units: Mapping[str, str], run: str = "", retried: Mapping[str, str] | None = None
+) -> None:
+    """Write the postponed and retried units of a shard; no file if there are none and were none before.
 
     Parameters
     ----------
@@ -160,11 +181,15 @@ def note_postponed(state: Path, units: Mapping[str, str], run: str = "") -> None
         Unit -> fault.
     run : str
         Start time of the run, "" outside a run; a unit that was postponed before keeps its run.
+    retried : mapping of str to str or None
+        Unit with quarantine rows -> fault; None: none.
     """
     jobs, before = read_postponed(state)
-    if units or before:
-        runs = dict.fromkeys(units, run) | {u: r for u, r in first_postponed(state).items() if u in units}
-        _write(state, jobs + bool(units), units, runs)
+    retried = retried or {}
+    named = {**units, **retried}
+    if named or before or read_retried(state):
+        runs = dict.fromkeys(named, run) | {u: r for u, r in first_postponed(state).items() if u in named}
+        _write(state, jobs + bool(named), units, runs, retried)
 
 
 def request_rerun(state: Path) -> None:
@@ -176,11 +201,15 @@ def request_rerun(state: Path) -> None:
         State file of the shard.
     """
     jobs, units = read_postponed(state)
-    _write(state, jobs + 1, units, first_postponed(state))
+    _write(state, jobs + 1, units, first_postponed(state), read_retried(state))
 
 
-def _write(state: Path, jobs: int, units: Mapping[str, str], runs: Mapping[str, str]) -> None:
-    content = {"jobs": jobs, "units": dict(units), "runs": dict(runs)}
+def _write(
+    state: Path, jobs: int, units: Mapping[str, str], runs: Mapping[str, str], retried: Mapping[str, str]
+) -> None:
+    content: dict[str, Any] = {"jobs": jobs, "units": dict(units), "runs": dict(runs)}
+    if retried:  # an earlier version of the program does not know it
+        content["retried"] = dict(retried)
     write_text(_postponed_path(state), json.dumps(content, indent=1) + "\n")
 
 

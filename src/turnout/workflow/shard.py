@@ -1,6 +1,7 @@
 """Compute one stage of one shard: units whose key changed are computed, the results of all others stay."""
 
 import logging
+import os
 import sys
 import time
 import traceback
@@ -12,7 +13,8 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from turnout.config import Configuration
-from turnout.workflow.batches import UnitResult
+from turnout.config.merge import digest
+from turnout.workflow.batches import UnitResult, read_results
 from turnout.workflow.duplicate_files import (
     copies,
     key_without,
@@ -22,7 +24,7 @@ from turnout.workflow.duplicate_files import (
     withdrawal,
     without_copies,
 )
-from turnout.workflow.guard import compute_guarded, death_rows, memory_rows
+from turnout.workflow.guard import compute_guarded, death_rows, memory_rows, unreadable_rows
 from turnout.workflow.ledger import Ledger
 from turnout.workflow.plan import PlannedUnit, read_plan
 from turnout.workflow.pool import LostTask, map_in_order, map_in_processes
@@ -33,11 +35,21 @@ from turnout.workflow.retries import (
     mark_started,
     note_postponed,
     read_postponed,
+    read_retried,
     started_units,
 )
 from turnout.workflow.scan import unit_id
-from turnout.workflow.state import state_lock
-from turnout.workflow.tasks import Stage, Task, Tasks, contents_of, key_of, load_function, short_contents
+from turnout.workflow.state import WITH_ROWS, batch_folder, state_lock
+from turnout.workflow.tasks import (
+    Stage,
+    Task,
+    Tasks,
+    contents_of,
+    key_of,
+    load_function,
+    readable_contents,
+    short_contents,
+)
 
 # Seconds between two lines of progress in a log.
 LOG_INTERVAL = 30.0
@@ -91,6 +103,7 @@ class Progress:
 
 LOG = logging.getLogger("turnout.workflow")
 PROCESS_DIED = "the process died that computed it"
+UNREADABLE = "unreadable"  # begins the key of a result without some of the unit's files
 # A result, and the stamp and the contents that it was computed from.
 Computed = tuple[UnitResult, str, str]
 
@@ -100,7 +113,8 @@ class Summary:
     """Summary of a shard job, in numbers of units.
 
     ``stale`` units wait for a new plan, because the configuration changed after it. ``postponed`` ones wait for the
-    next run, because of a fault of the machine.
+    next run, because of a fault of the machine. ``retried`` ones have quarantine rows about files that the machine
+    could not read in two runs; every run tries them again.
     """
 
     shard: str
@@ -111,12 +125,13 @@ class Summary:
     vanished: int = 0
     stale: int = 0
     postponed: int = 0
+    retried: int = 0
 
     def __str__(self) -> str:
         words = f"{self.shard}: {self.n_known} known, {self.processed} processed, {self.quarantined} quarantined"
         more = {
             "internal errors": self.internal_errors, "postponed": self.postponed,
-            "vanished": self.vanished, "waiting for a plan": self.stale,
+            "vanished": self.vanished, "waiting for a plan": self.stale, "tried again in every run": self.retried,
         }  # fmt: skip
         return words + "".join(f", {n} {what}" for what, n in more.items() if n)
 
@@ -178,7 +193,9 @@ class _Run:
         self.state = self.ledger.state
         self.tasks = Tasks(self.state, stage, configuration, raw_root)
         self.postponed: dict[str, str] = {}
-        self.faults_before, self.postponed_since = read_postponed(path)[1], first_postponed(path)
+        self.retried: dict[str, str] = {}
+        self.faults_before = read_postponed(path)[1] | read_retried(path)
+        self.postponed_since = first_postponed(path)
         self.suspects = started_units(path)
 
     def bring_up(self, planned: list[PlannedUnit], only: Sequence[str] | None) -> Summary:
@@ -194,6 +211,7 @@ class _Run:
         n_done, faults = statuses.total(), statuses["internal_error"]
         return Summary(
             self.name, len(wanted), n_done, n_done - statuses["ok"], faults, vanished, stale, n_postponed,
+            len(self.retried),
         )  # fmt: skip
 
     def _clear_notes(self, due: list[Task], only: Sequence[str] | None) -> None:
@@ -219,7 +237,7 @@ class _Run:
                 if isinstance(computed, LostTask):
                     tasks_alone.append(computed.task)
                 else:
-                    self._keep(self._second_want_of_memory(computed, tasks_by_name))
+                    self._keep(self._after_second_night(computed, tasks_by_name))
             self.ledger.checkpoint()
             for task in tasks_alone:
                 self._compute_alone(task)
@@ -238,7 +256,7 @@ class _Run:
         LOG.warning("%s: a process or a job died while it was computed: it is computed by itself", name)
         (computed,) = map_in_processes(self._compute, [task], 1)
         if not isinstance(computed, LostTask):
-            self._keep(self._second_want_of_memory(computed, {name: task}))
+            self._keep(self._after_second_night(computed, {name: task}))
         elif self.strict:
             raise RuntimeError(f"{name}: {PROCESS_DIED}")
         elif name not in self.suspects or (self.launched and self.suspects[name] == self.launched):
@@ -249,18 +267,69 @@ class _Run:
             if not isinstance(computed, Postponed):
                 clear_mark(self.path, name)
 
-    def _second_want_of_memory(self, computed: Computed | Postponed, tasks: Mapping[str, Task]) -> Computed | Postponed:
-        """``computed``, or a quarantine row for a unit that an earlier run postponed for the same want of memory."""
-        if not isinstance(computed, Postponed) or not computed.fault.startswith(MemoryError.__name__):
+    def _after_second_night(
+        self, computed: Computed | Postponed, tasks: Mapping[str, Task]
+    ) -> Computed | Postponed | None:
+        """``computed``, or quarantine rows for a unit that an earlier run postponed for a fault of the same kind.
+
+        None if these rows are there already.
+        """
+        if not isinstance(computed, Postponed):
             return computed
-        first_run = self.postponed_since.get(computed.unit)
+        unit = computed.unit
+        first_run, kind = self.postponed_since.get(unit), _kind_of_fault(computed.fault)
         if first_run is None or (self.launched and first_run == self.launched):
             return computed
-        if not self.faults_before.get(computed.unit, "").startswith(MemoryError.__name__):
+        if kind is None or _kind_of_fault(self.faults_before.get(unit, "")) != kind:
             return computed
-        return _provisional(self._compute_with_guard(tasks[computed.unit], memory_rows))
+        if kind is MemoryError:
+            return _provisional(self._compute_with_guard(tasks[unit], memory_rows))
+        self.retried[unit] = computed.fault
+        return self._compute_readable(tasks[unit], computed.fault)
 
-    def _keep(self, computed: Computed | Postponed) -> None:
+    def _compute_readable(self, task: Task, fault: str) -> Computed | None:
+        """Result of a unit of which files cannot be read, with a quarantine row for each of them.
+
+        The rows of its earlier files stay. A new unit is computed from its readable files. Its stamp is empty, so that
+        the next run tries it again. None if the state has this result.
+        """
+        name, unit = _name(task), task.planned.unit
+        contents, faults = readable_contents(task.planned, self.raw_root)
+        key = f"{UNREADABLE} {digest([key_of(task.planned, contents), sorted(faults)])}"
+        entry = self.state.units.get(name)
+        if entry and (entry.key, entry.algo) == (key, self.stage.algo):
+            return None
+        excluded = {*faults, *task.copied}
+        readable = replace(unit, files=tuple(file for file in unit.files if file[0] not in excluded))
+        compute = self.compute if faults and readable.files else _no_rows
+        kept_contents = ""
+        if entry and entry.status in WITH_ROWS and not entry.key.startswith(UNREADABLE):
+            tables = self._tables_of(name, entry.batch)
+            compute, kept_contents = (lambda *_, **__: tables), entry.contents
+        faults = faults or {"": fault.replace(f"{self.raw_root}{os.sep}", "")}
+
+        def with_rows(*args: Any, **more: Any) -> dict[str, list[dict]]:
+            tables = compute(*args, **more)
+            return {**tables, "quarantine": [*tables.get("quarantine", ()), *unreadable_rows(unit, faults)]}
+
+        extra = {"context": task.context} if self.stage.context else {}
+        algo = self.stage.algo
+        try:
+            result = compute_guarded(with_rows, readable, task.turnout, self.raw_root, key, algo, self.strict, **extra)
+        except (OSError, MemoryError):
+            compute = _no_rows
+            result = compute_guarded(with_rows, readable, task.turnout, self.raw_root, key, algo, self.strict)
+        return with_copy_rows(result, unit, task.copied), "", kept_contents
+
+    def _tables_of(self, name: str, batch: str) -> dict[str, list[dict]]:
+        """Rows of a unit in a batch of this shard."""
+        (result,) = read_results(batch_folder(self.path) / batch, {name})
+        return result.tables
+
+    def _keep(self, computed: Computed | Postponed | None) -> None:
+        if computed is None:
+            self.progress.step(False)
+            return
         if isinstance(computed, Postponed):
             self.postponed[computed.unit] = computed.fault
             self.progress.step(False)
@@ -297,7 +366,8 @@ class _Run:
         """Write the postponed units and return their number; those of turnouts that did not take part stay."""
         before = read_postponed(self.path)[1]
         postponed = {unit: fault for unit, fault in before.items() if unit in wanted and unit not in tried}
-        note_postponed(self.path, postponed | self.postponed, self.launched)
+        retried = {u: fault for u, fault in read_retried(self.path).items() if u in wanted and u not in tried}
+        note_postponed(self.path, postponed | self.postponed, self.launched, retried | self.retried)
         return len(self.postponed)
 
     def _set_copies_aside(self, wanted: dict[str, PlannedUnit], only: Sequence[str] | None) -> None:
@@ -334,6 +404,13 @@ def _provisional(computed: Computed | Postponed) -> Computed | Postponed:
     if isinstance(computed, Postponed):
         return computed
     return replace(computed[0], key=f"{PROCESS_DIED} {computed[0].key}"), *computed[1:]
+
+
+def _kind_of_fault(fault: str) -> type[Exception] | None:
+    """Kind of the fault for which a unit was postponed; None if its process died, or for no fault."""
+    if not fault or fault == PROCESS_DIED:
+        return None
+    return MemoryError if fault.startswith(MemoryError.__name__) else OSError
 
 
 def _name(task: Task) -> str:

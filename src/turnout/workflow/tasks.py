@@ -64,6 +64,32 @@ def contents_of(planned: PlannedUnit, raw_root: Path) -> list[str | None]:
     return [_content(os.path.join(raw_root, path)) for path, *_ in planned.unit.files]
 
 
+def readable_contents(planned: PlannedUnit, raw_root: Path) -> tuple[list[str | None], dict[str, str]]:
+    """Hashes of the files of a unit as far as they can be read, and the faults of the others.
+
+    Parameters
+    ----------
+    planned : PlannedUnit
+        The unit with its notes.
+    raw_root : Path
+        The raw root.
+
+    Returns
+    -------
+    tuple of (list of str or None, dict of str to str)
+        sha256 of each file, None for a missing or unreadable one; path -> fault of each unreadable one.
+    """
+    contents: list[str | None] = []
+    faults: dict[str, str] = {}
+    for path, *_ in planned.unit.files:
+        try:
+            contents.append(_content(os.path.join(raw_root, path)))
+        except OSError as error:
+            contents.append(None)
+            faults[path] = f"{type(error).__name__}: [Errno {error.errno}] {error.strerror}"
+    return contents, faults
+
+
 def key_of(planned: PlannedUnit, contents: Sequence[str | None]) -> str:
     """Digest of configuration, notes, and name and content of each file.
 

@@ -17,6 +17,7 @@ from turnout.records import RawDescription
 from turnout.workflow import tasks
 from turnout.workflow.plan import read_plan, read_problems
 from turnout.workflow.retries import read_postponed
+from turnout.workflow.state import load_state
 from turnout.workflow.tasks import Stage
 
 OTHERS = {"t0/hammer/A/2024-05-13", "t2/hammer/A/2024-05-13"}
@@ -83,6 +84,7 @@ def test_notes_that_are_a_pipe_do_not_stop_the_plan(fleet, name):
     assert problems == ["it is a pipe, not a file"]
 
 
+VANISHED_CODES = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR}  # the file is gone: its chain says so
 CODES = dict(enumerate(sorted(errno.errorcode), 1))  # turnout -> every code of this platform; t0 is intact
 
 
@@ -148,3 +150,88 @@ def test_an_attempt_of_the_same_run_is_no_second_night(fleet):
         assert fleet.run(launched=first).postponed == 1
     assert json.loads((fleet.state.with_suffix("") / "postponed.json").read_text())["runs"] == {UNIT: first.isoformat()}
     assert fleet.run(launched=second).quarantined == 1
+
+
+def quarantine(fleet, unit=UNIT):
+    return [(r["reason_code"], r["path"], r["found"]) for r in fleet.rows()[unit]["quarantine"]]
+
+
+@pytest.mark.parametrize("when", ["hashed", "computed"])
+def test_every_error_code_that_stays_is_a_quarantine_row_the_second_night(tmp_path, monkeypatch, when):
+    """Every code of the platform at once, each at a file of its own: no unit is left for a third night."""
+    fleet, hashed = Fleet(tmp_path, len(CODES) + 1), tasks.sha256_of
+
+    def fail(path):
+        if code := code_of(path):
+            raise OSError(code, os.strerror(code), str(path))
+
+    def failing_length(unit, turnout, raw_root, algo=""):
+        fail(unit.turnout)
+        return length(unit, turnout, raw_root, algo)
+
+    def failing_hash(path):
+        fail(path)
+        return hashed(path)
+
+    if when == "hashed":
+        monkeypatch.setattr(tasks, "sha256_of", failing_hash)
+    stage = Stage("hammer", failing_length if when == "computed" else length, "1")
+    for _ in range(2):
+        fleet.run(stage=stage)
+    assert read_postponed(fleet.state)[1] == {}
+    first = load_state(fleet.state)
+    for unit in first.units:
+        code, rows = code_of(unit), quarantine(fleet, unit)
+        if code and (when == "computed" or code not in VANISHED_CODES):
+            ((reason, path, found),) = rows
+            assert path == f"t{unit.split('/')[0][1:]}/2024-05-13/A_1.txt"
+            assert reason == ("internal_error" if code in DATA_ERRNOS and when == "computed" else "read_fault")
+            assert f"[Errno {code}]" in found and str(tmp_path) not in found
+    assert len(first.units) == len(CODES) + 1
+    summary = fleet.run(stage=stage)  # the third night tries them again and finds the same
+    assert (summary.processed, summary.postponed) == (0, 0) and load_state(fleet.state) == first
+    monkeypatch.undo()
+    assert fleet.run().retried == 0
+    assert [unit for unit in fleet.rows() if quarantine(fleet, unit)] == [
+        unit for unit in fleet.rows() if when == "computed" and code_of(unit) in DATA_ERRNOS
+    ]
+
+
+def unreadable(monkeypatch, *names):
+    """Let files with these names fail with EIO."""
+    hashed = tasks.sha256_of
+
+    def failing(path):
+        if any(str(path).endswith(name) for name in names):
+            raise OSError(errno.EIO, "Input/output error", str(path))
+        return hashed(path)
+
+    monkeypatch.setattr(tasks, "sha256_of", failing)
+
+
+def test_the_readable_files_of_a_unit_are_used_beside_one_that_stays_unreadable(fleet, monkeypatch):
+    fleet.put("t1/2024-05-13/A_2.txt", "another impact")
+    unreadable(monkeypatch, "t1/2024-05-13/A_1.txt")
+    assert fleet.run().postponed == 1
+    assert (summary := fleet.run()).postponed == 0 and summary.retried == 1
+    assert fleet.lengths()[UNIT] == [len("another impact")]
+    assert quarantine(fleet) == [("read_fault", "t1/2024-05-13/A_1.txt", "OSError: [Errno 5] Input/output error")]
+    fleet.put("t1/2024-05-13/A_3.txt", "a third")
+    assert fleet.run().processed == 1
+    assert fleet.lengths()[UNIT] == [len("another impact"), len("a third")]
+    monkeypatch.undo()
+    assert fleet.run().processed == 1 and quarantine(fleet) == []
+    assert len(fleet.lengths()[UNIT]) == 3 and fleet.run().processed == 0
+
+
+def test_the_rows_of_a_file_stay_where_it_can_no_longer_be_read(fleet, monkeypatch):
+    """A new version of the program computes everything again; a disk that fails by then takes no measurement away."""
+    fleet.run()
+    before = fleet.lengths()
+    unreadable(monkeypatch, "t1/2024-05-13/A_1.txt")
+    for _ in range(3):
+        fleet.run(algo="2")
+        assert fleet.lengths() == before
+    assert [reason for reason, *_ in quarantine(fleet)] == ["read_fault"]
+    monkeypatch.undo()
+    assert fleet.run(algo="2").processed == 1 and quarantine(fleet) == [] and fleet.lengths() == before
