@@ -32,6 +32,10 @@ VIEW = """-- A row per section: how many models it has.
 -- needs: models_current
 create or replace view models_of_sections as
     select section_id, count(*) as n from models_current group by section_id;
+
+-- columns of models_of_sections
+-- section_id | varchar | | section
+-- n | bigint | models | how many models the section has
 """
 
 
@@ -54,7 +58,8 @@ def views_folder(tmp_path, monkeypatch):
     folder = tmp_path / "registry_package"
     shutil.copytree(str(files("turnout.registry")), folder, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
     monkeypatch.setattr(database, "files", lambda package: folder if package == "turnout.registry" else files(package))
-    monkeypatch.setattr(database, "view_files", database.view_files.__wrapped__)
+    for function in ("view_files", "view_columns"):
+        monkeypatch.setattr(database, function, getattr(database, function).__wrapped__)
     return folder / "views"
 
 
@@ -63,3 +68,5 @@ def test_a_new_view(views_folder, tmp_path):
     register([], tmp_path / "registry", read=iter)
     with duckdb.connect(str(tmp_path / "registry" / "registry.duckdb"), read_only=True) as connection:
         assert connection.sql("select * from models_of_sections").columns == ["section_id", "n"]
+        comments = "select comment from duckdb_columns() where table_name = 'models_of_sections' and column_name = 'n'"
+        assert connection.sql(comments).fetchall() == [("how many models the section has [models]",)]

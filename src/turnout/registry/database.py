@@ -5,8 +5,8 @@ Views and macros are in one SQL file per question and are created in the order o
 
 from __future__ import annotations
 
-import csv
 import re
+from collections.abc import Iterator
 from datetime import UTC, datetime
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from os import PathLike
 
 _NEEDS = re.compile(r"^--\s*needs:\s*(.+)$", re.MULTILINE)
+_COLUMNS = re.compile(r"^-- columns of (\w+)(.*)\n((?:--.*(?:\n|$))+)", re.MULTILINE)
+_COLUMN_FIELDS = ("view", "parameters", "column", "type", "unit", "meaning")
 
 
 @cache
@@ -330,6 +332,47 @@ def _comment(con: duckdb.DuckDBPyConnection) -> None:
 
 @cache
 def view_columns() -> tuple[dict[str, str], ...]:
-    """Rows of ``view_columns.csv``: view, parameters, column, type, unit, meaning."""
-    text = (files("turnout.registry") / "view_columns.csv").read_text(encoding="utf-8")
-    return tuple(csv.DictReader(text.splitlines()))
+    """Columns of all views and macros, from the comments ``-- columns of <name>`` at the end of their files.
+
+    Returns
+    -------
+    tuple of dict
+        Per column: view, parameters (of a macro), column, type, unit and meaning.
+
+    Raises
+    ------
+    RegistryError
+        When a line below such a comment is not ``-- column | type | unit | meaning``.
+    """
+    return tuple(row for name, sql in view_files().items() for row in described_columns(name, sql))
+
+
+def described_columns(name: str, sql: str) -> Iterator[dict[str, str]]:
+    """Columns that one file of views describes.
+
+    Parameters
+    ----------
+    name : str
+        Name of the file, without ``.sql``.
+    sql : str
+        Its text.
+
+    Yields
+    ------
+    dict
+        As in `view_columns`.
+
+    Raises
+    ------
+    RegistryError
+        When a line is not ``-- column | type | unit | meaning``.
+
+    >>> list(described_columns("file", "-- columns of a(b)\\n-- c | double | Hz | frequency"))[0]["parameters"]
+    '(b)'
+    """
+    for view, parameters, block in _COLUMNS.findall(sql):
+        for line in block.splitlines():
+            values = [value.strip() for value in line.removeprefix("--").split("|")]
+            if len(values) != 4:
+                raise RegistryError(f"views/{name}.sql: expected '-- column | type | unit | meaning', found {line!r}")
+            yield dict(zip(_COLUMN_FIELDS, (view, parameters, *values), strict=True))

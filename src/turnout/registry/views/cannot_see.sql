@@ -53,3 +53,15 @@ select
 from alarms
 where in_service(turnout_id) and not has_left(section_id) and closed_by = 'recomputed'
     and closed_at_utc >= newest_charted() and coalesce("asof", newest_measurement()) >= newest_charted();
+
+-- columns of cannot_see(asof := null)
+-- turnout_id | varchar | | turnout
+-- section_id | varchar | | section; * = median of the turnout's sections
+-- band | varchar | | which resonance; all = no newer recording could be used
+-- source | varchar | | hammer or passage: never mixed in one chart; empty = no file belongs to either
+-- state | varchar | | learning, cannot tell or not measured
+-- why | varchar | | in words
+-- detectable_pct | double | % | smallest change of frequency seen within a year with 90 %
+-- target_pct | double | % | change of frequency that is to be seen
+-- n_campaigns | integer | | campaigns with a value
+-- last_measured_at_utc | timestamp | UTC | newest campaign with a value

@@ -55,3 +55,19 @@ select
     event_id, kind, event_at_utc, turnout_id, section_id, band, source, n_before, n_after, before_pct, after_pct,
     change_pct, change_se_pct, abs(change_pct) > students_t(n_baseline - 2) * change_se_pct as changed
 from compared;
+
+-- columns of change_since_event(kind_of_event, days)
+-- event_id | varchar | | content id of the event
+-- kind | varchar | | what was done
+-- event_at_utc | timestamp | UTC | when it was done
+-- turnout_id | varchar | | turnout
+-- section_id | varchar | | section; * = median of the turnout's sections
+-- band | varchar | | which resonance
+-- source | varchar | | hammer or passage: never mixed in one chart
+-- n_before | bigint | | campaigns before
+-- n_after | bigint | | campaigns after
+-- before_pct | double | % | level before, of the baseline's frequency
+-- after_pct | double | % | level after
+-- change_pct | double | % | after minus before
+-- change_se_pct | double | % | its standard error
+-- changed | boolean | | whether its 95 % interval leaves out zero

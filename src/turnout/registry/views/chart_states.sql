@@ -48,3 +48,59 @@ where in_service(s.turnout_id) and not has_left(s.section_id);
 
 -- One row per chart: its state at the newest measurement, in the words of the worklist.
 create or replace view chart_states as select * from chart_states_on(newest_measurement());
+
+-- columns of chart_states
+-- turnout_id | varchar | | turnout
+-- section_id | varchar | | section; * = median of the turnout's sections
+-- band | varchar | | which resonance
+-- source | varchar | | hammer or passage: never mixed in one chart
+-- state | varchar | | what is to be done or known about the chart
+-- reason | varchar | | why
+-- raised_at_utc | timestamp | UTC | campaign that raised the alarm
+-- acknowledged | varchar | | who acknowledged the alarm and why
+-- suppressed | varchar | | who silenced the chart and why
+-- direction | varchar | | direction of a flagged change
+-- statistic_ratio | double | | CUSUM over its limit
+-- change_kind | varchar | | what fits the flagged change better
+-- since_at_utc | timestamp | UTC | estimated time of the change
+-- since_earliest_utc | timestamp | UTC | 95 % interval, earliest
+-- since_latest_utc | timestamp | UTC | 95 % interval, latest
+-- change_pct | double | % | change of frequency at the newest campaign since the onset
+-- change_low_pct | double | % | 95 % interval, lower end
+-- change_high_pct | double | % | upper end
+-- n_after | integer | | campaigns after the onset
+-- detectable_pct | double | % | smallest change of frequency seen within a year with 90 %
+-- target_pct | double | % | change of frequency that is to be seen
+-- drift_pct_per_year | double | %/a | slope of the residual in the present epoch
+-- drift_se_pct_per_year | double | %/a | its standard error with memory
+-- drift_q | double | | the same adjusted for all charts (Benjamini-Hochberg)
+-- last_measured_at_utc | timestamp | UTC | newest campaign with a value
+-- n_campaigns | integer | | campaigns with a value
+
+-- columns of chart_states_on(asof)
+-- turnout_id | varchar | | turnout
+-- section_id | varchar | | section; * = median of the turnout's sections
+-- band | varchar | | which resonance
+-- source | varchar | | hammer or passage: never mixed in one chart
+-- state | varchar | | what is to be done or known about the chart
+-- reason | varchar | | why
+-- raised_at_utc | timestamp | UTC | campaign that raised the alarm
+-- acknowledged | varchar | | who acknowledged the alarm and why
+-- suppressed | varchar | | who silenced the chart and why
+-- direction | varchar | | direction of a flagged change
+-- statistic_ratio | double | | CUSUM over its limit
+-- change_kind | varchar | | what fits the flagged change better
+-- since_at_utc | timestamp | UTC | estimated time of the change
+-- since_earliest_utc | timestamp | UTC | 95 % interval, earliest
+-- since_latest_utc | timestamp | UTC | 95 % interval, latest
+-- change_pct | double | % | change of frequency at the newest campaign since the onset
+-- change_low_pct | double | % | 95 % interval, lower end
+-- change_high_pct | double | % | upper end
+-- n_after | integer | | campaigns after the onset
+-- detectable_pct | double | % | smallest change of frequency seen within a year with 90 %
+-- target_pct | double | % | change of frequency that is to be seen
+-- drift_pct_per_year | double | %/a | slope of the residual in the present epoch
+-- drift_se_pct_per_year | double | %/a | its standard error with memory
+-- drift_q | double | | the same adjusted for all charts (Benjamini-Hochberg)
+-- last_measured_at_utc | timestamp | UTC | newest campaign with a value
+-- n_campaigns | integer | | campaigns with a value

@@ -140,3 +140,62 @@ select
     n_needed, complete, without_temperature, detectable_pct, target_pct
 from chart_status_on("asof")
 where coalesce("asof" >= newest_charted(), true);
+
+-- columns of chart_status_at(asof)
+-- turnout_id | varchar | | turnout
+-- section_id | varchar | | section; * = median of the turnout's sections
+-- band | varchar | | which resonance
+-- source | varchar | | hammer or passage: never mixed in one chart
+-- state | varchar | | ok, alarm, confirm_now, learning, cannot_tell or not_measured
+-- reason | varchar | | why: see docs/trends.md
+-- last_measured_at_utc | timestamp | UTC | newest campaign with a value
+-- n_campaigns | integer | | campaigns with a value
+-- n_baseline | integer | | campaigns of the baseline by then
+-- n_learned | integer | | campaigns that have learned the present level
+-- n_needed | integer | | campaigns it takes to learn a level
+-- complete | boolean | | baseline long enough by then
+-- without_temperature | integer | | campaigns without rail temperature
+-- detectable_pct | double | % | smallest change of frequency seen within a year with 90 %; empty while it learns
+-- target_pct | double | % | change of frequency that is to be seen
+
+-- columns of chart_status_on(asof)
+-- turnout_id | varchar | | turnout
+-- section_id | varchar | | section; * = median of the turnout's sections
+-- band | varchar | | which resonance
+-- source | varchar | | hammer or passage: never mixed in one chart
+-- state | varchar | | what the chart says today
+-- reason | varchar | | why: see docs/trends.md
+-- last_measured_at_utc | timestamp | UTC | newest campaign with a value
+-- n_campaigns | integer | | campaigns with a value
+-- campaigns_per_year | integer | | usual number of campaigns a year
+-- n_baseline | integer | | campaigns of the baseline
+-- baseline_until_utc | timestamp | UTC | campaign that completed the baseline; empty = not complete
+-- n_learned | integer | | campaigns that learned the present level
+-- complete | boolean | | baseline long enough
+-- n_needed | integer | | campaigns it takes to learn a level
+-- without_temperature | integer | | campaigns without rail temperature
+-- detectable_pct | double | % | smallest change of frequency seen within a year with 90 %
+-- target_pct | double | % | change of frequency that is to be seen
+-- worklist_rows | integer | | rows that the list of things to do has unless more alarms are open
+-- stale_after_days | double | d | older than this the chart is not measured
+-- drift_pct_per_year | double | %/a | slope of the residual in the present epoch
+-- drift_se_pct_per_year | double | %/a | its standard error with memory
+-- drift_p | double | | p value of the slope
+-- drift_q | double | | the same adjusted for all charts (Benjamini-Hochberg)
+-- run_length_down | double | | mean campaigns between false alarms, loss of stiffness
+-- run_length_up | double | | the same for a gain
+-- direction | varchar | | direction of a flagged change
+-- statistic_ratio | double | | CUSUM over its limit
+-- change_kind | varchar | | what fits the flagged change better
+-- since_at_utc | timestamp | UTC | estimated time of the change
+-- since_earliest_utc | timestamp | UTC | 95 % interval, earliest
+-- since_latest_utc | timestamp | UTC | 95 % interval, latest
+-- change_pct | double | % | change of frequency at the newest campaign since the onset
+-- change_low_pct | double | % | 95 % interval, lower end
+-- change_high_pct | double | % | upper end
+-- n_after | integer | | campaigns after the onset
+-- forecast | varchar | | when the limit is reached
+-- forecast_slope_pct_per_year | double | %/a | slope since the change
+-- forecast_slope_se_pct_per_year | double | %/a | its standard error
+-- not_before_utc | timestamp | UTC | 80 % interval of the limit, earliest
+-- not_after_utc | timestamp | UTC | 80 % interval of the limit, latest; empty = none

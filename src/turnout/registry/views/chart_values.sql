@@ -8,3 +8,13 @@ from modes_current
 where source = 'hammer' and coalesce(method, 'joint') = 'joint'
 union all
 select * from passage_values;
+
+-- columns of chart_values
+-- turnout_id | varchar | | turnout
+-- section_id | varchar | | section
+-- band | varchar | | resonance, or 'amplitude'
+-- source | varchar | | what it was identified from
+-- measured_at_utc | timestamp | UTC | time of the campaign; Monday of the week for source passage
+-- frequency_hz | double | Hz | value of the campaign or week; m/s² for band 'amplitude'
+-- frequency_se_hz | double | Hz | its standard error, in the same unit
+-- rail_temperature_c | double | °C | rail temperature, mean of the week for source passage

@@ -73,3 +73,17 @@ window history as (
     partition by turnout_id, section_id, band, source, epoch order by measured_at_utc
     rows between unbounded preceding and current row
 );
+
+-- columns of cusum(since, k := null, h := null)
+-- turnout_id | varchar | | turnout
+-- section_id | varchar | | section; * = median of the turnout's sections
+-- band | varchar | | which resonance
+-- source | varchar | | hammer or passage: never mixed in one chart
+-- measured_at_utc | timestamp | UTC | start of the campaign
+-- epoch | integer | | epoch of the chart, 0 from the first campaign
+-- z | double | | residual in its guarded standard deviations with memory
+-- cusum_down | double | | sum for a loss of stiffness
+-- cusum_up | double | | sum for a gain
+-- threshold_down | double | | limit of cusum_down
+-- threshold_up | double | | limit of cusum_up
+-- state | varchar | | what the campaign says

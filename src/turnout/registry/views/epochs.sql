@@ -33,3 +33,52 @@ from modes_current m
     asof left join resets r
     on m.section_id = r.section_id and m.band = r.band and m.measured_at_utc >= r.event_at_utc
 where coalesce(m.method, 'joint') = 'joint';
+
+-- columns of epochs
+-- model_id | varchar | | model
+-- band | varchar | | which resonance
+-- turnout_id | varchar | | turnout
+-- section_id | varchar | | section
+-- measured_at_utc | timestamp | UTC | time of the campaign
+-- method | varchar | | method of its model; charts use joint only
+-- frequency_hz | double | Hz | undamped natural frequency, mean over impacts
+-- frequency_se_hz | double | Hz | standard error of frequency_hz from the spread of its impacts and the choice among explanations
+-- frequency_sd_hz | double | Hz | between-impact spread beyond the estimation error
+-- damping_ratio | double | | damping ratio, mean over impacts
+-- damping_se | double | | standard error of damping_ratio
+-- rail_temperature_c | double | °C | rail temperature of the campaign
+-- n_impacts | integer | | impacts (method frf: responses) behind the value
+-- source | varchar | | what it was identified from
+-- run_id | varchar | | content id of the batch
+-- frequency_repeatability_hz | double | Hz | part of frequency_se_hz from the scatter of the impacts of the campaign
+-- frequency_systematic_hz | double | Hz | part of frequency_se_hz from the choice among models that explain the impacts
+-- damping_repeatability | double | | part of damping_se from the scatter of the impacts of the campaign
+-- damping_systematic | double | | part of damping_se from the choice among models that explain the impacts
+-- stiffness_mn_m | double | MN/m | dynamic stiffness at the resonance; empty where the line fails the gate, and behind an exponential window
+-- stiffness_low_mn_m | double | MN/m | lower 95 % limit of stiffness_mn_m
+-- stiffness_high_mn_m | double | MN/m | upper 95 % limit of stiffness_mn_m; empty where there is none
+-- a_block | double[] | | a11, a12, a21, a22 of this mode (Tables 1 and 2 of the paper)
+-- a_block_se | double[] | | their standard errors
+-- c_block | double[] | | c1, c2 of this mode (Tables 1 and 2 of the paper)
+-- c_block_se | double[] | | their standard errors; empty without a fitted receptance
+-- epoch | bigint | | epoch of the chart, 0 before the first event that resets it
+-- epoch_start_utc | timestamp | UTC | event that started the epoch; empty for epoch 0
+-- epoch_event_id | varchar | | that event
+-- epoch_kind | varchar | | what was done then
+
+-- columns of reset_events
+-- turnout_id | varchar | | turnout
+-- section_id | varchar | | section
+-- band | varchar | | resonance that starts again
+-- event_at_utc | timestamp | UTC | when it was done
+-- event_id | varchar | | event
+-- kind | varchar | | what was done
+
+-- columns of resets
+-- turnout_id | varchar | | turnout
+-- section_id | varchar | | section
+-- band | varchar | | resonance that starts again
+-- event_at_utc | timestamp | UTC | when it was done
+-- event_id | varchar | | event; of several at one moment the first id
+-- kind | varchar | | what was done
+-- epoch | bigint | | number of the epoch that it starts, from 1

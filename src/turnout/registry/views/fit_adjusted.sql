@@ -24,3 +24,19 @@ select
     avg(adjusted_pct) as adjusted_pct, stddev_samp(adjusted_pct) / sqrt(count(*)) as adjusted_se_pct
 from classes where class is not null
 group by turnout_id, section_id, score, factor, class;
+
+-- columns of fit_adjusted
+-- turnout_id | varchar | | turnout
+-- section_id | varchar | | section
+-- score | varchar | | fit or forecast
+-- factor | varchar | | train type, speed or axle load
+-- class | varchar | | class of it
+-- class_from | double | | lower end of the class, km/h or t; empty for train types
+-- n | bigint | | scores
+-- n_passages | bigint | | passages
+-- score_pct | double | % | mean of the scores
+-- score_sd_pct | double | % | spread of the passages: standard deviation
+-- score_se_pct | double | % | standard error of score_pct
+-- null_pct | double | % | mean of the 95 % quantiles of random models
+-- adjusted_pct | double | % | mean with the other two factors at the section's mean
+-- adjusted_se_pct | double | % | standard error of adjusted_pct, without that of the slopes

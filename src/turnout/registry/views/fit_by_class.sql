@@ -21,3 +21,22 @@ select
     avg(null_share) as null_share
 from section_scores
 group by turnout_id, section_id, class_name, class_from;
+
+-- columns of fit_by_class(kind_of_class)
+-- turnout_id | varchar | | turnout
+-- section_id | varchar | | section
+-- class_name | varchar | | name of the class; empty for classes of speed or axle load
+-- class_from | double | | lower edge of the class [km/h, t]; empty for types, and where it is not known
+-- n | bigint | | fits
+-- n_passages | bigint | | passages
+-- fit_pct | double | % | mean in-sample fit
+-- fit_sd_pct | double | % | its spread between passages
+-- fit_se_pct | double | % | standard error of the mean, passages taken as independent
+-- fit_null_pct | double | % | mean of the null's 95 % quantile
+-- forecast_pct | double | % | mean forecast skill
+-- forecast_sd_pct | double | % | its spread
+-- forecast_se_pct | double | % | its standard error
+-- leave_one_out_pct | double | % | mean leave-one-wheel-out score
+-- leave_one_out_sd_pct | double | % | its spread
+-- leave_one_out_se_pct | double | % | its standard error
+-- null_share | double | | share of fits that their null explains

@@ -4,3 +4,21 @@
 create or replace view fit_by_speed as
 select turnout_id, section_id, class_from as speed_from_kmh, columns(* exclude (turnout_id, section_id, class_name, class_from))
 from fit_by_class('speed');
+
+-- columns of fit_by_speed
+-- turnout_id | varchar | | turnout
+-- section_id | varchar | | section
+-- speed_from_kmh | double | km/h | lower edge of the class, 20 km/h wide
+-- n | bigint | | fits
+-- n_passages | bigint | | passages
+-- fit_pct | double | % | mean in-sample fit
+-- fit_sd_pct | double | % | its spread between passages
+-- fit_se_pct | double | % | standard error of the mean, passages taken as independent
+-- fit_null_pct | double | % | mean of the null's 95 % quantile
+-- forecast_pct | double | % | mean forecast skill
+-- forecast_sd_pct | double | % | its spread
+-- forecast_se_pct | double | % | its standard error
+-- leave_one_out_pct | double | % | mean leave-one-wheel-out score
+-- leave_one_out_sd_pct | double | % | its spread
+-- leave_one_out_se_pct | double | % | its standard error
+-- null_share | double | | share of fits that their null explains

@@ -25,3 +25,17 @@ select
     change_pct - change_se_pct * students_t(freedom) as low_pct,
     change_pct + change_se_pct * students_t(freedom) as high_pct
 from sections where known;
+
+-- columns of fit_effects
+-- turnout_id | varchar | | turnout
+-- section_id | varchar | | section
+-- score | varchar | | fit or forecast
+-- factor | varchar | | speed or axle load
+-- per | varchar | | step that the changes are for: 10 km/h or a tonne
+-- held_fixed | varchar | | what was held fixed
+-- n | bigint | | scores
+-- raw_change_pct | double | % | change per step with nothing held fixed
+-- change_pct | double | % | change per step, the others held fixed
+-- change_se_pct | double | % | standard error of change_pct (HC3)
+-- low_pct | double | % | lower end of the 95 % interval of change_pct
+-- high_pct | double | % | upper end

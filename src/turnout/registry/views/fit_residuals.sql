@@ -59,3 +59,31 @@ select
     -- what it would be had this passage not been fitted (HC3)
     residual_pct / (1 - least(1.0 / n_type + i_vv * v * v + 2 * i_vp * v * p + i_pp * p * p, 0.999)) as left_out_pct
 from solved;
+
+-- columns of fit_residuals
+-- turnout_id | varchar | | turnout
+-- section_id | varchar | | section
+-- score | varchar | | fit or forecast
+-- passage_id | varchar | | passage
+-- train_type | varchar | | type of train
+-- speed_kmh | double | km/h | speed
+-- axle_load_t | double | t | mean axle load
+-- value_pct | double | % | the score
+-- null_pct | double | % | 95 % quantile of random models
+-- n_sensors | bigint | | sensors that have the score
+-- n | bigint | | passages of the section
+-- n_types | bigint | | train types among them
+-- has_speed | boolean | | the speed varies within the types and can be distinguished from the load
+-- has_load | boolean | | the load varies within the types and can be distinguished from the speed
+-- per_speed | double | | change of the score per 10 km/h, the others held fixed
+-- per_load | double | | change of the score per tonne, the others held fixed
+-- i_vv | double | | inverse of the normal matrix, speed
+-- i_vp | double | | inverse of the normal matrix, speed and load
+-- i_pp | double | | inverse of the normal matrix, load
+-- v | double | | speed against the mean of its type, 10 km/h
+-- p | double | | load against the mean of its type, t
+-- of_type_pct | double | % | score of the train type at the section's mean speed and load
+-- of_speed_pct | double | % | section's mean score at this speed
+-- of_load_pct | double | % | section's mean score at this load
+-- residual_pct | double | % | what type, speed and load leave over
+-- left_out_pct | double | % | the same had this passage not been fitted

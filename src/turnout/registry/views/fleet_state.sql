@@ -23,3 +23,21 @@ select
     last_event, last_event_utc
 from turnouts t left join measured using (turnout_id) left join passed using (turnout_id)
     left join waiting using (turnout_id) left join work using (turnout_id);
+
+-- columns of fleet_state
+-- turnout_id | varchar | | turnout, as in config/turnouts.tsv
+-- name | varchar | | name for people
+-- line | varchar | | railway line
+-- km | double | km | position along the line
+-- layout | varchar | | layout it follows, config/layouts/<layout>.yaml
+-- n_sections | bigint | | sections configured
+-- n_sections_measured | bigint | | sections with a model, rejected ones included
+-- n_campaigns | bigint | | hammer campaigns with a model
+-- n_models | bigint | | models that are not rejected
+-- n_models_rejected | bigint | | rejected models
+-- last_campaign_utc | timestamp | UTC | newest hammer campaign
+-- n_passages | bigint | | passages used
+-- last_passage_utc | timestamp | UTC | newest passage used
+-- n_quarantine | bigint | | open quarantine rows
+-- last_event | varchar | | newest maintenance event
+-- last_event_utc | timestamp | UTC | when that was

@@ -8,3 +8,15 @@ from parameter_growth
 where in_service(turnout_id) and term = 'hanging_sleeper' and parameter = 'gap' and is_open and value > above
     and per_year > 1.959964 * per_year_se
 order by gap_m_per_year desc;
+
+-- columns of hanging_sleepers_that_grow(above := 0.0003)
+-- turnout_id | varchar | | turnout
+-- position_m | double | m | place of the sleeper, to 0.1 m
+-- gap_m | double | m | gap at the newest visit
+-- gap_se_m | double | m | its standard error
+-- gap_m_per_year | double | m/a | growth of the gap
+-- gap_se_m_per_year | double | m/a | its standard error
+-- n_visits | integer | | visits behind it
+-- first_at_utc | timestamp | UTC | time of the first visit
+-- found_at_utc | timestamp | UTC | time of the newest
+-- finding_id | varchar | | newest finding with it

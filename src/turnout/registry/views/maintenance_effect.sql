@@ -88,3 +88,19 @@ select
     p.last_at as last_measured_at_utc
 from pairs p
 left join lost l using (turnout_id, section_id, band, source, epoch);
+
+-- columns of maintenance_effect
+-- turnout_id | varchar | | turnout
+-- section_id | varchar | | section
+-- band | varchar | | which resonance
+-- source | varchar | | hammer or passage: never mixed in one chart
+-- event_at_utc | timestamp | UTC | when it was done
+-- kinds | varchar | | what was done
+-- n_before | bigint | | campaigns before, at most eight
+-- n_after | bigint | | campaigns after, at most eight
+-- gain_pct | double | % | level after minus level before
+-- gain_low_pct | double | % | 95 % interval, lower end
+-- gain_high_pct | double | % | 95 % interval, upper end
+-- verdict | varchar | | stiffer, softer or cannot tell
+-- held_until_utc | timestamp | UTC | first campaign at which half of a gain was lost again; empty = it holds
+-- last_measured_at_utc | timestamp | UTC | newest campaign of the epoch

@@ -69,3 +69,16 @@ select
     sibling_median_pct,
     coalesce(corrected_pct - sibling_median_pct - sibling_shift_pct, corrected_pct) as residual_pct
 from siblings;
+
+-- columns of mode_residuals(since)
+-- turnout_id | varchar | | turnout
+-- section_id | varchar | | section; * = median of the turnout's sections
+-- band | varchar | | which resonance
+-- source | varchar | | hammer or passage: never mixed in one chart
+-- measured_at_utc | timestamp | UTC | start of the campaign
+-- epoch | integer | | epoch of the chart, 0 from the first campaign
+-- state | varchar | | what the campaign says
+-- frequency_hz | double | Hz | undamped natural frequency, mean over impacts
+-- corrected_pct | double | % | deviation from the baseline at its temperature, minus the level of the epoch
+-- sibling_median_pct | double | % | median of the other sections' corrected_pct; empty where they do not serve
+-- residual_pct | double | % | corrected_pct minus the siblings' median and its usual difference

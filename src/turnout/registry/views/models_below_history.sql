@@ -25,3 +25,16 @@ select
     n_history, 'fit_below_history' as reason, model_id
 from judged where hammer_fit_pct < limit_pct
 order by measured_at_utc, section_id;
+
+-- columns of models_below_history
+-- section_id | varchar | | section
+-- turnout_id | varchar | | turnout
+-- campaign_id | varchar | | campaign
+-- measured_at_utc | timestamp | UTC | time of the campaign
+-- method | varchar | | method of the model
+-- hammer_fit_pct | double | % | fit of this model on the hammer decays left out
+-- history_median_pct | double | % | median of the same fit over the earlier campaigns of the section
+-- limit_pct | double | % | fit below which the model is doubtful: three standard deviations, at least five points, below the median
+-- n_history | bigint | | earlier campaigns; at least five are needed
+-- reason | varchar | | fit_below_history
+-- model_id | varchar | | model

@@ -35,3 +35,18 @@ select
     model_id
 from judged where frequency_distance > 5.0 or damping_distance > 5.0
 order by measured_at_utc, section_id, band;
+
+-- columns of modes_off_track
+-- section_id | varchar | | section
+-- turnout_id | varchar | | turnout
+-- band | varchar | | which resonance
+-- measured_at_utc | timestamp | UTC | time of the campaign
+-- frequency_hz | double | Hz | frequency of this mode
+-- frequency_track_hz | double | Hz | median over the earlier campaigns of the section
+-- frequency_distance | double | | distance from it in standard deviations, of the track (by quartiles) and of this mode together; above 5 the mode is listed
+-- damping_ratio | double | | damping ratio of this mode
+-- damping_track | double | | median over the earlier campaigns of the section
+-- damping_distance | double | | the same distance of the damping ratio; above 5 the mode is listed
+-- residue_ratio | double | | c1² + c2² of this mode over its median over the earlier campaigns: far from 1 for another mode
+-- n_history | bigint | | earlier campaigns; at least five are needed
+-- model_id | varchar | | model

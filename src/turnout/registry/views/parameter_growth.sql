@@ -39,3 +39,20 @@ select
     product / spread as per_year, spread ** -0.5 as per_year_se,
     finding_id in (select finding_id from findings_newest) as is_open, finding_id
 from sums;
+
+-- columns of parameter_growth
+-- turnout_id | varchar | | turnout
+-- term | varchar | | effect
+-- position_m | double | m | its position along the turnout, to 0.1 m
+-- channel | varchar | | its sensor
+-- parameter | varchar | | parameter of the effect
+-- unit | varchar | | unit of value and growth
+-- n_visits | integer | | visits behind it
+-- first_at_utc | timestamp | UTC | time of the first visit
+-- found_at_utc | timestamp | UTC | time of the newest
+-- value | double | | value at the newest visit, in the unit of the row
+-- value_se | double | | its standard error
+-- per_year | double | | growth per year, weighted least squares; empty with one visit
+-- per_year_se | double | | its standard error
+-- is_open | boolean | | the newest visit of its sections still has it
+-- finding_id | varchar | | newest finding with it

@@ -24,3 +24,15 @@ with everything as (
 )
 select e.*, r.meaning as reason
 from everything e left join reasons r using (reason_code);
+
+-- columns of rejected
+-- what | varchar | | impact, model, passage, fit or recording
+-- id | varchar | | its id in its table
+-- turnout_id | varchar | | turnout
+-- section_id | varchar | | section, where it belongs to one
+-- at_utc | timestamp | UTC | time of the campaign (impact: its day) or passage; empty for recordings
+-- reason_code | varchar | | code of the reason; for a fit its status
+-- measured_value | double | | number behind the reason
+-- limit_value | double | | limit it was compared with
+-- detail | varchar | | all reasons and notes in words
+-- reason | varchar | | what the code means

@@ -71,3 +71,23 @@ select
         when d is null then 'temperature not separable'
         else 'ok' end as verdict
 from fitted;
+
+-- columns of resonance_drift(days := 365, asof := null)
+-- turnout_id | varchar | | turnout
+-- section_id | varchar | | section
+-- band | varchar | | which resonance
+-- source | varchar | | what it was identified from
+-- n | bigint | | values with rail temperature
+-- n_without_temperature | bigint | | values without; not used
+-- first_at_utc | timestamp | UTC | oldest value used
+-- last_at_utc | timestamp | UTC | newest value used
+-- frequency_hz | double | Hz | mean frequency
+-- raw_pct_per_year | double | %/a | slope over time alone, of the mean frequency: season and all; never rank by it
+-- raw_se_pct_per_year | double | %/a | its standard error, values taken as independent
+-- drift_pct_per_year | double | %/a | slope over time with rail temperature held fixed
+-- drift_se_pct_per_year | double | %/a | its standard error, values taken as independent
+-- t | double | | drift over its standard error, n - 3 degrees of freedom
+-- hz_per_c | double | Hz/°C | slope over rail temperature
+-- hz_per_c_se | double | Hz/°C | its standard error
+-- residual_sd_pct | double | % | spread of the residuals, of the mean frequency
+-- verdict | varchar | | ok, too few (n < 12), season not separable (less than 300 days), temperature not separable

@@ -10,3 +10,26 @@ select
 from modes_current m join models_current k on m.model_id = k.model_id
 where m.a_block is not null and m.source = 'hammer'
 order by m.section_id, m.measured_at_utc, m.band;
+
+-- columns of section_matrices
+-- section_id | varchar | | section
+-- turnout_id | varchar | | turnout
+-- campaign_id | varchar | | campaign
+-- measured_at_utc | timestamp | UTC | time of the campaign
+-- band | varchar | | which resonance: ballast is Table 1 of the paper, railpad Table 2
+-- method | varchar | | method of its model
+-- a11 | double | | entry a11 of the model in balanced form
+-- a11_se | double | | standard error of a11
+-- a12 | double | | entry a12 of the model in balanced form
+-- a12_se | double | | standard error of a12
+-- a21 | double | | entry a21 of the model in balanced form
+-- a21_se | double | | standard error of a21
+-- a22 | double | | entry a22 of the model in balanced form
+-- a22_se | double | | standard error of a22
+-- c1 | double | | entry c1 of the model in balanced form
+-- c1_se | double | | standard error of c1
+-- c2 | double | | entry c2 of the model in balanced form
+-- c2_se | double | | standard error of c2
+-- n_impacts | integer | | impacts behind the values
+-- sampling_rate_hz | double | Hz | rate of the state-space model
+-- model_id | varchar | | model

@@ -30,3 +30,15 @@ select
 from weighted
 group by turnout_id, section_id
 order by z, section_id;
+
+-- columns of sections_whose_scores_fell(days := 28, asof := null)
+-- turnout_id | varchar | | turnout
+-- section_id | varchar | | section
+-- n_clusters | bigint | | clusters compared
+-- n_recent | bigint | | passages of the last days
+-- n_before | bigint | | passages of the year before
+-- fit_before_pct | double | % | score before, weighted over clusters
+-- fit_recent_pct | double | % | score of the last days, weighted the same
+-- change_pct | double | % | recent minus before, the cluster held fixed
+-- change_se_pct | double | % | its standard error
+-- z | double | | change over its standard error; below -3 is hardly chance

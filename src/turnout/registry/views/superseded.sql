@@ -8,3 +8,9 @@ select
 from supersedes
 group by old_id
 having arg_max(reason, generation) <> 'reinstated';
+
+-- columns of superseded
+-- old_id | varchar | | id that no longer counts
+-- new_id | varchar | | what took its place; empty = nothing
+-- kind | varchar | | what kind of row
+-- reason | varchar | | why

@@ -16,3 +16,18 @@ select
     end as words
 from chart_status
 where forecast is not null;
+
+-- columns of time_to_threshold
+-- turnout_id | varchar | | turnout
+-- section_id | varchar | | section; * = median of the turnout's sections
+-- band | varchar | | which resonance
+-- source | varchar | | hammer or passage: never mixed in one chart
+-- change_pct | double | % | change of frequency at the newest campaign since the onset
+-- change_low_pct | double | % | 95 % interval, lower end
+-- change_high_pct | double | % | upper end
+-- slope_pct_per_year | double | %/a | slope since the change
+-- slope_se_pct_per_year | double | %/a | its standard error
+-- forecast | varchar | | when the limit is reached
+-- not_before_utc | timestamp | UTC | 80 % interval of the limit, earliest
+-- not_after_utc | timestamp | UTC | 80 % interval of the limit, latest; empty = none
+-- words | varchar | | in words

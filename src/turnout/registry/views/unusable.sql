@@ -93,3 +93,12 @@ from quarantine_open
 where kind = 'configuration' and turnout_id not in (select turnout_id from tried)
     and coalesce("asof" >= newest_measurement(), true)
 group by turnout_id;
+
+-- columns of unusable(asof := null)
+-- turnout_id | varchar | | turnout
+-- section_id | varchar | | section; * = the whole turnout
+-- source | varchar | | hammer or passage; empty = no file belongs to either
+-- used_at_utc | timestamp | UTC | newest test or passage that was used; empty = none ever
+-- n | bigint | | tests or passages since then, or entries in quarantine
+-- at_utc | timestamp | UTC | newest of them
+-- why | varchar | | in words

@@ -258,3 +258,55 @@ qualify rank <= coalesce(most, (select max(worklist_rows) from chart_status), 20
 order by rank;
 
 create or replace view worklist as select * from worklist(newest_measurement());
+
+-- columns of worklist
+-- rank | bigint | | 1 = first
+-- turnout_id | varchar | | turnout
+-- section_id | varchar | | section; * = median of the turnout's sections; empty = several, see sections
+-- sections | varchar | | labels of the sections meant, or 'whole turnout' (its median)
+-- band | varchar | | which resonance; all = no newer recording could be used
+-- source | varchar | | hammer or passage: never mixed in one chart; empty = no file belongs to either
+-- state | varchar | | confirm now, inspect this week, plan, learning or cannot tell
+-- direction | varchar | | loss of stiffness (down) or gain (up)
+-- raised_at_utc | timestamp | UTC | campaign that raised the alarm
+-- since_at_utc | timestamp | UTC | estimated time of the change
+-- since_earliest_utc | timestamp | UTC | 95 % interval, earliest
+-- since_latest_utc | timestamp | UTC | 95 % interval, latest
+-- change_pct | double | % | change of frequency at the newest campaign since the onset
+-- change_low_pct | double | % | 95 % interval, lower end
+-- change_high_pct | double | % | upper end
+-- statistic_ratio | double | | CUSUM over its limit
+-- sentence | varchar | | what happened, with its interval, in words
+-- false_alarm_words | varchar | | how often an intact chart does this
+-- last_maintenance | varchar | | newest work on the section
+-- look_at | varchar | | what to look at
+-- name | varchar | | name for people
+-- line | varchar | | railway line
+-- km | double | km | position along the line
+-- n_in_all | bigint | | rows that the list would have without an end
+
+-- columns of worklist(asof, most := null)
+-- rank | bigint | | 1 = first
+-- turnout_id | varchar | | turnout
+-- section_id | varchar | | section; * = median of the turnout's sections; empty = several, see sections
+-- sections | varchar | | labels of the sections meant, or 'whole turnout' (its median)
+-- band | varchar | | which resonance; all = no newer recording could be used
+-- source | varchar | | hammer or passage: never mixed in one chart; empty = no file belongs to either
+-- state | varchar | | confirm now, inspect this week, plan, learning or cannot tell
+-- direction | varchar | | loss of stiffness (down) or gain (up)
+-- raised_at_utc | timestamp | UTC | campaign that raised the alarm
+-- since_at_utc | timestamp | UTC | estimated time of the change
+-- since_earliest_utc | timestamp | UTC | 95 % interval, earliest
+-- since_latest_utc | timestamp | UTC | 95 % interval, latest
+-- change_pct | double | % | change of frequency at the newest campaign since the onset
+-- change_low_pct | double | % | 95 % interval, lower end
+-- change_high_pct | double | % | upper end
+-- statistic_ratio | double | | CUSUM over its limit
+-- sentence | varchar | | what happened, with its interval, in words
+-- false_alarm_words | varchar | | how often an intact chart does this
+-- last_maintenance | varchar | | newest work on the section
+-- look_at | varchar | | what to look at
+-- name | varchar | | name for people
+-- line | varchar | | railway line
+-- km | double | km | position along the line
+-- n_in_all | bigint | | rows that the list would have without an end
