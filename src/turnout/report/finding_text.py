@@ -6,6 +6,7 @@ import json
 from typing import TYPE_CHECKING
 
 from turnout.constants import Z95_EXACT
+from turnout.report.formatting import count_of
 from turnout.stages.mismatch_text import interval, number_in_words, parameter_in_words, title
 
 if TYPE_CHECKING:
@@ -88,7 +89,7 @@ def facts(finding: Mapping[str, Any]) -> list[tuple[str, str]]:
         Question and answer.
     """
     evidence = json.loads(finding["evidence_json"] or "{}")
-    pairs = [("Where", _where(finding)), ("It is fixed to", _frame_words(finding, evidence))]
+    pairs = [("Where", _where(finding)), (_frame_question(finding), _frame_words(finding, evidence))]
     if finding["band_low_hz"] is not None and finding["verdict"] not in ("none", "numerics"):
         pairs.append(("Band", f"{finding['band_low_hz']:.0f} to {finding['band_high_hz']:.0f} Hz"))
     if finding["wheel_within_m"] is not None and finding["verdict"] not in ("none", "numerics"):
@@ -98,6 +99,7 @@ def facts(finding: Mapping[str, Any]) -> list[tuple[str, str]]:
     if words := _conditions(evidence):
         pairs.append(("Shows most in", words))
     pairs.append(("From", _amount(finding)))
+    pairs.append(("Prediction", _held_out_fit(finding)))
     pairs.append(("How sure", _certainty(finding, evidence)))
     return [(question, answer) for question, answer in pairs if answer]
 
@@ -130,6 +132,19 @@ def _frame_words(finding: Mapping[str, Any], evidence: Mapping[str, Any]) -> str
         most = f"; before, most was left at {'; '.join(words)}" if words else ""
         return f"{_owner(finding)}{most}"
     return "; ".join(words) or "no position, sensor or train stands out"
+
+
+def _frame_question(finding: Mapping[str, Any]) -> str:
+    """A verdict without a deviation has nothing that could be fixed to something."""
+    return "Largest deviation" if finding["verdict"] in ("none", "numerics") else "It is fixed to"
+
+
+def _held_out_fit(finding: Mapping[str, Any]) -> str:
+    """Fit where nothing is compared with it, so that it has no panel; else ""."""
+    compared = [finding[key] for key in ("fit_after_pct", "fit_rival_pct", "fit_decoy_pct")]
+    if finding["fit_before_pct"] is None or not finding["n_held_out"] or any(fit is not None for fit in compared):
+        return ""
+    return f"fit {finding['fit_before_pct']:.0f} % on {count_of(finding['n_held_out'], 'held-out recording')}"
 
 
 def _owner(finding: Mapping[str, Any]) -> str:

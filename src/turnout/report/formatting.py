@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from scipy.stats import t as student
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
     from datetime import datetime
 
 BADGES = {
@@ -138,3 +139,32 @@ def count_of(n: int, noun: str) -> str:
     ('1 turnout', '0 turnouts')
     """
     return f"{n} {noun}{'' if n == 1 else 's'}"
+
+
+def number_ranges(numbers: Iterable[int]) -> str:
+    """Whole numbers in words, those in a row as a range.
+
+    Parameters
+    ----------
+    numbers : iterable of int
+        Numbers in any order.
+
+    Returns
+    -------
+    str
+        For example "1 to 3, 7".
+
+    Examples
+    --------
+    >>> number_ranges([3, 1, 2, 7]), number_ranges([4, 5]), number_ranges([])
+    ('1 to 3, 7', '4, 5', '')
+    """
+    rows: list[list[int]] = []
+    for number in sorted(set(numbers)):
+        if rows and number == rows[-1][-1] + 1:
+            rows[-1].append(number)
+        else:
+            rows.append([number])
+    return ", ".join(
+        f"{row[0]} to {row[-1]}" if len(row) > 2 else ", ".join(str(number) for number in row) for row in rows
+    )

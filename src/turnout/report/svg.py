@@ -1,11 +1,13 @@
 """Draw small charts in SVG: axes with ticks, lines, bands, and points with error bars. They need no script.
 
-Long curves are reduced to the points that are visible.
+Long curves are reduced to the points that are visible. ``data-`` attributes hold the ends of the axes and the names of
+the series, from which templates/chart.js offers zoom, values and toggles.
 """
 
 from __future__ import annotations
 
 import math
+import textwrap
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from html import escape
@@ -223,6 +225,8 @@ def reduce_points(px: np.ndarray, py: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 LEFT, RIGHT, TOP, BOTTOM = 62, 14, 26, 40  # px, margins around the plot area
+LETTER, TITLE_LETTER = 6.2, 6.9  # px, mean width of a letter of a label and of a title
+LINE = 13  # px, height of a further line of a title
 
 
 @dataclass
@@ -276,8 +280,39 @@ class Axis:
 
 
 @dataclass
+class VerticalLabel:
+    """Words beside a vertical line at ``px``, wanted in line ``row`` of the text, counted from the top."""
+
+    px: float
+    words: str
+    style: str
+    row: int
+
+    def box(self, row: int, side: int) -> tuple[int, float, float]:
+        """Row, left and right end [px] of the words to the right (``side`` 1) or left (-1) of the line.
+
+        Parameters
+        ----------
+        row : int
+            Line of the text.
+        side : int
+            1 or -1.
+
+        Returns
+        -------
+        (int, float, float)
+            Row and ends.
+        """
+        ends = sorted((self.px + 3.0 * side, self.px + side * (3.0 + LETTER * len(self.words))))
+        return row, ends[0], ends[1]
+
+
+@dataclass
 class Chart:
-    """One panel. Add elements in drawing order, then call ``svg()``; styles are classes of the style sheet."""
+    """One panel. Add elements in drawing order, then call ``svg()``; styles are classes of the style sheet.
+
+    A title that is wider than the panel gets a second line, and the panel grows by it.
+    """
 
     x: Axis
     y: Axis
@@ -285,6 +320,23 @@ class Chart:
     width: int = 462
     height: int = 240
     elements: list = field(default_factory=list)
+    outside: list = field(default_factory=list)
+    top: int = TOP
+
+    def __post_init__(self) -> None:
+        self.title_lines = textwrap.wrap(self.title, max(8, int((self.width - LEFT) / TITLE_LETTER))) or [""]
+        self.grow_top(LINE * (len(self.title_lines) - 1))
+        self._labels: list[VerticalLabel] = []
+
+    def grow_top(self, pixels: int) -> None:
+        """Make room above the plot area, for lines of a title or a legend in ``outside``.
+
+        Parameters
+        ----------
+        pixels : int
+            Height. [px]
+        """
+        self.top, self.height = self.top + pixels, self.height + pixels
 
     def px(self, values: ArrayLike) -> np.ndarray:
         """Horizontal pixels of data values.
@@ -314,7 +366,7 @@ class Chart:
         array
             Pixels from the top.
         """
-        return self.height - BOTTOM - self.y.share(values) * (self.height - TOP - BOTTOM)
+        return self.height - BOTTOM - self.y.share(values) * (self.height - self.top - BOTTOM)
 
     def line(self, x: ArrayLike, y: ArrayLike, style: str, label: str = "") -> None:
         """Draw a polyline with gaps at missing values.
@@ -328,12 +380,12 @@ class Chart:
         style : str
             Class of the style sheet.
         label : str
-            Text on hovering.
+            Name of the series.
         """
         px, py = self.px(x), self.py(y)
         pieces = (reduce_points(px[piece], py[piece]) for piece in runs(np.isfinite(px) & np.isfinite(py)))
         path = "".join("M" + _path_points(*piece) for piece in pieces)
-        self.elements.append(f'<path class="{style}" d="{path}">{_title(label)}</path>')
+        self.elements.append(f'<path class="{style}"{_series(label)} d="{path}">{_title(label)}</path>')
 
     def band(self, x: ArrayLike, low: ArrayLike, high: ArrayLike, style: str, label: str = "") -> None:
         """Draw the area between two lines, with gaps at missing values.
@@ -349,13 +401,13 @@ class Chart:
         style : str
             Class of the style sheet.
         label : str
-            Text on hovering.
+            Name of the series.
         """
         px, low, high = self.px(x), self.py(low), self.py(high)
         for piece in runs(np.isfinite(px) & np.isfinite(low) & np.isfinite(high)):
             forward, (x_back, y_back) = reduce_points(px[piece], high[piece]), reduce_points(px[piece], low[piece])
             path = f"M{_path_points(*forward)}L{_path_points(x_back[::-1], y_back[::-1])}Z"
-            self.elements.append(f'<path class="{style}" d="{path}">{_title(label)}</path>')
+            self.elements.append(f'<path class="{style}"{_series(label)} d="{path}">{_title(label)}</path>')
 
     def points(
         self,
@@ -366,6 +418,7 @@ class Chart:
         low: ArrayLike | None = None,
         high: ArrayLike | None = None,
         labels: Sequence[str] | None = None,
+        series: str = "",
     ) -> None:
         """Draw dots, with bars if their ends are given.
 
@@ -385,6 +438,8 @@ class Chart:
             Upper ends of the bars.
         labels : sequence of str or None
             Text of each dot on hovering.
+        series : str
+            Name of the series.
         """
         px, py = np.atleast_1d(self.px(x)), np.atleast_1d(self.py(y))
         is_finite = np.isfinite(px) & np.isfinite(py)
@@ -393,14 +448,14 @@ class Chart:
             barred = np.flatnonzero(is_finite & np.isfinite(bottom) & np.isfinite(top))
             numbers = np.column_stack([px[barred], bottom[barred], top[barred]]).ravel()
             if barred.size:
-                path = "M%.1f %.1fV%.1f" * barred.size % tuple(numbers.tolist())
-                self.elements.append(f'<path class="{style} bar" d="{path}"/>')
+                path = "M%.2f %.2fV%.2f" * barred.size % tuple(numbers.tolist())
+                self.elements.append(f'<path class="{style} bar"{_series(series)} d="{path}"/>')
         texts = [""] * len(px) if labels is None else [_title(label) for label in labels]
-        dot = f'<circle class="{style}" r="{radius:g}" cx="%.1f" cy="%.1f">%s</circle>'
+        dot = f'<circle class="{style}"{_series(series)} r="{radius:g}" cx="%.2f" cy="%.2f">%s</circle>'
         self.elements += [dot % (px[i], py[i], texts[i]) for i in np.flatnonzero(is_finite).tolist()]
 
     def vertical(self, x: float, style: str, label: str = "", row: int = 0) -> None:
-        """Draw a vertical line with a label at its top.
+        """Draw a vertical line with a label at its top, or along the line where it would lie on another line or label.
 
         Parameters
         ----------
@@ -411,16 +466,35 @@ class Chart:
         label : str
             Text beside the line.
         row : int
-            Number of the line of text, counted from the top.
+            Number of the first line of text to try, counted from the top.
         """
         px = float(self.px(x))
         if LEFT - 1 <= px <= self.width - RIGHT + 1:
-            self.elements.append(f'<path class="{style}" d="M{px:.1f} {TOP}V{self.height - BOTTOM}"/>')
-            if label:
-                room = self.width - RIGHT - px > 6.2 * len(label)
-                position = f'x="{px + (3 if room else -3):.1f}" y="{TOP + 9 + 11 * row}"'
-                anchor = "start" if room else "end"
-                self.elements.append(f'<text class="{style}" {position} text-anchor="{anchor}">{escape(label)}</text>')
+            self.elements.append(f'<path class="{style}" d="M{px:.2f} {self.top}V{self.height - BOTTOM}"/>')
+            self._labels.append(VerticalLabel(px, label, style, row))
+
+    def _placed_labels(self) -> str:
+        """Labels of the vertical lines, none on another one or across a line."""
+        taken: list[tuple[int, float, float]] = []
+        texts = []
+        for label in (one for one in self._labels if one.words):
+            boxes = ((side, label.box(row, side)) for row in range(label.row, label.row + 3) for side in (1, -1))
+            side, box = next(((s, b) for s, b in boxes if self._is_free(b, label.px, taken)), (0, (0, 0.0, 0.0)))
+            if side:
+                taken.append(box)
+                anchor = "start" if side > 0 else "end"
+                where = f'x="{3 * side}" y="{self.top + 9 + 11 * box[0]}" text-anchor="{anchor}"'
+            else:
+                where = f'transform="translate(-3 {self.height - BOTTOM - 6}) rotate(-90)"'
+            words = f'<text class="{label.style}" {where}>{escape(label.words)}</text>'
+            texts.append(f'<g data-px="{label.px:.2f}" transform="translate({label.px:.2f} 0)">{words}</g>')
+        return "".join(texts)
+
+    def _is_free(self, box: tuple[int, float, float], own: float, taken: Sequence[tuple[int, float, float]]) -> bool:
+        row, low, high = box
+        inside = low >= LEFT and high <= self.width - RIGHT
+        crossed = any(low < other.px < high for other in self._labels if other.px != own)
+        return inside and not crossed and not any(r == row and low < b and a < high for r, a, b in taken)
 
     def span(self, x_low: float, x_high: float, style: str, label: str = "") -> None:
         """Shade an interval of the horizontal axis.
@@ -439,8 +513,8 @@ class Chart:
         x_left, x_right = (float(np.clip(self.px(v), LEFT, self.width - RIGHT)) for v in (x_low, x_high))
         if x_right > x_left:
             self.elements.append(
-                f'<rect class="{style}" x="{x_left:.1f}" y="{TOP}" width="{x_right - x_left:.1f}" '
-                f'height="{self.height - TOP - BOTTOM}">{_title(label)}</rect>'
+                f'<rect class="{style}" x="{x_left:.1f}" y="{self.top}" width="{x_right - x_left:.1f}" '
+                f'height="{self.height - self.top - BOTTOM}">{_title(label)}</rect>'
             )
 
     def text(self, x_share: float, y_share: float, words: str, style: str = "note", anchor: str = "start") -> None:
@@ -460,7 +534,7 @@ class Chart:
             End of the text that is at the position: "start", "middle" or "end".
         """
         px = LEFT + x_share * (self.width - LEFT - RIGHT)
-        py = TOP + y_share * (self.height - TOP - BOTTOM)
+        py = self.top + y_share * (self.height - self.top - BOTTOM)
         self.elements.append(
             f'<text class="{style}" x="{px:.1f}" y="{py:.1f}" text-anchor="{anchor}">{escape(words)}</text>'
         )
@@ -471,26 +545,32 @@ class Chart:
             f'<svg class="chart" viewBox="0 0 {self.width} {self.height}" width="{self.width}" '
             f'height="{self.height}" role="img" aria-label="{escape(self.title, quote=True)}">'
         )
-        title = f'<text class="title" x="{LEFT}" y="16">{escape(self.title)}</text>'
-        width, height = self.width - LEFT - RIGHT, self.height - TOP - BOTTOM
-        window = f'x="{LEFT}" y="{TOP}" width="{width}" height="{height}" viewBox="{LEFT} {TOP} {width} {height}"'
-        body = f"<svg {window}>" + "".join(self.elements) + "</svg>"
-        return frame + title + self._axes() + body + "</svg>"
+        title = "".join(
+            f'<text class="title" x="{LEFT}" y="{16 + LINE * k}">{escape(line)}</text>'
+            for k, line in enumerate(self.title_lines)
+        )
+        width, height = self.width - LEFT - RIGHT, self.height - self.top - BOTTOM
+        window = (
+            f'x="{LEFT}" y="{self.top}" width="{width}" height="{height}" '
+            f'viewBox="{LEFT} {self.top} {width} {height}" data-x="{_ends(self.x)}" data-y="{_ends(self.y)}"'
+        )
+        body = f"<svg {window}>" + "".join(self.elements) + self._placed_labels() + "</svg>"
+        return frame + title + self._axes() + body + "".join(self.outside) + "</svg>"
 
     def _axes(self) -> str:
         bottom, right = self.height - BOTTOM, self.width - RIGHT
         x_ticks, y_ticks = self.x.ticks(), self.y.ticks()
         px, py = self.px([v for v, _ in x_ticks]).tolist(), self.py([v for v, _ in y_ticks]).tolist()
-        grid = [f"M{x:.1f} {TOP}V{bottom}" for x in px] + [f"M{LEFT} {y:.1f}H{right}" for y in py]
+        grid = [f"M{x:.1f} {self.top}V{bottom}" for x in px] + [f"M{LEFT} {y:.1f}H{right}" for y in py]
         elements = [
-            f'<path class="frame" d="M{LEFT} {TOP}V{bottom}H{right}"/><path class="grid" d="{"".join(grid)}"/>',
-            '<g class="tick" text-anchor="middle">',
+            f'<path class="frame" d="M{LEFT} {self.top}V{bottom}H{right}"/><path class="grid" d="{"".join(grid)}"/>',
+            '<g class="tick x" text-anchor="middle">',
             *[f'<text x="{x:.1f}" y="{bottom + 14}">{text}</text>' for x, (_, text) in zip(px, x_ticks)],
-            '</g><g class="tick" text-anchor="end">',
+            '</g><g class="tick y" text-anchor="end">',
             *[f'<text x="{LEFT - 5}" y="{y + 3.5:.1f}">{text}</text>' for y, (_, text) in zip(py, y_ticks)],
             "</g>",
         ]
-        middle_x, middle_y = (LEFT + right) / 2, (TOP + bottom) / 2
+        middle_x, middle_y = (LEFT + right) / 2, (self.top + bottom) / 2
         elements.append(
             f'<text class="label" x="{middle_x:.0f}" y="{self.height - 6}" text-anchor="middle">'
             f"{escape(self.x.label)}</text>"
@@ -503,8 +583,17 @@ class Chart:
 def _path_points(px: np.ndarray, py: np.ndarray) -> str:
     """Path data of the points: ``x y`` of each, with the letter L of a straight line between them."""
     numbers = np.column_stack([px, py]).ravel().tolist()
-    return ("%.1f %.1fL" * len(px) % tuple(numbers))[:-1]
+    return ("%.2f %.2fL" * len(px) % tuple(numbers))[:-1]
 
 
 def _title(words: str) -> str:
     return f"<title>{escape(words)}</title>" if words else ""
+
+
+def _series(name: str) -> str:
+    return f' data-series="{escape(name, quote=True)}"' if name else ""
+
+
+def _ends(axis: Axis) -> str:
+    """Lowest and highest value of an axis, its scale and its label, for the script."""
+    return escape(f"{float(axis.low):.10g} {float(axis.high):.10g} {axis.scale} {axis.label}", quote=True)

@@ -285,3 +285,12 @@ def test_a_refused_name_is_not_offered_as_what_was_left_out():
     shown = page(finding("unknown", term_json=json.dumps([GAP]), fit_after_pct=26.0))
     assert "what was rejected" in shown and "what was left out" not in shown and "--accept" not in shown
     assert "what was left out" in page(named()) and "--accept" in page(named())
+
+
+def test_one_fit_alone_is_a_sentence_and_no_chart():
+    """Nothing is compared with the fit of an intact turnout; of a named effect four are compared."""
+    quiet = page(finding("none"))
+    assert "Fit on held-out recordings" not in quiet and "fit 41 % on 2 held-out recordings" in quiet
+    assert "It is fixed to" not in quiet and "Largest deviation" in quiet
+    text = page(named())
+    assert "Fit on held-out recordings" in text and "fit 41 % on 2" not in text and "It is fixed to" in text

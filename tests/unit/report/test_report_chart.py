@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from turnout.report.panels.hammer import HammerTest, coherence_panel, receptance_panel
+from turnout.report.panels.history import history_panel
 from turnout.report.panels.phase import phase_panel
 from turnout.report.svg import BOTTOM, LEFT, RIGHT, TOP, Axis, Chart, linear_ticks, log_ticks, reduce_points, time_ticks
 
@@ -123,7 +124,7 @@ def test_a_curve_behind_an_exponential_window_says_so(decay, said):
     assert ("exp(-25/s t)" in receptance_panel(HammerTest(row, {}, [], []))) is said
 
 
-@pytest.mark.parametrize(("required", "drawn_at"), [(0.9, "M62.0 40.6L448.0 40.6"), (None, "")])
+@pytest.mark.parametrize(("required", "drawn_at"), [(0.9, "M62.00 40.59L448.00 40.59"), (None, "")])
 def test_the_limit_of_the_coherence_is_that_of_the_settings(required, drawn_at):
     """0.9 of an axis to 1.02 in a panel of 190: 150 - 124 * 0.9 / 1.02. Rows of earlier versions do not know it."""
     n = 40
@@ -132,7 +133,7 @@ def test_the_limit_of_the_coherence_is_that_of_the_settings(required, drawn_at):
         "valid_to_hz": None, "gate": "limit", "gate_required": required,
     }  # fmt: skip
     svg = coherence_panel(HammerTest(row, {}, [], []))
-    limits = re.findall(r'<path class="limit" d="([^"]*)"><title>required ([\d.]+)', svg)
+    limits = re.findall(r'<path class="limit" data-series="[^"]*" d="([^"]*)"><title>required ([\d.]+)', svg)
     assert limits == ([(drawn_at, "0.9")] if required else [])
 
 
@@ -151,7 +152,7 @@ def test_the_phase_of_a_resonator_falls_from_0_to_minus_180_degrees():
         "frequency_hz": frequency, "h1_real_m_n": response.real, "h1_imag_m_n": response.imag,
         "passed": np.ones(400, dtype=bool),
     }  # fmt: skip
-    path = re.search(r'<path class="curve" d="M([^"]*)"', phase_panel(HammerTest(row, {}, [], [])))[1]
+    path = re.search(r'<path class="curve" data-series="H1" d="M([^"]*)"', phase_panel(HammerTest(row, {}, [], [])))[1]
     points = np.array([pair.split() for pair in path.split("L")], dtype=float)
     phase = 200.0 - 400.0 * (points[:, 1] - TOP) / (190 - TOP - BOTTOM)
     assert abs(phase[0]) < 3.0 and abs(phase[-1] + 180.0) < 3.0
@@ -159,3 +160,50 @@ def test_the_phase_of_a_resonator_falls_from_0_to_minus_180_degrees():
         np.abs(points[:, 0] - Axis(30.0, 1600.0, "", "log").share(200.0) * (462 - LEFT - RIGHT) - LEFT)
     )
     assert phase[at_resonance] == pytest.approx(-90.0, abs=12.0)
+
+
+def test_a_long_title_has_two_lines_and_leaves_the_plot_area_as_it_was():
+    short, long = (
+        Chart(Axis(0.0, 1.0), Axis(0.0, 1.0), words) for words in ("Phase", "Free decay of one impact, " * 3)
+    )
+    titles = re.findall(r'<text class="title" x="62" y="(\d+)">([^<]*)', long.svg())
+    assert [y for y, _ in titles] == ["16", "29"] and all(6.9 * len(words) <= 462 - LEFT for _, words in titles)
+    assert long.height == short.height + 13
+    assert float(long.py(0.0) - long.py(1.0)) == float(short.py(0.0) - short.py(1.0))
+
+
+def boxes_of_labels(svg):
+    """(row, left, right) of each label that is written across, (None, px, px) of each along its line."""
+    found = re.findall(
+        r'<g data-px="([\d.]+)"[^>]*><text class="\w+" (?:x="(-?\d+)" y="(\d+)" text-anchor="(\w+)"|'
+        r"transform[^>]*)>([^<]*)",
+        svg,
+    )
+    for px, dx, y, anchor, words in found:
+        start = float(px) + float(dx or 0)
+        ends = (start, start + 6.2 * len(words)) if anchor == "start" else (start - 6.2 * len(words), start)
+        yield (y, *ends) if anchor else (None, float(px), float(px))
+
+
+@pytest.mark.parametrize("edge", [650.0, 905.0, 1500.0])
+def test_no_label_lies_on_another_one_or_across_a_line(edge):
+    c = Chart(Axis(30.0, 1600.0, "f", "log"), Axis(0.0, 1.0))
+    lines = {"ballast 104 Hz": 104.0, "railpad 614 Hz": 614.0, "band edge of the hammer": edge}
+    for words, frequency in lines.items():
+        c.vertical(frequency, "mode", words)
+    boxes = list(boxes_of_labels(c.svg()))
+    assert len(boxes) == 3
+    for row, low, high in boxes:
+        assert LEFT <= low and high <= 462 - RIGHT
+        assert not any(low < float(c.px(f)) < high for f in lines.values())
+        assert sum(r == row and a < high and low < b for r, a, b in boxes if row) <= 1
+
+
+def test_one_campaign_without_an_error_has_short_numbers_at_its_axis():
+    mode = {
+        "measured_at_utc": datetime(2026, 5, 13), "frequency_hz": 102.13, "frequency_se_hz": None, "n_impacts": 1,
+        "damping_ratio": 0.05, "rail_temperature_c": None,
+    }  # fmt: skip
+    svg = history_panel("ballast", [mode], [], [])
+    ticks = re.findall(r">([^<]*)</text>", svg[svg.index('class="tick y"') :].split("</g>")[0])
+    assert len(ticks) >= 3 and max(map(len, ticks)) <= 5

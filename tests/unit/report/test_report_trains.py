@@ -84,3 +84,12 @@ def test_names_with_quotes_ask_for_themselves():
     train_rows(lambda sql: asked.append(sql) or [], ["o'hara"])
     assert all("'o''hara'" in sql for sql in asked) and len(asked) == 4
     assert train_rows(lambda sql: 1 / 0, [])["bars"] == {}
+
+
+def test_no_bar_lies_behind_the_legend():
+    rows = [bar("OT", name, 95.0) for name in ("IC3", "freight", "regional")]
+    svg = train_bars("train type", rows, SECTIONS)
+    swatches = [float(y) for y in re.findall(r'<rect x="\d+" y="(\d+)" width="10"', svg)]
+    tops = [float(y) for y in re.findall(r'<rect x="[\d.]+" y="([-\d.]+)" width="[\d.]+" height="[\d.]+" fill', svg)]
+    window = float(re.search(r'<svg x="62" y="(\d+)"', svg)[1])
+    assert len(swatches) == 3 and max(swatches) + 10 <= window <= min(t for t in tops if t not in swatches)

@@ -145,3 +145,15 @@ def test_a_full_disk_leaves_the_old_page_and_nothing_beside_it(tmp_path, monkeyp
     with pytest.raises(OSError, match="No space left"):
         replace_page(tmp_path / "t.html", "new")
     assert [p.name for p in tmp_path.iterdir()] == ["t.html"] and (tmp_path / "t.html").read_text() == "old"
+
+
+def test_the_records_of_one_file_that_fail_alike_have_one_row_of_the_quarantine():
+    row = {
+        "turnout_id": "t", "kind": "hammer", "path": "t/ASM_1.h5", "record": 0, "reason_code": "not_finite",
+        "place": "record 1 of 10", "found": "5 samples are not finite", "remedy": "Export it again", "n_alike": 5,
+    }  # fmt: skip
+    cut = row | {"record": None, "reason_code": "truncated", "place": "byte 81920", "n_alike": 1}
+    text = page(quarantine=[*(row | {"record": k, "place": f"record {k + 1} of 10"} for k in (9, 1, 2, 0, 5)), cut])
+    assert text.count("<td>t/ASM_1.h5</td>") == 2
+    assert "<td>5 records: 1 to 3, 6, 10</td><td>5 samples are not finite</td>" in text
+    assert "<td>byte 81920</td>" in text and "more of" not in text

@@ -163,7 +163,7 @@ def test_a_turnout_that_was_taken_out_is_off_the_list_and_its_history_stays(sett
                 [[*kept]],
             ).fetchall()[0][0]
             words = [said for _, state, said in listed if state == "inspect this week"]
-            assert all(f"in all {n_charts} charts" in said for said in words)
+            assert all(f"if all {n_charts} charts were intact" in said for said in words)
         assert {t for (t,) in con.execute("select distinct turnout_id from chart_states").fetchall()} == kept
         history = con.execute("select count(*) from charts where turnout_id = 'T00001'").fetchall()
         assert history[0][0] > 800

@@ -349,12 +349,12 @@ def test_one_quantity_in_one_sentence_and_no_impossible_figure(frames):
         why = dict(con.execute("select section_id, why from cannot_see()").fetchall())
     # (1 - 0.019)^2 = 0.962 and (1 - 0.015)^2 = 0.970: one degree of freedom.
     assert why["T00000/S0"] == (
-        "a change below 1.9 % of frequency (about 3.8 % of stiffness) may go unseen for a year; "
+        "a change below 1.9 % of frequency (about 3.8 % in stiffness) may go unseen for a year; "
         "asked for: 1.5 % (3.0 %)"
     )
     assert "cannot see any change" in why["T00000/S1"] and "149" not in why["T00000/S1"]
     # 1.53 % is more than the 1.5 % asked for, and reads so; (1 - 0.0153)^2 = 0.9696.
-    assert why["T00000/S2"].startswith("a change below 1.6 % of frequency (about 3.1 % of stiffness)")
+    assert why["T00000/S2"].startswith("a change below 1.6 % of frequency (about 3.1 % in stiffness)")
 
 
 def test_rows_of_several_sections_name_them(con):

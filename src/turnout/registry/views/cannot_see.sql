@@ -28,7 +28,7 @@ select
             printf('a change below %.1f %% of acceleration may go unseen for a year; asked for: %.1f %%',
                 up_to_a_tenth(detectable_pct), target_pct)
         when coalesce(detectable_pct < 50, false) then
-            printf('a change below %.1f %% of frequency (about %.1f %% of stiffness) may go unseen for a year; '
+            printf('a change below %.1f %% of frequency (about %.1f %% in stiffness) may go unseen for a year; '
                 || 'asked for: %.1f %% (%.1f %%)',
                 up_to_a_tenth(detectable_pct), up_to_a_tenth(100 * (1 - (1 - detectable_pct / 100) ** 2)),
                 target_pct, 100 * (1 - (1 - target_pct / 100) ** 2))

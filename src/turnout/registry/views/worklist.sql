@@ -188,8 +188,9 @@ select
                 || coalesce(' (' || strftime(h.since_earliest_utc, '%Y-%m-%d') || ' to '
                     || strftime(h.since_latest_utc, '%Y-%m-%d') || ')', ''), '')
             || (case when h.source = 'passage' then '; from passages' else '; from hammer tests' end)
-            || (case when h.band in ('ballast', 'railpad') then printf('; that is about %.0f %% of stiffness',
-                abs((1 + h.change_pct / 100) ** 2 - 1) * 100) else '' end)
+            || (case when h.band in ('ballast', 'railpad') then printf('; the stiffness is about %.0f %% %s',
+                abs((1 + h.change_pct / 100) ** 2 - 1) * 100, case when h.change_pct < 0 then 'lower' else 'higher' end)
+                else '' end)
             || coalesce('; not measured since ' || strftime(h.not_since_utc, '%Y-%m-%d'), '')
             || (case when h.is_small then printf('; below the target of %.1f %%: nobody needs to go there', s.target_pct)
                 else '' end)
@@ -201,11 +202,12 @@ select
             || printf('%.0f campaigns', case when h.direction = 'up' then s.run_length_up else s.run_length_down end)
             || coalesce(printf(' (%.0f years)', case when h.direction = 'up' then s.run_length_up else s.run_length_down end
                 / nullif(s.campaigns_per_year, 0)), '')
-            || '; in all ' || f.n_charts || ' charts expect '
+            || '; '
             || case
-                when f.alarms_per_year < 10 then printf('%.1f', f.alarms_per_year)
-                else printf('%.0f', f.alarms_per_year)
-            end || ' such alarms a year'
+                when f.alarms_per_year >= 2 then printf('%.0f such alarms a year', f.alarms_per_year)
+                when f.alarms_per_year >= 0.01 then printf('one such alarm in %.0f years', 1 / f.alarms_per_year)
+                else 'less than one such alarm in 100 years'
+            end || ' expected if all ' || f.n_charts || ' charts were intact'
         when h.state = 'confirm now' then
             'one campaign alone is no alarm: only a second one shows whether the track has changed or the measurement was wrong'
         when h.state = 'plan' then

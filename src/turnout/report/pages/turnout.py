@@ -6,7 +6,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from turnout.report import panels
-from turnout.report.formatting import badge, day, with_interval
+from turnout.report.formatting import badge, count_of, day, number_ranges, with_interval
 from turnout.report.panels.diagram import diagram
 from turnout.report.panels.hammer import HammerTest
 from turnout.report.panels.history import history_panel
@@ -66,7 +66,7 @@ def turnout_page(
         summary=[_summary(s, models.get(s["section_id"]), _rows_of(rows, "modes", s)) for s in rows["sections"]],
         sections=[_section(rows, s, models, states) for s in rows["sections"]],
         part=trains_part(rows, rows["sections"]),
-        quarantine=rows["quarantine"],
+        quarantine=_by_file(rows["quarantine"]),
         unshown=_hidden_counts(rows["quarantine"]),
         events=[_event(e) for e in rows["events"]],
         **shared,
@@ -158,6 +158,24 @@ def _section(
         "detail": model["detail"] if model else "",
         "unused": _unused_tests(_rows_of(rows, "unused", section)),
     }
+
+
+def _by_file(quarantine: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """One row for each file and reason, with its records together; the details are those of its first record."""
+    groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
+    for row in sorted(quarantine, key=lambda q: (q["path"], -1 if q["record"] is None else q["record"])):
+        groups.setdefault((row["path"], row["reason_code"]), []).append(row)
+    return [dict(same[0]) | _records(same) for same in groups.values()]
+
+
+def _records(same: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Words for where and what in rows of one file and reason."""
+    if len(same) == 1:
+        return {}
+    numbers = [q["record"] + 1 for q in same if q["record"] is not None]
+    alike = len({q["found"] for q in same}) == 1
+    what = same[0]["found"] if alike else f"{same[0]['found']} (first of {len(same)})"
+    return {"place": f"{count_of(len(same), 'record')}: {number_ranges(numbers)}", "found": what}
 
 
 def _hidden_counts(quarantine: Sequence[Mapping[str, Any]]) -> list[tuple[str, int]]:

@@ -114,7 +114,7 @@ def fit_panel(finding: Mapping[str, Any]) -> str:
     Returns
     -------
     str
-        SVG, "" without a fit.
+        SVG, "" with less than two fits to compare.
     """
     entries = [
         ("before", finding["fit_before_pct"], "bar-before"),
@@ -123,7 +123,7 @@ def fit_panel(finding: Mapping[str, Any]) -> str:
         ("decoy", finding["fit_decoy_pct"], "bar-rival"),
     ]
     entries = [e for e in entries if e[1] is not None]
-    if not entries or not finding["n_held_out"]:
+    if len(entries) < 2 or not finding["n_held_out"]:
         return ""
     low = min(0.0, *(max(e[1], -100.0) for e in entries))
     chart = Chart(

@@ -139,17 +139,20 @@ def decay_panel(test: HammerTest) -> str:
     largest = 1.1 * float(np.max(np.abs(measured[:n])))
     fit, null = model["hammer_fit_pct"], model["hammer_fit_null_pct"]
     score = (
-        f"fit of held-out impacts {fit:.0f} % (null model {null:.0f} %)" if _is_number(fit) and _is_number(null) else ""
+        f"predicts {fit:.0f} % of held-out impacts (a random model {null:.0f} %)"
+        if _is_number(fit) and _is_number(null)
+        else ""
     )
     chart = Chart(
         Axis(0.0, float(time[-1]), "time after contact [ms]"),
         Axis(-largest, largest, "acceleration [m/s²]"),
-        f"Free decay, one impact; {score}" if score else "Free decay, one impact",
+        "Free decay of one impact",
     )
     chart.line(time, measured[:n], "measured", "measured")
     chart.line(time, predicted[:n], "model", "model")
     chart.text(0.98, 0.08, "measured", "key measured", "end")
     chart.text(0.98, 0.16, f"model of order {model['model_order']}", "key model", "end")
+    chart.text(0.98, 0.96, score, "note", "end")
     return chart.svg()
 
 

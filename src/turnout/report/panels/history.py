@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 EPOCH = datetime(1970, 1, 1)
+SERIES = {"point": "campaign", "confirm": "campaign to be confirmed", "alarm": "campaign in an open alarm"}
 
 
 def history_panel(
@@ -53,7 +54,9 @@ def history_panel(
     expected = [c for c in charts if c["expected_low_hz"] is not None and c["expected_high_hz"] is not None]
     lowest = min([low.min(), *(c["expected_low_hz"] for c in expected)])
     highest = max([high.max(), *(c["expected_high_hz"] for c in expected)])
-    pad, margin = 0.08 * (highest - lowest) + 1e-9, 0.03 * (time.max() - time.min()) + 86400
+    # a single value without an error still gets an axis of 2 % with short numbers at its ticks
+    pad = max(0.08 * (highest - lowest), 0.01 * highest - 0.5 * (highest - lowest))
+    margin = 0.03 * (time.max() - time.min()) + 86400
     chart = Chart(
         Axis(time.min() - margin, time.max() + margin, "", "time"),
         Axis(lowest - pad, highest + pad, f"{band} [Hz]"),
@@ -74,9 +77,9 @@ def history_panel(
         for m, e in zip(modes, error)
     ]
     styles = _point_styles(modes, charts)
-    for style in ("point", "confirm", "alarm"):
+    for style, series in SERIES.items():
         some = np.flatnonzero(styles == style)
-        chart.points(time[some], frequency[some], style, 3.0, low[some], high[some], [labels[i] for i in some])
+        chart.points(time[some], frequency[some], style, 3.0, low[some], high[some], [labels[i] for i in some], series)
     return chart.svg()
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.constants import Z95
-from turnout.report.svg import LEFT, TOP, Axis, Chart
+from turnout.report.svg import LEFT, LINE, Axis, Chart
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -63,17 +63,17 @@ def train_bars(factor: str, rows: Sequence[Mapping[str, Any]], sections: Sequenc
             "names",
             _labels(sections_shown),
         ),
-        Axis(min(0.0, max(min(ends), -60.0)) - 2.0, max(ends) * 1.25 + 4.0, f"{rows[0]['score']} [%]"),
+        Axis(min(0.0, max(min(ends), -60.0)) - 2.0, max(ends) * 1.08 + 2.0, f"{rows[0]['score']} [%]"),
         title,
         WIDTH,
         230,
     )
+    _key(chart, names)
     width = 0.8 / len(names)
     for k, section in enumerate(sections_shown, start=1):
         for j, name in enumerate(names):
             if drawn := at.get((section["section_id"], name)):
                 _bar(chart, k - 0.4 + (j + 0.5) * width, width, COLOURS[j], drawn)
-    _key(chart, names)
     return chart.svg()
 
 
@@ -118,9 +118,10 @@ def _bar(chart: Chart, x: float, width: float, colour: str, row: Mapping[str, An
 
 
 def _key(chart: Chart, names: Sequence[str]) -> None:
-    """Draw the legend: the colours of the classes."""
-    x, y = float(LEFT + 8), TOP + 6
+    """Draw the legend above the plot area, so that no bar lies behind it: the colours of the classes."""
+    chart.grow_top(LINE + 3)
+    x, y = float(LEFT), chart.top - LINE - 4
     for colour, name in zip(COLOURS, names):
-        chart.elements.append(f'<rect x="{x:.0f}" y="{y}" width="10" height="10" fill="{colour}" stroke="#65727f"/>')
-        chart.elements.append(f'<text x="{x + 14:.0f}" y="{y + 9}">{escape(name)}</text>')
+        chart.outside.append(f'<rect x="{x:.0f}" y="{y}" width="10" height="10" fill="{colour}" stroke="#65727f"/>')
+        chart.outside.append(f'<text x="{x + 14:.0f}" y="{y + 9}">{escape(name)}</text>')
         x += 30 + 6.2 * len(name)
