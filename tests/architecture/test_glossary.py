@@ -33,8 +33,11 @@ def replaced_words(repository):
 
 
 def messages(path):
-    """Text constants of a module with a space in them, docstrings excluded."""
+    """Text constants of a module with a space in them, docstrings excluded, and the labels of printed lines."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "_line" and node.args:
+            yield from (str(x.value) for x in ast.walk(node.args[0]) if isinstance(x, ast.Constant))
     docs = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
     for node in ast.walk(tree):
         if (

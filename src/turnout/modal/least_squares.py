@@ -4,6 +4,7 @@ The sums over samples of damped waves z^k and of their products come from short 
 """
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -157,9 +158,15 @@ def geometric_sums(q: np.ndarray, q_to_n: np.ndarray, n: int) -> tuple[np.ndarra
 
 def _sums_near_one(log: np.ndarray, n: int) -> tuple[np.ndarray, ...]:
     """The same sums for (n_q,) logarithms of q, by the exponential series."""
-    k = np.arange(n) / n
     term = (log[:, None] * n) ** np.arange(SERIES_TERMS) / factorial(np.arange(SERIES_TERMS))
-    return tuple(float(n) ** p * (term @ [np.sum(k ** (p + j)) for j in range(SERIES_TERMS)]) for p in range(3))
+    return tuple(float(n) ** p * (term @ _power_sums(n)[p]) for p in range(3))
+
+
+@cache
+def _power_sums(n: int) -> np.ndarray:
+    """(3, SERIES_TERMS) sums over k of (k / n) to the power p + j."""
+    k = np.arange(n) / n
+    return np.array([[np.sum(k ** (p + j)) for j in range(SERIES_TERMS)] for p in range(3)])
 
 
 def pair_sums(table: WaveTable) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:

@@ -7,6 +7,9 @@ import numpy as np
 from turnout.modal.least_squares import Linearisation, linearise
 
 MAX_STEP = np.array([0.2, 0.15])  # of ln f and of zeta in one iteration
+SEARCH_RSS_STEPS = 2  # iterations over which an improvement is measured: steps may alternate between two values
+SEARCH_RSS_STEP = 1.0  # improvement in variances of the noise that no choice depends on: limits are chi-squared of 2 n
+SEARCH_RSS_SHARE = 0.1  # improvement in shares of the distance to go
 MAX_PRINCIPAL = 8  # combinations of the decays that hold the signal
 RIDGE = 1e-10  # keeps matrices of two nearly equal modes invertible; distinct modes differ by 1e-6 and more
 MIN_DAMPING, MAX_DAMPING = 1e-5, 0.95  # damping ratios during the fit
@@ -173,6 +176,8 @@ def fit_mixed(
     theta: np.ndarray | None = None,
     iterations: int = 12,
     tolerance: float = 0.01,
+    target_rss: float | None = None,
+    is_search: bool = False,
 ) -> MixedFit:
     r"""Modes of every impact, shrunken towards their common mean according to the spread in the data.
 
@@ -198,6 +203,10 @@ def fit_mixed(
         Largest number of iterations.
     tolerance : float
         Step in errors of single impacts at which the fit has converged.
+    target_rss : float or None
+        Sum of squared residuals that matters to the caller: the fit ends when it is clear that it stays above.
+    is_search : bool
+        The fit ends, too, when it no longer improves by what matters to a choice of modes.
 
     Returns
     -------
@@ -212,9 +221,11 @@ def fit_mixed(
         theta = np.repeat(np.asarray(start, dtype=float)[None], len(decays), axis=0)
     n_decay, n_mode = theta.shape[:2]
     dof = degrees_of_freedom(decays, n_mode, len(drift))
+    lowest_rss: list[float] = []
     for count in range(1, iterations + 1):
         linearisation = linearise(theta, decays, rate, drift)
         sigma2 = max(linearisation.rss.sum() / dof, 1e-300)
+        lowest_rss.append(min([float(linearisation.rss.sum()), *lowest_rss[-1:]]))
         inverse = _inverse(linearisation.information)
         step = np.einsum("ijk,ik->ij", inverse, linearisation.score).reshape(theta.shape)
         free = (theta + np.where(np.isfinite(step), step, 0.0)).reshape(n_decay, -1)
@@ -235,7 +246,30 @@ def fit_mixed(
         theta = shrunken
         if change < tolerance and count > 1:
             return result
+        if is_search and _is_decided(lowest_rss, sigma2, target_rss):
+            return result
     return result if n_decay == 1 else MixedFit(**{**result.__dict__, "converged": False})
+
+
+def _is_decided(lowest_rss: list[float], sigma2: float, target_rss: float | None) -> bool:
+    """Whether more iterations cannot change a choice of modes.
+
+    The sum of squares either no longer falls by ``SEARCH_RSS_STEP`` variances of the noise, or it falls by less than
+    ``SEARCH_RSS_SHARE`` of its distance from ``target_rss``: a sequence that loses at most a tenth of an improvement
+    with each step then never arrives there.
+
+    >>> rss = [200.0, 120.0, 110.0, 108.0]
+    >>> [_is_decided(rss, 1.0, target) for target in (None, 50.0, 0.0)]  # 12 is more than a tenth of 58
+    [False, False, False]
+    >>> [_is_decided([*rss, 106.0], 1.0, target) for target in (50.0, 100.0)], _is_decided([*rss, 107.9], 1.0, None)
+    ([True, False], False)
+    """
+    if len(lowest_rss) < 2 + SEARCH_RSS_STEPS:
+        return False
+    improvement = lowest_rss[-1 - SEARCH_RSS_STEPS] - lowest_rss[-1]
+    if improvement < SEARCH_RSS_STEP * sigma2:
+        return True
+    return target_rss is not None and improvement < SEARCH_RSS_SHARE * (lowest_rss[-1] - target_rss)
 
 
 def _limit_to_domain(free: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -147,7 +147,7 @@ MAX_SCREENING_PROBABILITY = (
 )
 MIN_LISTED_PRESENCE = 0.2  # share of orders and starts from which on a rejected pole is listed
 # During the search a fit within a tenth of the errors of single impacts is accurate enough to choose modes.
-SEARCH_OPTIONS: dict[str, Any] = {"iterations": 24, "tolerance": 0.1}
+SEARCH_OPTIONS: dict[str, Any] = {"iterations": 24, "tolerance": 0.1, "is_search": True}
 
 
 def rejection(candidate: Candidate, reason: str, value: float, limit: float) -> dict:
@@ -357,6 +357,7 @@ def _redundant_mode(
     Poles that differ between impacts look like two poles to a realisation of all impacts, but not to a fit of each.
     """
     statistic = mode_chi_squared(fit.linearisation, fit.sigma2).sum(axis=0)
+    target_rss = fit.rss + fit.sigma2 * float(chi2.isf(settings.false_mode_probability, 4 * len(decays)))
     for weak in np.argsort(statistic):
         if id(candidates[weak]) in indispensable:
             continue
@@ -365,7 +366,9 @@ def _redundant_mode(
         if not overlaps.any():
             continue
         # start from common modes: the remaining mode must be free to move between the two
-        without = fit_mixed(np.delete(fit.shrunken_mean, weak, axis=0), decays, rate, columns, **SEARCH_OPTIONS)
+        without = fit_mixed(
+            np.delete(fit.shrunken_mean, weak, axis=0), decays, rate, columns, target_rss=target_rss, **SEARCH_OPTIONS
+        )
         probability = float(chi2.sf((without.rss - fit.rss) / fit.sigma2, 4 * len(decays)))
         if probability > settings.false_mode_probability:
             return int(weak), without, probability

@@ -198,7 +198,7 @@ def _impact_lines(rows: Mapping[str, Sequence[Mapping[str, Any]]], settings: Rec
     names = _names(rows["recordings"])
     impacts = rows["impacts"]
     used = sum(impact["status"] == "accepted" for impact in impacts)
-    lines = [_line("blows", f"{used} of {len(impacts)} accepted, {settings.minimum_impacts} are needed")]
+    lines = [_line("impacts", f"{used} of {len(impacts)} accepted, {settings.minimum_impacts} are needed")]
     width = max(map(len, names.values()))
     for impact in impacts:
         force, contact = (_number(impact[c], d) for c, d in (("peak_n", 1e3), ("contact_ms", 1.0)))

@@ -42,11 +42,11 @@ def test_passages_below_160_hz_are_blind_to_frequency_dependent_pads_and_blows_a
     # twenty times what a name needs: the model's own smooth errors, integrated out, take part of it
     assert one_warm_day.detectability[one_warm_day.names.index("zener_pad")] > 100.0
     ratio = {n: s for n, s in zip(rolling.names, rolling.detectability)}
-    blows = {n: s for n, s in zip(one_warm_day.names, one_warm_day.detectability)}
+    impacts = {n: s for n, s in zip(one_warm_day.names, one_warm_day.detectability)}
     # 5 nats of expected evidence are what a name needs
-    assert ratio["mount_resonance"] < 5.0 < blows["mount_resonance"]
+    assert ratio["mount_resonance"] < 5.0 < impacts["mount_resonance"]
     # the rail's own waves, and each wheel's, take part of what a dip does; a hammer does not roll over it
-    assert ratio["surface_dip"] > 100.0 and "surface_dip" not in blows
+    assert ratio["surface_dip"] > 100.0 and "surface_dip" not in impacts
 
 
 @pytest.mark.parametrize(

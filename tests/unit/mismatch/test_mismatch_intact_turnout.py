@@ -18,7 +18,7 @@ def measured(places, seed):
     """Impacts at the first place and two trains over one rail; the owner's file is the very track."""
     turnout = load_track("tommerup")
     sensors = tuple(Sensor(f"S{x:g}", x, noise=0.05) for x in places)
-    blows = simulate_hammer(turnout, places[0], Hammer(position_spread=0.004), sensors, 5, seed=seed, duration=RECORD)
+    impacts = simulate_hammer(turnout, places[0], Hammer(position_spread=0.004), sensors, 5, seed=seed, duration=RECORD)
     passages = []
     for k, speed in enumerate(SPEEDS):
         train = load_vehicle("ic3", 0.5)
@@ -26,7 +26,7 @@ def measured(places, seed):
             turnout, train, speed, sensors, seed=seed + k, rail_seed=seed, rate=5e3, lead=0.6, tail=0.4
         )
         passages.append(PassageInput(f"ic3 {k}", recording, train, speed, "ic3"))
-    return CampaignInput(turnout, sensors, (HammerInput("blows", places[0], blows),), tuple(passages))
+    return CampaignInput(turnout, sensors, (HammerInput("impacts", places[0], impacts),), tuple(passages))
 
 
 @pytest.mark.slow

@@ -80,9 +80,9 @@ def test_the_response_to_a_unit_impulse_does_not_depend_on_the_exponential_windo
     ]
     for decay in (0.0, 30.0, 100.0):
         settings = ReceptanceSettings(exponential_window=decay)
-        blows = [i for i in find_impacts(recordings, "h", "r", settings) if i.accepted]
-        curve = receptance_of(blows, settings)
-        model = identify([i.decay for i in blows], test.rate, SETTINGS, curve)
+        impacts = [i for i in find_impacts(recordings, "h", "r", settings) if i.accepted]
+        curve = receptance_of(impacts, settings)
+        model = identify([i.decay for i in impacts], test.rate, SETTINGS, curve)
         assert model.diagnostics["scale"].startswith("unit impulse")
         modes = [m.frequency for m in model.modes], [m.damping for m in model.modes]
         found.append((fit_receptance(curve, *modes).residue, model.b))

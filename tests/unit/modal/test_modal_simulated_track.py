@@ -64,9 +64,9 @@ def test_an_interval_holds_the_choice_among_explanations():
     """More than one was made, and the interval is wider than the scatter of the impacts alone asks for."""
     model = identify(test_of_ten_blows("A9", 5), RATE, SETTINGS)
     mode = model.mode("ballast")
-    blows = np.array([row["frequency"] for row in model.per_impact if row["band"] == "ballast"])
+    impacts = np.array([row["frequency"] for row in model.per_impact if row["band"] == "ballast"])
     assert model.diagnostics["explanations"] > 1
-    assert mode.frequency_se > 1.5 * blows.std(ddof=1) / np.sqrt(len(blows))
+    assert mode.frequency_se > 1.5 * impacts.std(ddof=1) / np.sqrt(len(impacts))
 
 
 @pytest.mark.parametrize("section", ["A9"])

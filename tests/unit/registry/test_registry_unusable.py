@@ -20,11 +20,11 @@ def rejected_result(section="A1", day="2026-02-09", reason="sign_reversed", turn
     (model,), (recording,) = result.tables["models"], result.tables["recordings"]
     model |= {"status": "rejected", "reason": "too_few_impacts"}
     base = {k: recording[k] for k in ("turnout_id", "section_id", "campaign_id", "recording_id")}
-    blows = [
+    impacts = [
         base | {"impact_id": f"{recording['recording_id']}:{k}", "record": k, "status": "rejected", "reason": reason}
         for k in range(6)
     ]
-    result.tables.update(modes=[], impacts=blows)
+    result.tables.update(modes=[], impacts=impacts)
     return result
 
 
