@@ -12,7 +12,7 @@ NAMES = (
     "students_t", "epochs", "resonance_drift",
     "passage_values", "chart_values", "mode_residuals", "cusum", "change_since_event", "maintenance_effect",
     "chart_status_at", "unusable", "cannot_see", "was_said", "in_service", "time_to_threshold",
-    "is_below_target", "chart_states", "worklist",
+    "is_below_target", "stiffness_words", "chart_states", "worklist",
 )  # fmt: skip
 
 

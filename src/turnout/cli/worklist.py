@@ -126,7 +126,7 @@ def as_text(
 def _paragraph(row: Mapping[str, Any]) -> str:
     where = row["turnout_id"] + (f" ({row['name']})" if row["name"] else "")
     lines = [
-        f"{row['rank']:>2}. {row['state'].upper()}: {where}, {row['sections']}, {row['band']}",
+        f"{row['rank']:>2}. {row['state'].upper()}: {where}, {row['sections']}, {row['component']}",
         f"    {row['sentence']}",
     ]
     if row["false_alarm_words"] != "no statement":

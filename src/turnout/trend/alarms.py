@@ -18,6 +18,7 @@ from turnout.trend.drift import adjusted_p_values
 from turnout.trend.forecast import N_RECENT, forecast
 from turnout.trend.panel import WHOLE_TURNOUT, timestamps
 from turnout.trend.residuals import first_epoch
+from turnout.trend.stiffness import COMPONENTS, ResonancePair, chart_numbers, resonance_pair, stiffness_change
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -42,6 +43,13 @@ COLUMNS = {
     "forecast_slope_se_pct_per_year": float,
     "not_before_utc": "datetime64[us]",
     "not_after_utc": "datetime64[us]",
+    "changed_component": object,
+    "ballast_stiffness_pct": float,
+    "ballast_stiffness_low_pct": float,
+    "ballast_stiffness_high_pct": float,
+    "pad_stiffness_pct": float,
+    "pad_stiffness_low_pct": float,
+    "pad_stiffness_high_pct": float,
 }
 
 
@@ -51,7 +59,8 @@ class Flag:
 
     ``time`` [d] and ``values`` [%] are (n,) arrays; ``autocorrelation`` is their lag-one coefficient. ``temperature``
     (n,) [°C] is None for a whole turnout. ``slope_weight`` is that of ``fit_onsets``. ``ratio`` (CUSUM over threshold)
-    and ``opening_campaign`` (the campaign that raised each open alarm) are by direction.
+    and ``opening_campaign`` (the campaign that raised each open alarm) are by direction. ``pair`` holds both resonances
+    of the section, None where only one has a chart.
     """
 
     time: np.ndarray
@@ -61,6 +70,7 @@ class Flag:
     slope_weight: float
     ratio: dict[str, float]
     opening_campaign: dict[str, int]
+    pair: ResonancePair | None = None
 
 
 def candidates(charts: Charts, status: pd.DataFrame, settings: TrendSettings) -> dict[int, Flag]:
@@ -83,7 +93,7 @@ def candidates(charts: Charts, status: pd.DataFrame, settings: TrendSettings) ->
     p = charts.prepared
     whole = status["section_id"].to_numpy() == WHOLE_TURNOUT
     drifting = p.baseline.complete & ~whole & (status["drift_p"].to_numpy() <= settings.false_discovery)
-    flags = {}
+    flags, numbers = {}, chart_numbers(charts)
     for i in np.flatnonzero((status["state"].to_numpy() == "alarm") | drifting):
         column = np.flatnonzero(np.isfinite(charts.residual[i]) & (p.epoch[i] == p.epoch[i, -1]))
         ratio = {d: getattr(charts, d)[i, -1] / getattr(charts, f"threshold_{d}")[i] for d in ("down", "up")}
@@ -100,6 +110,7 @@ def candidates(charts: Charts, status: pd.DataFrame, settings: TrendSettings) ->
             slope_weight,
             ratio,
             opening_campaign,
+            resonance_pair(charts, int(i), numbers),
         )
     return flags
 
@@ -169,7 +180,14 @@ def _describe_chart(flag: Flag, settings: TrendSettings) -> dict[str, Any]:
         direction = "down" if values[-N_RECENT:].mean() < values.mean() else "up"
     outlook = forecast(time[at:], values[at:], flag.autocorrelation, settings)
     now = time[-1] if len(time) else np.nan
-    return dict(
+    stiffness = stiffness_change(flag.pair, change.shape, change.since)
+    sizes = {
+        f"{component}_stiffness{end}_pct": value
+        for component in COMPONENTS
+        for end, value in zip(("", "_low", "_high"), getattr(stiffness, component), strict=True)
+    }
+    return sizes | dict(
+        changed_component=stiffness.component if flag.pair is not None else None,
         direction=direction,
         statistic_ratio=flag.ratio[direction],
         change_kind=change.shape,

@@ -167,8 +167,9 @@ def message_text(entries: Sequence[Mapping[str, Any]]) -> str:
     paragraphs = []
     for entry in entries:
         name = f" ({entry['name']})" if entry["name"] else ""
+        component = entry.get("component") or entry["band"]
         paragraphs.append(
-            f"{entry['state'].upper()}: {entry['turnout_id']}{name}, {entry['sections']}, {entry['band']}\n"
+            f"{entry['state'].upper()}: {entry['turnout_id']}{name}, {entry['sections']}, {component}\n"
             f"{entry['sentence']}\nLook first at: {entry['look_at']}."
         )
     return "\n\n".join(paragraphs) + "\n"

@@ -1,6 +1,6 @@
 -- One row per chart: its state at the newest campaign, in the words of the worklist, on the day `asof` at or after it.
 -- confirm now: the newest campaign is far outside and not confirmed. inspect this week: an open alarm, unless its change
--- is below the target. plan: an acknowledged or smaller alarm, or a drift among the discoveries of the fleet
+-- is below the target, or only follows from the other component (is_coupled). plan: an acknowledged or smaller alarm, or a drift among the discoveries of the fleet
 -- (false-discovery rate 10 %), also where the chart is too noisy to see the target within a year. suppressed: somebody
 -- silenced it, with a reason and an end, a day at which it comes back.
 -- needs: chart_status_at, was_said, in_service, is_below_target
@@ -33,6 +33,7 @@ select
         when p.suppressed is not null and s.state in ('alarm', 'confirm_now', 'ok') then 'suppressed'
         when s.state = 'alarm' and p.acknowledged is null
             and not is_below_target(s.band, s.change_low_pct, s.change_high_pct, s.target_pct)
+            and not s.is_coupled
         then 'inspect this week'
         when s.state = 'alarm' then 'plan'
         when (s.state = 'ok' or s.reason = 'too_noisy') and s.forecast is not null then 'plan'
@@ -41,7 +42,8 @@ select
     s.reason, p.raised_at_utc, p.acknowledged, p.suppressed, s.direction, s.statistic_ratio, s.change_kind,
     s.since_at_utc, s.since_earliest_utc, s.since_latest_utc, s.change_pct, s.change_low_pct, s.change_high_pct,
     s.n_after, s.detectable_pct, s.target_pct, s.drift_pct_per_year, s.drift_se_pct_per_year, s.drift_q,
-    s.last_measured_at_utc, s.n_campaigns
+    s.last_measured_at_utc, s.n_campaigns, s.changed_component, s.ballast_stiffness_pct, s.ballast_stiffness_low_pct,
+    s.ballast_stiffness_high_pct, s.pad_stiffness_pct, s.pad_stiffness_low_pct, s.pad_stiffness_high_pct
 from chart_status_on("asof") s
 join spoken p using (turnout_id, section_id, band, source)
 where in_service(s.turnout_id) and not has_left(s.section_id);
@@ -76,6 +78,13 @@ create or replace view chart_states as select * from chart_states_on(newest_meas
 -- drift_q | double | | the same adjusted for all charts (Benjamini-Hochberg)
 -- last_measured_at_utc | timestamp | UTC | newest campaign with a value
 -- n_campaigns | integer | | campaigns with a value
+-- changed_component | varchar | | stiffness that changed: ballast, pad, both, or either (both resonances together do not decide)
+-- ballast_stiffness_pct | double | % | change of the ballast's stiffness since the onset
+-- ballast_stiffness_low_pct | double | % | 95 % interval, lower end
+-- ballast_stiffness_high_pct | double | % | upper end
+-- pad_stiffness_pct | double | % | change of the railpads' stiffness since the onset
+-- pad_stiffness_low_pct | double | % | 95 % interval, lower end
+-- pad_stiffness_high_pct | double | % | upper end
 
 -- columns of chart_states_on(asof)
 -- turnout_id | varchar | | turnout
@@ -104,3 +113,10 @@ create or replace view chart_states as select * from chart_states_on(newest_meas
 -- drift_q | double | | the same adjusted for all charts (Benjamini-Hochberg)
 -- last_measured_at_utc | timestamp | UTC | newest campaign with a value
 -- n_campaigns | integer | | campaigns with a value
+-- changed_component | varchar | | stiffness that changed: ballast, pad, both, or either (both resonances together do not decide)
+-- ballast_stiffness_pct | double | % | change of the ballast's stiffness since the onset
+-- ballast_stiffness_low_pct | double | % | 95 % interval, lower end
+-- ballast_stiffness_high_pct | double | % | upper end
+-- pad_stiffness_pct | double | % | change of the railpads' stiffness since the onset
+-- pad_stiffness_low_pct | double | % | 95 % interval, lower end
+-- pad_stiffness_high_pct | double | % | upper end

@@ -3,6 +3,7 @@ create or replace macro newest_charted() as (select max(last_measured_at_utc) fr
 
 -- One row per chart: chart_status on a day at or after the newest campaign. A chart that nobody has measured since for
 -- long is not measured, also where the whole fleet is silent; a turnout's median is as old as the newest of its charts.
+-- is_coupled: the alarm of one resonance follows from the component of the other, which is in alarm as well.
 create or replace macro chart_status_on("asof") as table
 select * exclude (is_silent) replace (
     case when is_silent then 'not_measured' else state end as state,
@@ -17,7 +18,12 @@ from (
                     max(last_measured_at_utc) over (partition by turnout_id, band, source) end)
                     > to_microseconds((86400e6 * stale_after_days)::bigint),
             false
-        ) as is_silent
+        ) as is_silent,
+        state = 'alarm' and coalesce(
+            (band = 'railpad' and changed_component = 'ballast') or (band = 'ballast' and changed_component = 'pad'),
+            false
+        ) and count(*) filter (state in ('alarm', 'confirm_now'))
+            over (partition by turnout_id, section_id, source, band in ('ballast', 'railpad')) > 1 as is_coupled
     from chart_status
 );
 
@@ -199,3 +205,11 @@ where coalesce("asof" >= newest_charted(), true);
 -- forecast_slope_se_pct_per_year | double | %/a | its standard error
 -- not_before_utc | timestamp | UTC | 80 % interval of the limit, earliest
 -- not_after_utc | timestamp | UTC | 80 % interval of the limit, latest; empty = none
+-- changed_component | varchar | | stiffness that changed: ballast, pad, both, or either (both resonances together do not decide)
+-- ballast_stiffness_pct | double | % | change of the ballast's stiffness since the onset
+-- ballast_stiffness_low_pct | double | % | 95 % interval, lower end
+-- ballast_stiffness_high_pct | double | % | upper end
+-- pad_stiffness_pct | double | % | change of the railpads' stiffness since the onset
+-- pad_stiffness_low_pct | double | % | 95 % interval, lower end
+-- pad_stiffness_high_pct | double | % | upper end
+-- is_coupled | boolean | | the alarm follows from the component of the other resonance of the section, which is in alarm as well

@@ -2,7 +2,7 @@
 -- end of its interval nearer to none), and what else there is up to `trend.worklist_rows` rows in all, or `most`; n_in_all counts what there would be without an end.
 -- asof at or after the newest measurement uses everything; an earlier one uses only what was measured by then
 -- (change and date then come from the sums alone, and a slow drift is not among the plans).
--- needs: chart_states, cannot_see, chart_status_at, was_said, in_service, is_below_target
+-- needs: chart_states, cannot_see, chart_status_at, was_said, in_service, is_below_target, stiffness_words
 create or replace macro worklist("asof", most := null) as table
 with then_status as (select * from chart_status_at("asof")),
 recent as (
@@ -60,17 +60,24 @@ alarmed as (
         case when told then s.since_earliest_utc end as since_earliest_utc,
         case when told then s.since_latest_utc end as since_latest_utc,
         is_below_target(r.band, low_pct, high_pct, c.target_pct) as is_small,
-        case when r.acknowledged is null and not is_small then 'inspect this week' else 'plan' end as state,
+        case when told then s.changed_component end as changed_component,
+        s.ballast_stiffness_pct, s.ballast_stiffness_low_pct, s.ballast_stiffness_high_pct,
+        s.pad_stiffness_pct, s.pad_stiffness_low_pct, s.pad_stiffness_high_pct,
+        coalesce(told and d.is_coupled, false) as follows_other,
+        case when r.acknowledged is null and not is_small and not follows_other then 'inspect this week' else 'plan' end as state,
         null::varchar as why
     from spoken r
     left join chart_states_on("asof") s using (turnout_id, section_id, band, source)
+    left join chart_status_on("asof") d using (turnout_id, section_id, band, source)
     left join chart_status c using (turnout_id, section_id, band, source)
 ),
 drifting as (
     select
         turnout_id, section_id, band, source, 'plan' as state, direction, null::timestamp as raised_at_utc,
         statistic_ratio as ratio, null::varchar as acknowledged, change_pct, change_low_pct as low_pct,
-        change_high_pct as high_pct, since_at_utc, since_earliest_utc, since_latest_utc, null::varchar as why
+        change_high_pct as high_pct, since_at_utc, since_earliest_utc, since_latest_utc, null::varchar as why,
+        changed_component, ballast_stiffness_pct, ballast_stiffness_low_pct, ballast_stiffness_high_pct,
+        pad_stiffness_pct, pad_stiffness_low_pct, pad_stiffness_high_pct
     from chart_states_on("asof") s
     where state = 'plan' and "asof" >= newest_charted()
         and not exists (
@@ -174,7 +181,9 @@ select
     row_number() over importance as rank,
     h.turnout_id, h.section_id, h.sections, h.band, h.source, h.state, h.direction, h.raised_at_utc, h.since_at_utc,
     h.since_earliest_utc, h.since_latest_utc, h.change_pct, h.low_pct as change_low_pct,
-    h.high_pct as change_high_pct, h.ratio as statistic_ratio,
+    h.high_pct as change_high_pct, h.ratio as statistic_ratio, h.component, h.changed_component,
+    h.ballast_stiffness_pct, h.ballast_stiffness_low_pct, h.ballast_stiffness_high_pct,
+    h.pad_stiffness_pct, h.pad_stiffness_low_pct, h.pad_stiffness_high_pct,
     case
         when h.why is not null then h.why
         else (case when h.band = 'amplitude' then 'acceleration under trains, ' else h.band || ' resonance of ' end)
@@ -188,9 +197,12 @@ select
                 || coalesce(' (' || strftime(h.since_earliest_utc, '%Y-%m-%d') || ' to '
                     || strftime(h.since_latest_utc, '%Y-%m-%d') || ')', ''), '')
             || (case when h.source = 'passage' then '; from passages' else '; from hammer tests' end)
-            || (case when h.band in ('ballast', 'railpad') then printf('; the stiffness is about %.0f %% %s',
-                abs((1 + h.change_pct / 100) ** 2 - 1) * 100, case when h.change_pct < 0 then 'lower' else 'higher' end)
-                else '' end)
+            || stiffness_words(h.band, h.changed_component, h.change_pct,
+                h.ballast_stiffness_pct, h.ballast_stiffness_low_pct, h.ballast_stiffness_high_pct,
+                h.pad_stiffness_pct, h.pad_stiffness_low_pct, h.pad_stiffness_high_pct)
+            || (case when h.follows_other then '; it follows from the ' ||
+                (case h.changed_component when 'pad' then 'railpads' else 'ballast' end)
+                || ', whose own row says what to do' else '' end)
             || coalesce('; not measured since ' || strftime(h.not_since_utc, '%Y-%m-%d'), '')
             || (case when h.is_small then printf('; below the target of %.1f %%: nobody needs to go there', s.target_pct)
                 else '' end)
@@ -225,21 +237,30 @@ select
                 when h.band = 'railpad' and h.direction = 'down' then 'broken or displaced pads, loose fastenings'
                 else 'frost, or work that is not in the events'
             end
+        when h.follows_other then 'nothing for this resonance: see the other one of this section'
         when h.is_small then 'nothing on site: the next campaigns, and the other resonance of this section'
         when h.state = 'learning' then 'nothing: measure again as planned'
         when h.why like 'the alarm of %' then 'what was corrected or entered since, and the chart of this section'
         when h.band = 'all' then 'what was rejected: turnout query "from rejected where turnout_id = ''' || h.turnout_id || '''"'
         when h.state = 'cannot tell' then 'the measurement: more impacts per campaign, rail temperature, sensor'
         when h.section_id = '*' then 'what all sections share: thermometer, hammer and method first, then drainage'
-        when h.band = 'ballast' and h.direction = 'down' then 'voids and wet or fouled ballast under these sleepers'
-        when h.band = 'ballast' then 'frost, or tamping that is not in the events'
-        when h.band = 'railpad' and h.direction = 'down' then 'worn, cracked or displaced pads, loose fastenings'
-        when h.band = 'railpad' then 'pads exchanged or hardened; an exchange that is not in the events'
+        when h.changed_component = 'both' and h.direction = 'down' then
+            'voids and wet or fouled ballast under these sleepers; worn, cracked or displaced pads, loose fastenings'
+        when h.component = 'ballast' and h.direction = 'down' then 'voids and wet or fouled ballast under these sleepers'
+        when h.component = 'ballast' then 'frost, or tamping that is not in the events'
+        when h.component = 'railpad' and h.direction = 'down' then 'worn, cracked or displaced pads, loose fastenings'
+        when h.component = 'railpad' then 'pads exchanged or hardened; an exchange that is not in the events'
         when h.band = 'amplitude' then 'running surface, fastenings and voids; the mounting of the sensor'
         else 'the section'
     end as look_at,
     t.name, t.line, t.km, count(*) over () as n_in_all
-from listed h
+from (
+    select
+        *, case changed_component
+            when 'ballast' then 'ballast' when 'pad' then 'railpad' when 'both' then 'ballast and railpad' else band
+        end as component
+    from listed
+) h
 left join chart_status s
     on s.turnout_id = h.turnout_id and s.section_id = h.section_id and s.band = h.band and s.source = h.source
 left join maintenance m
@@ -278,6 +299,14 @@ create or replace view worklist as select * from worklist(newest_measurement());
 -- change_low_pct | double | % | 95 % interval, lower end
 -- change_high_pct | double | % | upper end
 -- statistic_ratio | double | | CUSUM over its limit
+-- component | varchar | | what to look at: ballast, railpad, both; else the resonance as in band
+-- changed_component | varchar | | stiffness that changed: ballast, pad, both, or either (both resonances together do not decide)
+-- ballast_stiffness_pct | double | % | change of the ballast's stiffness since the onset
+-- ballast_stiffness_low_pct | double | % | 95 % interval, lower end
+-- ballast_stiffness_high_pct | double | % | upper end
+-- pad_stiffness_pct | double | % | change of the railpads' stiffness since the onset
+-- pad_stiffness_low_pct | double | % | 95 % interval, lower end
+-- pad_stiffness_high_pct | double | % | upper end
 -- sentence | varchar | | what happened, with its interval, in words
 -- false_alarm_words | varchar | | how often an intact chart does this
 -- last_maintenance | varchar | | newest work on the section
@@ -304,6 +333,14 @@ create or replace view worklist as select * from worklist(newest_measurement());
 -- change_low_pct | double | % | 95 % interval, lower end
 -- change_high_pct | double | % | upper end
 -- statistic_ratio | double | | CUSUM over its limit
+-- component | varchar | | what to look at: ballast, railpad, both; else the resonance as in band
+-- changed_component | varchar | | stiffness that changed: ballast, pad, both, or either (both resonances together do not decide)
+-- ballast_stiffness_pct | double | % | change of the ballast's stiffness since the onset
+-- ballast_stiffness_low_pct | double | % | 95 % interval, lower end
+-- ballast_stiffness_high_pct | double | % | upper end
+-- pad_stiffness_pct | double | % | change of the railpads' stiffness since the onset
+-- pad_stiffness_low_pct | double | % | 95 % interval, lower end
+-- pad_stiffness_high_pct | double | % | upper end
 -- sentence | varchar | | what happened, with its interval, in words
 -- false_alarm_words | varchar | | how often an intact chart does this
 -- last_maintenance | varchar | | newest work on the section

@@ -76,7 +76,7 @@ def _work(row: Mapping[str, Any]) -> dict[str, Any]:
         "turnout_id": row["turnout_id"],
         "label": row["sections"],
         "anchor": (row["section_id"] or "").split("/")[-1].replace("*", ""),
-        "band": row["band"],
+        "component": row["component"],
         "state": row["state"],
         "badge": badge(row["state"]),
         "what": row["sentence"],

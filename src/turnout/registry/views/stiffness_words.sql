@@ -1,0 +1,25 @@
+-- Words on the stiffness behind a change of a resonance: which component, by how much with its 95 % interval.
+-- Without a component (one resonance, or a list of an earlier day) the stiffness is about twice the change of frequency.
+create or replace macro one_stiffness_words(component, pct, low_pct, high_pct) as (
+    component || case when pct < 0 then ' lost ' else ' gained ' end
+        || printf('%.0f %% of stiffness (%.0f to %.0f)', abs(pct),
+            case when pct < 0 then -high_pct else low_pct end, case when pct < 0 then -low_pct else high_pct end)
+);
+
+create or replace macro stiffness_words(
+    band, component, change_pct, ballast_pct, ballast_low_pct, ballast_high_pct, pad_pct, pad_low_pct, pad_high_pct
+) as (
+    case
+        when band not in ('ballast', 'railpad') then ''
+        when component = 'ballast' then
+            '; the ' || one_stiffness_words('ballast', ballast_pct, ballast_low_pct, ballast_high_pct)
+        when component = 'pad' then '; the ' || one_stiffness_words('railpads', pad_pct, pad_low_pct, pad_high_pct)
+        when component = 'both' then
+            '; the ' || one_stiffness_words('ballast', ballast_pct, ballast_low_pct, ballast_high_pct)
+            || ', the ' || one_stiffness_words('railpads', pad_pct, pad_low_pct, pad_high_pct)
+        else printf('; the stiffness is about %.0f %% %s', abs((1 + change_pct / 100) ** 2 - 1) * 100,
+                case when change_pct < 0 then 'lower' else 'higher' end)
+            || case when component = 'either' then '; both resonances together do not decide between ballast and railpads'
+                else '' end
+    end
+);

@@ -1,0 +1,89 @@
+"""Which stiffness changed: the pair of resonances of one section names ballast, pads, both, or neither of them."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from benchmarks.trend_fleet import Fleet, modes
+from scipy.linalg import eigvalsh
+
+from turnout.trend import candidates, chart_status, describe_flagged, evaluate
+from turnout.trend.stiffness import coupling_limits, coupling_share, judged_change
+
+from .test_trend_list import viewed
+
+
+def chain(pad, ballast, rail=36.0, sleeper=150.0):
+    """Resonances [Hz] of a rail on a pad on a sleeper on ballast, by the eigenvalues of its matrices."""
+    stiffness = np.array([[pad, -pad], [-pad, pad + ballast]])
+    return np.sqrt(eigvalsh(stiffness, np.diag([rail, sleeper]))) / (2.0 * np.pi)
+
+
+@pytest.mark.parametrize("pad, ballast, sleeper", [(450e6, 170e6, 150.0), (200e6, 250e6, 90.0), (80e6, 60e6, 60.0)])
+def test_the_sensitivities_are_those_of_the_chain(pad, ballast, sleeper):
+    low, high = chain(pad, ballast, 36.0, sleeper)
+    share = coupling_share(high / low, sleeper / 36.0)
+    step = 1e-5
+    by_ballast = np.log(chain(pad, ballast * (1 + step), 36.0, sleeper) / [low, high]) / np.log1p(step)
+    by_pad = np.log(chain(pad * (1 + step), ballast, 36.0, sleeper) / [low, high]) / np.log1p(step)
+    assert by_ballast == pytest.approx([0.5 * (1 - share), 0.5 * share], abs=1e-5)
+    assert by_pad == pytest.approx([0.5 * share, 0.5 * (1 - share)], abs=1e-5)
+    assert coupling_limits(high / low)[1] >= share
+
+
+def test_resonances_that_the_masses_do_not_allow_tell_nothing():
+    assert coupling_limits(1.1) == (0.0, 0.5) and coupling_limits(float("nan")) == (0.0, 0.5)
+    assert judged_change(np.log([0.95, 0.95]), np.full(2, 1e-6), (0.0, 0.5)).component == "either"
+
+
+@pytest.mark.parametrize("component, factors", [("ballast", (0.8, 1.0)), ("pad", (1.0, 0.8)), ("both", (0.9, 0.8))])
+def test_the_component_and_its_size_are_those_of_the_chain(component, factors):
+    before, after = chain(450e6, 170e6), chain(450e6 * factors[1], 170e6 * factors[0])
+    found = judged_change(np.log(after / before), np.full(2, 1e-3**2), coupling_limits(before[1] / before[0]))
+    assert found.component == component
+    for factor, (_, low, high) in zip(factors, (found.ballast, found.pad)):
+        assert low - 0.1 <= 100.0 * (factor - 1.0) <= high + 0.1
+
+
+def test_a_change_within_the_errors_of_both_is_either():
+    found = judged_change(np.log([0.99, 0.997]), np.full(2, 5e-3**2), (0.0, 0.08))
+    assert found.component == "either" and found.ballast[1] < 0.0 < found.ballast[2]
+
+
+def both_bands(pad, ballast, seed, turnouts=2, weeks=120, start=80, **more):
+    """Modes of a fleet whose first section changes its stiffness at week ``start`` by the factors of both springs."""
+    before, after = chain(450e6, 170e6), chain(450e6 * pad, 170e6 * ballast)
+    frames = []
+    for k, (band, sigma) in enumerate((("ballast", 0.9), ("railpad", 0.5))):
+        fleet = Fleet(turnouts=turnouts, weeks=weeks, phi=0.1, sigma=sigma, frequency=before[k], band=band, **more)
+        change = np.zeros((turnouts, fleet.sections, len(np.arange(0, weeks, fleet.every))))
+        change[:, 0] = 100.0 * (after[k] / before[k] - 1.0) * (np.arange(0, weeks, fleet.every) >= start)
+        frames.append(modes(fleet, [seed, k], change).astype({"band": object}))
+    return pd.concat(frames, ignore_index=True)
+
+
+@pytest.mark.parametrize("pad, ballast, component", [(1.0, 0.88, "ballast"), (0.88, 1.0, "pad")])
+def test_no_alarm_of_a_fleet_blames_the_wrong_component(settings, pad, ballast, component):
+    charts = evaluate(both_bands(pad, ballast, 5, turnouts=40), None, settings)
+    status = chart_status(charts, settings)
+    status = describe_flagged(status, candidates(charts, status, settings), settings)
+    flagged = status[(status["state"] == "alarm") & status["section_id"].str.endswith("/S0")]
+    named = flagged["changed_component"].value_counts()
+    assert named[component] >= 0.95 * len(flagged) and set(named.index) <= {component, "either"}
+    own = flagged[flagged["changed_component"] == component]
+    is_covered = (own[f"{component}_stiffness_low_pct"] <= -12.0) & (own[f"{component}_stiffness_high_pct"] >= -12.0)
+    assert len(own) >= 40 and is_covered.mean() >= 0.9
+
+
+def test_the_railpad_is_not_on_the_list_for_softer_ballast(settings):
+    rows = both_bands(1.0, 0.5, 7, turnouts=2)
+    with viewed(rows, settings) as con:
+        listed = con.execute(
+            "select band, component, state, sentence, look_at from worklist where section_id like '%/S0'"
+        ).fetchall()
+    inspected = {band: (component, look) for band, component, state, _, look in listed if state == "inspect this week"}
+    assert set(inspected) == {"ballast"} and inspected["ballast"][0] == "ballast"
+    assert "ballast" in inspected["ballast"][1]
+    sentence = next(s for band, _, state, s, _ in listed if band == "ballast" and state == "inspect this week")
+    assert "the ballast lost 5" in sentence and "of stiffness" in sentence
+    coupled = [(state, component) for band, component, state, _, _ in listed if band == "railpad"]
+    assert all(state != "inspect this week" for state, _ in coupled)
