@@ -15,7 +15,7 @@ import numpy as np
 
 from turnout.readers.writing import write
 from turnout_blind.nominal_files import write_configuration
-from turnout_blind.record import CAMPAIGNS, FIRST_PASSAGE, N_IMPACTS, PASSAGE_INTERVAL, hammer_test, passage
+from turnout_blind.record import N_IMPACTS, hammer_test, passage
 from turnout_blind.site import draw_site
 from turnout_blind.visibility import effect_visibility
 
@@ -55,7 +55,7 @@ def make_case(folder: str | Path, case: str, plan: CasePlan, effects: Mapping[st
     folder = Path(folder) / case
     write_configuration(folder / "config", case, site)
     _write_recordings(folder / "raw" / case, site, world, rng, decoys)
-    _set_file_times(folder)
+    set_file_times(folder)
     visibility = (
         effect_visibility(site, world, [int(v) for v in plan.seed])
         if concealed
@@ -148,31 +148,105 @@ def draw_decoys(rng: np.random.Generator, site: Site) -> tuple[dict[Any, Any], d
 def _write_recordings(
     folder: Path, site: Site, world: World, rng: np.random.Generator, decoys: Mapping[Any, Any]
 ) -> None:
+    for c in range(len(site.campaigns)):
+        write_campaign(folder, site, world, c, rng, decoys)
+    speeds = read_speeds(site, rng)
+    for k in range(len(site.passages)):
+        write_passage(folder, site, world, k, speeds[k], rng, decoys)
+    write_notes(folder, site, speeds, rng)
+
+
+def write_campaign(
+    folder: Path, site: Site, world: World, c: int, rng: np.random.Generator, decoys: Mapping[Any, Any]
+) -> None:
+    """Write the hammer tests of one campaign.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the recordings of the site.
+    site : Site
+        The site.
+    world : World
+        Its true state at this campaign.
+    c : int
+        Number of the campaign.
+    rng : Generator
+        Source of the random numbers.
+    decoys : mapping
+        Disturbances from ``draw_decoys``.
+    """
+    campaign_folder = folder / "hammer" / site.campaigns[c].date().isoformat()
+    campaign_folder.mkdir(parents=True, exist_ok=True)
+    for position in site.hammer_positions:
+        section = f"S{site.sensors.index(position) + 1}"
+        recordings = hammer_test(site, world, c, position, rng, decoys)
+        write(recordings, campaign_folder / f"{section}_1.npz", "npz", single=True)
+
+
+def read_speeds(site: Site, rng: np.random.Generator) -> list[float]:
+    """Speeds of the passages as read by a wayside device.
+
+    Parameters
+    ----------
+    site : Site
+        The site.
+    rng : Generator
+        Source of the random numbers.
+
+    Returns
+    -------
+    list of float
+        [m/s]
+    """
+    return [p.speed * (1.0 + 0.005 * float(rng.normal())) for p in site.passages]
+
+
+def write_passage(
+    folder: Path, site: Site, world: World, k: int, speed: float, rng: np.random.Generator, decoys: Mapping[Any, Any]
+) -> None:
+    """Write the recording of one passage.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the recordings of the site.
+    site : Site
+        The site.
+    world : World
+        Its true state at this passage.
+    k : int
+        Number of the passage.
+    speed : float
+        Speed as it was read. [m/s]
+    rng : Generator
+        Source of the random numbers.
+    decoys : mapping
+        Disturbances from ``draw_decoys``.
+    """
     (folder / "passages").mkdir(parents=True, exist_ok=True)
-    for c, when in enumerate(CAMPAIGNS):
-        campaign_folder = folder / "hammer" / when.date().isoformat()
-        campaign_folder.mkdir(parents=True, exist_ok=True)
-        for position in site.hammer_positions:
-            section = f"S{site.sensors.index(position) + 1}"
-            write(
-                hammer_test(site, world, c, position, rng, decoys),
-                campaign_folder / f"{section}_1.npz",
-                "npz",
-                single=True,
-            )
-    speeds = [p.speed * (1.0 + 0.005 * float(rng.normal())) for p in site.passages]  # as read by a wayside device
-    for k, plan in enumerate(site.passages):
-        recording = passage(site, world, k, rng, decoys)
-        conditions = {**recording.conditions, "train_type": plan.train, "speed": round(speeds[k], 3)}
-        name = f"{FIRST_PASSAGE + k * PASSAGE_INTERVAL:%Y%m%dT%H%M%SZ}.npz"
-        write([replace(recording, conditions=conditions)], folder / "passages" / name, "npz", single=True)
-    _write_notes(folder, site, speeds, rng)
+    recording = passage(site, world, k, rng, decoys)
+    conditions = {**recording.conditions, "train_type": site.passages[k].train, "speed": round(speed, 3)}
+    name = f"{site.passage_time(k):%Y%m%dT%H%M%SZ}.npz"
+    write([replace(recording, conditions=conditions)], folder / "passages" / name, "npz", single=True)
 
 
-def _write_notes(folder: Path, site: Site, speeds: Sequence[float], rng: np.random.Generator) -> None:
-    """Write campaigns.csv and trains.csv with realistic errors of such notes. One train in eight has no speed."""
+def write_notes(folder: Path, site: Site, speeds: Sequence[float], rng: np.random.Generator) -> None:
+    """Write campaigns.csv and trains.csv with realistic errors of such notes. One train has no speed.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the recordings of the site.
+    site : Site
+        The site.
+    speeds : sequence of float
+        Speeds as they were read. [m/s]
+    rng : Generator
+        Source of the random numbers.
+    """
     rows = [["campaign", "started_at_utc", "rail_temperature_c", "hammer_id", "tip", "operator"]]
-    for when, t in zip(CAMPAIGNS, site.temperatures):
+    for when, t in zip(site.campaigns, site.temperatures):
         temperature = f"{t + float(rng.normal()) * 0.7:.1f}"
         rows.append([when.date().isoformat(), when.isoformat(), temperature, "H1", "plastic", "survey crew"])
     _write_csv(folder / "campaigns.csv", rows)
@@ -180,10 +254,9 @@ def _write_notes(folder: Path, site: Site, speeds: Sequence[float], rng: np.rand
     without_speed = int(rng.integers(len(site.passages)))
     for k, plan in enumerate(site.passages):
         train = site.true_trains[plan.train]
-        when = FIRST_PASSAGE + k * PASSAGE_INTERVAL
         speed = f"{3.6 * speeds[k]:.1f}"
         load = train.axle_load / 9810.0 * (1.0 + 0.03 * float(rng.normal()))
-        time = when.replace(second=int(rng.integers(1, 4))).isoformat()
+        time = site.passage_time(k).replace(second=int(rng.integers(1, 4))).isoformat()
         n = str(train.axles().size)
         rows.append([time, plan.train, "" if k == without_speed else speed, f"{load:.2f}", "main", n])
     _write_csv(folder / "trains.csv", rows)
@@ -194,7 +267,13 @@ def _write_csv(path: Path, rows: Iterable[Sequence[str]]) -> None:
         csv.writer(file, lineterminator="\n").writerows(rows)
 
 
-def _set_file_times(folder: Path) -> None:
-    """Give all files the same modification time."""
+def set_file_times(folder: Path) -> None:
+    """Give all files the same modification time.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Folder of the case.
+    """
     for path in sorted(Path(folder).rglob("*")):
         os.utime(path, (FILE_TIME, FILE_TIME))

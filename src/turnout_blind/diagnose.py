@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 # Runs in a copy of the case, which holds config/ and raw/. Filled in are {python}, {case}, {folder} (the copy), {work}
 # (a folder for this case) and {out} (a JSON file of rows). Without {out} the rows are the JSON that the tool prints.
 COMMAND = "{python} -m turnout.cli.main diagnose --turnout {case} --visit all --work {work} --json"
+HISTORY_COMMAND = "{python} -m turnout.cli.main twin --turnout {case} --each-visit --work {work} --json"
 MAX_WALL_TIME, MAX_CPU_TIME = 1800.0, 900.0  # budget of a case: wall clock and CPU time [s]
 
 
@@ -225,11 +226,13 @@ def printed_rows(text: str) -> list | None:
     Returns
     -------
     list or None
-        Rows; a single object is one row.
+        Rows; a single object is one row, or has the rows in ``result``.
 
     Examples
     --------
     >>> printed_rows('reading\n[{"verdict": "none"}]\npage: results/pages/T1.html')
+    [{'verdict': 'none'}]
+    >>> printed_rows('{"command": "diagnose", "result": [{"verdict": "none"}]}')
     [{'verdict': 'none'}]
     >>> printed_rows("nothing") is None
     True
@@ -244,4 +247,6 @@ def printed_rows(text: str) -> list | None:
         except ValueError:
             continue
         last_value = value
+    if isinstance(last_value, dict) and isinstance(last_value.get("result"), list):
+        return last_value["result"]
     return last_value if isinstance(last_value, list) or last_value is None else [last_value]

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import turnout
 from turnout_blind.campaign import make_case
 from turnout_blind.effect import load_effects
+from turnout_blind.history import HistoryPlan, make_history, plan_histories
 from turnout_blind.seal import SET_FILE, BlindError, digest, digest_of_folder, seed_for, write_commit, write_truth
 from turnout_blind.site import PLAIN
 from turnout_blind.strata import CasePlan, case_id, plan_cases
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 # folder of the cases, folder of the truths, id, plan, folders with further effects, seed of the set
-Job = tuple[Path, Path, str, CasePlan, tuple[str, ...], int]
+Job = tuple[Path, Path, str, CasePlan | HistoryPlan, tuple[str, ...], int]
 
 
 def make_set(
@@ -37,6 +38,7 @@ def make_set(
     panel: str = PLAIN,
     workers: int = 1,
     progress: Callable[..., Iterable] | None = None,
+    histories: tuple[int, int] | None = None,
 ) -> str:
     """Write ``out``/cases, ``out``/commit.json and the truths below ``truth``.
 
@@ -60,6 +62,9 @@ def make_set(
         Number of processes.
     progress : callable or None
         (iterable of finished cases, their number) -> iterable.
+    histories : (int, int) or None
+        Number of sites with a history of two years, and of passages at each visit; None: single campaigns. ``full``,
+        ``only`` and ``panel`` have no meaning for them.
 
     Returns
     -------
@@ -81,9 +86,13 @@ def make_set(
     if unknown := sorted(set(only or ()) - set(load_effects(*folders))):
         available = ", ".join(sorted(load_effects(*folders)))
         raise BlindError("--only", unknown[0], "no such kind", f"There are {available}")
-    set_info = _open_set(truth, seed_for(examines) if examines else seed, full, folders, only, limit, panel)
+    set_info = _open_set(truth, seed_for(examines) if examines else seed, full, folders, only, limit, panel, histories)
     set_seed: int = set_info["seed"]
-    plans = plan_cases(set_seed, load_effects(*folders), full, only, panel)[:limit]
+    plans: Sequence[CasePlan | HistoryPlan]
+    if histories is None:
+        plans = plan_cases(set_seed, load_effects(*folders), full, only, panel)[:limit]
+    else:
+        plans = plan_histories(set_seed, histories[0], load_effects(*folders), histories[1])[:limit]
     effect_folders = tuple(map(str, folders))
     jobs = [
         (out / "cases", truth, case_id(set_seed, k), plan, effect_folders, set_seed) for k, plan in enumerate(plans)
@@ -107,6 +116,7 @@ def _open_set(
     only: Iterable[str] | None,
     limit: int | None,
     panel: str,
+    histories: tuple[int, int] | None,
 ) -> dict[str, Any]:
     """Content of set.json: seed and options of an interrupted set, or written now."""
     settings = {"full": full, "effects": sorted(map(str, folders)), "only": sorted(only or ()), "limit": limit}
@@ -114,6 +124,7 @@ def _open_set(
         "panel": panel,
         "generator_sha256": digest_of_folder(Path(__file__).parent, "*.py"),
         "made_on": platform.machine(),
+        **({"histories": list(histories)} if histories else {}),
     }
     path = truth / SET_FILE
     if not path.exists():
@@ -139,7 +150,10 @@ def _make(job: Job) -> str:
     cases, truth, case, plan, folders, seed = job
     temporary = cases.parent / "unfinished"
     shutil.rmtree(temporary / case, ignore_errors=True)
-    case_truth = make_case(temporary, case, plan, load_effects(*folders))
+    if isinstance(plan, HistoryPlan):
+        case_truth = make_history(temporary, case, plan, load_effects(*folders))
+    else:
+        case_truth = make_case(temporary, case, plan, load_effects(*folders))
     write_truth(truth, case, case_truth, seed)
     cases.mkdir(parents=True, exist_ok=True)
     shutil.rmtree(cases / case, ignore_errors=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import datetime, timedelta
+from datetime import timedelta
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,8 +24,6 @@ RATE = 1.0 / TIME_STEP
 HAMMER_DECIMATION, PASSAGE_DECIMATION = 3, 12  # 20 kHz and 5 kHz
 HAMMER_DURATION, PRETRIGGER, PASSAGE_DURATION = 0.25, 0.025, 3.5  # [s]
 N_IMPACTS = 6
-CAMPAIGNS = (datetime(2024, 2, 6, 9, 0), datetime(2024, 7, 16, 9, 0))
-FIRST_PASSAGE, PASSAGE_INTERVAL = datetime(2024, 7, 16, 11, 0), timedelta(minutes=30)
 
 
 def sensor_positions(site: Site, world: World) -> list[float]:
@@ -77,7 +75,7 @@ def hammer_test(
     world : World
         True state of the site.
     campaign : int
-        Number of the campaign, 0 or 1.
+        Number of the campaign in ``site.campaigns``.
     position : float
         Position of the impacts, one of ``site.hammer_positions``. [m]
     rng : Generator
@@ -91,7 +89,7 @@ def hammer_test(
         One recording for each impact.
     """
     force = Channel("force", "force", position, "hammer", limit=site.force.full_scale, resolution=site.force.step)
-    recordings, start = [], CAMPAIGNS[campaign] + timedelta(minutes=20 * site.hammer_positions.index(position))
+    recordings, start = [], site.campaigns[campaign] + timedelta(minutes=20 * site.hammer_positions.index(position))
     for k in range(N_IMPACTS):
         f, a = _draw_impact(
             site, world, site.temperatures[campaign], position, rng, decoys.get(("blow", campaign, position, k))
@@ -172,9 +170,13 @@ def passage(site: Site, world: World, k: int, rng: np.random.Generator, decoys: 
         x = a[i] + decoys[chain.name](np.arange(a.shape[1]) / RATE, rng) if chain.name in decoys else a[i]
         rows.append(digitise(chain, x, RATE, PASSAGE_DECIMATION, rng, faults))
     conditions = {"rail_temperature": round(plan.temperature + float(rng.normal()), 1)}
-    when = FIRST_PASSAGE + k * PASSAGE_INTERVAL
     return Recording(
-        np.array(rows), RATE / PASSAGE_DECIMATION, channels(site), "passage", started_at=when, conditions=conditions
+        np.array(rows),
+        RATE / PASSAGE_DECIMATION,
+        channels(site),
+        "passage",
+        started_at=site.passage_time(k),
+        conditions=conditions,
     )
 
 

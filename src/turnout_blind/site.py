@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from datetime import datetime, timedelta
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,18 +30,24 @@ NOMINAL_RANGES = {
 }
 SUPPORT_SCATTER = {"pad": 0.08, "pad_damping": 0.15, "mass": 0.02, "ballast": 0.10, "ballast_damping": 0.15}
 RAIL_DAMPING = 4000.0  # [N s/m²], loss factor 0.010 at 1040 Hz; Thompson 2009, Railway Noise and Vibration: 0.02
+CAMPAIGNS = (datetime(2024, 2, 6, 9, 0), datetime(2024, 7, 16, 9, 0))
+FIRST_PASSAGE, PASSAGE_INTERVAL = datetime(2024, 7, 16, 11, 0), timedelta(minutes=30)
 PLAIN, CROSSING = PANELS = ("plain", "crossing")
 COMMON_ERROR = {"pad": 0.08, "pad_damping": 0.2, "mass": 0.02, "ballast": 0.08, "ballast_damping": 0.2}
 
 
 @dataclass(frozen=True)
 class PlannedPassage:
-    """One passage: ``train`` name, ``speed`` [m/s], ``phase`` [rad] of its wheels, true rail ``temperature`` [°C]."""
+    """One passage: ``train`` name, ``speed`` [m/s], ``phase`` [rad] of its wheels, true rail ``temperature`` [°C].
+
+    ``when`` is its time; None: in turn after the last campaign.
+    """
 
     train: str
     speed: float
     phase: float
     temperature: float
+    when: datetime | None = None
 
 
 @dataclass
@@ -49,7 +56,7 @@ class Site:
 
     ``nominal`` holds the values of the two ``zones`` [(from, to)]; ``trains`` are as filed, ``true_trains`` as they
     run. ``sensors`` and ``hammer_positions`` are nominal positions [m]; ``chains`` has one entry per sensor.
-    ``temperatures`` are those of the two campaigns [°C]. ``crossing`` is as drawn, None on plain track.
+    ``temperatures`` are those of the ``campaigns`` [°C]. ``crossing`` is as drawn, None on plain track.
     """
 
     zones: tuple[tuple[float, float], ...]
@@ -59,13 +66,29 @@ class Site:
     trains: dict[str, Train]
     true_trains: dict[str, Train]
     passages: list[PlannedPassage]
-    temperatures: tuple[float, float]
+    temperatures: tuple[float, ...]
     world: World
     chains: tuple[MeasurementChain, ...]
     force: MeasurementChain
     roughness: dict[Any, Callable[..., np.ndarray]] = field(default_factory=dict)
     tip: float = 1.1e9
     crossing: Crossing | None = None
+    campaigns: tuple[datetime, ...] = CAMPAIGNS
+
+    def passage_time(self, k: int) -> datetime:
+        """Time of a passage.
+
+        Parameters
+        ----------
+        k : int
+            Number of the passage.
+
+        Returns
+        -------
+        datetime
+            UTC, without a time zone.
+        """
+        return self.passages[k].when or FIRST_PASSAGE + k * PASSAGE_INTERVAL
 
     def names(self) -> tuple[str, ...]:
         """Names of the sensors."""

@@ -6,8 +6,9 @@
   turnout blind score --out proof                              every figure with its interval
 
 An interrupted make or diagnose goes on where it stopped. --fast makes 40 cases instead of 235. --effects FOLDER adds
-effects of your own, one file each; --panel crossing puts all cases into crossing panels. Print commit.json's hash (make
-does) and publish it before anybody diagnoses.
+effects of your own, one file each; --panel crossing puts all cases into crossing panels. --histories N makes N sites
+that are visited for two years; with --histories, diagnose asks the calibrated model and score judges its answers.
+Print commit.json's hash (make does) and publish it before anybody diagnoses.
 """
 
 from __future__ import annotations
@@ -47,10 +48,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--panel", choices=("plain", "crossing"), default="plain", help="where all cases lie (default: plain track)"
     )
     make.add_argument("--workers", type=at_least_one, default=1, help="processes (default 1)")
+    make.add_argument("--histories", type=at_least_one, metavar="N", help="N sites with a history of two years")
+    make.add_argument(
+        "--passages", type=at_least_one, default=1, help="passages at each visit of a history (default 1)"
+    )
     diagnose = steps.add_parser("diagnose", help="let the tool diagnose every case, the truth out of its reach")
     diagnose.add_argument(
         "--command", dest="tool", help="command of the tool; {python}, {case}, {folder}, {out} are filled in"
     )
+    diagnose.add_argument("--histories", action="store_true", help="the set has histories: ask the calibrated model")
     diagnose.add_argument("--cases", help="only these, by commas")
     diagnose.add_argument("--timeout", type=float, default=1800.0, help="seconds of the clock per case (default 1800)")
     diagnose.add_argument("--cpu", type=float, default=900.0, help="seconds of the processor per case (default 900)")
@@ -61,6 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     diagnose.add_argument("--workers", type=at_least_one, default=1, help="cases at a time (default 1)")
     reveal = steps.add_parser("reveal", help="open the envelopes and verify every hash")
     score = steps.add_parser("score", help="print every figure with its interval")
+    score.add_argument("--histories", action="store_true", help="the set has histories")
     score.add_argument("--names", help="JSON file {effect: [names of the tool that are right]} to add")
     score.add_argument("--report", help="file to write the report to, as Markdown")
     score.add_argument("--page", help="page between whose marks report, pictures and stories go, as docs/blind.md")
@@ -101,9 +108,11 @@ def _make(args: argparse.Namespace) -> None:
     from turnout_blind.make import make_set
 
     only = args.only.split(",") if args.only else None
+    histories = (args.histories, args.passages) if args.histories else None
     sha = make_set(
-        args.out, _truth(args), args.seed, not args.fast, args.effects, only, args.limit, args.panel, args.workers, _bar
-    )
+        args.out, _truth(args), args.seed, not args.fast, args.effects, only, args.limit, args.panel, args.workers,
+        _bar, histories,
+    )  # fmt: skip
     print(f"sealed: SHA-256 of commit.json is {sha}; the truth lies in {_truth(args)}")
 
 
@@ -114,11 +123,12 @@ def _bar(results: Iterable[Any], total: int) -> Iterable[Any]:
 
 
 def _diagnose(args: argparse.Namespace) -> None:
-    from turnout_blind.diagnose import COMMAND, diagnose_set
+    from turnout_blind.diagnose import COMMAND, HISTORY_COMMAND, diagnose_set
 
+    command = args.tool or (HISTORY_COMMAND if args.histories else COMMAND)
     only = args.cases.split(",") if args.cases else None
     record = diagnose_set(
-        args.out, _truth(args), args.tool or COMMAND, only, args.timeout, args.workers, cpu=args.cpu,
+        args.out, _truth(args), command, only, args.timeout, args.workers, cpu=args.cpu,
         again=args.again, progress=_bar, label=args.ablation,
     )  # fmt: skip
     failed = sum(run["status"] != "answered" for run in record["cases"].values())
@@ -136,8 +146,15 @@ def _score(args: argparse.Namespace) -> None:
     import json
     from pathlib import Path
 
+    from turnout_blind.score.histories import history_text
     from turnout_blind.score.report import report_text
 
+    if args.histories:
+        text = history_text(args.out)
+        if args.report:
+            Path(args.report).write_text(text, encoding="utf-8")
+        print(text)
+        return
     names = json.loads(Path(args.names).read_text()) if args.names else None
     text = report_text(args.out, names)
     if args.page:

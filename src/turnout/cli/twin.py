@@ -1,6 +1,7 @@
 """The calibrated model of a turnout: its parameters from all visits, what differs from the file, and what has changed.
 
   turnout twin --turnout tommerup_s1
+  turnout twin --turnout tommerup_s1 --each-visit
 
 Each visit is fitted once and kept below the work folder; a visit of another code version, track file or set of
 recordings is fitted again. Visits with an open finding of ``turnout diagnose`` are not used.
@@ -11,12 +12,12 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import add_configuration, add_raw, add_track, add_turnout, add_work
+from turnout.cli.options import add_configuration, add_raw, add_result, add_track, add_turnout, add_work
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from turnout.mismatch.calibrated import Deviation, StateParameter
+    from turnout.mismatch.calibrated import Deviation, ModelAnswer, StateParameter
     from turnout.stages.calibrated_model import CalibratedModel
 
 GROUP = "Simulate and diagnose"
@@ -37,6 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_configuration(parser)
     add_raw(parser)
     add_work(parser, "where the information of each visit is kept (%(default)s)")
+    parser.add_argument("--each-visit", action="store_true", help="say what was known after each visit, too")
     parser.add_argument("--all", action="store_true", help="list parameters that recordings hardly determine, too")
 
 
@@ -53,9 +55,10 @@ def run(args: argparse.Namespace) -> int:
     int
         Exit code.
     """
-    from turnout.stages.calibrated_model import calibrate_turnout
+    from turnout.stages.calibrated_model import answer_rows, calibrate_turnout
 
-    model = calibrate_turnout(args.turnout, args.configuration, args.raw, args.work, args.track)
+    model = calibrate_turnout(args.turnout, args.configuration, args.raw, args.work, args.track, args.each_visit)
+    add_result(args, answer_rows(model))
     print("\n".join(model_text(args.turnout, model, args.all)))
     return 0
 
@@ -92,7 +95,10 @@ def model_text(turnout_id: str, model: CalibratedModel, show_all: bool = False) 
     yield from (f"note: {note}" for note in model.notes)
     yield from _table(model, show_all)
     yield "against the file: " + ("; ".join(_deviations(model)) or "nothing differs")
-    yield "changes: " + _change(model)
+    for answer in model.answers:
+        if answer.question == "change":
+            yield f"changes up to {answer.visit}: {_change(answer)}"
+    yield from _strongest(model)
 
 
 def _table(model: CalibratedModel, show_all: bool) -> Iterator[str]:
@@ -123,26 +129,28 @@ def _deviations(model: CalibratedModel) -> Iterator[str]:
         yield f"{extent}: {d.size:+.3g} ± {d.sd:.2g} {_unit(d)}".removesuffix(" -")
 
 
-def _change(model: CalibratedModel) -> str:
-    """The change with the most evidence, or why there is none."""
-    from turnout.config.settings.mismatch import MismatchSettings
+def _change(answer: ModelAnswer) -> str:
+    """The change in words: effect, parameter, size and onset."""
+    if answer.verdict == "none":
+        return "none"
+    if answer.verdict == "unknown":
+        return f"unknown, the visit differs from all before, most at {answer.parameter}"
+    assert answer.size is not None and answer.sd is not None and answer.onset is not None
+    from turnout.stages.calibrated_model import day_of
 
-    settings = MismatchSettings()  # the evidence and the margin of a name
+    start, end = (day_of(t) for t in answer.onset)
+    unit = "ln" if answer.unit == "-" and answer.group != "gain" else answer.unit
+    rate = f"{unit} a year" if answer.grows else unit
+    return (
+        f"{' or '.join(answer.names).replace('_', ' ')}, {answer.parameter} {answer.size:+.3g} ± {answer.sd:.2g} "
+        f"{rate}, appeared after {start}, at the latest at {end} ({answer.gain:.0f} nats)"
+    )
+
+
+def _strongest(model: CalibratedModel) -> Iterator[str]:
+    """The change with the largest evidence, where none is stated."""
     if not model.changes:
-        return "cannot tell from fewer than two visits"
-    best, *others = model.changes
-    if best.gain < settings.threshold:
-        return f"none (the largest evidence is {best.gain:.1f} nats, {best.effect.name})"
-    rival = others[0] if others and others[0].gain > best.gain - settings.margin else None
-    name = best.effect.name if rival is None else f"{best.effect.name} or {rival.effect.name}"
-    size, sd = best.size
-    start, end = (_day(t) for t in best.interval())
-    return f"{name}: {size:+.3g} ± {sd:.2g}, appeared after {start}, at the latest at {end} ({best.gain:.0f} nats)"
-
-
-def _day(time: float) -> str:
-    from datetime import date
-
-    from turnout.stages.calibrated_model import DAYS_PER_YEAR
-
-    return date.fromordinal(round(time * DAYS_PER_YEAR)).isoformat()
+        yield "changes: cannot tell from fewer than two visits"
+    elif all(a.verdict == "none" for a in model.answers if a.question == "change"):
+        best = model.changes[0]
+        yield f"the largest evidence of a change is {best.gain:.1f} nats ({best.effect.name})"

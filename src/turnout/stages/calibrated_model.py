@@ -23,14 +23,16 @@ from turnout.content import sha256_of
 from turnout.errors import SimulationError
 from turnout.fingerprint import fingerprint
 from turnout.mismatch.calibrated import (
-    ChangeEffect,
     Deviation,
     Event,
     GroupInformation,
     History,
+    ModelAnswer,
     OnsetEvidence,
     StateParameter,
     VisitInformation,
+    answers_after_visits,
+    change_candidates,
     compare_onsets,
     deviations_from_file,
     estimate_history,
@@ -39,7 +41,12 @@ from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.engine.diagnose import fit_base
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.turnout import TrackCase
-from turnout.mismatch.turnout.calibration import calibrated_parameters, linearization_point, visit_groups
+from turnout.mismatch.turnout.calibration import (
+    calibrated_parameters,
+    dip_directions,
+    linearization_point,
+    visit_groups,
+)
 from turnout.stages.checkpoint import SUFFIX, read_value, write_value
 from turnout.stages.mismatch_groups import groups, unit_of, visits
 from turnout.stages.mismatch_inputs import digest_of_model, gather_inputs, mismatch_context, track_of
@@ -82,8 +89,9 @@ class StoredVisit:
 class CalibratedModel:
     """The calibrated model of a turnout: belief from all visits, deviations from the file, and changes.
 
-    ``held`` are visits with an open finding, which are not used, with their answers. ``computed`` are the visits that
-    were fitted for this call, ``notes`` what could not be.
+    ``answers`` are those after the visits, the last two after the newest visit. ``held`` are visits with an open
+    finding, which are not used, with their answers. ``computed`` are the visits that were fitted for this call,
+    ``notes`` what could not be.
     """
 
     history: History
@@ -92,6 +100,7 @@ class CalibratedModel:
     held: Mapping[str, str]
     computed: tuple[str, ...]
     notes: tuple[str, ...]
+    answers: tuple[ModelAnswer, ...] = ()
 
 
 def folder_of(fits: str | Path) -> Path:
@@ -350,6 +359,7 @@ def calibrate_turnout(
     raw_root: str | Path = "raw",
     work: str | Path = "work",
     track: str | None = None,
+    each_visit: bool = False,
 ) -> CalibratedModel:
     """Calibrated model of a turnout from all visits below the raw root.
 
@@ -368,6 +378,8 @@ def calibrate_turnout(
         Folder of intermediate results.
     track : str or None
         Name or file of a track; None: the turnout's own.
+    each_visit : bool
+        Whether ``answers`` are those after each visit, or after the newest one alone.
 
     Returns
     -------
@@ -401,15 +413,27 @@ def calibrate_turnout(
     parameters = _parameters_of(stored)
     events = events_of(turnout, parameters)
     history = estimate_history(parameters, _visits_of(_without_findings(stored)), events)
-    changes = estimate_history(parameters, _visits_of(stored), events, repeats_between_visits=False, accepted=None)
+    informed = _visits_of(stored)
+    changes = estimate_history(parameters, informed, events, repeats_between_visits=False, accepted=None)
     deviations = deviations_from_file(history.belief, parameters, dict(CALIBRATION.least_sizes))
+    candidates, settings = change_candidates(parameters, dip_directions(parameters)), turnout.settings["mismatch"]
+    answers = answers_after_visits(
+        parameters,
+        informed,
+        events,
+        candidates,
+        settings.threshold,
+        settings.margin,
+        1 if each_visit else len(informed),
+    )
     return CalibratedModel(
         history,
-        tuple(compare_onsets(changes, change_effects(parameters))),
+        tuple(compare_onsets(changes, candidates)),
         tuple(deviations),
         {f"{s.visit} {s.sections}": s.answer for s in stored if s.answer not in USED_ANSWERS},
         tuple(missing),
         tuple(notes),
+        tuple(answers),
     )
 
 
@@ -436,18 +460,49 @@ def _fit_visit(
     return notes
 
 
-def change_effects(parameters: Sequence[StateParameter]) -> list[ChangeEffect]:
-    """Steps of each support and each sensor, at an unknown visit.
+def day_of(time: float) -> str:
+    """Day of a time of the calibrated model.
 
     Parameters
     ----------
-    parameters : sequence of StateParameter
+    time : float
+        [years]
 
     Returns
     -------
-    list of ChangeEffect
+    str
+        YYYY-MM-DD.
+
+    Examples
+    --------
+    >>> day_of(years_of("2024-02-29"))
+    '2024-02-29'
     """
-    changing = {group for group, _ in CALIBRATION.least_sizes}
-    return [
-        ChangeEffect(p.name, {p.name: 1.0}, CALIBRATION.change_sds * p.sd) for p in parameters if p.group in changing
-    ]
+    return date.fromordinal(round(time * DAYS_PER_YEAR)).isoformat()
+
+
+def answer_rows(model: CalibratedModel) -> list[dict[str, Any]]:
+    """Answers of the model as rows: verdict, effect, position and onset after each visit and question.
+
+    Parameters
+    ----------
+    model : CalibratedModel
+
+    Returns
+    -------
+    list of dict
+    """
+    rows = []
+    for a in model.answers:
+        after, by = (None, None) if a.onset is None else map(day_of, a.onset)
+        names: list[str | None] = [*a.names, None, None]
+        channel = a.parameter.rpartition("_")[2] if a.group in ("gain", "seat") else None
+        rows.append(
+            {
+                "visit": a.visit, "question": a.question, "verdict": a.verdict, "term": names[0],
+                "rival_term": names[1], "parameter": a.parameter or None, "position_m": a.position, "channel": channel,
+                "size": a.size, "size_se": a.sd, "unit": a.unit or None, "grows": a.grows, "onset_after": after,
+                "onset_by": by, "gain_nats": a.gain,
+            }
+        )  # fmt: skip
+    return rows

@@ -30,6 +30,10 @@ class CalibrationConstants:
         "unit of the group", "deviations from the file below which nobody would act", PAGE,
     )  # fmt: skip
     change_sds: float = threshold(5.0, "prior sd", "prior standard deviation of a change of a parameter", PAGE)
+    dip_sd: float = threshold(5e-4, "m", "prior standard deviation of the depth of a dip that appears", PAGE)
+    least_dip: float = threshold(1e-4, "m", "depth of a dip below which nobody would act", PAGE)
+    dip_lengths: tuple[float, ...] = threshold((0.4, 0.8), "m", "lengths of the dips that are sought", PAGE)
+    dip_spacing: float = threshold(0.3, "m", "distance of the positions at which a dip is sought", PAGE)
     finding_sds: float = threshold(3.0, "standard deviations", "beyond which a value differs from the file", PAGE)
     min_prior_share: float = threshold(
         1e-9, "share of the prior variance", "of a mean over components, below which data say nothing", "numerical"

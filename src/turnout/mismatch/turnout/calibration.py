@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,8 @@ from turnout.constants import KMH
 from turnout.mismatch.calibrated.belief import StateParameter
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.information import GroupInformation, marginalize
+from turnout.mismatch.turnout.priors import ROUGHNESS
+from turnout.mismatch.turnout.rail_roughness import Waves
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -167,3 +170,44 @@ def linearization_point(case: TrackCase, fit: Fit, route: str = "main") -> Mappi
     mapping
     """
     return {p.name: float(fit.values[n]) for n, p in calibrated_parameters(case, route).items()}
+
+
+def dip_directions(parameters: Sequence[StateParameter]) -> dict[str, dict[str, float]]:
+    """Dips of the running surface that may appear, as changes of the amplitudes of the waves.
+
+    A dip is a triangle of ``CALIBRATION.dip_lengths`` and depth 1, at positions between the outer sensors. It is
+    projected on the waves by least squares.
+
+    Parameters
+    ----------
+    parameters : sequence of StateParameter
+        Those of group "wave" are used.
+
+    Returns
+    -------
+    dict
+        "dip of 0.4 m@3.30" -> wave parameter -> change per metre of depth.
+    """
+    stretches: dict[tuple[str, str, str], dict[str, str]] = {}
+    for p in parameters:
+        match = (
+            re.fullmatch(r"(.*?)((?:cos|sin)_wave_\d+)@(-?[\d.]+)-(-?[\d.]+)", p.name) if p.group == "wave" else None
+        )
+        if match:
+            stretches.setdefault((match[1], match[3], match[4]), {})[match[2]] = p.name
+    directions = {}
+    for (route, start, end), names in stretches.items():
+        ends = float(start) + ROUGHNESS.rolling_reach, float(end) - ROUGHNESS.rolling_reach
+        waves = Waves(ends, 0.0)
+        x = np.arange(waves.start, waves.end, ROUGHNESS.path_step)
+        used = [k for k, name in enumerate(waves.names) if name in names]
+        shapes = waves.shapes(x)[used].T
+        inverse = np.linalg.pinv(shapes)
+        for length in CALIBRATION.dip_lengths:
+            for position in np.arange(ends[0], ends[1] + 1e-9, CALIBRATION.dip_spacing):
+                dip = np.clip(1.0 - abs(x - position) / (0.5 * length), 0.0, None)
+                amplitudes = inverse @ dip
+                directions[f"{route}dip of {length:g} m@{position:.2f}"] = {
+                    names[waves.names[k]]: float(a) for k, a in zip(used, amplitudes)
+                }
+    return directions

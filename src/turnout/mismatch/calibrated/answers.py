@@ -1,0 +1,274 @@
+"""Answers of the calibrated model: which effect has appeared since when, and which was there from the first visit.
+
+An answer after a visit rests on that visit and those before it, as one has it on that day.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from turnout.mismatch.calibrated.belief import StateParameter
+from turnout.mismatch.calibrated.change import ChangeEffect, OnsetEvidence, compare_onsets
+from turnout.mismatch.calibrated.constants import CALIBRATION
+from turnout.mismatch.calibrated.file_comparison import Deviation, deviations_from_file
+from turnout.mismatch.calibrated.history import Event, History, estimate_history
+from turnout.mismatch.calibrated.information import VisitInformation
+
+CHANGE, FILE = QUESTIONS = ("change", "file")
+# Group of a parameter -> the effect of the library that changes it
+NAMES = {
+    "ballast": "local_ballast",
+    "pad": "local_pad",
+    "gain": "sensor_gain",
+    "seat": "sensor_position",
+    "surface": "surface_dip",
+    "dip": "surface_dip",
+}
+IMPACTS = "impacts at"  # part of the name of a group of hammer tests
+
+
+@dataclass(frozen=True)
+class ModelAnswer:
+    """Answer of the calibrated model after one ``visit``.
+
+    ``question`` of ``QUESTIONS``; ``verdict`` "none", "named", "a_or_b" or "unknown" with its ``names``.
+    ``parameter`` has changed by ``size`` (standard error ``sd``, ``unit``), or by as much per year if it ``grows``.
+    ``onset``: last time without and first time with the change [years], None against the file. ``gain`` is the evidence
+    less the logarithm of the number of candidates [nats], None where the answer does not rest on one.
+    """
+
+    visit: str
+    question: str
+    verdict: str
+    names: tuple[str, ...] = ()
+    parameter: str = ""
+    group: str = ""
+    position: float | None = None
+    size: float | None = None
+    sd: float | None = None
+    unit: str = ""
+    onset: tuple[float, float] | None = None
+    gain: float | None = None
+    grows: bool = False
+
+
+def change_candidates(
+    parameters: Sequence[StateParameter], shapes: Mapping[str, Mapping[str, float]] | None = None
+) -> list[ChangeEffect]:
+    """Steps of each support, sensor and surface parameter at an unknown visit, and their growth.
+
+    Parameters
+    ----------
+    parameters : sequence of StateParameter
+    shapes : mapping or None
+        Further candidates: name -> direction (parameter -> change per unit of size), with a prior standard deviation
+        of the size of ``CALIBRATION.dip_sd``.
+
+    Returns
+    -------
+    list of ChangeEffect
+    """
+    changing = {group for group, _ in CALIBRATION.least_sizes}
+    candidates = [(p.name, {p.name: 1.0}, CALIBRATION.change_sds * p.sd) for p in parameters if p.group in changing]
+    candidates += [(name, dict(direction), CALIBRATION.dip_sd) for name, direction in (shapes or {}).items()]
+    return [ChangeEffect(name, d, sd, grows) for name, d, sd in candidates for grows in (False, True)]
+
+
+def answers_after_visits(
+    parameters: Sequence[StateParameter],
+    visits: Sequence[VisitInformation],
+    events: Sequence[Event],
+    candidates: Sequence[ChangeEffect],
+    threshold: float,
+    margin: float,
+    first: int = 1,
+) -> list[ModelAnswer]:
+    """What the model says after each visit, of changes and against the file.
+
+    Parameters
+    ----------
+    parameters : sequence of StateParameter
+    visits : sequence of VisitInformation
+    events : sequence of Event
+    candidates : sequence of ChangeEffect
+        As ``change_candidates``.
+    threshold : float
+        Evidence that a name needs. [nats]
+    margin : float
+        A rival of another name within it makes the answer "a or b". [nats]
+    first : int
+        Number of the first visit after which an answer is given, from 1.
+
+    Returns
+    -------
+    list of ModelAnswer
+        Two for each visit, in the order of time.
+    """
+    ordered = sorted(visits, key=lambda v: (v.time, v.visit))
+    answers = []
+    for n in range(first, len(ordered) + 1):
+        change = change_answer(parameters, ordered[:n], events, candidates, threshold, margin)
+        before = _visits_before(ordered[:n], change)
+        answers += [change, file_answer(parameters, before, events, ordered[n - 1].visit)]
+    return answers
+
+
+def _visits_before(visits: Sequence[VisitInformation], change: ModelAnswer) -> list[VisitInformation]:
+    """Visits that certainly lie before the change: with it the mean of all visits deviates from the file, too."""
+    if change.onset is None:
+        return list(visits)
+    return [v for v in visits if v.time <= change.onset[0]]
+
+
+def change_answer(
+    parameters: Sequence[StateParameter],
+    visits: Sequence[VisitInformation],
+    events: Sequence[Event],
+    candidates: Sequence[ChangeEffect],
+    threshold: float,
+    margin: float,
+) -> ModelAnswer:
+    """What has changed up to the last of these visits.
+
+    Every candidate is equally probable before, so that its evidence is less by the logarithm of their number. By
+    Markov's inequality an intact history then exceeds ``threshold`` with a probability of at most exp(-threshold).
+
+    Parameters
+    ----------
+    parameters : sequence of StateParameter
+    visits : sequence of VisitInformation
+        In the order of time.
+    events : sequence of Event
+    candidates : sequence of ChangeEffect
+    threshold : float
+        [nats]
+    margin : float
+        [nats]
+
+    Returns
+    -------
+    ModelAnswer
+        "unknown" if the last visit differs from all before, and no candidate has the evidence of a name.
+    """
+    visit = visits[-1].visit
+    history = estimate_history(parameters, visits, events, repeats_between_visits=False, accepted=None)
+    evidence = compare_onsets(history, candidates)
+    price = float(np.log(max(len(candidates), 1)))
+    by_name = {p.name: p for p in parameters}
+    material = [e for e in evidence if e.gain - price >= threshold and _is_material(e, by_name)]
+    if not material:
+        return _unexplained(history, visit, by_name)
+    best = material[0]
+    names = [_name(best, by_name)]
+    if names == ["local_ballast"] and best.size[0] < 0.0:
+        names = _supported_names(parameters, visits, events, best)
+    rivals = [_name(e, by_name) for e in material if e.gain > best.gain - margin]
+    names += [name for name in dict.fromkeys(rivals) if name not in names and name != _name(best, by_name)]
+    parameter = by_name.get(best.effect.name)
+    size, sd = best.size
+    return ModelAnswer(
+        visit, CHANGE, "named" if len(names) == 1 else "a_or_b", tuple(names[:2]), best.effect.name,
+        parameter.group if parameter else "dip", position_of(best.effect.name, parameter), size, sd,
+        parameter.unit if parameter else "m", best.interval(), best.gain - price, best.effect.grows,
+    )  # fmt: skip
+
+
+def position_of(name: str, parameter: StateParameter | None) -> float | None:
+    """Position of a candidate [m]: that of its parameter, or the number behind "@" or "at" in its name.
+
+    Parameters
+    ----------
+    name : str
+    parameter : StateParameter or None
+
+    Returns
+    -------
+    float or None
+    """
+    if parameter is not None and parameter.position is not None:
+        return parameter.position
+    number = re.search(r"(?:@| at )(-?\d+(?:\.\d+)?)", name)
+    return float(number.group(1)) if number else None
+
+
+def _name(evidence: OnsetEvidence, by_name: Mapping[str, StateParameter]) -> str:
+    parameter = by_name.get(evidence.effect.name)
+    return NAMES[parameter.group if parameter else "dip"]
+
+
+def _is_material(evidence: OnsetEvidence, by_name: Mapping[str, StateParameter]) -> bool:
+    """Whether the present size causes any action: of growth, that since its most probable onset."""
+    parameter = by_name.get(evidence.effect.name)
+    least = dict(CALIBRATION.least_sizes)[parameter.group] if parameter else CALIBRATION.least_dip
+    start = evidence.times[int(np.argmax(evidence.gains))]
+    elapsed = float(evidence.times[-1] - start) if evidence.effect.grows else 1.0
+    return abs(evidence.size[0]) * elapsed >= least
+
+
+def _supported_names(
+    parameters: Sequence[StateParameter],
+    visits: Sequence[VisitInformation],
+    events: Sequence[Event],
+    best: OnsetEvidence,
+) -> list[str]:
+    """Names of softer ballast: a gap is felt by impacts on the unloaded track, and less by trains that close it."""
+    sizes = []
+    for is_impact in (True, False):
+        chosen = [replace(v, groups=tuple(g for g in v.groups if (IMPACTS in g.group) == is_impact)) for v in visits]
+        history = estimate_history(parameters, chosen, events, repeats_between_visits=False, accepted=None)
+        sizes.append(compare_onsets(history, [best.effect])[0].size)
+    (by_impacts, impacts_sd), (by_trains, trains_sd) = sizes
+    difference, sd = by_trains - by_impacts, float(np.hypot(impacts_sd, trains_sd))
+    if difference > CALIBRATION.finding_sds * sd:
+        return ["hanging_sleeper"]
+    if abs(difference) <= CALIBRATION.finding_sds * sd and by_impacts < -CALIBRATION.finding_sds * sd:
+        return ["local_ballast"]
+    return ["local_ballast", "hanging_sleeper"]
+
+
+def _unexplained(history: History, visit: str, by_name: Mapping[str, StateParameter]) -> ModelAnswer:
+    """ "none", or "unknown" if the last visit differs from all before."""
+    innovation = history.steps[-1].innovation
+    if len(history.steps) < 2 or innovation.is_expected:
+        return ModelAnswer(visit, CHANGE, "none")
+    parameter = by_name.get(innovation.parameter)
+    return ModelAnswer(
+        visit, CHANGE, "unknown", (), innovation.parameter, parameter.group if parameter else "",
+        position_of(innovation.parameter, parameter),
+    )  # fmt: skip
+
+
+def file_answer(
+    parameters: Sequence[StateParameter], visits: Sequence[VisitInformation], events: Sequence[Event], visit: str
+) -> ModelAnswer:
+    """What differs from the file, the clearest first deviation.
+
+    Parameters
+    ----------
+    parameters : sequence of StateParameter
+    visits : sequence of VisitInformation
+        Those that lie before any change.
+    events : sequence of Event
+    visit : str
+        Visit after which the answer is given.
+
+    Returns
+    -------
+    ModelAnswer
+    """
+    history = estimate_history(parameters, visits, events, accepted=None)
+    deviations = deviations_from_file(history.belief, parameters, dict(CALIBRATION.least_sizes))
+    if not deviations:
+        return ModelAnswer(visit, FILE, "none")
+    first: Deviation = deviations[0]
+    by_name = {p.name: p for p in parameters}
+    middle = None if first.positions is None else 0.5 * sum(first.positions)
+    position = middle if middle is not None else position_of(first.names[0], by_name[first.names[0]])
+    return ModelAnswer(
+        visit, FILE, "named", (NAMES[first.group],), ", ".join(first.names), first.group,
+        position, first.size, first.sd, first.unit,
+    )  # fmt: skip

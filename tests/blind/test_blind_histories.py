@@ -1,0 +1,166 @@
+"""Histories of sites: what is drawn, what changes from visit to visit, and how the answers are judged."""
+
+import csv
+import json
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from datetime import date, datetime
+
+import numpy as np
+import pytest
+
+from turnout.config.events import read_events
+from turnout_blind import history
+from turnout_blind.effect import load_effects
+from turnout_blind.history import HistoryPlan, make_history, parameters_at, plan_histories
+from turnout_blind.make import make_set
+from turnout_blind.score.histories import history_figures, judge_history
+
+EFFECTS = load_effects()
+
+
+def test_a_set_has_its_patterns_effects_and_panels_in_shares():
+    plans = plan_histories(5, 80, EFFECTS)
+    assert [sum(p.pattern == n for p in plans) for n in history.PATTERNS] == [20, 10, 25, 25]
+    assert sum(p.panel == "crossing" for p in plans) == 40
+    kinds = [p.effect[0] for p in plans if p.effect]
+    assert set(kinds) == set(history.HISTORY_EFFECTS) and max(map(kinds.count, kinds)) <= 14
+    assert all(p.effect is None for p in plans if p.pattern == "none")
+    assert plans == plan_histories(5, 80, EFFECTS) != plan_histories(6, 80, EFFECTS)
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """A site with growing soft ballast, whose recordings are not simulated."""
+    folder = tmp_path_factory.mktemp("history")
+    worlds, patch = [], pytest.MonkeyPatch()
+    patch.setattr(history, "write_campaign", lambda f, site, world, c, rng, decoys: worlds.append(world))
+    patch.setattr(history, "write_passage", lambda *a: None)
+    patch.setattr(history, "effect_visibility", lambda *a: {"hammer_pct": 30.0, "passage_pct": 0.0})
+    (folder / "T1" / "raw" / "T1").mkdir(parents=True)
+    truth = make_history(folder, "T1", HistoryPlan("growth", ("ballast", 5), (4, 2, 8)), EFFECTS)
+    patch.undo()
+    return folder / "T1", truth, worlds
+
+
+def test_the_effect_grows_from_its_day_on_and_the_track_wears(site):
+    _, truth, worlds = site
+    effect, shares = truth["effects"][0], truth["severities"]
+    assert shares[0] == 0.0 and sorted(shares) == shares and 0.0 < shares[-1] <= 1.0
+    assert truth["visits"][0] < truth["onset"] < truth["visits"][-1]
+    j = effect["where"]["sleeper"]
+    far = j + 6  # wear alone, and tamping where it is recorded
+    others = [w.ballast[far] / worlds[0].ballast[far] for w in worlds]
+    if not any(m["kind"] == "tamping" for m in truth["maintenance"]):
+        assert 0.85 < others[-1] < 1.0
+    changes = [w.ballast[j] / worlds[0].ballast[j] for w in worlds]
+    expected = effect["parameters"]["factor"] ** shares[-1]
+    assert changes[-1] / others[-1] == pytest.approx(expected, rel=0.1)
+
+
+def test_the_owner_has_the_notes_of_all_visits_and_its_events_but_not_the_effect(site):
+    folder, truth, _ = site
+    with open(folder / "raw" / "T1" / "campaigns.csv") as file:
+        assert [row["campaign"] for row in csv.DictReader(file)] == truth["visits"]
+    events, errors, _ = read_events(folder / "config" / "events.csv", "events.csv", None, {})
+    assert not errors and [(e.at.date().isoformat(), e.kind) for e in events] == sorted(
+        (m["day"], m["kind"]) for m in truth["maintenance"]
+    )
+    written = "".join(p.read_text() for p in folder.rglob("*") if p.is_file())
+    assert "growth" not in written and truth["onset"] not in written
+
+
+def test_parameters_of_a_growing_effect_end_at_their_full_size():
+    for kind in history.HISTORY_EFFECTS:
+        site = history.draw_site(np.random.default_rng(3))
+        full = EFFECTS[kind].draw_concealed(np.random.default_rng(1), site, 5).parameters
+        assert parameters_at(kind, full, 1.0) == pytest.approx({**full, **({"growth": 0.0} if kind == "void" else {})})
+    assert parameters_at("void", {"gap": 2e-3, "seated": 0.2, "close": 1e-4, "growth": 0.02}, 0.5) == pytest.approx(
+        {"gap": 1e-3, "seated": 0.6, "close": 1e-4, "growth": 0.0}
+    )
+
+
+def test_a_set_of_histories_is_sealed_like_any_other(tmp_path, monkeypatch):
+    def light(folder, case, plan, effects):
+        (folder / case).mkdir(parents=True)
+        (folder / case / "raw.txt").write_text(f"{plan.seed}")
+        return {"case": case, "pattern": plan.pattern, "effects": []}
+
+    monkeypatch.setattr("turnout_blind.make.make_history", light)
+    monkeypatch.setattr("turnout_blind.make.ProcessPoolExecutor", ThreadPoolExecutor)
+    sha = [make_set(tmp_path / f"s{k}", tmp_path / f"t{k}", 7, histories=(4, 2)) for k in range(2)]
+    assert sha[0] == sha[1]
+    assert json.loads((tmp_path / "t0" / "set.json").read_text())["histories"] == [4, 2]
+
+
+TRUTH = {
+    "case": "T1", "pattern": "step", "panel": "plain", "onset": "2023-04-20", "maintenance": [],
+    "effects": [{"kind": "pad", "where": {"sleeper": 42, "position": 1.8}, "parameters": {"factor": 0.24}}],
+    "visits": ["2022-02-06", "2022-10-12", "2023-06-13", "2024-01-29"], "severities": [0.0, 0.0, 1.0, 1.0],
+    "visible": [{"hammer_pct": h, "passage_pct": 0.0} for h in (0.0, 0.0, 70.0, 70.0)],
+}  # fmt: skip
+NOTHING = {"verdict": "none", "term": None, "rival_term": None, "position_m": None, "channel": None}
+PAD = {
+    **NOTHING,
+    "verdict": "named",
+    "term": "local_pad",
+    "position_m": 1.9,
+    "onset_after": "2022-10-12",
+    "onset_by": "2023-06-13",
+}
+
+
+def rows(*change):
+    return [
+        {**row, "visit": v, "question": q}
+        for v, c in zip(TRUTH["visits"], change)
+        for q, row in (("change", c), ("file", NOTHING))
+    ]
+
+
+def test_a_change_that_is_named_at_its_position_in_time_counts():
+    result = judge_history(TRUTH, rows(NOTHING, NOTHING, PAD, PAD))
+    assert (result.named, result.is_located, result.onset_covered) == ("named", True, True)
+    assert not result.wrong_names and not result.alarms
+    late = judge_history(TRUTH, rows(NOTHING, NOTHING, NOTHING, PAD))
+    assert late.named == "named"
+    far = judge_history(TRUTH, rows(NOTHING, NOTHING, {**PAD, "position_m": 4.2}, NOTHING))
+    assert far.named == "named" and not far.is_located
+
+
+def test_wrong_names_false_alarms_and_maintenance_are_counted():
+    early = judge_history(
+        {**TRUTH, "maintenance": [{"day": "2022-05-01", "kind": "tamping"}]}, rows(NOTHING, PAD, PAD, PAD)
+    )
+    assert early.alarms == {"change": "2022-10-12"} and early.maintenance_alarms == 1
+    assert early.years == pytest.approx((date(2023, 6, 13) - date(2022, 2, 6)).days / 365.25)
+    gain = {**PAD, "term": "sensor_gain", "channel": "A1"}
+    wrong = judge_history(TRUTH, rows(NOTHING, NOTHING, gain, gain))
+    assert wrong.wrong_names == ("sensor_gain",) and wrong.named == ""
+    outside = judge_history({**TRUTH, "onset": "2022-06-01"}, rows(NOTHING, NOTHING, PAD, PAD))
+    assert outside.onset_covered is False
+    none = judge_history(TRUTH, None)
+    assert not none.answered and none.named == "" and none.last_answer == "no answer"
+    shares = {f.name: (f.k, f.n) for f in history_figures([early, wrong, none])}
+    assert shares["clear effects named within two visits"] == (1, 3)
+    assert shares["recorded maintenance called a defect"] == (1, 3)
+    assert shares["sites with a wrong name"] == (1, 3)
+    assert shares["false alarms of a change, per site-year"] == (1, 4)
+
+
+def test_an_effect_of_the_first_day_is_asked_of_the_file():
+    truth = {**TRUTH, "pattern": "start", "onset": None, "severities": [1.0] * 4, "visible": [TRUTH["visible"][2]] * 4}
+    answers = [{**PAD, "visit": TRUTH["visits"][0], "question": "file", "onset_after": None}]
+    result = judge_history(truth, answers)
+    assert (result.named, result.is_located, result.onset_covered) == ("named", True, None)
+    change = judge_history(
+        truth, [{**PAD, "visit": TRUTH["visits"][1], "question": "change", "term": "sensor_gain", "channel": "A1"}]
+    )
+    assert change.alarms == {"change": "2022-10-12"}
+
+
+def test_times_of_campaigns_and_passages_of_single_cases_stay(tmp_path):
+    site = history.draw_site(np.random.default_rng(1))
+    assert site.passage_time(1) == datetime(2024, 7, 16, 11, 30)
+    moved = replace(site, passages=[replace(site.passages[0], when=datetime(2023, 1, 1))])
+    assert moved.passage_time(0) == datetime(2023, 1, 1) and len(site.campaigns) == 2

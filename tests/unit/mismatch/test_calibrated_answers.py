@@ -1,0 +1,107 @@
+"""What the calibrated model answers after each visit, on seeded linear histories with a known change."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from turnout.mismatch.calibrated import GroupInformation, StateParameter, VisitInformation
+from turnout.mismatch.calibrated.answers import answers_after_visits, change_answer, change_candidates
+from turnout.mismatch.turnout.calibration import dip_directions
+from turnout.mismatch.turnout.rail_roughness import Waves
+
+N_SUPPORT, SD, STEP = 5, 0.05, 0.5
+SUPPORTS = [StateParameter(f"ballast@{0.6 * k:.2f}", 0.0, 0.1, 0.03, "ballast", k, 0.6 * k) for k in range(N_SUPPORT)]
+GAINS = [StateParameter(f"gain_A{k}", 1.0, 0.02, 0.003, "gain", None, 0.6 * k) for k in (1, 3)]
+PARAMETERS = [*SUPPORTS, *GAINS]
+NAMES = tuple(p.name for p in PARAMETERS)
+MEAN = np.array([p.mean for p in PARAMETERS])
+CANDIDATES = change_candidates(PARAMETERS)
+
+
+def histories(rng, n_visit, change, trains_feel=1.0):
+    """Visits with one group of impacts and one of trains; ``change(visit)`` is added to the parameters."""
+    rows = np.array([[0.6 ** abs(i - j) for j in range(N_SUPPORT)] + [0.0, 0.0] for i in range(6)])
+    rows = np.vstack([rows, np.eye(len(PARAMETERS))[N_SUPPORT:]])
+    x = rng.normal(MEAN, [p.sd for p in PARAMETERS])
+    visits = []
+    for v in range(n_visit):
+        groups = []
+        for group, share in (("A: impacts at 1.20 m", 1.0), ("A: locomotive, 120 km/h", trains_feel)):
+            y = rows @ (x + share * change(v)) + rng.normal(0.0, SD, len(rows))
+            groups.append(GroupInformation(group, 1, NAMES, rows.T @ rows / SD**2, rows.T @ y / SD**2))
+        visits.append(VisitInformation(f"v{v}", STEP * v, tuple(groups)))
+    return visits
+
+
+def step(name, size, first):
+    return lambda v: size * (v >= first) * np.eye(len(PARAMETERS))[NAMES.index(name)]
+
+
+def last_answers(visits):
+    return {a.question: a for a in answers_after_visits(PARAMETERS, visits, [], CANDIDATES, 12.0, 6.0, len(visits))}
+
+
+def test_a_step_is_named_from_its_first_visit_on_with_its_onset_and_not_before():
+    visits = histories(np.random.default_rng(1), 5, step("ballast@1.20", -0.8, 3))
+    answers = [a for a in answers_after_visits(PARAMETERS, visits, [], CANDIDATES, 12.0, 6.0) if a.question == "change"]
+    assert [a.verdict for a in answers] == ["none", "none", "none", "named", "named"]
+    last = answers[-1]
+    assert (last.names, last.parameter, last.position) == (("local_ballast",), "ballast@1.20", 1.2)
+    assert last.onset == (2 * STEP, 3 * STEP)
+    assert last.size == pytest.approx(-0.8, abs=4.0 * last.sd)
+
+
+def test_what_grows_is_a_change_whose_onset_lies_in_the_interval():
+    visits = histories(np.random.default_rng(2), 6, lambda v: -0.3 * max(v - 1, 0) * np.eye(len(PARAMETERS))[2])
+    answer = last_answers(visits)["change"]
+    assert answer.verdict == "named" and answer.parameter == "ballast@1.20" and answer.grows
+    assert answer.size == pytest.approx(-0.6, abs=0.1)  # a year
+    assert answer.onset[0] <= STEP <= answer.onset[1]
+
+
+def test_softer_ballast_that_trains_feel_less_is_a_hanging_sleeper():
+    visits = histories(np.random.default_rng(3), 4, step("ballast@1.20", -1.0, 2), trains_feel=0.3)
+    assert last_answers(visits)["change"].names == ("hanging_sleeper",)
+    only_trains = [
+        replace(v, groups=v.groups[1:]) for v in histories(np.random.default_rng(4), 4, step("ballast@1.20", -1.0, 2))
+    ]
+    answer = change_answer(PARAMETERS, only_trains, [], CANDIDATES, 12.0, 6.0)
+    assert answer.verdict == "a_or_b" and answer.names == ("local_ballast", "hanging_sleeper")
+
+
+def test_a_sensor_whose_gain_changed_is_named_with_its_channel_position():
+    answer = last_answers(histories(np.random.default_rng(5), 4, step("gain_A3", 0.5, 2)))["change"]
+    assert answer.names == ("sensor_gain",) and answer.position == pytest.approx(1.8)
+
+
+def test_an_effect_of_the_first_day_differs_from_the_file_and_is_no_change():
+    answers = last_answers(histories(np.random.default_rng(6), 5, step("ballast@1.20", -0.8, 0)))
+    assert answers["change"].verdict == "none"
+    assert answers["file"].names == ("local_ballast",) and answers["file"].position == pytest.approx(1.2)
+
+
+def test_intact_histories_are_called_intact():
+    """60 histories: by Markov's inequality a name has a probability below exp(-12) in each."""
+    rng = np.random.default_rng(7)
+    verdicts = [last_answers(histories(rng, 5, step("ballast@1.20", 0.0, 0)))["change"].verdict for _ in range(60)]
+    assert verdicts.count("none") >= 59 and "named" not in verdicts
+
+
+def test_a_change_below_the_least_size_has_no_name():
+    answer = last_answers(histories(np.random.default_rng(8), 6, step("gain_A1", 0.07, 3)))["change"]
+    assert answer.verdict in ("none", "unknown")  # 0.08 is the least change of a gain that anybody acts on
+
+
+def test_directions_of_dips_give_the_triangle_back():
+    waves = Waves((2.0, 9.0), 0.0)
+    parameters = [StateParameter(f"{n}@{waves.start:.2f}-{waves.end:.2f}", 0.0, 1e-4, 0.0, "wave") for n in waves.names]
+    directions = dip_directions(parameters)
+    direction = directions["dip of 0.8 m@5.00"]
+    x = np.linspace(4.0, 6.0, 201)
+    amplitudes = np.array([direction[p.name] for p in parameters])
+    shape = amplitudes @ waves.shapes(x)
+    triangle = np.clip(1.0 - abs(x - 5.0) / 0.4, 0.0, None)
+    assert np.corrcoef(shape, triangle)[0, 1] > 0.9  # waves longer than the sensors' stretch are missing
+    assert np.argmax(shape) == pytest.approx(100, abs=5) and 0.6 < np.ptp(shape) < 1.3
+    assert dip_directions([replace(p, group="pad") for p in parameters]) == {}
