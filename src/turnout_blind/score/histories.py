@@ -77,7 +77,8 @@ def judge_history(truth: Mapping[str, Any], rows: Sequence[Mapping[str, Any]] | 
     in_time = visits[visits.index(clear[0]) :][:MAX_VISITS_LATE] if clear else []
     right = [r for r in relevant if r["visit"] in in_time and set(_names(r)) & set(names)]
     best = next((r for r in right if r["verdict"] == "named"), right[0] if right else None)
-    false = [r for r in stated if r not in relevant and not (r["visit"] in present and _restates(r, question, effect))]
+    restated = [r for r in stated if r["visit"] in present and _restates(r, question, effect, names)]
+    false = [r for r in stated if r not in relevant and r not in restated]
     alarms: dict[str, str] = {}
     for row in false:
         alarms.setdefault(row["question"], row["visit"])
@@ -102,9 +103,11 @@ def _names(row: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(n for n in (row.get("term"), row.get("rival_term")) if n) if row["verdict"] != "unknown" else ()
 
 
-def _restates(row: Mapping[str, Any], question: str, effect: Mapping[str, Any] | None) -> bool:
-    """Whether a row of the other question states the concealed effect, at its position."""
-    return effect is not None and row["question"] != question and _is_located(effect, row)
+def _restates(row: Mapping[str, Any], question: str, effect: Mapping[str, Any] | None, names: Sequence[str]) -> bool:
+    """Whether a row of the other question states the concealed effect at its position, and no other name."""
+    if effect is None or row["question"] == question or not _is_located(effect, row):
+        return False
+    return not _names(row) or bool(set(_names(row)) & set(names))
 
 
 def _is_located(effect: Mapping[str, Any], row: Mapping[str, Any]) -> bool:
