@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime, timedelta
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from turnout_blind.effect import Effect
+    from turnout_blind.instrument import Fault
     from turnout_blind.site import Site
     from turnout_blind.true_site import World
 
@@ -269,11 +271,14 @@ def _world_at(site: Site, when: datetime, wear: np.ndarray, work: list[Maintenan
             world.ballast_damping = world.ballast_damping * change["damping"]
         else:
             gain = float(change["gain"])
-            world.channels.setdefault(change["sensor"], []).append(
-                lambda recording_type, rng, gain=gain: lambda x, rate: gain * x
-            )
+            world.channels.setdefault(change["sensor"], []).append(partial(_other_gain, gain))
             world.sensor_shift[change["sensor"]] = float(change["shift"])
     return world
+
+
+def _other_gain(gain: float, recording_type: str, rng: np.random.Generator) -> Fault:
+    """Fault of a sensor with another gain."""
+    return lambda x, rate: gain * x
 
 
 def _write_events(path: Path, case: str, work: list[Maintenance]) -> None:

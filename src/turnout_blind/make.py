@@ -94,7 +94,7 @@ def make_set(
     else:
         plans = plan_histories(set_seed, histories[0], load_effects(*folders), histories[1])[:limit]
     effect_folders = tuple(map(str, folders))
-    jobs = [
+    jobs: list[Job] = [
         (out / "cases", truth, case_id(set_seed, k), plan, effect_folders, set_seed) for k, plan in enumerate(plans)
     ]
     pending = [job for job in jobs if not _is_made(job)]

@@ -95,9 +95,8 @@ def model_text(turnout_id: str, model: CalibratedModel, show_all: bool = False) 
     yield from (f"note: {note}" for note in model.notes)
     yield from _table(model, show_all)
     yield "against the file: " + ("; ".join(_deviations(model)) or "nothing differs")
-    for answer in model.answers:
-        if answer.question == "change":
-            yield f"changes up to {answer.visit}: {_change(answer)}"
+    for change in (a for a in model.answers if a.question == "change"):
+        yield f"changes up to {change.visit}: {_change(change)}"
     yield from _strongest(model)
 
 

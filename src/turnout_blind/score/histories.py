@@ -90,7 +90,7 @@ def judge_history(truth: Mapping[str, Any], rows: Sequence[Mapping[str, Any]] | 
     return HistoryResult(
         truth["case"], pattern, truth["panel"], effect["kind"] if effect else "", rows is not None,
         clear[0] if clear else None, best["verdict"] if best else "",
-        bool(best) and effect is not None and _is_located(effect, best),
+        best is not None and effect is not None and _is_located(effect, best),
         None if onset_row is None or truth["onset"] is None
         else onset_row["onset_after"] <= truth["onset"] <= onset_row["onset_by"],
         tuple(dict.fromkeys(wrong)), alarms,

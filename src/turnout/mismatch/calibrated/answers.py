@@ -161,7 +161,7 @@ def change_answer(
     by_name = {p.name: p for p in parameters}
     material = [e for e in evidence if e.gain - price >= threshold and _is_material(e, by_name)]
     if not material:
-        return _unexplained(history, visit, by_name)
+        return _answer_without_name(history, visit, by_name)
     best = material[0]
     names = [_name(best, by_name)]
     if names == ["local_ballast"] and best.size[0] < 0.0:
@@ -230,7 +230,7 @@ def _supported_names(
     return ["local_ballast", "hanging_sleeper"]
 
 
-def _unexplained(history: History, visit: str, by_name: Mapping[str, StateParameter]) -> ModelAnswer:
+def _answer_without_name(history: History, visit: str, by_name: Mapping[str, StateParameter]) -> ModelAnswer:
     """ "none", or "unknown" if the last visit differs from all before."""
     innovation = history.steps[-1].innovation
     if len(history.steps) < 2 or innovation.is_expected:
