@@ -88,11 +88,11 @@ def make_set(
         raise BlindError("--only", unknown[0], "no such kind", f"There are {available}")
     set_info = _open_set(truth, seed_for(examines) if examines else seed, full, folders, only, limit, panel, histories)
     set_seed: int = set_info["seed"]
-    plans: Sequence[CasePlan | HistoryPlan]
+    library, plans = load_effects(*folders), list[CasePlan | HistoryPlan]()
     if histories is None:
-        plans = plan_cases(set_seed, load_effects(*folders), full, only, panel)[:limit]
+        plans += plan_cases(set_seed, library, full, only, panel)[:limit]
     else:
-        plans = plan_histories(set_seed, histories[0], load_effects(*folders), histories[1])[:limit]
+        plans += plan_histories(set_seed, histories[0], library, histories[1])[:limit]
     effect_folders = tuple(map(str, folders))
     jobs: list[Job] = [
         (out / "cases", truth, case_id(set_seed, k), plan, effect_folders, set_seed) for k, plan in enumerate(plans)
