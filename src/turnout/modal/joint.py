@@ -39,7 +39,7 @@ def stabilisation_rows(selection: Selection, tolerance: float) -> tuple[dict, ..
     Returns
     -------
     tuple of dict
-        ``order``, ``frequency`` [Hz], ``damping``, ``emac`` and ``status`` of each pole.
+        ``order``, ``frequency`` [Hz], ``damping``, ``emac``, ``energy`` and ``status`` of each pole.
     """
     table = selection.table
     mean = selection.mode_fit.mean if selection.fit is not None else np.empty((0, 2))
@@ -53,6 +53,7 @@ def stabilisation_rows(selection: Selection, tolerance: float) -> tuple[dict, ..
                 "frequency": float(table.frequency[i]),
                 "damping": float(table.damping[i]),
                 "emac": float(table.emac[i]),
+                "energy": float(table.energy[i]),
                 "status": "stable" if near.any() else "unstable",
             }
         )

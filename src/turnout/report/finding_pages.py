@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 
 from jinja2 import Environment, PackageLoader
 
-from turnout import __version__
 from turnout.config import load_configuration
 from turnout.report.pages.finding import finding_page
-from turnout.report.site import replace_page
+from turnout.report.site import replace_page, shared_by_pages
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -104,8 +103,7 @@ def _write(
 ) -> Path:
     environment = Environment(loader=PackageLoader("turnout.report"), trim_blocks=True, autoescape=True)
     templates = files("turnout.report") / "templates"
-    css, finding_css = ((templates / name).read_text() for name in ("page.css", "finding.css"))
-    shared = {"css": css, "finding_css": finding_css, "version": __version__, "generation": generation}
+    shared = shared_by_pages(generation) | {"finding_css": (templates / "finding.css").read_text()}
     path = Path(folder) / "findings" / f"{about['turnout_id']}.html"
     path.parent.mkdir(parents=True, exist_ok=True)
     replace_page(path, finding_page(about, rows, environment.get_template("finding.html"), shared))

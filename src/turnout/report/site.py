@@ -127,7 +127,7 @@ def page_environment() -> Environment:
 
 
 def shared_by_pages(generation: str | int = "") -> dict[str, Any]:
-    """Template variables of every page: style, script of the fleet's table, program version and generation.
+    """Template variables of every page: style, scripts, version of the program and generation.
 
     Parameters
     ----------
@@ -137,11 +137,19 @@ def shared_by_pages(generation: str | int = "") -> dict[str, Any]:
     Returns
     -------
     dict
-        ``css``, ``script``, ``version`` and ``generation``.
+        ``css``, ``script``, ``chart_script``, ``version`` and ``generation``.
     """
     templates = files("turnout.report") / "templates"
-    css, script = ((templates / name).read_text(encoding="utf-8") for name in ("page.css", "fleet.js"))
-    return {"css": css, "script": script, "version": __version__, "generation": generation}
+    names = ("page.css", "fleet.js", "chart.js")
+    css, script, chart_script = ((templates / name).read_text(encoding="utf-8") for name in names)
+    chart_script = "\n".join(line.strip() for line in chart_script.partition("*/")[2].splitlines())
+    return {
+        "css": css,
+        "script": script,
+        "chart_script": chart_script,
+        "version": __version__,
+        "generation": generation,
+    }
 
 
 def _remove_stale(folder: Path, turnout_ids: Collection[str]) -> None:

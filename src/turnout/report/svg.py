@@ -513,7 +513,7 @@ class Chart:
         x_left, x_right = (float(np.clip(self.px(v), LEFT, self.width - RIGHT)) for v in (x_low, x_high))
         if x_right > x_left:
             self.elements.append(
-                f'<rect class="{style}" x="{x_left:.1f}" y="{self.top}" width="{x_right - x_left:.1f}" '
+                f'<rect class="{style}" data-span="" x="{x_left:.1f}" y="{self.top}" width="{x_right - x_left:.1f}" '
                 f'height="{self.height - self.top - BOTTOM}">{_title(label)}</rect>'
             )
 

@@ -403,6 +403,8 @@ def _pole_row(pole: Mapping[str, Any]) -> dict[str, Any]:
         "order": int(pole["order"]),
         "frequency": round(float(pole["frequency"]), 2),
         "damping": round(float(pole["damping"]), 4),
+        "emac": round(float(pole["emac"]), 3),
+        "energy": round(float(pole["energy"]), 4),
         "status": pole["status"],
     }
 

@@ -191,9 +191,18 @@ def stabilisation_panel(test: HammerTest) -> str:
             [p["order"] for p in chosen],
             style,
             radius,
-            labels=[f"order {p['order']}: {p['frequency']:.1f} Hz, damping {p['damping']:.3f}" for p in chosen],
+            labels=[_pole_words(p) for p in chosen],
+            series=f"{status} pole",
         )
     return chart.svg()
+
+
+def _pole_words(pole: Mapping[str, Any]) -> str:
+    """One pole in words; rows of earlier versions have no coherence and no energy."""
+    words = f"order {pole['order']}, {pole['status']}: {pole['frequency']:.1f} Hz, damping {pole['damping']:.3f}"
+    if pole.get("emac") is None:
+        return words
+    return f"{words}, amplitude coherence {pole['emac']:.2f}, {100 * pole['energy']:.1f} % of the energy"
 
 
 def impacts_panel(test: HammerTest) -> str:
@@ -223,7 +232,7 @@ def impacts_panel(test: HammerTest) -> str:
     for style in ("used", "rejected"):
         some = [i for i, row in enumerate(rows) if (row["status"] == "accepted") == (style == "used")]
         labels = [_words(rows[i], peaks[i]) for i in some]
-        chart.points([i + 1 for i in some], [peaks[i] for i in some], style, 3.5, labels=labels)
+        chart.points([i + 1 for i in some], [peaks[i] for i in some], style, 3.5, labels=labels, series=style)
     return chart.svg()
 
 
