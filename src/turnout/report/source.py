@@ -82,6 +82,15 @@ REASONS = """
         select reason_code, 0, count(*) from quarantine_open group by reason_code
     ) group by reason order by sum(impacts) + sum(rows) desc, reason
 """
+# How much the stiffness (the square of a frequency) changes in ten years at the present drift, at least, in per cent.
+SCORES = """
+    select turnout_id, max(score) as score, max_by(section_id, score) as section_id, max_by(band, score) as band from (
+        select turnout_id, section_id, band,
+            100 * (1 - exp(-0.2 * greatest(abs(drift_pct_per_year) - 1.96 * drift_se_pct_per_year, 0))) as score
+        from chart_states_on(:today)
+        where band in ('ballast', 'railpad') and drift_pct_per_year is not null and drift_se_pct_per_year is not null
+    ) group by turnout_id
+"""
 TREND_VIEWS = {"charts", "chart_states", "worklist"}
 
 
@@ -119,10 +128,14 @@ class FleetSource:
         """Tomorrow's worklist; empty before the first trend."""
         return self._fetch("select * from worklist(:today) order by rank") if self.has("worklist") else []
 
-    def worklist_counts(self) -> dict[str, int]:
-        """Number of rows of the whole worklist by state."""
-        sql = f"select state, count(*) as n from {whole_list(':today')} group by state"
-        return {row["state"]: row["n"] for row in self._fetch(sql)} if self.has("worklist") else {}
+    def listed_states(self) -> list[dict[str, Any]]:
+        """States in the whole worklist by turnout."""
+        sql = f"select distinct turnout_id, state from {whole_list(':today')}"
+        return self._fetch(sql) if self.has("worklist") else []
+
+    def scores(self) -> list[dict[str, Any]]:
+        """Long-term score of each turnout with a drift of a resonance, and the chart that it comes from."""
+        return self._fetch(SCORES) if self.has("chart_states") else []
 
     def has(self, table: str) -> bool:
         """Whether the registry has ``table``; those of the trend exist after its first run.

@@ -103,7 +103,7 @@ def test_the_command_and_the_page_show_it_before_any_chart(bench, capsys):
     assert "from rejected where turnout_id = 't1'" in told and "No chart has been computed yet" in told
 
 
-def test_the_cards_of_the_fleets_page_count_the_rows_of_the_list(bench):
+def test_a_turnout_counts_once_on_the_cards_however_many_rows_of_the_list_it_has(bench):
     """Two rows: A1, and A2 and A3 that failed alike on another day."""
     day = "2026-02-02"
     others = rejected_result("A2", day), rejected_result("A3", day)
@@ -117,7 +117,8 @@ def test_the_cards_of_the_fleets_page_count_the_rows_of_the_list(bench):
     with open_registry(bench.registry) as con:
         said = fleet_page(FleetSource(con), Template(), {})
     assert [w["label"] for w in said["worklist"]] == ["A1", "A2, A3"]
-    assert said["count"]["cannot_tell"] == 2
+    counts = {card["state"]: card["n"] for card in said["cards"]}
+    assert counts == {"inspect this week": 0, "plan": 0, "cannot tell": 1, "ok": 0} and said["n_turnouts"] == 1
 
 
 def test_a_turnout_that_was_taken_out_is_on_no_list_and_back_on_it_when_it_is_back(bench):

@@ -7,26 +7,31 @@ from typing import TYPE_CHECKING
 
 from turnout.errors import REASONS
 from turnout.report.formatting import badge, day
+from turnout.report.panels.diagram import HATCH
+from turnout.report.panels.lines import line_diagrams
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping, Sequence
     from typing import Any
 
     from jinja2 import Template
 
     from turnout.report.source import FleetSource
 
-STATES = {
-    "confirm now": "confirm_now",
-    "inspect this week": "inspect",
-    "plan": "plan",
-    "learning": "learning",
-    "cannot tell": "cannot_tell",
-    "not measured": "not_measured",
-    "suppressed": "suppressed",
-    "ok": "ok",
-}
-LISTED_STATES = ("confirm now", "inspect this week", "plan", "learning", "cannot tell")
+# The short-term alert of a turnout, the most urgent first.
+STATES = (
+    "confirm now",
+    "inspect this week",
+    "plan",
+    "learning",
+    "cannot tell",
+    "not measured",
+    "suppressed",
+    "ok",
+)
+NO_CHART = "no chart yet"
+ALWAYS_COUNTED = ("inspect this week", "plan", "ok")
+N_BASELINE_CAMPAIGNS = 12  # of the rule that docs/trends.md states
 
 
 def fleet_page(source: FleetSource, template: Template, shared: Mapping[str, Any]) -> str:
@@ -47,28 +52,49 @@ def fleet_page(source: FleetSource, template: Template, shared: Mapping[str, Any
         HTML.
     """
     turnouts, worklist, reasons = source.turnouts(), source.worklist(), source.reasons()
-    states: dict[str, dict[str, int]] = {}
-    counts: Counter[str] = Counter()
+    charts: dict[str, dict[str, int]] = {}
     for row in source.states():
-        states.setdefault(row["turnout_id"], {})[row["state"]] = row["n"]
-        counts[row["state"]] += row["n"]
-    listed = source.worklist_counts()
-    totals = counts | {state: listed.get(state, 0) for state in LISTED_STATES}
+        charts.setdefault(row["turnout_id"], {})[row["state"]] = row["n"]
+    listed: dict[str, set[str]] = {}
+    for row in source.listed_states():
+        listed.setdefault(row["turnout_id"], set()).add(row["state"])
+    scores = {row["turnout_id"]: row for row in source.scores()}
+    of_charts: Counter[str] = Counter()
+    for states in charts.values():
+        of_charts.update(states)
+    lines = [
+        _line(t, charts.get(t["turnout_id"], {}), listed.get(t["turnout_id"], set()), scores.get(t["turnout_id"]))
+        for t in turnouts
+    ]
     return template.render(
         n_turnouts=len(turnouts),
         n_sections=sum(t["n_sections"] for t in turnouts),
         today=source.day.split("'")[1][:10],
         latest=day(max((t["latest"] for t in turnouts if t["latest"]), default=None)),
-        count={key: totals.get(state, 0) for state, key in STATES.items()},
+        cards=_cards(lines),
         n_quarantined=sum(r["rows"] for r in reasons),
         worklist=[_work(w) for w in worklist],
         n_more=worklist[0]["n_in_all"] - len(worklist) if worklist else 0,
-        n_charts=counts.total(),
+        n_charts=of_charts.total(),
+        charts=[f"{of_charts[state]} {state}" for state in STATES if of_charts[state]],
+        n_within=of_charts["ok"],
+        n_suppressed=of_charts["suppressed"],
+        n_unmeasured=of_charts["not measured"],
         learning=source.learning(),
-        turnouts=[_line(t, states.get(t["turnout_id"], {})) for t in turnouts],
+        n_baseline=N_BASELINE_CAMPAIGNS,
+        diagrams=line_diagrams(lines),
+        hatch=HATCH,
+        turnouts=sorted(lines, key=lambda t: (t["urgency"], -t["score"], t["turnout_id"])),
         reasons=[r | {"meaning": REASONS.get(r["reason"], "")} for r in reasons],
         **shared,
     )
+
+
+def _cards(lines: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Number of turnouts by their most urgent state: each turnout counts once. The first states are always shown."""
+    counts = Counter(line["worst"] for line in lines)
+    shown = [s for s in (*STATES, NO_CHART) if counts[s] or s in ALWAYS_COUNTED]
+    return [{"state": state, "n": counts[state], "badge": badge(state)} for state in shown]
 
 
 def _work(row: Mapping[str, Any]) -> dict[str, Any]:
@@ -86,15 +112,24 @@ def _work(row: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _line(turnout: dict[str, Any], states: Mapping[str, int]) -> dict[str, Any]:
-    urgency = next((k for k, state in enumerate(STATES) if state in states), len(STATES))
-    worst = next((state for state in STATES if state in states), "no chart yet")
+def _line(
+    turnout: dict[str, Any],
+    charts: Mapping[str, int],
+    listed: Collection[str],
+    score: Mapping[str, Any] | None,
+) -> dict[str, Any]:
+    """One turnout of the table: the most urgent state of its charts and its rows of the worklist, and its score."""
+    worst = next((state for state in STATES if state in charts or state in listed), NO_CHART)
+    urgency = [*STATES, NO_CHART].index(worst)
     return turnout | {
         "urgency": urgency,
         "worst": worst,
         "badge": badge(worst),
+        "score": score["score"] if score else 0.0,
+        "score_text": f"{score['score']:.0f}" if score else "–",
+        "score_of": f"{score['section_id'].split('/')[-1]} {score['band']}" if score and score["score"] >= 0.5 else "",
         "name": turnout["name"] or "",
         "km_text": "" if turnout["km"] is None else f"{turnout['km']:.3f}",
         "latest": day(turnout["latest"]),
-        "states": ", ".join(f"{states[s]} {s}" for s in STATES if s in states) or "–",
+        "states": ", ".join(f"{charts[s]} {s}" for s in STATES if s in charts) or "–",
     }

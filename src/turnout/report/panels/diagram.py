@@ -9,6 +9,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from typing import Any
 
+HATCH = (
+    '<defs><pattern id="hatch" width="6" height="6" patternUnits="userSpaceOnUse" patternTransform="rotate(45)">'
+    '<rect width="6" height="6" class="hatch-ground"/><path d="M0 0V6" class="hatch-line"/></pattern></defs>'
+)
 STYLE = {
     "confirm now": "state-confirm",
     "inspect this week": "state-inspect",
@@ -59,10 +63,7 @@ def diagram(
     elements = [
         f'<svg class="diagram" viewBox="0 0 {width} {height}" width="{width}" height="{height}" '
         'role="group" aria-label="Measured sections of the turnout, coloured by state">'
-        '<defs><pattern id="hatch" width="6" height="6" patternUnits="userSpaceOnUse" '
-        'patternTransform="rotate(45)"><rect width="6" height="6" class="hatch-ground"/>'
-        '<path d="M0 0V6" class="hatch-line"/></pattern></defs>'
-        f'<path class="rail" d="M{px(low):.1f} {main}H{px(high):.1f}"/>'
+        f'{HATCH}<path class="rail" d="M{px(low):.1f} {main}H{px(high):.1f}"/>'
         f'<path class="rail" d="M{px(toe):.1f} {main} {curve}"/>'
     ]
     for section, lift in zip(sections, _lifts(sections, px)):

@@ -18,13 +18,23 @@
       head.setAttribute("aria-sort", direction > 0 ? "ascending" : "descending");
     });
   });
-  filter.addEventListener("input", function () {
+  var state = "", cards = document.querySelectorAll("button.card");
+  function show() {
     var words = filter.value.toLowerCase(), count = 0;
     Array.prototype.forEach.call(body.rows, function (row) {
-      row.hidden = row.textContent.toLowerCase().indexOf(words) < 0;
+      row.hidden = row.textContent.toLowerCase().indexOf(words) < 0 || (state && text(row, 0) !== state);
       if (!row.hidden) { count += 1; }
     });
-    shown.textContent = words ? count + " of " + body.rows.length + " shown" : "";
+    shown.textContent = words || state ? count + " of " + body.rows.length + " shown" : "";
+  }
+  filter.addEventListener("input", show);
+  Array.prototype.forEach.call(cards, function (card) {
+    card.addEventListener("click", function () {
+      state = state === card.dataset.state ? "" : card.dataset.state;
+      Array.prototype.forEach.call(cards, function (other) { other.setAttribute("aria-pressed", String(other.dataset.state === state)); });
+      show();
+      if (state) { document.getElementById("turnouts").scrollIntoView(); }
+    });
   });
   document.getElementById("csv").addEventListener("click", function () {
     function field(words) {

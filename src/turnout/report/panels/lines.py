@@ -1,0 +1,103 @@
+"""Draw the lines of the network with their turnouts by kilometre, coloured by state."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING
+
+from turnout.report.panels.diagram import STYLE
+from turnout.report.svg import LETTER, format_number, linear_ticks
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from typing import Any
+
+WIDTH, LEFT, RIGHT = 960, 20, 40  # px
+LANE, LANES = 22, 4  # px, and number of rows in which turnouts close to each other are drawn
+RADIUS = 7  # px
+URGENT = ("confirm now", "inspect this week", "plan")
+
+
+def line_diagrams(turnouts: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """One drawing for each line that has a turnout with a kilometre, the line with the most urgent turnouts first.
+
+    Parameters
+    ----------
+    turnouts : sequence of mapping
+        With ``turnout_id``, ``name``, ``line``, ``km`` and ``worst``, the most urgent state.
+
+    Returns
+    -------
+    list of dict
+        ``line``, ``n`` and ``n_urgent`` numbers of turnouts, and ``svg``.
+    """
+    by_line: dict[str, list[Mapping[str, Any]]] = {}
+    for turnout in turnouts:
+        if turnout["km"] is not None:
+            by_line.setdefault(turnout["line"] or "no line given", []).append(turnout)
+    drawings = [
+        {
+            "line": line,
+            "n": len(members),
+            "n_urgent": sum(t["worst"] in URGENT for t in members),
+            "svg": _drawing(line, members),
+        }
+        for line, members in sorted(by_line.items())
+    ]
+    return sorted(drawings, key=lambda d: -d["n_urgent"])
+
+
+def _drawing(line: str, turnouts: Sequence[Mapping[str, Any]]) -> str:
+    ordered = sorted(turnouts, key=lambda t: (t["km"], t["turnout_id"]))
+    low, high = ordered[0]["km"], ordered[-1]["km"]
+    margin = 0.03 * (high - low) or 0.5
+    low, high = low - margin, high + margin
+
+    def px(km: float) -> float:
+        return LEFT + (WIDTH - LEFT - RIGHT) * (km - low) / (high - low)
+
+    lanes = _lanes([px(t["km"]) for t in ordered])
+    rail = LANE * max(lanes) + 30
+    elements = [
+        f'<svg class="diagram" viewBox="0 0 {WIDTH} {rail + 34}" width="{WIDTH}" height="{rail + 34}" role="group" '
+        f'aria-label="Turnouts of {escape(line, quote=True)} by kilometre">'
+        f'<path class="rail" d="M{LEFT} {rail}H{WIDTH - RIGHT}"/>'
+    ]
+    ticks = linear_ticks(low, high, 8)
+    step = ticks[1] - ticks[0] if len(ticks) > 1 else None
+    for tick in ticks:
+        x = px(tick)
+        elements.append(
+            f'<path class="frame" d="M{x:.0f} {rail + 3}v5"/>'
+            f'<text class="tick" x="{x:.0f}" y="{rail + 20}" text-anchor="middle">{format_number(tick, step)}</text>'
+        )
+    elements.append(f'<text class="label" x="{WIDTH}" y="{rail + 20}" text-anchor="end">km</text>')
+    label_end = -1e9
+    for turnout, lane in zip(ordered, lanes):
+        half = 0.5 * LETTER * len(turnout["turnout_id"])
+        x = min(max(px(turnout["km"]), half), WIDTH - half)
+        if x - half > label_end:
+            words = (
+                f'<text class="place" x="{x:.1f}" y="11" text-anchor="middle">{escape(turnout["turnout_id"])}</text>'
+            )
+            elements.append(words)
+            label_end = x + half + 4.0
+        words = escape(f"{turnout['turnout_id']}, km {turnout['km']:.3f}: {turnout['worst']}")
+        elements.append(
+            f'<a href="turnouts/{escape(turnout["turnout_id"], quote=True)}.html">'
+            f'<circle class="{STYLE.get(turnout["worst"], "state-unknown")}" cx="{px(turnout["km"]):.1f}" '
+            f'cy="{rail - LANE * lane}" r="{RADIUS}"><title>{words}</title></circle></a>'
+        )
+    return "".join(elements) + "</svg>"
+
+
+def _lanes(positions: Sequence[float]) -> list[int]:
+    """Row of each turnout, 0 on the rail: the first where it lies on no other."""
+    ends = [-1e9] * LANES
+    lanes = []
+    for x in positions:
+        free = [k for k, end in enumerate(ends) if x - end >= 2 * RADIUS + 2]
+        lane = free[0] if free else min(range(LANES), key=lambda k: ends[k])
+        ends[lane] = x
+        lanes.append(lane)
+    return lanes

@@ -1,0 +1,97 @@
+"""The page of the fleet: counts that add up, a diagram of each line, the alert and the long-term score."""
+
+import math
+import re
+
+from turnout.report.pages.fleet import fleet_page
+from turnout.report.panels.lines import line_diagrams
+from turnout.report.site import page_environment, shared_by_pages
+
+
+class Source:
+    """Rows by hand in place of a registry."""
+
+    day = "timestamp '2026-07-25'"
+
+    def __init__(self, turnouts, states=(), listed=(), scores=(), learning=None):
+        self.rows = {"turnouts": turnouts, "states": states, "listed_states": listed, "scores": scores}
+        self.learned = learning or {"n": 0, "n_campaigns": 0}
+
+    def __getattr__(self, name):
+        return lambda: list(self.rows.get(name, []))
+
+    def learning(self):
+        return self.learned
+
+
+def turnout(name, km=1.0, line="L1"):
+    counts = dict.fromkeys(("n_sections", "n_models", "n_rejected", "n_quarantined"), 2)
+    return {"turnout_id": name, "name": "", "line": line, "km": km, "latest": None, "layout": "m"} | counts
+
+
+def state(name, words, n=1):
+    return {"turnout_id": name, "state": words, "n": n}
+
+
+def page(*arguments, **rows):
+    source = Source(*arguments, **rows)
+    return fleet_page(source, page_environment().get_template("fleet.html"), shared_by_pages(1))
+
+
+def cards(text):
+    return {words: int(n) for n, words in re.findall(r"<b>(\d+)</b><span[^>]*>([^<]*)", text)}
+
+
+def test_the_cards_add_up_to_the_turnouts_and_the_charts_to_their_number():
+    states = [
+        state("a", "plan"),
+        state("a", "inspect this week", 2),
+        state("b", "ok", 3),
+        state("c", "not measured", 4),
+    ]
+    listed = [state("d", "cannot tell")]
+    text = page([turnout(name) for name in "abcde"], states, listed)
+    counts = cards(text)
+    expected = {"inspect this week": 1, "plan": 0, "cannot tell": 1, "not measured": 1, "ok": 1, "no chart yet": 1}
+    assert counts == expected and sum(counts.values()) == 5
+    assert "10 charts, one for each resonance of a section: 2 inspect this week, 1 plan, 4 not measured, 3 ok" in text
+
+
+def test_the_most_urgent_turnout_comes_first_and_of_two_alike_the_one_that_drifts_faster():
+    scores = [
+        {"turnout_id": t, "score": s, "section_id": f"{t}/A7", "band": "ballast"} for t, s in (("b", 9.0), ("c", 31.4))
+    ]
+    text = page(
+        [turnout(name) for name in "abc"],
+        [state("a", "inspect this week"), state("b", "ok"), state("c", "ok")],
+        scores=scores,
+    )
+    rows = text[text.index('<table id="fleet">') :].split("<tr>")[2:]
+    assert [re.search(r"turnouts/(\w+)", row)[1] for row in rows[:3]] == ["a", "c", "b"]
+    assert '<td class="n" data-key="31">31 <span class="soft">A7 ballast</span></td>' in rows[1]
+    assert '<td class="n" data-key="–">–</td>' in rows[0]
+
+
+def test_a_first_campaign_is_progress_and_no_failure():
+    states = [state("a", "learning", 2), state("a", "not measured", 10)]
+    text = page([turnout("a")], states, learning={"n": 2, "n_campaigns": 1})
+    assert "Your measurements are in. 2 charts learn what is normal: 1 of 12 campaigns" in text
+    assert "Nothing to do" not in text and "10 charts without a recent campaign" in text
+
+
+def test_a_line_is_drawn_to_scale_with_a_link_for_each_turnout():
+    """Kilometres 10, 11 and 14: the second lies a quarter of the way from the first to the third."""
+    fleet = [turnout("a", 10.0), turnout("b", 11.0), turnout("c", 14.0), turnout("d", None), turnout("e", 3.0, "L2")]
+    worst = {"a": "ok", "b": "ok", "c": "ok", "d": "ok", "e": "inspect this week"}
+    first, second = line_diagrams([t | {"worst": worst[t["turnout_id"]]} for t in fleet])
+    assert (first["line"], first["n"], first["n_urgent"]) == ("L2", 1, 1) and (second["line"], second["n"]) == ("L1", 3)
+    x = [float(v) for v in re.findall(r'cx="([\d.]+)"', second["svg"])]
+    assert math.isclose((x[1] - x[0]) / (x[2] - x[0]), 0.25, abs_tol=0.001)
+    assert re.findall(r"turnouts/(\w)\.html", second["svg"]) == ["a", "b", "c"]
+
+
+def test_turnouts_of_one_station_do_not_lie_on_each_other():
+    fleet = [turnout(f"t{k}", 5.0) | {"worst": "ok"} for k in range(4)] + [turnout("far", 9.0) | {"worst": "ok"}]
+    (drawing,) = line_diagrams(fleet)
+    dots = re.findall(r'cx="([\d.]+)" cy="([\d.]+)"', drawing["svg"])
+    assert len(set(dots)) == 5
