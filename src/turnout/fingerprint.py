@@ -2,8 +2,13 @@
 
 import ast
 import hashlib
+import json
+import os
+import sys
 from functools import cache
 from pathlib import Path
+
+from turnout.files import write_text
 
 PACKAGE = "turnout"
 ROOT = Path(__file__).parent
@@ -43,6 +48,7 @@ def fingerprint(*modules: str) -> str:
     """
     names = closure(*modules)
     text = "\n".join(f"{name} {_digest_and_imports(name)[0]}" for name in sorted(names))
+    _remember()
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
@@ -81,6 +87,9 @@ def clear_caches() -> None:
     _module_path.cache_clear()
     _digest_and_imports.cache_clear()
     _data_in_folder.cache_clear()
+    _data_digest.cache_clear()
+    _module_names.cache_clear()
+    _module_memory.cache_clear()
 
 
 @cache
@@ -99,7 +108,18 @@ def _digest_and_imports(name: str) -> tuple[str, tuple[str, ...]]:
     path = _module_path(name)
     if path is None:
         raise ValueError(f"no module {name} in the package {PACKAGE}")
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    source = path.read_bytes()
+    key = _key(name, path, source)
+    if name in _module_memory() and _module_memory()[name][0] == key:
+        return _module_memory()[name][1], tuple(_module_memory()[name][2])
+    digest, imported = _parse(name, path, source)
+    _module_memory()[name] = [key, digest, imported]
+    _module_memory()[NEW] = []
+    return digest, tuple(imported)
+
+
+def _parse(name: str, path: Path, source: bytes) -> tuple[str, list[str]]:
+    tree = ast.parse(source)
     for node in ast.walk(tree):
         if isinstance(node, ast.If) and _is_type_checking(node.test):
             node.body = [ast.Pass()]
@@ -111,7 +131,65 @@ def _digest_and_imports(name: str) -> tuple[str, tuple[str, ...]]:
     digest = hashlib.sha256(ast.dump(tree).encode())
     for data in _data_files(path.parent, nodes):
         digest.update(data.name.encode() + data.read_bytes())
-    return digest.hexdigest(), tuple(imported)
+    return digest.hexdigest(), sorted(set(imported))
+
+
+NEW = ""  # an entry that says that others are not in the file yet
+
+
+def _key(name: str, path: Path, source: bytes) -> str:
+    """Hash of all that the digest of a module depends on; equal bytes need not be parsed again."""
+    parts = (name, path.name, sys.version, _module_names(ROOT), _data_digest(path.parent))
+    return hashlib.sha256("\0".join(parts).encode() + source).hexdigest()
+
+
+@cache
+def _module_names(root: Path) -> str:
+    return " ".join(sorted(str(path.relative_to(root)) for path in root.rglob("*.py")))
+
+
+@cache
+def _data_digest(folder: Path) -> str:
+    """Hash of the tables in a folder and of all files of its data folders."""
+    tables, folders = _data_in_folder(folder)
+    files = sorted([*tables, *(p for inner in folders for p in inner.iterdir() if p.is_file())])
+    return hashlib.sha256(b"".join(str(p.relative_to(folder)).encode() + p.read_bytes() for p in files)).hexdigest()
+
+
+def _memory_files() -> list[Path]:
+    """Where parsed modules are remembered: beside the source, else in the user's cache."""
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    return [folder / "fingerprints.json" for folder in (ROOT / "__pycache__", Path(home) / PACKAGE)]
+
+
+@cache
+def _module_memory() -> dict[str, list]:
+    """Per module [key, digest, imports] of the first readable memory file; empty for a damaged one."""
+    for path in _memory_files():
+        try:
+            content = json.loads(path.read_bytes())
+            if content["sha256"] == _checksum(content["modules"]):
+                return dict(content["modules"])
+        except (OSError, ValueError, KeyError, TypeError):
+            continue
+    return {}
+
+
+def _remember() -> None:
+    """Write the memory file if a module was parsed; a computer without a writable cache parses again each time."""
+    modules = _module_memory()
+    if modules.pop(NEW, None) is None:
+        return
+    for path in _memory_files():
+        try:
+            write_text(path, json.dumps({"sha256": _checksum(modules), "modules": modules}))
+        except OSError:
+            continue
+        return
+
+
+def _checksum(modules: dict[str, list]) -> str:
+    return hashlib.sha256(json.dumps(modules, sort_keys=True).encode()).hexdigest()
 
 
 def _data_files(folder: Path, nodes: list[ast.AST]) -> list[Path]:

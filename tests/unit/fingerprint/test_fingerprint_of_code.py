@@ -117,3 +117,31 @@ def test_the_hammer_chain_stands_on_its_parts():
     assert not {
         m for m in found if m.startswith(("turnout.report", "turnout.trend", "turnout.workflow", "turnout.cli.main"))
     }
+
+
+def test_equal_modules_are_parsed_once(package, monkeypatch):
+    first = fp.fingerprint("turnout.core", "turnout.pages.write")
+    fp.clear_caches()
+    monkeypatch.setattr(fp.ast, "parse", lambda source: pytest.fail("parsed again"))
+    assert fp.fingerprint("turnout.core", "turnout.pages.write") == first
+
+
+@pytest.mark.parametrize("damage", [b"", b"{}", b'{"sha256": "", "modules": []}', None])
+def test_a_damaged_memory_is_no_fingerprint(package, damage):
+    first = fp.fingerprint("turnout.core")
+    file = package / "__pycache__" / "fingerprints.json"
+    if damage is None:  # a digest that does not belong to the module
+        digest = fp.json.loads(file.read_text())["modules"]["turnout.low"][1]
+        damage = file.read_bytes().replace(digest.encode(), digest[::-1].encode())
+    file.write_bytes(damage)
+    fp.clear_caches()
+    assert fp.fingerprint("turnout.core") == first
+
+
+def test_a_package_that_cannot_be_written_has_a_fingerprint(package, tmp_path, monkeypatch):
+    first = fp.fingerprint("turnout.core")
+    shutil.rmtree(package / "__pycache__")
+    (package / "__pycache__").write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "turnout" / "core.py"))
+    fp.clear_caches()
+    assert fp.fingerprint("turnout.core") == first
