@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from turnout.passage.wheel_basis import WheelBasis
 
 ACCEPTED, NULL, NOT_AN_IMPULSE, REJECTED = "accepted", "null_explains", "not_an_impulse", "rejected"
+PEAK_ONLY = "peak_only"  # by configuration: not scored
 LEAD_TIME = 0.25  # s before the first wheel, in which the band-pass settles
 
 
@@ -69,6 +70,7 @@ def fit_channel(
     settings: PassageSettings,
     other_models: Mapping[str, ModalModel] | None = None,
     with_null: bool = True,
+    with_scores: bool = True,
 ) -> ChannelFit:
     """Fit ``model`` to one sensor.
 
@@ -90,6 +92,8 @@ def fit_channel(
         Name -> ModalModel of other sections, whose forecast skill is given for comparison.
     with_null : bool
         Also score random models. Without them "null_explains" cannot result.
+    with_scores : bool
+        Also fit and score the model. Without it only the peak and the times of the wheels are found ("peak_only").
 
     Returns
     -------
@@ -103,12 +107,17 @@ def fit_channel(
         return ChannelFit(REJECTED, "fewer than two wheels with a whole window in the recording")
     band_filter = band_pass(settings.band_low, settings.band_high, settings.filter_order, rate)
     data = apply_filter(excerpt, band_filter)
-    quiet = _quiet_samples(samples, rate, axle_times, speed)
     min_noise = converter_step(samples) / np.sqrt(12.0)  # a record constant within one step has at least this noise
     if not min_noise > 0.0:
         return ChannelFit(REJECTED, "it never changes")
     basis = _filtered_basis(model, rate, settings)
     delay = common_delay(delay_power(data, expected, basis, settings))
+    window = np.concatenate([data[int(t) : int(t + settings.score_window * rate)] for t in expected + delay])
+    peak = float(np.max(np.abs(window)))
+    start = _excerpt_start(samples, rate, axle_times)
+    if not with_scores:
+        return ChannelFit(PEAK_ONLY, times=(expected + delay) / rate + start, peak=peak)
+    quiet = _quiet_samples(samples, rate, axle_times, speed)
     times, test = _impacts_and_test(excerpt, expected + delay, quiet, speed, model, rate, settings, min_noise)
     scores = score(data, expected, basis, settings)
     null = (
@@ -121,7 +130,6 @@ def fit_channel(
         for name, m in (other_models or {}).items()
     }
     joint = joint_fit(data, times.times, basis)
-    start = _excerpt_start(samples, rate, axle_times)
     noise = (
         float(np.std(apply_filter(quiet, band_filter)[int(0.02 * rate) :])) if quiet.size > 0.1 * rate else float("nan")
     )
@@ -129,7 +137,6 @@ def fit_channel(
         2.0 * (min(settings.band_high, rate / 2) - settings.band_low) / rate
     )  # of white noise in the band
     noise = max(noise, min_noise * band_ratio)
-    window = np.concatenate([data[int(t) : int(t + settings.score_window * rate)] for t in expected + delay])
     status, detail = _judge(scores, null, test, settings)
     return ChannelFit(
         status,
@@ -144,7 +151,7 @@ def fit_channel(
         null,
         other_skills,
         100.0 * (1.0 - noise / max(float(np.std(window)), 1e-300)),
-        float(np.max(np.abs(window))),
+        peak,
         scores.n_parameter / (scores.n_value / rate),
     )
 

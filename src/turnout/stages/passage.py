@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any, cast
+from zlib import crc32
 
 from turnout.config.settings.passage import PassageSettings
 from turnout.config.turnout import PassageConfig, TurnoutConfig
@@ -299,10 +300,35 @@ def _fit_rows(
             samples = recording.signal(sensor.name)
             other_models = {label: m.model for label, m in latest.items() if m is not None and label != sensor.section}
             fit = fit_channel(
-                samples, recording.rate, times, passage.train_motion.speed, section_model.model, settings, other_models
-            )
+                samples, recording.rate, times, passage.train_motion.speed, section_model.model, settings, other_models,
+                with_scores=is_scored(identity["passed_at_utc"], settings.scored_share),
+            )  # fmt: skip
         rows.append(fit_row(fit, sensor, section_model.model_id, turnout, identity))
     return rows
+
+
+def is_scored(passed_at: datetime, share: float) -> bool:
+    """Whether a passage is among the share that is scored: by its time, so the same again and in any order.
+
+    Parameters
+    ----------
+    passed_at : datetime
+        Time of the first axle.
+    share : float
+        Share of the passages that are scored. [-]
+
+    Returns
+    -------
+    bool
+        True for every passage if the share is 1.
+
+    Examples
+    --------
+    >>> moments = [datetime(2025, 1, 1) + timedelta(hours=k) for k in range(1000)]
+    >>> [sum(is_scored(m, share) for m in moments) for share in (0.0, 0.3, 1.0)]
+    [0, 284, 1000]
+    """
+    return crc32(passed_at.isoformat(timespec="seconds").encode()) < share * 2**32
 
 
 def _time_of_label(label: str) -> datetime | None:

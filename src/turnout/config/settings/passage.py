@@ -39,6 +39,9 @@ class PassageSettings:
         1.0,
     )
     null_models: int = setting(30, "", "random pole pairs behind each null band", 5, 1000)
+    scored_share: float = setting(
+        1.0, "", "share of the passages that are scored; of the others only the peak acceleration is kept", 0.0, 1.0
+    )
     null_seed: int = setting(20171001, "", "seed of the random pole pairs: the same for every passage", 0)
     # axles, speed, direction
     envelope_step: float = setting(0.001, "s", "grid of the band envelope that axles are sought in", 1e-4, 0.01)

@@ -29,3 +29,6 @@ from passage_fits_touched t
 -- n_wheels | integer | | wheels fitted
 -- peak_ms2 | double | m/s² | peak of the band-passed acceleration
 -- run_id | varchar | | content id of the batch
+-- wheel_times_s | double[] | s | time of each wheel's impact from the start of the recording; empty where not scored
+-- wheel_amplitudes | double[] | | amplitude g of each wheel
+-- wheel_amplitudes_se | double[] | | standard errors of wheel_amplitudes

@@ -6,7 +6,7 @@ select
     count(*) as n, avg(fit_pct) as fit_pct, median(fit_pct) as fit_median_pct, stddev_samp(fit_pct) as fit_sd_pct,
     stddev_samp(fit_pct) / sqrt(count(fit_pct)) as fit_se_pct, avg(fit_null_pct) as fit_null_pct,
     avg(forecast_pct) as forecast_pct, stddev_samp(forecast_pct) / sqrt(count(forecast_pct)) as forecast_se_pct,
-    avg(leave_one_out_pct) as leave_one_out_pct, avg((status = 'null_explains')::integer) as null_share,
+    avg(leave_one_out_pct) as leave_one_out_pct, avg((status = 'null_explains')::integer) filter (status <> 'peak_only') as null_share,
     avg(peak_ms2) as peak_ms2
 from passage_fits_current
 where status <> 'rejected'

@@ -1,4 +1,4 @@
--- One row per passage, sensor and model that counts: its scores beside what the train was.
+-- One row per scored passage, sensor and model that counts: its scores beside what the train was.
 -- needs: passages_current, passage_fits_current
 create or replace view passage_scores as
 select
@@ -7,7 +7,7 @@ select
     f.chi_squared_failed_share, f.along_b_share, f.forecast_others_pct, f.n_wheels, f.peak_ms2,
     p.train_type, p.speed_kmh, p.axle_load_t, p.track, p.direction, p.n_axles, p.cluster_id, p.rail_temperature_c
 from passage_fits_current f join passages_current p on f.passage_id = p.passage_id
-where f.status <> 'rejected' and p.status <> 'rejected';
+where f.status not in ('rejected', 'peak_only') and p.status <> 'rejected';
 
 -- columns of passage_scores
 -- turnout_id | varchar | | turnout

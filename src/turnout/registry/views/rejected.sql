@@ -15,7 +15,7 @@ with everything as (
     union all
     select
         'fit', passage_id, turnout_id, section_id, passed_at_utc, status, fit_pct, fit_null_pct, 'sensor ' || channel
-    from passage_fits_current where status <> 'accepted'
+    from passage_fits_current where status not in ('accepted', 'peak_only')
     union all
     select
         'recording', quarantine_id, turnout_id, section_id, null, reason_code, measured_value, threshold,
