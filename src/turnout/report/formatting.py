@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from datetime import datetime
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -22,6 +23,8 @@ BADGES = {
     "not measured": "unknown",
     "suppressed": "unknown",
 }
+
+EPOCH = datetime(1970, 1, 1)
 
 
 @cache
@@ -168,3 +171,24 @@ def number_ranges(numbers: Iterable[int]) -> str:
     return ", ".join(
         f"{row[0]} to {row[-1]}" if len(row) > 2 else ", ".join(str(number) for number in row) for row in rows
     )
+
+
+def seconds(when: datetime) -> float:
+    """Time on the axis of a chart.
+
+    Parameters
+    ----------
+    when : datetime
+        Naive UTC.
+
+    Returns
+    -------
+    float
+        Since 1970. [s]
+
+    Examples
+    --------
+    >>> seconds(datetime(1970, 1, 2))
+    86400.0
+    """
+    return (when - EPOCH).total_seconds()

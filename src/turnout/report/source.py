@@ -168,7 +168,7 @@ class FleetSource:
         chosen = {"turnouts": list(turnout_ids)}
         tables = [table for table in ROWS if self.has(table)]
         rows = {table: _by_turnout(self._fetch(ROWS[table], chosen)) for table in tables if table != "receptances"}
-        rows |= train_rows(self._fetch, turnout_ids)
+        rows |= train_rows(self._fetch, turnout_ids, self.has("charts"))
         return rows | {"receptances": _by_turnout(self._arrays(ROWS["receptances"], chosen))}
 
     def _arrays(self, sql: str, parameters: Mapping[str, Any]) -> list[dict[str, Any]]:

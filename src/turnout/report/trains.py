@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from turnout.constants import Z95
 from turnout.registry.schema import literal
 from turnout.report.panels.train_bars import train_bars
+from turnout.report.panels.weekly_peaks import weekly_peaks_panel
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -21,6 +22,14 @@ ROWS = {
             count(*) filter (forecast_pct > forecast_others_pct) as n_best,
             count(*) filter (chi_squared_failed_share > 0.5 and along_b_share < 0.8) as n_no_impulse
         from passage_scores where turnout_id in ({own}) group by all""",
+    "weeks": """
+        select
+            v.turnout_id, v.section_id, v.measured_at_utc as week_utc, v.frequency_hz as peak_ms2,
+            v.frequency_se_hz as peak_se_ms2, c.state
+        from passage_values v
+        left join {charts} c on c.section_id = v.section_id and c.band = v.band and c.source = v.source
+            and c.measured_at_utc = v.measured_at_utc
+        where v.band = 'amplitude' and v.turnout_id in ({own}) order by v.section_id, week_utc""",
     "bars": "select * from fit_adjusted where turnout_id in ({own}) order by section_id, factor, class_from, class",
     "effects": "select * from fit_effects where turnout_id in ({own}) order by section_id, factor",
     "passages": """
@@ -28,12 +37,17 @@ ROWS = {
         qualify row_number() over (partition by turnout_id order by passed_at_utc desc) <= 15
         order by passed_at_utc desc""",
 }
+# Stands for the table of charts before the first trend.
+NO_CHARTS = """(
+    select null::varchar as section_id, null as band, null as source, null::timestamp as measured_at_utc,
+        null::varchar as state
+    where false)"""
 FACTORS = ("train type", "speed", "axle load")
 SCORES = ("fit", "forecast")
 
 
 def train_rows(
-    fetch: Callable[[str], list[dict[str, Any]]], turnout_ids: Iterable[str]
+    fetch: Callable[[str], list[dict[str, Any]]], turnout_ids: Iterable[str], has_charts: bool = True
 ) -> dict[str, dict[str, list[dict[str, Any]]]]:
     """Rows that ``trains_part`` needs.
 
@@ -43,6 +57,8 @@ def train_rows(
         Runs SQL and returns its rows.
     turnout_ids : iterable of str
         Ids of turnouts.
+    has_charts : bool
+        Whether the registry has the table ``charts``, which the first trend makes.
 
     Returns
     -------
@@ -53,7 +69,7 @@ def train_rows(
     rows_by_table: dict[str, dict[str, list[dict[str, Any]]]] = {}
     for table, sql in ROWS.items():
         grouped = defaultdict(list)
-        for row in fetch(sql.format(own=ids)) if ids else ():
+        for row in fetch(sql.format(own=ids, charts="charts" if has_charts else NO_CHARTS)) if ids else ():
             grouped[row["turnout_id"]].append(row)
         rows_by_table[table] = grouped
     return rows_by_table
@@ -85,6 +101,12 @@ def trains_part(
     return {
         "passages": [_passage(p) for p in rows["passages"]],
         "words": score_words(rows["scores"]),
+        "weeks": "".join(
+            weekly_peaks_panel(s["label"], [w for w in rows["weeks"] if w["section_id"] == s["section_id"]])
+            for s in sections
+        ),
+        "n_scores": sum(s["n"] for s in rows["scores"]),
+        "n_beyond": sum(s["n"] for s in rows["scores"] if s["status"] in ("accepted", "not_an_impulse")),
         "charts": charts,
         "loads_known": any(b["factor"] == "axle load" for b in rows["bars"]),
         "effects": [_effect(e) for e in rows["effects"] if e["score"] == "fit"],

@@ -6,6 +6,8 @@ from datetime import datetime
 import pytest
 
 from turnout.report.panels.train_bars import train_bars
+from turnout.report.panels.weekly_peaks import weekly_peaks_panel
+from turnout.report.site import page_environment
 from turnout.report.trains import score_words, train_rows, trains_part
 
 SECTIONS = [{"section_id": f"t/{s}", "label": s} for s in ("OT", "A7")]
@@ -71,7 +73,7 @@ def test_the_part_says_speed_and_load_with_intervals_and_effects_with_what_was_h
         "section_id": "t/A7", "score": "fit", "factor": "speed", "per": "10 km/h", "held_fixed": "train type", "n": 40,
         "raw_change_pct": 0.5, "change_pct": -1.0, "low_pct": -1.5, "high_pct": -0.5,
     }  # fmt: skip
-    rows = {"passages": [passage], "scores": [], "bars": [bar("A7", "IC3", 10.0)], "effects": [effect]}
+    rows = {"passages": [passage], "scores": [], "weeks": [], "bars": [bar("A7", "IC3", 10.0)], "effects": [effect]}
     part = trains_part(rows, SECTIONS)
     assert part["passages"][0]["speed"] == "142.5 ± 0.4" and part["passages"][0]["load"] == "not available"
     assert part["passages"][0]["listed"] == "140 km/h, IC3"
@@ -82,7 +84,7 @@ def test_the_part_says_speed_and_load_with_intervals_and_effects_with_what_was_h
 def test_names_with_quotes_ask_for_themselves():
     asked = []
     train_rows(lambda sql: asked.append(sql) or [], ["o'hara"])
-    assert all("'o''hara'" in sql for sql in asked) and len(asked) == 4
+    assert all("'o''hara'" in sql for sql in asked) and len(asked) == 5
     assert train_rows(lambda sql: 1 / 0, [])["bars"] == {}
 
 
@@ -93,3 +95,25 @@ def test_no_bar_lies_behind_the_legend():
     tops = [float(y) for y in re.findall(r'<rect x="[\d.]+" y="([-\d.]+)" width="[\d.]+" height="[\d.]+" fill', svg)]
     window = float(re.search(r'<svg x="62" y="(\d+)"', svg)[1])
     assert len(swatches) == 3 and max(swatches) + 10 <= window <= min(t for t in tops if t not in swatches)
+
+
+def test_weekly_peaks_come_before_the_scores_which_are_folded():
+    """Four weeks of which the last two are in alarm: their values are in the picture, the scores behind a summary."""
+    weeks = [
+        {"section_id": "W1/OT", "week_utc": datetime(2026, 1, 5 + 7 * k), "peak_ms2": value, "peak_se_ms2": 2.0,
+         "state": state}
+        for k, (value, state) in enumerate([(100.0, "ok"), (102.0, "ok"), (140.0, "alarm up"), (150.0, "alarm up")])
+    ]  # fmt: skip
+    svg = weekly_peaks_panel("OT", weeks)
+    assert "OT: 150 m/s² under trains, in alarm; 4 weeks" in svg
+    assert "week of 2026-01-19: 140.0 m/s² ± 3.9 (95 %)" in svg
+    assert weekly_peaks_panel("OT", []) == ""
+    part = {
+        "weeks": svg, "words": "12 records", "n_scores": 12, "n_beyond": 2, "passages": [], "effects": [],
+        "charts": {"fit": "<svg>bars</svg>", "forecast": ""}, "loads_known": True,
+    }  # fmt: skip
+    page = page_environment().get_template("trains.html").render(part=part)
+    scores = page.index("<details><summary>Scores of the sections' models: 2 of 12 predict more")
+    assert (
+        page.index("under trains, in alarm") < page.index('aria-label="Passages"') < scores < page.index("bars</svg>")
+    )

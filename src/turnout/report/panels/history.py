@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from datetime import datetime
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.report.formatting import count_of, student_quantile
+from turnout.report.formatting import count_of, seconds, student_quantile
 from turnout.report.svg import Axis, Chart
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from typing import Any
 
-EPOCH = datetime(1970, 1, 1)
 SERIES = {"point": "campaign", "confirm": "campaign to be confirmed", "alarm": "campaign in an open alarm"}
 
 
@@ -47,7 +45,7 @@ def history_panel(
     """
     if not modes:
         return ""
-    time = np.array([_seconds(m["measured_at_utc"]) for m in modes])
+    time = np.array([seconds(m["measured_at_utc"]) for m in modes])
     frequency = np.array([m["frequency_hz"] for m in modes])
     error = np.array([_half_width(m) for m in modes])
     low, high = frequency - np.nan_to_num(error), frequency + np.nan_to_num(error)
@@ -65,12 +63,12 @@ def history_panel(
         width=width,
     )
     if expected:
-        when = [_seconds(c["measured_at_utc"]) for c in expected]
+        when = [seconds(c["measured_at_utc"]) for c in expected]
         lows, highs = [c["expected_low_hz"] for c in expected], [c["expected_high_hz"] for c in expected]
         chart.band(when, lows, highs, "expected", "expected at this temperature")
     for row, event in enumerate(events):
         style = "event" if event[f"resets_{band}"] else "event mild"
-        chart.vertical(_seconds(event["event_at_utc"]), style, event["kind"].replace("_", " "), row % 3)
+        chart.vertical(seconds(event["event_at_utc"]), style, event["kind"].replace("_", " "), row % 3)
     labels = [
         f"{m['measured_at_utc']:%Y-%m-%d}: {m['frequency_hz']:.2f} Hz {_interval(e)}, damping "
         f"{m['damping_ratio']:.4f}, n = {m['n_impacts']}, {_temperature(m['rail_temperature_c'])}"
@@ -89,8 +87,8 @@ def _point_styles(modes: Sequence[Mapping[str, Any]], charts: Sequence[Mapping[s
     The campaign of a value is the last one that began before it, for one may last two days.
     """
     rows = sorted(charts, key=lambda c: c["measured_at_utc"])
-    began = np.array([_seconds(c["measured_at_utc"]) for c in rows])
-    of = np.searchsorted(began, [_seconds(m["measured_at_utc"]) for m in modes], side="right") - 1
+    began = np.array([seconds(c["measured_at_utc"]) for c in rows])
+    of = np.searchsorted(began, [seconds(m["measured_at_utc"]) for m in modes], side="right") - 1
     return np.array([_style(rows[k]) if k >= 0 else "point" for k in of])
 
 
@@ -98,10 +96,6 @@ def _style(row: Mapping[str, Any]) -> str:
     if row["state"].startswith("alarm"):
         return "alarm"
     return "point" if row.get("deviation_pct") is None else "confirm"
-
-
-def _seconds(when: datetime) -> float:
-    return (when - EPOCH).total_seconds()
 
 
 def _half_width(mode: Mapping[str, Any]) -> float:

@@ -1,0 +1,54 @@
+"""Draw the weekly peak acceleration under trains of one section."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from turnout.constants import Z95
+from turnout.report.formatting import count_of, seconds
+from turnout.report.svg import Axis, Chart
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from typing import Any
+
+
+def weekly_peaks_panel(label: str, weeks: Sequence[Mapping[str, Any]], width: int = 462) -> str:
+    """Weekly peak acceleration over time, at the usual speed.
+
+    Parameters
+    ----------
+    label : str
+        Label of the section.
+    weeks : sequence of mapping
+        ``week_utc``, ``peak_ms2``, ``peak_se_ms2`` and ``state`` of its chart, in order of time.
+    width : int
+        Width. [px]
+
+    Returns
+    -------
+    str
+        SVG, "" without a week.
+    """
+    if not weeks:
+        return ""
+    time = np.array([seconds(w["week_utc"]) for w in weeks])
+    peak = np.array([w["peak_ms2"] for w in weeks], dtype=float)
+    half = Z95 * np.array([np.nan if w["peak_se_ms2"] is None else w["peak_se_ms2"] for w in weeks], dtype=float)
+    low, high = peak - np.nan_to_num(half), peak + np.nan_to_num(half)
+    margin = 0.03 * (time.max() - time.min()) + 86400
+    is_alarm = np.array([(w["state"] or "").startswith("alarm") for w in weeks])
+    state = "in alarm" if is_alarm[-1] else "no alarm"
+    chart = Chart(
+        Axis(time.min() - margin, time.max() + margin, "", "time"),
+        Axis(0.0, 1.08 * float(high.max()), "peak [m/s²]"),
+        f"{label}: {peak[-1]:.0f} m/s² under trains, {state}; {count_of(len(weeks), 'week')}",
+        width=width,
+    )
+    labels = [f"week of {w['week_utc']:%Y-%m-%d}: {p:.1f} m/s² ± {h:.1f} (95 %)" for w, p, h in zip(weeks, peak, half)]
+    for style, chosen in (("point", ~is_alarm), ("alarm", is_alarm)):
+        some = np.flatnonzero(chosen)
+        chart.points(time[some], peak[some], style, 3.0, low[some], high[some], [labels[i] for i in some])
+    return chart.svg()
