@@ -2,7 +2,8 @@
 
 Three turnouts with the paper's eight locations over three years: raw files in five formats below raw/,
 with double impacts, overloads, a cut-off file, a dead channel, a reversed sign, a missing temperature, maintenance,
-one true drift and one sleeper that comes to hang. What is true lies below truth/, where the pipeline does not read.
+one true drift and one sleeper that comes to hang. One turnout has five trains a week for 70 weeks, and a weld that
+becomes a dip, which trains alone record. What is true lies below truth/, where the pipeline does not read.
 The same seed gives the same samples. The configuration that comes with the program (config/) describes these
 turnouts.
 """
@@ -25,7 +26,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     parser.add_argument("--seed", type=int, default=1, help="another seed makes another fleet (default 1)")
     parser.add_argument("--campaigns", type=int, default=24, help="campaigns per turnout (default 24)")
-    parser.add_argument("--passages", type=int, default=12, help="train passages per turnout (default 12)")
+    parser.add_argument(
+        "--passages",
+        type=int,
+        default=6,
+        help="train passages per turnout without weekly trains, 0: no trains at all (default 6)",
+    )
     add_cores(parser, "processors to use (default: all)", default=None)
     parser.add_argument("--only-raw", action="store_true", help="make the raw files and stop")
 
@@ -49,6 +55,7 @@ def run(args: argparse.Namespace) -> int:
     from turnout.demo.fleet import make_fleet, run_pipeline
     from turnout.demo.scenario import campaign_days
     from turnout.demo.summary import print_summary
+    from turnout.demo.train_clusters import write_clusters
     from turnout.errors import ConfigError
     from turnout.workflow.project import use_demonstration
 
@@ -61,6 +68,8 @@ def run(args: argparse.Namespace) -> int:
     print("1. Raw files of the demonstration fleet", flush=True)
     n = make_fleet("raw", "truth", seed=args.seed, n_campaign=args.campaigns, n_passage=args.passages, workers=cores)
     print(f"   {n} files below raw/. What is true of them lies below truth/, which the pipeline does not read.")
+    if args.passages:
+        write_clusters("raw")
     if args.only_raw:
         return 0
     print("2. The pipeline; all of its output is in logs/workflow.log", flush=True)

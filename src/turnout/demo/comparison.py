@@ -73,6 +73,9 @@ def compare(connection: duckdb.DuckDBPyConnection, truth: Path, worklist: str) -
         for change in _changes(content):
             rows.append(_change_row(connection, content, *change))
             changed.add((content["turnout"], *change[:2]))
+        if weld := content.get("weld"):
+            rows.append(_weld_row(connection, content, weld))
+            changed.add((content["turnout"], weld["section"], "amplitude"))
     for content in turnouts:
         rows += [_file_row(connection, content["days"], *fault) for fault in content["file_faults"]]
     rows += _impact_rows(connection, truth)
@@ -145,6 +148,20 @@ def _change_row(
     found = f"{state}: frequency {change:+.1f} %, stiffness about {_stiffness(change):+.0f} %{from_day}"
     finding = connection.execute(FINDING_QUERY, [turnout, section]).fetchone()
     return Comparison(where, words, found + (f"; diagnosis: {finding[0]}" if finding else ""))
+
+
+def _weld_row(connection: duckdb.DuckDBPyConnection, content: dict[str, Any], weld: dict[str, Any]) -> Comparison:
+    """A weld that becomes a dip: what the weekly peak accelerations of the trains show of it."""
+    depth, last, section = 1e3 * weld["depth_on_last_day"], content["days"][-1], weld["section"]
+    words = f"weld at {weld['position']:g} m dips by {depth:.2f} mm by {last}, from {weld['since']}"
+    where = f"{content['turnout']} {section} trains"
+    alarm = connection.execute(ALARM_QUERY, [content["turnout"], f"{content['turnout']}/{section}", "amplitude"])
+    row = alarm.fetchone()
+    if row is None or row[0] is None:
+        return Comparison(where, words, "nothing" if row is None else row[2])
+    change, since, state = row
+    from_day = f", from {since:%Y-%m-%d}" if since else ""
+    return Comparison(where, words, f"{state}: weekly peak acceleration {change:+.0f} %{from_day}")
 
 
 def _stiffness(frequency_pct: float) -> float:

@@ -22,6 +22,7 @@ from turnout.demo.hammer import hammer_test, simulated_response
 from turnout.demo.passages import make_passage, make_passages
 from turnout.demo.progress import run_with_progress
 from turnout.demo.scenario import FLEET, SECTIONS, campaign_days, gap_under, rail_temperature, stiffness_factors
+from turnout.demo.weekly_trains import N_WEEK, simulate_run, weekly_jobs, write_weekly_trains
 from turnout.readers.writing import write
 from turnout.workflow.project import snakefile_options
 
@@ -55,6 +56,7 @@ def make_fleet(
     turnouts: Iterable[str] | None = None,
     workers: int | None = None,
     progress: bool = True,
+    n_week: int = N_WEEK,
 ) -> int:
     """Write raw files below ``raw`` and one truth file per turnout below ``truth``.
 
@@ -67,13 +69,15 @@ def make_fleet(
     n_campaign : int
         Campaigns per turnout, six and a half weeks apart: 24 are three years.
     n_passage : int
-        Train passages per turnout, in the weeks before the last campaign.
+        Train passages per turnout without weekly trains, in the weeks before the last campaign; 0: no trains at all.
     turnouts : iterable of str, optional
         Only these; all by default.
     workers : int, optional
         Processes; as many as there are processors by default.
     progress : bool
         Show progress bars.
+    n_week : int
+        Weeks of the turnout with weekly trains, five or six trains each.
 
     Returns
     -------
@@ -82,7 +86,7 @@ def make_fleet(
     """
     chosen = [s for s in FLEET if turnouts is None or s.turnout in set(turnouts)]
     days = campaign_days(n_campaign)
-    jobs, trains = [], []
+    jobs, trains, weekly = [], [], {}
     for scenario in chosen:
         weather = np.random.default_rng([seed, crc32(scenario.turnout.encode())])
         temperatures = [rail_temperature(day, weather) for day in days]
@@ -95,16 +99,26 @@ def make_fleet(
         ]
         if n_passage:
             layout = load_configuration("config").turnout(scenario.turnout)
-            trains += make_passages(raw, scenario, layout, seed, n_passage, days[-1])
+            if scenario.has_weekly_trains:
+                weekly[scenario] = {s.label: (s.position, s.track) for s in layout.sections}
+            else:
+                trains += make_passages(raw, scenario, layout, seed, n_passage, days[-1])
+    runs = [job for scenario, positions in weekly.items() for job in weekly_jobs(scenario, positions, days[-1], n_week)]
     with ProcessPoolExecutor(workers or os.cpu_count()) as pool:
         counts = pool.map(_make_tests, jobs, chunksize=4)
         total = sum(tqdm(counts, total=len(jobs), desc="hammer tests", unit="section", disable=not progress))
         results = pool.map(make_passage, trains)
         passage_truths = list(tqdm(results, total=len(trains), desc="passages", unit="train", disable=not progress))
-    for scenario in chosen if trains else ():
-        turnout_truths = [t for job, t in zip(trains, passage_truths) if job[1].turnout == scenario.turnout]
-        (Path(truth) / f"{scenario.turnout}_passages.json").write_text(json.dumps(turnout_truths, indent=1))
-    return total + len(passage_truths)
+        responses = pool.map(simulate_run, runs)
+        signals = list(tqdm(responses, total=len(runs), desc="weekly trains", unit="run", disable=not progress))
+    truths = {s.turnout: [t for job, t in zip(trains, passage_truths) if job[1].turnout == s.turnout] for s in chosen}
+    for (scenario, positions), k in zip(weekly.items(), range(0, len(runs), len(runs) // max(len(weekly), 1))):
+        own = signals[k : k + len(runs) // len(weekly)]
+        truths[scenario.turnout] = write_weekly_trains(raw, scenario, positions, own, seed, days[-1], n_week)
+    if n_passage:
+        for turnout, turnout_truths in truths.items():
+            (Path(truth) / f"{turnout}_passages.json").write_text(json.dumps(turnout_truths, indent=1))
+    return total + sum(map(len, truths.values()))
 
 
 def _make_tests(job: Job) -> int:
@@ -165,6 +179,13 @@ def _write_truth(
         "rail_temperature_c": temperatures,
         "stiffness_factors_ballast_railpad": sections,
         "gaps_m": {s: [gap_under(scenario, s, day) for day in days] for s in {g.section for g in scenario.gaps}},
+        "weld": None
+        if scenario.weld is None
+        else asdict(scenario.weld)
+        | {
+            "since": scenario.weld.since.isoformat(),
+            "depth_on_last_day": scenario.weld.depth_on(days[-1]),
+        },
         "changes": [asdict(c) | {"since": c.since.isoformat(), "until": None} for c in scenario.changes],
         "file_faults": [[*k, v] for k, v in FILE_FAULTS.items() if k[0] == scenario.turnout],
     }

@@ -116,11 +116,11 @@ def make_passage(job: PassageJob) -> dict[str, Any]:
     """
     raw, scenario, positions, vehicle, truth, seed = job
     moment = datetime.fromisoformat(truth["started_at_utc"])
-    track = _track_of(scenario, moment.date(), round(truth["rail_temperature_c"]))
-    sensors = [_sensor(label, position, side, truth["track"]) for label, (position, side) in positions.items()]
+    track = track_of(scenario, moment.date(), round(truth["rail_temperature_c"]))
+    sensors = [passage_sensor(label, position, side, truth["track"]) for label, (position, side) in positions.items()]
     recording = simulate_passage(
         track,
-        _vehicle(vehicle, round(truth["load_share"], 1)),
+        vehicle_of(vehicle, round(truth["load_share"], 1)),
         truth["speed_kmh"] / KMH,
         sensors,
         terms=_terms_of(scenario, track, truth["track"], moment.date()),
@@ -143,7 +143,7 @@ def make_passage(job: PassageJob) -> dict[str, Any]:
     return truth | {"file": name, "n_axles": len(loads), "axle_load_t": float(np.mean(loads)) / (1e3 * GRAVITY)}
 
 
-def _sensor(label: str, position: float, side: str, route: str) -> Sensor:
+def passage_sensor(label: str, position: float, side: str, route: str) -> Sensor:
     gain = 1.0 if side in ("both", route) else NEIGHBOUR_GAIN
     return Sensor(label, position, "rail web", gain=gain, noise=NOISE, limit=LIMIT, resolution=LIMIT / 2**15)
 
@@ -160,12 +160,12 @@ def _terms_of(scenario: TurnoutScenario, turnout: TurnoutTrack, route: str, day:
 
 
 @lru_cache(maxsize=32)
-def _vehicle(name: str, load: float) -> Vehicle:
+def vehicle_of(name: str, load: float) -> Vehicle:
     return load_vehicle(name, load)
 
 
 @lru_cache(maxsize=4)
-def _track_of(scenario: TurnoutScenario, day: date, temperature: float) -> TurnoutTrack:
+def track_of(scenario: TurnoutScenario, day: date, temperature: float) -> TurnoutTrack:
     """The turnout with the stiffness of every section on that day, on both routes."""
     turnout = load_track("tommerup")
 

@@ -1,4 +1,4 @@
-"""Scenario of the demonstration fleet: campaigns, weather, maintenance, one true drift, and instrument faults.
+"""Scenario of the demonstration fleet: campaigns, weather, maintenance, true changes, and instrument faults.
 
 Each fault is a function that puts it into a recording or a file.
 """
@@ -89,6 +89,46 @@ class Gap:
 
 
 @dataclass(frozen=True)
+class WornWeld:
+    """A weld that becomes a dip in the running surface, which trains record and hammer tests do not.
+
+    ``position`` [m], ``depth`` [m] from the day ``since``, growing by ``per_year`` [m] over ``length`` [m], on the rail
+    of ``track``.
+    """
+
+    section: str
+    position: float
+    since: date
+    depth: float
+    per_year: float
+    length: float = 0.6
+    track: str = "main"
+
+    def depth_on(self, day: date) -> float:
+        """Depth on a day.
+
+        Parameters
+        ----------
+        day : date
+            The day.
+
+        Returns
+        -------
+        float
+            0 before ``since``. [m]
+
+        Examples
+        --------
+        >>> weld = WornWeld("ASM", 36.3, date(2026, 1, 1), 0.1e-3, 0.2e-3)
+        >>> weld.depth_on(date(2025, 12, 31)), round(1e3 * weld.depth_on(date(2027, 1, 1)), 3)
+        (0.0, 0.3)
+        """
+        if day < self.since:
+            return 0.0
+        return self.depth + self.per_year * (day - self.since).days / 365.25
+
+
+@dataclass(frozen=True)
 class TurnoutScenario:
     """One turnout of the fleet: its file format and its changes over time."""
 
@@ -99,6 +139,8 @@ class TurnoutScenario:
     events: tuple[tuple[date, str, str], ...] = ()
     odd_campaign: tuple[int, str] | None = None
     stiffness: float = 1.0
+    weld: WornWeld | None = None
+    has_weekly_trains: bool = False
 
 
 FLEET = (
@@ -108,6 +150,8 @@ FLEET = (
         "tdms",
         changes=(Change("A8", "ballast", since=date(2025, 5, 1), per_year=-0.15),),
         stiffness=1.06,
+        weld=WornWeld("ASM", 36.3, since=date(2026, 4, 1), depth=0.4 * MILLIMETRE, per_year=1.8 * MILLIMETRE),
+        has_weekly_trains=True,
     ),
     TurnoutScenario(
         "aarup_n4",

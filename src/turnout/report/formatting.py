@@ -11,7 +11,6 @@ from scipy.stats import t as student
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-    from datetime import datetime
 
 BADGES = {
     "confirm now": "confirm",

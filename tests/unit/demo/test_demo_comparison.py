@@ -17,6 +17,7 @@ TRUTH = {
          "event": "pad_exchange"},
     ],
     "gaps_m": {"ASM": [0.0, 0.0003, 0.0012]},
+    "weld": {"section": "OT", "position": -11.7, "since": "2025-11-01", "depth_on_last_day": 0.00032},
     "file_faults": [["W1", 1, "SP", 2, "cut_off"], ["W1", 2, "OT", 1, "swapped_sign"]],
 }  # fmt: skip
 
@@ -44,7 +45,8 @@ def connection():
             ('W1', 'W1/A8', 'ballast', -8.0::double, timestamp '2025-01-20', 'inspect this week'),
             ('W1', 'W1/ASM', 'ballast', -30.0, timestamp '2025-01-10', 'inspect this week'),
             ('W1', 'W1/A7', 'railpad', -2.0, timestamp '2025-02-10', 'inspect this week'),
-            ('W1', 'W1/A9', 'railpad', null, null, 'cannot tell')
+            ('W1', 'W1/A9', 'railpad', null, null, 'cannot tell'),
+            ('W1', 'W1/OT', 'amplitude', 31.4, timestamp '2025-11-17', 'inspect this week')
         ) t(turnout_id, section_id, band, change_pct, since_at_utc, state);
         create table maintenance_effect as select 'W1/CLP' as section_id, 'railpad' as band,
             timestamp '2025-01-01' as event_at_utc, 10.0::double as gain_pct,
@@ -71,6 +73,9 @@ def test_every_fault_and_change_has_a_row_with_what_was_found(connection, truth)
     gap = rows["W1 ASM ballast"]
     assert gap.truth == "hanging sleeper, 1.2 mm by 2026-01-01, first on 2025-01-01"
     assert gap.found.endswith("stiffness about -51 %, from 2025-01-10; diagnosis: a hanging sleeper at 36.0 m")
+    weld = rows["W1 OT trains"]
+    assert weld.truth == "weld at -11.7 m dips by 0.32 mm by 2026-01-01, from 2025-11-01"
+    assert weld.found == "inspect this week: weekly peak acceleration +31 %, from 2025-11-17"
     assert rows["W1 SP, test 2"].found == "truncated"
     assert rows["W1 OT, test 1"].found == "nothing (another reason)"
     assert rows["all other sections"].found == "1 alarms: W1/A7 railpad"

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from typing import Any
 
 
+SERIES = {"point": "week", "alarm": "week in an open alarm"}
+
+
 def weekly_peaks_panel(label: str, weeks: Sequence[Mapping[str, Any]], width: int = 462) -> str:
     """Weekly peak acceleration over time, at the usual speed.
 
@@ -50,5 +53,7 @@ def weekly_peaks_panel(label: str, weeks: Sequence[Mapping[str, Any]], width: in
     labels = [f"week of {w['week_utc']:%Y-%m-%d}: {p:.1f} m/s² ± {h:.1f} (95 %)" for w, p, h in zip(weeks, peak, half)]
     for style, chosen in (("point", ~is_alarm), ("alarm", is_alarm)):
         some = np.flatnonzero(chosen)
-        chart.points(time[some], peak[some], style, 3.0, low[some], high[some], [labels[i] for i in some])
+        chart.points(
+            time[some], peak[some], style, 3.0, low[some], high[some], [labels[i] for i in some], SERIES[style]
+        )
     return chart.svg()
