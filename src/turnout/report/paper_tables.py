@@ -12,11 +12,14 @@ import numpy as np
 from turnout.records.modal import value_with_error
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
+    from typing import Any
 
     import duckdb
 
 ENTRIES = ("a11", "a12", "a21", "a22", "c1", "c2")
+PAPER_TRAIN, PAPER_SPEED = "IC3", 160.0  # trains of Table 4 [km/h]
+SPEED_TOLERANCE = 5.0  # km/h
 LATEX_ESCAPES = str.maketrans({"_": r"\_", "%": r"\%", "&": r"\&", "#": r"\#"})
 
 
@@ -41,7 +44,13 @@ class PaperTable:
     rows: tuple[tuple[str | Quantity | int | None, ...], ...]
 
 
-def paper_tables(connection: duckdb.DuckDBPyConnection, turnout: str, campaign: str) -> tuple[PaperTable, ...]:
+def paper_tables(
+    connection: duckdb.DuckDBPyConnection,
+    turnout: str,
+    campaign: str,
+    train_type: str = PAPER_TRAIN,
+    speed: float = PAPER_SPEED,
+) -> tuple[PaperTable, ...]:
     """The four tables of one campaign.
 
     Parameters
@@ -52,6 +61,10 @@ def paper_tables(connection: duckdb.DuckDBPyConnection, turnout: str, campaign: 
         Turnout.
     campaign : str
         Id of the campaign.
+    train_type : str
+        Trains of Table 4.
+    speed : float
+        Their speed on the main track. [km/h]
 
     Returns
     -------
@@ -62,7 +75,7 @@ def paper_tables(connection: duckdb.DuckDBPyConnection, turnout: str, campaign: 
         _matrices(connection, campaign, 1, "ballast"),
         _matrices(connection, campaign, 2, "railpad"),
         _modes(connection, campaign),
-        _fits(connection, turnout, campaign),
+        _fits(connection, turnout, campaign, train_type, speed),
     )
 
 
@@ -104,30 +117,97 @@ def _modes(connection: duckdb.DuckDBPyConnection, campaign: str) -> PaperTable:
     return PaperTable(3, title, columns, tuple(rows))
 
 
-def _fits(connection: duckdb.DuckDBPyConnection, turnout: str, campaign: str) -> PaperTable:
-    query = """
-        select k.section_id, k.hammer_fit_pct, k.n_impacts_used, k.validation_fit_pct, k.n_validation,
-            avg(f.fit_pct) filter (p.track = 'main'), stddev_samp(f.fit_pct) filter (p.track = 'main'),
-            count(f.fit_pct) filter (p.track = 'main'),
-            avg(f.fit_pct) filter (p.track = 'diverging'), stddev_samp(f.fit_pct) filter (p.track = 'diverging'),
-            count(f.fit_pct) filter (p.track = 'diverging')
-        from models_current k
-            left join passage_fits_current f on f.section_id = k.section_id and f.turnout_id = ?
-            left join passages_current p on p.passage_id = f.passage_id
-        where k.campaign_id = ? and k.status <> 'rejected' group by all order by 1
-    """
-    rows = []
-    for section, fit, n, second, n_second, *trains in connection.execute(query, [turnout, campaign]).fetchall():
-        main, diverging = (
-            (Quantity(trains[k], trains[k + 1]), trains[k + 2]) if trains[k + 2] else (Quantity(None), 0)
-            for k in (0, 3)
+def _fits(
+    connection: duckdb.DuckDBPyConnection, turnout: str, campaign: str, train_type: str, speed: float
+) -> PaperTable:
+    is_main = "p.track = 'main' and abs(p.speed_kmh - $speed) <= $tolerance"
+    is_diverging = "p.track = 'diverging'"
+    aggregates = ", ".join(
+        f"{function}(f.{column}) filter ({group})"
+        for group in (is_main, is_diverging)
+        for function, column in (
+            ("avg", "fit_pct"), ("stddev_samp", "fit_pct"), ("count", "fit_pct"), ("avg", "fit_null_pct"),
+            ("avg", "forecast_pct"), ("avg", "forecast_null_pct"),
         )
-        rows.append((_label(section), Quantity(fit), n, Quantity(second), n_second or 0, *main, *diverging))
-    columns = (
-        "section", "held-out impacts", "n", "second response", "n", "trains, main track", "n",
-        "trains, diverging track", "n",
     )  # fmt: skip
-    return PaperTable(4, "Fit [%]; trains: mean ± standard deviation over n trains", columns, tuple(rows))
+    query = f"""
+        select k.section_id, k.hammer_fit_pct, k.n_impacts_used, k.validation_fit_pct, k.n_validation, {aggregates}
+        from models_current k
+            left join passage_fits_current f on f.section_id = k.section_id and f.turnout_id = $turnout
+            left join passages_current p on p.passage_id = f.passage_id and p.train_type = $train_type
+        where k.campaign_id = $campaign and k.status <> 'rejected' group by all order by 1
+    """
+    parameters = {
+        "turnout": turnout, "campaign": campaign, "train_type": train_type, "speed": speed,
+        "tolerance": SPEED_TOLERANCE,
+    }  # fmt: skip
+    rows = []
+    for section, fit, n, second, n_second, *trains in connection.execute(query, parameters).fetchall():
+        cells: list[Quantity | int] = []
+        for mean, spread, n_train, *others in (trains[:6], trains[6:]):
+            cells += [Quantity(mean, spread), n_train, *(cell for v in others for cell in (Quantity(v), n_train))]
+        rows.append((_label(section), Quantity(fit), n, Quantity(second), n_second or 0, *cells))
+    scores = "{0}", "random models, {0}", "forecast, {0}", "forecast of random models, {0}"
+    names = [name.format(track) for track in ("main track", "diverging track") for name in scores]
+    columns = ("section", "held-out impacts", "n", "second response", "n", *(c for name in names for c in (name, "n")))
+    title = (
+        f"Fit [%]; {train_type} trains within {SPEED_TOLERANCE:g} km/h of {speed:g} km/h on the main track, "
+        "at any speed on the diverging track: mean ± standard deviation over n trains; random models: mean of 95 % "
+        "quantiles"
+    )
+    return PaperTable(4, title, columns, tuple(rows))
+
+
+def class_rows(connection: duckdb.DuckDBPyConnection, turnout: str) -> list[dict[str, Any]]:
+    """The bars of the paper: fit by train type, speed and axle load of each section.
+
+    Parameters
+    ----------
+    connection : duckdb.DuckDBPyConnection
+        The registry.
+    turnout : str
+        Turnout.
+
+    Returns
+    -------
+    list of dict
+        Rows of the view ``fit_adjusted``, score "fit".
+    """
+    cursor = connection.execute(
+        "select * from fit_adjusted where turnout_id = ? and score = 'fit' "
+        "order by section_id, factor, class_from, class",
+        [turnout],
+    )
+    return [dict(zip((d[0] for d in cursor.description), row)) for row in cursor.fetchall()]
+
+
+def class_table(rows: Sequence[Mapping[str, Any]]) -> PaperTable:
+    """The numbers behind the bars, beside what random models reach.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        From ``class_rows``.
+
+    Returns
+    -------
+    PaperTable
+        Table 5, which the paper shows as bars alone.
+    """
+    cells = [
+        (
+            _label(r["section_id"]), r["factor"], r["class"], Quantity(r["score_pct"], r["score_sd_pct"]),
+            r["n_passages"], Quantity(r["null_pct"]), r["n_passages"],
+            Quantity(r["adjusted_pct"], r["adjusted_se_pct"]), r["n_passages"],
+        )
+        for r in rows
+    ]  # fmt: skip
+    columns = "section", "factor", "class", "fit", "n", "random models", "n", "other factors held fixed", "n"
+    title = (
+        "Fit [%] by class of trains: mean ± standard deviation over n passages; random models: mean of 95 % quantiles; "
+        "other factors held fixed: ± standard error"
+    )
+    return PaperTable(5, title, columns, tuple(cells))
 
 
 def _label(section_id: str) -> str:
@@ -142,7 +222,7 @@ def render(tables: Sequence[PaperTable], form: str) -> str:
     tables : sequence of PaperTable
         Tables to print.
     form : "text", "csv" or "latex"
-        CSV has one row per value: table, section, band, quantity, value, error, n.
+        CSV has one row per value: table, section, band (Table 5: class), quantity, value, error, n.
 
     Returns
     -------
@@ -199,7 +279,8 @@ def _csv(tables: Sequence[PaperTable]) -> str:
     bands = {1: "ballast", 2: "railpad"}
     for table in tables:
         for row in table.rows:
-            band = bands.get(table.number, row[1] if table.columns[1] == "band" else "")
+            part = {"band": 1, "factor": 2}.get(table.columns[1])
+            band = bands.get(table.number, "" if part is None else row[part])
             for k, (name, cell) in enumerate(zip(table.columns, row, strict=True)):
                 if isinstance(cell, Quantity) and cell.value is not None:
                     n = row[table.columns.index("n", k)]

@@ -15,11 +15,13 @@ from turnout.report.formatting import count_of
 from turnout.report.pages.fleet import fleet_page
 from turnout.report.pages.glossary import glossary_page
 from turnout.report.pages.turnout import turnout_page
+from turnout.report.panels.train_bars import train_bars
 from turnout.report.source import ROWS, FleetSource
 from turnout.report.stale_pages import HASH_MARK, page_hash, page_hashes
+from turnout.report.trains import FACTORS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping
+    from collections.abc import Callable, Collection, Mapping, Sequence
     from typing import Any
 
     import duckdb
@@ -170,3 +172,25 @@ def replace_page(path: Path, text: str) -> None:
         Its whole text.
     """
     write_text(path, text)
+
+
+def bars_page(turnout: str, rows: Sequence[Mapping[str, Any]], sections: Sequence[Mapping[str, Any]]) -> str:
+    """A page with the bars of the fit by train type, speed and axle load.
+
+    Parameters
+    ----------
+    turnout : str
+        Turnout.
+    rows : sequence of mapping
+        From ``paper_tables.class_rows``.
+    sections : sequence of mapping
+        Rows of ``sections``, in the order along the track.
+
+    Returns
+    -------
+    str
+        HTML in one file.
+    """
+    charts = "".join(train_bars(factor, rows, sections) for factor in FACTORS)
+    template = page_environment().get_template("bars.html")
+    return template.render(turnout=turnout, charts=charts, **shared_by_pages())

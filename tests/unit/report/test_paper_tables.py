@@ -3,6 +3,7 @@
 import csv
 import io
 import sys
+from datetime import datetime
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "registry"))
 from registry_rows import Bench, hammer_result
 
 from turnout.cli.main import main
+from turnout.workflow.batches import UnitResult
 
 BLOCK = {
     "a_block": [0.9986, -0.0307, 0.0307, 0.9824], "a_block_se": [0.0001, 0.0016, 0.0016, 0.0011],
@@ -57,6 +59,60 @@ def test_a_campaign_is_chosen_by_its_date(registry, capsys):
     assert (a12["table"], float(a12["value"]), float(a12["error"])) == ("1", -0.0307, 0.0016)
     (second,) = (r for r in rows if r["quantity"] == "second response")
     assert (second["value"], second["n"]) == ("70.1", "29")
+
+
+TRAINS = (
+    # train type, speed, track, fit
+    ("IC3", 158.0, "main", 50.0), ("IC3", 163.0, "main", 60.0), ("IC3", 120.0, "main", 10.0),
+    ("freight", 160.0, "main", 20.0), ("IC3", 60.0, "diverging", 40.0),
+)  # fmt: skip
+
+
+@pytest.fixture
+def registry_with_trains(registry, tmp_path):
+    bench, results = Bench(tmp_path), []
+    for k, (train_type, speed, track, fit) in enumerate(TRAINS):
+        at = datetime(2017, 11, 5, 8 + k)
+        passage = {
+            "passage_id": f"p{k}", "turnout_id": "t1", "recording_id": f"r{k}", "passed_at_utc": at, "n_axles": 8,
+            "status": "accepted", "train_type": train_type, "speed_kmh": speed, "track": track, "axle_load_t": 12.0,
+        }  # fmt: skip
+        score = {
+            "passage_id": f"p{k}", "section_id": "t1/A7", "channel": "A7", "model_id": "m", "turnout_id": "t1",
+            "passed_at_utc": at, "status": "null_explains", "fit_pct": fit, "fit_null_pct": fit + 5.0,
+            "forecast_pct": 1.0, "forecast_null_pct": 2.0, "n_wheels": 8,
+        }  # fmt: skip
+        tables = {"passages": [passage], "passage_fits": [score]}
+        results.append(UnitResult(f"t1/p{k}", "t1", "passage", f"p{k}", "1", "ok", tables))
+    bench.register(*results)
+    return registry
+
+
+def test_table_4_has_the_trains_of_the_paper_beside_random_models(registry_with_trains, capsys):
+    arguments = ["paper", "t1", "--registry", registry_with_trains, "--table", "4", "--format", "csv"]
+    assert main(arguments) == 0
+    rows = {r["quantity"]: r for r in csv.DictReader(io.StringIO(capsys.readouterr().out))}
+    assert (rows["main track"]["value"], rows["main track"]["n"]) == ("55", "2")
+    assert float(rows["main track"]["error"]) == pytest.approx(50**0.5, rel=1e-5)  # of 50 and 60
+    assert (rows["random models, main track"]["value"], rows["diverging track"]["value"]) == ("60", "40")
+    assert main([*arguments, "--train-type", "freight"]) == 0
+    rows = {r["quantity"]: r for r in csv.DictReader(io.StringIO(capsys.readouterr().out))}
+    assert (rows["main track"]["value"], rows["main track"]["n"]) == ("20", "1") and "diverging track" not in rows
+
+
+def test_bars_are_a_page_with_the_numbers_of_table_5(registry_with_trains, tmp_path, capsys):
+    page = tmp_path / "bars.html"
+    assert main(["paper", "t1", "--registry", registry_with_trains, "--table", "5", "--bars", str(page)]) == 0
+    text = capsys.readouterr().out
+    assert text.startswith("Table 5:") and "train type" in text and "160-180 km/h" in text
+    assert "10.0-12.5 t 36 ± 21 5 41 5" in " ".join(text.split())  # mean of all five, and of their nulls
+    html = page.read_text(encoding="utf-8")
+    assert html.count("<svg") >= 3 and "fit by speed" in html and "http" not in html.split("</style>")[-1][:50]
+
+
+def test_bars_without_a_passage_are_an_error(registry, tmp_path, capsys):
+    assert main(["paper", "t1", "--registry", registry, "--bars", str(tmp_path / "bars.html")]) == 2
+    assert "no scored passage of t1" in capsys.readouterr().err
 
 
 def test_latex_has_four_tables_and_no_bare_sign(registry, capsys):
