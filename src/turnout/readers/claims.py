@@ -5,6 +5,8 @@ times its size plus ``FREE_CLAIM``. An HDF5 file may also name other files as th
 read, because they may be outside the raw root and change while the hash of the file stays the same.
 """
 
+from __future__ import annotations
+
 import math
 import re
 import zipfile
@@ -21,7 +23,9 @@ FREE_CLAIM = 128 * 2**20  # bytes that a file of any size may claim: a long reco
 MAX_COLUMNS = 4096  # columns of a text or Parquet file: each costs kilobytes, whatever it holds
 REMEDY = "Copy the file again from the logger; if it is whole, export it unpacked or in shorter records"
 ELSEWHERE_REMEDY = "Export the samples into the file itself"
-MAT_HEADER, MAT_COMPRESSED = 128, 15  # bytes; type of a compressed element in MATLAB 5
+MAT_HEADER, MAT_COMPRESSED, MAT_MATRIX = 128, 15, 14  # bytes; types of elements in MATLAB 5
+MAX_MAT_DEPTH = 64  # of cells and structures in each other
+BLOCK = 2**16  # bytes that are unpacked at a time
 
 
 def check_claims(format_module: str, source: Source) -> None:
@@ -152,33 +156,108 @@ def _elsewhere(dataset: Any) -> str:
 
 
 def _mat(source: Source) -> None:
-    """The elements of a MATLAB 5 file: each compressed one claims its unpacked size in its first eight bytes."""
+    """The elements of a MATLAB 5 file: none may claim more bytes than the element or file that it is in."""
     order = "<" if source.head[126:128] == b"IM" else ">"
     total, position = 0, MAT_HEADER
     with source.path.open("rb") as file:
         while position + 8 <= source.size:
-            kind, length = _mat_tag(file, position, order)
+            where = f"the variable at byte {position}"
+            file.seek(position)
+            kind, length = _mat_tag(file.read(8), order)
             if kind == MAT_COMPRESSED:
-                file.seek(position + 8)
-                first = _decompress(file.read(min(length, 1024)))
-                length_unpacked = int(np.frombuffer(first[4:8], f"{order}u4")[0]) if len(first) == 8 else 0
-                total += length_unpacked
-                _check(total, source, f"the variable at byte {position}")
+                stream = _Unpacked(file, min(length, source.size - position - 8))
+                kind_inside, length_unpacked = _mat_tag(stream.read(8), order)
+                _check(total := total + length_unpacked, source, where)
+                if kind_inside == MAT_MATRIX:
+                    _check_mat_parts(stream, length_unpacked, order, source, where)
+            elif kind == MAT_MATRIX:
+                # a file that was cut ends within its last element, which its reader reports
+                _check_mat_parts(_Plain(file), length, order, source, where)
             position += 8 + length
 
 
-def _mat_tag(file: BinaryIO, position: int, order: str) -> tuple[int, int]:
-    file.seek(position)
-    kind, length = np.frombuffer(file.read(8), f"{order}u4")
+def _check_mat_parts(stream: _Plain | _Unpacked, length: int, order: str, source: Source, where: str) -> None:
+    """ReadError if a part of a matrix claims more bytes than the rest of the matrix; parts may be matrices again."""
+    ends, position = [length], 0
+    while ends and len(ends) <= MAX_MAT_DEPTH:
+        if position + 8 > ends[-1]:
+            ends.pop()
+            continue
+        kind, n_byte = _mat_tag(stream.read(8), order)
+        position += 8
+        if kind == 0 and n_byte == 0:  # the end of damaged or cut data, or an empty part
+            continue
+        if kind >> 16:  # up to four bytes in the tag itself
+            continue
+        if n_byte > ends[-1] - position:
+            problem = f"a part of it claims {n_byte} bytes, where {ends[-1] - position} are left"
+            raise source.error(where, problem, REMEDY, reason="claims_too_much")
+        if kind == MAT_MATRIX:
+            ends.append(position + n_byte)
+            continue
+        n_padded = min(n_byte + -n_byte % 8, ends[-1] - position)
+        if not stream.skip(n_padded):
+            return
+        position += n_padded
+
+
+def _mat_tag(tag: bytes, order: str) -> tuple[int, int]:
+    """Type and length of an element; zeros where the bytes end."""
+    kind, length = np.frombuffer(tag.ljust(8, b"\0"), f"{order}u4")
     return int(kind), int(length)
 
 
-def _decompress(packed: bytes) -> bytes:
-    """The first eight unpacked bytes; none if they are damaged, which the reader reports."""
-    try:
-        return zlib.decompressobj().decompress(packed, 8)
-    except zlib.error:
-        return b""
+class _Plain:
+    """The bytes of an open file from its present position on."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self.file = file
+
+    def read(self, n: int) -> bytes:
+        return self.file.read(n)
+
+    def skip(self, n: int) -> bool:
+        """Whether there may be bytes behind."""
+        self.file.seek(n, 1)
+        return True
+
+
+class _Unpacked:
+    """The unpacked bytes of ``n_packed`` bytes of an open file; they end where these are damaged."""
+
+    def __init__(self, file: BinaryIO, n_packed: int) -> None:
+        self.file, self.n_packed, self.unpacker = file, n_packed, zlib.decompressobj()
+
+    def read(self, n: int) -> bytes:
+        pieces = []
+        while n > 0 and (piece := self._next(n)):
+            pieces.append(piece)
+            n -= len(piece)
+        return b"".join(pieces)
+
+    def skip(self, n: int) -> bool:
+        """Whether all these bytes were there."""
+        while n > 0 and (piece := self._next(min(n, BLOCK))):
+            n -= len(piece)
+        return n <= 0
+
+    def _next(self, n: int) -> bytes:
+        """At least one byte, at most ``n``; none at the end."""
+        try:
+            while not (piece := self.unpacker.decompress(self._packed(), n)):
+                if not self.n_packed and not self.unpacker.unconsumed_tail:
+                    return b""
+        except zlib.error:
+            self.n_packed = 0
+            return b""
+        return piece
+
+    def _packed(self) -> bytes:
+        if self.unpacker.unconsumed_tail:
+            return self.unpacker.unconsumed_tail
+        packed = self.file.read(min(BLOCK, self.n_packed))
+        self.n_packed = self.n_packed - len(packed) if packed else 0
+        return packed
 
 
 def _parquet(source: Source) -> None:

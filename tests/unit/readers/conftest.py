@@ -1,11 +1,15 @@
 """A small hammer test and the two ways in which its files are described."""
 
+import sys
 from datetime import datetime
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from turnout.records import Channel, RawChannel, RawDescription, Recording
+
+sys.path.insert(0, str(Path(__file__).parent))  # for the modules beside the tests
 
 RATE = 51200.0
 EXTENSION = {"uff58": "uff", "uff58b": "uff", "hdf5": "h5", "mat73": "mat"}  # others are called like their format

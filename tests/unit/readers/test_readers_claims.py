@@ -1,17 +1,21 @@
 """A file that claims more than it can hold, or keeps its samples elsewhere, is rejected before memory is allocated."""
 
 import io
+import json
+import os
 import struct
 import subprocess
 import sys
 import zipfile
 import zlib
+from pathlib import Path
 
 import h5py
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from size_claims import ENDINGS
 
 from turnout.errors import ReadError
 from turnout.readers import read
@@ -125,6 +129,32 @@ def test_no_claim_costs_memory(tmp_path):
     )
     done = subprocess.run([sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[-2000:]
+
+
+ACCEPTED = {"read", "unreadable", "truncated", "claims_too_much", "wrong_length", "empty", "wrong_rate"}
+LIMITED = """
+import json, logging, re, resource, sys
+from pathlib import Path
+import h5py, nptdms, pyarrow.csv, pyarrow.parquet, pymatreader, scipy.io, soundfile
+from size_claims import ENDINGS, outcomes
+logging.disable(logging.CRITICAL)
+size = int(re.search(r"VmSize:\\s*(\\d+)", Path("/proc/self/status").read_text())[1]) * 1024
+resource.setrlimit(resource.RLIMIT_AS, (size + 700 * 2**20,) * 2)
+print(json.dumps({format: outcomes(Path(sys.argv[1]), format) for format in ENDINGS}))
+"""
+
+
+def test_a_false_size_anywhere_in_a_file_of_any_format_costs_no_memory_and_gives_no_longer_record(tmp_path):
+    """Each number of an intact file that states a size is replaced by each of six claims from 2**27 to 2**62."""
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *filter(None, sys.path)])}
+    command = [sys.executable, "-c", LIMITED, str(tmp_path)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    found = json.loads(done.stdout)
+    assert sorted(found) == sorted(ENDINGS)
+    assert {format: n for format, cases in found.items() if (n := len(cases)) < 8} == {}
+    wrong = {(f, place): o for f, cases in found.items() for place, o in cases.items() if o not in ACCEPTED}
+    assert wrong == {}
 
 
 def outside(tmp_path):

@@ -1,0 +1,84 @@
+"""Small intact files of every format, and copies of them in which one number that states a size is false."""
+
+import struct
+from itertools import islice
+
+import numpy as np
+
+from turnout.readers.writing import write
+from turnout.records import Channel, Recording
+
+ENDINGS = {
+    "uff58": "uff", "uff58b": "uff", "tdms": "tdms", "hdf5": "h5", "rcmdx": "rcmdx", "mat": "mat", "mat73": "mat",
+    "wav": "wav", "flac": "flac", "csv": "csv", "lvm": "lvm", "npz": "npz", "parquet": "parquet",
+}  # fmt: skip
+N_SAMPLE, RATE = 1237, 5003.0  # primes: what equals them, or 2, 4, 8 times as many bytes, states a size
+CLAIMS = (2**27, 2**30, 2**31 - 1, 2**32 - 2, 2**40, 2**62)
+INTEGERS = ("<H", ">H", "<I", ">I", "<Q", ">Q")
+
+
+def intact(folder, format):
+    """A file of two channels of noise; its path."""
+    samples = np.random.default_rng(5).normal(size=(2, N_SAMPLE))
+    path = folder / f"{format}.{ENDINGS[format]}"
+    if format == "flac":
+        import soundfile
+
+        soundfile.write(path, samples.T / 10.0, int(RATE), subtype="PCM_16")
+        return path
+    if format == "mat":  # not packed, so that its numbers can be replaced
+        import scipy.io
+
+        scipy.io.savemat(path, {"a": samples[0], "b": samples[1], "fs": RATE})
+        return path
+    recording = Recording(samples, RATE, (Channel("a", "acceleration"), Channel("b", "acceleration")))
+    return write([recording], path, format)
+
+
+def false_claims(content):
+    """Yield (place, content) of each number in the file that states a size, with each claim that fits there."""
+    for number in sorted({factor * N_SAMPLE + more for factor in (1, 2, 4, 8, 16) for more in (0, 1, 128)}):
+        for form in INTEGERS:
+            for claim in CLAIMS:
+                try:
+                    old, new = struct.pack(form, number), struct.pack(form, claim)
+                except struct.error:
+                    continue
+                for at in islice(_places(content, old), 4):
+                    yield f"{form}{number} at {at} is {claim}", content[:at] + new + content[at + len(old) :]
+        old = str(number).encode()
+        for claim in CLAIMS:
+            for at in islice(_places(content, old), 4):
+                new = str(claim).encode()
+                yield f"text {number} at {at} is {claim}", content[:at] + new + content[at + len(old) :]
+
+
+def _places(content, old):
+    at = content.find(old)
+    while at >= 0:
+        yield at
+        at = content.find(old, at + 1)
+
+
+def outcomes(folder, format, most=60):
+    """{place: outcome} of the false claims of a format, at most ``most``, spread evenly over the file."""
+    from turnout.errors import ReadError
+    from turnout.readers import read
+    from turnout.records import RawDescription
+
+    path = intact(folder, format)
+    cases = list(false_claims(path.read_bytes()))
+    found = {}
+    for place, content in cases[:: -(-len(cases) // most) or 1]:
+        path.write_bytes(content)
+        for lazily in ({}, {"max_duration": 1e-3, "max_whole_file_size": 0}):
+            try:
+                result = read(path.name, folder, RawDescription(channels=()), **lazily)
+                longest = max((r.n_sample for r in (*result.recordings, *result.long_recordings)), default=0)
+                outcome = "read" if longest <= N_SAMPLE else f"{longest} samples"
+            except ReadError as error:
+                outcome = error.reason if path.name in str(error) else f"no name: {error}"
+            except BaseException as error:
+                outcome = f"{type(error).__name__}: {error}"
+            found[f"{place} {lazily}"] = outcome
+    return found
