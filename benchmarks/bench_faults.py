@@ -14,14 +14,22 @@ FIRST_SEED = int(os.environ.get("TURNOUT_FIRST_SEED", "0"))
 
 
 def bars():
-    """Number of seeds after which a night is broken, hangs, or gives other answers than the raw files."""
-    wrong, hangs, kinds = 0, 0, Counter()
-    for seed, kind, problem, said in run_seeds(range(FIRST_SEED, FIRST_SEED + N_SEED)):
-        kinds[kind] += 1
-        hangs += said == "hangs" or "hangs" in problem
-        if problem:
+    """Number of seeds after which a night is broken, hangs, or gives other rows than the undisturbed fleet."""
+    wrong, hangs, identical, kinds = 0, 0, 0, Counter()
+    for result in run_seeds(FIRST_SEED, N_SEED):
+        kinds[result["kind"]] += 1
+        identical += result["is_identical"]
+        hangs += "hangs" in result["problem"]
+        if result["problem"]:
             wrong += 1
-            print(f"  seed {seed}, {kind}: {problem}; the night of the fault: {said}", flush=True)
+            print(
+                f"  seed {result['seed']}, {result['kind']}, {result['scenario']}: {result['problem']}; "
+                f"the night of the fault: {result['said']}",
+                flush=True,
+            )
     drawn = ", ".join(f"{n} {kind}" for kind, n in sorted(kinds.items()))
-    yield Bar("seeds after which a night is broken or an answer differs", wrong, 0, "", n=f"of {N_SEED}: {drawn}")
+    yield Bar(
+        "seeds after which a night is broken or a row differs without a word", wrong, 0, "", n=f"of {N_SEED}: {drawn}"
+    )
     yield Bar("nights that hang", hangs, 0, "")
+    yield Bar("seeds after which every file is byte identical (others: same rows, and a message)", identical, None, "")

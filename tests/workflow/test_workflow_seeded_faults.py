@@ -1,11 +1,17 @@
 """A few seeds of ``python -m benchmarks faults``: after a fault the answers are again those of the raw files."""
 
+import shutil
 import subprocess
 import sys
 
+import pytest
 
+N_SEED = 40  # half a minute on two free cores
+
+
+@pytest.mark.skipif(not shutil.which("cc"), reason="there is no C compiler for the library that injects the faults")
 def test_the_nights_after_a_fault_are_right(repository):
-    """Three seeds, one process: CI has 30 s for them. The benchmark takes any number."""
-    command = [sys.executable, "-m", "benchmarks", "faults", "--seeds", "3", "--strict"]
-    done = subprocess.run(command, cwd=repository, capture_output=True, text=True, timeout=600)
+    """The benchmark takes any number."""
+    command = [sys.executable, "-m", "benchmarks", "faults", "--seeds", str(N_SEED), "--strict"]
+    done = subprocess.run(command, cwd=repository, capture_output=True, text=True, timeout=1800)
     assert done.returncode == 0 and "No bar missed" in done.stdout, done.stdout + done.stderr

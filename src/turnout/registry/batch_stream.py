@@ -62,11 +62,11 @@ def existing_batches(paths: Sequence[PathLike], faults: dict[str, str]) -> tuple
     return existing, tokens
 
 
-def unread_positions(tokens: Sequence[str], consumed: Sequence[str]) -> list[int]:
-    """Positions of the batches to read: those that are new, or that come later in the list than before.
+def unread_positions(tokens: Sequence[str], consumed: Sequence[str], folders: Sequence[str]) -> list[int]:
+    """Positions of the batches to read: those that are new, or that follow a new one or come later than before.
 
-    Batches are in the order of writing, and the last result of a unit counts. A configuration that is changed back
-    gives an old batch again, at the end of the list.
+    The batches of a folder are in the order of writing, and the last result of a unit counts. A configuration that is
+    changed back, or a damaged batch that is written again, gives an old batch again, behind new ones.
 
     Parameters
     ----------
@@ -74,6 +74,8 @@ def unread_positions(tokens: Sequence[str], consumed: Sequence[str]) -> list[int
         Tokens of the offered batches, in the order of writing.
     consumed : sequence of str
         Tokens of the batches that were registered already.
+    folders : sequence of str
+        Folder of each offered batch; those of another shard hold other units.
 
     Returns
     -------
@@ -82,16 +84,19 @@ def unread_positions(tokens: Sequence[str], consumed: Sequence[str]) -> list[int
 
     Examples
     --------
-    >>> unread_positions(["a", "b", "c"], ["a", "c"]), unread_positions(["b", "a"], ["a", "b"])
-    ([1], [1])
+    >>> unread_positions(["a", "b", "c"], ["a", "c"], ["1", "1", "1"]), unread_positions(["b", "a"], ["a", "b"], "11")
+    ([1, 2], [1])
+    >>> unread_positions(["a", "b", "c"], ["a", "c"], ["1", "1", "2"])
+    [1]
     """
     positions = {name: i for i, name in enumerate(consumed)}
-    last, new = -1, []
-    for i, name in enumerate(tokens):
-        if positions.get(name, -1) > last:
+    last, new, changed = -1, [], set()
+    for i, (name, folder) in enumerate(zip(tokens, folders, strict=True)):
+        if positions.get(name, -1) > last and folder not in changed:
             last = positions[name]
         else:
             new.append(i)
+            changed.add(folder)
     return new
 
 

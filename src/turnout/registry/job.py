@@ -66,7 +66,8 @@ def register(
         check_schemas(before)
         faults: dict[str, str] = {}
         existing, tokens = existing_batches(batches, faults)
-        unread, count = [existing[i] for i in unread_positions(tokens, before.consumed)], 0
+        folders = [fspath(Path(path).parent) for path in existing]
+        unread, count = [existing[i] for i in unread_positions(tokens, before.consumed, folders)], 0
         registration = Registration(root, before)
         with _without_collection():
             for chunk in chunks(merge_units(unread, read, faults)):

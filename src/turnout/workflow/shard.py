@@ -45,6 +45,7 @@ from turnout.workflow.tasks import (
     Task,
     Tasks,
     contents_of,
+    file_states,
     key_of,
     load_function,
     readable_contents,
@@ -103,6 +104,7 @@ class Progress:
 
 LOG = logging.getLogger("turnout.workflow")
 PROCESS_DIED = "the process died that computed it"
+CHANGED = "changed while it was computed"
 UNREADABLE = "unreadable"  # begins the key of a result without some of the unit's files
 # A result, and the stamp and the contents that it was computed from.
 Computed = tuple[UnitResult, str, str]
@@ -346,6 +348,7 @@ class _Run:
     def _compute_with_guard(self, task: Task, compute: Callable) -> Computed | Postponed:
         planned, unit = task.planned, task.planned.unit
         extra = {"context": task.context} if self.stage.context else {}
+        before = file_states(planned, self.raw_root)
         try:
             contents = contents_of(planned, self.raw_root)
             key = key_without(key_of(planned, contents), task.copied)
@@ -360,7 +363,11 @@ class _Run:
             LOG.warning("%s: left for the next run\n%s", unit_id(unit), traceback.format_exc())
             return Postponed(unit_id(unit), f"{type(error).__name__}: {error}")
         elsewhere = {k for k, (path, *_) in enumerate(unit.files) if path in task.copied}
-        return with_copy_rows(result, unit, task.copied), task.stamp, short_contents(contents, elsewhere)
+        computed = with_copy_rows(result, unit, task.copied), task.stamp, short_contents(contents, elsewhere)
+        if file_states(planned, self.raw_root) == before:
+            return computed
+        LOG.warning("%s: its files changed while it was computed: the next run computes it again", unit_id(unit))
+        return _provisional(computed, CHANGED)
 
     def _note_postponed(self, wanted: Container[str], tried: Container[str]) -> int:
         """Write the postponed units and return their number; those of turnouts that did not take part stay."""
@@ -399,11 +406,12 @@ class _Run:
         return 0 if self.stage.gather else len(missing)
 
 
-def _provisional(computed: Computed | Postponed) -> Computed | Postponed:
+def _provisional(computed: Computed | Postponed, why: str = PROCESS_DIED) -> Computed | Postponed:
     """A result whose key matches no content, so that touching a file repeats it, perhaps on another machine."""
     if isinstance(computed, Postponed):
         return computed
-    return replace(computed[0], key=f"{PROCESS_DIED} {computed[0].key}"), *computed[1:]
+    stamp = "" if why == CHANGED else computed[1]
+    return replace(computed[0], key=f"{why} {computed[0].key}"), stamp, computed[2]
 
 
 def _kind_of_fault(fault: str) -> type[Exception] | None:

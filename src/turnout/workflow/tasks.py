@@ -64,6 +64,32 @@ def contents_of(planned: PlannedUnit, raw_root: Path) -> list[str | None]:
     return [_content(os.path.join(raw_root, path)) for path, *_ in planned.unit.files]
 
 
+def file_states(planned: PlannedUnit, raw_root: Path) -> list[tuple[int, int, int] | None]:
+    """Size, time of change and number of each file of a unit: another list says that a file was replaced or written.
+
+    Parameters
+    ----------
+    planned : PlannedUnit
+        The unit with its notes.
+    raw_root : Path
+        The raw root.
+
+    Returns
+    -------
+    list of tuple of (int, int, int) or None
+        None for a file that is gone or whose folder cannot be read.
+    """
+    states: list[tuple[int, int, int] | None] = []
+    for path, *_ in planned.unit.files:
+        try:
+            status = os.stat(os.path.join(raw_root, path))
+        except OSError:
+            states.append(None)
+        else:
+            states.append((status.st_size, status.st_mtime_ns, status.st_ino))
+    return states
+
+
 def readable_contents(planned: PlannedUnit, raw_root: Path) -> tuple[list[str | None], dict[str, str]]:
     """Hashes of the files of a unit as far as they can be read, and the faults of the others.
 

@@ -235,3 +235,20 @@ def test_the_rows_of_a_file_stay_where_it_can_no_longer_be_read(fleet, monkeypat
     assert [reason for reason, *_ in quarantine(fleet)] == ["read_fault"]
     monkeypatch.undo()
     assert fleet.run(algo="2").processed == 1 and quarantine(fleet) == [] and fleet.lengths() == before
+
+
+def test_a_file_that_changes_while_it_is_computed_is_computed_again_though_it_was_put_back_with_its_time(fleet):
+    """Between its hash and its rows it holds other bytes: these rows must not stay under the hash of the first ones."""
+    path = fleet.raw / "t1/2024-05-13/A_1.txt"
+    content, times = path.read_text(), (path.stat().st_atime_ns, path.stat().st_mtime_ns)
+
+    def replaced(unit, turnout, raw_root, algo=""):
+        if unit.turnout == "t1":
+            path.write_text("other bytes of another length")
+        return length(unit, turnout, raw_root, algo)
+
+    fleet.run(stage=Stage("hammer", replaced, "1"))
+    path.write_text(content)
+    os.utime(path, ns=times)
+    assert fleet.run().processed == 1
+    assert fleet.lengths()[UNIT] == [len(content)] and fleet.run().processed == 0
