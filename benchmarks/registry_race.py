@@ -1,18 +1,21 @@
 """A writer that appends and compacts, and a concurrent reader: by the published list it must never count wrongly."""
 
+import random
 import subprocess
 import sys
 import time
+from ast import literal_eval
 from dataclasses import dataclass
 from pathlib import Path
 
 import duckdb
 
 from turnout.registry.compaction import compact
-from turnout.registry.database import build_database, open_registry
-from turnout.registry.generation import commit, delete_files, due_for_deletion, load, schema_of
+from turnout.registry.database import open_registry
+from turnout.registry.generation import load, schema_of
 from turnout.registry.lock import registry_lock
 from turnout.registry.parquet import write_sorted
+from turnout.registry.publication import history, publish
 from turnout.registry.staging import connect
 
 ROWS = 20_000
@@ -34,25 +37,22 @@ class Outcome:
     commits: int = 0
 
 
-def append(root: Path, k: int) -> None:
-    """Append one batch of ``ROWS`` rows, by the steps of a registration."""
+def append(root: Path, k: int, rows: int = ROWS) -> None:
+    """Append one batch, by the steps of a registration."""
     with registry_lock(root):
         now, con = load(root), connect()
         now.number += 1
-        file = write_sorted(con, root, "modes", 2026, BATCH.format(k=k, rows=ROWS), f"batch-{k}")
+        file = write_sorted(con, root, "modes", 2026, BATCH.format(k=k, rows=rows), f"batch-{k}")
         now.files.append(file)
         now.schemas[file.schema] = schema_of("modes")
-        due = due_for_deletion(now)
-        commit(root, now)
-        build_database(root, now)
-        delete_files(root, due)
+        publish(root, now)
 
 
-def write(root: Path, stop: Path) -> int:
+def write(root: Path, stop: Path, rows: int = ROWS) -> int:
     """Append until ``stop`` exists and compact after every fifth batch; returns the number of commits."""
     k, commits = 1, 0
     while not stop.exists():
-        append(root, k)
+        append(root, k, rows)
         commits += 1
         if k % 5 == 0:
             compact(root)
@@ -90,3 +90,45 @@ def _count(root, through_glob):
             return connection.execute(f"{counted} read_parquet('{root}/modes/year=2026/*.parquet')").fetchall()[0]
     with open_registry(root) as connection:
         return connection.execute(f"{counted} modes").fetchall()[0]
+
+
+FEW_ROWS = 100  # of each batch, where the number of reads matters
+
+
+def read(root: Path, n: int, seed: int) -> list[str]:
+    """Read ``n`` times, with connections that are kept while generations pass, some of them of earlier ones."""
+    draw, problems, done = random.Random(seed), [], 0
+    while done < n:
+        try:
+            earlier = draw.choice([None, *list(history(root))[-4:]])
+            with open_registry(root, as_of=earlier) as connection:
+                seen = None
+                for _ in range(min(n - done, draw.choice((1, 40, 160)))):
+                    done += 1
+                    rows, batches = connection.execute("select count(*), count(distinct run_id) from modes").fetchall()[
+                        0
+                    ]
+                    if rows != FEW_ROWS * batches or (seen or rows) != rows:
+                        problems.append(f"{rows} rows of {batches} batches, {seen} before")
+                    seen = rows
+        except Exception as error:
+            problems.append(f"{type(error).__name__}: {error}")
+            done += 1
+    return problems
+
+
+def race_of_readers(root: Path, n_reader: int = 4, n_read: int = 10_000) -> tuple[int, list[str], int]:
+    """(reads, what was wrong, commits) of several readers during the nights of a writer, which also compacts."""
+    root.mkdir(parents=True)
+    append(root, 0, FEW_ROWS)
+    stop, folder = root.with_suffix(".stop"), Path(__file__).resolve().parents[1]
+    start = "from pathlib import Path; from benchmarks.registry_race import read, write; "
+    calls = [f"print(write(Path({str(root)!r}), Path({str(stop)!r}), {FEW_ROWS}))"]
+    calls += [f"print(read(Path({str(root)!r}), {n_read // n_reader}, {k}))" for k in range(n_reader)]
+    writer, *readers = [
+        subprocess.Popen([sys.executable, "-c", start + call], stdout=subprocess.PIPE, text=True, cwd=folder)
+        for call in calls
+    ]
+    problems = [problem for reader in readers for problem in literal_eval(reader.communicate()[0] or "['no answer']")]
+    stop.touch()
+    return n_read // n_reader * n_reader, problems, int(writer.communicate()[0])

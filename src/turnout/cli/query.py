@@ -2,6 +2,7 @@
 
   turnout query "from resonance_drift(365)"
   turnout query "select * from section_trend('tommerup_s1/A7', 'ballast')" --csv trend.csv
+  turnout query "from worklist" --as-of 2026-11-24T12:00    what readers saw at that time (UTC), or in generation 17
   turnout query --list
 
 docs/registry.md lists every table, view and macro with its columns and units. Only queries are allowed, and only the
@@ -41,6 +42,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_registry(parser)
     add_csv(parser)
     parser.add_argument("--rows", type=at_least_one, default=60, help="rows shown at most (%(default)s)")
+    parser.add_argument(
+        "--as-of",
+        metavar="TIME|GENERATION",
+        help="what readers saw at that time (UTC) or in that generation; kept for a day",
+    )
     parser.add_argument("--list", action="store_true", help="name the tables, views and macros")
 
 
@@ -67,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
         print(listing())
         return 0
     sql = sys.stdin.read() if args.sql == "-" else args.sql
-    with open_confined(args.registry) as connection:
+    with open_confined(args.registry, args.as_of) as connection:
         try:
             require_reading(sql)
             result = connection.sql(sql)

@@ -13,14 +13,12 @@ from turnout.registry.database import build_database
 from turnout.registry.generation import (
     DataFile,
     Generation,
-    commit,
-    delete_files,
-    due_for_deletion,
     load,
     schema_of,
 )
 from turnout.registry.lock import registry_lock
 from turnout.registry.parquet import folder_of, read_list, read_live, write_sorted
+from turnout.registry.publication import publish
 from turnout.registry.schema import WHOLE_TABLES, file_literal, tables
 from turnout.registry.staging import connect
 from turnout.registry.supersede import LARGE_TABLES, count_superseded, latest_supersession, split_superseded
@@ -34,7 +32,7 @@ if TYPE_CHECKING:
 def compact(registry_dir: PathLike, at_least: int = 2, patience: float = 600.0) -> dict[str, tuple[int, int]]:
     """Merge the files of every table and year that has many.
 
-    Readers may continue meanwhile: the old files stay for two more generations. A damaged file is not merged: it is
+    Readers may continue meanwhile: the old files stay for another day. A damaged file is not merged: it is
     logged and taken off the list (``turnout.registry.damage``).
 
     Parameters
@@ -129,10 +127,7 @@ def _rewrite(
     files = sorted(count_superseded(con, root, files), key=lambda f: f.path)
     schemas = {f.schema: before.schemas.get(f.schema) or schema_of(f.table) for f in files}
     now = replace(before, number=number, files=files, retired=retired, schemas=schemas)
-    due = due_for_deletion(now)
-    commit(root, now)
-    build_database(root, now)
-    delete_files(root, due)
+    publish(root, now)
     return summary
 
 

@@ -12,6 +12,7 @@ from turnout.registry.database import open_registry
 from turnout.registry.schema import literal
 
 if TYPE_CHECKING:
+    from datetime import datetime
     from os import PathLike
 
 # Statements that only read; PIVOT is one of several steps (MULTI).
@@ -19,13 +20,15 @@ READING = {duckdb.StatementType.SELECT, duckdb.StatementType.MULTI}
 _EXPLAIN = re.compile(r"\s*explain\b(\s+analyze\b|\s*\([^()]*\))?", re.IGNORECASE)
 
 
-def open_confined(path: str | PathLike) -> duckdb.DuckDBPyConnection:
+def open_confined(path: str | PathLike, as_of: int | str | datetime | None = None) -> duckdb.DuckDBPyConnection:
     """Open a registry for queries of people: no other file, no network, no extension, no change of these limits.
 
     Parameters
     ----------
     path : str or PathLike
         Folder of the registry, or its ``registry.duckdb``.
+    as_of : int, str, datetime or None
+        Number of a kept generation, or a time, as for ``open_registry``; None: the present one.
 
     Returns
     -------
@@ -37,7 +40,7 @@ def open_confined(path: str | PathLike) -> duckdb.DuckDBPyConnection:
     RegistryError
         When there is none, when it cannot be opened, or when it was moved and not relocated.
     """
-    connection = open_registry(path)
+    connection = open_registry(path, as_of=as_of)
     ((folder,),) = connection.execute("select folder from registry_info").fetchall()
     for setting in (
         f"allowed_directories = [{literal(folder)}]",

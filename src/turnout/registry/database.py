@@ -150,10 +150,13 @@ LAST_POSSIBLE_SQL = """
     )::varchar"""
 
 
-def open_registry(path: str | PathLike, read_only: bool = True) -> duckdb.DuckDBPyConnection:
+def open_registry(
+    path: str | PathLike, read_only: bool = True, as_of: int | str | datetime | None = None
+) -> duckdb.DuckDBPyConnection:
     """Open a registry.
 
-    It is read-only by default: the next registration replaces the file with all that was written into it.
+    It is read-only by default: the next registration replaces the file with all that was written into it. An earlier
+    generation has its views in memory.
 
     Parameters
     ----------
@@ -161,6 +164,9 @@ def open_registry(path: str | PathLike, read_only: bool = True) -> duckdb.DuckDB
         Folder of the registry, or its ``registry.duckdb``.
     read_only : bool
         Whether nothing can be written.
+    as_of : int, str, datetime or None
+        Number of a kept generation, or a time (ISO text or datetime, UTC where it states no zone): what readers saw
+        then. Generations are kept for a day. None: the present one.
 
     Returns
     -------
@@ -170,10 +176,13 @@ def open_registry(path: str | PathLike, read_only: bool = True) -> duckdb.DuckDB
     Raises
     ------
     RegistryError
-        When there is none, when it cannot be opened, or when it was moved and not relocated.
+        When there is none, when it cannot be opened, when it was moved and not relocated, or when the generation
+        ``as_of`` is not kept.
     """
     path = Path(path)
     file = path / DATABASE if path.is_dir() else path
+    if as_of is not None and file.exists():
+        return _open_generation(file.parent, as_of)
     if not file.exists():
         raise RegistryError(
             f"{file}: there is no registry here. Run the pipeline, or give the folder that holds {DATABASE}."
@@ -188,6 +197,21 @@ def open_registry(path: str | PathLike, read_only: bool = True) -> duckdb.DuckDB
         connection.close()
         remedy = f"Where it was moved, run once: turnout registry relocate --registry '{file.parent}'"
         raise RegistryError(f"{file}: was made in {folder}, which is not there. {remedy}.")
+    return connection
+
+
+def _open_generation(folder: Path, as_of: int | str | datetime) -> duckdb.DuckDBPyConnection:
+    """Views of an earlier generation in a database in memory."""
+    from turnout.registry.publication import find_generation  # it publishes what this module builds
+
+    generation, time = find_generation(folder, as_of)
+    connection = duckdb.connect(":memory:", config=OFFLINE_CONFIG)
+    connection.execute("set enable_progress_bar = false")
+    try:
+        _create_views(connection, folder.resolve(), generation, time or datetime.now(UTC))
+    except duckdb.Error as error:
+        connection.close()
+        raise RegistryError(f"{folder}, generation {generation.number}: {str(error).splitlines()[0]}") from error
     return connection
 
 
@@ -214,7 +238,7 @@ def build_database(registry_dir: Path, generation: Generation) -> None:
     try:
         con.execute(f"attach {literal(str(unfinished))} as registry (storage_version '{STORAGE_VERSION}')")
         con.execute("use registry")
-        _create_views(con, root, generation)
+        _create_views(con, root, generation, datetime.now(UTC))
         con.execute("use memory")
         con.execute("detach registry")
         publish_file(unfinished, root / DATABASE)
@@ -286,7 +310,7 @@ def rebuild_database(registry_dir: Path) -> Generation:
     return generation
 
 
-def _create_views(con: duckdb.DuckDBPyConnection, root: Path, generation: Generation) -> None:
+def _create_views(con: duckdb.DuckDBPyConnection, root: Path, generation: Generation, published: datetime) -> None:
     for table in tables():
         con.execute(f'create view "{table}" as {read_live(con, root, table, generation.of(table))}')
     for table in LARGE_TABLES:
@@ -296,7 +320,7 @@ def _create_views(con: duckdb.DuckDBPyConnection, root: Path, generation: Genera
     last = counted and min(counted, until or counted)
     newest = f"timestamp {literal(last)}" if last else "null::timestamp"
     con.execute(f"create macro newest_measurement() as {newest}")
-    con.execute(f"create macro published_at() as timestamp '{datetime.now(UTC):%Y-%m-%d}'")
+    con.execute(f"create macro published_at() as timestamp '{published:%Y-%m-%d}'")
     con.execute(
         f"create view registry_info as select {generation.number}::bigint as generation, "
         f"{literal(str(root))} as folder, {newest} as newest_measurement_at_utc, "

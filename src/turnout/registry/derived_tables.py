@@ -13,14 +13,12 @@ from turnout.registry.database import build_database, is_behind
 from turnout.registry.generation import (
     DataFile,
     Generation,
-    commit,
-    delete_files,
-    due_for_deletion,
     load,
     schema_of,
 )
 from turnout.registry.lock import registry_lock
 from turnout.registry.parquet import write_sorted
+from turnout.registry.publication import publish as publish_generation
 from turnout.registry.schema import WHOLE_TABLES, key, tables, time_column
 from turnout.registry.staging import connect
 
@@ -73,10 +71,7 @@ def publish(
             return before
         schemas = before.schemas | {f.schema: schema_of(f.table) for f in files if f.table in frames}
         now = Generation(number, files, [*before.retired, *removed], schemas, before.consumed, before.incomplete)
-        due = due_for_deletion(now)
-        commit(root, now)
-        build_database(root, now)
-        delete_files(root, due)
+        publish_generation(root, now)
         return now
 
 

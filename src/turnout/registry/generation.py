@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 GENERATION_FILE = "_generation.json"
 FORMAT_VERSION = 1
-N_KEPT_GENERATIONS = 2  # for which retired files stay, for readers of an older state
+N_KEPT_GENERATIONS = 2  # for which retired files stay at least, whatever the clock says
 FORBIDDEN_CHARACTERS = {"?", "\\"}  # in a path: DuckDB reads options after the first and takes the second for a slash
 
 
@@ -43,9 +43,9 @@ class DataFile:
 class Generation:
     """State of the registry after one commit.
 
-    ``files`` are live. ``retired`` are (path, generation that removed it); they are deleted two generations later, so
-    that readers of an older state still find them. ``schemas`` maps a schema hash to its columns. ``consumed`` are the
-    work batches that are already registered and may be offered again. ``incomplete`` are tables of which damaged files
+    ``files`` are live. ``retired`` are (path, generation that removed it); they stay for another day, so that readers
+    of an older state still find them. ``schemas`` maps a schema hash to its columns. ``consumed`` are the work batches
+    that are already registered and may be offered again. ``incomplete`` are tables of which damaged files
     were taken off the list; the next registration restores their rows.
     """
 
@@ -100,12 +100,35 @@ def load(registry_dir: Path) -> Generation:
         When the file is not readable, which means that something else changed it, for it is written in one step. Also
         for a folder in which DuckDB can make no database.
     """
-    path = Path(registry_dir) / GENERATION_FILE
     require_usable_folder(registry_dir)
     try:
-        raw = json.loads(path.read_text(encoding="utf-8"))
+        return read_generation(Path(registry_dir) / GENERATION_FILE)
     except FileNotFoundError:
         return Generation()
+
+
+def read_generation(path: Path) -> Generation:
+    """A generation from its file.
+
+    Parameters
+    ----------
+    path : Path
+        ``_generation.json``, or that of an earlier generation.
+
+    Returns
+    -------
+    Generation
+        The list of files.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    RegistryError
+        When the file is not readable.
+    """
+    try:
+        raw = json.loads(path.read_text(encoding="utf-8"))
     except (json.JSONDecodeError, UnicodeDecodeError) as error:
         raise RegistryError(f"{path}: not a generation file ({error}). Put it back from a backup.") from None
     try:
@@ -232,28 +255,6 @@ def write_durably(path: Path, content: bytes) -> None:
     """
     write_atomic(path, lambda stream: stream.write(content))
     sync_folder(path.parent)
-
-
-def due_for_deletion(generation: Generation) -> list[str]:
-    """Remove from ``retired``, and return, the files that no reader of the last two generations can need.
-
-    Parameters
-    ----------
-    generation : Generation
-        List of the live and retired files; changed.
-
-    Returns
-    -------
-    list of str
-        Paths in the registry.
-    """
-    live = {f.path for f in generation.files}
-    # a small table that was changed back has its old path again, which may be live or retired a second time
-    dropped = dict(sorted(generation.retired, key=lambda entry: entry[1]))
-    waiting = {path: n for path, n in dropped.items() if path not in live}
-    last = generation.number - N_KEPT_GENERATIONS
-    generation.retired = sorted((path, n) for path, n in waiting.items() if n > last)
-    return sorted(path for path, n in waiting.items() if n <= last)
 
 
 def delete_files(registry_dir: Path, paths: list[str]) -> None:

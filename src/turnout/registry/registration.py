@@ -6,16 +6,18 @@ import platform
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
 from turnout.registry.database import build_database, is_behind
-from turnout.registry.generation import GENERATION_FILE, Generation, commit, delete_files, due_for_deletion, schema_of
+from turnout.registry.generation import GENERATION_FILE, Generation, commit, schema_of
 from turnout.registry.ids import content_id
 from turnout.registry.intake import Arrival, Refusal, gather
 from turnout.registry.parquet import read_live, write_sorted
+from turnout.registry.publication import publish
 from turnout.registry.schema import WHOLE_TABLES, key, literal, tables
 from turnout.registry.staging import (
     admit,
@@ -38,6 +40,8 @@ from turnout.registry.supersede import (
 if TYPE_CHECKING:
     from collections.abc import Iterable
     from typing import Any
+
+    import duckdb
 
     from turnout.registry.generation import DataFile
 
@@ -78,15 +82,20 @@ class Registration:
 
     def __init__(self, root: Path, before: Generation) -> None:
         self.root, self.before = root, before
-        self.con = connect(temp_directory=str(root / ".spill"))
         self.result_ids: list[str] = []
         self.n_refused = self.n_bad = 0
         self.whole: set[str] = set()
         self.replaced: set[str] = set()
-        create_staging(self.con)
+
+    @cached_property
+    def con(self) -> duckdb.DuckDBPyConnection:
+        """Connection with the staging tables and the views of the live rows; a night without news needs none."""
+        con = connect(temp_directory=str(self.root / ".spill"))
+        create_staging(con)
         for table in tables():
-            self.con.execute(f"create view old_{table} as {read_live(self.con, root, table, before.of(table))}")
-        note_superseded(self.con)
+            con.execute(f"create view old_{table} as {read_live(con, self.root, table, self.before.of(table))}")
+        note_superseded(con)
+        return con
 
     def take(self, arrivals: list[Arrival]) -> None:
         """Admit those units of a chunk whose result is not live already.
@@ -170,14 +179,11 @@ class Registration:
         if n_superseded:
             now.files = self._count_superseded(now.files)
         now.consumed = consumed
-        due = due_for_deletion(now)
-        commit(self.root, now)
-        build_database(self.root, now)
-        delete_files(self.root, due)
+        publish(self.root, now)
         return RegistrationResult(run_id, number, len(self.result_ids), rows, self.n_refused, n_superseded, faults)
 
     def _select_changed(self, arrivals: list[Arrival]) -> list[Arrival]:
-        if self.before.incomplete:  # a result that is live may have lost rows
+        if self.before.incomplete or not arrivals:  # a result that is live may have lost rows
             return arrivals
         offered_ids = pa.table({"result_id": pa.array([a.result_id for a in arrivals], pa.string())})
         self.con.register("_asked", offered_ids)

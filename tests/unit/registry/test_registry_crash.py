@@ -13,7 +13,7 @@ from filelock import FileLock
 from registry_rows import Bench, hammer_result
 
 from turnout.errors import RegistryError
-from turnout.registry import registration
+from turnout.registry import publication, registration
 from turnout.registry.database import is_behind, rebuild_database
 from turnout.registry.generation import load
 from turnout.registry.integrity import check, vacuum
@@ -80,14 +80,15 @@ def test_killed_at_random_moments_and_started_again_gives_the_same_bytes(bench, 
     assert check(bench.registry) == []
 
 
-STEPS = ["write_sorted", "commit", "build_database", "delete_files"]
+STEPS = ["write_sorted", "write_durably", "commit", "build_database", "delete_files"]
 
 
 @pytest.mark.parametrize("step", STEPS)
 @pytest.mark.parametrize("when", ["before", "after"])
 def test_a_stop_at_any_step_leaves_the_old_or_the_new_state(after_one, calm, hashes, monkeypatch, step, when):
     bench, (undisturbed, first, second) = after_one, calm
-    real, calls = getattr(registration, step), []
+    module = registration if step == "write_sorted" else publication
+    real, calls = getattr(module, step), []
 
     def stopped(*arguments):
         calls.append(arguments)
@@ -97,12 +98,12 @@ def test_a_stop_at_any_step_leaves_the_old_or_the_new_state(after_one, calm, has
             raise KeyboardInterrupt
         return real(*arguments)
 
-    monkeypatch.setattr(registration, step, stopped)
+    monkeypatch.setattr(module, step, stopped)
     with pytest.raises(KeyboardInterrupt):
         register([first, second], bench.registry, read=read_results)
     monkeypatch.undo()
     before, after = bench.ask("select count(*) from modes_current")[0][0], load(bench.registry).number
-    assert (before, after) == (64, 2 if step in STEPS[2:] or (step, when) == ("commit", "after") else 1)
+    assert (before, after) == (64, 2 if step in STEPS[3:] or (step, when) == ("commit", "after") else 1)
     register([first, second], bench.registry, read=read_results)
     assert bench.ask("select count(*), count(distinct model_id) from modes") == [(96, 96)]
     assert not is_behind(bench.registry, load(bench.registry))

@@ -9,7 +9,7 @@ import pytest
 from registry_rows import Bench, hammer_result
 
 from turnout.errors import RegistryError
-from turnout.registry import compaction, database
+from turnout.registry import database, publication
 from turnout.registry.compaction import compact, rebuild
 from turnout.registry.database import open_registry, rebuild_database, sort_by_needs
 from turnout.registry.generation import GENERATION_FILE, load
@@ -75,29 +75,17 @@ def test_compaction_parts_what_counts_from_what_does_not(five_nights, hammer):
 
 def test_a_glob_counts_twice_during_compaction_and_the_list_does_not(five_nights, monkeypatch):
     glob = f"select count(*) from read_parquet('{five_nights.registry}/modes/year=*/*.parquet')"
-    seen, real = [], compaction.commit
+    seen, real = [], publication.commit
 
     def look(root, generation):
         seen.append((five_nights.ask("select count(*) from modes"), duckdb.sql(glob).fetchall()))
         real(root, generation)
         seen.append((five_nights.ask("select count(*) from modes"), duckdb.sql(glob).fetchall()))
 
-    monkeypatch.setattr(compaction, "commit", look)
+    monkeypatch.setattr(publication, "commit", look)
     compact(five_nights.registry)
     assert [listed for listed, _ in seen] == [[(21,)], [(21,)]]
     assert [globbed for _, globbed in seen] == [[(42,)], [(42,)]]
-
-
-def test_who_opened_the_registry_before_can_still_read_two_generations_on(five_nights, hammer):
-    with open_registry(five_nights.registry) as reader:
-        compact(five_nights.registry)
-        assert reader.execute("select count(*) from modes").fetchall() == [(21,)]
-        five_nights.register(hammer("t8"))
-        assert reader.execute("select count(*) from modes").fetchall() == [(21,)]
-    five_nights.register(hammer("t9"))
-    names = [p.name.split("-")[0] for p in (five_nights.registry / "modes" / "year=2026").iterdir()]
-    assert sorted(names) == ["batch", "batch", "compact", "superseded"], "dropped files go two generations later"
-    assert check(five_nights.registry) == []
 
 
 def test_a_small_table_that_changes_and_changes_back_is_never_deleted(bench):

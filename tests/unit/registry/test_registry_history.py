@@ -1,0 +1,139 @@
+"""Generations are kept for a day: for who opened one before, and for who asks what it said."""
+
+import re
+import shutil
+from datetime import UTC, datetime, timedelta
+
+import pytest
+from registry_rows import Bench, hammer_result
+
+from turnout.cli.main import main
+from turnout.errors import RegistryError
+from turnout.registry import database
+from turnout.registry.compaction import compact
+from turnout.registry.database import open_registry
+from turnout.registry.generation import load
+from turnout.registry.integrity import check, vacuum
+from turnout.registry.publication import HISTORY_FOLDER, TIME_FORMAT, history
+
+COUNT = "select count(*) from modes"
+
+
+def pass_time(registry, span):
+    """Let ``span`` pass: all generations were published that much earlier."""
+    for number, (path, time) in history(registry).items():
+        path.rename(path.with_name(f"{number:06d}-{(time - span).strftime(TIME_FORMAT)}.json"))
+
+
+def parquet_files(registry):
+    return {p.relative_to(registry).as_posix() for p in registry.rglob("*.parquet") if not p.name.startswith("_schema")}
+
+
+def count_as_of(registry, as_of):
+    with open_registry(registry, as_of=as_of) as connection:
+        return connection.execute(COUNT).fetchall()[0][0]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _few_views():
+    """Registries without views: their tables are enough here, and views take most of the time."""
+    database.views_version()  # keep that of all views, it is cached
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(database, "view_files", dict)
+        yield
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Generations 1 to 3 add a mode each, 4 merges them."""
+    root = tmp_path_factory.mktemp("made")
+    (root / "work").mkdir()
+    bench = Bench(root)
+    for day in ("2026-01-05", "2026-01-12", "2026-01-19"):
+        bench.register(hammer_result(day=day))
+    compact(bench.registry)
+    return bench
+
+
+@pytest.fixture
+def merged(made, tmp_path):
+    shutil.copytree(made.root, tmp_path / "copy")
+    bench = Bench(tmp_path / "copy")
+    bench.batches = [bench.root / "work" / b.name for b in made.batches]
+    return bench
+
+
+def test_who_opened_the_registry_can_read_it_for_a_day_whatever_is_published_meanwhile(merged, hammer):
+    merged.register(hammer("t1", day="2026-01-26"))
+    with open_registry(merged.registry) as reader:
+        for k in range(2):
+            compact(merged.registry)
+            merged.register(hammer(f"t{k + 2}"))
+            assert reader.execute(COUNT).fetchall() == [(4,)]
+        pass_time(merged.registry, timedelta(hours=23))
+        merged.register(hammer("t8"))
+        assert reader.execute(COUNT).fetchall() == [(4,)]
+
+
+def test_what_no_generation_of_the_last_day_names_is_deleted(merged, hammer):
+    assert len(load(merged.registry).retired) >= 3
+    pass_time(merged.registry, timedelta(days=1))
+    for k in range(2):
+        merged.register(hammer(f"t{k + 2}"))
+    generation = load(merged.registry)
+    assert {number for _, number in generation.retired} == {5, 6}  # the table of sections was written again
+    assert parquet_files(merged.registry) == {f.path for f in generation.files} | {p for p, _ in generation.retired}
+    assert list(history(merged.registry)) == [4, 5, 6]  # the last before that day was read until 5 came
+    assert [count_as_of(merged.registry, number) for number in (4, 5, 6)] == [3, 4, 5]
+    assert check(merged.registry) == [] and vacuum(merged.registry) == []
+
+
+@pytest.mark.parametrize("span", [timedelta(days=-400), timedelta(days=400)])
+def test_a_clock_that_was_wrong_keeps_nothing_for_ever_and_takes_nothing_at_once(merged, hammer, span):
+    """All times so far lie in the future, or long ago: two more generations are kept, then the files go."""
+    pass_time(merged.registry, span)
+    with open_registry(merged.registry, as_of=3) as reader:
+        merged.register(hammer("t2"))
+        assert reader.execute(COUNT).fetchall() == [(3,)]
+    merged.register(hammer("t3"))
+    assert {number for _, number in load(merged.registry).retired} == {5, 6}
+
+
+def test_an_earlier_generation_answers_by_number_and_by_time(merged):
+    start = datetime(2026, 11, 24, 6, tzinfo=UTC)
+    for number, (path, _) in history(merged.registry).items():
+        time = start + timedelta(hours=number)
+        path.rename(path.with_name(f"{number:06d}-{time.strftime(TIME_FORMAT)}.json"))
+    assert [count_as_of(merged.registry, number) for number in (1, 2, 3, 4)] == [1, 2, 3, 3]
+    asked = (
+        "2026-11-24T07:00",
+        "2026-11-24T08:59:59",
+        datetime(2026, 11, 24, 9),
+        "2026-11-24 12:30+02:00",
+        "2027-01-01",
+    )
+    assert [count_as_of(merged.registry, time) for time in asked] == [1, 2, 3, 3, 3]
+    with open_registry(merged.registry, as_of=2) as connection:
+        assert connection.execute("select generation, n_files from registry_info").fetchall()[0][0] == 2
+        assert connection.execute("select published_at()::varchar").fetchall() == [("2026-11-24 00:00:00",)]
+    kept = r"Kept are.*1 \(2026-11-24 07:00:00\)"
+    wrong = {9: "no generation of 9 is kept", "2026-11-24T06:59": kept, "yesterday": "no time and no number"}
+    for as_of, words in wrong.items():
+        with pytest.raises(RegistryError, match=words):
+            open_registry(merged.registry, as_of=as_of)
+
+
+def test_the_command_asks_an_earlier_generation_and_reads_nothing_else(merged, capsys, tmp_path):
+    assert main(["query", COUNT, "--registry", str(merged.registry), "--as-of", "2"]) == 0
+    assert re.search(r"^\s*2$", capsys.readouterr().out, re.M)
+    (tmp_path / "secret.csv").write_text("a\n1\n")
+    for sql in (f"from '{tmp_path}/secret.csv'", "create table x as select 1"):
+        assert main(["query", sql, "--registry", str(merged.registry), "--as-of", "2"]) != 0
+
+
+def test_an_entry_of_a_run_that_was_killed_before_its_generation_counted_is_not_used(merged, hammer):
+    lost = merged.registry / HISTORY_FOLDER / f"000005-{datetime.now(UTC).strftime(TIME_FORMAT)}.json"
+    lost.write_text("cut")
+    assert count_as_of(merged.registry, "2999-01-01") == 3
+    merged.register(hammer("t2"))
+    assert not lost.exists() and count_as_of(merged.registry, 5) == 4
