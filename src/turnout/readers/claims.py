@@ -244,7 +244,7 @@ class _Unpacked:
     def _next(self, n: int) -> bytes:
         """At least one byte, at most ``n``; none at the end."""
         try:
-            while not (piece := self.unpacker.decompress(self._packed(), n)):
+            while not (piece := self.unpacker.decompress(self._packed_bytes(), n)):
                 if not self.n_packed and not self.unpacker.unconsumed_tail:
                     return b""
         except zlib.error:
@@ -252,7 +252,7 @@ class _Unpacked:
             return b""
         return piece
 
-    def _packed(self) -> bytes:
+    def _packed_bytes(self) -> bytes:
         if self.unpacker.unconsumed_tail:
             return self.unpacker.unconsumed_tail
         packed = self.file.read(min(BLOCK, self.n_packed))
