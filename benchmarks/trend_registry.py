@@ -62,9 +62,8 @@ def registry_of_modes(root, turnouts, weeks, holdback=1):
 
 def small_registry(root, rows, number=1):
     """Write a registry in ``root`` that holds ``rows`` of modes only, with the writer of the registry."""
-    rows = rows.assign(
-        model_id=[f"m{i}" for i in range(len(rows))], damping_ratio=0.05, n_impacts=10, run_id="r", method="joint"
-    )
+    rows = rows.assign(model_id=[f"m{i}" for i in range(len(rows))], n_impacts=10, run_id="r", method="joint")
+    rows = rows if "damping_ratio" in rows else rows.assign(damping_ratio=0.05)
     with duckdb.connect() as con:
         con.register("came", rows.astype({"turnout_id": str, "section_id": str, "band": str, "source": str}))
         empty = [f"null::{c.type} as {c.name}" for c in tables()["modes"] if c.name not in rows.columns]

@@ -10,9 +10,10 @@ from turnout.trend.tables import arrow_rows
 
 NAMES = (
     "students_t", "epochs", "resonance_drift",
-    "passage_values", "chart_values", "mode_residuals", "cusum", "change_since_event", "maintenance_effect",
+    "passage_values", "chart_values", "recursive_modes", "mode_residuals",
+    "cusum", "change_since_event", "maintenance_effect",
     "chart_status_at", "unusable", "cannot_see", "was_said", "in_service", "time_to_threshold",
-    "is_below_target", "stiffness_words", "chart_states", "worklist",
+    "is_below_target", "stiffness_words", "damping_charts", "chart_states", "worklist",
 )  # fmt: skip
 
 

@@ -55,6 +55,12 @@ ROWS = {
     "charts": f"""
         select turnout_id, section_id, band, measured_at_utc, expected_low_hz, expected_high_hz, state, deviation_pct
         from charts where source = 'hammer' and {ID_GIVEN} order by section_id, band, measured_at_utc""",
+    "damping_charts": f"""
+        select turnout_id, section_id, band, measured_at_utc, expected_low_damping, expected_high_damping, state
+        from damping_charts where source = 'hammer' and {ID_GIVEN} order by section_id, band, measured_at_utc""",
+    "recursive_modes": f"""
+        select turnout_id, section_id, band, measured_at_utc, frequency_recursive_hz, damping_recursive
+        from recursive_modes where source = 'hammer' and {ID_GIVEN} order by section_id, band, measured_at_utc""",
     "chart_states": f"select * from chart_states_on(:today) where {ID_GIVEN}",
     "mismatches": f"select * from findings_newest where {ID_GIVEN} and verdict <> 'none' order by level_before desc",
     "worklist": f"select * from {whole_list(':today')} where {ID_GIVEN} order by rank",
@@ -91,7 +97,7 @@ SCORES = """
         where band in ('ballast', 'railpad') and drift_pct_per_year is not null and drift_se_pct_per_year is not null
     ) group by turnout_id
 """
-TREND_VIEWS = {"charts", "chart_states", "worklist"}
+TREND_VIEWS = {"charts", "damping_charts", "chart_states", "worklist"}
 
 
 class FleetSource:

@@ -24,6 +24,9 @@ PAGE_CONTENT = {
     "charts": """(
         select turnout_id, section_id, band, measured_at_utc, expected_low_hz, expected_high_hz, state, deviation_pct
         from charts where source = 'hammer')""",
+    "damping_charts": """(
+        select turnout_id, section_id, band, measured_at_utc, expected_low_damping, expected_high_damping
+        from damping_charts where source = 'hammer')""",
     "chart_states": "chart_states_on(:today)",
     "worklist": f"(select * exclude (rank, n_in_all) from {whole_list(':today')})",
 }

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -17,12 +17,12 @@ from turnout.trend.change_point import find_change
 from turnout.trend.drift import adjusted_p_values
 from turnout.trend.forecast import N_RECENT, forecast
 from turnout.trend.panel import WHOLE_TURNOUT, timestamps
+from turnout.trend.quantities import is_damping
 from turnout.trend.residuals import first_epoch
 from turnout.trend.stiffness import COMPONENTS, ResonancePair, chart_numbers, resonance_pair, stiffness_change
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from typing import Any
 
     from turnout.config.settings.trend import TrendSettings
     from turnout.trend.cusum import Charts
@@ -50,6 +50,15 @@ COLUMNS = {
     "pad_stiffness_pct": float,
     "pad_stiffness_low_pct": float,
     "pad_stiffness_high_pct": float,
+}
+
+# No limit is set for a damping ratio, so there is no time to it.
+WITHOUT_LIMIT: dict[str, Any] = {
+    "forecast": None,
+    "forecast_slope_pct_per_year": np.nan,
+    "forecast_slope_se_pct_per_year": np.nan,
+    "not_before_utc": np.datetime64("NaT"),
+    "not_after_utc": np.datetime64("NaT"),
 }
 
 
@@ -92,7 +101,12 @@ def candidates(charts: Charts, status: pd.DataFrame, settings: TrendSettings) ->
     """
     p = charts.prepared
     whole = status["section_id"].to_numpy() == WHOLE_TURNOUT
-    drifting = p.baseline.complete & ~whole & (status["drift_p"].to_numpy() <= settings.false_discovery)
+    drifting = (
+        p.baseline.complete
+        & ~whole
+        & ~is_damping(status["band"])
+        & (status["drift_p"].to_numpy() <= settings.false_discovery)
+    )
     flags, numbers = {}, chart_numbers(charts)
     for i in np.flatnonzero((status["state"].to_numpy() == "alarm") | drifting):
         column = np.flatnonzero(np.isfinite(charts.residual[i]) & (p.epoch[i] == p.epoch[i, -1]))
@@ -155,10 +169,13 @@ def describe_flagged(status: pd.DataFrame, flags: Mapping[int, Flag], settings: 
         A copy of ``status`` with the columns ``drift_q`` and ``COLUMNS``.
     """
     status = status.copy()
-    is_tested = status["complete"].to_numpy() & (status["section_id"].to_numpy() != WHOLE_TURNOUT)
+    damping = is_damping(status["band"])
+    is_tested = status["complete"].to_numpy() & (status["section_id"].to_numpy() != WHOLE_TURNOUT) & ~damping
     status["drift_q"] = adjusted_p_values(np.where(is_tested, status["drift_p"].to_numpy(), np.nan))
     flagged = ((status["state"] == "alarm") | (status["drift_q"] <= settings.false_discovery)).to_numpy()
     descriptions = {i: _describe_chart(flag, settings) for i, flag in flags.items() if flagged[i]}
+    for i in descriptions.keys() & set(np.flatnonzero(damping)):
+        descriptions[i] |= WITHOUT_LIMIT
     for name, dtype in COLUMNS.items():
         column = np.full(len(status), None if dtype is object else np.nan, dtype=object if dtype is object else float)
         if "datetime" in str(dtype):

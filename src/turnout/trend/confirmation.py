@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.trend.epochs import expand_epochs
+from turnout.trend.quantities import is_damping
 
 if TYPE_CHECKING:
     from turnout.config.settings.trend import TrendSettings
@@ -50,7 +51,9 @@ def deviation_limit(sd: np.ndarray, settings: TrendSettings) -> np.ndarray:
 
 
 def far_deviations(charts: Charts, settings: TrendSettings) -> np.ndarray:
-    """Deviation of every campaign of a hammer test that is far outside its expected value.
+    """Deviation of every campaign of a hammer test whose resonance is far outside its expected value.
+
+    A damping ratio asks for no repetition: it scatters far more than its resonance, which shows the same loss.
 
     A settled campaign is compared with the chart, with and without siblings, for a loss may be common to many
     sections. Without a temperature, the standard deviation contains the effect of the temperatures of the baseline.
@@ -78,7 +81,8 @@ def far_deviations(charts: Charts, settings: TrendSettings) -> np.ndarray:
     sections = np.where(np.isfinite(sections), sections, own)
     early = _beyond(*_deviation_from_earlier(charts, ~settled[:n], settings), settings, by_percent=True)
     deviation[:n] = np.where(np.isfinite(early), early, sections)
-    return np.where((p.charts["source"] == "hammer").to_numpy()[:, None], deviation, np.nan)
+    is_judged = (p.charts["source"] == "hammer").to_numpy() & ~is_damping(p.charts["band"])
+    return np.where(is_judged[:, None], deviation, np.nan)
 
 
 def _beyond(values: np.ndarray, sd: np.ndarray, settings: TrendSettings, by_percent: bool = False) -> np.ndarray:

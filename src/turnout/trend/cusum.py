@@ -12,6 +12,7 @@ import numpy as np
 
 from turnout.trend.confirmation import far_deviations
 from turnout.trend.epochs import by_epoch, expand_epochs
+from turnout.trend.quantities import targets
 from turnout.trend.residuals import (
     Prepared,
     first_epoch,
@@ -199,7 +200,10 @@ def finish(p: Prepared, phi: np.ndarray, settings: TrendSettings) -> Charts:
     n = len(p.panel.charts)
     widening = np.sqrt((1.0 + phi) / (1.0 - phi))
     with np.errstate(invalid="ignore"):
-        visible = settings.target_percent >= settings.allowance_switch * p.spread * widening * settings.guard_large
+        visible = (
+            targets(p.charts["band"], settings)
+            >= settings.allowance_switch * p.spread * widening * settings.guard_large
+        )
     allowance = np.where(visible, settings.allowance_large, settings.allowance_small)
     guard = guard_factor(p.baseline.count, ~visible, settings)
     n_learning = np.where(visible, settings.learning_large, settings.learning_small)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.trend.panel import days, is_true
+from turnout.trend.quantities import resonances_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -17,9 +18,9 @@ def epochs_of(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Number the epochs of every chart from the maintenance events.
 
-    An event resets the charts of its band (``resets_ballast``, ``resets_railpad``) in its section, or in the whole
-    turnout where ``section_id`` is empty. The flags alone decide, so a change of sensor or method resets as tamping
-    does. Bands other than ballast and railpad are reset by either flag. A campaign at the time of the event belongs to
+    An event resets the charts of its resonance and of its damping (``resets_ballast``, ``resets_railpad``) in its
+    section, or in the whole turnout where ``section_id`` is empty. The flags alone decide, so a change of sensor or
+    method resets as tamping does. Other bands are reset by either flag. A campaign at the time of the event belongs to
     the new epoch. An event before the first campaign changes nothing. Two events between the same two campaigns make
     one epoch. An event after the last campaign is pending.
 
@@ -58,7 +59,7 @@ def _mark(reset: np.ndarray, charts: pd.DataFrame, time: np.ndarray, events: pd.
     """Enter each event in ``reset`` at the first campaign at or after it; column n_campaign means none yet."""
     filled = np.where(np.isnan(time), np.inf, time)
     members = charts.groupby("turnout_id", sort=False, observed=True).indices
-    band = charts["band"].to_numpy()
+    band = resonances_of(charts["band"])
     section = charts["section_id"].to_numpy()
     chosen = {flag: (band == flag) | ~np.isin(band, ["ballast", "railpad"]) for flag in ("ballast", "railpad")}
     for event, at in zip(events.itertuples(index=False), days(events["event_at_utc"])):

@@ -14,6 +14,7 @@ from turnout.trend.detectability import detectable_shift
 from turnout.trend.drift import slopes, span
 from turnout.trend.epochs import by_epoch
 from turnout.trend.panel import WHOLE_TURNOUT, timestamps
+from turnout.trend.quantities import targets
 from turnout.trend.residuals import FREQUENCY_RESOLUTION, first_epoch, slope_variance
 from turnout.trend.threshold import run_lengths
 
@@ -224,7 +225,7 @@ def chart_status(charts: Charts, settings: TrendSettings) -> pd.DataFrame:
     status["without_temperature"] = p.baseline.without_temperature
     status["detectable_pct"] = detectable
     status["stale_after_days"] = stale_after(p, settings)
-    status["target_pct"] = settings.target_percent
+    status["target_pct"] = targets(p.charts["band"], settings)
     status["worklist_rows"] = settings.worklist_rows
     status["drift_pct_per_year"] = np.where(is_too_short, np.nan, slope)
     status["drift_se_pct_per_year"] = np.where(is_too_short, np.nan, error)
@@ -352,7 +353,7 @@ def _states(
     mostly_no_temperature = p.baseline.without_temperature > 0.5 * status["n_campaigns"].to_numpy()
     n_learned = status["n_learned"].to_numpy()
     relearn = p.baseline.complete & (p.pending | ((p.epoch[:, -1] > first_epoch(p)) & (n_learned < charts.n_learning)))
-    too_noisy = ~(status["detectable_pct"].to_numpy() <= settings.target_percent)
+    too_noisy = ~(status["detectable_pct"].to_numpy() <= status["target_pct"].to_numpy())
     rules = [
         (~np.isfinite(last) & whole, "cannot_tell", "too_few_sections"),
         (~np.isfinite(last), "not_measured", "never"),

@@ -23,6 +23,7 @@ COMPONENTS = ("ballast", "pad")  # the spring that holds most of the energy of e
 # Half a sleeper over the rail of one sleeper bay: a light wooden sleeper under 60E1 to a long concrete bearer.
 MASS_RATIOS = (1.2, 10.0)
 REJECTION_PROBABILITY = 0.002  # a single component is ruled out below it: the true one is, in one case of 500
+MAX_DEVIATION = 4.0  # errors between a value and the fit of the change
 NORMAL_QUANTILE = float(stats.norm.isf(0.025))
 
 
@@ -30,13 +31,13 @@ NORMAL_QUANTILE = float(stats.norm.isf(0.025))
 class ResonancePair:
     """Values of both resonances of one section, each since the last event that resets it.
 
-    ``time`` [d] and ``values`` [%] are (n,) arrays by band; ``error`` is the standard deviation of a value, guarded and
-    with its memory [%]. ``coupling`` are the limits of ``coupling_limits``.
+    ``time`` [d], ``values`` and ``error`` [%] are (n,) arrays by band; an error is the standard deviation of a value,
+    guarded and with its memory. ``coupling`` are the limits of ``coupling_limits``.
     """
 
     time: Mapping[str, np.ndarray]
     values: Mapping[str, np.ndarray]
-    error: Mapping[str, float]
+    error: Mapping[str, np.ndarray]
     coupling: tuple[float, float]
 
 
@@ -163,9 +164,9 @@ def resonance_pair(
     time, values, error = {}, {}, {}
     for band in BANDS:
         i = chart_of[band]
-        columns = np.isfinite(charts.residual[i]) & (p.epoch[i] == p.epoch[i, -1])
+        columns = np.isfinite(charts.residual[i]) & np.isfinite(charts.sigma[i]) & (p.epoch[i] == p.epoch[i, -1])
         time[band], values[band] = p.time[i, columns], charts.residual[i, columns]
-        error[band] = float(p.spread[i] * charts.guard[i] * charts.widening[i])
+        error[band] = charts.sigma[i, columns] * charts.guard[i] * charts.widening[i]
     low, high = (_mean_frequency(charts, chart_of[band]) for band in BANDS)
     return ResonancePair(time, values, error, coupling_limits(high / low if low > 0.0 else np.nan))
 
@@ -280,18 +281,29 @@ def _extremes(changes: list[tuple[float, float]]) -> tuple[float, float, float]:
 
 
 def _log_change(pair: ResonancePair, band: str, shape: str, since: float) -> tuple[float, float]:
-    """Change of the logarithm of a resonance, and its variance; nan where it has no value before or after it."""
-    time, values = pair.time[band], pair.values[band]
-    after = time >= since
-    if not after.any() or after.all():
-        return float("nan"), float("nan")
-    newest = max(float(t[-1]) for t in pair.time.values() if t.size)
-    change = after.astype(float)
-    if shape == "drift":
-        change = np.maximum(time - since, 0.0) / max(newest - since, 1e-9)
-    centred = change - change.mean()
-    weight = float(centred @ centred)
-    if not weight > 0.0:
-        return float("nan"), float("nan")
-    factor = 1.0 + float(centred @ values) / weight / 100.0
-    return float(np.log(max(factor, 1e-3))), (pair.error[band] / 100.0 / max(factor, 1e-3)) ** 2 / weight
+    """Change of the logarithm of a resonance, and its variance; nan where it has no value before or after it.
+
+    A value further than ``MAX_DEVIATION`` errors from the fit is left out, the furthest first: it may be another mode.
+    """
+    newest = max((float(t[-1]) for t in pair.time.values() if t.size), default=0.0)
+    time, values, error = pair.time[band], pair.values[band], pair.error[band]
+    while True:
+        after = time >= since
+        if not after.any() or after.all():
+            return float("nan"), float("nan")
+        change = after.astype(float)
+        if shape == "drift":
+            change = np.maximum(time - since, 0.0) / max(newest - since, 1e-9)
+        weight = 1.0 / error**2
+        centred = change - np.average(change, weights=weight)
+        precision = float(np.sum(weight * centred**2))
+        if not precision > 0.0:
+            return float("nan"), float("nan")
+        size = float(np.sum(weight * centred * values)) / precision
+        deviation = np.abs(values - np.average(values, weights=weight) - size * centred) / error
+        furthest = int(np.argmax(deviation))
+        if deviation[furthest] <= MAX_DEVIATION:
+            break
+        time, values, error = (np.delete(part, furthest) for part in (time, values, error))
+    factor = max(1.0 + size / 100.0, 1e-3)
+    return float(np.log(factor)), 1e-4 / (factor**2 * precision)

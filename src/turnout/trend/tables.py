@@ -15,6 +15,7 @@ from scipy import stats
 from turnout.registry.schema import arrow_schema, tables
 from turnout.trend.epochs import by_epoch
 from turnout.trend.panel import timestamps
+from turnout.trend.quantities import DAMPING_SCALE, is_damping
 from turnout.trend.residuals import first_epoch
 from turnout.trend.states import campaigns_a_year, detectable_in_epoch, spread_in
 from turnout.trend.threshold import run_lengths
@@ -130,7 +131,7 @@ def chart_rows(charts: Charts) -> pd.DataFrame:
 
 
 def reference_frequency(p: Prepared) -> np.ndarray:
-    """f0 of each chart; nan for a whole turnout and for amplitudes, which are no frequencies.
+    """f0 of each chart; nan for a whole turnout, and for amplitudes and damping ratios, which are no frequencies.
 
     Parameters
     ----------
@@ -142,7 +143,8 @@ def reference_frequency(p: Prepared) -> np.ndarray:
     (n_chart,) array of float
         Frequency. [Hz]
     """
-    return np.where(p.charts["band"] == "amplitude", np.nan, p.baseline.frequency)
+    is_frequency = (p.charts["band"] != "amplitude") & ~is_damping(p.charts["band"])
+    return np.where(is_frequency, p.baseline.frequency, np.nan)
 
 
 def _with_wrong_times(rows: pd.DataFrame, left_out: pd.DataFrame) -> pd.DataFrame:
@@ -198,6 +200,7 @@ def baseline_rows(charts: Charts, settings: TrendSettings) -> pd.DataFrame:
         epoch=epoch.astype(np.int32),
         epoch_start_utc=timestamps(p.started[chart, epoch]),
         frequency_hz=reference_frequency(p)[chart],
+        damping_ratio=np.where(is_damping(p.charts["band"]), p.baseline.frequency / DAMPING_SCALE, np.nan)[chart],
         rail_temperature_c=base.reference[chart],
         slope_pct_per_c=base.slope[chart],
         slope_se_pct_per_c=base.slope_se[chart],

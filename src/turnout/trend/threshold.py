@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import brentq
 
+from turnout.trend.quantities import is_damping
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -80,7 +82,7 @@ def threshold_for(campaigns: float, allowance: float) -> float:
 def run_lengths(bands: Sequence[str] | np.ndarray | pd.Series, direction: str, settings: TrendSettings) -> np.ndarray:
     """Mean campaigns between false alarms: fewer for the harmful direction.
 
-    Harmful is down for stiffness, up for acceleration.
+    Harmful is down for stiffness, up for acceleration. Of a damping ratio both directions are alike.
 
     Parameters
     ----------
@@ -103,4 +105,5 @@ def run_lengths(bands: Sequence[str] | np.ndarray | pd.Series, direction: str, s
     array([ 5600., 56000.])
     """
     harmful = (np.asarray(bands) == "amplitude") == (direction == "up")
-    return np.where(harmful, settings.run_length_loss, settings.run_length_gain)
+    lengths = np.where(harmful, settings.run_length_loss, settings.run_length_gain)
+    return np.where(is_damping(bands), settings.run_length_damping, lengths)

@@ -26,6 +26,7 @@ from turnout.trend.alarms import PREVIOUS_ALARMS, Flag, candidates, describe_fla
 from turnout.trend.cusum import finish
 from turnout.trend.evaluation import shared_autocorrelation
 from turnout.trend.panel import CHART_KEYS, SECONDS_PER_DAY, believable_times, days, lay_out, timestamps
+from turnout.trend.quantities import DAMPING_ENDING, DAMPING_SCALE, RESONANCES
 from turnout.trend.residuals import prepare
 from turnout.trend.states import chart_status
 from turnout.trend.tables import alarm_rows, arrow_rows, baseline_rows, chart_rows
@@ -115,6 +116,14 @@ CELLS_PER_PART = 1_500_000  # values per group of turnouts that is evaluated at 
 HAMMER_MODES_SQL = (
     "select turnout_id, section_id, band, source, measured_at_utc, frequency_hz, frequency_se_hz, rail_temperature_c "
     "from modes_current where source = 'hammer' and coalesce(method, 'joint') = 'joint'"
+)
+# Damping ratios in percent of critical damping. One without a standard error is not charted.
+HAMMER_DAMPING_SQL = (
+    f"select turnout_id, section_id, band || '{DAMPING_ENDING}' as band, source, measured_at_utc, "
+    f"{DAMPING_SCALE} * damping_ratio as frequency_hz, {DAMPING_SCALE} * damping_se as frequency_se_hz, "
+    "rail_temperature_c "
+    "from modes_current where source = 'hammer' and coalesce(method, 'joint') = 'joint' and damping_se is not null "
+    f"and band in {RESONANCES}"
 )
 
 
@@ -245,7 +254,8 @@ def _chart_groups(
     con.execute("create temp table by_trains as select * from passage_values")
     later = "" if as_of is None else f" where measured_at_utc <= timestamp '{timestamps(days([as_of]))[0]}'"
     con.execute(
-        f"create temp view charted as select * from ({HAMMER_MODES_SQL} union all select * from by_trains){later}"
+        f"create temp view charted as select * from ({HAMMER_MODES_SQL} union all {HAMMER_DAMPING_SQL} "
+        f"union all select * from by_trains){later}"
     )
     charts = con.execute(
         f"select {', '.join(CHART_KEYS)}, max(measured_at_utc) as newest from charted group by all"

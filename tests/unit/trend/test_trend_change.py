@@ -158,3 +158,34 @@ def test_the_size_of_a_clear_step_has_students_interval():
     assert found.size == pytest.approx(after.mean() - before.mean(), abs=1e-3)
     # the normal distribution would give an interval that is 13 % narrower
     assert found.high - found.low == pytest.approx(2.0 * half, rel=0.01)
+
+
+def brute_force_size(time, values, pieces, level):
+    """Quantiles of the size by a sum over every onset and shape: least squares by numpy, Student's t by scipy."""
+    years, n, parts = (time - time[-1]) / DAYS_PER_YEAR, time.size, []
+    for i in range(2, n):
+        width = (years[i] - years[i - 1]) / pieces
+        for k in range(pieces):
+            onset = years[i - 1] + (k + 0.5) * width
+            for x in ((years >= onset).astype(float), np.maximum(years - onset, 0.0) / -onset):
+                design = np.column_stack([np.ones(n), x])
+                coefficient, rss, *_ = np.linalg.lstsq(design, values, rcond=None)
+                weight = 1.0 / np.linalg.inv(design.T @ design)[1, 1]
+                parts.append((width * weight**-0.5 * rss[0] ** (-0.5 * (n - 2)), coefficient[1], rss[0], weight))
+    p, size, rss, weight = np.array(parts).T
+    freedom = n - 3  # level, size and onset
+    scale = np.sqrt(rss / freedom / weight)
+    grid = np.linspace(size.min() - 60 * scale.max(), size.max() + 60 * scale.max(), 20_001)
+    probability = np.zeros(grid.size)
+    for share, middle, width in zip(p / p.sum(), size, scale):
+        probability += share * stats.t.cdf(grid, freedom, middle, width)
+    return np.interp([0.5 - level / 2, 0.5 + level / 2], probability, grid)
+
+
+def test_the_interval_of_a_size_from_few_values_is_that_of_students_t():
+    """With three degrees of freedom its 95 % limit is 3.18 standard errors; that of a normal distribution is 1.96."""
+    rng, n = np.random.default_rng(6), 6
+    time = np.arange(n) * 46.0
+    values = np.where(np.arange(n) >= n // 2, -3.0, 0.0) + 0.4 * rng.standard_normal(n)
+    found = find_change(time, values, 0.0)
+    assert [found.low, found.high] == pytest.approx(brute_force_size(time, values, 4, 0.95), rel=2e-3)

@@ -7,7 +7,13 @@ from benchmarks.trend_fleet import Fleet, modes
 from scipy.linalg import eigvalsh
 
 from turnout.trend import candidates, chart_status, describe_flagged, evaluate
-from turnout.trend.stiffness import coupling_limits, coupling_share, judged_change
+from turnout.trend.stiffness import (
+    ResonancePair,
+    coupling_limits,
+    coupling_share,
+    judged_change,
+    stiffness_change,
+)
 
 from .test_trend_list import viewed
 
@@ -72,6 +78,21 @@ def test_no_alarm_of_a_fleet_blames_the_wrong_component(settings, pad, ballast, 
     own = flagged[flagged["changed_component"] == component]
     is_covered = (own[f"{component}_stiffness_low_pct"] <= -12.0) & (own[f"{component}_stiffness_high_pct"] >= -12.0)
     assert len(own) >= 40 and is_covered.mean() >= 0.9
+
+
+def test_one_campaign_of_another_mode_does_not_name_its_component():
+    """Five campaigns after softer ballast; in the fourth another mode was taken for the railpad resonance."""
+    time, rng = np.arange(25.0) * 46.0, np.random.default_rng(8)
+    since, after = 900.0, time >= 900.0
+    values = {"ballast": -6.0 * after + 0.3 * rng.standard_normal(25), "railpad": 0.3 * rng.standard_normal(25)}
+    values["railpad"][23] += 28.0
+    error = {band: np.full(25, 0.5) for band in values}
+    pair = ResonancePair({band: time for band in values}, values, error, coupling_limits(4.0))
+    found = stiffness_change(pair, "step", since)
+    assert found.component == "ballast" and found.ballast[1] < 100.0 * (0.94**2 - 1.0) < found.ballast[2]
+    error["railpad"][:] = 20.0
+    assert stiffness_change(pair, "step", since).component == "ballast"
+    assert stiffness_change(None, "step", since).component == "either"
 
 
 def test_the_railpad_is_not_on_the_list_for_softer_ballast(settings):

@@ -34,6 +34,9 @@ class TrendSettings:
     target_percent: float = setting(
         1.5, "%", "change in frequency to be seen: 3 % of stiffness, one degree of freedom", minimum=0.01
     )
+    target_damping_percent: float = setting(
+        20.0, "%", "change of a damping ratio to be seen; no limit is published, so this is an estimate", minimum=0.01
+    )
     allowance_large: float = setting(
         1.0, "", "CUSUM allowance k where the target is at least allowance_switch standard deviations", minimum=0.1
     )
@@ -53,6 +56,12 @@ class TrendSettings:
     )
     run_length_gain: float = setting(
         56000.0, "", "the same for a gain of stiffness, which is rarely urgent: a tenth of the alarms", minimum=20.0
+    )
+    run_length_damping: float = setting(
+        112000.0,
+        "",
+        "the same for a damping ratio, up and down alike: both together a tenth of the alarms of its resonance",
+        minimum=20.0,
     )
     single_share: float = setting(
         0.6,

@@ -27,6 +27,9 @@ select
         when band = 'amplitude' and coalesce(detectable_pct < 50, false) then
             printf('a change below %.1f %% of acceleration may go unseen for a year; asked for: %.1f %%',
                 up_to_a_tenth(detectable_pct), target_pct)
+        when ends_with(band, '_damping') and detectable_pct is not null then
+            printf('a change below %.0f %% of the damping ratio may go unseen for a year; asked for: %.0f %%',
+                ceil(detectable_pct), target_pct)
         when coalesce(detectable_pct < 50, false) then
             printf('a change below %.1f %% of frequency (about %.1f %% in stiffness) may go unseen for a year; '
                 || 'asked for: %.1f %% (%.1f %%)',

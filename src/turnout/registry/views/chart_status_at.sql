@@ -66,7 +66,8 @@ pending as (
     join events e
         on e.turnout_id = c.turnout_id and e.event_at_utc > c.last_at_utc and e.event_at_utc <= "asof"
             and (e.section_id is null or e.section_id = c.section_id)
-            and ((e.resets_ballast and c.band <> 'railpad') or (e.resets_railpad and c.band <> 'ballast'))
+            and ((e.resets_ballast and not starts_with(c.band, 'railpad'))
+                or (e.resets_railpad and not starts_with(c.band, 'ballast')))
 ),
 alarmed as (
     select distinct turnout_id, section_id, band, source

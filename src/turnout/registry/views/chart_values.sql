@@ -1,4 +1,5 @@
 -- One row per chart and campaign: the values that the charts are made of, with their own error bars.
+-- Bands ballast_damping and railpad_damping hold damping ratios in percent of critical damping, amplitude accelerations.
 -- source hammer: modes of hammer tests, method joint. source passage: passage_values. Never one chart.
 -- needs: modes_current, passage_values
 create or replace view chart_values as
@@ -6,6 +7,13 @@ select
     turnout_id, section_id, band, source, measured_at_utc, frequency_hz, frequency_se_hz, rail_temperature_c
 from modes_current
 where source = 'hammer' and coalesce(method, 'joint') = 'joint'
+union all
+select
+    turnout_id, section_id, band || '_damping', source, measured_at_utc, 100 * damping_ratio, 100 * damping_se,
+    rail_temperature_c
+from modes_current
+where source = 'hammer' and coalesce(method, 'joint') = 'joint' and damping_se is not null
+    and band in ('ballast', 'railpad')
 union all
 select * from passage_values;
 

@@ -18,7 +18,7 @@ with own as (
         ) as value_pct
     from charts c
     join baselines b using (turnout_id, section_id, band, source, epoch)
-    where c.residual_pct is not null and c.section_id <> '*'
+    where c.residual_pct is not null and c.section_id <> '*' and not ends_with(c.band, '_damping')
 ),
 values_pct as (
     select

@@ -11,7 +11,7 @@ with valued as (
     asof join charts c
         on m.turnout_id = c.turnout_id and m.section_id = c.section_id and m.band = c.band and m.source = c.source
             and m.measured_at_utc >= c.measured_at_utc
-    where c.measured_at_utc >= since and m.frequency_hz > 0
+    where c.measured_at_utc >= since and m.frequency_hz > 0 and not ends_with(c.band, '_damping')
     qualify row_number() over (
         partition by c.turnout_id, c.section_id, c.band, c.source, c.measured_at_utc order by m.measured_at_utc desc
     ) = 1

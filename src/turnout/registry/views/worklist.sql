@@ -110,6 +110,8 @@ silent as (
         null::timestamp as since_latest_utc, why
     from cannot_see("asof") c
     where (section_id <> '*' or band = 'all') and state in ('learning', 'cannot tell')
+        -- nobody measures better for the damping alone; its resonance has a row of its own
+        and not ends_with(band, '_damping')
         and not exists (
             select 1 from alarmed a
             where a.turnout_id = c.turnout_id and a.section_id = c.section_id and a.band = c.band
@@ -186,7 +188,10 @@ select
     h.pad_stiffness_pct, h.pad_stiffness_low_pct, h.pad_stiffness_high_pct,
     case
         when h.why is not null then h.why
-        else (case when h.band = 'amplitude' then 'acceleration under trains, ' else h.band || ' resonance of ' end)
+        else (case
+                when h.band = 'amplitude' then 'acceleration under trains, '
+                when ends_with(h.band, '_damping') then 'damping of the ' || replace(h.band, '_damping', '') || ' resonance of '
+                else h.band || ' resonance of ' end)
             || (case when h.section_id = '*' then 'the whole turnout' else split_part(h.section_id, '/', -1) end)
             || (case when not coalesce(h.told, true) then ', mean of its last campaigns since the sum began to grow,' else '' end)
             || (case when h.change_pct < 0 then ' fell by ' else ' rose by ' end)
@@ -250,6 +255,8 @@ select
         when h.component = 'ballast' then 'frost, or tamping that is not in the events'
         when h.component = 'railpad' and h.direction = 'down' then 'worn, cracked or displaced pads, loose fastenings'
         when h.component = 'railpad' then 'pads exchanged or hardened; an exchange that is not in the events'
+        when h.band = 'ballast_damping' then 'wet, fouled or loose ballast; frost; the position of hammer and sensor'
+        when h.band = 'railpad_damping' then 'aged or hardened pads, loose fastenings; the position of hammer and sensor'
         when h.band = 'amplitude' then 'running surface, fastenings and voids; the mounting of the sensor'
         else 'the section'
     end as look_at,

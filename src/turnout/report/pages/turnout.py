@@ -9,7 +9,7 @@ from turnout.report import panels
 from turnout.report.formatting import badge, count_of, day, number_ranges, with_interval
 from turnout.report.panels.diagram import diagram
 from turnout.report.panels.hammer import HammerTest
-from turnout.report.panels.history import history_panel
+from turnout.report.panels.history import DAMPING, FREQUENCY, history_panel
 from turnout.report.trains import trains_part
 
 if TYPE_CHECKING:
@@ -137,13 +137,18 @@ def _section(
     receptances = (r for r in _rows_of(rows, "receptances", section) if model and r["model_id"] == model["model_id"])
     receptance = next(receptances, None)  # a test with too few impacts has none
     charts, events = _rows_of(rows, "charts", section), [e for e in rows["events"] if e["section_id"] in (None, key)]
+    tables = {FREQUENCY: charts, DAMPING: _rows_of(rows, "damping_charts", section)}
+    recursive = _rows_of(rows, "recursive_modes", section)
     history = "".join(
         history_panel(
             band,
-            [m for m in modes if m["band"] == band],
-            [c for c in charts if c["band"] == band],
+            [m for m in modes if m["band"] == band and m[quantity.value] is not None],
+            [c for c in table if c["band"] == band],
             events,
+            quantity=quantity,
+            recursive=[r for r in recursive if r["band"] == band],
         )
+        for quantity, table in tables.items()
         for band in BANDS
     )
     return {

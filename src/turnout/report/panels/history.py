@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +14,33 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from typing import Any
 
+
+@dataclass(frozen=True)
+class Quantity:
+    """Columns of one quantity of a mode, and how it is written.
+
+    ``value`` and ``error`` are columns of ``modes_current``; ``low``, ``high`` those of its chart; ``recursive``
+    that of ``recursive_modes``. ``name`` stands behind the band, ``unit`` behind a value; ``decimals``
+    are those of a title.
+    """
+
+    value: str
+    error: str
+    low: str
+    high: str
+    recursive: str
+    name: str = ""
+    unit: str = ""
+    decimals: int = 1
+
+
+FREQUENCY = Quantity(
+    "frequency_hz", "frequency_se_hz", "expected_low_hz", "expected_high_hz", "frequency_recursive_hz", unit=" Hz"
+)
+DAMPING = Quantity(
+    "damping_ratio", "damping_se", "expected_low_damping", "expected_high_damping", "damping_recursive", " damping",
+    decimals=4,
+)  # fmt: skip
 SERIES = {"point": "campaign", "confirm": "campaign to be confirmed", "alarm": "campaign in an open alarm"}
 
 
@@ -22,8 +50,10 @@ def history_panel(
     charts: Sequence[Mapping[str, Any]],
     events: Sequence[Mapping[str, Any]],
     width: int = 462,
+    quantity: Quantity = FREQUENCY,
+    recursive: Sequence[Mapping[str, Any]] = (),
 ) -> str:
-    """Frequency over time.
+    """Frequency or damping ratio over time.
 
     Parameters
     ----------
@@ -37,6 +67,10 @@ def history_panel(
         Rows of ``events`` that affect the section.
     width : int
         Width. [px]
+    quantity : Quantity
+        ``FREQUENCY`` or ``DAMPING``.
+    recursive : sequence of mapping
+        Rows of ``recursive_modes`` of the same section and band, drawn as a line.
 
     Returns
     -------
@@ -46,38 +80,42 @@ def history_panel(
     if not modes:
         return ""
     time = np.array([seconds(m["measured_at_utc"]) for m in modes])
-    frequency = np.array([m["frequency_hz"] for m in modes])
-    error = np.array([_half_width(m) for m in modes])
-    low, high = frequency - np.nan_to_num(error), frequency + np.nan_to_num(error)
-    expected = [c for c in charts if c["expected_low_hz"] is not None and c["expected_high_hz"] is not None]
-    lowest = min([low.min(), *(c["expected_low_hz"] for c in expected)])
-    highest = max([high.max(), *(c["expected_high_hz"] for c in expected)])
+    value = np.array([m[quantity.value] for m in modes])
+    error = np.array([_half_width(m, quantity) for m in modes])
+    low, high = value - np.nan_to_num(error), value + np.nan_to_num(error)
+    expected = [c for c in charts if c[quantity.low] is not None and c[quantity.high] is not None]
+    lowest = min([low.min(), *(c[quantity.low] for c in expected)])
+    highest = max([high.max(), *(c[quantity.high] for c in expected)])
     # a single value without an error still gets an axis of 2 % with short numbers at its ticks
     pad = max(0.08 * (highest - lowest), 0.01 * highest - 0.5 * (highest - lowest))
     margin = 0.03 * (time.max() - time.min()) + 86400
     chart = Chart(
         Axis(time.min() - margin, time.max() + margin, "", "time"),
-        Axis(lowest - pad, highest + pad, f"{band} [Hz]"),
-        f"{band}: {frequency[-1]:.1f} Hz {_interval(error[-1])}, n = {modes[-1]['n_impacts']}; "
-        + count_of(len(modes), "campaign"),
+        Axis(lowest - pad, highest + pad, f"{band}{quantity.name} [{quantity.unit.strip() or '-'}]"),
+        f"{band}{quantity.name}: {value[-1]:.{quantity.decimals}f}{quantity.unit} {_interval(error[-1])}, "
+        f"n = {modes[-1]['n_impacts']}; " + count_of(len(modes), "campaign"),
         width=width,
     )
     if expected:
         when = [seconds(c["measured_at_utc"]) for c in expected]
-        lows, highs = [c["expected_low_hz"] for c in expected], [c["expected_high_hz"] for c in expected]
+        lows, highs = [c[quantity.low] for c in expected], [c[quantity.high] for c in expected]
         chart.band(when, lows, highs, "expected", "expected at this temperature")
+    if recursive:
+        means = [r[quantity.recursive] for r in recursive]
+        chart.line([seconds(r["measured_at_utc"]) for r in recursive], means, "curve", "estimated recursively")
     for row, event in enumerate(events):
         style = "event" if event[f"resets_{band}"] else "event mild"
         chart.vertical(seconds(event["event_at_utc"]), style, event["kind"].replace("_", " "), row % 3)
     labels = [
-        f"{m['measured_at_utc']:%Y-%m-%d}: {m['frequency_hz']:.2f} Hz {_interval(e)}, damping "
-        f"{m['damping_ratio']:.4f}, n = {m['n_impacts']}, {_temperature(m['rail_temperature_c'])}"
+        f"{m['measured_at_utc']:%Y-%m-%d}: {m['frequency_hz']:.2f} Hz{_of(e, quantity is FREQUENCY)}, damping "
+        f"{m['damping_ratio']:.4f}{_of(e, quantity is DAMPING)}, n = {m['n_impacts']}, "
+        f"{_temperature(m['rail_temperature_c'])}"
         for m, e in zip(modes, error)
     ]
     styles = _point_styles(modes, charts)
     for style, series in SERIES.items():
         some = np.flatnonzero(styles == style)
-        chart.points(time[some], frequency[some], style, 3.0, low[some], high[some], [labels[i] for i in some], series)
+        chart.points(time[some], value[some], style, 3.0, low[some], high[some], [labels[i] for i in some], series)
     return chart.svg()
 
 
@@ -98,11 +136,16 @@ def _style(row: Mapping[str, Any]) -> str:
     return "point" if row.get("deviation_pct") is None else "confirm"
 
 
-def _half_width(mode: Mapping[str, Any]) -> float:
+def _half_width(mode: Mapping[str, Any], quantity: Quantity) -> float:
     """Half of the 95 % t interval, nan where the campaign has no standard error."""
-    if mode["frequency_se_hz"] is None or mode["n_impacts"] < 2:
+    if mode[quantity.error] is None or mode["n_impacts"] < 2:
         return np.nan
-    return student_quantile(mode["n_impacts"]) * mode["frequency_se_hz"]
+    return student_quantile(mode["n_impacts"]) * mode[quantity.error]
+
+
+def _of(half: float, is_shown: bool) -> str:
+    """The interval of the quantity that is shown, with a space before it."""
+    return f" {_interval(half)}" if is_shown else ""
 
 
 def _interval(half: float) -> str:
