@@ -35,7 +35,16 @@ def site(repository, tmp_path_factory):
 
 def test_the_site_has_a_search_that_needs_no_server(site):
     assert (site / "search" / "search_index.json").stat().st_size > 100_000
+    script = (site / "search" / "search_index.js").read_text(
+        "utf-8"
+    )  # a page opened from a folder can load a script only
+    assert script.startswith("var __index") and "search/search_index.js" in (site / "index.html").read_text("utf-8")
     assert "identify_modes" in (site / "modules.html").read_text(encoding="utf-8")
+
+
+def test_notebooks_are_pages_of_the_site(site):
+    text = (site / "notebooks" / "passages_to_mismatch.html").read_text("utf-8")
+    assert "From passages to a named mismatch" in text and "Candidate" in text
 
 
 def test_no_page_loads_anything_from_elsewhere(site):

@@ -151,9 +151,12 @@ def _owner(finding: Mapping[str, Any]) -> str:
     """What a named effect belongs to, in words."""
     if finding["locked_to"] in ("sensor", "clock") and finding["channel"]:
         return f"sensor {finding['channel']}"
-    return {"condition": "load or temperature", "amplitude": "how strong the load is"}.get(
-        finding["locked_to"], f"the {finding['locked_to']}"
-    )
+    owners = {
+        "place": "its position on the track",
+        "condition": "load or temperature",
+        "amplitude": "how strong the load is",
+    }
+    return owners.get(finding["locked_to"], f"the {finding['locked_to']}")
 
 
 def _conditions(evidence: Mapping[str, Any]) -> str:
