@@ -55,6 +55,23 @@ def law_candidates(without=()):
     return tuple(result)
 
 
+# Stiffness and damping of any form: even and odd powers, which together follow any law of the state.
+FREE_LAWS = ("absolute_quadratic_spring", "cubic_spring", "quadratic_spring", "dry_friction", "quadratic_drag",
+             "state_damping")  # fmt: skip
+
+
+def free_law_candidates(without=()):
+    """The free laws but those in ``without``, with amounts of either sign."""
+    result = []
+    for name in (n for n in FREE_LAWS if n not in without):
+        parameter = Parameter("amount", "-", 0.0, (-3.0, 3.0), "amount of a part of the free law", SOURCE)
+        result.append(
+            Candidate.of(name, (parameter,), lambda psi, n=name: LawTerm(n, LAWS[n][0], psi["amount"]), ((0.05,),),
+                         frame="amplitude", component="oscillator")
+        )  # fmt: skip
+    return tuple(result)
+
+
 @njit(cache=True)
 def _law_force(law_index, y, v):
     if law_index == CUBIC:
@@ -142,6 +159,7 @@ class OscillatorCase(Case):
         prior_table += [("offset", "V", (0.0, offset), (-np.inf, np.inf))] if offset else []
         self.nuisances = tuple(Nuisance(n, u, *prior, bounds=b) for n, u, prior, b in prior_table)
         self.candidates = law_candidates(without)
+        self.free_laws = free_law_candidates()
 
     def _observation(self, name, condition, u, y, tolerance):
         judged = y[self.skipped :]

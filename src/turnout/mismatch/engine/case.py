@@ -157,6 +157,9 @@ class Case:
         Those that no fit uses. They may withdraw a name, and verify it.
     nuisances : tuple of Nuisance
     candidates : tuple of Candidate
+    free_laws : tuple of Candidate
+        Stiffness and damping of any form, by a few candidates without a meaning of their own. They are never named. A
+        name beside which they still explain much of held-out recordings is withdrawn.
     expensive : bool
         Predictions are expensive. Derivatives of the nuisances are then kept and updated by Broyden's formula, except
         for the observations for which ``is_cheap`` holds.
@@ -178,6 +181,7 @@ class Case:
     reserved: tuple[Observation, ...] = ()
     nuisances: tuple[Nuisance, ...] = ()
     candidates: tuple[Candidate, ...] = ()
+    free_laws: tuple[Candidate, ...] = ()
     expensive = False
     start_values: Values = {}
     control_level: Mapping[str, float] = {}

@@ -162,7 +162,9 @@ PAIR_RULES: tuple[Rule[PairEvidence], ...] = (
 NAME_RULES: tuple[Rule[NameEvidence], ...] = (
     Rule("size_known_from_below", lambda e: e.score.is_unbounded, "a_or_b",
          "the size of {e.score.family} is known from below alone", PAIRS),
-    Rule("reaches_control_level", lambda e: e.excess <= 1.0, "A", "", HOW),
+    Rule("free_law_predicts_better", lambda e: e.free_share > THRESHOLDS.max_free_law_share, "unknown",
+         "{e.score.family} misses {e.free_share:.0%} of what a free law explains of held-out recordings", HOW),
+    Rule("reaches_control_level", lambda e: e.leaves_nothing, "A", "", HOW),
     Rule("must_reach_control_level", lambda e: e.score.candidate.naming.must_reach_control_level, "unknown",
          "{e.score.family} would leave no excess, and more is left than in intact turnouts", LOCATED),
     Rule("leaves_some_residual", _always, "B", "", HOW),
@@ -216,7 +218,7 @@ def judge(scores: Sequence[Score], excess: float, settings: MismatchSettings, **
 
 
 def grade_name(
-    verdict: Verdict, fit: Fit, excess: float, settings: MismatchSettings
+    verdict: Verdict, fit: Fit, excess: float, settings: MismatchSettings, free_share: float = 0.0
 ) -> tuple[Verdict, Rule[NameEvidence], str]:
     """A name with its grade by the last fit, by the first of ``NAME_RULES`` that applies.
 
@@ -232,6 +234,8 @@ def grade_name(
     excess : float
         Largest excess ratio of that fit, of a data type or of one channel of one recording.
     settings : MismatchSettings
+    free_share : float
+        Share of the gain on held-out recordings that the names miss, see ``free_law_share``.
 
     Returns
     -------
@@ -243,7 +247,7 @@ def grade_name(
         Reason of the rule in words.
     """
     score = replace(verdict.scores[0], fit=fit)
-    evidence = NameEvidence(score, excess)
+    evidence = NameEvidence(score, excess, free_share)
     rule = first_applicable(NAME_RULES, evidence)
     reason = rule.reason_for(evidence)
     graded = replace(verdict, grade="A" if rule.answer == "A" else "B", scores=(score, *verdict.scores[1:]))

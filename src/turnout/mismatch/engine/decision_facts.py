@@ -208,10 +208,19 @@ class NumericalError:
 
 @dataclass(frozen=True)
 class NameEvidence:
-    """What the grade of a name rests on: its ``score`` in the last fit, and the largest excess ratio of that fit."""
+    """What the grade of a name rests on: its ``score`` in the last fit, and the largest excess ratio of that fit.
+
+    ``free_share`` is the share of the gain on held-out recordings that all names miss, and free laws reach.
+    """
 
     score: Score
     excess: float
+    free_share: float = 0.0
+
+    @property
+    def leaves_nothing(self) -> bool:
+        """Whether the residual is at the control level, and free laws explain at most half of what they may."""
+        return self.excess <= 1.0 and self.free_share <= 0.5 * THRESHOLDS.max_free_law_share
 
 
 @dataclass(frozen=True)

@@ -16,12 +16,14 @@ from turnout.mismatch.engine.decision import (
 )
 from turnout.mismatch.engine.decision_facts import NumericalError
 from turnout.mismatch.engine.evidence import assess, excess_ratio, latent_force_of, worst_excess
+from turnout.mismatch.engine.free_laws import free_law_share
 from turnout.mismatch.engine.localization import Location, locate
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.refit import score_candidates
 from turnout.mismatch.engine.reserved_data import Verification, verify
 from turnout.mismatch.engine.residual_attribution import Attribution, attribute, cell_energies
 from turnout.mismatch.engine.search import Findings, Search
+from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.mismatch.engine.two_effects import add_second, settle_pair
 from turnout.mismatch.engine.verdict import Verdict
 
@@ -217,9 +219,12 @@ def grade_names(findings: Findings) -> Findings:
     """
     search, fit = findings.search, findings.fit
     verdicts, failing = [], None
+    free_share = free_law_share(search, findings.base, fit)
     for verdict in findings.verdicts:
-        if verdict.answer == "named":
-            verdict, rule, reason = grade_name(verdict, fit, worst_excess(search, fit), search.settings)
+        is_refuted = verdict.answer == "a_or_b" and free_share > THRESHOLDS.max_free_law_share
+        if verdict.answer == "named" or is_refuted:
+            excess = worst_excess(search, fit)
+            verdict, rule, reason = grade_name(verdict, fit, excess, search.settings, free_share)
             failing = failing or ((rule, reason) if rule.answer == "unknown" else None)
         verdicts.append(verdict)
     if failing is None:

@@ -194,6 +194,12 @@ class Thresholds:
     n_steps: int = threshold(6, "steps", "of a joint fit, unless its caller says more", "numerical")
     max_cheap_steps: int = threshold(60, "steps", "of a fit to cheap observations alone: some valleys are long", FITS)
     min_gain: float = threshold(0.05, "nats", "a smaller gain ends the iteration", "numerical")
+    least_gain: float = threshold(
+        1e-4, "nats", "the same where fits are compared whose residual is below the tolerated error", "numerical"
+    )
+    max_free_law_share: float = threshold(
+        0.05, "share of the gain", "on held-out recordings, that a name may miss beside a free law", GUIDE
+    )
     stall: float = threshold(
         5e-4, "of minus twice the log posterior per sample", "a fit of an expensive case that gains less ends", FITS
     )
