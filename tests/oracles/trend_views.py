@@ -35,6 +35,7 @@ def connect_views(frames, newest, rounded=True) -> duckdb.DuckDBPyConnection:
     for table in ("models", "modes", "impacts", "passages", "passage_fits"):
         con.execute(f"create view {table}_current as select * from {table}")
     con.execute("create view quarantine_open as select * from quarantine")
+    con.execute("create view findings_current as select * from mismatch_findings")
     for name in view_files():
         if name in NAMES:
             con.execute(view_files()[name])

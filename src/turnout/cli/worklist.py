@@ -132,6 +132,8 @@ def _paragraph(row: Mapping[str, Any]) -> str:
     if row["false_alarm_words"] != "no statement":
         lines.append(f"    How sure: {row['false_alarm_words']}.")
     lines.append(f"    Last maintenance: {row['last_maintenance'] or 'none known'}. Look at: {row['look_at']}.")
+    if row.get("diagnosis"):
+        lines.append(f"    Diagnosis: {row['diagnosis']}.")
     return "\n".join(lines)
 
 

@@ -2,7 +2,7 @@
 -- end of its interval nearer to none), and what else there is up to `trend.worklist_rows` rows in all, or `most`; n_in_all counts what there would be without an end.
 -- asof at or after the newest measurement uses everything; an earlier one uses only what was measured by then
 -- (change and date then come from the sums alone, and a slow drift is not among the plans).
--- needs: chart_states, cannot_see, chart_status_at, was_said, in_service, is_below_target, stiffness_words
+-- needs: chart_states, cannot_see, chart_status_at, was_said, in_service, is_below_target, stiffness_words, findings_current
 create or replace macro worklist("asof", most := null) as table
 with then_status as (select * from chart_status_at("asof")),
 recent as (
@@ -178,6 +178,15 @@ maintenance as (
             and (h.section_id = '*' or e.section_id is null
                 or list_contains(string_split(h.sections, ', '), split_part(e.section_id, '/', -1)))
     group by all
+),
+diagnosed as (
+    select *
+    from (
+        select turnout_id, unnest(string_split(coalesce(sections, ''), ', ')) as label, finding_id, found_at_utc, visit, verdict, sentence
+        from findings_current
+        where found_at_utc <= "asof"
+    )
+    qualify row_number() over (partition by turnout_id, label order by found_at_utc desc, finding_id) = 1
 )
 select
     row_number() over importance as rank,
@@ -260,6 +269,19 @@ select
         when h.band = 'amplitude' then 'running surface, fastenings and voids; the mounting of the sensor'
         else 'the section'
     end as look_at,
+    case
+        when h.raised_at_utc is null then null
+        when h.section_id = '*' then 'no decision: a diagnosis is of sections, and this is the median of all'
+        when g.finding_id is null then 'no decision: no diagnosis of this section yet; turnout diagnose --turnout ' || h.turnout_id
+        when g.found_at_utc < coalesce(h.since_at_utc, h.raised_at_utc) then
+            'no decision: the diagnosis of ' || coalesce(g.visit, strftime(g.found_at_utc, '%Y-%m-%d'))
+            || ' is older than the change; turnout diagnose --turnout ' || h.turnout_id
+        when g.verdict = 'none' then
+            'no decision: within the tolerances of the track file the recordings of '
+            || coalesce(g.visit, strftime(g.found_at_utc, '%Y-%m-%d'))
+            || ' need no effect; turnout twin --turnout ' || h.turnout_id || ' compares them with earlier visits'
+        else g.sentence
+    end as diagnosis,
     t.name, t.line, t.km, count(*) over () as n_in_all
 from (
     select
@@ -273,6 +295,7 @@ left join chart_status s
 left join maintenance m
     on m.turnout_id = h.turnout_id and m.sections = h.sections and m.band = h.band and m.source = h.source
         and m.state = h.state
+left join diagnosed g on g.turnout_id = h.turnout_id and g.label = split_part(h.section_id, '/', -1)
 left join turnouts t on t.turnout_id = h.turnout_id
 cross join fleet f
 window importance as (
@@ -318,6 +341,7 @@ create or replace view worklist as select * from worklist(newest_measurement());
 -- false_alarm_words | varchar | | how often an intact chart does this
 -- last_maintenance | varchar | | newest work on the section
 -- look_at | varchar | | what to look at
+-- diagnosis | varchar | | of an alarm: sentence of the newest diagnosis of its section since the change, or why there is no decision; empty = no alarm
 -- name | varchar | | name for people
 -- line | varchar | | railway line
 -- km | double | km | position along the line
@@ -352,6 +376,7 @@ create or replace view worklist as select * from worklist(newest_measurement());
 -- false_alarm_words | varchar | | how often an intact chart does this
 -- last_maintenance | varchar | | newest work on the section
 -- look_at | varchar | | what to look at
+-- diagnosis | varchar | | of an alarm: sentence of the newest diagnosis of its section since the change, or why there is no decision; empty = no alarm
 -- name | varchar | | name for people
 -- line | varchar | | railway line
 -- km | double | km | position along the line

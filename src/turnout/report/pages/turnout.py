@@ -83,6 +83,8 @@ def _rows_of(
 def line_of(work: Mapping[str, Any]) -> dict[str, str]:
     """A row of the worklist as a line of the page; a sentence without a change gets the section and band in front.
 
+    Behind an alarm stands what the newest diagnosis of the section says, or why there is no decision.
+
     Parameters
     ----------
     work : mapping
@@ -95,7 +97,8 @@ def line_of(work: Mapping[str, Any]) -> dict[str, str]:
     """
     of = "" if work["change_pct"] is not None else f"{work['sections']}, {work['band']}: "
     anchor = (work.get("section_id") or "").split("/")[-1].replace("*", "")
-    return {"state": work["state"], "badge": badge(work["state"]), "words": of + work["sentence"], "anchor": anchor}
+    words = of + work["sentence"] + (f". Diagnosis: {work['diagnosis']}" if work.get("diagnosis") else "")
+    return {"state": work["state"], "badge": badge(work["state"]), "words": words, "anchor": anchor}
 
 
 def _position_words(turnout: Mapping[str, Any]) -> str:
