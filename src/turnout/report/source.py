@@ -63,6 +63,10 @@ ROWS = {
         from recursive_modes where source = 'hammer' and {ID_GIVEN} order by section_id, band, measured_at_utc""",
     "chart_states": f"select * from chart_states_on(:today) where {ID_GIVEN}",
     "mismatches": f"select * from findings_newest where {ID_GIVEN} and verdict <> 'none' order by level_before desc",
+    "calibrated": f"""
+        select turnout_id, visit, found_at_utc, parameter, position_m, value, sd, prior_sd, n_visits, n_recordings
+        from twin_states anti join superseded on finding_id = old_id
+        where {ID_GIVEN} and position_m is not null order by found_at_utc, parameter_no""",
     "worklist": f"select * from {whole_list(':today')} where {ID_GIVEN} order by rank",
 }
 TURNOUTS = f"""

@@ -272,14 +272,14 @@ select
     case
         when h.raised_at_utc is null then null
         when h.section_id = '*' then 'no decision: a diagnosis is of sections, and this is the median of all'
-        when g.finding_id is null then 'no decision: no diagnosis of this section yet; turnout diagnose --turnout ' || h.turnout_id
+        when g.finding_id is null then 'no decision: no diagnosis of this section yet (turnout diagnose)'
         when g.found_at_utc < coalesce(h.since_at_utc, h.raised_at_utc) then
             'no decision: the diagnosis of ' || coalesce(g.visit, strftime(g.found_at_utc, '%Y-%m-%d'))
-            || ' is older than the change; turnout diagnose --turnout ' || h.turnout_id
+            || ' is older than the change (turnout diagnose)'
         when g.verdict = 'none' then
             'no decision: within the tolerances of the track file the recordings of '
             || coalesce(g.visit, strftime(g.found_at_utc, '%Y-%m-%d'))
-            || ' need no effect; turnout twin --turnout ' || h.turnout_id || ' compares them with earlier visits'
+            || ' need no effect (turnout twin compares them with earlier visits)'
         else g.sentence
     end as diagnosis,
     t.name, t.line, t.km, count(*) over () as n_in_all

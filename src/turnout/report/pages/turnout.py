@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from turnout.report import panels
 from turnout.report.formatting import badge, count_of, day, number_ranges, with_interval
+from turnout.report.panels.calibrated_model import calibrated_panels
 from turnout.report.panels.diagram import diagram
 from turnout.report.panels.hammer import HammerTest
 from turnout.report.panels.history import DAMPING, FREQUENCY, history_panel
@@ -65,6 +66,7 @@ def turnout_page(
         mismatches=[m["sentence"] for m in rows["mismatches"]],
         summary=[_summary(s, models.get(s["section_id"]), _rows_of(rows, "modes", s)) for s in rows["sections"]],
         sections=[_section(rows, s, models, states) for s in rows["sections"]],
+        calibrated=calibrated_panels(rows.get("calibrated", [])),
         part=trains_part(rows, rows["sections"]),
         quarantine=_by_file(rows["quarantine"]),
         unshown=_hidden_counts(rows["quarantine"]),
