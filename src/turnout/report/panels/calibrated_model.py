@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from turnout.constants import Z95
 from turnout.report.formatting import count_of
 from turnout.report.svg import Axis, Chart
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
     States = Sequence[Mapping[str, Any]]
 
-NORMAL_95 = 1.96  # half of the 95 % interval over the standard deviation
+
 # Beginning of the names of one kind of parameter -> words of the axis, and whether its values are logarithms of factors
 KINDS = {
     "ballast": ("ballast stiffness over file", True),
@@ -95,8 +96,8 @@ def _kind_panel(words: str, is_factor: bool, states: States, width: int) -> str:
         np.array([s[name] for s in states], dtype=float) for name in ("position_m", "value", "sd", "prior_sd")
     )
     scaled = np.exp if is_factor else np.asarray
-    low, high = scaled(mean - NORMAL_95 * sd), scaled(mean + NORMAL_95 * sd)
-    prior_low, prior_high = scaled(-NORMAL_95 * prior), scaled(NORMAL_95 * prior)
+    low, high = scaled(mean - Z95 * sd), scaled(mean + Z95 * sd)
+    prior_low, prior_high = scaled(-Z95 * prior), scaled(Z95 * prior)
     lowest, highest = min(low.min(), prior_low.min()), max(high.max(), prior_high.max())
     pad = 0.06 * (highest - lowest)
     chart = Chart(
