@@ -19,8 +19,14 @@ def main() -> int:
     parser.add_argument("--strict", action="store_true", help="exit code 1 where a bar is missed; 0 without it")
     parser.add_argument("--seeds", metavar="N", help="faults: number of seeds (20)")
     parser.add_argument("--first", metavar="SEED", help="faults: first seed (0)")
+    parser.add_argument("--files", metavar="N", help="mutations: number of files (2400)")
     args = parser.parse_args()
-    for name, value in (("TURNOUT_FAULT_SEEDS", args.seeds), ("TURNOUT_FIRST_SEED", args.first)):
+    environment = {
+        "TURNOUT_FAULT_SEEDS": args.seeds,
+        "TURNOUT_FIRST_SEED": args.first,
+        "TURNOUT_MUTATED_FILES": args.files,
+    }
+    for name, value in environment.items():
         if value is not None:
             os.environ[name] = value
     names = args.part or available

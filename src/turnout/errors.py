@@ -154,6 +154,7 @@ REASONS = {
     "unit_unknown": "a unit that cannot be converted to the configured one",
     "scale_unknown": "the file states a scale, and nothing says whether its numbers contain it",
     "library_warning": "the library that reads the format warns about the file; its recordings are used",
+    "condition_lost": "names, or a condition such as a temperature, are damaged in the file; its recordings are used",
     "not_finite": "NaN or infinity in the samples",
     "dead_channel": "a channel is constant or below its noise floor",
     "sign_reversed": "the force is negative at contact: the sign is reversed",

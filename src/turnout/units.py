@@ -3,6 +3,7 @@
 import math
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 
 from turnout.constants import KMH, STANDARD_GRAVITY
 
@@ -131,6 +132,7 @@ class Conversion:
     offset: float = 0.0
 
 
+@lru_cache(maxsize=1024)
 def conversion(unit: str) -> Conversion:
     """Conversion of numbers in a unit to SI; a leading factor is the value of one step or of full scale.
 
@@ -170,6 +172,7 @@ def conversion(unit: str) -> Conversion:
     return Conversion(dimension, factor * scale, offset)
 
 
+@lru_cache(maxsize=1024)
 def to_si(quantity: str, unit: str, sensitivity: float | None = None, sensitivity_unit: str = "") -> Conversion:
     r"""Conversion from raw numbers in ``unit`` to the SI unit of ``quantity``.
 

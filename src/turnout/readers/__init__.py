@@ -163,18 +163,24 @@ def _reject_repeated_bytes(source: Source) -> None:
     """ReadError if the file is a smaller one two to four times in a row: it was appended to itself."""
     for n in range(2, MAX_REPEATS + 1):
         part = source.size // n
-        if part * n != source.size or part < MIN_REPEATED_SIZE:
+        if part * n != source.size or part < MIN_REPEATED_SIZE or not _is_beginning(source, part):
             continue
-        with source.path.open("rb") as file:
-            file.seek(part)
-            if file.read(min(part, len(source.head))) != source.head[:part]:
-                continue
         data = source.memory_map if source.lazy else source.data
         first = data[:part]
         if all(data[k * part : (k + 1) * part] == first for k in range(1, n)):
             problem = f"its first {part} bytes are in it {n} times: it was appended to itself"
             remedy = f"{COPY_AGAIN}; one copy holds all recordings"
             raise source.error(f"byte {part}", problem, remedy, reason="duplicate")
+
+
+def _is_beginning(source: Source, part: int) -> bool:
+    """Whether the bytes from ``part`` on equal the first bytes of the file."""
+    n = min(part, len(source.head))
+    if part + 16 <= len(source.head) and source.head[part : part + 16] != source.head[:16]:
+        return False
+    with source.path.open("rb", buffering=0) as file:
+        file.seek(part)
+        return file.read(n) == source.head[:n]
 
 
 MIN_REPEATED_SIZE = 64  # bytes: shorter repetitions are no files

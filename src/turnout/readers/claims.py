@@ -7,11 +7,11 @@ read, because they may be outside the raw root and change while the hash of the 
 
 from __future__ import annotations
 
+import io
 import math
 import re
 import zipfile
 import zlib
-from collections.abc import Iterator
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -31,6 +31,8 @@ BLOCK = 2**16  # bytes that are unpacked at a time
 def check_claims(format_module: str, source: Source) -> None:
     """Stop before a reader allocates more memory than a file of this size can hold, or opens another file.
 
+    Readers of HDF5 and Parquet call ``check_hdf5`` and ``check_parquet`` with the file that they have opened.
+
     Parameters
     ----------
     format_module : str
@@ -43,9 +45,12 @@ def check_claims(format_module: str, source: Source) -> None:
     ReadError
         If the file claims too much, or its samples are in another file.
     """
-    hdf5 = format_module in ("hdf5", "rcmdx") or (format_module == "mat" and source.head.startswith(b"MATLAB 7.3"))
-    check = _hdf5 if hdf5 else CHECKS.get(format_module)
-    if check:
+    if format_module == "mat" and source.head.startswith(b"MATLAB 7.3"):
+        import h5py
+
+        with source.parsed_by("HDF5"), h5py.File(source.path, "r") as file:
+            check_hdf5(file, source)
+    elif check := CHECKS.get(format_module):
         check(source)
 
 
@@ -59,15 +64,15 @@ def _check(n_byte: float, source: Source, where: str) -> None:
 
 
 def _npz(source: Source) -> None:
-    """The sizes in the directory of the archive; the header of an array is checked with it, see ``check_array``."""
+    """The sizes in the directory of the archive; the header of an array is checked with it, see ``read_array``."""
     total = 0
     with source.parsed_by("zipfile"), zipfile.ZipFile(source.path) as archive:
         for member in archive.infolist():
             _check(total := total + member.file_size, source, f"variable {member.filename!r}")
 
 
-def check_array(archive: zipfile.ZipFile, name: str, source: Source) -> None:
-    """Stop before an array of a NumPy archive is read whose header claims more values than the array has bytes.
+def read_array(archive: zipfile.ZipFile, name: str, source: Source) -> np.ndarray | bytes:
+    """An array of a NumPy archive, whose header must not claim more values than the array has bytes.
 
     Parameters
     ----------
@@ -78,79 +83,108 @@ def check_array(archive: zipfile.ZipFile, name: str, source: Source) -> None:
     source : Source
         The raw file.
 
+    Returns
+    -------
+    array or bytes
+        The numbers, read-only; the bytes of a member that is no array.
+
     Raises
     ------
     ReadError
-        If it does. Other arrays of the archive are not concerned.
+        If it claims more. Other arrays of the archive are not concerned.
+    ValueError
+        If the header cannot be read, or the array holds objects.
     """
-    member = next((m for m in archive.infolist() if m.filename.removesuffix(".npy") == name), None)
-    if member is None:  # no array in NumPy's format, which its reader reports
-        return
-    with archive.open(member) as stream:
-        shape, itemsize = _npy_claim(stream)
-    if math.prod(shape) * itemsize > member.file_size:
-        problem = f"its header claims {shape} values, in {member.file_size} bytes"
+    file_name = name if name in archive.NameToInfo else f"{name}.npy"
+    data = archive.read(file_name)
+    if not data.startswith(np.lib.format.MAGIC_PREFIX):
+        return data
+    stream = io.BytesIO(data)
+    shape, is_fortran_order, dtype = _npy_header(stream)
+    if dtype.hasobject:
+        raise ValueError("it holds objects of Python, which are not loaded")
+    count, start = math.prod(shape), stream.tell()
+    if count * dtype.itemsize > len(data) - start:
+        problem = f"its header claims {shape} values, in {len(data)} bytes"
         raise source.error(f"variable {name!r}", problem, REMEDY, reason="claims_too_much")
+    values = np.frombuffer(data, dtype, count, start)
+    return values.reshape(shape[::-1]).T if is_fortran_order else values.reshape(shape)
 
 
-def _npy_claim(stream: Any) -> tuple[tuple[int, ...], int]:
-    """Shape and bytes per value of an array in NumPy's format; no values if it is none, which its reader reports."""
-    try:
-        version = np.lib.format.read_magic(stream)
-        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-        shape, _, dtype = read(stream)
-    except (ValueError, OSError, EOFError, zlib.error, zipfile.BadZipFile):
-        return (0,), 0
-    return shape, 0 if dtype.hasobject else dtype.itemsize
+def _npy_header(stream: io.BytesIO) -> tuple[tuple[int, ...], bool, np.dtype]:
+    """Shape, whether the first index runs fastest, and type of the values of an array in NumPy's format."""
+    version = np.lib.format.read_magic(stream)
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    return read(stream)
 
 
-def _hdf5(source: Source) -> None:
-    """All datasets; links to other files, external storage and virtual datasets are found without following them."""
+def check_hdf5(file: Any, source: Source) -> None:
+    """Check all datasets; links to other files, external storage and virtual datasets are found without following them.
+
+    Parameters
+    ----------
+    file : h5py.File
+        The open file.
+    source : Source
+        The raw file.
+
+    Raises
+    ------
+    ReadError
+        If the file claims too much, or its samples are in another file.
+    """
     import h5py
 
     total, seen = 0, set()
 
-    def members(group: Any) -> Iterator[tuple[str, Any]]:
-        for name in group:
-            link = group.get(name, getlink=True)
-            if isinstance(link, h5py.ExternalLink):
-                problem = f"it is a link to the file {link.filename!r}"
-                raise source.error(f"{group.name}/{name}", problem, ELSEWHERE_REMEDY, reason="outside_root")
-            if isinstance(link, h5py.HardLink):
-                yield name, link
-
-    def walk(group: Any) -> None:
+    def walk(group: Any, above: str) -> None:
         nonlocal total
-        for name, _ in members(group):
-            if group.get(name, getclass=True) not in (h5py.Group, h5py.Dataset):
+        links = group.links
+        for name in group:
+            path = (
+                f"{h5py.h5i.get_name(group).decode('utf-8', 'replace').rstrip('/')}/{name.decode('utf-8', 'replace')}"
+            )
+            kind = links.get_info(name).type
+            if kind == h5py.h5l.TYPE_EXTERNAL:
+                file_name = links.get_val(name)[0].decode("utf-8", "replace")
+                problem = f"it is a link to the file {file_name!r}"
+                raise source.error(path, problem, ELSEWHERE_REMEDY, reason="outside_root")
+            if kind != h5py.h5l.TYPE_HARD:
                 continue
             try:
-                member = group[name]
+                info = h5py.h5o.get_info(group, name)
+                if info.addr in seen or info.type not in (h5py.h5o.TYPE_GROUP, h5py.h5o.TYPE_DATASET):
+                    continue
+                member = h5py.h5o.open(group, name)
+                space = member.get_space() if info.type == h5py.h5o.TYPE_DATASET else None
             except (KeyError, OSError, RuntimeError, ValueError):  # damaged: its reader reports it
                 continue
-            address = h5py.h5o.get_info(member.id).addr
-            if address in seen:
-                continue
-            seen.add(address)
-            if isinstance(member, h5py.Group):
-                walk(member)
+            seen.add(info.addr)
+            if space is None:
+                walk(member, path)
                 continue
             if problem := _elsewhere(member):
-                raise source.error(f"dataset {member.name!r}", problem, ELSEWHERE_REMEDY, reason="outside_root")
-            total += member.size * member.dtype.itemsize if member.shape is not None else 0
-            _check(total, source, f"dataset {member.name!r}")
+                raise source.error(f"dataset {path!r}", problem, ELSEWHERE_REMEDY, reason="outside_root")
+            if space.get_simple_extent_type() != h5py.h5s.NULL:
+                total += space.get_simple_extent_npoints() * member.get_type().get_size()
+            _check(total, source, f"dataset {path!r}")
 
-    with source.parsed_by("HDF5"), h5py.File(source.path, "r") as file:
-        seen.add(h5py.h5o.get_info(file["/"].id).addr)
-        walk(file)
+    root = h5py.h5g.open(file.id, b"/")
+    seen.add(h5py.h5o.get_info(root).addr)
+    walk(root, "")
 
 
 def _elsewhere(dataset: Any) -> str:
     """Where the values of a dataset are, if not in its own file."""
-    if dataset.external:
-        return f"its values are in the file {dataset.external[0][0]!r}"
-    if dataset.is_virtual:
-        files = sorted({piece.file_name for piece in dataset.virtual_sources()} - {"."})
+    import h5py
+
+    creation = dataset.get_create_plist()
+    if creation.get_external_count():
+        file_name = creation.get_external(0)[0].decode("utf-8", "replace")
+        return f"its values are in the file {file_name!r}"
+    if creation.get_layout() == h5py.h5d.VIRTUAL:
+        names = {creation.get_virtual_filename(i) for i in range(creation.get_virtual_count())}
+        files = sorted(names - {"."})
         return f"its values are in the file {files[0]!r}" if files else ""
     return ""
 
@@ -260,12 +294,21 @@ class _Unpacked:
         return packed
 
 
-def _parquet(source: Source) -> None:
-    """Rows and columns of the metadata: repeated values take no space in the file."""
-    import pyarrow.parquet as pq
+def check_parquet(metadata: Any, source: Source) -> None:
+    """Check rows and columns of the metadata: repeated values take no space in the file.
 
-    with source.parsed_by("pyarrow"):
-        metadata = pq.read_metadata(source.path)
+    Parameters
+    ----------
+    metadata : pyarrow.parquet.FileMetaData
+        Metadata of the open file.
+    source : Source
+        The raw file.
+
+    Raises
+    ------
+    ReadError
+        If the file claims too much.
+    """
     _check_columns(metadata.num_columns, source)
     sizes = sum(metadata.row_group(k).total_byte_size for k in range(metadata.num_row_groups))
     _check(max(sizes, 8 * metadata.num_rows * metadata.num_columns), source, "the metadata")
@@ -302,4 +345,4 @@ def _check_columns(n_column: int, source: Source) -> None:
         raise source.error("the file", problem, remedy, reason="claims_too_much")
 
 
-CHECKS = {"npz": _npz, "mat": _mat, "parquet": _parquet, "wav": _wav, "lvm": _lvm, "csv": _csv}
+CHECKS = {"npz": _npz, "mat": _mat, "wav": _wav, "lvm": _lvm, "csv": _csv}

@@ -6,6 +6,8 @@ checksum, so that damage is limited to one record. ``scale_factor``, ``add_offse
 are applied; a dataset with another gain or offset is rejected unless the layout decides.
 """
 
+from collections.abc import Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +15,7 @@ import h5py
 import numpy as np
 
 from turnout.errors import ReadError
+from turnout.readers.claims import check_hdf5
 from turnout.readers.lazy import is_large, lazy_array
 from turnout.readers.named_arrays import (
     STATED_SCALES,
@@ -23,7 +26,7 @@ from turnout.readers.named_arrays import (
     raw_file,
 )
 from turnout.readers.source import RawFile, Source
-from turnout.readers.stated_scales import SCALE_WORDS, apply_packing, plain_word, scale_text
+from turnout.readers.stated_scales import apply_packing, is_scale_name, scale_text
 
 UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units")
 
@@ -46,14 +49,27 @@ def read_raw(source: Source) -> RawFile:
     ReadError
         If the file cannot be opened, or its groups are no records.
     """
-    if source.lazy:
-        with source.parsed_by("HDF5"):
-            # not closed here: a dataset keeps its file open as long as it exists
-            variables = _variables(h5py.File(source.path, "r"), source)
-    else:
-        with source.parsed_by("HDF5"), h5py.File(source.path, "r") as file:
-            variables = _variables(file, source)
+    with source.parsed_by("HDF5"), open_file(source) as file:
+        check_hdf5(file, source)
+        variables = _variables(file, source)
     return raw_file(variables, source)
+
+
+def open_file(source: Source) -> AbstractContextManager[h5py.File]:
+    """The file as a context; with a lazy source the datasets keep it open.
+
+    Parameters
+    ----------
+    source : Source
+        The HDF5 file.
+
+    Returns
+    -------
+    context manager of h5py.File
+        The open file.
+    """
+    file = h5py.File(source.path, "r")
+    return nullcontext(file) if source.lazy else file
 
 
 def _variables(group: h5py.Group, source: Source) -> dict[str, Any]:
@@ -71,21 +87,22 @@ def _variables(group: h5py.Group, source: Source) -> dict[str, Any]:
             variables[name] = _variables(member, source)
             continue
         try:
-            with source.parsed_by("HDF5", f"dataset {member.name!r}"):
+            with source.parsed_by("HDF5", f"dataset {name!r} in {group.name!r}"):
+                attributes = {k: _attribute(v) for k, v in member.attrs.items()}
                 large = source.lazy and is_large(member) and name.lower() not in TIME_NAMES
-                numbers = _with_packing(member, source)
+                numbers = _with_packing(member, attributes, source)
                 variables[name] = lazy_array(numbers) if large else _values(numbers)
         except ReadError as error:
             variables[name] = error
             continue
-        variables[f"{name} (attributes)"] = Attributes(name, {k: _attribute(v) for k, v in member.attrs.items()})
-        for key, value in member.attrs.items():
-            if key in UNIT_ATTRIBUTES and isinstance(value := _attribute(value), str):
+        variables[f"{name} (attributes)"] = Attributes(name, attributes)
+        for key, value in attributes.items():
+            if key in UNIT_ATTRIBUTES and isinstance(value, str):
                 units[name] = value
             elif key.lower() in ("channels", "channel_names", "units"):
-                variables.setdefault(key, _attribute(value))
-            elif plain_word(key) in SCALE_WORDS and key not in PACKING_ATTRIBUTES:
-                stated.setdefault(name, {})[key] = _attribute(value)
+                variables.setdefault(key, value)
+            elif is_scale_name(key) and key not in PACKING_ATTRIBUTES:
+                stated.setdefault(name, {})[key] = value
     for name in matrices(variables):
         variables |= stated.pop(name, {})  # of all channels of the matrix
     if texts := tuple((name, text) for name, facts in stated.items() if (text := scale_text(facts))):
@@ -118,11 +135,11 @@ class PackedDataset:
         return apply_packing(self.dataset[selection], self.factor, self.offset, self.fills)
 
 
-def _with_packing(dataset: h5py.Dataset, source: Source) -> h5py.Dataset | PackedDataset:
+def _with_packing(
+    dataset: h5py.Dataset, all_attributes: Mapping[str, Any], source: Source
+) -> h5py.Dataset | PackedDataset:
     """The dataset itself, or with its attributes of packing applied; ReadError if they are no numbers."""
-    attributes = {
-        k: _attribute(dataset.attrs[k]) for k in (*PACKING_ATTRIBUTES, *FILL_ATTRIBUTES) if k in dataset.attrs
-    }
+    attributes = {k: all_attributes[k] for k in (*PACKING_ATTRIBUTES, *FILL_ATTRIBUTES) if k in all_attributes}
     if not attributes or dataset.dtype.kind not in "fiu":
         return dataset
     try:

@@ -5,7 +5,8 @@ It assigns the channels of a file to those of the layout, converts units and che
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from datetime import datetime
 from difflib import get_close_matches
 from types import MappingProxyType
 from typing import Any
@@ -14,9 +15,10 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers import stated_scales
-from turnout.readers.lazy import BlockReader, ChannelStatistics, channel_error
+from turnout.readers.lazy import BlockReader, ChannelStatistics, Column, channel_error
+from turnout.readers.lost_entries import lost_entry_errors
 from turnout.readers.rate_words import is_rate_name, rate_unit
-from turnout.readers.source import COPY_AGAIN, MEANINGLESS_UNITS, MIN_SAMPLES, RawFile, RawRecord, Source
+from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, MEANINGLESS_UNITS, MIN_SAMPLES, RawFile, RawRecord, Source
 from turnout.readers.statements import resolve
 from turnout.readers.time_axes import all_statements, is_axis_name
 from turnout.readers.timing import check_order, is_plausible, start_errors, start_times
@@ -169,8 +171,8 @@ def _channel_mapping(index: int, record: RawRecord, raw: RawChannel, where: str,
         raise source.error(place, str(error), remedy, reason="unit_unknown") from error
     if (statement := record.undecided.get(index)) and not (raw.unit or "").endswith("!"):
         raise source.error(place, statement, stated_scales.remedy(file_unit), reason="scale_unknown")
-    largest = record.above_full_scale.get(index)
-    if largest is not None and FULL_SCALE_UNIT.match(raw.unit or ""):
+    is_fraction = record.is_floating_audio and FULL_SCALE_UNIT.match(raw.unit or "")
+    if is_fraction and (largest := _largest(record.samples[index])) > 1.0:
         problem = f"its numbers reach {largest:.4g}, so they are no fractions of the full scale {raw.unit!r}"
         remedy = "The logger wrote physical numbers: set the unit in the layout without a number, such as 'unit: V'"
         raise source.error(place, problem, remedy, reason="out_of_scale")
@@ -185,6 +187,12 @@ def _channel_mapping(index: int, record: RawRecord, raw: RawChannel, where: str,
         resolution=raw.resolution,
     )
     return ChannelMapping(index, channel, sign * conversion_to_si.scale, sign * conversion_to_si.offset)
+
+
+def _largest(column: Column) -> float:
+    """Largest absolute number of a column that is finite."""
+    blocks = (column[start : start + BLOCK_SIZE] for start in range(0, len(column), BLOCK_SIZE))
+    return max((float(np.fmax(np.nanmax(block), -np.nanmin(block))) for block in blocks), default=0.0)
 
 
 def resolve_unit(file_unit: str, layout_unit: str | None) -> str:
@@ -279,6 +287,8 @@ def convert_records(
     stamps = [(k, record.started_at) for k, record in enumerate(raw.records) if not isinstance(record, ReadError)]
     starts = start_times(stamps, description.time_zone)
     order_errors = check_order(starts, source)
+    start_of = dict(starts)
+    assignments = Assignments(description.channels, source)
     for k, record in enumerate(raw.records):
         try:
             if isinstance(record, ReadError):
@@ -286,14 +296,18 @@ def convert_records(
             if k in order_errors:
                 raise order_errors[k]
             limit = max_duration if source.lazy and description.kind == "passage" else None
-            recording, channel_errors = _recording(record, k, len(raw.records), description, source, limit)
-            start = dict(starts)[k]
-            recordings.append(replace(recording, started_at=start if start and is_plausible(start) else None))
+            start = start_of[k]
+            started_at = start if start and is_plausible(start) else None
+            recording, channel_errors = _recording(
+                record, k, len(raw.records), started_at, assignments, description, source, limit
+            )
+            recordings.append(recording)
             errors.extend(channel_errors)
         except ReadError as error:
             errors.append(error)
     errors.extend(_count_errors(raw, description, source))
     errors.extend(raw.remarks)
+    errors.extend(lost_entry_errors(raw.records, source))
     unread = {k: r.unread_start for k, r in enumerate(raw.records) if isinstance(r, RawRecord) and r.unread_start}
     kept = [(k, stamp) for k, stamp in stamps if k not in order_errors]
     errors.extend(start_errors(kept, unread, description.time_zone, source))
@@ -321,16 +335,89 @@ def _copy_or_correct(key: str, promised: int | None) -> str:
     return f"{COPY_AGAIN}; if it is whole, correct '{key}: {promised}' in the layout (null: any number)"
 
 
+class Assignments:
+    """Channels of the layout assigned to rows of a file, computed once for all records with the same channels.
+
+    Parameters
+    ----------
+    channels : sequence of RawChannel
+        Channels of the layout.
+    source : Source
+        The raw file.
+    """
+
+    def __init__(self, channels: Sequence[RawChannel], source: Source):
+        self.channels, self.source = channels, source
+        self._rows: dict[tuple, set[int]] = {}
+        self._mappings: dict[tuple, tuple[ChannelMapping, ...]] = {}
+
+    def sensor_rows(self, record: RawRecord, where: str) -> set[int]:
+        """Rows that the layout assigns to a sensor.
+
+        Parameters
+        ----------
+        record : RawRecord
+            The record as it is in the file.
+        where : str
+            The record, for the message.
+
+        Returns
+        -------
+        set of int
+            Numbers of the rows, from 0.
+        """
+        key = _key(record)
+        if key not in self._rows:
+            self._rows[key] = _sensor_rows(record, self.channels, where, self.source)
+        return self._rows[key]
+
+    def mappings(self, record: RawRecord, where: str) -> tuple[ChannelMapping, ...]:
+        """As ``channel_mappings``.
+
+        Parameters
+        ----------
+        record : RawRecord
+            The record as it is in the file.
+        where : str
+            The record, for the message.
+
+        Returns
+        -------
+        tuple of ChannelMapping
+            One mapping per channel that is read, in the order of the layout.
+
+        Raises
+        ------
+        ReadError
+            If file and layout disagree about channels or units.
+        """
+        key = _key(record)
+        if key not in self._mappings or record.is_floating_audio:
+            self._mappings[key] = channel_mappings(record, self.channels, where, self.source)
+        return self._mappings[key]
+
+
+def _key(record: RawRecord) -> tuple:
+    return record.names, record.units, record.aliases, tuple(record.undecided.items())
+
+
 def _recording(
-    record: RawRecord, k: int, n_record: int, description: RawDescription, source: Source, max_duration: float | None
+    record: RawRecord,
+    k: int,
+    n_record: int,
+    started_at: datetime | None,
+    assignments: Assignments,
+    description: RawDescription,
+    source: Source,
+    max_duration: float | None,
 ) -> tuple[Recording | LongRecording, list[ReadError]]:
     """(recording, errors of channels left out) of raw record ``k``; ReadError if the record cannot be used."""
     where = f"record {k + 1} of {n_record}"
     n_sample = _sample_count(record, where, description.n_samples, source)
-    sensor_rows = _sensor_rows(record, description.channels, where, source)
+    sensor_rows = assignments.sensor_rows(record, where)
     statements = all_statements(record, k, n_record, sensor_rows, where, source)
     rate = resolve(statements, description.rate, where, source)
-    channel_maps = channel_mappings(record, description.channels, where, source)
+    channel_maps = assignments.mappings(record, where)
     if not channel_maps:
         raise source.error(where, "the layout wants none of its channels", "Name channels in the layout")
     block_reader = BlockReader(record, channel_maps, where, source, source.state())
@@ -353,6 +440,7 @@ def _recording(
         "kind": description.kind,
         "source": source.name,
         "record": k,
+        "started_at": started_at,
         "conditions": MappingProxyType(dict(record.conditions)),
     }
     channel_errors = list(faults.values())

@@ -4,18 +4,23 @@ pymatreader turns structures into dictionaries and returns both versions in the 
 have reversed axes. The number of channels and the longer axis identify the axes.
 """
 
+import io
 import warnings
 from typing import Any
 
 import h5py
 import numpy as np
 import pymatreader
+import scipy.io
+from pymatreader.pymatreader import _parse_scipy_mat_dict as parse_loaded_variables
+from scipy.io.matlab import matfile_version
 
 from turnout.readers.lazy import LazyColumn, LazyMatrix, is_large, lazy_array
+from turnout.readers.mat_elements import HEADER_SIZE, unpacked_file
 from turnout.readers.named_arrays import TIME_NAMES, Alphabetical, raw_file
 from turnout.readers.source import RawFile, Source
 
-HEADER_SIZE = 128  # bytes of the header of version 5
+VERSION_5 = 1  # as scipy numbers it
 VERSION_73 = b"MATLAB 7.3"
 
 
@@ -42,7 +47,12 @@ def read_raw(source: Source) -> RawFile:
     with source.parsed_by("pymatreader"), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # objects and tables that it cannot read are no samples
         large = _lazy_arrays(source) if source.lazy and source.head.startswith(VERSION_73) else {}
-        variables = pymatreader.read_mat(source.path, ignore_fields=list(large)) | large
+        if matfile_version(io.BytesIO(source.head[:HEADER_SIZE]))[0] == VERSION_5:
+            unpacked = io.BytesIO(unpacked_file(source))
+            loaded = scipy.io.loadmat(unpacked, struct_as_record=True, squeeze_me=True, mat_dtype=False)
+            variables = parse_loaded_variables(loaded)
+        else:
+            variables = pymatreader.read_mat(source.path, ignore_fields=list(large)) | large
     mapping_type = Alphabetical if source.head.startswith(VERSION_73) else dict
     return raw_file(
         _plain_variables({k: v for k, v in variables.items() if not k.startswith("__")}, mapping_type), source

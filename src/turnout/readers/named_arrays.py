@@ -20,6 +20,7 @@ The names that loggers use in European languages are listed here in lower case, 
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,7 @@ from turnout.errors import ReadError
 from turnout.readers.lazy import ARRAYS, Array, Column
 from turnout.readers.rate_words import is_rate_name
 from turnout.readers.source import CONDITIONS, RawFile, RawRecord, Source
-from turnout.readers.stated_scales import scale_problem, scale_statements
+from turnout.readers.stated_scales import is_scale_name, scale_problem, scale_statements
 from turnout.readers.statements import MAX_ENTRIES, Entry, entries_of
 from turnout.readers.timing import start_fields
 
@@ -195,9 +196,11 @@ class Metadata:
         self.lower = {(k if k == "t" else k.lower()): v for k, v in variables.items() if k != "T"}
         self.variables, self.parent, self.source, self.place = variables, parent, source, place
 
-    def with_parents(self) -> dict[str, Any]:
-        """All variables of this group and its parent groups; those of the group itself count."""
-        return {**(self.parent.with_parents() if self.parent else {}), **self.lower}
+    @cached_property
+    def scale_facts(self) -> dict[str, Any]:
+        """Variables of this group and its parent groups whose names speak of a scale; those of the group count."""
+        own = {name: value for name, value in self.lower.items() if is_scale_name(name)}
+        return {**(self.parent.scale_facts if self.parent else {}), **own}
 
     def get(self, names: Sequence[str]) -> Any:
         """The first variable of ``names``, here or in a parent group; ReadError if it is damaged.
@@ -309,6 +312,7 @@ class Metadata:
             return None if value is None else int(value)
         raise self.source.error(f"variable {names[0]!r}", f"{value!r} is no whole number above 0")
 
+    @cached_property
     def entries(self) -> tuple[Entry, ...]:
         """All metadata of the group and of its parents, with their places; records beside this one take no part."""
         samples = {*vectors(self.variables), *matrices(self.variables)}
@@ -318,7 +322,7 @@ class Metadata:
             if not isinstance(value, Mapping) or not _holds_samples(value)
             if not isinstance(value, Attributes) or not _is_slow(self.variables.get(value.owner), value.owner, samples)
         }
-        return (*entries_of(own, self.place), *(self.parent.entries() if self.parent else ()))
+        return (*entries_of(own, self.place), *(self.parent.entries if self.parent else ()))
 
     def conditions(self, k: int, n: int) -> dict[str, Any]:
         """Conditions that are stored with the samples.
@@ -562,7 +566,7 @@ def _raw_record(
     return RawRecord(
         names=tuple(names),
         samples=samples,
-        entries=facts.entries(),
+        entries=facts.entries,
         units=tuple(units),
         **start_fields(facts.record_value(START_NAMES, k, n)),
         conditions=facts.conditions(k, n),
@@ -573,7 +577,7 @@ def _raw_record(
 
 def _undecided_scales(names: Sequence[str], facts: Metadata) -> dict[int, str]:
     """Statements about the scale of channels, by index: of the group, its parents and the channels themselves."""
-    texts = scale_statements(facts.with_parents(), len(names))
+    texts = scale_statements(facts.scale_facts, len(names))
     problems = {i: scale_problem(text) for i, text in enumerate(texts) if text}
     by_name = dict(facts.get((STATED_SCALES,)) or ())
     return problems | {i: by_name[name] for i, name in enumerate(names) if name in by_name}

@@ -3,7 +3,7 @@
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.claims import check_array
+from turnout.readers.claims import read_array
 from turnout.readers.named_arrays import raw_file
 from turnout.readers.source import RawFile, Source
 
@@ -26,13 +26,12 @@ def read_raw(source: Source) -> RawFile:
     ReadError
         If the archive cannot be opened, or its arrays are no records.
     """
-    variables = {}
+    variables: dict[str, np.ndarray | bytes | ReadError] = {}
     with source.parsed_by("numpy"), np.load(source.path, allow_pickle=False) as archive:
         for name in archive.files:
             try:
                 with source.parsed_by("numpy", f"variable {name!r}"):
-                    check_array(archive.zip, name, source)
-                    variables[name] = archive[name]
+                    variables[name] = read_array(archive.zip, name, source)
             except ReadError as error:
                 variables[name] = error
     return raw_file(variables, source)

@@ -12,6 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from turnout.errors import ReadError
+from turnout.readers.claims import check_parquet
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.named_arrays import RECORD_COUNT_NAMES, START_NAMES, TIME_NAMES, Metadata
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
@@ -41,6 +42,7 @@ def read_raw(source: Source) -> RawFile:
     """
     with source.parsed_by("pyarrow"):
         file = pq.ParquetFile(source.path, page_checksum_verification=True)
+        check_parquet(file.metadata, source)
         schema, n_row = file.schema_arrow, file.metadata.num_rows
         rows = RowGroupReader(file) if source.lazy and "record" not in schema.names else None
         columns = _columns(file, rows)

@@ -8,7 +8,7 @@ Layout: OpenRail Association, RCM-DX Specification 2.0.2 (document 1.04 of 23.11
 and attributes that a later release adds are ignored.
 """
 
-from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
@@ -16,6 +16,8 @@ import h5py
 import numpy as np
 
 from turnout.errors import ReadError
+from turnout.readers.claims import check_hdf5
+from turnout.readers.hdf5 import open_file
 from turnout.readers.lazy import is_large, lazy_array
 from turnout.readers.named_arrays import Metadata
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
@@ -23,6 +25,11 @@ from turnout.readers.statements import entries_of, rate_entry
 
 FREQUENCY_ATTRIBUTES = ("CommonTriggerFrequency", "CommonTriggerFreq", "CommonTriggerFrequence", "TriggerValue")
 METADATA_ATTRIBUTES = {*CONDITIONS, "RecordCount"}
+# Attributes that the specification defines and that say nothing about rate, scale and conditions; not read, for speed.
+FURTHER_ATTRIBUTES = {
+    b"Element", b"ID", b"ChannelBasis", b"CommonTriggerDistance", b"MeasurementType", b"MoveDirAutoInvert", b"Neighbor",
+    b"PositionOffset",
+}  # fmt: skip
 
 
 def read_raw(source: Source) -> RawFile:
@@ -43,62 +50,89 @@ def read_raw(source: Source) -> RawFile:
     ReadError
         If the file cannot be opened, or has no group RCMDX.
     """
-    with source.parsed_by("HDF5"), _open(source) as file:
+    with source.parsed_by("HDF5"), open_file(source) as file:
+        check_hdf5(file, source)
         if "RCMDX" not in file:
             raise source.error("the root", "there is no group RCMDX", "Set the format in the layout to hdf5")
-        data_sources: list[tuple[h5py.Group, dict]] = []
-        _data_sources(file["RCMDX"], {}, data_sources)
+        data_sources: list[DataSource] = []
+        _data_sources(file["RCMDX"], "/RCMDX", {}, data_sources)
         records = []
-        for group, notes in data_sources:
+        for data_source in data_sources:
             try:
-                with source.parsed_by("HDF5", f"data source {group.name!r}"):
-                    record: RawRecord | ReadError | None = _record(group, notes, source)
+                with source.parsed_by("HDF5", f"data source {data_source.path!r}"):
+                    record: RawRecord | ReadError | None = _record(data_source, source)
             except ReadError as error:
                 record = error
             if record is not None:
-                records.append((group.name, record))
+                records.append((data_source.path, record))
     records.sort(key=lambda entry: entry[0])  # sessions are named by their date
-    notes = data_sources[0][1] if data_sources else {}
+    notes = _notes(data_sources[0].attributes) if data_sources else {}
     return RawFile(tuple(record for _, record in records), Metadata(notes, source).count(("recordcount",)))
-
-
-def _open(source: Source) -> AbstractContextManager[h5py.File]:
-    """The file; with a lazy source the datasets keep it open."""
-    file = h5py.File(source.path, "r")
-    return nullcontext(file) if source.lazy else file
 
 
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
-def _data_sources(group: h5py.Group, notes: dict[str, Any], data_sources: list[tuple[h5py.Group, dict]]) -> None:
-    """Append every group that holds time stamps and channels, with the metadata of its parent groups."""
-    notes = {**notes, **{k: group.attrs[k] for k in METADATA_ATTRIBUTES.intersection(group.attrs)}}
-    if isinstance(group.get("timestamp"), h5py.Dataset) and any(_is_channel(m) for m in group.values()):
-        data_sources.append((group, notes))
-        return
-    for member in group.values():
+@dataclass(frozen=True)
+class DataSource:
+    """A group with time stamps and channels; ``attributes`` are its own and those of the groups above, by path."""
+
+    group: h5py.Group
+    path: str
+    attributes: dict[str, dict[str, Any]]
+    channels: dict[str, tuple[h5py.Group, h5py.Dataset]]
+
+
+def _data_sources(
+    group: h5py.Group, path: str, above: dict[str, dict[str, Any]], data_sources: list[DataSource]
+) -> None:
+    """Append every group that holds time stamps and channels, with the attributes of its parent groups."""
+    attributes = {path: _attributes_of(group), **above}
+    members = dict(group.items())
+    if isinstance(members.get("timestamp"), h5py.Dataset):
+        channels = {name: (m, d) for name, m in members.items() if (d := _data_of(m)) is not None}
+        if channels:
+            data_sources.append(DataSource(group, path, attributes, channels))
+            return
+    for name, member in members.items():
         if isinstance(member, h5py.Group):
-            _data_sources(member, notes, data_sources)
+            _data_sources(member, f"{path}/{name}", attributes, data_sources)
 
 
-def _is_channel(member: Any) -> bool:
-    return isinstance(member, h5py.Group) and isinstance(member.get("data"), h5py.Dataset)
+def _attributes_of(member: Any) -> dict[str, Any]:
+    """Attributes of a group or dataset that may matter."""
+    names: list[bytes] = []
+    h5py.h5a.iterate(member.id, lambda name, *_: names.append(name))  # returns None, so that it goes on
+    wanted = [name.decode("utf-8", "surrogateescape") for name in names if name not in FURTHER_ATTRIBUTES]
+    return {name: member.attrs[name] for name in wanted}
+
+
+def _data_of(member: Any) -> h5py.Dataset | None:
+    """The samples of a channel; None if the member is no channel."""
+    data = member.get("data") if isinstance(member, h5py.Group) else None
+    return data if isinstance(data, h5py.Dataset) else None
+
+
+def _notes(attributes: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    """Conditions and the number of records among the attributes; those of the innermost group count."""
+    return {k: v for of in reversed(attributes.values()) for k, v in of.items() if k in METADATA_ATTRIBUTES}
 
 
 def _text(value: Any) -> str:
     return (value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)).strip()
 
 
-def _record(group: h5py.Group, notes: dict[str, Any], source: Source) -> RawRecord | None:
+def _record(data_source: DataSource, source: Source) -> RawRecord | None:
     """The record of one data source; None if it is not sampled in time."""
-    channels = {name: member for name, member in group.items() if _is_channel(member)}
-    modes = {_text(c.attrs.get("TriggerMode", "TIME")).upper() for c in channels.values()}
+    group, path, channels = data_source.group, data_source.path, data_source.channels
+    settings = {name: _attributes_of(channel) for name, (channel, _) in channels.items()}
+    of_data = {name: _attributes_of(data) for name, (_, data) in channels.items()}
+    modes = {_text(attributes.get("TriggerMode", "TIME")).upper() for attributes in settings.values()}
     if modes != {"TIME"}:
         return None
-    where = f"data source {group.name!r}"
+    where = f"data source {path!r}"
     stamps = group["timestamp"][()].astype("int64")  # unsigned from 2.0.0 on: differences would wrap around
-    data = [c["data"] for c in channels.values()]
+    data = [dataset for _, dataset in channels.values()]
     samples: list[Any] = [lazy_array(d) if source.lazy and is_large(d) else d[()] for d in data]
     for name, x in zip(channels, samples):
         if len(x) != len(stamps):
@@ -107,19 +141,25 @@ def _record(group: h5py.Group, notes: dict[str, Any], source: Source) -> RawReco
     if len(stamps) < MIN_SAMPLES:
         raise source.error(where, f"it has {len(stamps)} samples", COPY_AGAIN, reason="empty")
     rates = [
-        rate_entry(f"{key} of {name!r}", c.attrs[key])
-        for name, c in channels.items()
+        rate_entry(f"{key} of {name!r}", attributes[key])
+        for name, attributes in settings.items()
         for key in FREQUENCY_ATTRIBUTES
-        if key in c.attrs and float(c.attrs[key]) != 0.0
+        if key in attributes and float(attributes[key]) != 0.0
     ]
+    places = {
+        **data_source.attributes,
+        **{f"{path}/{name}": attributes for name, attributes in settings.items()},
+        **{f"{path}/{name}/data": attributes for name, attributes in of_data.items()},
+    }
+    notes = _notes(data_source.attributes)
     time = (stamps - stamps[0]) * 1e-9
     names = tuple(name.rpartition(".")[2] for name in channels)
     names = names if len(set(names)) == len(names) else tuple(channels)
     return RawRecord(
         names=names,
         samples=samples,
-        entries=(*rates, *entries_of(_attributes(group, channels), "")),
-        units=tuple(_text(d.attrs.get("Unit", "")) for d in data),
+        entries=(*rates, *entries_of(_plain_attributes(places), "")),
+        units=tuple(_text(attributes.get("Unit", "")) for attributes in of_data.values()),
         started_at=EPOCH + timedelta(microseconds=int(stamps[0]) // 1000),
         conditions={name: _plain(notes[name]) for name in CONDITIONS if name in notes},
         time=time,
@@ -128,18 +168,15 @@ def _record(group: h5py.Group, notes: dict[str, Any], source: Source) -> RawReco
     )
 
 
-def _attributes(group: h5py.Group, channels: dict[str, h5py.Group]) -> dict[str, dict]:
-    """Attributes of a data source, of the groups above it, and of its channels and their data, by path."""
-    path, members = group.name, [group]
-    while path := path.rpartition("/")[0]:
-        members.append(group.file[path])
-    members += [member for channel in channels.values() for member in (channel, channel["data"])]
+def _plain_attributes(places: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Attributes by path, without those that the format defines and without arrays."""
     own = {*FREQUENCY_ATTRIBUTES, "TriggerMode"}
     return {
-        m.name: {k: _plain(v) for k, v in m.attrs.items() if k not in own and not isinstance(v, np.ndarray)}
-        for m in members
+        path: {k: _plain(v) for k, v in attributes.items() if k not in own and not isinstance(v, np.ndarray)}
+        for path, attributes in places.items()
     }
 
 
 def _plain(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else _text(value)
+    is_number = isinstance(value, np.generic) and not isinstance(value, np.bytes_)
+    return value.item() if is_number else _text(value)

@@ -197,7 +197,7 @@ class RawRecord:
     False: then its unit is not stated. ``clocks`` are further time axes (place, seconds). ``aliases`` are further names
     of the channels.
     ``undecided`` are statements about the scale of channels, by index, of which nothing says whether it is applied.
-    ``above_full_scale`` are the largest numbers of channels of an audio file that are no fractions of full scale.
+    ``is_floating_audio`` is True for an audio file of floating-point numbers, which may be no fractions of full scale.
     """
 
     names: tuple[str, ...]
@@ -212,7 +212,7 @@ class RawRecord:
     clocks: tuple[tuple[str, np.ndarray], ...] = ()
     aliases: tuple[tuple[str, ...], ...] = ()
     undecided: Mapping[int, str] = field(default_factory=lambda: EMPTY_MAPPING)
-    above_full_scale: Mapping[int, float] = field(default_factory=lambda: EMPTY_MAPPING)
+    is_floating_audio: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "units", tuple(self.units) or ("",) * len(self.names))

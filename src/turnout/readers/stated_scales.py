@@ -7,6 +7,7 @@ unit in the layout ends with "!".
 import re
 import unicodedata
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ OFFSET_WORDS = frozenset(
 SCALE_WORDS = FACTOR_WORDS | OFFSET_WORDS
 
 
+@lru_cache(maxsize=4096)
 def plain_word(name: str) -> str:
     """A name in lower case without accents, separators and a unit in brackets.
 
@@ -47,6 +49,22 @@ def plain_word(name: str) -> str:
     """
     letters = unicodedata.normalize("NFKD", re.sub(r"[\[(].*?[\])]", "", name).lower())
     return re.sub(r"[^a-z0-9]", "", letters.replace("æ", "ae").replace("ø", "o"))
+
+
+def is_scale_name(name: str) -> bool:
+    """Whether a name speaks of a factor or an offset of the ordinate.
+
+    Parameters
+    ----------
+    name : str
+        Name of an attribute, a property or a head line.
+
+    Returns
+    -------
+    bool
+        True for "gain", "Scale factor", "Skalierung" and the like.
+    """
+    return plain_word(name) in SCALE_WORDS
 
 
 def scale_statements(facts: Mapping[str, Any], n_channel: int = 1) -> tuple[str, ...]:

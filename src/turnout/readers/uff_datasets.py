@@ -9,7 +9,8 @@ Layout: Structural Dynamics Research Laboratory, University of Cincinnati, Unive
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from functools import lru_cache
+from itertools import accumulate, pairwise
 from mmap import mmap
 from typing import Any
 
@@ -148,14 +149,16 @@ def _numbers(body: bytes, widths: Sequence[int]) -> np.ndarray:
         values = np.frombuffer(block, f"S{widths[0]}").astype(float)
     else:
         table = np.frombuffer(block, "S1").reshape(-1, width)
-        columns = [np.ascontiguousarray(table[:, a:b]).view(f"S{b - a}") for a, b in _edges(widths)]
+        columns = [np.ascontiguousarray(table[:, a:b]).view(f"S{b - a}") for a, b in _edges(tuple(widths))]
         values = np.hstack([c.astype(float) for c in columns]).ravel()
-    last_values = [float(last[a:b].replace(b"D", b"E")) for a, b in _edges(widths) if last[a:b].strip()]
+    last_values = [float(last[a:b].replace(b"D", b"E")) for a, b in _edges(tuple(widths)) if last[a:b].strip()]
     return np.concatenate([values, last_values])
 
 
-def _edges(widths: Sequence[int]) -> list[tuple[int, int]]:
-    return list(pairwise(np.cumsum([0, *widths])))
+@lru_cache
+def _edges(widths: tuple[int, ...]) -> tuple[tuple[int, int], ...]:
+    """First character of each column, and that behind its last one."""
+    return tuple(pairwise(accumulate(widths, initial=0)))
 
 
 def split_columns(values: np.ndarray, header: Header) -> tuple[np.ndarray, np.ndarray | None, str]:
@@ -329,9 +332,8 @@ def _decode_text(raw: bytes) -> str:
 
 def _fields(line: str, widths: Sequence[int]) -> list[str]:
     """Fixed columns of one line, stripped."""
-    edges = np.cumsum([0, *widths])
     line = line.ljust(80)
-    return [line[a:b].strip() for a, b in pairwise(edges)]
+    return [line[a:b].strip() for a, b in _edges(tuple(widths))]
 
 
 def _integer(text: str) -> int:

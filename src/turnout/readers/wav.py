@@ -18,11 +18,10 @@ import soundfile
 
 from turnout.readers.lazy import LazyMatrix
 from turnout.readers.named_arrays import CHANNEL_NAMES, START_NAMES, UNIT_NAMES, Metadata, list_of_texts
-from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, RawFile, RawRecord, Source
+from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.stated_scales import scale_problem, scale_statements
 from turnout.readers.statements import Entry, entries_of, entries_of_text, rate_entry
 from turnout.readers.timing import start_fields
-from turnout.records import EMPTY_MAPPING
 
 UNKNOWN_LENGTH = 0xFFFFFFFF
 UNCOMPRESSED = (1, 3, 0xFFFE)  # PCM, float, extensible
@@ -73,22 +72,18 @@ def read_raw(source: Source) -> RawFile:
         conditions=facts.conditions(0, 1),
         aliases=tuple((str(i),) for i in range(n)),
         undecided={i: scale_problem(text) for i, text in enumerate(scale_statements(facts.lower, n)) if text},
-        above_full_scale=_above_full_scale(samples) if is_float else EMPTY_MAPPING,
+        is_floating_audio=is_float,
     )
-    return RawFile((record,))
+    remarks = []
+    if comment.lstrip().startswith("{") and not _notes(comment):
+        problem = (
+            f"its comment {comment.strip()[:40]!r} begins like JSON and cannot be decoded: names and times are lost"
+        )
+        remarks.append(source.error("the comment", problem, COPY_AGAIN, reason="condition_lost"))
+    return RawFile((record,), None, tuple(remarks))
 
 
 FLOAT_SUBTYPES = ("FLOAT", "DOUBLE")
-
-
-def _above_full_scale(samples: np.ndarray | LazyMatrix) -> dict[int, float]:
-    """Largest absolute number of each channel of a file of floating-point numbers, where it exceeds 1."""
-    largest = np.zeros(len(samples))
-    for start in range(0, samples.shape[1], BLOCK_SIZE):
-        stop = min(start + BLOCK_SIZE, samples.shape[1])
-        block = samples.block(start, stop) if isinstance(samples, LazyMatrix) else samples[:, start:stop]
-        largest = np.fmax(largest, np.fmax(np.max(block, axis=1), -np.min(block, axis=1)))
-    return {i: float(x) for i, x in enumerate(largest) if x > 1.0}
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,93 @@
+"""Entries of the metadata that damage may have taken away: a start time or a condition that only some records lack.
+
+A bit that changes in a name such as "rail_temperature" removes the condition without a trace. Two rules find it: an
+entry that most records of a file have and some lack, and a name that nearly equals a known one.
+"""
+
+from collections.abc import Iterator, Sequence
+from difflib import get_close_matches
+from functools import lru_cache
+
+from turnout.errors import ReadError
+from turnout.readers.named_arrays import START_NAMES
+from turnout.readers.source import CONDITIONS, RawRecord, Source
+
+MIN_SIMILARITY = 0.85  # of two names by difflib: one changed character in seven
+MIN_NAME_SIZE = 5  # characters: shorter names resemble many
+START = "start time"
+REMEDY = "Copy the file again; if it is whole, correct the entry in the logger's settings"
+
+
+def lost_entry_errors(records: Sequence[RawRecord | ReadError], source: Source) -> Iterator[ReadError]:
+    """Errors about start times and conditions that are lost; the records stay usable.
+
+    Parameters
+    ----------
+    records : sequence of RawRecord or ReadError
+        Records of the file.
+    source : Source
+        The raw file.
+
+    Yields
+    ------
+    ReadError
+        One per entry, with the reason ``wrong_time`` or ``condition_lost``.
+    """
+    read = [(k, record, _names(record)) for k, record in enumerate(records) if isinstance(record, RawRecord)]
+    if not read:
+        return
+    everywhere = set.intersection(*(names for _, _, names in read))
+    reported = set()
+    for name in sorted(set.union(*(names for _, _, names in read)) - everywhere):
+        lacking = [k for k, _, names in read if name not in names]
+        if 2 * len(lacking) < len(read):
+            reported.add(name)
+            numbers = ", ".join(str(k + 1) for k in lacking[:5])
+            yield _error(f"record {numbers}", name, f"it lacks the {name} that the other records have", source)
+    _, first, names = read[0]
+    for entry in {entry.name: entry for entry in first.entries}.values():
+        known = similar_name(entry.name)
+        if known and known not in names and known not in reported:
+            reported.add(known)
+            problem = f"{entry.name[:60]!r} in {entry.place[:80]} is nearly the name of the {known}, which is missing"
+            yield _error("the file", known, problem, source)
+
+
+def _names(record: RawRecord) -> set[str]:
+    """The entries that a record has."""
+    has_start = record.started_at is not None or bool(record.unread_start)
+    return {*record.conditions, *([START] if has_start else [])}
+
+
+def _error(where: str, name: str, problem: str, source: Source) -> ReadError:
+    return source.error(where, problem, REMEDY, reason="wrong_time" if name == START else "condition_lost")
+
+
+@lru_cache(maxsize=4096)
+def similar_name(name: str) -> str:
+    """The condition, or "start time", whose name nearly equals another name.
+
+    Parameters
+    ----------
+    name : str
+        Name of an entry of the metadata.
+
+    Returns
+    -------
+    str
+        "" if it resembles none, or is one.
+
+    Examples
+    --------
+    >>> similar_name("rail_temqerature"), similar_name("started_ad"), similar_name("rail_temperature")
+    ('rail_temperature', 'start time', '')
+    """
+    plain = name.strip().lower()
+    if plain in KNOWN or len(plain) < MIN_NAME_SIZE or len(plain) > MAX_NAME_SIZE:
+        return ""
+    match = get_close_matches(plain, KNOWN, n=1, cutoff=MIN_SIMILARITY)
+    return KNOWN[match[0]] if match else ""
+
+
+KNOWN = {name: name for name in CONDITIONS} | {name: START for name in START_NAMES}
+MAX_NAME_SIZE = 2 * max(map(len, KNOWN))  # characters

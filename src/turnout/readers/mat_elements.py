@@ -1,0 +1,135 @@
+"""Elements of a MATLAB 5 file, unpacked and checked before a library parses them.
+
+scipy parses elements while it unpacks them, before their checksum is known, and a wrong size in a tag can end the
+process. Therefore each element is unpacked here, and its tags must fit into each other. Layout: MathWorks, "MAT-File
+Format", version 5.
+"""
+
+import math
+import struct
+import zlib
+
+from turnout.readers.source import COPY_AGAIN, Source
+
+HEADER_SIZE = 128  # bytes: text, version and byte order
+MATRIX, COMPRESSED = 14, 15  # types of elements
+INT8, INT32, UINT32, UTF8 = 1, 5, 6, 16
+# Type of an element -> bytes of a number.
+NUMBER_SIZES = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8}
+TEXT_TYPES = {1, 2, 3, 4, 16, 17, 18}
+CELL, STRUCTURE, TEXT = 1, 2, 4  # classes of arrays
+NUMERIC_CLASSES = range(6, 16)
+IS_COMPLEX = 1 << 11  # bit of the array flags
+MAX_DIMENSIONS = 32
+MAX_DEPTH = 20  # cells within cells
+
+
+def unpacked_file(source: Source) -> bytes:
+    """The file with all elements unpacked.
+
+    Parameters
+    ----------
+    source : Source
+        The MATLAB 5 file.
+
+    Returns
+    -------
+    bytes
+        A MATLAB 5 file without compression.
+
+    Raises
+    ------
+    ReadError
+        If an element is damaged or ends behind the file.
+    """
+    data = source.data
+    order = "<" if data[126:128] == b"IM" else ">"
+    pieces, position = [data[:HEADER_SIZE]], HEADER_SIZE
+    while position < len(data):
+        try:
+            if position + 8 > len(data):
+                raise ValueError("its tag is cut off")
+            kind, size = struct.unpack_from(f"{order}II", data, position)
+            if kind not in (MATRIX, COMPRESSED) or position + 8 + size > len(data):
+                raise ValueError(f"an element of type {kind} with {size} bytes does not fit into the file")
+            element = data[position : position + 8 + size]
+            if kind == COMPRESSED:
+                element = zlib.decompress(element[8:])
+            _check_matrix(element, 0, len(element), order, 0)
+        except (ValueError, struct.error, zlib.error) as error:
+            problem = f"it is damaged ({error})"
+            raise source.error(f"the variable at byte {position}", problem, COPY_AGAIN, reason="unreadable") from error
+        pieces.append(element)
+        position += 8 + size
+    return b"".join(pieces)
+
+
+def _element(data: bytes, position: int, stop: int, order: str) -> tuple[int, int, int, int]:
+    """(type, first byte of the content, its size, position of the next element) of the element at ``position``."""
+    kind, size = struct.unpack_from(f"{order}II", data, position)
+    if kind >> 16:  # small element: size, type and up to four bytes of content
+        kind, size = kind & 0xFFFF, kind >> 16
+        begin, following = position + 4, position + 8
+        if size > 4:
+            raise ValueError(f"a small element holds {size} bytes")
+    else:
+        begin, following = position + 8, position + 8 + size + (-size % 8 if kind != MATRIX else 0)
+    if begin + size > stop:
+        raise ValueError(f"an element of {size} bytes ends behind its array")
+    return kind, begin, size, following
+
+
+def _check_matrix(data: bytes, position: int, stop: int, order: str, depth: int) -> int:
+    """Position behind the array at ``position``; ValueError if the tags in it do not fit into each other."""
+    kind, begin, size, following = _element(data, position, stop, order)
+    if kind != MATRIX or depth > MAX_DEPTH:
+        raise ValueError(f"an element of type {kind} stands for an array")
+    if not size:
+        return following
+    end = begin + size
+    kind, flags_at, n_flag, position = _element(data, begin, end, order)
+    if kind != UINT32 or n_flag != 8:
+        raise ValueError("an array has no flags")
+    (flags,) = struct.unpack_from(f"{order}I", data, flags_at)
+    array_class = flags & 0xFF
+    if array_class not in (CELL, STRUCTURE, TEXT, *NUMERIC_CLASSES):
+        return following  # objects, functions and sparse matrices are no samples
+    kind, at, n_byte, position = _element(data, position, end, order)
+    if kind != INT32 or n_byte % 4 or not 8 <= n_byte <= 4 * MAX_DIMENSIONS:
+        raise ValueError("an array has no dimensions")
+    shape = struct.unpack_from(f"{order}{n_byte // 4}i", data, at)
+    if min(shape) < 0:
+        raise ValueError(f"an array has the dimensions {shape}")
+    count = math.prod(shape)
+    kind, _, _, position = _element(data, position, end, order)
+    if kind not in (INT8, UTF8):
+        raise ValueError("an array has no name")
+    if array_class in (CELL, STRUCTURE):
+        if array_class == STRUCTURE:
+            n_field, position = _field_count(data, position, end, order)
+            count *= n_field
+        if count * 8 > size:
+            raise ValueError(f"{count} cells do not fit into {size} bytes")
+        for _ in range(count):
+            position = _check_matrix(data, position, end, order, depth + 1)
+        return following
+    for _ in range(2 if flags & IS_COMPLEX and array_class != TEXT else 1):
+        kind, _, n_byte, position = _element(data, position, end, order)
+        if array_class == TEXT:
+            if kind not in TEXT_TYPES:
+                raise ValueError(f"a text has the type {kind}")
+        elif kind not in NUMBER_SIZES or n_byte != count * NUMBER_SIZES[kind]:
+            raise ValueError(f"{n_byte} bytes of type {kind} for {count} numbers")
+    return following
+
+
+def _field_count(data: bytes, position: int, stop: int, order: str) -> tuple[int, int]:
+    """(number of fields of a structure, position behind their names)."""
+    kind, at, size, position = _element(data, position, stop, order)
+    if kind != INT32 or size != 4:
+        raise ValueError("a structure has no fields")
+    (length,) = struct.unpack_from(f"{order}i", data, at)
+    kind, _, size, position = _element(data, position, stop, order)
+    if kind != INT8 or length < 1 or size % length:
+        raise ValueError("a structure has no names of fields")
+    return size // length, position

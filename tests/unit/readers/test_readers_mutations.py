@@ -1,0 +1,72 @@
+"""Mutated files of every format: no crash, no other samples, and no lost metadata without a message."""
+
+import io
+import struct
+import zlib
+
+import numpy as np
+import pytest
+import scipy.io
+from benchmarks.mutations import cases
+
+from turnout.errors import ReadError
+from turnout.readers import read
+from turnout.readers.writing import write
+from turnout.records import RawChannel, RawDescription
+
+LAYOUT = RawDescription((RawChannel("force", "force", "force"), RawChannel("rail", "rail", "acceleration")))
+
+
+def test_no_mutated_file_is_read_with_other_samples_or_metadata_without_a_message():
+    found = list(cases(192, first_seed=50_000))
+    bad = [case for case in found if case.outcome in ("crash", "hang", "samples")]
+    assert not bad and sum(case.outcome == "metadata" for case in found) <= 1  # 0.2 % of 192 files are 0.4
+
+
+@pytest.mark.parametrize("format", ["tdms", "mat", "npz", "wav", "lvm", "csv"])
+def test_a_misspelt_name_of_a_condition_is_reported(format, hammer_test, tmp_path):
+    recordings = hammer_test[:1] if format == "wav" else hammer_test
+    path = write(recordings, tmp_path / f"a.{format}", format)
+    if format in ("mat", "npz"):  # with checksums: written with the false name
+        damaged = {"record_000": hammer_test[0].samples.T, "rail_temqerature": 12.5, "channels": ["force", "rail"]}
+        damaged |= {"units": ["N", "m/s²"], "fs": 51200.0}
+        (scipy.io.savemat if format == "mat" else lambda p, v: np.savez(p, **v))(path, damaged)
+    else:
+        path.write_bytes(path.read_bytes().replace(b"rail_temperature", b"rail_temqerature"))
+    result = read(path.name, tmp_path, LAYOUT)
+    assert len(result.recordings) == (1 if format in ("wav", "mat", "npz") else 4)
+    (error,) = [e for e in result.errors if e.reason == "condition_lost"]
+    assert "'rail_temqerature'" in str(error) and "nearly the name of the rail_temperature" in str(error)
+
+
+def test_a_start_time_that_one_record_lacks_is_reported(hammer_test, tmp_path):
+    path = write(hammer_test, tmp_path / "a.csv", "csv")
+    path.write_text(path.read_text().replace("# started_at_2:", "# begun_2:"))
+    (error,) = read(path.name, tmp_path, LAYOUT).errors
+    assert error.reason == "wrong_time" and "record 3: it lacks the start time that the other records have" in str(
+        error
+    )
+
+
+def test_a_matlab_element_whose_packed_bytes_are_damaged_is_rejected_before_scipy_parses_it(tmp_path):
+    """Bytes inserted into a packed element once ended the process within scipy."""
+    buffer = io.BytesIO()
+    scipy.io.savemat(buffer, {"channels": np.array(["force", "rail"], dtype=object)}, do_compression=True)
+    data = bytearray(buffer.getvalue())
+    data[190:190] = data[186:190]
+    (tmp_path / "a.mat").write_bytes(data)
+    with pytest.raises(ReadError, match="damaged"):
+        read("a.mat", tmp_path, LAYOUT)
+
+
+def test_a_matlab_array_with_a_false_size_is_rejected(tmp_path):
+    buffer = io.BytesIO()
+    scipy.io.savemat(buffer, {"record_000": np.ones((64, 2))}, do_compression=True)
+    data = buffer.getvalue()
+    element = bytearray(zlib.decompress(data[136:]))
+    at = element.index(struct.pack("<ii", 64, 2))
+    element[at : at + 4] = struct.pack("<i", 640)
+    packed = zlib.compress(bytes(element))
+    (tmp_path / "a.mat").write_bytes(data[:128] + struct.pack("<II", 15, len(packed)) + packed)
+    with pytest.raises(ReadError, match="1024 bytes of type 9 for 1280 numbers"):
+        read("a.mat", tmp_path, LAYOUT)
