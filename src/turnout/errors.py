@@ -175,6 +175,7 @@ REASONS = {
     "low_coherence": "the lower confidence limit of the coherence fails the gate over a mode's band",
     "not_identified": "no stable mode in the band",
     "fit_below_history": "the fit of the model lies far below those of the section's earlier campaigns",
+    "no_accelerometer": "the layout of the passages names no accelerometer, so that no train can be found",
     "no_train": "no axle found",
     "train_cut_off": "the train is cut off at an end of the recording",
     "two_trains": "two trains at the same time",

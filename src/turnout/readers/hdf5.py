@@ -18,6 +18,7 @@ from turnout.errors import ReadError
 from turnout.readers.claims import check_hdf5
 from turnout.readers.lazy import is_large, lazy_array
 from turnout.readers.named_arrays import (
+    ATTRIBUTES_MARK,
     STATED_SCALES,
     TIME_NAMES,
     Alphabetical,
@@ -95,7 +96,7 @@ def _variables(group: h5py.Group, source: Source) -> dict[str, Any]:
         except ReadError as error:
             variables[name] = error
             continue
-        variables[f"{name} (attributes)"] = Attributes(name, attributes)
+        variables[f"{name}{ATTRIBUTES_MARK}"] = Attributes(name, attributes)
         for key, value in attributes.items():
             if key in UNIT_ATTRIBUTES and isinstance(value, str):
                 units[name] = value

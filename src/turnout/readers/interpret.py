@@ -171,7 +171,16 @@ def _channel_mapping(index: int, record: RawRecord, raw: RawChannel, where: str,
         raise source.error(place, str(error), remedy, reason="unit_unknown") from error
     if (statement := record.undecided.get(index)) and not (raw.unit or "").endswith("!"):
         raise source.error(place, statement, stated_scales.remedy(file_unit), reason="scale_unknown")
-    is_fraction = record.is_floating_audio and FULL_SCALE_UNIT.match(raw.unit or "")
+    is_overruled = (raw.unit or "").endswith("!")
+    if (other_unit := _unit_in_name(record.names[index], file_unit)) and not is_overruled:
+        problem = f"its name {record.names[index]!r} says {other_unit!r}, its unit {file_unit!r}"
+        remedy = f"Find out which is right; then set it in the layout as 'unit: {other_unit}!' or 'unit: {file_unit}!'"
+        raise source.error(place, problem, remedy, reason="unit_unknown")
+    if raw.sensitivity is not None and not is_overruled:
+        if problem := stated_scales.sensitivity_problem(record.entries, raw.sensitivity, raw.sensitivity_unit):
+            remedy = f"Correct the layout; if it is right, set 'unit: {raw.unit or file_unit}!' for this channel"
+            raise source.error(place, problem, remedy, reason="scale_unknown")
+    is_fraction = record.is_floating_audio and not is_overruled and FULL_SCALE_UNIT.match(raw.unit or "")
     if is_fraction and (largest := _largest(record.samples[index])) > 1.0:
         problem = f"its numbers reach {largest:.4g}, so they are no fractions of the full scale {raw.unit!r}"
         remedy = "The logger wrote physical numbers: set the unit in the layout without a number, such as 'unit: V'"
@@ -187,6 +196,35 @@ def _channel_mapping(index: int, record: RawRecord, raw: RawChannel, where: str,
         resolution=raw.resolution,
     )
     return ChannelMapping(index, channel, sign * conversion_to_si.scale, sign * conversion_to_si.offset)
+
+
+UNIT_IN_NAME = re.compile(r"[\[(]([^\[\]()]+)[\])]\s*$")
+
+
+def _unit_in_name(name: str, file_unit: str) -> str:
+    """Unit in brackets behind the name of a channel if it contradicts the unit that the file states, else ""."""
+    match = UNIT_IN_NAME.search(name)
+    if not match or _is_meaningless(file_unit.strip()):
+        return ""
+    try:
+        in_name, stated = conversion(match[1]), conversion(file_unit)
+    except ValueError:
+        return ""
+    same = in_name.dimension == stated.dimension and abs(in_name.scale - stated.scale) <= 1e-9 * abs(stated.scale)
+    return "" if same else match[1]
+
+
+def _check_fill_values(record: RawRecord, mappings: Sequence[ChannelMapping], where: str, source: Source) -> None:
+    """ReadError if samples equal a number that the file states for missing samples."""
+    for fill in stated_scales.fill_values(record.entries):
+        for mapping in mappings:
+            column = record.samples[mapping.index]
+            blocks = (column[start : start + BLOCK_SIZE] for start in range(0, len(column), BLOCK_SIZE))
+            if n := sum(int(np.count_nonzero(block == fill)) for block in blocks):
+                problem = f"{n} samples are {fill:g}, which the file states for missing ones"
+                remedy = "Export the record again from the logger; if it is so there too, check the channel's cable"
+                place = f"{where}, channel {mapping.channel.name!r}"
+                raise source.error(place, problem, remedy, reason="not_finite")
 
 
 def _largest(column: Column) -> float:
@@ -420,6 +458,7 @@ def _recording(
     channel_maps = assignments.mappings(record, where)
     if not channel_maps:
         raise source.error(where, "the layout wants none of its channels", "Name channels in the layout")
+    _check_fill_values(record, channel_maps, where, source)
     block_reader = BlockReader(record, channel_maps, where, source, source.state())
     is_long = max_duration is not None and n_sample / rate > max_duration
     samples = np.empty((0, 0)) if is_long else block_reader(0, n_sample)

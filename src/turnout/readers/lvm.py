@@ -15,6 +15,7 @@ from pyarrow import csv
 from turnout.errors import ReadError
 from turnout.readers.named_arrays import Metadata
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, Source, number_or_text
+from turnout.readers.stated_scales import scale_problem, scale_statements
 from turnout.readers.statements import Entry, entries_of, step_entry
 from turnout.readers.timing import check_simultaneous, parse_time, start_fields, start_offsets
 
@@ -164,6 +165,10 @@ def _records(
     entries = (*_entries(fields, steps[0]), *entries_of(head, "the file's header"))
     has_x = x is not None and len(x) == n_row and bool(np.isfinite(x).all())
     n_sample = n_row // n_write
+    scales = {name: values if len(values) == count else values[:1] for name, values in fields.items() if values}
+    listed = {name: ";".join(value.replace(",", ".") for value in values) for name, values in scales.items()}
+    problems = enumerate(map(scale_problem, scale_statements({**head, **listed}, count)))
+    undecided = {i: problem for i, problem in problems if problem}
     return [
         RawRecord(
             names=tuple(names),
@@ -174,6 +179,7 @@ def _records(
             units=tuple(units[:count]) if len(units) >= count else ("",) * count,
             **start_fields(started_text if i == 0 else None),  # of later writes no time is stated
             conditions={name: number_or_text(head[name]) for name in CONDITIONS if name in head},
+            undecided=undecided,
         )
         for i in range(n_write)
     ]

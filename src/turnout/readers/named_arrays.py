@@ -29,7 +29,7 @@ from turnout.errors import ReadError
 from turnout.readers.lazy import ARRAYS, Array, Column
 from turnout.readers.rate_words import is_rate_name
 from turnout.readers.source import CONDITIONS, RawFile, RawRecord, Source
-from turnout.readers.stated_scales import is_scale_name, scale_problem, scale_statements
+from turnout.readers.stated_scales import entry_statements, is_scale_name, scale_problem, scale_statements
 from turnout.readers.statements import MAX_ENTRIES, Entry, entries_of
 from turnout.readers.timing import start_fields
 
@@ -173,6 +173,7 @@ SAMPLE_COUNT_NAMES = (
 TIME_NAMES = ("time", "t", "time_s")
 CHANNEL_NAMES = ("channels", "channel_names", "names", "labels")
 UNIT_NAMES = ("units", "unit", "channel_units")
+ATTRIBUTES_MARK = " (attributes)"  # behind the name of a variable: the name of its attributes
 STATED_SCALES = "(scales)"  # pairs (channel, statement about its scale) that a reader adds to the variables
 RECORD_COUNT_NAMES = ("n_records", "n_record")
 
@@ -323,6 +324,21 @@ class Metadata:
             if not isinstance(value, Attributes) or not _is_slow(self.variables.get(value.owner), value.owner, samples)
         }
         return (*entries_of(own, self.place), *(self.parent.entries if self.parent else ()))
+
+    def nested_scales(self, n_channel: int) -> dict[int, str]:
+        """Problems about scales that nested metadata state; attributes of single variables take no part.
+
+        Parameters
+        ----------
+        n_channel : int
+            Number of channels.
+
+        Returns
+        -------
+        dict of int to str
+            Index of the channel -> problem.
+        """
+        return entry_statements((e for e in self.entries if ATTRIBUTES_MARK not in e.place), n_channel)
 
     def conditions(self, k: int, n: int) -> dict[str, Any]:
         """Conditions that are stored with the samples.
@@ -578,6 +594,6 @@ def _raw_record(
 def _undecided_scales(names: Sequence[str], facts: Metadata) -> dict[int, str]:
     """Statements about the scale of channels, by index: of the group, its parents and the channels themselves."""
     texts = scale_statements(facts.scale_facts, len(names))
-    problems = {i: scale_problem(text) for i, text in enumerate(texts) if text}
+    problems = facts.nested_scales(len(names)) | {i: scale_problem(text) for i, text in enumerate(texts) if text}
     by_name = dict(facts.get((STATED_SCALES,)) or ())
     return problems | {i: by_name[name] for i, name in enumerate(names) if name in by_name}

@@ -16,7 +16,7 @@ from turnout.readers.claims import check_parquet
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.named_arrays import RECORD_COUNT_NAMES, START_NAMES, TIME_NAMES, Metadata
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
-from turnout.readers.stated_scales import scale_text
+from turnout.readers.stated_scales import entry_statements, scale_text
 from turnout.readers.statements import entries_of
 from turnout.readers.time_axes import seconds_since_first
 from turnout.readers.timing import start_fields
@@ -58,7 +58,9 @@ def read_raw(source: Source) -> RawFile:
     names = [name for name, x in columns.items() if name != time and x.dtype.kind in "fiu"]
     clocks = [name for name, x in columns.items() if name != time and x.dtype.kind in "mM" and _varies(x)]
     fields = {f"column {f.name!r}": _field_notes(f) for f in schema}
-    entries = (*entries_of(_metadata(schema), "metadata"), *entries_of(fields, ""))
+    common = tuple(entries_of(_metadata(schema), "metadata"))
+    entries = (*common, *entries_of(fields, ""))
+    nested = entry_statements(common, len(names))
     n = len(edges) - 1
     records: list[RawRecord | ReadError] = []
     for k in range(n):
@@ -77,7 +79,7 @@ def read_raw(source: Source) -> RawFile:
                 **start_fields(facts.record_value(START_NAMES, k, n)),
                 conditions=facts.conditions(k, n),
                 time=None if time is None else _seconds(columns[time][span]),
-                undecided={i: stated[name] for i, name in enumerate(names) if stated[name]},
+                undecided=nested | {i: stated[name] for i, name in enumerate(names) if stated[name]},
                 is_time_in_seconds=time is not None and columns[time].dtype.kind in "mM",
                 clocks=tuple((f"column {name!r}", _seconds(columns[name][span])) for name in clocks),
             )

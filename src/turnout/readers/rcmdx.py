@@ -21,6 +21,7 @@ from turnout.readers.hdf5 import open_file
 from turnout.readers.lazy import is_large, lazy_array
 from turnout.readers.named_arrays import Metadata
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
+from turnout.readers.stated_scales import scale_text
 from turnout.readers.statements import entries_of, rate_entry
 
 FREQUENCY_ATTRIBUTES = ("CommonTriggerFrequency", "CommonTriggerFreq", "CommonTriggerFrequence", "TriggerValue")
@@ -151,6 +152,8 @@ def _record(data_source: DataSource, source: Source) -> RawRecord | None:
         **{f"{path}/{name}": attributes for name, attributes in settings.items()},
         **{f"{path}/{name}/data": attributes for name, attributes in of_data.items()},
     }
+    above = {k: v for attributes in reversed(data_source.attributes.values()) for k, v in attributes.items()}
+    scales = [scale_text({**above, **settings[name], **of_data[name]}) for name in channels]
     notes = _notes(data_source.attributes)
     time = (stamps - stamps[0]) * 1e-9
     names = tuple(name.rpartition(".")[2] for name in channels)
@@ -165,6 +168,7 @@ def _record(data_source: DataSource, source: Source) -> RawRecord | None:
         time=time,
         is_time_in_seconds=True,
         aliases=tuple((name,) for name in channels),
+        undecided={i: text for i, text in enumerate(scales) if text},
     )
 
 

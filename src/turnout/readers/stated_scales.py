@@ -6,11 +6,15 @@ unit in the layout ends with "!".
 
 import re
 import unicodedata
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
+
+from turnout.constants import STANDARD_GRAVITY
+from turnout.readers.statements import Entry
+from turnout.units import to_si
 
 # Words for a factor and an offset of the ordinate: lower case, without accents and separators.
 FACTOR_WORDS = frozenset(
@@ -100,6 +104,26 @@ def scale_statements(facts: Mapping[str, Any], n_channel: int = 1) -> tuple[str,
     return tuple(", ".join(text) for text in texts)
 
 
+def entry_statements(entries: Iterable[Entry], n_channel: int = 1) -> dict[int, str]:
+    """Problems of a message about the scales that entries of the metadata state, nested ones too.
+
+    Parameters
+    ----------
+    entries : iterable of Entry
+        Metadata that concern all of the channels.
+    n_channel : int
+        Number of channels, as in ``scale_statements``.
+
+    Returns
+    -------
+    dict of int to str
+        Index of the channel -> problem; without channels of which nothing or a neutral scale is stated.
+    """
+    facts = {entry.name: entry.value for entry in entries if is_scale_name(entry.name)}
+    texts = scale_statements(facts, n_channel) if facts else ()
+    return {i: scale_problem(text) for i, text in enumerate(texts) if text}
+
+
 def scale_text(facts: Mapping[str, Any]) -> str:
     """``scale_statements`` of one channel as the problem of a message.
 
@@ -139,6 +163,10 @@ def _numbers(value: Any) -> np.ndarray | None:
         cells = re.split(r"[;\s]+", value.strip())
         listed = len(cells) == 1 and (value.count(",") > 1 or "." in value)  # else a comma is the decimal mark
         value = cells[0].split(",") if listed else [cell.replace(",", ".") for cell in cells]
+        if len(value) > 1 and not re.match(r"[+-]?\.?\d", value[1]):  # a number with its unit
+            number = _numbers(value[0])
+            is_level = number is not None and value[1].casefold() == "db"
+            return 10 ** (number / 20) if is_level and number is not None else number
     if not isinstance(value, (int, float, list, tuple, np.ndarray, np.generic)) or isinstance(value, bool):
         return None
     try:
@@ -149,6 +177,84 @@ def _numbers(value: Any) -> np.ndarray | None:
 
 
 MAX_CHANNELS = 64  # a longer array is no list of scales but one of samples
+
+
+FILL_WORDS = frozenset(
+    "fillvalue missingvalue missing nodata nodatavalue invalidvalue novalue nanvalue fehlwert ersatzwert "
+    "valeurmanquante manglendevaerdi valoremancante valorfaltante".split()
+)
+SENSITIVITY = re.compile(r"sensitiv|empfindlich|sensibi|folsom|gevoelig")
+MAX_SENSITIVITY_DEVIATION = 0.1  # relative: a certificate and a logger's nominal sensitivity differ by less
+# Ratios of units of one sensitivity: prefixes, and g against m/s².
+UNIT_RATIOS = tuple(10.0**p * g for p in (-6, -3, 0, 3, 6) for g in (1.0, STANDARD_GRAVITY, 1.0 / STANDARD_GRAVITY))
+
+
+def fill_values(entries: Iterable[Entry]) -> tuple[float, ...]:
+    """Numbers that stand for a missing sample, as the metadata state.
+
+    Parameters
+    ----------
+    entries : iterable of Entry
+        Metadata of a record.
+
+    Returns
+    -------
+    tuple of float
+        Values of the entries that are named like a fill value.
+
+    Examples
+    --------
+    >>> fill_values([Entry("head", "_FillValue", -999), Entry("head", "gain", 2.0)])
+    (-999.0,)
+    """
+    found = (_numbers(entry.value) for entry in entries if plain_word(entry.name) in FILL_WORDS)
+    return tuple(float(x) for numbers in found if numbers is not None for x in numbers)
+
+
+def sensitivity_problem(entries: Iterable[Entry], sensitivity: float, unit: str) -> str:
+    """The problem of a message if the metadata state sensitivities and none is that of the layout.
+
+    Parameters
+    ----------
+    entries : iterable of Entry
+        Metadata of a record.
+    sensitivity : float
+        Sensitivity of the channel in the layout.
+    unit : str
+        Its unit.
+
+    Returns
+    -------
+    str
+        "" if the file states none, or one that agrees within a tenth in any unit of the same kind.
+
+    Examples
+    --------
+    >>> stated = [Entry("head", "Sensitivity", "10.2 mV/(m/s²)")]
+    >>> sensitivity_problem(stated, 100.0, "mV/g"), bool(sensitivity_problem(stated, 35.3, "mV/g"))
+    ('', True)
+    """
+    stated = [entry for entry in entries if SENSITIVITY.search(plain_word(entry.name))]
+    numbers = [(entry, float(x)) for entry in stated if (n := _numbers(entry.value)) is not None for x in n if x != 0.0]
+    if not numbers or any(_is_same_sensitivity(entry, x, sensitivity, unit) for entry, x in numbers):
+        return ""
+    shown = "; ".join(f"{entry.name}: {entry.value}" for entry in stated[:3])
+    return f"the file states {shown[:100]!r}, and the layout's sensitivity of {sensitivity:g} {unit} is none of these"
+
+
+def _is_same_sensitivity(entry: Entry, stated: float, sensitivity: float, unit: str) -> bool:
+    """Whether a number is the sensitivity of the layout, in its own unit or, without one, in any of the kind."""
+    in_name = re.search(r"[\[(](.+)[\])]\s*$", entry.name)
+    behind = re.sub(r"^[\s\d.,eE+-]*", "", str(entry.value)) if isinstance(entry.value, str) else ""
+    own_unit = behind.strip() or (in_name[1] if in_name else "")
+    for quantity in ("force", "acceleration", "velocity", "displacement", "strain") if own_unit else ():
+        try:
+            ratio = to_si(quantity, "V", abs(stated), own_unit).scale / to_si(quantity, "V", sensitivity, unit).scale
+        except ValueError:
+            continue
+        return abs(ratio - 1.0) <= MAX_SENSITIVITY_DEVIATION
+    ratios = (abs(stated) / sensitivity, 1.0 / (abs(stated) * sensitivity))
+    return any(abs(r / unit_ratio - 1.0) <= MAX_SENSITIVITY_DEVIATION for r in ratios for unit_ratio in UNIT_RATIOS)
 
 
 def remedy(unit: str) -> str:

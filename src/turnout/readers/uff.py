@@ -15,6 +15,7 @@ from turnout.errors import ReadError
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.rate_words import rate_unit
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, Source, load, number_or_text
+from turnout.readers.stated_scales import entry_statements
 from turnout.readers.statements import Entry, entries_of_text, step_entry
 from turnout.readers.timing import check_simultaneous, is_unread_uff_time, parse_uff_time
 from turnout.readers.uff_datasets import UffDataset, declares_si, read_datasets
@@ -217,6 +218,7 @@ def _record(
         time=None if first.x is None else first.x * _seconds_per_x(first),
         is_time_in_seconds=True,
         aliases=aliases,
+        undecided={i: of[0] for i, s in enumerate(sets) if (of := entry_statements(_entries([s])))},
     )
 
 

@@ -19,7 +19,7 @@ import soundfile
 from turnout.readers.lazy import LazyMatrix
 from turnout.readers.named_arrays import CHANNEL_NAMES, START_NAMES, UNIT_NAMES, Metadata, list_of_texts
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
-from turnout.readers.stated_scales import scale_problem, scale_statements
+from turnout.readers.stated_scales import entry_statements
 from turnout.readers.statements import Entry, entries_of, entries_of_text, rate_entry
 from turnout.readers.timing import start_fields
 
@@ -63,15 +63,16 @@ def read_raw(source: Source) -> RawFile:
     facts = Metadata(_notes(comment), source)
     n = len(samples)
     names, units = list_of_texts(facts.get(CHANNEL_NAMES)), list_of_texts(facts.get(UNIT_NAMES))
+    entries = tuple(_entries(texts, comment))
     record = RawRecord(
         names=tuple(names) if len(names) == n else tuple(str(i) for i in range(n)),
         samples=list(samples),
-        entries=(rate_entry("sample rate of the header", rate), *byte_rate, *_entries(texts, comment)),
+        entries=(rate_entry("sample rate of the header", rate), *byte_rate, *entries),
         units=tuple(units) if len(units) == n else ("",) * n,
         **start_fields(facts.record_value(START_NAMES, 0, 1)),
         conditions=facts.conditions(0, 1),
         aliases=tuple((str(i),) for i in range(n)),
-        undecided={i: scale_problem(text) for i, text in enumerate(scale_statements(facts.lower, n)) if text},
+        undecided=entry_statements(entries, n),
         is_floating_audio=is_float,
     )
     remarks = []

@@ -25,6 +25,7 @@ from turnout.records import LongRecording, ModalModel, Recording, Unit
 from turnout.registry.ids import content_id
 from turnout.stages.common import quarantine_row, read_or_quarantine, recording_row, time_contradiction
 from turnout.stages.passage_rows import finding_rows, fit_row, passage_row
+from turnout.units import IGNORED
 
 # Largest time between the file's name and its content; names in local time differ by less.
 MAX_NAME_OFFSET = timedelta(days=1)
@@ -97,6 +98,10 @@ def passage_unit(
         if contradiction is not None:
             rows["quarantine"].append(quarantine_row(contradiction, base, "passage", "passage", None, recording_id))
             continue
+        if not sensors_of(turnout):
+            rows["quarantine"] += [_without_sensor(path, r.record, base, turnout, recording_id) for r in records]
+            rows["recordings"].append(recording_row(result, path, size, description, base, "passage", passage_id=None))
+            continue
         for recording in records:
             started_at = recording.started_at or _time_of_label(unit.label)
             if started_at is None:
@@ -123,6 +128,17 @@ def passage_unit(
     if faults:
         raise PartlyComputed(rows, faults)
     return rows
+
+
+def _without_sensor(
+    path: str, record: int, base: Mapping[str, Any], turnout: TurnoutConfig, recording_id: str
+) -> dict[str, Any]:
+    """Quarantine row of a record of a turnout whose passages have no accelerometer."""
+    quantities = sorted({c.quantity for c in passage_config(turnout).description.channels} - {IGNORED})
+    problem = f"its channels measure {' and '.join(quantities)}, and trains are found by accelerometers alone"
+    remedy = "Name an acceleration channel in the layout; until then the recording is filed without a passage"
+    error = ReadError(path, f"record {record + 1}", problem, remedy, "no_accelerometer")
+    return quarantine_row(error, base, "passage", "passage", record, recording_id)
 
 
 def sensors_of(turnout: TurnoutConfig) -> tuple[PassageSensor, ...]:
@@ -246,8 +262,6 @@ def _add_train(
     """Add the rows of one train; ``name`` distinguishes it from others in the same record."""
     settings = turnout.settings["passage"]
     sensors = sensors_of(turnout)
-    if not sensors:
-        return
     passage = analyse(recording, sensors, context.patterns, settings)
     recording, _ = without_pulses(recording, sensors)  # for loads and fits
     base = {"turnout_id": turnout.id}

@@ -1,0 +1,144 @@
+"""Every format x each way to state scale, unit, offset, fill value and sensitivity x right, wrong, missing, overruled.
+
+Each file is read to within rounding or rejected by name; nothing is misread without a message.
+"""
+
+from dataclasses import replace
+
+import h5py
+import nptdms
+import numpy as np
+import pytest
+from tests.unit.readers.test_readers_rate_matrix import FORMATS, SAMPLES, SENSORS, TRUE, plain, write_csv
+
+from turnout.errors import ReadError
+from turnout.readers import read
+from turnout.records import RawChannel, RawDescription
+
+# Name of the entry, its neutral value, and a value that changes the numbers.
+SCALES = [
+    ("gain", 1.0, 0.4),
+    ("Scale factor", 1.0, "0.4 N/V"),
+    ("Gain", "0 dB", "20 dB"),
+    ("scale_factor", 1.0, 0.4),
+    ("add_offset", 0.0, 5.0),
+    ("Offset", "0", "2,5"),
+    ("Slope", 1, 12),
+    ("Verstärkung", "1,0", "10"),
+    ("Facteur d'échelle", 1.0, 4.448),
+    ("Skalafaktor", 1.0, 9.81),
+    ("Factor de escala", 1.0, 1000.0),
+    ("Fattore di scala", 1.0, 25.4),
+    ("Nullpunkt", 0.0, -3.0),
+]
+LAYOUT = RawDescription(SENSORS, rate=TRUE)
+OVERRULED = RawDescription(tuple(replace(s, unit=f"{s.unit}!") for s in SENSORS), rate=TRUE)
+SCALED = RawDescription(tuple(replace(s, unit=f"0.4 {s.unit}!") for s in SENSORS), rate=TRUE)
+
+
+def written(format, tmp_path, entries):
+    writer, name, _ = FORMATS[format]
+    writer(tmp_path / name, entries)
+    return name
+
+
+def outcome(name, folder, layout):
+    """(samples, errors) of the only record."""
+    try:
+        result = read(name, folder, layout)
+    except ReadError as error:
+        return None, (error,)
+    return (result.recordings[0].samples if result.recordings else None), result.errors
+
+
+def is_rejected(found, reason, *words):
+    samples, errors = found
+    return samples is None and errors[0].reason == reason and all(w.lower() in str(errors[0]).lower() for w in words)
+
+
+def is_read(found, expected=SAMPLES):
+    return found[0] is not None and not found[1] and np.allclose(found[0], expected, rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("format", FORMATS)
+def test_a_stated_scale_is_neutral_overruled_or_rejected_by_name(format, tmp_path):
+    for name, neutral, value in SCALES:
+        if format == "uff" and not name.isascii():
+            continue
+        word = plain(name) if format in ("mat", "csv") else name
+        word = word.removeprefix("Facteur_d")
+        path = written(format, tmp_path, [(name, neutral)])
+        assert is_read(outcome(path, tmp_path, LAYOUT)), (name, neutral)
+        path = written(format, tmp_path, [(name, value)])
+        assert is_rejected(outcome(path, tmp_path, LAYOUT), "scale_unknown", word), (name, value)
+        assert is_read(outcome(path, tmp_path, OVERRULED)), (name, value)
+        assert is_read(outcome(path, tmp_path, SCALED), 0.4 * SAMPLES), (name, value)
+        path = written(format, tmp_path, [("tip", "steel"), (name, value)])  # in a nested place, where there is one
+        found = outcome(path, tmp_path, LAYOUT)
+        assert is_rejected(found, "scale_unknown", word) or (format == "hdf5" and name in CF), (name, value, "nested")
+
+
+CF = ("scale_factor", "add_offset")  # on a dataset of HDF5 they are applied
+
+
+def test_packing_of_netcdf_is_applied_to_its_dataset(tmp_path):
+    FORMATS["hdf5"][0](tmp_path / "a.h5", [])
+    with h5py.File(tmp_path / "a.h5", "r+") as file:
+        file["force"].attrs.update({"scale_factor": 0.4, "add_offset": 5.0})
+    assert is_read(outcome("a.h5", tmp_path, LAYOUT), [0.4 * SAMPLES[0] + 5.0, SAMPLES[1]])
+
+
+@pytest.mark.parametrize("format", FORMATS)
+@pytest.mark.parametrize("name", ["_FillValue", "missing_value", "NoData"])
+def test_samples_that_equal_a_stated_fill_value_are_missing(format, name, tmp_path):
+    other = written(format, tmp_path, [(name, -999.0)])
+    assert is_read(outcome(other, tmp_path, LAYOUT))
+    fill = float(outcome(other, tmp_path, LAYOUT)[0][0, 20])  # as it is printed in the file
+    path = written(format, tmp_path, [(name, fill if format != "uff" else repr(fill))])
+    assert is_rejected(outcome(path, tmp_path, LAYOUT), "not_finite")
+
+
+@pytest.mark.parametrize("format", FORMATS)
+def test_a_unit_of_the_file_that_differs_from_the_layout_is_rejected(format, tmp_path):
+    if format in ("npz", "mat", "parquet", "hdf5"):
+        pytest.skip("these files of the matrix state no unit; the layout tells it")
+    path = written(format, tmp_path, [])
+    for unit in ("kN", "lbf", "V", "m/s²"):
+        layout = RawDescription((RawChannel("force", "force", "force", unit=unit), SENSORS[1]), rate=TRUE)
+        assert outcome(path, tmp_path, layout)[0] is None
+    assert (
+        outcome(path, tmp_path, replace(LAYOUT, channels=(replace(SENSORS[0], unit=None), SENSORS[1])))[0] is not None
+    )
+
+
+def test_a_unit_in_the_name_that_contradicts_the_stated_unit_is_rejected(tmp_path):
+    with nptdms.TdmsWriter(str(tmp_path / "a.tdms")) as writer:
+        channels = [nptdms.ChannelObject("impact", "force [kN]", SAMPLES[0], {"unit_string": "N"})]
+        channels += [nptdms.ChannelObject("impact", "rail", SAMPLES[1], {"unit_string": "m/s²"})]
+        writer.write_segment(channels)
+    layout = replace(LAYOUT, channels=(replace(SENSORS[0], source="force [kN]"), SENSORS[1]))
+    assert is_rejected(outcome("a.tdms", tmp_path, layout), "unit_unknown", "'force [kN]' says 'kN'")
+
+
+@pytest.mark.parametrize("format", FORMATS)
+@pytest.mark.parametrize("name", ["Sensitivity", "Sensor sensitivity", "Empfindlichkeit"])
+def test_a_sensitivity_of_the_file_is_compared_with_that_of_the_layout(format, name, tmp_path):
+    force = RawChannel("force", "force", "force", unit="V", sensitivity=0.23, sensitivity_unit="mV/N")
+    layout = RawDescription((force, RawChannel("rail", "rail", "ignored")), rate=TRUE)
+    if format in ("csv", "tdms", "wav", "lvm", "uff", "rcmdx"):  # these files say N
+        layout = replace(layout, channels=(replace(force, unit="V!"), layout.channels[1]))
+        assert outcome(written(format, tmp_path, [(name, 1.1)]), tmp_path, layout)[0] is not None
+        return
+    for stated, is_right in ((0.23, True), ("0.231 mV/N", True), (1.1, False), ("2.2 mV/N", False)):
+        found = outcome(written(format, tmp_path, [(name, stated)]), tmp_path, layout)
+        assert is_read(found, SAMPLES[:1] / 0.23e-3) if is_right else is_rejected(found, "scale_unknown", "0.23 mV/N")
+
+
+def test_a_sensitivity_in_the_head_of_text_in_volts_is_compared(tmp_path):
+    write_csv(tmp_path / "a.csv", [("Empfindlichkeit", "2,2 mV/N")])
+    text = (tmp_path / "a.csv").read_text(encoding="utf-8").replace("force [N]", "force [V]")
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
+    for sensitivity, is_right in ((2.2, True), (0.23, False)):
+        force = RawChannel("force", "force", "force", unit="V", sensitivity=sensitivity, sensitivity_unit="mV/N")
+        found = outcome("a.csv", tmp_path, RawDescription((force, SENSORS[1]), rate=TRUE))
+        assert (found[0] is not None) == is_right
