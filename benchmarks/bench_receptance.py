@@ -5,6 +5,7 @@ from functools import cache
 import numpy as np
 
 from benchmarks import hammer_blows as blows
+from benchmarks import off_axis
 from benchmarks.bar import Bar, stopwatch
 from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.hammer_test import find_impacts, receptance_of
@@ -20,6 +21,7 @@ def bars():
     """Definitions: second hits of 5-30 % after 4-50 ms, tips of 0.1-3 ms in four pulse families, 12-bit loggers."""
     yield from impact_quality()
     yield from windows_and_gate()
+    yield from best_subset()
     yield from speed()
 
 
@@ -127,6 +129,17 @@ def coverage(n=10, draws=40_000):
             )
             yield Bar("   and the paper's plain > 0.8", float(np.mean(z > 0.8)), sense="", n=f"n {draws}")
     yield Bar("B7 coverage of the 95 % limits, worst deviation", float(max(worst)), 0.005, n=f"n {3 * draws}")
+
+
+def best_subset():
+    """Errors of the modes of tests with impacts beside the axis: best subset over all accepted impacts."""
+    seeds = range(100, 124)
+    found = off_axis.rms_errors(seeds)
+    for (band, name, n), error in found.items():
+        if n:
+            note = f"{error:.3g} against {found[band, name, 0]:.3g}"
+            ratio = error / found[band, name, 0]
+            yield Bar(f"best subset: error of the {band} {name}", ratio, 1.0, "times", n=f"n={len(seeds)}", note=note)
 
 
 def speed():

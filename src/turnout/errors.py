@@ -169,6 +169,7 @@ REASONS = {
     "late": "the impact is not where the trigger promises, began before the record, or too little decay is left",
     "not_simultaneous": "the response begins before the force or long after it",
     "cut_off": "the record ends before the vibration has died away",
+    "not_selected": "the test has more impacts than wanted, and the others agree better",
     "odd_one_out": "the response disagrees with all other impacts of the test",
     "no_impact": "no impact found in the record",
     "too_few_impacts": "too few accepted impacts for a coherence",

@@ -11,7 +11,7 @@ from turnout.constants import MAD_TO_SD
 from turnout.records import Rejection
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from turnout.config.settings.receptance import ReceptanceSettings
     from turnout.hammer_test.segmentation import Cut
@@ -45,6 +45,27 @@ def pairwise_coherence(force: np.ndarray, acceleration: np.ndarray) -> np.ndarra
     >>> print(pairwise_coherence(f, f * 3j * np.array([[1], [1], [-1]])).round(2)[0])
     [1.   1.   0.36]
     """
+    return _of_pairs(force, acceleration, lambda lines: np.median(lines, axis=1))
+
+
+def mean_pairwise_coherence(force: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
+    """As ``pairwise_coherence``, but the mean over frequency: it falls with a single resonance that differs.
+
+    Parameters
+    ----------
+    force, acceleration : (n_impact, n_frequency) array of complex
+        Spectra at the compared lines. [N s], [m/s]
+
+    Returns
+    -------
+    (n_impact, n_impact) array of float
+        1 on the diagonal.
+    """
+    return _of_pairs(force, acceleration, lambda lines: np.mean(lines, axis=1))
+
+
+def _of_pairs(force: np.ndarray, acceleration: np.ndarray, average: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """Average over frequency of the coherence of every two impacts, (n_impact, n_impact)."""
     cross = force.conj() * acceleration
     ff, aa = np.abs(force) ** 2, np.abs(acceleration) ** 2
     n = force.shape[0]
@@ -52,9 +73,8 @@ def pairwise_coherence(force: np.ndarray, acceleration: np.ndarray) -> np.ndarra
     for i in range(n - 1):
         numerator = np.abs(cross[i] + cross[i + 1 :]) ** 2
         denominator = (ff[i] + ff[i + 1 :]) * (aa[i] + aa[i + 1 :])
-        result[i, i + 1 :] = result[i + 1 :, i] = np.median(
-            numerator / np.where(denominator > 0.0, denominator, np.inf), axis=1
-        )
+        lines = numerator / np.where(denominator > 0.0, denominator, np.inf)
+        result[i, i + 1 :] = result[i + 1 :, i] = average(lines)
     return result
 
 
@@ -105,7 +125,7 @@ def judge_agreement(cuts: Sequence[Cut], settings: ReceptanceSettings) -> None:
     cuts = [c for c in cuts if not c.rejections]
     if len(cuts) < 3:
         return
-    force, acceleration = _spectra(cuts, settings)
+    force, acceleration = spectra_of(cuts, settings)
     _judge_coherence(cuts, force, acceleration, settings)
     agreeing = [k for k, c in enumerate(cuts) if not c.rejections]
     _judge_gain([cuts[k] for k in agreeing], force[agreeing], acceleration[agreeing], settings)
@@ -169,7 +189,21 @@ def _judge_gain(cuts: Sequence[Cut], force: np.ndarray, acceleration: np.ndarray
                 cut.notes.append(Rejection("odd_one_out", float(gain[k]), float(bound), detail))
 
 
-def _spectra(cuts: Sequence[Cut], settings: ReceptanceSettings) -> tuple[np.ndarray, np.ndarray]:
+def spectra_of(cuts: Sequence[Cut], settings: ReceptanceSettings) -> tuple[np.ndarray, np.ndarray]:
+    """Spectra of impacts at the lines at which they are compared.
+
+    Parameters
+    ----------
+    cuts : sequence of Cut
+        Impacts of one sampling rate.
+    settings : ReceptanceSettings
+        Limits of the compared frequencies.
+
+    Returns
+    -------
+    force, acceleration : (n_impact, n_frequency) array of complex
+        [N s], [m/s]
+    """
     n_fft = next_fast_len(max(c.force.size for c in cuts), real=True)
     rate = cuts[0].rate
     frequency = rfftfreq(n_fft, 1.0 / rate)

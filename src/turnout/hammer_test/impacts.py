@@ -9,6 +9,7 @@ import numpy as np
 
 from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.hammer_test.agreement import judge_agreement
+from turnout.hammer_test.best_subset import select_best
 from turnout.hammer_test.contact import NO_CONTACT, band_edges, measure_contact
 from turnout.hammer_test.free_decay import judge_decay, judge_second_contact
 from turnout.hammer_test.impact_quality import is_repeated, judge_against_median, judge_repeats, judge_tops, overload
@@ -77,7 +78,9 @@ def find_impacts(
     judge_against_median(candidates, settings)
     judge_tops(candidates, settings.deviation)
     for rate in sorted({c.rate for c in candidates}):
-        judge_agreement([c for c in candidates if c.rate == rate], settings)
+        of_rate = [c for c in candidates if c.rate == rate]
+        judge_agreement(of_rate, settings)
+        select_best(of_rate, settings)
     return tuple(_impact(c) for c in cuts)
 
 

@@ -99,6 +99,10 @@ class ReceptanceSettings:
         0.02, "1", "a response this far off what the test's mean predicts is odd, if the test is steadier than that",
         minimum=0.005, maximum=1.0,
     )  # fmt: skip
+    best_impacts: int = setting(
+        0, "", "of more accepted impacts, this many that agree best by their pairwise coherence; 0 uses all",
+        minimum=0, maximum=1000,
+    )  # fmt: skip
     minimum_impacts: int = setting(
         3, "", "with fewer accepted impacts the limits of the coherence say nothing", minimum=2, maximum=100
     )
