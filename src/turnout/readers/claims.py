@@ -96,6 +96,10 @@ def read_array(archive: zipfile.ZipFile, name: str, source: Source) -> np.ndarra
         If the header cannot be read, or the array holds objects.
     """
     file_name = name if name in archive.NameToInfo else f"{name}.npy"
+    member = archive.getinfo(file_name)
+    if member.compress_size > source.size:
+        problem = f"it claims {member.compress_size} packed bytes, in a file of {source.size} bytes"
+        raise source.error(f"variable {name!r}", problem, REMEDY, reason="claims_too_much")
     data = archive.read(file_name)
     if not data.startswith(np.lib.format.MAGIC_PREFIX):
         return data
