@@ -16,15 +16,21 @@ from turnout.registry.generation import load, schema_of
 from turnout.registry.lock import registry_lock
 from turnout.registry.parquet import write_sorted
 from turnout.registry.publication import history, publish
+from turnout.registry.schema import tables
 from turnout.registry.staging import connect
 
 ROWS = 20_000
-BATCH = """
-select md5('{k}-' || i) as model_id, 'ballast' as band, 't' as turnout_id, 't/' || (i % 8) as section_id,
-    timestamp '2026-01-05' + to_seconds(i) as measured_at_utc, 'joint' as method, 150.0 as frequency_hz,
-    null::double as frequency_se_hz, null::double as frequency_sd_hz, 0.1 as damping_ratio, null::double as damping_se,
-    12.0 as rail_temperature_c, 30 as n_impacts, 'hammer' as source, 'run{k}' as run_id from range({rows}) r(i)
-"""
+VALUES = {
+    "model_id": "md5('{k}-' || i)", "band": "'ballast'", "turnout_id": "'t'", "section_id": "'t/' || (i % 8)",
+    "measured_at_utc": "timestamp '2026-01-05' + to_seconds(i)", "method": "'joint'", "frequency_hz": "150.0",
+    "damping_ratio": "0.1", "rail_temperature_c": "12.0", "n_impacts": "30", "source": "'hammer'", "run_id": "'run{k}'",
+}  # fmt: skip
+
+
+def batch_sql(k: int, rows: int) -> str:
+    """SELECT of one batch; columns without a value are NULL."""
+    columns = [f'({VALUES.get(c.name, "null").format(k=k)})::{c.type} as "{c.name}"' for c in tables()["modes"]]
+    return f"select {', '.join(columns)} from range({rows}) r(i)"
 
 
 @dataclass
@@ -42,7 +48,7 @@ def append(root: Path, k: int, rows: int = ROWS) -> None:
     with registry_lock(root):
         now, con = load(root), connect()
         now.number += 1
-        file = write_sorted(con, root, "modes", 2026, BATCH.format(k=k, rows=rows), f"batch-{k}")
+        file = write_sorted(con, root, "modes", 2026, batch_sql(k, rows), f"batch-{k}")
         now.files.append(file)
         now.schemas[file.schema] = schema_of("modes")
         publish(root, now)

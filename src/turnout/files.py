@@ -157,6 +157,27 @@ def special_kind(mode: int) -> str:
     return next((kind for is_kind, kind in SPECIAL_FILES if is_kind(mode)), "special file")
 
 
+MIN_SPARSE_SIZE = 2**26  # bytes: a smaller file is read anyway
+MAX_HOLES = 1032  # bytes of a file per byte on the disk: the bound of deflate, for file systems that compress
+
+
+def sparse_size(status: os.stat_result) -> int:
+    """Bytes on the disk of a file that is nearly empty: a size without content, which takes hours to read.
+
+    Parameters
+    ----------
+    status : os.stat_result
+        Its status.
+
+    Returns
+    -------
+    int
+        0 or more for a sparse file; -1 for any other, and where the system does not say.
+    """
+    on_disk = 512 * getattr(status, "st_blocks", status.st_size)
+    return on_disk if status.st_size > max(MIN_SPARSE_SIZE, MAX_HOLES * on_disk) else -1
+
+
 def read_regular(path: os.PathLike | str) -> bytes:
     """All bytes of a regular file; what else the name may stand for is not opened.
 

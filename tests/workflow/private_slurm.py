@@ -6,6 +6,7 @@ import secrets
 import shutil
 import socket
 import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -78,6 +79,7 @@ class Slurm:
         real = shutil.which("srun", path=self.path)
         shim.write_text(f'#!/bin/sh\nSLURM_CONF={self.base}/slurm.conf exec {real} "$@"\n')
         shim.chmod(0o755)
+        self.guard = start_guard(self.base / "run", self.environment)
         try:
             self._start(user)
         except BaseException:
@@ -109,14 +111,40 @@ class Slurm:
         return done.stdout
 
     def __exit__(self, *_):
-        self.call("scancel", "--me", check=False)
-        self.call("scontrol", "shutdown", check=False)
-        time.sleep(1.0)
-        for name in ("slurmd", "slurmctld", "munged"):
-            try:
-                os.kill(int((self.base / f"run/{name}.pid").read_text()), 15)
-            except (FileNotFoundError, ProcessLookupError, ValueError):
-                pass
+        try:
+            self.call("scancel", "--me", check=False)
+            self.call("scontrol", "shutdown", check=False)
+        except subprocess.TimeoutExpired:
+            pass
+        finally:
+            self.guard.stdin.close()
+            self.guard.wait(30)
+
+
+# It reads until the process that started it closes the pipe or dies, also by SIGKILL, then ends what it guards.
+GUARD = """
+import os, pathlib, shutil, subprocess, sys, time
+sys.stdin.read()
+if shutil.which("scancel"):
+    try:
+        subprocess.run(["scancel", "--me"], timeout=10, capture_output=True)
+    except subprocess.TimeoutExpired:
+        pass
+time.sleep(float(sys.argv[2]))
+for number in (15, 9):
+    for path in sorted(pathlib.Path(sys.argv[1]).glob("*.pid")):
+        try:
+            os.kill(int(path.read_text()), number)
+        except (OSError, ValueError):
+            pass
+    time.sleep(float(sys.argv[2]))
+"""
+
+
+def start_guard(run, environment=None, patience=1.0):
+    """Process that ends the daemons whose numbers are in ``run``/*.pid when this process closes it or dies."""
+    command = [sys.executable, "-c", GUARD, str(run), str(patience)]
+    return subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True, env=environment)
 
 
 def free_ports(n):

@@ -7,6 +7,8 @@ import subprocess
 import time
 from typing import TYPE_CHECKING
 
+from turnout.workflow.project import snakemake_environment
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
     from pathlib import Path
@@ -78,8 +80,9 @@ def run_with_progress(command: Sequence[str], log: Path, say: Callable[[str], ob
     log.parent.mkdir(parents=True, exist_ok=True)
     with open(log, "w", encoding="utf-8") as stream:
         process = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, encoding="utf-8", errors="replace"
-        )
+            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, encoding="utf-8", errors="replace",
+            env=snakemake_environment(),
+        )  # fmt: skip
         if process.stdout is None:
             raise ValueError("the output of the process is not a pipe")
         lines = []

@@ -20,7 +20,7 @@ import numpy as np
 
 from turnout.content import sha256_of
 from turnout.errors import ReadError, TurnoutError, is_infrastructure
-from turnout.files import special_kind
+from turnout.files import sparse_size, special_kind
 from turnout.records import EMPTY_MAPPING
 
 if TYPE_CHECKING:
@@ -269,8 +269,12 @@ def load(path: PathLike | str, root: PathLike | str) -> Source:
     if not resolved.is_relative_to(base):
         raise ReadError(name, "the path", "it leads outside the raw root", remedy, reason="outside_root")
     try:
-        if kind := special_kind(resolved.stat().st_mode):
+        status = resolved.stat()
+        if kind := special_kind(status.st_mode):
             raise ReadError(name, "the path", f"it is a {kind}", "Put a file there, or remove it", reason="no_file")
+        if (on_disk := sparse_size(status)) >= 0:
+            problem = f"it has a size of {status.st_size} bytes, of which {on_disk} are on the disk"
+            raise ReadError(name, "the file", problem, COPY_AGAIN, reason="claims_too_much")
         with resolved.open("rb") as file:
             head, size = file.read(HEAD_SIZE), os.fstat(file.fileno()).st_size
     except (FileNotFoundError, NotADirectoryError) as error:

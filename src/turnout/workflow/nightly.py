@@ -18,7 +18,7 @@ from filelock import FileLock, Timeout
 from turnout.errors import TurnoutError
 from turnout.files import changed_at
 from turnout.workflow.plan import is_cut_plan, read_plan
-from turnout.workflow.project import profile_folder, snakefile_options
+from turnout.workflow.project import profile_folder, snakefile_options, snakemake_environment
 from turnout.workflow.run_report import failure_reason, rejected_units, unused_turnouts
 from turnout.workflow.scan import unit_id
 from turnout.workflow.state import load_state, states_below
@@ -192,7 +192,9 @@ def _run(options: Sequence[str], limit: float | None, work: Path) -> int:
 def _snakemake(options: Sequence[str], limit: float | None) -> int:
     """Exit code of Snakemake, run in its own process group so that the limit or a signal ends its jobs, too."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "snakemake", *snakefile_options(Path()), *options], start_new_session=True
+        [sys.executable, "-m", "snakemake", *snakefile_options(Path()), *options],
+        start_new_session=True,
+        env=snakemake_environment(),
     )
     try:
         return process.wait(limit)

@@ -5,7 +5,9 @@ Without a Snakefile or profile of its own, a project is run with those that come
 
 from __future__ import annotations
 
+import os
 import shutil
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -42,6 +44,25 @@ README = """\
 6. `turnout worklist` says which turnouts need attention; `turnout --help` lists all commands.
 7. Settings of the method are in `config/config.yaml`, each with its unit, limits and reason.
 """
+
+
+def snakemake_environment() -> dict[str, str]:
+    """Environment of a run of Snakemake: where it cannot write into the cache of the user, its cache is in the project.
+
+    A service often has a home folder that is absent or read-only; Snakemake would stop there without a reason.
+
+    Returns
+    -------
+    dict of str to str
+        Variables and values.
+    """
+    try:
+        cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "snakemake"
+        cache.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=cache):
+            return dict(os.environ)
+    except (OSError, RuntimeError):
+        return os.environ | {"XDG_CACHE_HOME": str(Path(".snakemake/cache").resolve())}
 
 
 def create_project(folder: Path) -> list[Path]:

@@ -13,7 +13,7 @@ from re import Match, Pattern
 from turnout.config import TurnoutConfig
 from turnout.config.filename_pattern import compile_pattern
 from turnout.errors import ReadError
-from turnout.files import special_kind
+from turnout.files import sparse_size, special_kind
 from turnout.records import Unit
 
 NOTE_FILES = ("campaigns.csv", "trains.csv")
@@ -68,6 +68,10 @@ class RawFolder:
             return None
         if kind := special_kind(status.st_mode):
             self._leave_out(inside, "file", f"is a {kind}", "Put a file there, or remove it", "no_file")
+            return None
+        if (on_disk := sparse_size(status)) >= 0:
+            finding = f"has a size of {status.st_size} bytes, of which {on_disk} are on the disk"
+            self._leave_out(inside, "file", finding, "Copy it again from the logger", "claims_too_much")
             return None
         # allowing to read it changes neither size nor time, so until then the file is not part of a unit
         if status.st_mode & 0o444 != 0o444 and not os.access(entry.path, os.R_OK):

@@ -41,6 +41,47 @@ def put_device(path):
         pytest.skip("only root may make a device file")
 
 
+def put_sparse(path):
+    """A size of 1 TB with a few bytes in it."""
+    with path.open("wb") as stream:
+        stream.write(b"1 2\n")
+        stream.truncate(10**12)
+
+
+@pytest.mark.parametrize("suffix", ["csv", "uff", "tdms", "h5", "mat", "wav", "lvm", "npz", "parquet"])
+def test_a_sparse_file_is_named_without_reading_it(tmp_path, suffix):
+    put_sparse(tmp_path / f"A7_1.{suffix}")
+    with pytest.raises(ReadError, match=f"A7_1.{suffix}, the file: it has a size of 1000000000000 bytes") as caught:
+        read(f"A7_1.{suffix}", tmp_path, RawDescription(channels=()))
+    assert caught.value.reason == "claims_too_much"
+
+
+def put_dangling_link(path):
+    path.symlink_to(path.with_name("nothing"))
+
+
+# kind: how it is made, what the plan says of it, reason
+NO_FILES = {
+    "sparse file": (put_sparse, "has a size of 1000000000000 bytes", "claims_too_much"),
+    "dangling link": (put_dangling_link, "leads to nothing", "unreadable"),
+    "link in a circle": (lambda path: path.symlink_to(path.name), os.strerror(errno.ELOOP), "unreadable"),
+}
+
+
+@pytest.mark.parametrize("kind", NO_FILES)
+def test_a_name_without_content_is_named_by_the_plan_and_all_others_are_computed_every_night(fleet, kind):
+    make, finding, reason = NO_FILES[kind]
+    path = fleet.raw / "t1/2024-05-13/A_1.txt"
+    path.unlink()
+    make(path)
+    for _ in range(2):
+        fleet.run()
+        assert set(fleet.lengths()) == OTHERS and read_postponed(fleet.state)[1] == {}
+        problems = [problem for turnout, problem in read_problems(fleet.plan) if turnout == "t1"]
+        assert (problems[0]["path"], problems[0]["reason"]) == ("t1/2024-05-13/A_1.txt", reason)
+        assert finding in problems[0]["found"]
+
+
 SPECIAL = {"socket": put_socket, "pipe": os.mkfifo, "character device": put_device, "folder": os.mkdir}
 
 
