@@ -1,0 +1,196 @@
+"""Two systems of other fields to start from: one under a known force, one released and left to decay.
+
+Adapt it in three steps: write the equation of motion in ``acceleration``, its parameters in ``Mount`` or ``Pendulum``,
+and what may be missing in ``LAWS``. Run it: ``python -m examples.own_system`` makes recordings with a concealed law
+and diagnoses them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from turnout.mismatch import Candidate, Case, Nuisance, Observation, diagnose
+from turnout.physics import Parameter
+
+# --- 1. The equation of motion: y'' = f(y, y', force; parameters), and the laws that may be missing
+
+# Name -> (number, meaning, lowest and highest amount). With an amount of 1 a law is as strong as the linear spring
+# at the displacement ``scale``.
+LAWS = {
+    "cubic_spring": (0, "spring force grows with the cube of the displacement", (-2.0, 2.0)),
+    "quadratic_drag": (1, "drag grows with the square of the velocity", (0.0, 2.0)),
+    "dry_friction": (2, "dry friction opposes the motion", (0.0, 0.5)),
+    "quadratic_spring": (3, "spring is stiffer on one side", (-2.0, 2.0)),
+}
+FREE_LAWS = ("cubic_spring", "quadratic_drag", "dry_friction", "quadratic_spring")
+SOURCE = "Worden and Tomlinson 2001, Nonlinearity in structural dynamics, chapter 2"
+
+
+@njit(cache=True)
+def law_force(law, y, v):
+    """Force of a law over that of the linear spring at y = 1; y and v are over their scales."""
+    if law == 0:
+        return y**3
+    if law == 1:
+        return abs(v) * v
+    if law == 2:
+        return np.tanh(v / 0.02)
+    return y * y
+
+
+@njit(cache=True)
+def acceleration(y, v, force, parameters, laws, amounts, scale):
+    """Acceleration of the mass: ``parameters`` are frequency [Hz], damping ratio and gain of the force."""
+    omega, damping, gain = 2.0 * np.pi * parameters[0], parameters[1], parameters[2]
+    missing = 0.0
+    for k in range(laws.size):
+        missing += amounts[k] * law_force(laws[k], y / scale, v / (omega * scale))
+    return gain * force - 2.0 * damping * omega * v - omega**2 * (y + scale * missing)
+
+
+@njit(cache=True)
+def simulate(force, dt, start, parameters, laws, amounts, scale):
+    """Displacement at every sample by the classical Runge-Kutta scheme, from rest at ``start``."""
+    out = np.zeros(force.size)
+    y, v = start, 0.0
+    for n in range(force.size):
+        out[n] = y
+        after = force[min(n + 1, force.size - 1)]
+        middle = 0.5 * (force[n] + after)
+        a1 = acceleration(y, v, force[n], parameters, laws, amounts, scale)
+        a2 = acceleration(y + 0.5 * dt * v, v + 0.5 * dt * a1, middle, parameters, laws, amounts, scale)
+        y3, v3 = y + 0.5 * dt * (v + 0.5 * dt * a1), v + 0.5 * dt * a2
+        a3 = acceleration(y3, v3, middle, parameters, laws, amounts, scale)
+        y4, v4 = y + dt * v3, v + dt * a3
+        a4 = acceleration(y4, v4, after, parameters, laws, amounts, scale)
+        y += dt / 6.0 * (v + 2.0 * (v + 0.5 * dt * a1) + 2.0 * v3 + v4)
+        v += dt / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
+        if not abs(y) < 1e3 * scale:
+            y, v = 0.0, 0.0
+    return out
+
+
+# --- 2. The case: recordings, uncertain parameters, candidates, and a prediction
+
+
+@dataclass(frozen=True)
+class Law:
+    """A law with its amount, as ``predict`` gets it."""
+
+    name: str
+    amount: float
+
+    def sentence(self):
+        """The law in words."""
+        return f"{LAWS[self.name][1]} (amount {self.amount:.3g})"
+
+
+def law_candidates(names, bounds=None):
+    """A candidate for each law; its parameter is the amount."""
+    candidates = []
+    for name in names:
+        low, high = bounds or LAWS[name][2]
+        parameter = Parameter("amount", "-", 0.0, (low, high), LAWS[name][1], SOURCE)
+        candidates.append(
+            Candidate.of(name, (parameter,), lambda psi, n=name: Law(n, psi["amount"]), ((0.1 * high,),),
+                         frame="amplitude", component="mass")
+        )  # fmt: skip
+    return tuple(candidates)
+
+
+class Mount(Case):
+    """A mass on a mount under a known force: displacement over time, recorded at several levels.
+
+    Parameters
+    ----------
+    records, reserved : sequence of (name, condition, force, displacement)
+        Those that are fitted, and those that test the result. One condition per level: a name must hold at all.
+    rate : float
+        Samples per second. [Hz]
+    frequency, damping, gain : (mean, sd)
+        What is known beforehand.
+    tolerance : float
+        Error of model and sensor that nobody minds, over the rms of a record.
+    """
+
+    def __init__(self, records, reserved, rate, frequency, damping, gain=(0.0, 0.0), tolerance=0.01, without=()):
+        self.rate, self.gain = rate, gain
+        self.recorded = {name: (force, y) for name, _, force, y in (*records, *reserved)}
+        self.scale = max(float(np.max(np.abs(y))) for *_, y in records)
+        self.observations = tuple(self.observation(*r, tolerance) for r in records)
+        self.reserved = tuple(self.observation(*r, tolerance) for r in reserved)
+        self.nuisances = tuple(self.parameters(frequency, damping))
+        self.candidates = law_candidates([n for n in LAWS if n not in without])
+        self.free_laws = law_candidates(FREE_LAWS, (-2.0, 2.0))
+
+    def observation(self, name, condition, force, y, tolerance):
+        """One record; a tenth of its samples count as independent."""
+        return Observation(name, condition, y, tolerance * float(np.std(y)), 0.1)
+
+    def parameters(self, frequency, damping):
+        """Uncertain numbers of the linear system, with mean and standard deviation."""
+        yield Nuisance("frequency", "Hz", *frequency, bounds=(0.05 * frequency[0], np.inf))
+        yield Nuisance("damping", "-", *damping, bounds=(0.0, 1.0))
+        yield Nuisance("gain", "m/s² per unit of force", *self.gain)
+
+    def start(self, values, name):
+        """Displacement at the start of a record. [m]"""
+        return 0.0
+
+    def predict(self, values, terms, observations):
+        """Displacement of every record with these parameters and laws."""
+        linear = np.array([values["frequency"], values["damping"], values.get("gain", 0.0)])
+        laws = np.array([LAWS[t.name][0] for t in terms], dtype=np.int64)
+        amounts = np.array([t.amount for t in terms], dtype=float)
+        return [
+            simulate(self.recorded[o.name][0], 1.0 / self.rate, self.start(values, o.name), linear, laws, amounts,
+                     self.scale)
+            for o in observations
+        ]  # fmt: skip
+
+
+class Pendulum(Mount):
+    """A body that is released from rest and left to decay: no force, an uncertain start for each record."""
+
+    def parameters(self, frequency, damping):
+        """Uncertain numbers: those of the system, and the start of each record, which this record alone knows."""
+        yield Nuisance("frequency", "Hz", *frequency, bounds=(0.05 * frequency[0], np.inf))
+        yield Nuisance("damping", "-", *damping, bounds=(0.0, 1.0))
+        for name, (_, y) in self.recorded.items():
+            yield Nuisance(f"start_{name}", "m", float(y[0]), 0.02 * self.scale, owner=name)
+
+    def start(self, values, name):
+        """Displacement at the release of a record. [m]"""
+        return values[f"start_{name}"]
+
+
+# --- 3. Recordings with a concealed law, to see that the case works
+
+
+def made_records(law, amount, levels, rate=200.0, seconds=10.0, force_sd=1.0, noise=0.002, seed=1):
+    """Records of a system of 4 Hz and 1.5 % damping with one law in it; ``force_sd`` 0: released from the levels."""
+    rng, n = np.random.default_rng(seed), round(rate * seconds)
+    numbers = np.array([LAWS[law][0]] if law else [], dtype=np.int64)
+    amounts = np.array([amount] if law else [], dtype=float)
+    records = []
+    for k, level in enumerate(levels):
+        force = level * force_sd * np.convolve(rng.normal(size=n), np.ones(10) / np.sqrt(10.0), "same")
+        start = 0.0 if force_sd else level
+        y = simulate(force, 1.0 / rate, start, np.array([4.0, 0.015, 100.0]), numbers, amounts, 1.0)
+        records.append((f"record {k}", f"level {level:g}", force, y + noise * np.std(y) * rng.normal(size=n)))
+    return records
+
+
+def main():
+    """Diagnose a mount with quadratic drag and a pendulum with dry friction."""
+    forced = made_records("quadratic_drag", 0.3, (0.3, 0.6, 1.0, 0.8))
+    case = Mount(forced[:3], forced[3:], 200.0, (3.8, 0.5), (0.03, 0.03), (90.0, 30.0))
+    print("forced:", diagnose(case))
+    free = made_records("dry_friction", 0.01, (1.0, 0.5, 0.25, 0.7), force_sd=0.0)
+    case = Pendulum(free[:3], free[3:], 200.0, (3.8, 0.5), (0.03, 0.03))
+    print("free decay:", diagnose(case))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,53 @@
+"""The example systems of other fields: a mount under a known force, and a pendulum that is left to decay."""
+
+import numpy as np
+import pytest
+from examples.own_system import LAWS, Mount, Pendulum, made_records, simulate
+
+from turnout.mismatch import diagnose
+
+PRIORS = 200.0, (3.8, 0.5), (0.03, 0.03)
+LEVELS = {"forced": (0.3, 0.6, 1.0, 0.8), "free": (1.0, 0.5, 0.25, 0.7)}
+
+
+def case_of(kind, law, amount, **options):
+    force_sd = 1.0 if kind == "forced" else 0.0
+    records = made_records(law, amount, LEVELS[kind], force_sd=force_sd, seconds=6.0)
+    if kind == "forced":
+        return Mount(records[:3], records[3:], *PRIORS, (90.0, 30.0), **options)
+    return Pendulum(records[:3], records[3:], *PRIORS, **options)
+
+
+# With another scale s than 1 the amount of drag is s times, that of friction one s-th of the true one.
+@pytest.mark.parametrize(
+    ("kind", "law", "amount", "power"), [("forced", "quadratic_drag", 0.3, 1), ("free", "dry_friction", 0.01, -1)]
+)
+def test_the_concealed_law_is_named_with_its_size(kind, law, amount, power):
+    case = case_of(kind, law, amount)
+    found = diagnose(case)
+    assert (found.verdict.answer, found.names, found.verdict.grade) == ("named", (law,), "A")
+    expected = amount * case.scale**power
+    error = max(3.0 * float(found.fit.psi_se[0]), 0.03 * expected)
+    assert float(found.fit.psi[0]) == pytest.approx(expected, abs=error)
+    assert found.verification.after > found.verification.before + 1.0
+
+
+@pytest.mark.parametrize("kind", ["forced", "free"])
+def test_a_system_without_a_concealed_law_has_no_finding(kind):
+    assert diagnose(case_of(kind, "", 0.0)).verdict.answer == "none"
+
+
+def test_a_law_that_is_not_in_the_library_gets_no_other_name():
+    found = diagnose(case_of("free", "dry_friction", 0.03, without=("dry_friction",)))
+    assert found.verdict.answer == "unknown"
+
+
+def test_a_free_decay_is_that_of_the_closed_form():
+    t = np.arange(2000) / 200.0
+    none = np.zeros(0, dtype=np.int64), np.zeros(0)
+    y = simulate(np.zeros(2000), 1.0 / 200.0, 0.7, np.array([4.0, 0.015, 0.0]), *none, 1.0)
+    omega, decay = 2.0 * np.pi * 4.0, 0.015 * 2.0 * np.pi * 4.0
+    damped = omega * np.sqrt(1.0 - 0.015**2)
+    exact = 0.7 * np.exp(-decay * t) * (np.cos(damped * t) + decay / damped * np.sin(damped * t))
+    assert np.max(np.abs(y - exact)) < 2e-4
+    assert set(LAWS) >= {"quadratic_drag", "dry_friction"}
