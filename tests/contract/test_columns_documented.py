@@ -121,3 +121,25 @@ def test_the_pages_are_those_that_the_lists_give(repository):
     assert documentation.with_sections(page, parts) == page, "run: python -m turnout.registry.documentation docs"
     assert (repository / "docs" / "reasons.md").read_text(encoding="utf-8") == documentation.reasons_page()
     assert len(REASONS) > 30
+
+
+def test_every_view_column_and_macro_of_the_catalogue_has_a_comment(tmp_path):
+    """As a tool for databases shows them; an empty registry has all views."""
+    from turnout.registry.database import open_registry
+    from turnout.registry.job import register
+
+    register([], tmp_path / "registry", read=iter)
+    with open_registry(tmp_path / "registry") as con:
+        own = "database_name = current_database() and not internal and coalesce(comment, '') = ''"
+        for kind, name in (
+            ("views", "view_name"),
+            ("columns", "table_name || '.' || column_name"),
+            ("functions", "function_name"),
+        ):
+            assert con.execute(f"select {name} from duckdb_{kind}() where {own}").fetchall() == [], kind
+        (words,) = con.execute("select comment from duckdb_views() where view_name = 'receptances_current'").fetchone()
+        assert words == "One row per receptance that counts: without what was computed again since."
+        (unit,) = con.execute(
+            "select comment from duckdb_columns() where table_name = 'modes_current' and column_name = 'frequency_hz'"
+        ).fetchone()
+        assert unit.endswith("[Hz]")

@@ -18,6 +18,7 @@ import duckdb
 
 from turnout.errors import REASONS, RegistryError
 from turnout.files import publish_file, temporary_path
+from turnout.registry.comments import add_comments
 from turnout.registry.generation import Generation, load
 from turnout.registry.ids import content_id
 from turnout.registry.parquet import MEASUREMENT_IDS, read_live
@@ -333,25 +334,7 @@ def _create_views(con: duckdb.DuckDBPyConnection, root: Path, generation: Genera
             con.execute(sql)
         except duckdb.Error as error:
             raise RegistryError(f"views/{name}.sql: {error}") from error
-    _comment(con)
-
-
-def _comment(con: duckdb.DuckDBPyConnection) -> None:
-    """Add comments with the unit to columns, for tools that show them; macros are described in the documentation."""
-    present = {
-        (view, column)
-        for view, column in con.execute(
-            "select table_name, column_name from duckdb_columns() where database_name = 'registry'"
-        ).fetchall()
-    }
-    described = [(c.table, c.name, c.unit, c.meaning) for t in tables().values() for c in t]
-    described += [(v["view"], v["column"], v["unit"], v["meaning"]) for v in view_columns()]
-    con.execute("begin")
-    for view, column, unit, meaning in described:
-        if (view, column) in present:
-            text = literal(f"{meaning} [{unit}]" if unit else meaning)
-            con.execute(f'comment on column "{view}"."{column}" is {text}')
-    con.execute("commit")
+    add_comments(con, view_files().values(), view_columns(), LARGE_TABLES)
 
 
 @cache

@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 
 from turnout.errors import REASONS, RegistryError
+from turnout.registry.comments import row_meaning
 from turnout.registry.database import view_columns, view_files
 from turnout.registry.schema import Column, tables
 
@@ -24,30 +25,10 @@ def views() -> dict[str, tuple[str, tuple[dict[str, str], ...]]]:
     columns_by_call: dict[str, list[dict[str, str]]] = {}
     for row in view_columns():
         columns_by_call.setdefault(row["view"] + row["parameters"], []).append(row)
-    return {call: (row_meaning(rows[0]["view"]), tuple(rows)) for call, rows in columns_by_call.items()}
-
-
-def row_meaning(name: str) -> str:
-    """Meaning of a row of the view: the SQL comment above the statement that creates it.
-
-    Parameters
-    ----------
-    name : str
-        Name of the view or macro.
-
-    Returns
-    -------
-    str
-        The meaning, "" without a comment.
-    """
-    for sql in view_files().values():
-        for keyword in ("view", "macro"):
-            head, statement, _ = sql.partition(f"create or replace {keyword} {name}")
-            if statement and not (sql[len(head) + len(statement)].isalnum() or sql[len(head) + len(statement)] == "_"):
-                comment = head.rstrip().rpartition("\n\n")[2].splitlines()
-                lines = [c[2:].strip() for c in comment if c.startswith("--") and "needs:" not in c]
-                return " ".join(lines)
-    return {"registry_info": "One row: what this registry is.", "reasons": "One row per reason code."}.get(name, "")
+    return {
+        call: (row_meaning(rows[0]["view"], view_files().values()), tuple(rows))
+        for call, rows in columns_by_call.items()
+    }
 
 
 def listing() -> str:
