@@ -11,8 +11,7 @@ import io
 import math
 import re
 import zipfile
-import zlib
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 
@@ -23,15 +22,12 @@ FREE_CLAIM = 128 * 2**20  # bytes that a file of any size may claim: a long reco
 MAX_COLUMNS = 4096  # columns of a text or Parquet file: each costs kilobytes, whatever it holds
 REMEDY = "Copy the file again from the logger; if it is whole, export it unpacked or in shorter records"
 ELSEWHERE_REMEDY = "Export the samples into the file itself"
-MAT_HEADER, MAT_COMPRESSED, MAT_MATRIX = 128, 15, 14  # bytes; types of elements in MATLAB 5
-MAX_MAT_DEPTH = 64  # of cells and structures in each other
-BLOCK = 2**16  # bytes that are unpacked at a time
 
 
 def check_claims(format_module: str, source: Source) -> None:
     """Stop before a reader allocates more memory than a file of this size can hold, or opens another file.
 
-    Readers of HDF5 and Parquet call ``check_hdf5`` and ``check_parquet`` with the file that they have opened.
+    The other readers check with the file that they have opened: HDF5, Parquet, and MATLAB 5 as it is unpacked.
 
     Parameters
     ----------
@@ -54,8 +50,23 @@ def check_claims(format_module: str, source: Source) -> None:
         check(source)
 
 
-def _check(n_byte: float, source: Source, where: str) -> None:
-    """ReadError if ``n_byte`` is more than a file of this size may claim."""
+def check_size(n_byte: float, source: Source, where: str) -> None:
+    """Stop if a number of bytes is more than a file of this size may claim.
+
+    Parameters
+    ----------
+    n_byte : float
+        Bytes that the file claims, unpacked.
+    source : Source
+        The raw file.
+    where : str
+        Position in the file, for the message.
+
+    Raises
+    ------
+    ReadError
+        If it is more.
+    """
     # a lazy column is read in blocks, so that only the bound of the compression counts
     limit = (MAX_COMPRESSION_RATIO if source.lazy else MAX_EXPANSION) * source.size + FREE_CLAIM
     if n_byte > limit:
@@ -68,7 +79,7 @@ def _npz(source: Source) -> None:
     total = 0
     with source.parsed_by("zipfile"), zipfile.ZipFile(source.path) as archive:
         for member in archive.infolist():
-            _check(total := total + member.file_size, source, f"variable {member.filename!r}")
+            check_size(total := total + member.file_size, source, f"variable {member.filename!r}")
 
 
 def read_array(archive: zipfile.ZipFile, name: str, source: Source) -> np.ndarray | bytes:
@@ -122,6 +133,74 @@ def _npy_header(stream: io.BytesIO) -> tuple[tuple[int, ...], bool, np.dtype]:
     return read(stream)
 
 
+class Hdf5Claims:
+    """What the datasets of an HDF5 file claim together, and whether their values are in the file itself.
+
+    Parameters
+    ----------
+    source : Source
+        The raw file.
+    """
+
+    def __init__(self, source: Source):
+        self.source, self.total = source, 0
+
+    def check_link(self, group: Any, name: bytes, path: str) -> bool:
+        """Check the link to a member of a group without following it.
+
+        Parameters
+        ----------
+        group : h5py.h5g.GroupID
+            The group.
+        name : bytes
+            Name of the member.
+        path : str
+            Its path, for the message.
+
+        Returns
+        -------
+        bool
+            Whether it is a hard link, to an object of this file.
+
+        Raises
+        ------
+        ReadError
+            If it leads to another file.
+        """
+        import h5py
+
+        kind = group.links.get_info(name).type
+        if kind == h5py.h5l.TYPE_EXTERNAL:
+            file_name = group.links.get_val(name)[0].decode("utf-8", "replace")
+            problem = f"it is a link to the file {file_name!r}"
+            raise self.source.error(path, problem, ELSEWHERE_REMEDY, reason="outside_root")
+        return kind == h5py.h5l.TYPE_HARD
+
+    def check_dataset(self, dataset: Any, path: str) -> None:
+        """Check a dataset before it is read.
+
+        Parameters
+        ----------
+        dataset : h5py.h5d.DatasetID
+            The dataset.
+        path : str
+            Its path, for the message.
+
+        Raises
+        ------
+        ReadError
+            If the file claims too much, or the values are in another file.
+        """
+        import h5py
+
+        if problem := _elsewhere(dataset):
+            raise self.source.error(f"dataset {path!r}", problem, ELSEWHERE_REMEDY, reason="outside_root")
+        space = dataset.get_space()
+        if space.get_simple_extent_type() != h5py.h5s.NULL:
+            self.total += space.get_simple_extent_npoints() * dataset.get_type().get_size()
+        check_size(self.total, self.source, f"dataset {path!r}")
+
+
 def check_hdf5(file: Any, source: Source) -> None:
     """Check all datasets; links to other files, external storage and virtual datasets are found without following them.
 
@@ -139,39 +218,25 @@ def check_hdf5(file: Any, source: Source) -> None:
     """
     import h5py
 
-    total, seen = 0, set()
+    claims, seen = Hdf5Claims(source), set()
 
     def walk(group: Any, above: str) -> None:
-        nonlocal total
-        links = group.links
         for name in group:
-            path = (
-                f"{h5py.h5i.get_name(group).decode('utf-8', 'replace').rstrip('/')}/{name.decode('utf-8', 'replace')}"
-            )
-            kind = links.get_info(name).type
-            if kind == h5py.h5l.TYPE_EXTERNAL:
-                file_name = links.get_val(name)[0].decode("utf-8", "replace")
-                problem = f"it is a link to the file {file_name!r}"
-                raise source.error(path, problem, ELSEWHERE_REMEDY, reason="outside_root")
-            if kind != h5py.h5l.TYPE_HARD:
+            path = f"{above}/{name.decode('utf-8', 'replace')}"
+            if not claims.check_link(group, name, path):
                 continue
             try:
                 info = h5py.h5o.get_info(group, name)
                 if info.addr in seen or info.type not in (h5py.h5o.TYPE_GROUP, h5py.h5o.TYPE_DATASET):
                     continue
                 member = h5py.h5o.open(group, name)
-                space = member.get_space() if info.type == h5py.h5o.TYPE_DATASET else None
             except (KeyError, OSError, RuntimeError, ValueError):  # damaged: its reader reports it
                 continue
             seen.add(info.addr)
-            if space is None:
+            if info.type == h5py.h5o.TYPE_GROUP:
                 walk(member, path)
-                continue
-            if problem := _elsewhere(member):
-                raise source.error(f"dataset {path!r}", problem, ELSEWHERE_REMEDY, reason="outside_root")
-            if space.get_simple_extent_type() != h5py.h5s.NULL:
-                total += space.get_simple_extent_npoints() * member.get_type().get_size()
-            _check(total, source, f"dataset {path!r}")
+            else:
+                claims.check_dataset(member, path)
 
     root = h5py.h5g.open(file.id, b"/")
     seen.add(h5py.h5o.get_info(root).addr)
@@ -193,111 +258,6 @@ def _elsewhere(dataset: Any) -> str:
     return ""
 
 
-def _mat(source: Source) -> None:
-    """The elements of a MATLAB 5 file: none may claim more bytes than the element or file that it is in."""
-    order = "<" if source.head[126:128] == b"IM" else ">"
-    total, position = 0, MAT_HEADER
-    with source.path.open("rb") as file:
-        while position + 8 <= source.size:
-            where = f"the variable at byte {position}"
-            file.seek(position)
-            kind, length = _mat_tag(file.read(8), order)
-            if kind == MAT_COMPRESSED:
-                stream = _Unpacked(file, min(length, source.size - position - 8))
-                kind_inside, length_unpacked = _mat_tag(stream.read(8), order)
-                _check(total := total + length_unpacked, source, where)
-                if kind_inside == MAT_MATRIX:
-                    _check_mat_parts(stream, length_unpacked, order, source, where)
-            elif kind == MAT_MATRIX:
-                # a file that was cut ends within its last element, which its reader reports
-                _check_mat_parts(_Plain(file), length, order, source, where)
-            position += 8 + length
-
-
-def _check_mat_parts(stream: _Plain | _Unpacked, length: int, order: str, source: Source, where: str) -> None:
-    """ReadError if a part of a matrix claims more bytes than the rest of the matrix; parts may be matrices again."""
-    ends, position = [length], 0
-    while ends and len(ends) <= MAX_MAT_DEPTH:
-        if position + 8 > ends[-1]:
-            ends.pop()
-            continue
-        kind, n_byte = _mat_tag(stream.read(8), order)
-        position += 8
-        if kind == 0 and n_byte == 0:  # the end of damaged or cut data, or an empty part
-            continue
-        if kind >> 16:  # up to four bytes in the tag itself
-            continue
-        if n_byte > ends[-1] - position:
-            problem = f"a part of it claims {n_byte} bytes, where {ends[-1] - position} are left"
-            raise source.error(where, problem, REMEDY, reason="claims_too_much")
-        if kind == MAT_MATRIX:
-            ends.append(position + n_byte)
-            continue
-        n_padded = min(n_byte + -n_byte % 8, ends[-1] - position)
-        if not stream.skip(n_padded):
-            return
-        position += n_padded
-
-
-def _mat_tag(tag: bytes, order: str) -> tuple[int, int]:
-    """Type and length of an element; zeros where the bytes end."""
-    kind, length = np.frombuffer(tag.ljust(8, b"\0"), f"{order}u4")
-    return int(kind), int(length)
-
-
-class _Plain:
-    """The bytes of an open file from its present position on."""
-
-    def __init__(self, file: BinaryIO) -> None:
-        self.file = file
-
-    def read(self, n: int) -> bytes:
-        return self.file.read(n)
-
-    def skip(self, n: int) -> bool:
-        """Whether there may be bytes behind."""
-        self.file.seek(n, 1)
-        return True
-
-
-class _Unpacked:
-    """The unpacked bytes of ``n_packed`` bytes of an open file; they end where these are damaged."""
-
-    def __init__(self, file: BinaryIO, n_packed: int) -> None:
-        self.file, self.n_packed, self.unpacker = file, n_packed, zlib.decompressobj()
-
-    def read(self, n: int) -> bytes:
-        pieces = []
-        while n > 0 and (piece := self._next(n)):
-            pieces.append(piece)
-            n -= len(piece)
-        return b"".join(pieces)
-
-    def skip(self, n: int) -> bool:
-        """Whether all these bytes were there."""
-        while n > 0 and (piece := self._next(min(n, BLOCK))):
-            n -= len(piece)
-        return n <= 0
-
-    def _next(self, n: int) -> bytes:
-        """At least one byte, at most ``n``; none at the end."""
-        try:
-            while not (piece := self.unpacker.decompress(self._packed_bytes(), n)):
-                if not self.n_packed and not self.unpacker.unconsumed_tail:
-                    return b""
-        except zlib.error:
-            self.n_packed = 0
-            return b""
-        return piece
-
-    def _packed_bytes(self) -> bytes:
-        if self.unpacker.unconsumed_tail:
-            return self.unpacker.unconsumed_tail
-        packed = self.file.read(min(BLOCK, self.n_packed))
-        self.n_packed = self.n_packed - len(packed) if packed else 0
-        return packed
-
-
 def check_parquet(metadata: Any, source: Source) -> None:
     """Check rows and columns of the metadata: repeated values take no space in the file.
 
@@ -315,7 +275,7 @@ def check_parquet(metadata: Any, source: Source) -> None:
     """
     _check_columns(metadata.num_columns, source)
     sizes = sum(metadata.row_group(k).total_byte_size for k in range(metadata.num_row_groups))
-    _check(max(sizes, 8 * metadata.num_rows * metadata.num_columns), source, "the metadata")
+    check_size(max(sizes, 8 * metadata.num_rows * metadata.num_columns), source, "the metadata")
 
 
 def _wav(source: Source) -> None:
@@ -323,7 +283,7 @@ def _wav(source: Source) -> None:
     if source.head[:4] == b"fLaC":
         fields = int.from_bytes(source.head[18:26], "big")  # rate 20, channels 3, bits 5, frames 36 bits
         n_channel, n_frame = (fields >> 41 & 7) + 1, fields & (1 << 36) - 1
-        _check(4 * n_channel * n_frame, source, "the header")
+        check_size(4 * n_channel * n_frame, source, "the header")
 
 
 def _lvm(source: Source) -> None:
@@ -349,4 +309,4 @@ def _check_columns(n_column: int, source: Source) -> None:
         raise source.error("the file", problem, remedy, reason="claims_too_much")
 
 
-CHECKS = {"npz": _npz, "mat": _mat, "wav": _wav, "lvm": _lvm, "csv": _csv}
+CHECKS = {"npz": _npz, "wav": _wav, "lvm": _lvm, "csv": _csv}

@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.claims import check_hdf5
+from turnout.readers.claims import Hdf5Claims
 from turnout.readers.lazy import is_large, lazy_array
 from turnout.readers.named_arrays import (
     ATTRIBUTES_MARK,
@@ -51,8 +51,7 @@ def read_raw(source: Source) -> RawFile:
         If the file cannot be opened, or its groups are no records.
     """
     with source.parsed_by("HDF5"), open_file(source) as file:
-        check_hdf5(file, source)
-        variables = _variables(file, source)
+        variables = _variables(file, "", source, Hdf5Claims(source))
     return raw_file(variables, source)
 
 
@@ -73,7 +72,7 @@ def open_file(source: Source) -> AbstractContextManager[h5py.File]:
     return nullcontext(file) if source.lazy else file
 
 
-def _variables(group: h5py.Group, source: Source) -> dict[str, Any]:
+def _variables(group: h5py.Group, path: str, source: Source, claims: Hdf5Claims) -> dict[str, Any]:
     """Members and attributes of a group in one dictionary; a ReadError for a dataset that cannot be read."""
     creation = group[group.name].id.get_create_plist()  # the id of a File does not have it
     is_order_tracked = creation.get_link_creation_order() & h5py.h5p.CRT_ORDER_TRACKED
@@ -83,12 +82,20 @@ def _variables(group: h5py.Group, source: Source) -> dict[str, Any]:
     variables = mapping_type({name: _attribute(value) for name, value in group.attrs.items()})
     units: dict[str, str] = {}
     stated: dict[str, dict] = {}
-    for name, member in group.items():
-        if isinstance(member, h5py.Group):
-            variables[name] = _variables(member, source)
-            continue
+    members = h5py.h5g.open(group.id, b"/") if isinstance(group, h5py.File) else group.id
+    for name in group:
+        claims.check_link(members, name.encode("utf-8", "surrogateescape"), f"{path}/{name}")
         try:
-            with source.parsed_by("HDF5", f"dataset {name!r} in {group.name!r}"):
+            member = group[name]
+        except KeyError:  # a link to nothing
+            member = None
+        if isinstance(member, h5py.Group):
+            variables[name] = _variables(member, f"{path}/{name}", source, claims)
+            continue
+        if isinstance(member, h5py.Dataset):
+            claims.check_dataset(member.id, f"{path}/{name}")
+        try:
+            with source.parsed_by("HDF5", f"dataset {name!r} in {path or '/'!r}"):
                 attributes = {k: _attribute(v) for k, v in member.attrs.items()}
                 large = source.lazy and is_large(member) and name.lower() not in TIME_NAMES
                 numbers = _with_packing(member, attributes, source)

@@ -404,10 +404,15 @@ class Assignments:
         set of int
             Numbers of the rows, from 0.
         """
-        key = _key(record)
+        key = self._key(record)
         if key not in self._rows:
             self._rows[key] = _sensor_rows(record, self.channels, where, self.source)
         return self._rows[key]
+
+    def _key(self, record: RawRecord) -> tuple:
+        """What the assignment depends on; aliases only if a channel of the layout is called by one."""
+        is_named = all(isinstance(c.source, int) or c.source in record.names for c in self.channels)
+        return record.names, record.units, () if is_named else record.aliases, tuple(record.undecided.items())
 
     def mappings(self, record: RawRecord, where: str) -> tuple[ChannelMapping, ...]:
         """As ``channel_mappings``.
@@ -429,14 +434,10 @@ class Assignments:
         ReadError
             If file and layout disagree about channels or units.
         """
-        key = _key(record)
+        key = self._key(record)
         if key not in self._mappings or record.is_floating_audio:
             self._mappings[key] = channel_mappings(record, self.channels, where, self.source)
         return self._mappings[key]
-
-
-def _key(record: RawRecord) -> tuple:
-    return record.names, record.units, record.aliases, tuple(record.undecided.items())
 
 
 def _recording(

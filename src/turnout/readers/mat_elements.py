@@ -9,6 +9,7 @@ import math
 import struct
 import zlib
 
+from turnout.readers.claims import check_size
 from turnout.readers.source import COPY_AGAIN, Source
 
 HEADER_SIZE = 128  # bytes: text, version and byte order
@@ -44,7 +45,7 @@ def unpacked_file(source: Source) -> bytes:
     """
     data = source.data
     order = "<" if data[126:128] == b"IM" else ">"
-    pieces, position = [data[:HEADER_SIZE]], HEADER_SIZE
+    pieces, position, total = [data[:HEADER_SIZE]], HEADER_SIZE, 0
     while position < len(data):
         try:
             if position + 8 > len(data):
@@ -54,7 +55,9 @@ def unpacked_file(source: Source) -> bytes:
                 raise ValueError(f"an element of type {kind} with {size} bytes does not fit into the file")
             element = data[position : position + 8 + size]
             if kind == COMPRESSED:
-                element = zlib.decompress(element[8:])
+                claimed = _claimed_size(element[8:], order)
+                check_size(total := total + claimed, source, f"the variable at byte {position}")
+                element = _unpacked(element[8:], claimed)
             _check_matrix(element, 0, len(element), order, 0)
         except (ValueError, struct.error, zlib.error) as error:
             problem = f"it is damaged ({error})"
@@ -62,6 +65,24 @@ def unpacked_file(source: Source) -> bytes:
         pieces.append(element)
         position += 8 + size
     return b"".join(pieces)
+
+
+def _claimed_size(packed: bytes, order: str) -> int:
+    """Bytes of the element in packed bytes, its tag included, as the tag states."""
+    tag = zlib.decompressobj().decompress(packed, 8)
+    if len(tag) < 8:
+        raise ValueError("its tag is cut off")
+    return 8 + struct.unpack(f"{order}II", tag)[1]
+
+
+def _unpacked(packed: bytes, size: int) -> bytes:
+    """The element in packed bytes, of which no more than ``size`` are unpacked."""
+    unpacker = zlib.decompressobj()
+    element = unpacker.decompress(packed, size)
+    rest = unpacker.decompress(unpacker.unconsumed_tail, 8)  # reads the checksum
+    if len(element) != size or len(rest) > 7 or not unpacker.eof:
+        raise ValueError(f"{len(element) + len(rest)} of {size} bytes are packed in it")
+    return element
 
 
 def _element(data: bytes, position: int, stop: int, order: str) -> tuple[int, int, int, int]:
@@ -93,7 +114,7 @@ def _check_matrix(data: bytes, position: int, stop: int, order: str, depth: int)
     (flags,) = struct.unpack_from(f"{order}I", data, flags_at)
     array_class = flags & 0xFF
     if array_class not in (CELL, STRUCTURE, TEXT, *NUMERIC_CLASSES):
-        return following  # objects, functions and sparse matrices are no samples
+        return _check_parts(data, position, end, following, order, depth)
     kind, at, n_byte, position = _element(data, position, end, order)
     if kind != INT32 or n_byte % 4 or not 8 <= n_byte <= 4 * MAX_DIMENSIONS:
         raise ValueError("an array has no dimensions")
@@ -120,6 +141,14 @@ def _check_matrix(data: bytes, position: int, stop: int, order: str, depth: int)
                 raise ValueError(f"a text has the type {kind}")
         elif kind not in NUMBER_SIZES or n_byte != count * NUMBER_SIZES[kind]:
             raise ValueError(f"{n_byte} bytes of type {kind} for {count} numbers")
+    return following
+
+
+def _check_parts(data: bytes, position: int, stop: int, following: int, order: str, depth: int) -> int:
+    """``following``, if all parts of an object, function or sparse matrix end within it."""
+    while position + 8 <= stop:
+        kind, _, _, behind = _element(data, position, stop, order)
+        position = _check_matrix(data, position, stop, order, depth + 1) if kind == MATRIX else behind
     return following
 
 

@@ -9,7 +9,7 @@ A statement that contradicts it beyond rounding, and an entry that may be a rate
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any
@@ -244,15 +244,15 @@ def statements_of(entries: Iterable[Entry], k: int = 0, n: int = 1) -> list[Stat
         for value in _values(entry.value, k, n):
             if isinstance(value, (bool, np.bool_)) or not isinstance(value, (str, int, float, np.number)):
                 continue
-            for statement in _statements_of_value(entry.place, entry.name, value, type(value).__name__):
-                found.setdefault((statement.place, statement.text), statement)
+            for statement in _statements_of_value(entry.name, value, type(value)):
+                found.setdefault((entry.place, statement.text), replace(statement, place=entry.place))
     return list(found.values())
 
 
 @lru_cache(maxsize=4096)
-def _statements_of_value(place: str, name: str, value: Any, kind: type) -> tuple[Statement, ...]:
-    """Statements of one value; the records of a file share most entries. Equal numbers of other types differ."""
-    return tuple(_statements(Entry(place, name, value), value))
+def _statements_of_value(name: str, value: Any, kind: type) -> tuple[Statement, ...]:
+    """Statements of one value, without its place: records share most entries. Equal numbers of other types differ."""
+    return tuple(_statements(Entry("", name, value), value))
 
 
 def _values(value: Any, k: int, n: int) -> list[Any]:

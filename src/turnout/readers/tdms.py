@@ -7,7 +7,6 @@ and the length of each channel with ``wf_samples``.
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import replace
 from typing import Any, BinaryIO
 
 import nptdms
@@ -57,7 +56,11 @@ def read_raw(source: Source) -> RawFile:
     groups = _records_of_groups(tdms.groups(), source)
     names = {channel.name for channels in groups for channel in channels}
     damaged = _damaged_paths(tdms) if truncation else set()
-    records = [_record(g, k, len(groups), names, damaged, tdms, source) for k, g in enumerate(groups)]
+    of_file = [
+        Entry(f"property of the file: {entry.name}", entry.name, entry.value)
+        for entry in entries_of(tdms.properties, "")
+    ]
+    records = [_record(g, k, len(groups), names, damaged, tdms, of_file, source) for k, g in enumerate(groups)]
     if truncation and not any(isinstance(r, ReadError) for r in records):
         records.append(source.error(f"record {len(records) + 1}", truncation, COPY_AGAIN, reason="truncated"))
     return RawFile(tuple(records), Metadata(tdms.properties, source).count(RECORD_COUNT_NAMES))
@@ -159,6 +162,7 @@ def _complete_record(
     names: set[str],
     damaged: set[str],
     tdms: nptdms.TdmsFile,
+    of_file: Sequence[Entry],
     source: Source,
 ) -> RawRecord:
     groups = {c.group_name: tdms[c.group_name].properties for c in channels}
@@ -186,7 +190,7 @@ def _complete_record(
     return RawRecord(
         names=tuple(c.name for c in channels),
         samples=samples,
-        entries=tuple(_entries(channels, groups, tdms.properties)),
+        entries=(*of_file, *_entries(channels, groups)),
         units=tuple(str(c.properties.get("unit_string", "") or "") for c in channels),
         **start_fields(facts.record_value(("wf_start_time",), 0, 1), facts.record_value(START_NAMES, 0, 1)),
         conditions=facts.conditions(0, 1),
@@ -209,16 +213,15 @@ def _scale_text(*levels: Mapping[str, Any]) -> str:
     return scale_text(merged)
 
 
-def _entries(
-    channels: Sequence[nptdms.TdmsChannel], groups: Mapping[str, Mapping[str, Any]], properties: Mapping[str, Any]
-) -> Iterator[Entry]:
-    """Properties of the file, of the groups and of the channels; a ``wf_increment`` of 0 states nothing."""
-    places = [("property of the file", properties)]
-    places += [(f"property of the group {name!r}", values) for name, values in groups.items()]
+def _entries(channels: Sequence[nptdms.TdmsChannel], groups: Mapping[str, Mapping[str, Any]]) -> Iterator[Entry]:
+    """Properties of the groups and of the channels; a ``wf_increment`` of 0 states nothing."""
+    places: list[tuple[str, Mapping[str, Any]]] = [
+        (f"property of the group {name!r}", values) for name, values in groups.items()
+    ]
     places += [(f"property of the channel {c.name!r}", c.properties) for c in channels]
     for place, values in places:
         stated = {name: value for name, value in values.items() if name != "wf_increment" or value != 0}
-        yield from (replace(entry, place=f"{place}: {entry.name}") for entry in entries_of(stated, ""))
+        yield from (Entry(f"{place}: {entry.name}", entry.name, entry.value) for entry in entries_of(stated, ""))
 
 
 def _check_steps(channels: Sequence[nptdms.TdmsChannel], where: str, source: Source) -> None:
