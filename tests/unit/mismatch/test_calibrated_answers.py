@@ -93,15 +93,42 @@ def test_a_change_below_the_least_size_has_no_name():
     assert answer.verdict in ("none", "unknown")  # 0.08 is the least change of a gain that anybody acts on
 
 
-def test_directions_of_dips_give_the_triangle_back():
-    waves = Waves((2.0, 9.0), 0.0)
-    parameters = [StateParameter(f"{n}@{waves.start:.2f}-{waves.end:.2f}", 0.0, 1e-4, 0.0, "wave") for n in waves.names]
-    directions = dip_directions(parameters)
+WAVES = Waves((2.0, 9.0), 0.0)
+SURFACE = [
+    StateParameter(f"{n}@{WAVES.start:.2f}-{WAVES.end:.2f}", 0.0, float(sd), 0.0, "wave")
+    for n, sd in zip(WAVES.names, WAVES.sd)
+]
+
+
+def test_directions_of_dips_have_their_shape_without_large_amplitudes_that_cancel():
+    directions = dip_directions(SURFACE)
     direction = directions["dip of 0.8 m@5.00"]
     x = np.linspace(4.0, 6.0, 201)
-    amplitudes = np.array([direction[p.name] for p in parameters])
-    shape = amplitudes @ waves.shapes(x)
-    triangle = np.clip(1.0 - abs(x - 5.0) / 0.4, 0.0, None)
-    assert np.corrcoef(shape, triangle)[0, 1] > 0.9  # waves longer than the sensors' stretch are missing
+    amplitudes = np.array([direction[p.name] for p in SURFACE])
+    shape = amplitudes @ WAVES.shapes(x)
+    dip = 0.5 + 0.5 * np.cos(2.0 * np.pi * np.clip((x - 5.0) / 0.8, -0.5, 0.5))
+    assert np.corrcoef(shape, dip)[0, 1] > 0.85  # waves longer than the sensors' stretch are missing
     assert np.argmax(shape) == pytest.approx(100, abs=5) and 0.6 < np.ptp(shape) < 1.3
-    assert dip_directions([replace(p, group="pad") for p in parameters]) == {}
+    assert np.max(np.abs(amplitudes)) < 0.3  # of a dip of 1
+    assert dip_directions([replace(p, group="pad") for p in SURFACE]) == {}
+
+
+@pytest.mark.parametrize(("depth", "verdict"), [(6e-4, "named"), (0.0, "none")])
+def test_a_dip_of_the_first_day_differs_from_the_file(depth, verdict):
+    """Trains measure the waves with half of their prior sd; the dip of 0.7 m is no candidate's length."""
+    rng, names, sd = np.random.default_rng(9), tuple(p.name for p in SURFACE), WAVES.sd
+    x = np.arange(WAVES.start, WAVES.end, 0.02)
+    dip = depth * (0.5 + 0.5 * np.cos(2.0 * np.pi * np.clip((x - 5.03) / 0.7, -0.5, 0.5)))
+    rows = WAVES.shapes(x).T * sd
+    truth = sd * np.linalg.solve(rows.T @ rows + 1e-10 * np.eye(len(sd)), rows.T @ dip) + rng.normal(0.0, sd)
+    visits = []
+    for v in range(3):
+        y = truth + 0.5 * sd * rng.normal(size=len(sd))
+        group = GroupInformation("A: locomotive", 1, names, np.diag(4.0 / sd**2), 4.0 * y / sd**2)
+        visits.append(VisitInformation(f"v{v}", 0.5 * v, (group,)))
+    candidates = change_candidates(SURFACE, dip_directions(SURFACE))
+    answers = {a.question: a for a in answers_after_visits(SURFACE, visits, [], candidates, 12.0, 6.0, 3)}
+    assert answers["change"].verdict == "none" and answers["file"].verdict == verdict
+    if depth:
+        assert answers["file"].names == ("surface_dip",) and answers["file"].position == pytest.approx(5.03, abs=0.15)
+        assert answers["file"].size == pytest.approx(depth, rel=0.35)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from turnout.mismatch.calibrated.belief import StateParameter
+from turnout.mismatch.calibrated.belief import Belief, StateParameter
 from turnout.mismatch.calibrated.change import ChangeEffect, OnsetEvidence, compare_onsets
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.file_comparison import Deviation, deviations_from_file
@@ -113,7 +113,7 @@ def answers_after_visits(
     for n in range(first, len(ordered) + 1):
         change = change_answer(parameters, ordered[:n], events, candidates, threshold, margin)
         before = _visits_before(ordered[:n], change)
-        answers += [change, file_answer(parameters, before, events, ordered[n - 1].visit)]
+        answers += [change, file_answer(parameters, before, events, ordered[n - 1].visit, candidates, threshold)]
     return answers
 
 
@@ -160,6 +160,9 @@ def change_answer(
     price = float(np.log(max(len(candidates), 1)))
     by_name = {p.name: p for p in parameters}
     material = [e for e in evidence if e.gain - price >= threshold and _is_material(e, by_name)]
+    if material:  # the belief takes some visits to follow what was there from the first
+        from_first, *_ = evidence_from_first(parameters, history, [e.effect for e in material])
+        material = [e for e, gain in zip(material, from_first) if e.gain >= gain]
     if not material:
         return _answer_without_name(history, visit, by_name)
     best = material[0]
@@ -243,9 +246,14 @@ def _answer_without_name(history: History, visit: str, by_name: Mapping[str, Sta
 
 
 def file_answer(
-    parameters: Sequence[StateParameter], visits: Sequence[VisitInformation], events: Sequence[Event], visit: str
+    parameters: Sequence[StateParameter],
+    visits: Sequence[VisitInformation],
+    events: Sequence[Event],
+    visit: str,
+    candidates: Sequence[ChangeEffect] = (),
+    threshold: float = np.inf,
 ) -> ModelAnswer:
-    """What differs from the file, the clearest first deviation.
+    """What differs from the file, the clearest deviation first; without one, a dip that was there from the first visit.
 
     Parameters
     ----------
@@ -255,6 +263,10 @@ def file_answer(
     events : sequence of Event
     visit : str
         Visit after which the answer is given.
+    candidates : sequence of ChangeEffect
+        As ``change_candidates``. Those of more than one parameter are asked.
+    threshold : float
+        Evidence that such a candidate needs. [nats]
 
     Returns
     -------
@@ -263,7 +275,7 @@ def file_answer(
     history = estimate_history(parameters, visits, events, accepted=None)
     deviations = deviations_from_file(history.belief, parameters, dict(CALIBRATION.least_sizes))
     if not deviations:
-        return ModelAnswer(visit, FILE, "none")
+        return _dip_answer(parameters, history, visit, candidates, threshold)
     first: Deviation = deviations[0]
     by_name = {p.name: p for p in parameters}
     middle = None if first.positions is None else 0.5 * sum(first.positions)
@@ -272,3 +284,60 @@ def file_answer(
         visit, FILE, "named", (NAMES[first.group],), ", ".join(first.names), first.group,
         position, first.size, first.sd, first.unit,
     )  # fmt: skip
+
+
+def _dip_answer(
+    parameters: Sequence[StateParameter],
+    history: History,
+    visit: str,
+    candidates: Sequence[ChangeEffect],
+    threshold: float,
+) -> ModelAnswer:
+    """A dip in the running surface of which the file says nothing: it raises many waves together."""
+    shapes = [c for c in candidates if len(c.direction) > 1 and not c.grows]
+    nothing = ModelAnswer(visit, FILE, "none")
+    if not shapes:
+        return nothing
+    gain, size, sd = evidence_from_first(parameters, history, shapes)
+    gain = gain - np.log(len(shapes))
+    k = int(np.argmax(gain))
+    if gain[k] < threshold or abs(size[k]) < CALIBRATION.least_dip:
+        return nothing
+    name = shapes[k].name
+    return ModelAnswer(
+        visit, FILE, "named", (NAMES["dip"],), name, "dip", position_of(name, None), float(size[k]), float(sd[k]), "m",
+        None, float(gain[k]),
+    )  # fmt: skip
+
+
+def evidence_from_first(
+    parameters: Sequence[StateParameter], history: History, candidates: Sequence[ChangeEffect]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    r"""Evidence of effects that were there from the first visit, over the values of the file with their scatter.
+
+    With the information of all visits, :math:`\Lambda = P^{-1} - P_0^{-1}`, it is that of ``compare_onsets`` for one
+    visit.
+
+    Parameters
+    ----------
+    parameters : sequence of StateParameter
+    history : History
+    candidates : sequence of ChangeEffect
+        Whether they grow makes no difference.
+
+    Returns
+    -------
+    gains, sizes, sds : (n_candidate,) array of float
+    """
+    names = [p.name for p in parameters]
+    prior, belief = Belief.of_file(parameters), history.belief
+    precision = np.linalg.inv(belief.covariance)
+    matrix = precision - np.diag(1.0 / prior.sd**2)
+    score = precision @ (belief.mean - prior.mean)  # information vector about the mean of the file
+    directions = np.array([[c.direction.get(name, 0.0) for name in names] for c in candidates])
+    seen = (matrix - matrix @ belief.covariance @ matrix) @ directions.T
+    information = np.sum(directions.T * seen, axis=0)
+    b = directions @ (score - matrix @ belief.covariance @ score)
+    variance = np.array([c.sd**2 for c in candidates])
+    sizes, sds = b / (information + 1.0 / variance), 1.0 / np.sqrt(information + 1.0 / variance)
+    return 0.5 * b * sizes - 0.5 * np.log1p(variance * information), sizes, sds

@@ -32,8 +32,12 @@ class CalibrationConstants:
     change_sds: float = threshold(5.0, "prior sd", "prior standard deviation of a change of a parameter", PAGE)
     dip_sd: float = threshold(5e-4, "m", "prior standard deviation of the depth of a dip that appears", PAGE)
     least_dip: float = threshold(1e-4, "m", "depth of a dip below which nobody would act", PAGE)
-    dip_lengths: tuple[float, ...] = threshold((0.4, 0.8), "m", "lengths of the dips that are sought", PAGE)
-    dip_spacing: float = threshold(0.3, "m", "distance of the positions at which a dip is sought", PAGE)
+    dip_lengths: tuple[float, ...] = threshold((0.4, 0.6, 0.8), "m", "lengths of the dips that are sought", PAGE)
+    dip_spacing: float = threshold(0.1, "m", "distance of the positions at which a dip is sought", PAGE)
+    dip_error: float = threshold(1e-5, "m", "error of the surface that waves make of a dip of any depth", PAGE)
+    dip_step: float = threshold(
+        0.02, "m", "step of the surface from which the waves of a dip are computed", "numerical"
+    )
     finding_sds: float = threshold(3.0, "standard deviations", "beyond which a value differs from the file", PAGE)
     min_prior_share: float = threshold(
         1e-9, "share of the prior variance", "of a mean over components, below which data say nothing", "numerical"

@@ -173,10 +173,12 @@ def linearization_point(case: TrackCase, fit: Fit, route: str = "main") -> Mappi
 
 
 def dip_directions(parameters: Sequence[StateParameter]) -> dict[str, dict[str, float]]:
-    """Dips of the running surface that may appear, as changes of the amplitudes of the waves.
+    r"""Dips of the running surface that may appear, as changes of the amplitudes of the waves.
 
-    A dip is a triangle of ``CALIBRATION.dip_lengths`` and depth 1, at positions between the outer sensors. It is
-    projected on the waves by least squares.
+    A dip is one period of a raised cosine, :math:`(1 + \cos 2\pi x/L)/2`, of ``CALIBRATION.dip_lengths``, at
+    positions between the outer sensors. Its waves are those that are most probable under their priors, if the surface
+    has the dip with an error of ``CALIBRATION.dip_error``. Waves overlap, so that a dip has many descriptions by waves;
+    one without the priors needs large amplitudes that cancel.
 
     Parameters
     ----------
@@ -188,26 +190,25 @@ def dip_directions(parameters: Sequence[StateParameter]) -> dict[str, dict[str, 
     dict
         "dip of 0.4 m@3.30" -> wave parameter -> change per metre of depth.
     """
-    stretches: dict[tuple[str, str, str], dict[str, str]] = {}
+    stretches: dict[tuple[str, str, str], dict[str, StateParameter]] = {}
     for p in parameters:
-        match = (
-            re.fullmatch(r"(.*?)((?:cos|sin)_wave_\d+)@(-?[\d.]+)-(-?[\d.]+)", p.name) if p.group == "wave" else None
-        )
-        if match:
-            stretches.setdefault((match[1], match[3], match[4]), {})[match[2]] = p.name
+        match = re.fullmatch(r"(.*?)((?:cos|sin)_wave_\d+)@(-?[\d.]+)-(-?[\d.]+)", p.name)
+        if match and p.group == "wave":
+            stretches.setdefault((match[1], match[3], match[4]), {})[match[2]] = p
     directions = {}
-    for (route, start, end), names in stretches.items():
+    for (route, start, end), by_wave in stretches.items():
         ends = float(start) + ROUGHNESS.rolling_reach, float(end) - ROUGHNESS.rolling_reach
         waves = Waves(ends, 0.0)
-        x = np.arange(waves.start, waves.end, ROUGHNESS.path_step)
-        used = [k for k, name in enumerate(waves.names) if name in names]
-        shapes = waves.shapes(x)[used].T
-        inverse = np.linalg.pinv(shapes)
+        x = np.arange(waves.start, waves.end, CALIBRATION.dip_step)
+        used = [(k, by_wave[name]) for k, name in enumerate(waves.names) if name in by_wave]
+        sd = np.array([p.sd for _, p in used])
+        shapes = waves.shapes(x)[[k for k, _ in used]].T * sd / CALIBRATION.dip_error
+        inverse = np.linalg.solve(shapes.T @ shapes + np.eye(len(used)), shapes.T) / CALIBRATION.dip_error
         for length in CALIBRATION.dip_lengths:
             for position in np.arange(ends[0], ends[1] + 1e-9, CALIBRATION.dip_spacing):
-                dip = np.clip(1.0 - abs(x - position) / (0.5 * length), 0.0, None)
-                amplitudes = inverse @ dip
+                distance = np.clip((x - position) / length, -0.5, 0.5)
+                amplitudes = sd * (inverse @ (0.5 + 0.5 * np.cos(2.0 * np.pi * distance)))
                 directions[f"{route}dip of {length:g} m@{position:.2f}"] = {
-                    names[waves.names[k]]: float(a) for k, a in zip(used, amplitudes)
+                    p.name: float(a) for (_, p), a in zip(used, amplitudes)
                 }
     return directions
