@@ -18,13 +18,14 @@ from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, S
 from turnout.readers.stated_scales import entry_statements
 from turnout.readers.statements import Entry, entries_of_text, step_entry
 from turnout.readers.timing import check_simultaneous, is_unread_uff_time, parse_uff_time
-from turnout.readers.uff_datasets import UffDataset, declares_si, read_datasets
+from turnout.readers.uff_datasets import FileUnits, UffDataset, file_units, read_datasets
+from turnout.units import UNITS, conversion
 
 # ID line 1; entity, node and direction of the response; label and unit of the ordinate
 ChannelKey = tuple[str, str, int, int, str, str]
 PROMISED_RECORDS = re.compile(r"record \d+ of (\d+)$")
 TIME_RESPONSE, FREQUENCY_RESPONSE, TIME_AXIS = 1, 4, 17
-# Unit of a specific data type (records 9 and 10) without a label, if dataset 164 declares SI.
+# Unit of a specific data type (records 9 and 10) without a label, where dataset 164 states SI.
 SI_OF_TYPE = {8: "m", 9: "N", 11: "m/s", 12: "m/s²", 13: "N", 15: "Pa"}
 DIRECTIONS = {0: "", 1: "+X", 2: "+Y", 3: "+Z", -1: "-X", -2: "-Y", -3: "-Z", 4: "+RX", 5: "+RY", 6: "+RZ"}
 
@@ -79,7 +80,7 @@ def read_raw(source: Source) -> RawFile:
             raise source.error(f"byte {damaged[0].offset}", damaged[0].damage, COPY_AGAIN)
         problem = f"it holds {_contents(all_sets)} and no time response"
         raise source.error("the file", problem, _remedy_without_time(sets), reason="empty")
-    return RawFile(tuple(_records(wanted, declares_si(data, all_sets), source)), _promised_count(wanted))
+    return RawFile(tuple(_records(wanted, file_units(data, all_sets), source)), _promised_count(wanted))
 
 
 # Function types of dataset 58 and other data sets that analysers export.
@@ -137,7 +138,9 @@ def _is_time_response(dataset: UffDataset) -> bool:
     return dataset.func_type == TIME_RESPONSE or (is_untyped and dataset.labels[0][0] == TIME_AXIS)
 
 
-def _records(sets: Sequence[UffDataset], is_si: bool, source: Source) -> Iterator[RawRecord | ReadError]:
+def _records(
+    sets: Sequence[UffDataset], stated_units: FileUnits | None, source: Source
+) -> Iterator[RawRecord | ReadError]:
     """RawRecord or ReadError per record, in order."""
     nameless = [s for s in sets if not s.labels]
     named = [s for s in sets if s.labels]
@@ -172,7 +175,7 @@ def _records(sets: Sequence[UffDataset], is_si: bool, source: Source) -> Iterato
             n_taken[key] += 1
     n = len(ordered)
     for k, group in enumerate(ordered):
-        yield _record(group, channels, k, n, is_si, source)
+        yield _record(group, channels, k, n, stated_units, source)
     for dataset in nameless:
         yield source.error(f"record {n + 1}, byte {dataset.offset}", dataset.damage, COPY_AGAIN, reason="truncated")
 
@@ -188,7 +191,12 @@ def _channel_key(dataset: UffDataset) -> ChannelKey:
 
 
 def _record(
-    group: Mapping[ChannelKey, UffDataset], channels: Sequence[ChannelKey], k: int, n: int, is_si: bool, source: Source
+    group: Mapping[ChannelKey, UffDataset],
+    channels: Sequence[ChannelKey],
+    k: int,
+    n: int,
+    stated_units: FileUnits | None,
+    source: Source,
 ) -> RawRecord | ReadError:
     """One record from the sets of its channels, or its error."""
     for key in channels:
@@ -211,7 +219,7 @@ def _record(
         names=names,
         samples=[s.data for s in sets],
         entries=tuple(_entries(sets)),
-        units=tuple(_unit(s.labels[1], is_si) for s in sets),
+        units=tuple(_unit(s.labels[1], stated_units) for s in sets),
         started_at=parse_uff_time(first.ids[2]),
         unread_start=first.ids[2] if is_unread_uff_time(first.ids[2]) else "",
         conditions=_conditions(first.ids[3]),
@@ -247,11 +255,21 @@ def _distinct_names(channels: Sequence[ChannelKey]) -> tuple[tuple[str, ...], tu
     return tuple(names), aliases
 
 
-def _unit(axis: tuple[int, str, str], is_si: bool) -> str:
-    """Unit of an ordinate: its label, else the unit of its data type if the file declares SI."""
+def _unit(axis: tuple[int, str, str], stated_units: FileUnits | None) -> str:
+    """Unit of an ordinate: its label, else that of its data type in the units of dataset 164."""
     data_type, _, label = axis
     blank = label.upper() in ("", "NONE", "UNKNOWN")
-    return (SI_OF_TYPE.get(data_type, "") if is_si else "") if blank else label
+    if not blank:
+        return label
+    si = SI_OF_TYPE.get(data_type, "")
+    if not si or stated_units is None:
+        return ""
+    scale = {"N": stated_units.force, "Pa": stated_units.force / stated_units.length**2}.get(si, stated_units.length)
+    known = UNITS[conversion(si).dimension]
+    return next((u for u, (s, _) in known.items() if abs(s / scale - 1.0) < FACTOR_PRECISION), f"{scale:.9g} {si}")
+
+
+FACTOR_PRECISION = 1e-5  # relative: factors of dataset 164 are printed with few digits
 
 
 def _entries(sets: Sequence[UffDataset]) -> Iterator[Entry]:
@@ -303,7 +321,7 @@ def read_frf(path: PathLike | str, root: PathLike | str = ".") -> FrequencyRespo
         with source.parsed_by("gzip"):
             data = gzip.decompress(data)
     all_sets = read_datasets(data)
-    is_si = declares_si(data, all_sets)
+    stated_units = file_units(data, all_sets)
     functions = [s for s in all_sets if s.dataset_type in ("58", "58b")]
     sets = [s for s in functions if s.damage or s.func_type == FREQUENCY_RESPONSE]
     for dataset in sets:
@@ -319,15 +337,15 @@ def read_frf(path: PathLike | str, root: PathLike | str = ".") -> FrequencyRespo
     return FrequencyResponses(
         frequency=axes[0],
         frf=np.vstack([s.data for s in sets]),
-        units=tuple(_frf_unit(s, is_si) for s in sets),
+        units=tuple(_frf_unit(s, stated_units) for s in sets),
         responses=tuple(_dof_name(s.response) for s in sets),
         references=tuple(_dof_name(s.reference) for s in sets),
         names=tuple(s.ids[0] for s in sets),
     )
 
 
-def _frf_unit(dataset: UffDataset, is_si: bool) -> str:
-    numerator, denominator = (_unit(axis, is_si) for axis in dataset.labels[1:3])
+def _frf_unit(dataset: UffDataset, stated_units: FileUnits | None) -> str:
+    numerator, denominator = (_unit(axis, stated_units) for axis in dataset.labels[1:3])
     return numerator if not denominator or "/N" in numerator else f"({numerator})/({denominator})"
 
 

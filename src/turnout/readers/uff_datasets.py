@@ -252,8 +252,16 @@ def read_datasets(data: bytes | mmap) -> tuple[UffDataset, ...]:
     return tuple(datasets)
 
 
-def declares_si(data: bytes | mmap, sets: Iterable[UffDataset]) -> bool:
-    """Whether dataset 164 declares SI: unit code 1, or factors of 1 from the file's units to SI.
+@dataclass(frozen=True)
+class FileUnits:
+    """Units of a file that dataset 164 states: metres and newtons per unit of length and of force."""
+
+    length: float
+    force: float
+
+
+def file_units(data: bytes | mmap, sets: Iterable[UffDataset]) -> FileUnits | None:
+    """Units that dataset 164 states: unit code 1 is SI, else by the factors, by which numbers are divided to become SI.
 
     Parameters
     ----------
@@ -264,18 +272,21 @@ def declares_si(data: bytes | mmap, sets: Iterable[UffDataset]) -> bool:
 
     Returns
     -------
-    bool
-        False without a dataset 164, or with one that cannot be read.
+    FileUnits or None
+        None without a dataset 164, or with one that cannot be read.
     """
     for dataset in sets:
         if dataset.dataset_type == "164":
             lines, _ = _lines(data, data.find(b"\n", dataset.offset) + 1, 3)
-            factors = _fields(lines[2].replace("D", "E"), [25, 25]) if len(lines) == 3 else ["nan"]
             try:
-                return int(lines[1][:10]) == 1 or all(float(f) == 1.0 for f in factors)
-            except ValueError:
-                return False
-    return False
+                if int(lines[1][:10]) == 1:
+                    return FileUnits(1.0, 1.0)
+                length, force = (float(text) for text in _fields(lines[2].replace("D", "E"), [25, 25]))
+            except (ValueError, IndexError):
+                return None
+            is_usable = np.isfinite([length, force]).all() and length > 0.0 and force > 0.0
+            return FileUnits(1.0 / length, 1.0 / force) if is_usable else None
+    return None
 
 
 def _read_dataset(data: bytes | mmap, begin: Delimiter) -> tuple[UffDataset, int]:

@@ -7,6 +7,7 @@ JSON comment are used (``channels``, ``units``, ``started_at``, conditions).
 """
 
 import json
+import re
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -48,6 +49,7 @@ def read_raw(source: Source) -> RawFile:
     with source.path.open("rb", buffering=0) as raw:  # libsndfile shares its position
         if truncation := find_truncation(raw, source.size):
             raise source.error("the header", truncation, COPY_AGAIN, reason="truncated")
+        further = _further_chunks(raw, source.size) if source.head[:4] in (b"RIFF", b"RF64") else {}
         raw.seek(0)
         with source.parsed_by("libsndfile"), soundfile.SoundFile(raw.fileno(), closefd=False) as file:
             rate, comment, is_float = file.samplerate, file.comment, file.subtype in FLOAT_SUBTYPES
@@ -63,13 +65,13 @@ def read_raw(source: Source) -> RawFile:
     facts = Metadata(_notes(comment), source)
     n = len(samples)
     names, units = list_of_texts(facts.get(CHANNEL_NAMES)), list_of_texts(facts.get(UNIT_NAMES))
-    entries = tuple(_entries(texts, comment))
+    entries = (*_entries(texts, comment), *_further_entries(further))
     record = RawRecord(
         names=tuple(names) if len(names) == n else tuple(str(i) for i in range(n)),
         samples=list(samples),
         entries=(rate_entry("sample rate of the header", rate), *byte_rate, *entries),
         units=tuple(units) if len(units) == n else ("",) * n,
-        **start_fields(facts.record_value(START_NAMES, 0, 1)),
+        **start_fields(facts.record_value(START_NAMES, 0, 1), _broadcast_start(further.get(b"bext", b""))),
         conditions=facts.conditions(0, 1),
         aliases=tuple((str(i),) for i in range(n)),
         undecided=entry_statements(entries, n),
@@ -148,6 +150,52 @@ def find_truncation(file: BinaryIO, size: int) -> str:
         return f"the file ends after {size} bytes, before its samples"
     expected_size = 8 + long_sizes.get(b"RIFF", struct.unpack_from("<I", head, 4)[0])
     return f"it ends after {size} of {expected_size} bytes" if expected_size > size + 1 else ""
+
+
+FURTHER_CHUNKS = (b"iXML", b"bext")  # of field recorders: XML, and the broadcast extension (EBU Tech 3285)
+MAX_CHUNK_SIZE = 2**20  # bytes of such a chunk that are read
+
+
+def _further_chunks(file: BinaryIO, size: int) -> dict[bytes, bytes]:
+    """Contents of the chunks that field recorders add, by their tag."""
+    chunks: dict[bytes, bytes] = {}
+    file.seek(0)
+    long_sizes, position = _long_sizes(file.read(36)), 12
+    while position + 8 <= size:
+        file.seek(position)
+        tag, length = struct.unpack("<4sI", file.read(8))
+        length = long_sizes.get(tag, length) if length == UNKNOWN_LENGTH else length
+        if tag in FURTHER_CHUNKS:
+            chunks[tag] = file.read(min(length, MAX_CHUNK_SIZE))
+        position += 8 + length + length % 2
+    return chunks
+
+
+# Fields of the chunk "bext": first byte and size.
+DESCRIPTION, DATE, TIME = (0, 256), (320, 10), (330, 8)
+CODING_HISTORY = 602  # first byte
+
+
+def _field_text(chunk: bytes, field: tuple[int, int]) -> str:
+    start, size = field
+    return chunk[start : start + size].partition(b"\0")[0].decode("utf-8", "replace").strip()
+
+
+def _broadcast_start(chunk: bytes) -> str | None:
+    """Start time in the chunk "bext"."""
+    date, clock = _field_text(chunk, DATE), _field_text(chunk, TIME)
+    return f"{re.sub('[_:/ .]', '-', date)} {re.sub('[_/. -]', ':', clock)}" if date and clock else None
+
+
+def _further_entries(chunks: dict[bytes, bytes]) -> Iterator[Entry]:
+    """Entries of the further chunks; "F=48000" in the coding history is a rate in Hz."""
+    xml = chunks.get(b"iXML", b"").decode("utf-8", "replace")
+    for name, value in re.findall(r"<(\w+)>\s*([^<>]{1,200}?)\s*</\1>", xml):
+        yield Entry(f"chunk iXML: {name}", name, value)
+    chunk = chunks.get(b"bext", b"")
+    yield from entries_of_text(_field_text(chunk, DESCRIPTION), "chunk bext: description")
+    for rate in re.findall(r"\bF=(\d{3,9})\b", chunk[CODING_HISTORY:].decode("ascii", "replace")):
+        yield rate_entry("chunk bext: coding history", int(rate))
 
 
 def _long_sizes(head: bytes) -> dict[bytes, int]:

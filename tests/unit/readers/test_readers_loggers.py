@@ -5,8 +5,10 @@ The files are written by the programs in ``shared/inputs/recordings``. Their imp
 
 import os
 import runpy
+import struct
 import subprocess
 import sys
+from datetime import datetime
 
 import h5py
 import nptdms
@@ -318,3 +320,46 @@ def test_bytes_inserted_into_audio_are_found(tmp_path):
     assert "appended" in errors_of(path, description)[0]
     path.write_bytes(data + b"LIST" + (4).to_bytes(4, "little") + b"INFO")  # a chunk that an editor appended
     assert samples_of(path, description).shape == (1, 2, 500)
+
+
+def wav_with(tmp_path, tag, content):
+    """Two channels at 25600 Hz, with a further chunk before the samples."""
+    samples = np.random.default_rng(3).normal(size=(2, 200)) * [[0.5], [0.1]]
+    soundfile.write(tmp_path / "a.wav", samples.T, 25600, "DOUBLE")
+    data = (tmp_path / "a.wav").read_bytes()
+    content += b"\0" * (len(content) % 2)
+    at = data.index(b"data")
+    chunk = tag + struct.pack("<I", len(content)) + content
+    size = struct.pack("<I", len(data) + len(chunk) - 8)
+    (tmp_path / "a.wav").write_bytes(data[:4] + size + data[8:at] + chunk + data[at:])
+    channels = (RawChannel("force", 0, "force", unit="N"), RawChannel("rail", 1, "acceleration", unit="m/s²"))
+    return RawDescription(channels)
+
+
+def broadcast(rate, date=b"2024-05-13", clock=b"10:02:03"):
+    head = b"hammer test".ljust(320, b"\0") + date + clock
+    return head.ljust(602, b"\0") + f"A=PCM,F={rate},W=24,M=stereo\r\n".encode()
+
+
+@pytest.mark.parametrize(
+    ("tag", "content"),
+    [
+        (b"bext", broadcast),
+        (b"iXML", lambda rate: f"<BWFXML><SPEED><FILE_SAMPLE_RATE>{rate}</FILE_SAMPLE_RATE></SPEED></BWFXML>".encode()),
+    ],
+)
+def test_chunks_of_field_recorders_are_statements_of_the_rate(tag, content, tmp_path):
+    layout = wav_with(tmp_path, tag, content(25600))
+    result = read("a.wav", tmp_path, layout)
+    assert not result.errors and result.recordings[0].rate == 25600.0
+    if tag == b"bext":
+        assert result.recordings[0].started_at == datetime(2024, 5, 13, 10, 2, 3)
+    layout = wav_with(tmp_path, tag, content(48000))
+    (error,) = read("a.wav", tmp_path, layout).errors
+    assert error.reason == "wrong_rate" and "25600" in str(error) and "48000" in str(error)
+
+
+def test_a_start_in_a_chunk_that_no_calendar_has_is_reported(tmp_path):
+    layout = wav_with(tmp_path, b"bext", broadcast(25600, date=b"2024-02-30"))
+    (error,) = read("a.wav", tmp_path, layout).errors
+    assert error.reason == "wrong_time" and "2024-02-30" in str(error)

@@ -12,7 +12,7 @@ from turnout.readers import read
 from turnout.readers.uff import read_frf
 from turnout.readers.uff_datasets import read_datasets
 from turnout.readers.writing import write
-from turnout.records import RawChannel, RawDescription
+from turnout.records import Channel, RawChannel, RawDescription, Recording
 
 VENDORS = (
     "Sample_UFF58_ascii.uff",
@@ -227,3 +227,36 @@ def test_a_set_after_the_last_record_costs_the_last_record(hammer_test, in_si, t
     (error,) = result.errors
     assert error.reason == "truncated"
     assert "record 4 of 4: channel 'rail' is missing from this record" in str(error)
+
+
+# Unit code of dataset 164, factors for length and force, newtons and metres of one unit.
+UNITS_164 = [
+    (1, 1.0, 1.0, 1.0, 1.0),
+    (5, 1000.0, 1000.0, 1e-3, 1e-3),
+    (7, 39.37007874, 0.22480894, 4.4482216, 0.0254),
+    (10, 1000.0, 1.0, 1.0, 1e-3),
+]
+
+
+@pytest.mark.parametrize(("code", "length", "force", "newton", "metre"), UNITS_164)
+def test_ordinates_without_a_label_are_in_the_units_of_dataset_164(code, length, force, newton, metre, tmp_path):
+    recording = Recording(
+        np.random.default_rng(164).normal(size=(2, 64)), 1000.0, (Channel("f", "force"), Channel("a", "acceleration"))
+    )
+    path = write([recording], tmp_path / "a.uff", "uff58")
+    lines = path.read_text().splitlines()
+    lines = [
+        f"{line[:46]}{'NONE':<20}" if line[:10].strip() in ("12", "13") and line[46:66].strip() else line
+        for line in lines
+    ]
+    head = ["    -1", "   164", f"{code:10d}{'units':20}{2:10d}", f"{length:25.17E}{force:25.17E}{1.0:25.17E}"]
+    head += [f"{273.15:25.17E}", "    -1"]
+    path.write_text("\n".join([*(h.replace("E", "D") if "E+" in h or "E-" in h else h for h in head), *lines]) + "\n")
+    channels = (RawChannel("f", "f", "force"), RawChannel("a", "a", "acceleration"))
+    found = read(path.name, tmp_path, RawDescription(channels, rate=1000.0)).recordings[0].samples
+    assert found == pytest.approx(recording.samples * [[newton], [metre]], rel=1e-5)
+    in_si = tuple(RawChannel(c.name, c.source, c.quantity, unit=u) for c, u in zip(channels, ("N", "m/s²")))
+    result = read(path.name, tmp_path, RawDescription(in_si, rate=1000.0))
+    assert (not result.errors) == (code == 1)
+    if code != 1:
+        assert result.errors[0].reason == "unit_unknown"
