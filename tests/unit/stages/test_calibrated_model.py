@@ -152,7 +152,7 @@ def test_the_stage_writes_the_state_after_a_visit_and_a_finding_keeps_the_visit_
     printed = capsys.readouterr().out
     assert f"visit {DAYS[3]} A, B is not used: its diagnosis is named, and not accepted" in printed
     assert "(2 fitted now)" in printed and "against the file: nothing differs" in printed
-    assert "changes: pad@18.00: -1.2" in printed and f"appeared after {DAYS[2]}, at the latest at {DAYS[3]}" in printed
+    assert "local pad, pad@18.00 -1.2" in printed and f"appeared after {DAYS[2]}, at the latest at {DAYS[3]}" in printed
 
 
 def test_work_on_the_track_opens_what_it_touches(turnout):
