@@ -13,7 +13,7 @@ from jinja2 import Environment, PackageLoader
 from turnout.errors import SimulationError
 from turnout.report.finding_text import accepted_parameters, answer, check, facts, parameters
 from turnout.report.pages.finding import finding_page
-from turnout.report.panels.finding import TurnoutDrawing, marked_position
+from turnout.report.panels.finding import TurnoutDrawing, marked_position, residual_panel
 from turnout.stages.accept_finding import _check_acceptable
 from turnout.stages.mismatch_text import headline
 
@@ -294,3 +294,17 @@ def test_one_fit_alone_is_a_sentence_and_no_chart():
     assert "It is fixed to" not in quiet and "Largest deviation" in quiet
     text = page(named())
     assert "Fit on held-out recordings" in text and "fit 41 % on 2" not in text and "It is fixed to" in text
+
+
+def test_the_residual_is_what_was_measured_less_what_was_simulated():
+    """A sine of which the base model predicts four fifths: 4 % of its energy are left, and nothing with the effect."""
+    x = np.linspace(0.0, 1.0, 201)
+    row = {"curve": "waveform", "x": x, "x_label": "time", "x_unit": "s", "y_unit": "m/s²", "label": "passage 1"}
+    row |= {"measured": np.sin(40 * x), "before": 0.8 * np.sin(40 * x), "after": np.sin(40 * x)}
+    svg = residual_panel(row, "what was left out")
+    assert "4.0 % of the energy before, 0.0 % with what was left out" in svg
+    path = re.search(r'<path class="curve-before"[^>]* d="M([^"]*)"', svg)[1]
+    y = np.array([pair.split()[1] for pair in path.split("L")], dtype=float)
+    # the axis reaches 1.25 times the largest residual on both sides of the middle of 190 - 26 - 40 px
+    assert np.ptp(y) == pytest.approx(124.0 / 1.25, abs=0.5)
+    assert residual_panel(row, "") == "" and residual_panel(row | {"curve": "spectrum"}, "it") == ""

@@ -6,7 +6,13 @@ from typing import TYPE_CHECKING
 
 from turnout.report.finding_text import accepted_parameters, answer, check, facts, parameters, rivals, title
 from turnout.report.formatting import day
-from turnout.report.panels.finding import curve_panel, fit_panel, history_of_parameter, position_panel
+from turnout.report.panels.finding import (
+    curve_panel,
+    fit_panel,
+    history_of_parameter,
+    position_panel,
+    residual_panel,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -68,6 +74,7 @@ def _finding(
     named = finding["verdict"] in ("named", "a_or_b")
     changed = ("what was left out" if named else "what was rejected") if finding["term_json"] is not None else ""
     drawings = [(c["curve"], curve_panel(c, changed)) for c in sorted(curves, key=lambda c: c["curve_no"])]
+    residuals = "".join(residual_panel(c, changed) for c in curves)
     return {
         "number": number,
         "id": finding["finding_id"][:12],
@@ -83,7 +90,7 @@ def _finding(
         "parameters": parameters(finding),
         "filed": accepted_parameters(_parameters_of(rows, finding)),
         "rivals": rivals(finding),
-        "wide": "".join(svg for curve, svg in drawings if curve == "waveform"),
+        "wide": "".join(svg for curve, svg in drawings if curve == "waveform") + residuals,
         "panels": "".join([*(svg for curve, svg in drawings if curve != "waveform"), fit_panel(finding)]),
         "history": "".join(_histories(rows, finding)),
     }
