@@ -12,6 +12,7 @@ COMMANDS: tuple[str, ...] = (
     "alert",
     "calibrate",
     "check",
+    "compare",
     "completion",
     "config",
     "demo",

@@ -1,7 +1,8 @@
 """Look at one passage file: axles, speed, type, and what the model of each section predicts.
 
-Nothing is written. The models are those that the last run identified (--work); without them, or with --no-fit, only
-the train is described.
+Nothing is written, unless --out names a page: for each sensor the passage as measured and as predicted, whole and two
+wheelsets, and its spectrogram with the axles. The models are those that the last run identified (--work); without
+them, or with --no-fit, only the train is described.
 
 Exit code 1 where no train is found, 2 where the command cannot be followed.
 """
@@ -15,8 +16,11 @@ from turnout.cli.options import add_configuration, add_turnout, add_work
 from turnout.constants import KMH
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from turnout.config import TurnoutConfig
     from turnout.config.settings.passage import PassageSettings
+    from turnout.passage.channel_fit import ChannelFit
     from turnout.passage.result import Passage
     from turnout.records import LongRecording, Recording
     from turnout.stages.passage import PassageContext
@@ -38,6 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_configuration(parser)
     add_work(parser, "folder of the last run (%(default)s)")
     parser.add_argument("--no-fit", action="store_true", help="only find the train, fit no model")
+    parser.add_argument("--out", metavar="FILE", help="write a page with panels of the first train as HTML")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -74,7 +79,8 @@ def run(args: argparse.Namespace) -> int:
     records: list[Recording | LongRecording] = [*result.recordings, *result.long_recordings]
     for record in records:
         for recording, offset, name in trains_in(record, settings):
-            has_train |= _show(recording, offset if name else None, turnout, context, settings, args.no_fit)
+            out = None if has_train else args.out
+            has_train |= _show(recording, offset if name else None, turnout, context, settings, args.no_fit, out)
     return 0 if has_train else 1
 
 
@@ -85,8 +91,9 @@ def _show(
     context: PassageContext,
     settings: PassageSettings,
     no_fit: bool,
+    out: str | None,
 ) -> bool:
-    """Print one train and its fits; returns whether there is a train."""
+    """Print one train and its fits, write its page; returns whether there is a train."""
     from turnout.passage.analysis import analyse
     from turnout.stages.passage import sensors_of
 
@@ -94,8 +101,11 @@ def _show(
         print(f"{offset:.1f} s after the start of the record:")
     passage = analyse(recording, sensors_of(turnout), context.patterns, settings)
     print("\n".join(_train_lines(recording, passage)))
-    if passage.n_axle and not no_fit:
-        print("\n".join(_fit_lines(recording, passage, turnout, context, settings)))
+    fits = {} if no_fit or not passage.n_axle else _fits(recording, passage, turnout, context, settings)
+    if fits:
+        print("\n".join(_fit_lines(fits, settings)))
+    if out and passage.n_axle:
+        _write_page(out, recording, passage, fits, _train_lines(recording, passage))
     return bool(passage.n_axle)
 
 
@@ -121,36 +131,63 @@ def _train_lines(recording: Recording, passage: Passage) -> list[str]:
     return lines
 
 
-def _fit_lines(
+def _fits(
     recording: Recording, passage: Passage, turnout: TurnoutConfig, context: PassageContext, settings: PassageSettings
-) -> list[str]:
-    """A line per sensor: each score with that of its null models."""
+) -> dict[str, ChannelFit | str]:
+    """The fit of each sensor's model, or why there is none."""
     from datetime import datetime
 
     from turnout.passage.channel_fit import fit_channel
     from turnout.stages.passage import model_at, sensors_of
 
-    lines = ["  sensor      fit / null   forecast / null  left out / null   along b  peak m/s²  status"]
+    fits: dict[str, ChannelFit | str] = {}
     for sensor in sensors_of(turnout):
         models = context.models.get(sensor.section, ())
         model = model_at(models, recording.started_at or datetime.max)
         if sensor.name not in passage.at_sensor or model is None:
-            reason = "does not record the train" if models else "no model of its section"
-            lines.append(f"  {sensor.name:<10}{reason}")
+            fits[sensor.name] = "does not record the train" if models else "no model of its section"
             continue
         samples, times = recording.signal(sensor.name), passage.at_sensor[sensor.name]
-        fit = fit_channel(samples, recording.rate, times, passage.train_motion.speed, model.model, settings)
-        if fit.scores is None or fit.null is None or fit.test is None:
-            lines.append(f"  {sensor.name:<10}{fit.detail}")
+        fits[sensor.name] = fit_channel(
+            samples, recording.rate, times, passage.train_motion.speed, model.model, settings
+        )
+    return fits
+
+
+def _fit_lines(fits: Mapping[str, ChannelFit | str], settings: PassageSettings) -> list[str]:
+    """A line per sensor: each score with that of its null models."""
+    lines = ["  sensor      fit / null   forecast / null  left out / null   along b  peak m/s²  status"]
+    for name, fit in fits.items():
+        if isinstance(fit, str) or fit.scores is None or fit.null is None or fit.test is None:
+            lines.append(f"  {name:<10}{fit if isinstance(fit, str) else fit.detail}")
             continue
         s, null = fit.scores, fit.null
         lines.append(
-            f"  {sensor.name:<10}{s.fit:6.1f} /{null.fit:5.1f} {s.forecast:9.1f} /{null.forecast:6.1f} "
+            f"  {name:<10}{s.fit:6.1f} /{null.fit:5.1f} {s.forecast:9.1f} /{null.forecast:6.1f} "
             f"{s.leave_one_out:9.1f} /{null.leave_one_out:6.1f} {fit.test.along_share:10.0%} {fit.peak:10.1f}"
             f"  {fit.status}"
         )
     lines.append(f"  {score_basis(settings)}")
     return lines
+
+
+def _write_page(
+    path: str, recording: Recording, passage: Passage, fits: Mapping[str, ChannelFit | str], lines: list[str]
+) -> None:
+    """The page of a passage, with panels of every sensor that recorded the train."""
+    from pathlib import Path
+
+    import numpy as np
+
+    from turnout.report.passage_page import SensorPassage, passage_page
+
+    sensors = []
+    for name, times in passage.at_sensor.items():
+        fit = fits.get(name)
+        samples = recording.signal(name)
+        shown = None if fit is None or isinstance(fit, str) else fit
+        sensors.append(SensorPassage(name, samples - np.median(samples), recording.rate, np.sort(times), shown))
+    Path(path).write_text(passage_page(recording.source, lines, sensors), encoding="utf-8")
 
 
 def score_basis(settings: PassageSettings) -> str:

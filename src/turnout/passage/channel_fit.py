@@ -34,6 +34,7 @@ class ChannelFit:
     ``times`` (n_wheel,) [s] of the impacts with ``times_se`` and ``ambiguous`` flags; ``amplitudes`` (n_wheel,)
     along b with ``amplitudes_se`` [m/s² per unit of b c]; ``test`` the chi-squared test per wheel; ``scores`` of the
     model, ``null`` band of random models, ``other_skills`` the forecast skill of other sections' models by name;
+    ``measured`` and ``predicted`` (n,) [m/s²] band-passed, from ``start`` [s] of the recording on;
     ``max_fit`` the fit that noise alone would leave [%]; ``peak`` [m/s²] of the band-passed acceleration;
     ``parameters_per_second``.
     """
@@ -52,6 +53,9 @@ class ChannelFit:
     max_fit: float = float("nan")
     peak: float = float("nan")
     parameters_per_second: float = float("nan")
+    measured: np.ndarray = field(default_factory=lambda: np.zeros(0), repr=False)
+    predicted: np.ndarray = field(default_factory=lambda: np.zeros(0), repr=False)
+    start: float = 0.0
 
     @property
     def skill(self) -> float:
@@ -153,6 +157,9 @@ def fit_channel(
         100.0 * (1.0 - noise / max(float(np.std(window)), 1e-300)),
         peak,
         scores.n_parameter / (scores.n_value / rate),
+        data,
+        joint.prediction,
+        start,
     )
 
 

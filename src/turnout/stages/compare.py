@@ -1,0 +1,289 @@
+"""Compare a recorded passage with its simulation on the calibrated track: time series and spectra in two bands."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+from scipy import signal
+
+from turnout.config import load_configuration, with_raw
+from turnout.constants import KMH
+from turnout.errors import ConfigError, SimulationError
+from turnout.passage.analysis import analyse
+from turnout.passage.scores import fit_percent
+from turnout.passage.train_type import UNKNOWN
+from turnout.readers import read
+from turnout.simulate.modal_calibration import with_section
+from turnout.simulate.parameters import load_track, load_vehicle
+from turnout.simulate.passage import simulate_passage
+from turnout.simulate.sensor import Sensor
+from turnout.stages.calibrate import calibrate_to_files, resolve_track
+from turnout.stages.passage import passage_config, sensors_of
+from turnout.stages.passage_context import known_patterns
+from turnout.workflow.scan import scan
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from turnout.config import TurnoutConfig
+    from turnout.passage.result import Passage, PassageSensor
+    from turnout.records import Recording
+    from turnout.simulate.turnout_track import TurnoutTrack
+    from turnout.simulate.vehicle import Vehicle
+
+BANDS = ((0.0, 40.0), (40.0, 1000.0))  # Hz, of the paper's Figs. 12 and 13
+MARGIN = 0.3  # s before the first and after the last axle
+SMALLEST_RATE = 10e3  # Hz, of the simulation: 1.6 % error up to 1 kHz
+FILTER_ORDER = 4
+MAX_DELAY, DELAY_STEP = 0.03, 0.0005  # s, between the found axles and the recording
+
+
+@dataclass(frozen=True)
+class BandComparison:
+    """One sensor in one band (``low``, ``high``) [Hz]: recorded and simulated.
+
+    ``time`` (n,) [s] from the first axle, ``recorded`` and ``simulated`` (n,) [m/s²]; ``frequency`` (m,) [Hz] with the
+    power spectral densities ``recorded_density`` and ``simulated_density`` (m,) [(m/s²)²/Hz].
+    """
+
+    sensor: str
+    low: float
+    high: float
+    time: np.ndarray
+    recorded: np.ndarray
+    simulated: np.ndarray
+    frequency: np.ndarray
+    recorded_density: np.ndarray
+    simulated_density: np.ndarray
+
+    @property
+    def level_difference(self) -> float:
+        """Power of the simulation over that of the recording. [dB]"""
+        return float(10.0 * np.log10(np.mean(self.simulated**2) / np.mean(self.recorded**2)))
+
+    @property
+    def fit(self) -> float:
+        """Fit of the simulated time series (equation 22). [%]"""
+        return fit_percent(self.recorded, self.simulated)
+
+
+@dataclass(frozen=True)
+class PassageComparison:
+    """A recorded passage beside its simulation: ``train`` and ``notes`` in words, ``bands`` per sensor and band."""
+
+    train: str
+    notes: tuple[str, ...]
+    bands: tuple[BandComparison, ...]
+
+
+def compare_passage(
+    file: str | Path,
+    turnout_id: str,
+    configuration: str | Path = "config",
+    raw: str | Path = "raw",
+    sensors: Sequence[str] = (),
+    track: str | None = None,
+    vehicle: str | None = None,
+    load: float = 0.5,
+    calibrate: bool = True,
+    seed: int = 0,
+) -> PassageComparison:
+    """Find the train in a recording, simulate it on the track of the turnout, and compare both.
+
+    Parameters
+    ----------
+    file : path
+        Recording of one passage.
+    turnout_id : str
+        Turnout.
+    configuration, raw : path
+        Folders of the configuration and of all recordings.
+    sensors : sequence of str
+        Names of the sensors; by default all that recorded the train.
+    track : str or None
+        Track file; None: that of the turnout.
+    vehicle : str or None
+        Vehicle file; None: that of the train's type.
+    load : float
+        Share of the payload. [-]
+    calibrate : bool
+        Fit the sections of the sensors to the latest hammer tests before the passage, where there are any.
+    seed : int
+        Seed of the rail's roughness and the supports' scatter.
+
+    Returns
+    -------
+    PassageComparison
+        The comparison.
+
+    Raises
+    ------
+    ConfigError
+        No train, an unknown type without ``vehicle``, or an unknown sensor.
+    """
+    turnout = with_raw(load_configuration(configuration).turnout(turnout_id), raw)
+    recording, passage = _recorded_train(Path(file), turnout)
+    chosen = _chosen_sensors(sensors, passage, sensors_of(turnout), file)
+    train = _vehicle(vehicle, load, passage, file)
+    path = resolve_track(track, turnout_id, configuration)
+    model = load_track(str(path), seed, path.parent)
+    notes = [f"track file {path}"]
+    if calibrate:
+        model = _calibrated(model, path, chosen, turnout, recording, raw, configuration, notes)
+    simulated = _simulate(model, train, passage, chosen, recording.rate, seed)
+    bands = tuple(band for sensor in chosen for band in _compare_sensor(sensor, recording, passage, *simulated))
+    speed = KMH * passage.train_motion.speed
+    words = f"{train.name}, {passage.n_axle} axles, {speed:.1f} km/h, {passage.direction}, track {passage.track}"
+    return PassageComparison(words, tuple(notes), bands)
+
+
+def _recorded_train(path: Path, turnout: TurnoutConfig) -> tuple[Recording, Passage]:
+    settings = turnout.settings["passage"]
+    result = read(path.name, path.resolve().parent, passage_config(turnout).description, settings.longest)
+    for error in result.errors:
+        raise error
+    if not result.recordings:
+        raise ConfigError(str(path), "recording", "no passage that fits into memory", "Cut the file at the train")
+    recording = result.recordings[0]
+    passage = analyse(recording, sensors_of(turnout), known_patterns(settings.axle_patterns), settings)
+    if not passage.n_axle:
+        raise ConfigError(str(path), "recording", "no train was found", "turnout passage FILE says why")
+    return recording, passage
+
+
+def _chosen_sensors(
+    names: Sequence[str], passage: Passage, sensors: Sequence[PassageSensor], file: str | Path
+) -> list[PassageSensor]:
+    by_name = {s.name: s for s in sensors if s.name in passage.at_sensor}
+    unknown = [name for name in names if name not in by_name]
+    if unknown:
+        remedy = f"Choose from {', '.join(by_name)}"
+        raise ConfigError("--sensors", "sensor", f"{', '.join(unknown)}: did not record the train of {file}", remedy)
+    return [by_name[name] for name in names or by_name]
+
+
+def _vehicle(name: str | None, load: float, passage: Passage, file: str | Path) -> Vehicle:
+    """The vehicle of the train's type, in as many units as its axles say."""
+    type_ = UNKNOWN if passage.type is None else passage.type.type
+    if name is None and type_ == UNKNOWN:
+        raise ConfigError(str(file), "train", "its type is unknown", "Name a vehicle file with --vehicle")
+    name = name or type_.lower()
+    one = load_vehicle(name, load)
+    units, rest = divmod(passage.n_axle, len(one.wheels))
+    if rest or not units:
+        observation = f"{passage.n_axle} axles were recorded, the vehicle {name} has {len(one.wheels)}"
+        raise ConfigError(str(file), "train", observation, "Name the right vehicle file with --vehicle")
+    return one if units == 1 else load_vehicle(name, load, units=units)
+
+
+def _calibrated(
+    model: TurnoutTrack,
+    path: Path,
+    sensors: Sequence[PassageSensor],
+    turnout: TurnoutConfig,
+    recording: Recording,
+    raw: str | Path,
+    configuration: str | Path,
+    notes: list[str],
+) -> TurnoutTrack:
+    """The track with each sensor's section fitted to its latest hammer tests before the passage."""
+    by_section: dict[str, list[tuple[str, tuple]]] = {}
+    for unit in scan(turnout, raw).units:
+        if unit.kind == "hammer" and unit.section and unit.campaign:
+            by_section.setdefault(unit.section, []).append((unit.campaign, unit.files))
+    for section in dict.fromkeys(s.section for s in sensors):
+        day = "9999" if recording.started_at is None else recording.started_at.isoformat()
+        campaigns = sorted(c for c in by_section.get(section, []) if c[0] <= day)
+        if not campaigns:
+            notes.append(f"{section}: no hammer test before the passage, as in the track file")
+            continue
+        campaign, files = campaigns[-1]
+        try:
+            fit = calibrate_to_files(path, section, [Path(raw) / name for name, *_ in files], turnout.id, configuration)
+        except SimulationError as error:
+            notes.append(f"{section}: as in the track file ({error})")
+            continue
+        values = {name: value for name, value in fit.values.items() if fit.is_determined(name)}
+        model = with_section(model, section, **values)
+        chi = "" if fit.is_adequate else f", chi-squared per degree of freedom {fit.reduced:.0f}"
+        notes.append(f"{section}: fitted to the hammer tests of {campaign}{chi}")
+    return model
+
+
+def _simulate(
+    model: TurnoutTrack, train: Vehicle, passage: Passage, sensors: Sequence[PassageSensor], rate: float, seed: int
+) -> tuple[np.ndarray, float, dict[str, float]]:
+    """Simulated samples (n_sensor, n), their rate [Hz], and when the first axle passes each sensor [s]."""
+    substeps = max(1, math.ceil(SMALLEST_RATE / rate))
+    speed, lead = passage.train_motion.speed, 0.3 + MARGIN
+    direction = passage.direction if passage.direction in ("facing", "trailing") else "facing"
+    route = passage.track if passage.track in model.routes else next(iter(model.routes))
+    recording = simulate_passage(
+        model,
+        train,
+        speed,
+        [Sensor(s.name, s.position, "rail web") for s in sensors],
+        direction,
+        route,
+        seed=seed,
+        rate=rate,
+        substeps=substeps,
+        lead=lead,
+        tail=lead,
+    )
+    sign = 1.0 if direction == "facing" else -1.0
+    places = sign * np.array([s.position for s in sensors])
+    first = {s.name: lead + (place - places.min()) / speed for s, place in zip(sensors, places)}
+    return cast("np.ndarray", recording.samples), rate, first
+
+
+def _compare_sensor(
+    sensor: PassageSensor,
+    recording: Recording,
+    passage: Passage,
+    samples: np.ndarray,
+    rate: float,
+    first: dict[str, float],
+) -> list[BandComparison]:
+    axles = np.sort(passage.at_sensor[sensor.name])
+    recorded = recording.signal(sensor.name)
+    recorded = recorded - np.median(recorded)
+    simulated = samples[list(first).index(sensor.name)]
+    start = max(int((axles[0] - MARGIN) * rate), 0)
+    stop = min(int((axles[-1] + MARGIN) * rate), recorded.size)
+    time = np.arange(start, stop) / rate - axles[0]
+    at = np.arange(simulated.size) / rate - first[sensor.name]
+    comparisons: list[BandComparison] = []
+    for low, high in BANDS:
+        high = min(high, 0.45 * rate)
+        ours, theirs = (_in_band(x, low, high, rate) for x in (recorded, simulated))
+        ours = ours[start:stop]
+        if not comparisons:  # the first band decides the delay of all
+            at = at + _delay(time, ours, at, theirs)
+        theirs = np.interp(time, at, theirs)
+        n = min(ours.size, round(rate))
+        frequency, density = signal.welch(np.array([ours, theirs]), rate, "boxcar", nperseg=n, detrend=False)
+        inside = (frequency >= low) & (frequency <= high)
+        comparisons.append(
+            BandComparison(
+                sensor.name, low, high, time, ours, theirs, frequency[inside], density[0, inside], density[1, inside]
+            )
+        )
+    return comparisons
+
+
+def _delay(time: np.ndarray, recorded: np.ndarray, at: np.ndarray, simulated: np.ndarray) -> float:
+    """Time that the simulation is late, at most ``MAX_DELAY``: the found axles are some centimetres off. [s]"""
+    delays = np.arange(-MAX_DELAY, MAX_DELAY + 1e-9, DELAY_STEP)
+    products = [float(recorded @ np.interp(time, at + delay, simulated)) for delay in delays]
+    return float(delays[int(np.argmax(products))])
+
+
+def _in_band(samples: np.ndarray, low: float, high: float, rate: float) -> np.ndarray:
+    """Samples in a band, without delay."""
+    edges, kind = (high, "lowpass") if low == 0.0 else ((low, high), "bandpass")
+    return signal.sosfiltfilt(signal.butter(FILTER_ORDER, edges, kind, fs=rate, output="sos"), samples)

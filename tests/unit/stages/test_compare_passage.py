@@ -1,0 +1,85 @@
+"""A recorded passage beside its simulation: the same train agrees, a louder recording differs by its factor."""
+
+import csv
+from dataclasses import replace
+from datetime import datetime
+
+import numpy as np
+import pytest
+
+from turnout.cli.main import main
+from turnout.readers.writing import write
+from turnout.simulate import Sensor, load_track, load_vehicle, simulate_passage
+from turnout.stages.compare import compare_passage
+
+SENSORS = {"OT": -12.0, "A7": 24.6, "ASM": 36.0}
+OTHERS = {"SP": 3.6, "CLP": 13.8, "A8": 26.4, "A9": 28.2, "ASD": 36.0}
+FACTOR = {"OT": 1.0, "A7": 1.0, "ASM": 2.0}
+
+
+@pytest.fixture(scope="module")
+def passage(tmp_path_factory):
+    """Recording of a locomotive at 5 kHz, twice as loud at ASM; A9 and ASD are on the other track."""
+    folder = tmp_path_factory.mktemp("raw")
+    places = {**SENSORS, **OTHERS}
+    sensors = [Sensor(name, x, "rail web", gain=0.02 if name in ("A9", "ASD") else 1.0) for name, x in places.items()]
+    sensors = [replace(s, gain=s.gain * FACTOR.get(s.name, 1.0), noise=0.05) for s in sensors]
+    recording = simulate_passage(
+        load_track("tommerup"),
+        load_vehicle("locomotive"),
+        120.0 / 3.6,
+        sensors,
+        rate=5e3,
+        substeps=2,
+        lead=0.8,
+        tail=0.8,
+        started_at=datetime(2026, 7, 24, 9),
+    )
+    path = folder / "20260724T090000Z.h5"
+    write([replace(recording, conditions={"rail_temperature": 15.0})], path, "hdf5", single=True)
+    return path
+
+
+@pytest.fixture(scope="module")
+def comparison(passage, repository):
+    return compare_passage(
+        passage, "tommerup_s2", repository / "config", passage.parent, sensors=("A7", "ASM"), calibrate=False
+    )
+
+
+def test_both_bands_are_complete(comparison):
+    assert comparison.train.startswith("locomotive, 4 axles, 120.") or comparison.train.startswith(
+        "locomotive, 4 axles, 119."
+    )
+    assert [(b.sensor, b.low, b.high) for b in comparison.bands] == [
+        (s, *band) for s in ("A7", "ASM") for band in ((0.0, 40.0), (40.0, 1000.0))
+    ]
+    for b in comparison.bands:
+        step = b.frequency[1] - b.frequency[0]
+        assert b.frequency[0] == pytest.approx(b.low, abs=step) and b.frequency[-1] == pytest.approx(b.high, abs=step)
+        assert step <= 1.5  # Hz
+
+
+def test_the_same_train_agrees_and_a_factor_of_two_is_six_decibels(comparison):
+    """20 lg 2 = 6.02 dB. The found speed is 0.4 % off, so the time series of the high band are out of phase."""
+    level = {(b.sensor, b.low): b.level_difference for b in comparison.bands}
+    assert level["A7", 0.0] == pytest.approx(0.0, abs=0.3) and level["A7", 40.0] == pytest.approx(0.0, abs=1.5)
+    assert level["ASM", 0.0] == pytest.approx(-6.02, abs=0.3) and level["ASM", 40.0] == pytest.approx(-6.02, abs=1.5)
+    low = next(b for b in comparison.bands if (b.sensor, b.low) == ("A7", 0.0))
+    assert low.fit > 80.0
+    power = np.sum(low.recorded_density) * (low.frequency[1] - low.frequency[0])
+    assert power == pytest.approx(np.mean(low.recorded**2), rel=0.02)  # Parseval
+
+
+def test_the_command_prints_a_row_per_band_and_writes_page_and_spectra(passage, repository, tmp_path, capsys):
+    page, spectra = tmp_path / "c.html", tmp_path / "c.csv"
+    arguments = ["compare", str(passage), "--turnout", "tommerup_s2", "--configuration", str(repository / "config")]
+    arguments += ["--raw", str(passage.parent), "--sensors", "A7", "--out", str(page), "--csv", str(spectra)]
+    assert main(arguments) == 0
+    text = capsys.readouterr().out
+    assert "A7: no hammer test before the passage" in text and text.count("\nA7 ") == 2
+    assert page.read_text(encoding="utf-8").count("<svg") >= 4
+    rows = list(csv.DictReader(spectra.open()))
+    assert {r["band_high_hz"] for r in rows} == {"40", "1000"} and float(rows[5]["recorded_psd"]) > 0.0
+    assert main([*arguments[:6], "--raw", str(passage.parent), "--sensors", "A9"]) == 2
+    assert "A9: did not record the train" in capsys.readouterr().err
