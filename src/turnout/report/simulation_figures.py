@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.constants import KMH
+from turnout.constants import GRAVITY, KMH
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 SPEED = 160.0 / KMH
 SENSORS = (("A1", 0.6), ("A4", 9.0), ("A7", 24.6), ("nose", 26.7), ("A11", 36.0))
+NOSE, NOSE_LENGTH, NOSE_SHARE, NOSE_REACH = 26.7, 1.2, 0.55, 4.0  # m, m, -, m: of the track file
+NOSE_DEPTHS, NOSE_SPEEDS = (0.3e-3, 0.5e-3, 1.0e-3), (60.0, 80.0, 100.0, 120.0, 140.0, 160.0)  # m, km/h
+WHEEL_MASS, WHEEL_LOAD = 775.0, 64e3  # kg, N: half a wheelset of an IC3
 LOW_BAND, HIGH_BAND = (0.0, 40.0), (40.0, 1000.0)
 
 
@@ -104,7 +107,7 @@ def _passage_forces(recording: Recording, truth: PassageTruth) -> Figure:
     """Acceleration at the crossing, and the contact force of every wheel over its position."""
     import matplotlib.pyplot as plt
 
-    figure, (top, bottom) = plt.subplots(2, 1, figsize=(8.5, 6.5), layout="constrained")
+    figure, (top, bottom, losses) = plt.subplots(3, 1, figsize=(8.5, 9.0), layout="constrained")
     time = truth.time
     top.plot(time, recording.signal("nose"), lw=0.5)
     top.set(xlabel="time [s]", ylabel="acceleration [m/s²]", title="IC3 at 160 km/h, rail at the crossing nose")
@@ -116,7 +119,42 @@ def _passage_forces(recording: Recording, truth: PassageTruth) -> Figure:
     bottom.set(xlabel="place [m]", ylabel="contact force [kN]", title="every wheel at the crossing (nose at 26.7 m)")
     bottom.set_ylim(0.0, 1.3 * bottom.get_ylim()[1])  # room for the legend
     bottom.legend(ncol=4, loc="upper center")
+    for depth in NOSE_DEPTHS:
+        lost = [contact_loss(depth, speed / KMH) for speed in NOSE_SPEEDS]
+        losses.plot(NOSE_SPEEDS, lost, "o-", lw=0.8, label=f"dip of {1e3 * depth:g} mm")
+    title = "one wheel of 64 kN: rail without contact behind the nose"
+    losses.set(xlabel="speed [km/h]", ylabel="length [m]", title=title)
+    losses.legend()
     return figure
+
+
+def contact_loss(depth: float, speed: float) -> float:
+    """Length of rail behind the nose over which a single wheel has no contact, on a smooth rail.
+
+    Parameters
+    ----------
+    depth : float
+        Depth of the dip at the nose, with the length and the share of the track file. [m]
+    speed : float
+        Speed. [m/s]
+
+    Returns
+    -------
+    float
+        Length. [m]
+    """
+    from dataclasses import replace
+
+    from turnout.simulate import Sensor, load_track, simulate_passage
+    from turnout.simulate.vehicle import lone_wheels
+    from turnout.simulate.wheel_path import Kink
+
+    turnout, wheel = load_track("tommerup"), lone_wheels(WHEEL_MASS, pressing=WHEEL_LOAD - WHEEL_MASS * GRAVITY)
+    turnout = replace(turnout, routes={"main": ((Kink(NOSE, depth, NOSE_LENGTH, NOSE_SHARE),),)}, roughness_level=None)
+    around = NOSE_REACH / speed
+    _, truth = simulate_passage(turnout, wheel, speed, [Sensor("nose", NOSE)], lead=around, tail=around, truth=True)
+    is_behind = (truth.wheel_position[0] > NOSE - 1.2) & (truth.wheel_position[0] < NOSE + 1.8)
+    return float(np.sum(truth.force[0, is_behind] <= 0.0) * speed * (truth.time[1] - truth.time[0]))
 
 
 def _two_sensors(recording: Recording) -> Figure:
