@@ -68,7 +68,9 @@ def test_the_same_train_agrees_and_a_factor_of_two_is_six_decibels(comparison):
     low = next(b for b in comparison.bands if (b.sensor, b.low) == ("A7", 0.0))
     assert low.fit > 80.0
     power = np.sum(low.recorded_density) * (low.frequency[1] - low.frequency[0])
-    assert power == pytest.approx(np.mean(low.recorded**2), rel=0.25)  # Parseval, without what the filter leaves above 40 Hz
+    assert power == pytest.approx(
+        np.mean(low.recorded**2), rel=0.25
+    )  # Parseval, without what the filter leaves above 40 Hz
 
 
 def test_the_command_prints_a_row_per_band_and_writes_page_and_spectra(passage, repository, tmp_path, capsys):
