@@ -35,7 +35,7 @@ from turnout.modal.noise import (
 from turnout.modal.stabilization import DAMPING_RANGE, Stabilisation, candidates, likely_poles, stabilisation
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from turnout.config.settings.identify import IdentifySettings
     from turnout.modal.stabilization import Candidate
@@ -217,6 +217,54 @@ def akaike_criterion(explanation: Explanation, decays: np.ndarray) -> float:
     return decays.size * np.log(fit.rss / total) + 2.0 * (2 * n_mode + order + per_decay)
 
 
+def likeliest_explanation(
+    explanations: Sequence[Explanation], decays: np.ndarray, settings: IdentifySettings
+) -> Explanation:
+    r"""The explanation whose modes are used.
+
+    One that leaves white noise is complete: among such explanations the Akaike criterion decides. Where all leave
+    coloured noise or a drift, none is complete, and the criterion separates wrong models with certainty although it
+    does not show which of them has the modes right. An explanation with a pole too many splits the strongest
+    resonance, and each part of it is then poorly determined. So of the explanations with a mode in the most bands that
+    one is used whose strongest mode is determined best,
+
+    .. math:: \max_m \sum_i \chi^2_{im}
+
+    over the modes that pass all tests, with :math:`\chi^2` from ``mode_chi_squared``.
+
+    Parameters
+    ----------
+    explanations : sequence of Explanation
+        Explanations of ``decays``, each with a fit.
+    decays : (n_decay, n) array of float
+        Free decays. [m/s²]
+    settings : IdentifySettings
+        Limits of the tests.
+
+    Returns
+    -------
+    Explanation
+        One of them.
+    """
+    complete = [e for e in explanations if not e.is_doubtful]
+    if complete:
+        return min(complete, key=lambda e: akaike_criterion(e, decays))
+    return max(explanations, key=lambda e: _determination(e, settings))
+
+
+def _determination(explanation: Explanation, settings: IdentifySettings) -> tuple[int, float]:
+    """Number of bands with a mode that passes all tests, and the statistic of the best determined one."""
+    fit = explanation.fit
+    if fit is None:
+        return 0, 0.0
+    failed = dict(mode_failures(fit, settings))
+    passed = [m for m in range(len(fit.mean)) if m not in failed]
+    statistic = mode_chi_squared(fit.linearisation, fit.sigma2).sum(axis=0)
+    frequency = np.exp(fit.mean[passed, 0])
+    n_band = sum(bool(np.any((low <= frequency) & (frequency < high))) for _, low, high in settings.bands())
+    return n_band, float(np.max(statistic[passed], initial=0.0))
+
+
 START_TIMES = (0.0, 5e-4, 1e-3)  # s, times at which the realisations start
 INITIAL_DRIFT_DEGREE = 2  # degree of the drift of the first fit
 MAX_START_LISTS = 2  # lists of likely poles that are tried
@@ -301,7 +349,7 @@ def select_modes(decays: np.ndarray, rate: float, settings: IdentifySettings) ->
     explanations = [explanation]
     if explanation.fit is not None and explanation.is_doubtful:
         explanations += _alternative_explanations(explanation, table, decays, rate, settings)
-        explanation = min(explanations, key=lambda e: akaike_criterion(e, decays))
+        explanation = likeliest_explanation(explanations, decays, settings)
     rival_modes = [e.fit.mean for e in explanations if e is not explanation and e.fit is not None]
     explanation = polish(explanation, decays, rate)
     result = Selection(table, rejected + explanation.rejected, rival_modes=rival_modes)
