@@ -28,7 +28,7 @@ def flip_bits(folder: Path, n_file: int, seed: int = 0) -> Flips:
     """Make a registry of at least ``n_file`` live files, flip a bit in each of ``n_file``, and run the next night."""
     registry = folder / "registry"
     years = range(2020 - n_file // len(TABLES), 2021)
-    batch = write_batch(folder / "work", [_unit(year) for year in years])
+    batch = write_batch(folder / "work", [unit_of_year(year) for year in years])
     register([batch], registry, read=read_results)
     before = _rows(registry)
     draw = random.Random(seed)
@@ -71,13 +71,15 @@ def _rows(registry):
         }
 
 
-def _unit(year):
+def unit_of_year(year: int, turnout: str = "t1") -> UnitResult:
     """A unit with one row in each table, all of its own year."""
-    day, base = f"{year}-05-13", {"turnout_id": "t1", "section_id": "t1/A"}
-    model = {"model_id": content_id("model", day), "measured_at_utc": f"{day}T10:00:00", "method": "joint"}
-    path = f"t1/{day}/A_1.uff"
+    day, base = f"{year}-05-13", {"turnout_id": turnout, "section_id": f"{turnout}/A"}
+    model = {"model_id": content_id("model", turnout, day), "measured_at_utc": f"{day}T10:00:00", "method": "joint"}
+    path = f"{turnout}/{day}/A_1.uff"
     tables = {
-        "recordings": [base | {"recording_id": content_id(day), "path": path, "kind": "hammer", "file_format": "uff"}],
+        "recordings": [
+            base | {"recording_id": content_id(turnout, day), "path": path, "kind": "hammer", "file_format": "uff"}
+        ],
         "models": [
             base
             | model
@@ -86,7 +88,7 @@ def _unit(year):
                 "model_order": 4,
                 "code_version": "1",
                 "config_hash": "k",
-                "campaign_id": f"t1/{day}",
+                "campaign_id": f"{turnout}/{day}",
             }
         ],
         "modes": [
@@ -102,4 +104,4 @@ def _unit(year):
         ],
         "quarantine": [base | {"path": path, "stage": "hammer", "kind": "hammer", "reason_code": "weak", "record": 1}],
     }
-    return UnitResult(f"t1/hammer/A/{day}", "t1", "hammer", "k", "1", "partly", tables)
+    return UnitResult(f"{turnout}/hammer/A/{day}", turnout, "hammer", "k", "1", "partly", tables)

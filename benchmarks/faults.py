@@ -9,6 +9,7 @@ other files, and the night must have named the file or the fault of the machine.
 import ctypes
 import errno
 import json
+import logging
 import os
 import random
 import re
@@ -29,7 +30,7 @@ from turnout.registry.generation import load
 from turnout.registry.ids import content_id
 from turnout.registry.job import register
 from turnout.workflow.batches import read_results
-from turnout.workflow.plan import write_plans
+from turnout.workflow.plan import read_problems, write_plans
 from turnout.workflow.shard import run_shard
 from turnout.workflow.state import batch_paths
 from turnout.workflow.tasks import Stage
@@ -96,6 +97,18 @@ def length(unit, turnout, raw_root, algo=""):
     return {"recordings": rows, "quarantine": []}
 
 
+class Warnings(logging.Handler):
+    """Keeps the warnings of a night."""
+
+    def __init__(self):
+        super().__init__(logging.WARNING)
+        self.texts = []
+
+    def emit(self, record):
+        """Keep the text of one warning."""
+        self.texts.append(record.getMessage()[:300])
+
+
 class Fleet:
     """Folder with configuration, raw files, work and registry."""
 
@@ -122,7 +135,9 @@ class Fleet:
         path.write_text(text)
 
     def night(self, compute=length):
-        """One night: plan, shard, registration, perhaps compaction; what it says."""
+        """One night: plan, shard, registration, perhaps compaction; what it says, with its warnings."""
+        warnings = Warnings()
+        logging.getLogger("turnout").addHandler(warnings)
         configuration = load_configuration(self.root / "config")
         write_plans(configuration, self.raw, self.plan.parent, 1, accept_vanished=True)
         stage = Stage("hammer", compute, "1")
@@ -133,7 +148,8 @@ class Fleet:
         faults = "".join(f"; {path}: {fault}" for path, fault in result.faults.items())
         postponed = self.state.with_suffix("") / "postponed.json"
         waiting = json.loads(postponed.read_text())["units"] if summary.postponed else ""
-        return f"{summary}{faults} {waiting}"
+        problems = "".join(f"; {problem['path']}: {problem['found']}" for _, problem in read_problems(self.plan))
+        return f"{summary}{faults}{problems} {waiting} {' '.join(warnings.texts)}"
 
     def calm_night(self):
         """A night without faults, and the registry after it."""
@@ -234,10 +250,11 @@ class Seeds:
         said = "hangs" if status is None else answer.get("error") or answer.get("value") or f"ended by {status}"
         if status is None:
             return kind, scenario, "the night hangs", False, said
-        after = {}
+        after, later = {}, ""
         for _ in range(N_CALM):
             status, answer = in_child(self.fleet.calm_night)
             after = answer.get("value") or {}
+            later += after.get("said", "")
             if status is None or (after and after["rows"] == truth["rows"] and not after["wrong"]):
                 break
         if status is None:
@@ -251,7 +268,7 @@ class Seeds:
             problem = f"{after['wrong']} missing {sorted(right - now)}, wrong {sorted(now - right)}; {after['said']}"
             return kind, scenario, problem, False, said
         is_identical = after["files"] == truth["files"]
-        is_excused = is_identical or kind in INPUT_KINDS or any(word and word in said for word in needle)
+        is_excused = is_identical or kind in INPUT_KINDS or any(word and word in said + later for word in needle)
         problem = "" if is_excused else "other files, and the night named neither a file nor the fault"
         return kind, scenario, problem, is_identical, said
 

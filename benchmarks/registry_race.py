@@ -98,6 +98,7 @@ def _count(root, through_glob):
         return connection.execute(f"{counted} modes").fetchall()[0]
 
 
+COUNTED = "select count(*), count(distinct run_id) from modes"
 FEW_ROWS = 100  # of each batch, where the number of reads matters
 
 
@@ -106,14 +107,12 @@ def read(root: Path, n: int, seed: int) -> list[str]:
     draw, problems, done = random.Random(seed), [], 0
     while done < n:
         try:
-            earlier = draw.choice([None, *list(history(root))[-4:]])
+            earlier = draw.choice(list(history(root))[-4:]) if draw.random() < 0.2 else None
             with open_registry(root, as_of=earlier) as connection:
                 seen = None
                 for _ in range(min(n - done, draw.choice((1, 40, 160)))):
                     done += 1
-                    rows, batches = connection.execute("select count(*), count(distinct run_id) from modes").fetchall()[
-                        0
-                    ]
+                    ((rows, batches),) = connection.execute(COUNTED).fetchall()
                     if rows != FEW_ROWS * batches or (seen or rows) != rows:
                         problems.append(f"{rows} rows of {batches} batches, {seen} before")
                     seen = rows

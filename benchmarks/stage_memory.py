@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.bit_flips import _unit
+from benchmarks.bit_flips import unit_of_year
 from turnout.readers.writing import WRITERS, write
 from turnout.records import Channel, Recording
 from turnout.workflow.batches import write_batch
@@ -33,11 +33,11 @@ assert result.recordings, result.errors
 """
 HAMMER = """
 from pathlib import Path
-from turnout.config import load_configuration
+from turnout.config import load_configuration, with_raw
 from turnout.workflow.scan import scan
 from turnout.stages.hammer import hammer_unit
 root = Path(sys.argv[1])
-turnout = load_configuration(root / 'config').turnout('t0')
+turnout = with_raw(load_configuration(root / 'config').turnout('t0'), root / 'raw')
 for unit in scan(turnout, root / 'raw').units[:1]:
     assert hammer_unit(unit, turnout, root / 'raw')['models']
 """
@@ -45,7 +45,25 @@ REGISTER = """
 from pathlib import Path
 from turnout.registry.job import register
 from turnout.workflow.batches import read_results
-assert register([Path(sys.argv[1]) / sys.argv[2]], Path(sys.argv[1]) / 'registry', read=read_results).n_units
+turnouts = [{'turnout_id': f't{k}', 'name': f't{k}', 'layout': 'l', 'config_hash': 'h'} for k in range(5000)]
+folder = Path(sys.argv[1])
+assert register([folder / sys.argv[2]], folder / 'registry', read=read_results, tables={'turnouts': turnouts}).n_units
+"""
+
+TREND = """
+from pathlib import Path
+from turnout.stages.trend import trend_job
+folder = Path(sys.argv[1])
+(folder / 'config').mkdir()
+(folder / 'config/turnouts.tsv').write_text('turnout\\tlayout\\n')
+paths = [str(folder / name) for name in ('registry/_generation.json', 'trend.json', 'worklist.csv', 'config')]
+trend_job(*paths, '2024-06-01')
+"""
+REPORT = """
+from pathlib import Path
+from turnout.report.job import report_job
+folder = Path(sys.argv[1])
+report_job(folder / 'registry', folder / 'pages', [f't{k}' for k in range(20)], day='2024-06-01')
 """
 
 
@@ -90,8 +108,11 @@ def measure(n_byte: int = 24_000_000, formats: tuple[str, ...] = tuple(WRITERS))
             path = write([recording(size)], folder / f"{format}.{ending}", format)
             yield StageMemory(f"reading {format}", path.stat().st_size, peak_of(READ, folder, path.name))
             path.unlink()
-        batch = write_batch(folder, [_unit(year) for year in range(1000, 2025)])
-        yield StageMemory("registration of 1,025 units", batch.stat().st_size, peak_of(REGISTER, folder, batch.name))
+        batch = write_batch(folder, [unit_of_year(2024, f"t{k}") for k in range(5000)])
+        yield StageMemory("registration of 5,000 units", batch.stat().st_size, peak_of(REGISTER, folder, batch.name))
+        n_byte = sum(path.stat().st_size for path in (folder / "registry").rglob("*.parquet"))
+        yield StageMemory("trends of its registry", n_byte, peak_of(TREND, folder))
+        yield StageMemory("pages of 20 of its turnouts", n_byte, peak_of(REPORT, folder))
 
 
 def measure_hammer() -> StageMemory:
