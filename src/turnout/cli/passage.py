@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 GROUP = "Look at recordings"
 HELP = "analyse one passage file and say what is in it"
+FIT_HEAD = "  sensor      fit / null   forecast / null  left out / null   along b  peak m/s²  status"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -156,7 +157,7 @@ def _fits(
 
 def _fit_lines(fits: Mapping[str, ChannelFit | str], settings: PassageSettings) -> list[str]:
     """A line per sensor: each score with that of its null models."""
-    lines = ["  sensor      fit / null   forecast / null  left out / null   along b  peak m/s²  status"]
+    lines = [FIT_HEAD]
     for name, fit in fits.items():
         if isinstance(fit, str) or fit.scores is None or fit.null is None or fit.test is None:
             lines.append(f"  {name:<10}{fit if isinstance(fit, str) else fit.detail}")
