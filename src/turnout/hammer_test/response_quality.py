@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from turnout.constants import MAD_TO_SD
 from turnout.hammer_test.impacts import find_impacts
 from turnout.records import Rejection
 
@@ -62,6 +63,7 @@ def find_track_impacts(
     impacts = find_impacts(recordings, force, response, settings)
     impacts = judge_causality(impacts, response)
     impacts = judge_saturation(impacts, response)
+    impacts = judge_partial_saturation(impacts, response)
     return judge_response_scale(impacts, response) if settings.softest_blow > 0.0 else impacts
 
 
@@ -111,7 +113,8 @@ def judge_saturation(impacts: Sequence[Impact], response: str) -> tuple[Impact, 
     .. math:: \ln \max|a_i| = b \ln \max F_i + c
 
     is 1 on a linear track, and above it for a tip that hardens. A test is rejected if b lies below
-    ``MAX_SATURATED_SLOPE`` by three standard errors.
+    ``MAX_SATURATED_SLOPE`` by three standard errors. The same holds for the steepest slope of the response, which an
+    amplifier may limit.
 
     Parameters
     ----------
@@ -129,21 +132,92 @@ def judge_saturation(impacts: Sequence[Impact], response: str) -> tuple[Impact, 
     if len(used) < MIN_SLOPE_IMPACTS:
         return tuple(impacts)
     x = np.log([abs(i.peak) for i in used])
-    y = np.log([np.max(np.abs(i.acceleration[i.onset :])) for i in used])
-    if np.std(x) < MIN_FORCE_SPREAD or not np.isfinite(y).all():
+    if np.std(x) < MIN_FORCE_SPREAD:
         return tuple(impacts)
     deviations = x - x.mean()
-    slope = float(deviations @ y / (deviations @ deviations))
-    residual = y - y.mean() - slope * deviations
-    error = float(np.sqrt(residual @ residual / (len(used) - 2) / (deviations @ deviations)))
-    if slope + 3.0 * error >= MAX_SATURATED_SLOPE:
+    for name in MIN_DEFICITS:
+        with np.errstate(divide="ignore"):
+            y = np.log(_largest_and_late(used, name == "steepest slope")[0])
+        if not np.isfinite(y).all():
+            continue
+        slope = float(deviations @ y / (deviations @ deviations))
+        residual = y - y.mean() - slope * deviations
+        error = float(np.sqrt(residual @ residual / (len(used) - 2) / (deviations @ deviations)))
+        if slope + 3.0 * error < MAX_SATURATED_SLOPE:
+            largest = float(np.exp(np.median(y)))
+            detail = (
+                f"the {name} of {response} is about {largest:.4g} whatever the force: it grows with the force to the "
+                f"power {slope:.2f}, not 1; the channel is limited before its filter, so choose a larger range"
+            )
+            return _with_rejection(impacts, Rejection("overload", slope, MAX_SATURATED_SLOPE, detail, response))
+    return tuple(impacts)
+
+
+# Least deficits of the logarithms of peak and of steepest slope, over those of the weaker impacts, that show a limit.
+# Peaks of intact impacts scatter by 0.01, slopes by 0.03, as sampling can miss the steepest part.
+MIN_DEFICITS = {"peak": 0.05, "steepest slope": 0.1}
+MAX_DEVIATION = 5.0  # robust standard deviations of the weaker impacts
+LIMIT_SHARE = 0.8  # of the largest peak or slope: a limit is where the largest are
+LATE_DECAY = 0.02  # s behind the contact: the part of the decay with which peak and slope are compared
+
+
+def judge_partial_saturation(impacts: Sequence[Impact], response: str) -> tuple[Impact, ...]:
+    r"""Reject impacts whose response is limited at its beginning, in height or in slope, while weaker impacts are not.
+
+    The peak of a linear response, and its steepest slope, are in proportion to its later decay. An amplifier that
+    saturates, or follows only to a highest slope, reduces both at the beginning of strong impacts.
+
+    .. math:: q_i = \ln\frac{\max|a_i|}{\mathrm{rms}(a_i, \mathrm{late})}
+
+    An impact is rejected if q lies ``MIN_DEFICITS`` and ``MAX_DEVIATION`` standard deviations below the median of the
+    weaker half of the test.
+
+    Parameters
+    ----------
+    impacts : sequence of Impact
+        All impacts of a test; the accepted ones are compared.
+    response : str
+        Name of the response's channel, for the message.
+
+    Returns
+    -------
+    tuple of Impact
+        The impacts, with a rejection "overload" in those that are limited.
+    """
+    used = [i for i in impacts if i.accepted]
+    if len(used) < MIN_SLOPE_IMPACTS:
         return tuple(impacts)
-    largest = float(np.exp(np.median(y)))
-    detail = (
-        f"{response} reaches about {largest:.4g} whatever the force: its peak grows with the force to the power "
-        f"{slope:.2f}, not 1; it saturates before its filter, so choose a larger range"
-    )
-    return _with_rejection(impacts, Rejection("overload", slope, MAX_SATURATED_SLOPE, detail, response))
+    weaker = np.argsort([abs(i.peak) for i in used])[: (len(used) + 1) // 2]
+    rejections: dict[int, Rejection] = {}
+    for name, least in MIN_DEFICITS.items():
+        largest, q = _largest_and_late(used, name == "steepest slope")
+        if not np.isfinite(q).all():
+            continue
+        deficits = float(np.median(q[weaker])) - q
+        spread = MAD_TO_SD * float(np.median(np.abs(deficits[weaker]))) * (1.0 + 1.2 / np.sqrt(len(weaker)))
+        limit = max(least, MAX_DEVIATION * spread)
+        for k in np.flatnonzero((deficits > limit) & (largest >= LIMIT_SHARE * largest.max())):
+            detail = (
+                f"the {name} of {response} is {100.0 * (1.0 - np.exp(-deficits[k])):.0f} % below that of weaker "
+                "impacts, compared by the later decay: the channel is limited there, so choose a larger range"
+            )
+            rejections.setdefault(id(used[k]), Rejection("overload", float(deficits[k]), limit, detail, response))
+    return tuple(replace(i, rejections=(rejections[id(i)],)) if id(i) in rejections else i for i in impacts)
+
+
+def _largest_and_late(impacts: Sequence[Impact], is_slope: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Largest value of each response or of its differences, and the logarithm of its ratio to the later decay."""
+    largest, q = np.zeros(len(impacts)), np.full(len(impacts), np.nan)
+    for k, impact in enumerate(impacts):
+        x = impact.acceleration[impact.onset :]
+        x = np.diff(x) if is_slope else x
+        late_at = impact.contact_end - impact.onset + 2 * max(2, round(impact.contact * impact.rate))
+        late = x[late_at : late_at + round(LATE_DECAY * impact.rate)]
+        if x.size:
+            largest[k] = float(np.max(np.abs(x)))
+        if late.size and np.any(late) and largest[k] > 0.0:
+            q[k] = float(np.log(largest[k] / np.sqrt(np.mean(late**2))))
+    return largest, q
 
 
 # Share of its largest value at which a response has begun: a filter of linear phase rings before it with less.

@@ -244,13 +244,13 @@ def statements_of(entries: Iterable[Entry], k: int = 0, n: int = 1) -> list[Stat
         for value in _values(entry.value, k, n):
             if isinstance(value, (bool, np.bool_)) or not isinstance(value, (str, int, float, np.number)):
                 continue
-            for statement in _statements_of_value(entry.name, value, type(value)):
+            for statement in _statements_of_value(entry.name, value, type(value).__name__):
                 found.setdefault((entry.place, statement.text), replace(statement, place=entry.place))
     return list(found.values())
 
 
 @lru_cache(maxsize=4096)
-def _statements_of_value(name: str, value: Any, kind: type) -> tuple[Statement, ...]:
+def _statements_of_value(name: str, value: Any, kind: str) -> tuple[Statement, ...]:
     """Statements of one value, without its place: records share most entries. Equal numbers of other types differ."""
     return tuple(_statements(Entry("", name, value), value))
 

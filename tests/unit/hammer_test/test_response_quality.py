@@ -88,3 +88,42 @@ def test_a_stronger_impact_on_a_linear_track_is_used(hits):
         assert not reasons_of(scaled)
     scaled[4, 1] *= 3.9 / 14.0  # the force channel overflowed: its response is that of a usual impact
     assert "overload" in reasons_of(scaled)
+
+
+def slew_limited(x, limit):
+    """A response that changes by at most ``limit`` per sample, as behind an amplifier that cannot follow."""
+    limited, y = np.empty_like(x), 0.0
+    for k, value in enumerate(x):
+        y += np.clip(value - y, -limit, limit)
+        limited[k] = y
+    return limited
+
+
+@pytest.mark.parametrize("quantile", [0.4, 0.6, 0.8])
+def test_impacts_that_saturate_while_weaker_ones_do_not_are_rejected_alone(hits, quantile):
+    """Clipped by at least 8 %, behind a filter that rounds the top: all found; not clipped: all used."""
+    peaks = np.abs(hits[:, 1]).max(axis=1)
+    limit = np.quantile(peaks, quantile)
+    clipped = hits.copy()
+    clipped[:, 1] = signal.sosfiltfilt(signal.butter(6, 0.9, output="sos"), np.clip(hits[:, 1], -limit, limit))
+    impacts = impacts_of(clipped)
+    for impact, peak in zip(impacts, peaks):
+        if peak > 1.08 * limit:
+            assert impact.rejections[0].reason == "overload" and "below that of weaker" in impact.rejections[0].detail
+        elif peak < limit:
+            assert impact.accepted
+
+
+def test_a_response_whose_slope_is_limited_in_all_impacts_is_found(hits):
+    slopes = np.abs(np.diff(hits[:, 1], axis=1)).max(axis=1)
+    limited = hits.copy()
+    limited[:, 1] = [slew_limited(x, 0.6 * slopes.min()) for x in hits[:, 1]]
+    impacts = impacts_of(limited)
+    assert all(i.rejections and i.rejections[0].reason == "overload" for i in impacts)
+    assert "the steepest slope of rail" in impacts[0].rejections[0].detail
+
+
+@pytest.mark.parametrize("seed", range(2, 6))
+def test_an_intact_response_is_never_limited(shared_recordings, seed):
+    samples = np.array(runpy.run_path(str(shared_recordings / "gen.py"))["hits"](seed=seed))
+    assert "overload" not in reasons_of(samples)
