@@ -187,6 +187,8 @@ def figure(a, path):
 
 PAGE = """# Track decay rates of Bern-Niederwangen: what changed
 
+This page shows what track decay rates alone tell about a changed track.
+
 *Made by `python -m benchmarks.niederwangen FOLDER`; every number and verdict comes from that run. Source of the
 measurements: repository mic-haf/SDWirkungNi (SBB; Scossa-Romano and Oertli), CC0 1.0. What was changed at the
 track, where and when, is not in the folder and was not looked up. What was added or taken away is asked with a model of

@@ -128,6 +128,8 @@ def _draw_term(axis, x, case, diagnosis, direction):
 
 PAGE = """# Bern-Niederwangen: what was changed at the track, by diagnosis
 
+This page shows which change the diagnosis finds on a measured track.
+
 *Made by `python -m examples.niederwangen [FOLDER]`; every number comes from that run. Measurements: repository
 mic-haf/SDWirkungNi (SBB; Scossa-Romano and Oertli), CC0 1.0. What was done at the track is not in the folder and was
 not looked up. `docs/niederwangen_decay_rate.md` asks the same of the same numbers without a model.*

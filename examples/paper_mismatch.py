@@ -151,6 +151,8 @@ def _ranking_rows(diagnosis):
 
 PAGE = """# The mismatch of the publication at A4, made again
 
+This page repeats the mismatch that the publication reports, and its name.
+
 *Made by `python -m examples.paper_mismatch`; every number comes from that run. The recordings are simulated.*
 
 Barkhordari et al. simulate one car over the turnout, calibrated on receptances of the unloaded track. It agrees with

@@ -165,6 +165,8 @@ def size(case, halves):
 
 PAGE = """# Real hammer tests against models that are too simple
 
+This page shows what the diagnosis names on beams that others measured.
+
 *Made by `python -m examples.real_frfs [FOLDER]`; every number comes from that run. A: a beam, 6 places struck, 7
 accelerometers, published with sdypy-EMA (MIT). B: a beam, one place struck five times, published with pyFRF (MIT).*
 

@@ -111,6 +111,8 @@ def draw_arrow(case, diagnosis, path):
 
 PAGE = """# A real oscillator, without prior knowledge: the Silverbox
 
+This page shows that the diagnosis finds the nonlinear spring of a measured oscillator.
+
 *Made by `python -m examples.silverbox [FOLDER]`; every number comes from that run. Recording: Wigren and Schoukens
 2013, Three free data sets for development and benchmarking in nonlinear system identification; SNLS80mV.csv.*
 

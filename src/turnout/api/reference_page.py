@@ -23,7 +23,9 @@ GROUPS = {
 }
 HEAD = """# Turnout in Python
 
-The names that `import turnout` offers to scripts and notebooks. All values are in SI units. `settings=None` means the
+This page lists the names that `import turnout` offers to scripts and notebooks.
+
+All values are in SI units. `settings=None` means the
 defaults of `config/config.yaml`. A result prints in one line; recordings, receptances and modal models have `.plot()`,
 which draws with matplotlib and returns the axes. A record, a channel or an impact that cannot be used is a result with
 a reason ([reasons](reasons.md)), not an exception. An exception states file, place, problem and remedy.

@@ -106,7 +106,9 @@ def reasons_page() -> str:
     lines = [
         "# Reasons",
         "",
-        "Why a recording is in quarantine, or an impact, a model or a passage was not used. The list is closed:",
+        "This page explains why a recording is in quarantine, or why an impact, a model or a passage was not used.",
+        "",
+        "The list is closed:",
         "`turnout.errors.REASONS`. In SQL: `from reasons`, `from rejected`, `from quarantine_open`.",
         "`rejected` has two more words for fits of passages: `null_explains`, a model of noise fits as well, and",
         "`not_an_impulse` ([passages](passages.md)).",

@@ -188,7 +188,10 @@ def runs(good: np.ndarray | bool) -> list[slice]:
     >>> runs(np.array([True, True, False, True]))
     [slice(0, 2, None), slice(3, 4, None)]
     """
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], np.atleast_1d(good), [False]]).astype(np.int8)))
+    good = np.atleast_1d(good)
+    if good.all():  # the usual case
+        return [slice(0, len(good))] if len(good) else []
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(np.int8)))
     return [slice(first, last) for first, last in zip(edges[::2].tolist(), edges[1::2].tolist())]
 
 
@@ -257,6 +260,11 @@ class Axis:
         array
             Position; outside 0 to 1 for values beyond the ends.
         """
+        if isinstance(values, (float, int)):  # much faster than an array of one value
+            if self.scale != "log":
+                return np.float64((values - self.low) / (self.high - self.low))
+            if values > 0.0:
+                return np.float64(math.log(values / self.low) / math.log(self.high / self.low))
         values = np.asarray(values, dtype=float)
         if self.scale == "log":
             with np.errstate(divide="ignore", invalid="ignore"):
@@ -441,6 +449,8 @@ class Chart:
         series : str
             Name of the series.
         """
+        if np.size(x) == 0:
+            return
         px, py = np.atleast_1d(self.px(x)), np.atleast_1d(self.py(y))
         is_finite = np.isfinite(px) & np.isfinite(py)
         if low is not None and high is not None:

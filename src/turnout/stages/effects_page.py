@@ -15,7 +15,9 @@ from turnout.stages.mismatch_text import number_in_words
 
 PAGE_HEAD = """# What a diagnosis can name
 
-Every effect that `turnout diagnose` asks for, from the catalogue (`turnout.physics`, one file each). "Least": how far
+This page lists every effect that `turnout diagnose` can name, and what to check on site then.
+
+The list comes from the catalogue (`turnout.physics`, one file each). "Least": how far
 the first number has to be from what it is in an intact track to get a name; for less nobody would go to the site.
 What is in no row is located and called "unknown". Which of them were found where they were concealed, and how small:
 [blind proof](blind.md).
