@@ -233,13 +233,14 @@ def fit_row(
     return row
 
 
-def _rounded(values: np.ndarray, digits: int) -> list[float]:
-    return [float(v) for v in np.round(np.asarray(values, dtype=float), digits)]
+def _rounded(values: np.ndarray, digits: int) -> list[float] | None:
+    """Values to some decimals, None if one is not finite: the registry holds whole lists alone."""
+    return [float(v) for v in np.round(values, digits)] if np.all(np.isfinite(values)) else None
 
 
-def _significant(values: np.ndarray) -> list[float | None]:
-    """Four significant digits of each value, None where it is not finite."""
-    return [float(f"{v:.4g}") if np.isfinite(v) else None for v in values]
+def _significant(values: np.ndarray) -> list[float] | None:
+    """Four significant digits of each value, None if one is not finite."""
+    return [float(f"{v:.4g}") for v in values] if np.all(np.isfinite(values)) else None
 
 
 def _plain(value: float | None) -> float | None:
