@@ -169,12 +169,12 @@ class Hdf5Claims:
         """
         import h5py
 
-        kind = group.links.get_info(name).type
-        if kind == h5py.h5l.TYPE_EXTERNAL:
+        link_type = group.links.get_info(name).type
+        if link_type == h5py.h5l.TYPE_EXTERNAL:
             file_name = group.links.get_val(name)[0].decode("utf-8", "replace")
             problem = f"it is a link to the file {file_name!r}"
             raise self.source.error(path, problem, ELSEWHERE_REMEDY, reason="outside_root")
-        return kind == h5py.h5l.TYPE_HARD
+        return link_type == h5py.h5l.TYPE_HARD
 
     def check_dataset(self, dataset: Any, path: str) -> None:
         """Check a dataset before it is read.
@@ -218,7 +218,7 @@ def check_hdf5(file: Any, source: Source) -> None:
     """
     import h5py
 
-    claims, seen = Hdf5Claims(source), set()
+    claims, addresses = Hdf5Claims(source), set()
 
     def walk(group: Any, above: str) -> None:
         for name in group:
@@ -227,19 +227,19 @@ def check_hdf5(file: Any, source: Source) -> None:
                 continue
             try:
                 info = h5py.h5o.get_info(group, name)
-                if info.addr in seen or info.type not in (h5py.h5o.TYPE_GROUP, h5py.h5o.TYPE_DATASET):
+                if info.addr in addresses or info.type not in (h5py.h5o.TYPE_GROUP, h5py.h5o.TYPE_DATASET):
                     continue
                 member = h5py.h5o.open(group, name)
             except (KeyError, OSError, RuntimeError, ValueError):  # damaged: its reader reports it
                 continue
-            seen.add(info.addr)
+            addresses.add(info.addr)
             if info.type == h5py.h5o.TYPE_GROUP:
                 walk(member, path)
             else:
                 claims.check_dataset(member, path)
 
     root = h5py.h5g.open(file.id, b"/")
-    seen.add(h5py.h5o.get_info(root).addr)
+    addresses.add(h5py.h5o.get_info(root).addr)
     walk(root, "")
 
 

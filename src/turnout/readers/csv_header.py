@@ -345,8 +345,8 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
             value = re.sub(r"\D", "", grouped[0])
         head_lines.append(line)
         if match and (line.startswith("#") or is_note or is_rate):
-            noted = value if _states_scale(name, value) else _value(f"{value} {match[2]}" if match[2] else value)
-            notes[plain_name if is_note else name] = noted
+            note = value if _states_scale(name, value) else _value(f"{value} {match[2]}" if match[2] else value)
+            notes[plain_name if is_note else name] = note
         elif line.strip():
             text_lines.append(line)
         position = end + 1

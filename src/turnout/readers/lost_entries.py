@@ -46,11 +46,13 @@ def lost_entry_errors(records: Sequence[RawRecord | ReadError], source: Source) 
             yield _error(f"record {numbers}", name, f"it lacks the {name} that the other records have", source)
     _, first, names = read[0]
     for entry in {entry.name: entry for entry in first.entries}.values():
-        known = similar_name(entry.name)
-        if known and known not in names and known not in reported:
-            reported.add(known)
-            problem = f"{entry.name[:60]!r} in {entry.place[:80]} is nearly the name of the {known}, which is missing"
-            yield _error("the file", known, problem, source)
+        condition = similar_name(entry.name)
+        if condition and condition not in names and condition not in reported:
+            reported.add(condition)
+            problem = (
+                f"{entry.name[:60]!r} in {entry.place[:80]} is nearly the name of the {condition}, which is missing"
+            )
+            yield _error("the file", condition, problem, source)
 
 
 def _names(record: RawRecord) -> set[str]:

@@ -50,11 +50,11 @@ def unpacked_file(source: Source) -> bytes:
         try:
             if position + 8 > len(data):
                 raise ValueError("its tag is cut off")
-            kind, size = struct.unpack_from(f"{order}II", data, position)
-            if kind not in (MATRIX, COMPRESSED) or position + 8 + size > len(data):
-                raise ValueError(f"an element of type {kind} with {size} bytes does not fit into the file")
+            element_type, size = struct.unpack_from(f"{order}II", data, position)
+            if element_type not in (MATRIX, COMPRESSED) or position + 8 + size > len(data):
+                raise ValueError(f"an element of type {element_type} with {size} bytes does not fit into the file")
             element = data[position : position + 8 + size]
-            if kind == COMPRESSED:
+            if element_type == COMPRESSED:
                 claimed = _claimed_size(element[8:], order)
                 check_size(total := total + claimed, source, f"the variable at byte {position}")
                 element = _unpacked(element[8:], claimed)
@@ -79,51 +79,51 @@ def _unpacked(packed: bytes, size: int) -> bytes:
     """The element in packed bytes, of which no more than ``size`` are unpacked."""
     unpacker = zlib.decompressobj()
     element = unpacker.decompress(packed, size)
-    rest = unpacker.decompress(unpacker.unconsumed_tail, 8)  # reads the checksum
-    if len(element) != size or len(rest) > 7 or not unpacker.eof:
-        raise ValueError(f"{len(element) + len(rest)} of {size} bytes are packed in it")
+    remainder = unpacker.decompress(unpacker.unconsumed_tail, 8)  # reads the checksum
+    if len(element) != size or len(remainder) > 7 or not unpacker.eof:
+        raise ValueError(f"{len(element) + len(remainder)} of {size} bytes are packed in it")
     return element
 
 
 def _element(data: bytes, position: int, stop: int, order: str) -> tuple[int, int, int, int]:
     """(type, first byte of the content, its size, position of the next element) of the element at ``position``."""
-    kind, size = struct.unpack_from(f"{order}II", data, position)
-    if kind >> 16:  # small element: size, type and up to four bytes of content
-        kind, size = kind & 0xFFFF, kind >> 16
+    element_type, size = struct.unpack_from(f"{order}II", data, position)
+    if element_type >> 16:  # small element: size, type and up to four bytes of content
+        element_type, size = element_type & 0xFFFF, element_type >> 16
         begin, following = position + 4, position + 8
         if size > 4:
             raise ValueError(f"a small element holds {size} bytes")
     else:
-        begin, following = position + 8, position + 8 + size + (-size % 8 if kind != MATRIX else 0)
+        begin, following = position + 8, position + 8 + size + (-size % 8 if element_type != MATRIX else 0)
     if begin + size > stop:
         raise ValueError(f"an element of {size} bytes ends behind its array")
-    return kind, begin, size, following
+    return element_type, begin, size, following
 
 
 def _check_matrix(data: bytes, position: int, stop: int, order: str, depth: int) -> int:
     """Position behind the array at ``position``; ValueError if the tags in it do not fit into each other."""
-    kind, begin, size, following = _element(data, position, stop, order)
-    if kind != MATRIX or depth > MAX_DEPTH:
-        raise ValueError(f"an element of type {kind} stands for an array")
+    element_type, begin, size, following = _element(data, position, stop, order)
+    if element_type != MATRIX or depth > MAX_DEPTH:
+        raise ValueError(f"an element of type {element_type} stands for an array")
     if not size:
         return following
     end = begin + size
-    kind, flags_at, n_flag, position = _element(data, begin, end, order)
-    if kind != UINT32 or n_flag != 8:
+    element_type, flags_at, n_flag, position = _element(data, begin, end, order)
+    if element_type != UINT32 or n_flag != 8:
         raise ValueError("an array has no flags")
     (flags,) = struct.unpack_from(f"{order}I", data, flags_at)
     array_class = flags & 0xFF
     if array_class not in (CELL, STRUCTURE, TEXT, *NUMERIC_CLASSES):
         return _check_parts(data, position, end, following, order, depth)
-    kind, at, n_byte, position = _element(data, position, end, order)
-    if kind != INT32 or n_byte % 4 or not 8 <= n_byte <= 4 * MAX_DIMENSIONS:
+    element_type, at, n_byte, position = _element(data, position, end, order)
+    if element_type != INT32 or n_byte % 4 or not 8 <= n_byte <= 4 * MAX_DIMENSIONS:
         raise ValueError("an array has no dimensions")
     shape = struct.unpack_from(f"{order}{n_byte // 4}i", data, at)
     if min(shape) < 0:
         raise ValueError(f"an array has the dimensions {shape}")
     count = math.prod(shape)
-    kind, _, _, position = _element(data, position, end, order)
-    if kind not in (INT8, UTF8):
+    element_type, _, _, position = _element(data, position, end, order)
+    if element_type not in (INT8, UTF8):
         raise ValueError("an array has no name")
     if array_class in (CELL, STRUCTURE):
         if array_class == STRUCTURE:
@@ -135,30 +135,30 @@ def _check_matrix(data: bytes, position: int, stop: int, order: str, depth: int)
             position = _check_matrix(data, position, end, order, depth + 1)
         return following
     for _ in range(2 if flags & IS_COMPLEX and array_class != TEXT else 1):
-        kind, _, n_byte, position = _element(data, position, end, order)
+        element_type, _, n_byte, position = _element(data, position, end, order)
         if array_class == TEXT:
-            if kind not in TEXT_TYPES:
-                raise ValueError(f"a text has the type {kind}")
-        elif kind not in NUMBER_SIZES or n_byte != count * NUMBER_SIZES[kind]:
-            raise ValueError(f"{n_byte} bytes of type {kind} for {count} numbers")
+            if element_type not in TEXT_TYPES:
+                raise ValueError(f"a text has the type {element_type}")
+        elif element_type not in NUMBER_SIZES or n_byte != count * NUMBER_SIZES[element_type]:
+            raise ValueError(f"{n_byte} bytes of type {element_type} for {count} numbers")
     return following
 
 
 def _check_parts(data: bytes, position: int, stop: int, following: int, order: str, depth: int) -> int:
     """``following``, if all parts of an object, function or sparse matrix end within it."""
     while position + 8 <= stop:
-        kind, _, _, behind = _element(data, position, stop, order)
-        position = _check_matrix(data, position, stop, order, depth + 1) if kind == MATRIX else behind
+        element_type, _, _, behind = _element(data, position, stop, order)
+        position = _check_matrix(data, position, stop, order, depth + 1) if element_type == MATRIX else behind
     return following
 
 
 def _field_count(data: bytes, position: int, stop: int, order: str) -> tuple[int, int]:
     """(number of fields of a structure, position behind their names)."""
-    kind, at, size, position = _element(data, position, stop, order)
-    if kind != INT32 or size != 4:
+    element_type, at, size, position = _element(data, position, stop, order)
+    if element_type != INT32 or size != 4:
         raise ValueError("a structure has no fields")
     (length,) = struct.unpack_from(f"{order}i", data, at)
-    kind, _, size, position = _element(data, position, stop, order)
-    if kind != INT8 or length < 1 or size % length:
+    element_type, _, size, position = _element(data, position, stop, order)
+    if element_type != INT8 or length < 1 or size % length:
         raise ValueError("a structure has no names of fields")
     return size // length, position

@@ -174,9 +174,9 @@ def _record(data_source: DataSource, source: Source) -> RawRecord | None:
 
 def _plain_attributes(places: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
     """Attributes by path, without those that the format defines and without arrays."""
-    own = {*FREQUENCY_ATTRIBUTES, "TriggerMode"}
+    defined = {*FREQUENCY_ATTRIBUTES, "TriggerMode"}
     return {
-        path: {k: _plain(v) for k, v in attributes.items() if k not in own and not isinstance(v, np.ndarray)}
+        path: {k: _plain(v) for k, v in attributes.items() if k not in defined and not isinstance(v, np.ndarray)}
         for path, attributes in places.items()
     }
 

@@ -207,8 +207,8 @@ def fill_values(entries: Iterable[Entry]) -> tuple[float, ...]:
     >>> fill_values([Entry("head", "_FillValue", -999), Entry("head", "gain", 2.0)])
     (-999.0,)
     """
-    found = (_numbers(entry.value) for entry in entries if plain_word(entry.name) in FILL_WORDS)
-    return tuple(float(x) for numbers in found if numbers is not None for x in numbers)
+    lists = (_numbers(entry.value) for entry in entries if plain_word(entry.name) in FILL_WORDS)
+    return tuple(float(x) for numbers in lists if numbers is not None for x in numbers)
 
 
 def sensitivity_problem(entries: Iterable[Entry], sensitivity: float, unit: str) -> str:
@@ -238,8 +238,8 @@ def sensitivity_problem(entries: Iterable[Entry], sensitivity: float, unit: str)
     numbers = [(entry, float(x)) for entry in stated if (n := _numbers(entry.value)) is not None for x in n if x != 0.0]
     if not numbers or any(_is_same_sensitivity(entry, x, sensitivity, unit) for entry, x in numbers):
         return ""
-    shown = "; ".join(f"{entry.name}: {entry.value}" for entry in stated[:3])
-    return f"the file states {shown[:100]!r}, and the layout's sensitivity of {sensitivity:g} {unit} is none of these"
+    listed = "; ".join(f"{entry.name}: {entry.value}" for entry in stated[:3])
+    return f"the file states {listed[:100]!r}, and the layout's sensitivity of {sensitivity:g} {unit} is none of these"
 
 
 def _is_same_sensitivity(entry: Entry, stated: float, sensitivity: float, unit: str) -> bool:

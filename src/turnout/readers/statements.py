@@ -457,12 +457,12 @@ def _most_precise(
     drift = MAX_CLOCK_DRIFT if first.is_clock else 0.0
     for other in ordered[1:]:
         if not other.agrees_with(interval.widen(drift)):
-            raise source.error(
-                where,
-                f"two rates: {first}, and {other}",
-                "Find out which of them is right and export the record again with that one alone",
-                reason="wrong_rate",
-            )
+            remedy = "Find out which of them is right and export the record again with that one alone"
+            if first.is_clock and other.is_clock:
+                remedy = (
+                    "If its columns were sampled at two rates, export all at one rate, or each rate to its own file"
+                )
+            raise source.error(where, f"two rates: {first}, and {other}", remedy, reason="wrong_rate")
     return first, interval
 
 

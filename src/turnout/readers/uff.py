@@ -265,8 +265,8 @@ def _unit(axis: tuple[int, str, str], stated_units: FileUnits | None) -> str:
     if not si or stated_units is None:
         return ""
     scale = {"N": stated_units.force, "Pa": stated_units.force / stated_units.length**2}.get(si, stated_units.length)
-    known = UNITS[conversion(si).dimension]
-    return next((u for u, (s, _) in known.items() if abs(s / scale - 1.0) < FACTOR_PRECISION), f"{scale:.9g} {si}")
+    candidates = UNITS[conversion(si).dimension]
+    return next((u for u, (s, _) in candidates.items() if abs(s / scale - 1.0) < FACTOR_PRECISION), f"{scale:.9g} {si}")
 
 
 FACTOR_PRECISION = 1e-5  # relative: factors of dataset 164 are printed with few digits

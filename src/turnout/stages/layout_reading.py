@@ -137,8 +137,8 @@ def _hammer_faults(
     # the scale of the response is wrong in all impacts at once: the stiffness shows by which factor
     measured = [replace(i, rejections=tuple(r for r in i.rejections if r.channel != response)) for i in impacts]
     stiffness = median_stiffness(measured)
-    found = "" if stiffness is None else f", dynamic stiffness {stiffness / 1e6:.3g} MN/m"
-    return faults, f", {len(impacts)} impacts{found}"
+    stiffness_text = "" if stiffness is None else f", dynamic stiffness {stiffness / 1e6:.3g} MN/m"
+    return faults, f", {len(impacts)} impacts{stiffness_text}"
 
 
 def _impact_numbers(numbers: Sequence[int]) -> str:

@@ -363,3 +363,14 @@ def test_a_start_in_a_chunk_that_no_calendar_has_is_reported(tmp_path):
     layout = wav_with(tmp_path, b"bext", broadcast(25600, date=b"2024-02-30"))
     (error,) = read("a.wav", tmp_path, layout).errors
     assert error.reason == "wrong_time" and "2024-02-30" in str(error)
+
+
+@pytest.mark.parametrize("rate", [None, 20000.0, 25600.0])
+def test_columns_of_two_sampling_rates_are_named_with_both_and_with_what_to_do(made, rate):
+    channels = (
+        RawChannel("force", "force", "force", unit="N"),
+        RawChannel("rail", "rail", "acceleration", unit="m/s²"),
+    )
+    (error,) = read("two_times.csv", made("15_csv_cells"), RawDescription(channels, rate=rate)).errors
+    assert error.reason == "wrong_rate" and "20000 Hz" in str(error) and "25600.0004 Hz" in str(error)
+    assert "export all at one rate, or each rate to its own file" in str(error)
