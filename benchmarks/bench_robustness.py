@@ -10,7 +10,7 @@ from pathlib import Path
 from benchmarks.bar import Bar
 from benchmarks.bit_flips import flip_bits
 from benchmarks.registry_race import race_of_readers
-from benchmarks.stage_memory import measure
+from benchmarks.stage_memory import measure, measure_hammer
 
 N_READ = int(os.environ.get("TURNOUT_READS", "10000"))
 
@@ -27,6 +27,6 @@ def bars():
         yield Bar("live files with a flipped bit", result.n_flipped, 500, "", ">=")
         yield Bar("flipped bits that no message names", result.n_flipped - result.n_named, 0, "")
         yield Bar("rows that differ after the next night", result.n_different, 0, "", n=f"of {result.n_row}")
-    for figure in measure():
+    for figure in (measure_hammer(), *measure()):
         note = f"input {figure.n_input / 1e6:.1f} MB"
         yield Bar(f"memory of {figure.stage}", figure.peak / 1e6, figure.limit / 1e6, "MB", n=note)
