@@ -217,20 +217,22 @@ def akaike_criterion(explanation: Explanation, decays: np.ndarray) -> float:
     return decays.size * np.log(fit.rss / total) + 2.0 * (2 * n_mode + order + per_decay)
 
 
+SPLIT_SHARE = 0.25  # of the statistic of a resonance is left to each of two equal poles that share it
+
+
 def likeliest_explanation(
     explanations: Sequence[Explanation], decays: np.ndarray, settings: IdentifySettings
 ) -> Explanation:
     r"""The explanation whose modes are used.
 
     One that leaves white noise is complete: among such explanations the Akaike criterion decides. Where all leave
-    coloured noise or a drift, none is complete, and the criterion separates wrong models with certainty although it
-    does not show which of them has the modes right. An explanation with a pole too many splits the strongest
-    resonance, and each part of it is then poorly determined. So of the explanations with a mode in the most bands that
-    one is used whose strongest mode is determined best,
+    coloured noise or a drift, none is complete, and the criterion may prefer a pole too many that splits the strongest
+    resonance. Of two equal parts each has half of its amplitude, and so at most a quarter of the statistic
 
     .. math:: \max_m \sum_i \chi^2_{im}
 
-    over the modes that pass all tests, with :math:`\chi^2` from ``mode_chi_squared``.
+    over the modes that pass all tests, with :math:`\chi^2` from ``mode_chi_squared``. An explanation below
+    ``SPLIT_SHARE`` of the largest one is not used; among the others the Akaike criterion decides.
 
     Parameters
     ----------
@@ -246,23 +248,22 @@ def likeliest_explanation(
     Explanation
         One of them.
     """
-    complete = [e for e in explanations if not e.is_doubtful]
-    if complete:
-        return min(complete, key=lambda e: akaike_criterion(e, decays))
-    return max(explanations, key=lambda e: _determination(e, settings))
+    usable = [e for e in explanations if not e.is_doubtful]
+    if not usable:
+        determination = [_determination(e, settings) for e in explanations]
+        least = SPLIT_SHARE * max(determination)
+        usable = [e for e, value in zip(explanations, determination) if value >= least]
+    return min(usable, key=lambda e: akaike_criterion(e, decays))
 
 
-def _determination(explanation: Explanation, settings: IdentifySettings) -> tuple[int, float]:
-    """Number of bands with a mode that passes all tests, and the statistic of the best determined one."""
+def _determination(explanation: Explanation, settings: IdentifySettings) -> float:
+    """Statistic of the best determined mode that passes all tests; 0 where none does."""
     fit = explanation.fit
     if fit is None:
-        return 0, 0.0
+        return 0.0
     failed = dict(mode_failures(fit, settings))
-    passed = [m for m in range(len(fit.mean)) if m not in failed]
     statistic = mode_chi_squared(fit.linearisation, fit.sigma2).sum(axis=0)
-    frequency = np.exp(fit.mean[passed, 0])
-    n_band = sum(bool(np.any((low <= frequency) & (frequency < high))) for _, low, high in settings.bands())
-    return n_band, float(np.max(statistic[passed], initial=0.0))
+    return float(max((value for m, value in enumerate(statistic) if m not in failed), default=0.0))
 
 
 START_TIMES = (0.0, 5e-4, 1e-3)  # s, times at which the realisations start
