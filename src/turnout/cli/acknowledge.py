@@ -13,6 +13,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_configuration, add_registry
+from turnout.config.acknowledgements import BANDS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -36,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         Parser of the command.
     """
     parser.add_argument("place", help="turnout, or turnout/section")
-    parser.add_argument("--band", default="", help="ballast, railpad or amplitude (under trains); all if not given")
+    parser.add_argument("--band", default="", help=f"{', '.join(BANDS)} (under trains); all if not given")
     parser.add_argument("--by", required=True, help="who says so")
     parser.add_argument("--reason", required=True, help="why")
     parser.add_argument("--suppress-until", metavar="DATE", default="", help="silence it until then, YYYY-MM-DD")

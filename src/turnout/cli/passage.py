@@ -186,8 +186,8 @@ def _write_page(
     for name, times in passage.at_sensor.items():
         fit = fits.get(name)
         samples = recording.signal(name)
-        shown = None if fit is None or isinstance(fit, str) else fit
-        sensors.append(SensorPassage(name, samples - np.median(samples), recording.rate, np.sort(times), shown))
+        prediction = None if fit is None or isinstance(fit, str) else fit
+        sensors.append(SensorPassage(name, samples - np.median(samples), recording.rate, np.sort(times), prediction))
     Path(path).write_text(passage_page(recording.source, lines, sensors), encoding="utf-8")
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 COLUMNS = ("turnout", "section", "band", "action", "by", "at", "until", "reason")
 ACTIONS = ("acknowledge", "suppress")
-BANDS = ("ballast", "railpad", "amplitude")
+BANDS = ("ballast", "railpad", "ballast_damping", "railpad_damping", "amplitude")
 
 
 def read_acknowledgements(

@@ -112,8 +112,8 @@ def make_fleet(
         responses = pool.map(simulate_run, runs)
         signals = list(tqdm(responses, total=len(runs), desc="weekly trains", unit="run", disable=not progress))
     truths = {s.turnout: [t for job, t in zip(trains, passage_truths) if job[1].turnout == s.turnout] for s in chosen}
-    for (scenario, positions), k in zip(weekly.items(), range(0, len(runs), len(runs) // max(len(weekly), 1))):
-        own = signals[k : k + len(runs) // len(weekly)]
+    for k, (scenario, positions) in enumerate(weekly.items()):
+        own = signals[k * len(runs) // len(weekly) : (k + 1) * len(runs) // len(weekly)]
         truths[scenario.turnout] = write_weekly_trains(raw, scenario, positions, own, seed, days[-1], n_week)
     if n_passage:
         for turnout, turnout_truths in truths.items():

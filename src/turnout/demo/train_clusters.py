@@ -34,7 +34,7 @@ def write_clusters(raw: Path | str, configuration: Path | str = "config") -> Clu
     settings = loaded.settings["passage"]
     rows = []
     for name in loaded.rows:
-        trains, _ = listed_trains(with_raw(loaded.turnout(name), raw).trains)
+        trains, _ = listed_trains(with_raw(loaded.turnout(name), Path(raw)).trains)
         rows += [{"train_type": t.train_type, "speed_kmh": t.speed, "axle_load_t": t.axle_load} for t in trains]
     clusters = fit_clusters(rows, settings)
     write_if_changed(Path(settings.assets) / "clusters.json", json.dumps(clusters.document(), indent=1) + "\n")

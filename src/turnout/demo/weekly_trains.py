@@ -68,7 +68,7 @@ KINDS = (
 WEEKDAYS = ((0,), (1,), (0, 3), (2, 4), (0,))  # kinds from Monday to Friday, in turn
 RUNS = ("light", "loaded", "dip", "later")
 
-# scenario, section -> (position [m], track), kind, run, first day, last day
+# scenario, section -> (position [m], track), train, run, first day, last day
 RunJob: TypeAlias = "tuple[TurnoutScenario, dict[str, tuple[float, str]], TrainKind, str, date, date]"
 
 
@@ -106,7 +106,7 @@ def weekly_jobs(
         A job for ``simulate_run`` per kind of train and run.
     """
     first_day = last_day - timedelta(weeks=n_week)
-    return [(scenario, positions, kind, run, first_day, last_day) for kind in KINDS for run in RUNS]
+    return [(scenario, positions, train, run, first_day, last_day) for train in KINDS for run in RUNS]
 
 
 def simulate_run(job: RunJob) -> np.ndarray:
@@ -122,19 +122,19 @@ def simulate_run(job: RunJob) -> np.ndarray:
     (n_section, n_sample) array of float
         At ``SIMULATED_RATE``. [m/s²]
     """
-    scenario, positions, kind, run, first_day, last_day = job
+    scenario, positions, train, run, first_day, last_day = job
     turnout = track_of(scenario, last_day if run == "later" else first_day, 15)
-    vehicle = vehicle_of(kind.vehicle, LOADED if run == "loaded" else LIGHT)
+    vehicle = vehicle_of(train.vehicle, LOADED if run == "loaded" else LIGHT)
     parts: list = _wheels(vehicle, turnout.track.start, turnout.track.end, 2 if run == "loaded" else 1)
-    if run == "dip" and scenario.weld is not None and scenario.weld.track in ("both", kind.track):
+    if run == "dip" and scenario.weld is not None and scenario.weld.track in ("both", train.track):
         parts.append(Kink(scenario.weld.position, DIP_DEPTH, scenario.weld.length))
     recording = simulate_passage(
         turnout,
         vehicle,
-        kind.speed_kmh / KMH,
-        [_ideal_sensor(label, place, side, kind.track) for label, (place, side) in positions.items()],
-        route=kind.track,
-        rail_seed=crc32(f"{scenario.turnout} {kind.track}".encode()),
+        train.speed_kmh / KMH,
+        [_ideal_sensor(label, place, side, train.track) for label, (place, side) in positions.items()],
+        route=train.track,
+        rail_seed=crc32(f"{scenario.turnout} {train.track}".encode()),
         rate=SIMULATED_RATE,
         lead=LEAD,
         tail=TAIL,
@@ -177,20 +177,20 @@ def write_weekly_trains(
         Train, speed, load, track, temperature, depth of the dip and file of every passage.
     """
     rng = np.random.default_rng([seed, 78, crc32(scenario.turnout.encode())])
-    by_kind = {kind: np.array(runs[k * len(RUNS) : (k + 1) * len(RUNS)]) for k, kind in enumerate(KINDS)}
+    by_kind = {train: np.array(runs[k * len(RUNS) : (k + 1) * len(RUNS)]) for k, train in enumerate(KINDS)}
     folder = Path(raw) / scenario.turnout
     (folder / "passages").mkdir(parents=True, exist_ok=True)
     first_day = last_day - timedelta(weeks=n_week)
     truths, listed = [], []
-    for day, kind in timetable(first_day, n_week):
-        truth = _draw_train(scenario, kind, day, rng)
+    for day, train in timetable(first_day, n_week):
+        truth = _draw_train(scenario, train, day, rng)
         progress = (day - first_day) / (last_day - first_day)
-        _write_train(folder, positions, truth, by_kind[kind], kind, progress, rng)
+        _write_train(folder, positions, truth, by_kind[train], train, progress, rng)
         truths.append(truth)
         if rng.uniform() < LISTED_SHARE:
             moment = datetime.fromisoformat(truth["started_at_utc"]) + timedelta(seconds=int(rng.integers(-20, 20)))
             listed.append({
-                "passed_at_utc": moment.isoformat(), "train_type": kind.name, "track": kind.track,
+                "passed_at_utc": moment.isoformat(), "train_type": train.name, "track": train.track,
                 "speed_kmh": f"{truth['speed_kmh'] * rng.normal(1.0, 0.01):.0f}",
                 "axle_load_t": f"{truth['axle_load_t'] * rng.normal(1.0, 0.02):.1f}",
             })  # fmt: skip
@@ -234,18 +234,18 @@ def timetable(first_day: date, n_week: int) -> list[tuple[date, TrainKind]]:
     return trains
 
 
-def _draw_train(scenario: TurnoutScenario, kind: TrainKind, day: date, rng: np.random.Generator) -> dict[str, Any]:
+def _draw_train(scenario: TurnoutScenario, train: TrainKind, day: date, rng: np.random.Generator) -> dict[str, Any]:
     """The truth about one train."""
     load = float(rng.uniform(0.0, 1.0))  # position between the two simulated loads
     moment = datetime(day.year, day.month, day.day) + timedelta(hours=float(rng.uniform(6, 20)))
-    light, loaded = (vehicle_of(kind.vehicle, share).static_loads for share in (LIGHT, LOADED))
+    light, loaded = (vehicle_of(train.vehicle, share).static_loads for share in (LIGHT, LOADED))
     loads = light + load * (loaded - light)
     return {
         "started_at_utc": moment.replace(microsecond=0).isoformat(),
-        "vehicle": kind.name,
-        "speed_kmh": kind.speed_kmh * (1.0 + SPEED_SPREAD * float(rng.uniform(-1.0, 1.0))),
+        "vehicle": train.name,
+        "speed_kmh": train.speed_kmh * (1.0 + SPEED_SPREAD * float(rng.uniform(-1.0, 1.0))),
         "load_share": load,
-        "track": kind.track,
+        "track": train.track,
         "direction": "facing",
         "rail_temperature_c": rail_temperature(day, rng),
         "dip_m": scenario.weld.depth_on(day) if scenario.weld is not None else 0.0,
@@ -259,7 +259,7 @@ def _write_train(
     positions: dict[str, tuple[float, str]],
     truth: dict[str, Any],
     runs: np.ndarray,
-    kind: TrainKind,
+    train: TrainKind,
     progress: float,
     rng: np.random.Generator,
 ) -> None:
@@ -267,12 +267,12 @@ def _write_train(
     light, loaded, dip, later = runs
     mixed = light + truth["load_share"] * (loaded - light) + progress * (later - light)
     mixed = mixed + truth["dip_m"] / DIP_DEPTH * (dip - light)
-    ratio = truth["speed_kmh"] / kind.speed_kmh
+    ratio = truth["speed_kmh"] / train.speed_kmh
     n = int(mixed.shape[1] / ratio * RATE / SIMULATED_RATE)
     at = np.arange(n) * ratio * SIMULATED_RATE / RATE
     samples, channels = [], []
     for (label, (place, side)), row in zip(positions.items(), mixed):
-        sensor = replace(passage_sensor(label, place, side, kind.track), gain=1.0, cutoff=None)
+        sensor = replace(passage_sensor(label, place, side, train.track), gain=1.0, cutoff=None)
         stretched = ndimage.map_coordinates(row.astype(float), [at], order=3, mode="nearest")
         samples.append(record_signal(sensor, stretched, RATE, rng))
         channels.append(sensor.channel())

@@ -255,8 +255,8 @@ def _is_decided(lowest_rss: list[float], sigma2: float, target_rss: float | None
     """Whether more iterations cannot change a choice of modes.
 
     The sum of squares either no longer falls by ``SEARCH_RSS_STEP`` variances of the noise, or it falls by less than
-    ``SEARCH_RSS_SHARE`` of its distance from ``target_rss``: a sequence that loses at most a tenth of an improvement
-    with each step then never arrives there.
+    ``SEARCH_RSS_SHARE`` of its distance from ``target_rss``: a sequence whose improvements each are at most nine
+    tenths of the one before never arrives there.
 
     >>> rss = [200.0, 120.0, 110.0, 108.0]
     >>> [_is_decided(rss, 1.0, target) for target in (None, 50.0, 0.0)]  # 12 is more than a tenth of 58

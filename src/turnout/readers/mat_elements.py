@@ -57,7 +57,7 @@ def unpacked_file(source: Source) -> bytes:
             if element_type == COMPRESSED:
                 claimed = _claimed_size(element[8:], order)
                 check_size(total := total + claimed, source, f"the variable at byte {position}")
-                element = _unpacked(element[8:], claimed)
+                element = _unpack(element[8:], claimed)
             _check_matrix(element, 0, len(element), order, 0)
         except (ValueError, struct.error, zlib.error) as error:
             problem = f"it is damaged ({error})"
@@ -75,7 +75,7 @@ def _claimed_size(packed: bytes, order: str) -> int:
     return 8 + struct.unpack(f"{order}II", tag)[1]
 
 
-def _unpacked(packed: bytes, size: int) -> bytes:
+def _unpack(packed: bytes, size: int) -> bytes:
     """The element in packed bytes, of which no more than ``size`` are unpacked."""
     unpacker = zlib.decompressobj()
     element = unpacker.decompress(packed, size)

@@ -107,24 +107,24 @@ def find_generation(registry_dir: PathLike | str, as_of: int | str | datetime) -
         If it is not kept, or ``as_of`` is neither a number nor a time.
     """
     root = Path(registry_dir)
-    now, kept = load(root), {}
+    now, generations = load(root), {}
     for number, (path, time) in history(root).items():
         if number <= now.number:
-            kept[number] = path, time
+            generations[number] = path, time
     if isinstance(as_of, int) or str(as_of).strip().isdigit():
         wanted = int(as_of) if isinstance(as_of, int) else int(str(as_of))
     else:
         moment = _moment(as_of)
-        wanted = max((number for number, (_, time) in kept.items() if time <= moment), default=-1)
+        wanted = max((number for number, (_, time) in generations.items() if time <= moment), default=-1)
     if wanted == now.number:
-        return now, kept[wanted][1] if wanted in kept else None
-    if wanted not in kept:
-        listed = ", ".join(f"{number} ({time:%Y-%m-%d %H:%M:%S})" for number, (_, time) in kept.items())
+        return now, generations[wanted][1] if wanted in generations else None
+    if wanted not in generations:
+        listed = ", ".join(f"{number} ({time:%Y-%m-%d %H:%M:%S})" for number, (_, time) in generations.items())
         raise RegistryError(
             f"{root}: no generation of {as_of} is kept. Kept are, with the time of publication in UTC: "
             f"{listed or now.number}. Give one of these numbers, or a later time."
         )
-    return read_generation(kept[wanted][0]), kept[wanted][1]
+    return read_generation(generations[wanted][0]), generations[wanted][1]
 
 
 def _moment(as_of: str | datetime) -> datetime:

@@ -78,8 +78,8 @@ def _time_chart(b: BandComparison) -> str:
 
 
 def _density_chart(b: BandComparison) -> str:
-    shown = b.frequency > 0.0
-    densities = [d[shown] for d in (b.recorded_density, b.simulated_density)]
+    is_positive = b.frequency > 0.0
+    densities = [d[is_positive] for d in (b.recorded_density, b.simulated_density)]
     top = float(max(d.max() for d in densities))
     chart = Chart(
         Axis(b.low, b.high, "frequency [Hz]"),
@@ -88,5 +88,5 @@ def _density_chart(b: BandComparison) -> str:
         width=462,
     )
     for (name, style), density in zip(SERIES, densities):
-        chart.line(b.frequency[shown], np.maximum(density, 1e-6 * top), style, name)
+        chart.line(b.frequency[is_positive], np.maximum(density, 1e-6 * top), style, name)
     return chart.svg()

@@ -159,5 +159,5 @@ def spectrogram(sensor: SensorPassage) -> tuple[np.ndarray, np.ndarray, np.ndarr
     frequency, time, density = signal.spectrogram(
         excerpt, sensor.rate, window="hann", nperseg=length, noverlap=length - min(hop, length), mode="psd"
     )
-    kept = frequency <= MAX_FREQUENCY
-    return 10.0 * np.log10(np.maximum(density[kept], 1e-12)), time + start / sensor.rate, frequency[kept]
+    in_range = frequency <= MAX_FREQUENCY
+    return 10.0 * np.log10(np.maximum(density[in_range], 1e-12)), time + start / sensor.rate, frequency[in_range]

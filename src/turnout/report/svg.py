@@ -485,13 +485,13 @@ class Chart:
 
     def _placed_labels(self) -> str:
         """Labels of the vertical lines, none on another one or across a line."""
-        taken: list[tuple[int, float, float]] = []
+        occupied: list[tuple[int, float, float]] = []
         texts = []
         for label in (one for one in self._labels if one.words):
             boxes = ((side, label.box(row, side)) for row in range(label.row, label.row + 3) for side in (1, -1))
-            side, box = next(((s, b) for s, b in boxes if self._is_free(b, label.px, taken)), (0, (0, 0.0, 0.0)))
+            side, box = next(((s, b) for s, b in boxes if self._is_free(b, label.px, occupied)), (0, (0, 0.0, 0.0)))
             if side:
-                taken.append(box)
+                occupied.append(box)
                 anchor = "start" if side > 0 else "end"
                 where = f'x="{3 * side}" y="{self.top + 9 + 11 * box[0]}" text-anchor="{anchor}"'
             else:
@@ -500,11 +500,11 @@ class Chart:
             texts.append(f'<g data-px="{label.px:.2f}" transform="translate({label.px:.2f} 0)">{words}</g>')
         return "".join(texts)
 
-    def _is_free(self, box: tuple[int, float, float], own: float, taken: Sequence[tuple[int, float, float]]) -> bool:
+    def _is_free(self, box: tuple[int, float, float], own: float, occupied: Sequence[tuple[int, float, float]]) -> bool:
         row, low, high = box
         inside = low >= LEFT and high <= self.width - RIGHT
         crossed = any(low < other.px < high for other in self._labels if other.px != own)
-        return inside and not crossed and not any(r == row and low < b and a < high for r, a, b in taken)
+        return inside and not crossed and not any(r == row and low < b and a < high for r, a, b in occupied)
 
     def span(self, x_low: float, x_high: float, style: str, label: str = "") -> None:
         """Shade an interval of the horizontal axis.

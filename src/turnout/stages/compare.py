@@ -125,7 +125,7 @@ def compare_passage(
     ConfigError
         No train, an unknown type without ``vehicle``, or an unknown sensor.
     """
-    turnout = with_raw(load_configuration(configuration).turnout(turnout_id), raw)
+    turnout = with_raw(load_configuration(configuration).turnout(turnout_id), Path(raw))
     recording, passage = _recorded_train(Path(file), turnout)
     chosen = _chosen_sensors(sensors, passage, sensors_of(turnout), file)
     train = _vehicle(vehicle, load, passage, file)
@@ -133,7 +133,7 @@ def compare_passage(
     model = load_track(str(path), seed, path.parent)
     notes = [f"track file {path}"]
     if calibrate:
-        model = _calibrated(model, path, chosen, turnout, recording, raw, configuration, notes)
+        model = _calibrate(model, path, chosen, turnout, recording, raw, configuration, notes)
     simulated = _simulate(model, train, passage, chosen, recording.rate, seed)
     bands = tuple(band for sensor in chosen for band in _compare_sensor(sensor, recording, passage, *simulated))
     speed = KMH * passage.train_motion.speed
@@ -180,7 +180,7 @@ def _vehicle(name: str | None, load: float, passage: Passage, file: str | Path) 
     return one if units == 1 else load_vehicle(name, load, units=units)
 
 
-def _calibrated(
+def _calibrate(
     model: TurnoutTrack,
     path: Path,
     sensors: Sequence[PassageSensor],
@@ -192,7 +192,7 @@ def _calibrated(
 ) -> TurnoutTrack:
     """The track with each sensor's section fitted to its latest hammer tests before the passage."""
     by_section: dict[str, list[tuple[str, tuple]]] = {}
-    for unit in scan(turnout, raw).units:
+    for unit in scan(turnout, Path(raw)).units:
         if unit.kind == "hammer" and unit.section and unit.campaign:
             by_section.setdefault(unit.section, []).append((unit.campaign, unit.files))
     for section in dict.fromkeys(s.section for s in sensors):

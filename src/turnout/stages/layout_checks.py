@@ -45,7 +45,7 @@ def position_fault(label: str, x: float, track: TurnoutTrack) -> str:
 
 
 def faults_of_tracks(configuration: Configuration) -> Iterator[str]:
-    """Faults of each track file: unreadable, positions off the track, and contradictions with its layout.
+    """Faults of each track file, each once: unreadable, positions off the track, and contradictions with its layout.
 
     Parameters
     ----------
@@ -66,15 +66,16 @@ def faults_of_tracks(configuration: Configuration) -> Iterator[str]:
             yield f"no simulation: {error}"
         except TurnoutError as error:
             yield f"no simulation: {path}: {error}"
-    checked = set()
+    # keys of one layout are in the trees of all turnouts that use it
+    faults: dict[str, None] = {}
     for row in configuration.rows.values():
         tree = configuration.variants[row.id].tree
         stems = (row.id, row.values["layout"])
         files = (configuration.folder / "tracks" / f"{stem}.yaml" for stem in stems)
         file = next((file for file in files if file in tracks), None)
-        if file is not None and (id(tree), file) not in checked:
-            checked.add((id(tree), file))
-            yield from (f"not on the track: {error}" for error in _position_errors(tree, tracks[file], file))
+        if file is not None:
+            faults |= {f"not on the track: {error}": None for error in _position_errors(tree, tracks[file], file)}
+    yield from faults
 
 
 def _position_errors(tree: Branch, track: TurnoutTrack, path: Path) -> Iterator[ConfigError]:

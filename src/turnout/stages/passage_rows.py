@@ -218,7 +218,7 @@ def fit_row(
         "parameters_per_s": _plain(fit.parameters_per_second),
         "chi_squared_failed_share": fit.test.failed_share,
         "along_b_share": _plain(fit.test.along_share),
-        "wheel_times_s": _rounded(fit.times, TIME_DIGITS),
+        "wheel_times_s": _round(fit.times, TIME_DIGITS),
         "wheel_amplitudes": _significant(fit.amplitudes),
         "wheel_amplitudes_se": _significant(fit.amplitudes_se),
     }
@@ -233,7 +233,7 @@ def fit_row(
     return row
 
 
-def _rounded(values: np.ndarray, digits: int) -> list[float] | None:
+def _round(values: np.ndarray, digits: int) -> list[float] | None:
     """Values to some decimals, None if one is not finite: the registry holds whole lists alone."""
     return [float(v) for v in np.round(values, digits)] if np.all(np.isfinite(values)) else None
 

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from turnout.trend.change_point import find_change
+from turnout.trend.change_point import Change, find_change
 from turnout.trend.drift import adjusted_p_values
 from turnout.trend.forecast import N_RECENT, forecast
 from turnout.trend.panel import WHOLE_TURNOUT, timestamps
-from turnout.trend.quantities import is_damping
+from turnout.trend.quantities import RESONANCES, is_damping
 from turnout.trend.residuals import first_epoch
 from turnout.trend.stiffness import COMPONENTS, ResonancePair, chart_numbers, resonance_pair, stiffness_change
 
@@ -173,7 +173,13 @@ def describe_flagged(status: pd.DataFrame, flags: Mapping[int, Flag], settings: 
     is_tested = status["complete"].to_numpy() & (status["section_id"].to_numpy() != WHOLE_TURNOUT) & ~damping
     status["drift_q"] = adjusted_p_values(np.where(is_tested, status["drift_p"].to_numpy(), np.nan))
     flagged = ((status["state"] == "alarm") | (status["drift_q"] <= settings.false_discovery)).to_numpy()
-    descriptions = {i: _describe_chart(flag, settings) for i, flag in flags.items() if flagged[i]}
+    changes = {
+        i: find_change(flag.time, flag.values, flag.autocorrelation, flag.temperature, flag.slope_weight)
+        for i, flag in flags.items()
+        if flagged[i]
+    }
+    of_section = _changes_of_sections(status, changes)
+    descriptions = {i: _describe_chart(flags[i], change, of_section[i], settings) for i, change in changes.items()}
     for i in descriptions.keys() & set(np.flatnonzero(damping)):
         descriptions[i] |= WITHOUT_LIMIT
     for name, dtype in COLUMNS.items():
@@ -186,10 +192,27 @@ def describe_flagged(status: pd.DataFrame, flags: Mapping[int, Flag], settings: 
     return status
 
 
-def _describe_chart(flag: Flag, settings: TrendSettings) -> dict[str, Any]:
+def _changes_of_sections(status: pd.DataFrame, changes: Mapping[int, Change]) -> dict[int, Change]:
+    """The change of each flagged chart, or that of the other resonance of its section where that is clearer.
+
+    A stiffness has one onset, so both rows of a section say the same of it.
+    """
+    members: dict[tuple, list[int]] = {}
+    for i in changes:
+        row = status.iloc[i]
+        name = ("", "", "", row["band"], i) if row["band"] not in RESONANCES else ()
+        members.setdefault((row["turnout_id"], row["section_id"], row["source"], *name), []).append(i)
+
+    def clearness(i: int) -> float:
+        width = changes[i].high - changes[i].low
+        return abs(changes[i].size) / width if width > 0.0 else 0.0
+
+    return {i: changes[max(same, key=clearness)] for same in members.values() for i in same}
+
+
+def _describe_chart(flag: Flag, change: Change, of_section: Change, settings: TrendSettings) -> dict[str, Any]:
     """Columns that describe one flagged chart. The change point is sought in its present epoch only."""
     time, values = flag.time, flag.values
-    change = find_change(time, values, flag.autocorrelation, flag.temperature, flag.slope_weight)
     at = int(np.searchsorted(time, change.since)) if np.isfinite(change.since) else 0
     if flag.opening_campaign:
         direction = max(flag.opening_campaign, key=lambda name: flag.opening_campaign[name])
@@ -197,7 +220,7 @@ def _describe_chart(flag: Flag, settings: TrendSettings) -> dict[str, Any]:
         direction = "down" if values[-N_RECENT:].mean() < values.mean() else "up"
     outlook = forecast(time[at:], values[at:], flag.autocorrelation, settings)
     now = time[-1] if len(time) else np.nan
-    stiffness = stiffness_change(flag.pair, change.shape, change.since)
+    stiffness = stiffness_change(flag.pair, of_section.shape, of_section.since)
     sizes = {
         f"{component}_stiffness{end}_pct": value
         for component in COMPONENTS

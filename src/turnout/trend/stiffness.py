@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 BANDS = ("ballast", "railpad")
 COMPONENTS = ("ballast", "pad")  # the spring that holds most of the energy of each band
-# Half a sleeper over the rail of one sleeper bay: a light wooden sleeper under 60E1 to a long concrete bearer.
-MASS_RATIOS = (1.2, 10.0)
+# Half a sleeper over the rail of one sleeper bay: a light wooden sleeper under 60E1. Heavier ones couple less.
+MIN_MASS_RATIO = 1.2
 REJECTION_PROBABILITY = 0.002  # a single component is ruled out below it: the true one is, in one case of 500
 MAX_DEVIATION = 4.0  # errors between a value and the fit of the change
 NORMAL_QUANTILE = float(stats.norm.isf(0.025))
@@ -54,7 +54,7 @@ class StiffnessChange:
     pad: tuple[float, float, float]
 
 
-def coupling_limits(frequency_ratio: float, mass_ratios: tuple[float, float] = MASS_RATIOS) -> tuple[float, float]:
+def coupling_limits(frequency_ratio: float, min_mass_ratio: float = MIN_MASS_RATIO) -> tuple[float, float]:
     r"""Share of the ballast in the energy of the railpad resonance, and of the pads in that of the ballast resonance.
 
     Rail (mass m) on pads (k_p), sleeper (M) on ballast (k_b), as a chain of two degrees of freedom. Both shares are the
@@ -73,8 +73,8 @@ def coupling_limits(frequency_ratio: float, mass_ratios: tuple[float, float] = M
     ----------
     frequency_ratio : float
         Railpad over ballast resonance.
-    mass_ratios : (float, float)
-        Smallest and largest M / m.
+    min_mass_ratio : float
+        Smallest M / m.
 
     Returns
     -------
@@ -88,12 +88,12 @@ def coupling_limits(frequency_ratio: float, mass_ratios: tuple[float, float] = M
 
     Examples
     --------
-    >>> print(f"{coupling_limits(4.0, (4.0, 4.0))[1]:.3f}")
+    >>> print(f"{coupling_limits(4.0, 4.0)[1]:.3f}")
     0.018
     >>> coupling_limits(1.2)
     (0.0, 0.5)
     """
-    return 0.0, coupling_share(frequency_ratio, mass_ratios[0])
+    return 0.0, coupling_share(frequency_ratio, min_mass_ratio)
 
 
 def coupling_share(frequency_ratio: float, mass_ratio: float) -> float:

@@ -119,7 +119,7 @@ def test_trains_may_have_further_columns(tmp_path):
 def config(tmp_path, repository, monkeypatch):
     import shutil
 
-    shutil.copytree(repository / "config", tmp_path / "config")
+    shutil.copytree(repository / "config", tmp_path / "config", ignore=shutil.ignore_patterns("overrides"))
     monkeypatch.chdir(tmp_path)
     return tmp_path / "config"
 

@@ -91,7 +91,8 @@ def test_a_line_is_drawn_to_scale_with_a_link_for_each_turnout():
 
 
 def test_turnouts_of_one_station_do_not_lie_on_each_other():
-    fleet = [turnout(f"t{k}", 5.0) | {"worst": "ok"} for k in range(4)] + [turnout("far", 9.0) | {"worst": "ok"}]
-    (drawing,) = line_diagrams(fleet)
-    dots = re.findall(r'cx="([\d.]+)" cy="([\d.]+)"', drawing["svg"])
-    assert len(set(dots)) == 5
+    fleet = [turnout(f"t{k}", 5.0 + 0.01 * k) | {"worst": "ok"} for k in range(9)]
+    (drawing,) = line_diagrams([*fleet, turnout("far", 99.0) | {"worst": "ok"}])
+    dots = [(float(x), float(y)) for x, y in re.findall(r'cx="([\d.]+)" cy="([\d.]+)"', drawing["svg"])]
+    assert len(dots) == 10
+    assert min(math.dist(a, b) for k, a in enumerate(dots) for b in dots[:k]) >= 14.0  # two radii

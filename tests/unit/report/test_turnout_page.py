@@ -157,3 +157,13 @@ def test_the_records_of_one_file_that_fail_alike_have_one_row_of_the_quarantine(
     assert text.count("<td>t/ASM_1.h5</td>") == 2
     assert "<td>5 records: 1 to 3, 6, 10</td><td>5 samples are not finite</td>" in text
     assert "<td>byte 81920</td>" in text and "more of" not in text
+
+
+def test_two_channels_of_one_record_have_a_row_each():
+    row = {
+        "turnout_id": "t", "kind": "passage", "path": "t/p.h5", "record": 0, "reason_code": "dead_channel",
+        "remedy": "Check the cable", "n_alike": 2,
+    }  # fmt: skip
+    dead = [row | {"channels": [c], "place": f"channel '{c}'", "found": f"{c} is constant"} for c in ("A7", "A8")]
+    text = page(quarantine=dead)
+    assert "<td>A7 is constant</td>" in text and "<td>A8 is constant</td>" in text and "records:" not in text

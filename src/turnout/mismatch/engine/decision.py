@@ -163,7 +163,7 @@ NAME_RULES: tuple[Rule[NameEvidence], ...] = (
     Rule("size_known_from_below", lambda e: e.score.is_unbounded, "a_or_b",
          "the size of {e.score.family} is known from below alone", PAIRS),
     Rule("free_law_predicts_better", lambda e: e.free_share > THRESHOLDS.max_free_law_share, "unknown",
-         "{e.score.family} misses {e.free_share:.0%} of what a free law explains of held-out recordings", HOW),
+         "{e.score.family} misses {e.free_share:.0%} of what a free law explains", HOW),
     Rule("reaches_control_level", lambda e: e.leaves_nothing, "A", "", HOW),
     Rule("must_reach_control_level", lambda e: e.score.candidate.naming.must_reach_control_level, "unknown",
          "{e.score.family} would leave no excess, and more is left than in intact turnouts", LOCATED),

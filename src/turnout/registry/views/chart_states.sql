@@ -1,6 +1,6 @@
 -- One row per chart: its state at the newest campaign, in the words of the worklist, on the day `asof` at or after it.
 -- confirm now: the newest campaign is far outside and not confirmed. inspect this week: an open alarm, unless its change
--- is below the target, or only follows from the other component (is_coupled). plan: an acknowledged or smaller alarm, or a drift among the discoveries of the fleet
+-- is below the target, or only follows from the other component (is_coupled), whose row is not silenced. plan: an acknowledged or smaller alarm, or a drift among the discoveries of the fleet
 -- (false-discovery rate 10 %), also where the chart is too noisy to see the target within a year. suppressed: somebody
 -- silenced it, with a reason and an end, a day at which it comes back.
 -- needs: chart_status_at, was_said, in_service, is_below_target
@@ -33,7 +33,9 @@ select
         when p.suppressed is not null and s.state in ('alarm', 'confirm_now', 'ok') then 'suppressed'
         when s.state = 'alarm' and p.acknowledged is null
             and not is_below_target(s.band, s.change_low_pct, s.change_high_pct, s.target_pct)
-            and not s.is_coupled
+            and not (s.is_coupled and count(*) filter (
+                s.band in ('ballast', 'railpad') and s.state in ('alarm', 'confirm_now') and p.suppressed is null
+            ) over (partition by s.turnout_id, s.section_id, s.source) > 1)
         then 'inspect this week'
         when s.state = 'alarm' then 'plan'
         when (s.state = 'ok' or s.reason = 'too_noisy') and s.forecast is not null then 'plan'

@@ -2,6 +2,7 @@
 -- end of its interval nearer to none), and what else there is up to `trend.worklist_rows` rows in all, or `most`; n_in_all counts what there would be without an end.
 -- asof at or after the newest measurement uses everything; an earlier one uses only what was measured by then
 -- (change and date then come from the sums alone, and a slow drift is not among the plans).
+-- An alarm that follows from the other resonance of a section refers to its row, if that one is listed.
 -- needs: chart_states, cannot_see, chart_status_at, was_said, in_service, is_below_target, stiffness_words, findings_current
 create or replace macro worklist("asof", most := null) as table
 with then_status as (select * from chart_status_at("asof")),
@@ -127,7 +128,7 @@ everything as (
     select * from alarmed union all by name select * from drifting union all by name select * from silent
     union all by name select * from confirming
 ),
-heard as (
+not_silenced as (
     select e.*
     from everything e
     where in_service(e.turnout_id) and not has_left(e.section_id) and not exists (
@@ -136,6 +137,18 @@ heard as (
             and coalesce(k.band, e.band) = e.band and k.action = 'suppress'
             and was_said(k.at_utc, "asof")
             and coalesce(k.until_utc, timestamp '9999-01-01') > "asof"
+    )
+),
+heard as (
+    select * exclude (has_other) replace (
+        follows_other and has_other as follows_other,
+        case when follows_other and not has_other and acknowledged is null and not is_small
+            then 'inspect this week' else state end as state
+    )
+    from (
+        select *, count(*) filter (band in ('ballast', 'railpad') and (raised_at_utc is not null or state = 'confirm now'))
+            over (partition by turnout_id, section_id, source) > 1 as has_other
+        from not_silenced
     )
 ),
 listed as (
@@ -230,7 +243,8 @@ select
                 / nullif(s.campaigns_per_year, 0)), '')
             || '; '
             || case
-                when f.alarms_per_year >= 2 then printf('%.0f such alarms a year', f.alarms_per_year)
+                when f.alarms_per_year >= 1.5 then printf('%.0f such alarms a year', f.alarms_per_year)
+                when f.alarms_per_year > 2 / 3 then 'one such alarm a year'
                 when f.alarms_per_year >= 0.01 then printf('one such alarm in %.0f years', 1 / f.alarms_per_year)
                 else 'less than one such alarm in 100 years'
             end || ' expected if all ' || f.n_charts || ' charts were intact'
@@ -258,12 +272,12 @@ select
         when h.band = 'all' then 'what was rejected: turnout query "from rejected where turnout_id = ''' || h.turnout_id || '''"'
         when h.state = 'cannot tell' then 'the measurement: more impacts per campaign, rail temperature, sensor'
         when h.section_id = '*' then 'what all sections share: thermometer, hammer and method first, then drainage'
-        when h.changed_component = 'both' and h.direction = 'down' then
-            'voids and wet or fouled ballast under these sleepers; worn, cracked or displaced pads, loose fastenings'
-        when h.component = 'ballast' and h.direction = 'down' then 'voids and wet or fouled ballast under these sleepers'
-        when h.component = 'ballast' then 'frost, or tamping that is not in the events'
-        when h.component = 'railpad' and h.direction = 'down' then 'worn, cracked or displaced pads, loose fastenings'
-        when h.component = 'railpad' then 'pads exchanged or hardened; an exchange that is not in the events'
+        when h.changed_component = 'both' then
+            ballast_advice(h.ballast_stiffness_pct) || '; ' || pad_advice(h.pad_stiffness_pct)
+        when h.component = 'ballast' then
+            ballast_advice(coalesce(h.ballast_stiffness_pct, case h.direction when 'down' then -1 else 1 end))
+        when h.component = 'railpad' then
+            pad_advice(coalesce(h.pad_stiffness_pct, case h.direction when 'down' then -1 else 1 end))
         when h.band = 'ballast_damping' then 'wet, fouled or loose ballast; frost; the position of hammer and sensor'
         when h.band = 'railpad_damping' then 'aged or hardened pads, loose fastenings; the position of hammer and sensor'
         when h.band = 'amplitude' then 'running surface, fastenings and voids; the mounting of the sensor'
@@ -329,7 +343,7 @@ create or replace view worklist as select * from worklist(newest_measurement());
 -- change_low_pct | double | % | 95 % interval, lower end
 -- change_high_pct | double | % | upper end
 -- statistic_ratio | double | | CUSUM over its limit
--- component | varchar | | what to look at: ballast, railpad, both; else the resonance as in band
+-- component | varchar | | what to look at: ballast, railpad, or ballast and railpad; else the resonance as in band
 -- changed_component | varchar | | stiffness that changed: ballast, pad, both, or either (both resonances together do not decide)
 -- ballast_stiffness_pct | double | % | change of the ballast's stiffness since the onset
 -- ballast_stiffness_low_pct | double | % | 95 % interval, lower end
@@ -364,7 +378,7 @@ create or replace view worklist as select * from worklist(newest_measurement());
 -- change_low_pct | double | % | 95 % interval, lower end
 -- change_high_pct | double | % | upper end
 -- statistic_ratio | double | | CUSUM over its limit
--- component | varchar | | what to look at: ballast, railpad, both; else the resonance as in band
+-- component | varchar | | what to look at: ballast, railpad, or ballast and railpad; else the resonance as in band
 -- changed_component | varchar | | stiffness that changed: ballast, pad, both, or either (both resonances together do not decide)
 -- ballast_stiffness_pct | double | % | change of the ballast's stiffness since the onset
 -- ballast_stiffness_low_pct | double | % | 95 % interval, lower end

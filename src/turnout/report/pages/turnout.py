@@ -171,21 +171,21 @@ def _section(
 
 
 def _by_file(quarantine: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """One row for each file and reason, with its records together; the details are those of its first record."""
-    groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
+    """One row for each file, reason and channels, with its records together; the details are those of its first one."""
+    groups: dict[tuple[str, str, str], list[Mapping[str, Any]]] = {}
     for row in sorted(quarantine, key=lambda q: (q["path"], -1 if q["record"] is None else q["record"])):
-        groups.setdefault((row["path"], row["reason_code"]), []).append(row)
+        groups.setdefault((row["path"], row["reason_code"], str(row.get("channels"))), []).append(row)
     return [dict(same[0]) | _records(same) for same in groups.values()]
 
 
 def _records(same: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Words for where and what in rows of one file and reason."""
-    if len(same) == 1:
+    """Words for where and what in rows of one file and reason, if they are of several records."""
+    numbers = sorted({q["record"] + 1 for q in same if q["record"] is not None})
+    if len(numbers) < 2:
         return {}
-    numbers = [q["record"] + 1 for q in same if q["record"] is not None]
     alike = len({q["found"] for q in same}) == 1
-    what = same[0]["found"] if alike else f"{same[0]['found']} (first of {len(same)})"
-    return {"place": f"{count_of(len(same), 'record')}: {number_ranges(numbers)}", "found": what}
+    what = same[0]["found"] if alike else f"{same[0]['found']} (first of {len(numbers)})"
+    return {"place": f"{count_of(len(numbers), 'record')}: {number_ranges(numbers)}", "found": what}
 
 
 def _hidden_counts(quarantine: Sequence[Mapping[str, Any]]) -> list[tuple[str, int]]:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 WIDTH, LEFT, RIGHT = 960, 20, 40  # px
-LANE, LANES = 22, 4  # px, and number of rows in which turnouts close to each other are drawn
+LANE = 22  # px between rows in which turnouts close to each other are drawn
 RADIUS = 7  # px
 URGENT = ("confirm now", "inspect this week", "plan")
 
@@ -93,11 +93,10 @@ def _drawing(line: str, turnouts: Sequence[Mapping[str, Any]]) -> str:
 
 def _lanes(positions: Sequence[float]) -> list[int]:
     """Row of each turnout, 0 on the rail: the first where it lies on no other."""
-    ends = [-1e9] * LANES
+    ends: list[float] = []
     lanes = []
     for x in positions:
-        free = [k for k, end in enumerate(ends) if x - end >= 2 * RADIUS + 2]
-        lane = free[0] if free else min(range(LANES), key=lambda k: ends[k])
-        ends[lane] = x
+        lane = next((k for k, end in enumerate(ends) if x - end >= 2 * RADIUS + 2), len(ends))
+        ends[lane : lane + 1] = [x]
         lanes.append(lane)
     return lanes

@@ -169,7 +169,7 @@
     this.marks = [];
     var plot = this;
     each(this.inner.querySelectorAll("path,circle,rect:not([data-span])"), function (node) {
-      var title = node.querySelector("title"), at = node.tagName === "circle" ? [+node.getAttribute("cx"), +node.getAttribute("cy")] :
+      var title = node.querySelector("title"), at = node.tagName === "circle" ? [+(node.dataset.cx || node.getAttribute("cx")), +(node.dataset.cy || node.getAttribute("cy"))] :
         [+node.getAttribute("x") + node.getAttribute("width") / 2, +node.getAttribute("y")];
       if (node.tagName !== "path") {
         if (title) { plot.marks.push({ node: node, words: title.textContent, at: at }); title.remove(); }
