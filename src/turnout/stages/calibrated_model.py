@@ -70,6 +70,14 @@ OPENED = {
     "sleeper_change": ("sleeper", "pad", "pad_damper", "ballast", "ballast_damper", "wave"),
     "sensor_change": ("gain", "seat"),
 }
+# Parameters that all supports share, which work on the whole turnout makes uncertain, too
+BALLAST, PADS = ("ballast_stiffness", "ballast_damping"), ("pad_stiffness", "pad_damping")
+OPENED_COMMON = {
+    "tamping": BALLAST,
+    "ballast_cleaning": BALLAST,
+    "pad_exchange": PADS,
+    "sleeper_change": ("sleeper_mass", *BALLAST, *PADS),
+}
 EVENT_REACH = 6.0  # m from a section that work there may touch
 
 
@@ -298,6 +306,8 @@ def events_of(turnout: TurnoutConfig, parameters: Sequence[StateParameter]) -> l
             if p.group in OPENED[event.kind]
             and (at is None or p.position is None or abs(p.position - at) <= EVENT_REACH)
         }
+        common = OPENED_COMMON.get(event.kind, ()) if at is None else ()
+        opened |= {p.name: p.sd for p in parameters if p.name.split(" ")[-1] in common}
         events.append(Event(event.at.date().toordinal() / DAYS_PER_YEAR, opened))
     return events
 

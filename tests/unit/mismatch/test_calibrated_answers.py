@@ -1,6 +1,7 @@
 """What the calibrated model answers after each visit, on seeded linear histories with a known change."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from turnout.mismatch.calibrated import GroupInformation, StateParameter, VisitI
 from turnout.mismatch.calibrated.answers import answers_after_visits, change_answer, change_candidates
 from turnout.mismatch.turnout.calibration import dip_directions
 from turnout.mismatch.turnout.rail_roughness import Waves
+from turnout.stages.calibrated_model import events_of
 
 N_SUPPORT, SD, STEP = 5, 0.05, 0.5
 SUPPORTS = [StateParameter(f"ballast@{0.6 * k:.2f}", 0.0, 0.1, 0.03, "ballast", k, 0.6 * k) for k in range(N_SUPPORT)]
@@ -132,3 +134,14 @@ def test_a_dip_of_the_first_day_differs_from_the_file(depth, verdict):
     if depth:
         assert answers["file"].names == ("surface_dip",) and answers["file"].position == pytest.approx(5.03, abs=0.15)
         assert answers["file"].size == pytest.approx(depth, rel=0.35)
+
+
+@pytest.mark.parametrize(("section", "opened"), [("", {"ballast@0.00", "ballast_stiffness"}), ("A", {"ballast@0.00"})])
+def test_work_on_the_whole_turnout_opens_what_all_supports_share(tmp_path, section, opened):
+    rows = f"turnout,section,date,kind,resets,note\nt1,{section},2026-01-10,tamping,,\n"
+    (tmp_path / "events.csv").write_text(rows)
+    sections = [SimpleNamespace(label="A", position=0.6)]
+    turnout = SimpleNamespace(folder=tmp_path, id="t1", sections=sections)
+    common = [StateParameter(n, 0.0, 0.25, 0.0, "track") for n in ("ballast_stiffness", "pad_stiffness")]
+    (event,) = events_of(turnout, [SUPPORTS[0], GAINS[0], *common])
+    assert set(event.opened) == opened

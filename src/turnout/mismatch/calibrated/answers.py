@@ -332,12 +332,14 @@ def evidence_from_first(
     names = [p.name for p in parameters]
     prior, belief = Belief.of_file(parameters), history.belief
     precision = np.linalg.inv(belief.covariance)
-    matrix = precision - np.diag(1.0 / prior.sd**2)
     score = precision @ (belief.mean - prior.mean)  # information vector about the mean of the file
-    directions = np.array([[c.direction.get(name, 0.0) for name in names] for c in candidates])
-    seen = (matrix - matrix @ belief.covariance @ matrix) @ directions.T
-    information = np.sum(directions.T * seen, axis=0)
-    b = directions @ (score - matrix @ belief.covariance @ score)
+    scaled = prior.sd[:, None] * precision * prior.sd - np.eye(len(names))
+    eigenvalues, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
+    informed = eigenvalues > CALIBRATION.min_prior_share  # not what an event made less certain than the file
+    w, vectors = eigenvalues[informed], vectors[:, informed]
+    directions = np.array([[c.direction.get(name, 0.0) for name in names] for c in candidates]) / prior.sd @ vectors
+    information = directions**2 @ (w / (1.0 + w))
+    b = directions @ (vectors.T @ (prior.sd * score) / (1.0 + w))
     variance = np.array([c.sd**2 for c in candidates])
     sizes, sds = b / (information + 1.0 / variance), 1.0 / np.sqrt(information + 1.0 / variance)
     return 0.5 * b * sizes - 0.5 * np.log1p(variance * information), sizes, sds
