@@ -161,21 +161,38 @@ MIN_SPARSE_SIZE = 2**26  # bytes: a smaller file is read anyway
 MAX_HOLES = 1032  # bytes of a file per byte on the disk: the bound of deflate, for file systems that compress
 
 
-def sparse_size(status: os.stat_result) -> int:
+def sparse_size(path: os.PathLike | str, status: os.stat_result) -> int:
     """Bytes on the disk of a file that is nearly empty: a size without content, which takes hours to read.
 
     Parameters
     ----------
+    path : path-like
+        The file.
     status : os.stat_result
         Its status.
 
     Returns
     -------
     int
-        0 or more for a sparse file; -1 for any other, and where the system does not say.
+        0 or more for a sparse file; -1 for any other, and where the system does not say. Some file systems report no
+        blocks for any file: then the file is sparse if it has no data at all.
     """
     on_disk = 512 * getattr(status, "st_blocks", status.st_size)
+    if on_disk == 0 and status.st_size > MIN_SPARSE_SIZE and _has_data(path):
+        return -1
     return on_disk if status.st_size > max(MIN_SPARSE_SIZE, MAX_HOLES * on_disk) else -1
+
+
+def _has_data(path: os.PathLike | str) -> bool:
+    """Whether a file has any data that is no hole; True where the system does not say."""
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.lseek(handle, 0, os.SEEK_DATA)
+    except (AttributeError, OSError) as error:
+        return getattr(error, "errno", None) != errno.ENXIO
+    finally:
+        os.close(handle)
+    return True
 
 
 def read_regular(path: os.PathLike | str) -> bytes:

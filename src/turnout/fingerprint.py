@@ -139,8 +139,14 @@ NEW = ""  # an entry that says that others are not in the file yet
 
 def _key(name: str, path: Path, source: bytes) -> str:
     """Hash of all that the digest of a module depends on; equal bytes need not be parsed again."""
-    parts = (name, path.name, sys.version, _module_names(ROOT), _data_digest(path.parent))
-    return hashlib.sha256("\0".join(parts).encode() + source).hexdigest()
+    facts = (name, path.name, sys.version, _own_digest(), _module_names(ROOT), _data_digest(path.parent))
+    return hashlib.sha256("\0".join(facts).encode() + source).hexdigest()
+
+
+@cache
+def _own_digest() -> str:
+    """Hash of this module: another rule gives other digests."""
+    return hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
 
 
 @cache

@@ -272,7 +272,7 @@ def load(path: PathLike | str, root: PathLike | str) -> Source:
         status = resolved.stat()
         if kind := special_kind(status.st_mode):
             raise ReadError(name, "the path", f"it is a {kind}", "Put a file there, or remove it", reason="no_file")
-        if (on_disk := sparse_size(status)) >= 0:
+        if (on_disk := sparse_size(resolved, status)) >= 0:
             problem = f"it has a size of {status.st_size} bytes, of which {on_disk} are on the disk"
             raise ReadError(name, "the file", problem, COPY_AGAIN, reason="claims_too_much")
         with resolved.open("rb") as file:

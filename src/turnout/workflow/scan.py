@@ -69,7 +69,7 @@ class RawFolder:
         if kind := special_kind(status.st_mode):
             self._leave_out(inside, "file", f"is a {kind}", "Put a file there, or remove it", "no_file")
             return None
-        if (on_disk := sparse_size(status)) >= 0:
+        if (on_disk := sparse_size(entry.path, status)) >= 0:
             finding = f"has a size of {status.st_size} bytes, of which {on_disk} are on the disk"
             self._leave_out(inside, "file", finding, "Copy it again from the logger", "claims_too_much")
             return None

@@ -7,11 +7,13 @@ import re
 import socket
 import stat
 from datetime import datetime
+from types import SimpleNamespace
 
 import pytest
 from length_fleet import Fleet, length
 
 from turnout.errors import DATA_ERRNOS, ReadError, is_infrastructure
+from turnout.files import sparse_size
 from turnout.readers import read
 from turnout.records import RawDescription
 from turnout.workflow import tasks
@@ -293,3 +295,13 @@ def test_a_file_that_changes_while_it_is_computed_is_computed_again_though_it_wa
     os.utime(path, ns=times)
     assert fleet.run().processed == 1
     assert fleet.lengths()[UNIT] == [len(content)] and fleet.run().processed == 0
+
+
+def test_a_file_system_that_reports_no_blocks_has_files_with_content(tmp_path):
+    """Several network file systems report 0 blocks for every file."""
+    full, empty = tmp_path / "full.csv", tmp_path / "empty.csv"
+    full.write_bytes(bytes(2**20))
+    empty.touch()
+    os.truncate(empty, 2**27)
+    no_blocks = SimpleNamespace(st_size=2**27, st_blocks=0)
+    assert sparse_size(full, no_blocks) == -1 and sparse_size(empty, no_blocks) == 0
