@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from turnout.config.settings.receptance import ReceptanceSettings
     from turnout.hammer_test.segmentation import Cut
+    from turnout.records import Impact
 
 # Least number of impacts from which the spread of a test is estimated.
 MIN_IMPACTS = 5
@@ -189,12 +190,12 @@ def _judge_gain(cuts: Sequence[Cut], force: np.ndarray, acceleration: np.ndarray
                 cut.notes.append(Rejection("odd_one_out", float(gain[k]), float(bound), detail))
 
 
-def spectra_of(cuts: Sequence[Cut], settings: ReceptanceSettings) -> tuple[np.ndarray, np.ndarray]:
+def spectra_of(cuts: Sequence[Cut | Impact], settings: ReceptanceSettings) -> tuple[np.ndarray, np.ndarray]:
     """Spectra of impacts at the lines at which they are compared.
 
     Parameters
     ----------
-    cuts : sequence of Cut
+    cuts : sequence of Cut or Impact
         Impacts of one sampling rate.
     settings : ReceptanceSettings
         Limits of the compared frequencies.

@@ -6,6 +6,7 @@ limit, and bias their mean. A test with spare impacts can do without it.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from turnout.config.settings.receptance import ReceptanceSettings
-    from turnout.hammer_test.segmentation import Cut
+    from turnout.records import Impact
 
 
 def best_subset(coherence: np.ndarray, n: int) -> list[int]:
@@ -60,25 +61,36 @@ def best_subset(coherence: np.ndarray, n: int) -> list[int]:
         selected = sorted({*selected, added} - {removed})
 
 
-def select_best(cuts: Sequence[Cut], settings: ReceptanceSettings) -> None:
-    """Reject the impacts of one test that are not among the ``best_impacts`` that agree best.
+def select_best(impacts: Sequence[Impact], settings: ReceptanceSettings) -> tuple[Impact, ...]:
+    """Reject the accepted impacts of one test that are not among the ``best_impacts`` that agree best.
 
     Parameters
     ----------
-    cuts : sequence of Cut
-        The impacts of one test with one sampling rate; the result is entered in them.
+    impacts : sequence of Impact
+        The impacts of one test. Those of each sampling rate are compared with each other.
     settings : ReceptanceSettings
-        With ``best_impacts``; 0 uses all that are accepted.
+        With ``best_impacts``, raised to ``minimum_impacts``; 0 uses all that are accepted.
+
+    Returns
+    -------
+    tuple of Impact
+        In the order given, those that are not selected with a rejection.
     """
-    candidates = [c for c in cuts if not c.rejections]
-    n = settings.best_impacts
-    if not n or len(candidates) <= n:
-        return
-    coherence = mean_pairwise_coherence(*spectra_of(candidates, settings))
-    selected = best_subset(coherence, n)
-    agreement = [float(np.mean(np.delete(coherence[i, selected], selected.index(i)))) for i in selected]
-    for k, cut in enumerate(candidates):
-        if k not in selected:
-            value = float(np.mean(coherence[k, selected]))
-            detail = f"its mean coherence with the {n} selected is {value:.4f}, theirs at least {min(agreement):.4f}"
-            cut.rejections.append(Rejection("not_selected", value, min(agreement), detail))
+    selected_impacts = list(impacts)
+    n = max(settings.best_impacts, settings.minimum_impacts) if settings.best_impacts else len(impacts)
+    for rate in {impact.rate for impact in impacts}:
+        index = [k for k, impact in enumerate(impacts) if impact.accepted and impact.rate == rate]
+        if len(index) <= n:
+            continue
+        coherence = mean_pairwise_coherence(*spectra_of([impacts[k] for k in index], settings))
+        selected = best_subset(coherence, n)
+        agreement = [float(np.mean(np.delete(coherence[i, selected], selected.index(i)))) for i in selected]
+        for i, k in enumerate(index):
+            if i not in selected:
+                value = float(np.mean(coherence[i, selected]))
+                detail = (
+                    f"its mean coherence with the {n} selected is {value:.4f}, theirs at least {min(agreement):.4f}"
+                )
+                rejection = Rejection("not_selected", value, min(agreement), detail)
+                selected_impacts[k] = replace(impacts[k], rejections=(*impacts[k].rejections, rejection))
+    return tuple(selected_impacts)

@@ -78,10 +78,8 @@ def find_impacts(
     judge_against_median(candidates, settings)
     judge_tops(candidates, settings.deviation)
     for rate in sorted({c.rate for c in candidates}):
-        of_rate = [c for c in candidates if c.rate == rate]
-        judge_agreement(of_rate, settings)
-        select_best(of_rate, settings)
-    return tuple(_impact(c) for c in cuts)
+        judge_agreement([c for c in candidates if c.rate == rate], settings)
+    return select_best([_impact(c) for c in cuts], settings)
 
 
 def _band_edges(cuts: Sequence[Cut], pulses: list[np.ndarray]) -> np.ndarray:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.constants import MAD_TO_SD
+from turnout.hammer_test.best_subset import select_best
 from turnout.hammer_test.impacts import find_impacts
 from turnout.records import Rejection
 
@@ -60,11 +61,12 @@ def find_track_impacts(
     KeyError
         A recording has no channel of that name.
     """
-    impacts = find_impacts(recordings, force, response, settings)
+    impacts = find_impacts(recordings, force, response, replace(settings, best_impacts=0))
     impacts = judge_causality(impacts, response)
     impacts = judge_saturation(impacts, response)
     impacts = judge_partial_saturation(impacts, response)
-    return judge_response_scale(impacts, response) if settings.softest_blow > 0.0 else impacts
+    impacts = judge_response_scale(impacts, response) if settings.softest_blow > 0.0 else impacts
+    return select_best(impacts, settings)  # among those that no other test has rejected
 
 
 def judge_response_scale(impacts: Sequence[Impact], response: str) -> tuple[Impact, ...]:

@@ -100,7 +100,7 @@ class ReceptanceSettings:
         minimum=0.005, maximum=1.0,
     )  # fmt: skip
     best_impacts: int = setting(
-        0, "", "of more accepted impacts, this many that agree best by their pairwise coherence; 0 uses all",
+        0, "", "of more accepted impacts, this many (at least minimum_impacts) that agree best; 0 uses all",
         minimum=0, maximum=1000,
     )  # fmt: skip
     minimum_impacts: int = setting(
