@@ -292,21 +292,27 @@ class _Run:
     def _compute_readable(self, task: Task, fault: str) -> Computed | None:
         """Result of a unit of which files cannot be read, with a quarantine row for each of them.
 
-        The rows of its earlier files stay. A new unit is computed from its readable files. Its stamp is empty, so that
-        the next run tries it again. None if the state has this result.
+        The rows of a result of all its files stay, under the version of the program that computed them, until all
+        files can be read again. A unit without such a result is computed from its readable files. Its stamp is empty,
+        so that the next run tries it again. None if the state has this result.
         """
         name, unit = _name(task), task.planned.unit
         contents, faults = readable_contents(task.planned, self.raw_root)
         key = f"{UNREADABLE} {digest([key_of(task.planned, contents), sorted(faults)])}"
         entry = self.state.units.get(name)
-        if entry and (entry.key, entry.algo) == (key, self.stage.algo):
+        # a result without some of the files has contents only if its rows are those of all files, kept from before
+        is_whole = bool(entry and (not entry.key.startswith(UNREADABLE) or entry.contents))
+        is_kept = bool(entry and entry.status in WITH_ROWS and is_whole)
+        algo = entry.algo if entry and is_kept else self.stage.algo
+        if entry and (entry.key, entry.algo) == (key, algo):
             return None
         excluded = {*faults, *task.copied}
         readable = replace(unit, files=tuple(file for file in unit.files if file[0] not in excluded))
         compute = self.compute if faults and readable.files else _no_rows
         kept_contents = ""
-        if entry and entry.status in WITH_ROWS and not entry.key.startswith(UNREADABLE):
+        if entry and is_kept:
             tables = self._tables_of(name, entry.batch)
+            tables["quarantine"] = [q for q in tables.get("quarantine", ()) if q["reason_code"] != "read_fault"]
             compute, kept_contents = (lambda *_, **__: tables), entry.contents
         faults = faults or {"": fault.replace(f"{self.raw_root}{os.sep}", "")}
 
@@ -315,7 +321,6 @@ class _Run:
             return {**tables, "quarantine": [*tables.get("quarantine", ()), *unreadable_rows(unit, faults)]}
 
         extra = {"context": task.context} if self.stage.context else {}
-        algo = self.stage.algo
         try:
             result = compute_guarded(with_rows, readable, task.turnout, self.raw_root, key, algo, self.strict, **extra)
         except (OSError, MemoryError):
