@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from turnout.mismatch.calibrated import GroupInformation, StateParameter, VisitInformation
+from turnout.mismatch.calibrated import GroupInformation, OnsetEvidence, StateParameter, VisitInformation, answers
 from turnout.mismatch.calibrated.answers import answers_after_visits, change_answer, change_candidates
 from turnout.mismatch.turnout.calibration import dip_directions
 from turnout.mismatch.turnout.rail_roughness import Waves
@@ -70,6 +70,56 @@ def test_softer_ballast_that_trains_feel_less_is_a_hanging_sleeper():
     ]
     answer = change_answer(PARAMETERS, only_trains, [], CANDIDATES, 12.0, 6.0)
     assert answer.verdict == "a_or_b" and answer.names == ("local_ballast", "hanging_sleeper")
+
+
+@pytest.mark.parametrize("kind", [0, 1])
+@pytest.mark.parametrize("seed", range(5))
+def test_impacts_alone_or_trains_alone_do_not_tell_a_gap_from_soft_ballast(kind, seed):
+    visits = histories(np.random.default_rng(seed), 4, step("ballast@1.20", -1.6, 2))
+    alone = [replace(v, groups=v.groups[kind : kind + 1]) for v in visits]
+    before = [replace(v, groups=v.groups[: 2 - (v.time >= 2 * STEP)]) for v in visits]  # trains before the change only
+    for chosen in (alone, before):
+        answer = change_answer(PARAMETERS, chosen, [], CANDIDATES, 12.0, 6.0)
+        assert (answer.verdict, answer.names) == ("a_or_b", ("local_ballast", "hanging_sleeper"))
+
+
+@pytest.mark.parametrize(("trains_feel", "name"), [(1.0, "local_ballast"), (0.0, "hanging_sleeper")])
+def test_impacts_and_trains_tell_a_gap_from_soft_ballast(trains_feel, name):
+    answers = [
+        last_answers(histories(np.random.default_rng(s), 4, step("ballast@1.20", -1.6, 2), trains_feel))["change"]
+        for s in range(10)
+    ]
+    assert [a.names for a in answers] == [(name,)] * 10
+
+
+def test_trains_that_say_little_of_the_support_do_not_decide():
+    visits = []
+    for v in histories(np.random.default_rng(1), 4, step("ballast@1.20", -1.6, 2)):
+        trains = replace(v.groups[1], matrix=1e-6 * v.groups[1].matrix, vector=1e-6 * v.groups[1].vector)
+        visits.append(replace(v, groups=(v.groups[0], trains)))
+    assert change_answer(PARAMETERS, visits, [], CANDIDATES, 12.0, 6.0).verdict == "a_or_b"
+
+
+def test_a_rival_just_below_the_threshold_counts(monkeypatch):
+    """Evidence of 12.3 and 11.9 nats beyond the price of the candidates: the threshold is for the best alone."""
+    price = float(np.log(len(CANDIDATES)))
+    by_name = {c.name: c for c in CANDIDATES if not c.grows}
+
+    def evidence(name, gain, size):
+        gains, sizes = np.array([gain + price]), np.array([size])
+        return OnsetEvidence(by_name[name], ("v0", "v1"), np.array([0.0, 0.5]), gains, sizes, np.array([0.01]))
+
+    def answer(rival):
+        pair = [evidence("gain_A1", 12.3, 0.3), evidence("ballast@1.20", rival, 0.5)]
+        monkeypatch.setattr(answers, "compare_onsets", lambda *a: sorted(pair, key=lambda e: -e.gain))
+        monkeypatch.setattr(answers, "evidence_from_first", lambda p, h, c: (np.zeros(len(c)),) * 3)
+        found = change_answer(PARAMETERS, visits, [], CANDIDATES, 12.0, 6.0)
+        return found.verdict, found.names
+
+    visits = histories(np.random.default_rng(1), 2, step("gain_A1", 0.0, 1))
+    assert answer(11.9) == ("a_or_b", ("sensor_gain", "local_ballast"))
+    assert answer(6.2) == ("named", ("sensor_gain",))
+    assert answer(12.4) == ("a_or_b", ("local_ballast", "sensor_gain"))
 
 
 def test_a_sensor_whose_gain_changed_is_named_with_its_channel_position():

@@ -16,7 +16,7 @@ from turnout.mismatch.calibrated.change import ChangeEffect, OnsetEvidence, comp
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.file_comparison import Deviation, deviations_from_file
 from turnout.mismatch.calibrated.history import Event, History, estimate_history
-from turnout.mismatch.calibrated.information import VisitInformation
+from turnout.mismatch.calibrated.information import GroupInformation, VisitInformation
 
 CHANGE, FILE = QUESTIONS = ("change", "file")
 # Group of a parameter -> the effect of the library that changes it
@@ -99,7 +99,7 @@ def answers_after_visits(
     threshold : float
         Evidence that a name needs. [nats]
     margin : float
-        A rival of another name within it makes the answer "a or b". [nats]
+        A rival of another name within it makes the answer "a or b", also one below the threshold. [nats]
     first : int
         Number of the first visit after which an answer is given, from 1.
 
@@ -159,16 +159,17 @@ def change_answer(
     evidence = compare_onsets(history, candidates)
     price = float(np.log(max(len(candidates), 1)))
     by_name = {p.name: p for p in parameters}
-    material = [e for e in evidence if e.gain - price >= threshold and _is_material(e, by_name)]
+    least = threshold + price
+    material = [e for e in evidence if e.gain > least - margin and _is_material(e, by_name)]
     if material:  # the belief takes some visits to follow what was there from the first
         from_first, *_ = evidence_from_first(parameters, history, [e.effect for e in material])
         material = [e for e, gain in zip(material, from_first) if e.gain >= gain]
-    if not material:
+    if not material or material[0].gain < least:
         return _answer_without_name(history, visit, by_name)
     best = material[0]
     names = [_name(best, by_name)]
     if names == ["local_ballast"] and best.size[0] < 0.0:
-        names = _supported_names(parameters, visits, events, best)
+        names = _supported_names(parameters, visits, events, best, margin)
     rivals = [_name(e, by_name) for e in material if e.gain > best.gain - margin]
     names += [name for name in dict.fromkeys(rivals) if name not in names and name != _name(best, by_name)]
     parameter = by_name.get(best.effect.name)
@@ -217,20 +218,42 @@ def _supported_names(
     visits: Sequence[VisitInformation],
     events: Sequence[Event],
     best: OnsetEvidence,
+    margin: float,
 ) -> list[str]:
-    """Names of softer ballast: a gap is felt by impacts on the unloaded track, and less by trains that close it."""
-    sizes = []
-    for is_impact in (True, False):
-        chosen = [replace(v, groups=tuple(g for g in v.groups if (IMPACTS in g.group) == is_impact)) for v in visits]
-        history = estimate_history(parameters, chosen, events, repeats_between_visits=False, accepted=None)
-        sizes.append(compare_onsets(history, [best.effect])[0].size)
-    (by_impacts, impacts_sd), (by_trains, trains_sd) = sizes
-    difference, sd = by_trains - by_impacts, float(np.hypot(impacts_sd, trains_sd))
-    if difference > CALIBRATION.finding_sds * sd:
-        return ["hanging_sleeper"]
-    if abs(difference) <= CALIBRATION.finding_sds * sd and by_impacts < -CALIBRATION.finding_sds * sd:
-        return ["local_ballast"]
-    return ["local_ballast", "hanging_sleeper"]
+    """Names of softer ballast: a gap is felt by impacts on the unloaded track, and less by trains that close it.
+
+    In one fit trains have a size of their own: that of impacts, or the shares of it that a gap leaves, which are
+    equally probable before. The prior of the size is so wide that it favours none: without trains, or without impacts,
+    the evidence decides nothing.
+    """
+    (name,) = best.effect.direction
+    felt = next(p for p in parameters if p.name == name)
+    offset = replace(felt, name=f"{name} as trains feel it", mean=0.0)
+    opened = [replace(e, opened={**e.opened, offset.name: e.opened[name]}) if name in e.opened else e for e in events]
+    split = [replace(v, groups=tuple(_with_offset(g, name, offset.name) for g in v.groups)) for v in visits]
+    history = estimate_history([*parameters, offset], split, opened, repeats_between_visits=False, accepted=None)
+    sd = CALIBRATION.gap_size_sds * max(best.effect.sd, abs(best.size[0]))
+    effects = [
+        ChangeEffect(f"{share:g}", {name: 1.0, offset.name: share - 1.0}, sd, best.effect.grows)
+        for share in (1.0, *CALIBRATION.gap_shares)
+    ]
+    gains = {e.effect.name: e.gain for e in compare_onsets(history, effects)}
+    equal, *of_gaps = (gains[e.name] for e in effects)
+    difference = float(np.logaddexp.reduce(of_gaps)) - float(np.log(len(of_gaps))) - equal
+    if abs(difference) < margin:
+        return ["local_ballast", "hanging_sleeper"]
+    return ["hanging_sleeper"] if difference > 0.0 else ["local_ballast"]
+
+
+def _with_offset(group: GroupInformation, name: str, offset: str) -> GroupInformation:
+    """Information of trains on the sum of a parameter and its ``offset``; that of impacts as it is."""
+    if IMPACTS in group.group or name not in group.names:
+        return group
+    k, n = group.names.index(name), len(group.names)
+    terms = np.vstack([np.eye(n), np.eye(n)[k]])  # (n + 1, n)
+    return replace(
+        group, names=(*group.names, offset), matrix=terms @ group.matrix @ terms.T, vector=terms @ group.vector
+    )  # fmt: skip
 
 
 def _answer_without_name(history: History, visit: str, by_name: Mapping[str, StateParameter]) -> ModelAnswer:

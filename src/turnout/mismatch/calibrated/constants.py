@@ -38,6 +38,12 @@ class CalibrationConstants:
     dip_step: float = threshold(
         0.02, "m", "step of the surface from which the waves of a dip are computed", "numerical"
     )
+    gap_shares: tuple[float, ...] = threshold(
+        (0.0, 0.25, 0.5), "share", "of the softening under impacts that trains still feel above a gap", PAGE
+    )
+    gap_size_sds: float = threshold(
+        10.0, "prior sd or size", "of a softening whose share under trains is asked: wide, to favour no share", PAGE
+    )
     finding_sds: float = threshold(3.0, "standard deviations", "beyond which a value differs from the file", PAGE)
     min_prior_share: float = threshold(
         1e-9, "share of the prior variance", "of a mean over components, below which data say nothing", "numerical"
