@@ -262,11 +262,11 @@ def test_the_list_in_words_says_what_it_rests_on_and_what_it_leaves_out(tmp_path
     pages = ["report", "--registry", str(tmp_path), "--pages", str(tmp_path / "pages")]
     assert main(pages) == 0
     assert f"turnout report --day {then} shows the pages of then." in capsys.readouterr().out
-    assert "<b>26</b>not measured" in (tmp_path / "pages/index.html").read_text()
+    assert ", 26 not measured" in (tmp_path / "pages/index.html").read_text()
     assert main([*pages, "--day", then]) == 0
     assert f"As of {then}." in capsys.readouterr().out
     index = (tmp_path / "pages/index.html").read_text()
-    assert "<b>9</b>not measured" in index and f"as of {then}" in index
+    assert ", 9 not measured" in index and f"as of {then}" in index
     assert main([*pages, "--day", "yesterday"]) == 2
     assert "--day, date: 'yesterday'. Write YYYY-MM-DD." in capsys.readouterr().err
     monkeypatch.setattr("turnout.registry.as_of.list_day", lambda connection: f"timestamp '{newest}'")
