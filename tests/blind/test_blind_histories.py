@@ -15,6 +15,7 @@ from turnout_blind.effect import load_effects
 from turnout_blind.history import HistoryPlan, make_history, parameters_at, plan_histories
 from turnout_blind.make import make_set
 from turnout_blind.score.histories import history_figures, judge_history
+from turnout_blind.score.metrics import Rate, Share
 
 EFFECTS = load_effects()
 
@@ -132,8 +133,8 @@ def test_wrong_names_false_alarms_and_maintenance_are_counted():
     early = judge_history(
         {**TRUTH, "maintenance": [{"day": "2022-05-01", "kind": "tamping"}]}, rows(NOTHING, PAD, PAD, PAD)
     )
-    assert early.alarms == {"change": "2022-10-12"} and early.maintenance_alarms == 1
-    assert early.years == pytest.approx((date(2023, 6, 13) - date(2022, 2, 6)).days / 365.25)
+    assert early.alarms == {"change": ("2022-10-12",)} and early.maintenance_alarms == 1
+    assert early.years == pytest.approx((date(2022, 10, 12) - date(2022, 2, 6)).days / 365.25)
     gain = {**PAD, "term": "sensor_gain", "channel": "A1"}
     wrong = judge_history(TRUTH, rows(NOTHING, NOTHING, gain, gain))
     assert wrong.wrong_names == ("sensor_gain",) and wrong.named == ""
@@ -141,11 +142,42 @@ def test_wrong_names_false_alarms_and_maintenance_are_counted():
     assert outside.onset_covered is False
     none = judge_history(TRUTH, None)
     assert not none.answered and none.named == "" and none.last_answer == "no answer"
-    shares = {f.name: (f.k, f.n) for f in history_figures([early, wrong, none])}
+    listed = history_figures([early, wrong, none])
+    shares = {f.name: (f.k, f.n) for f in listed if isinstance(f, Share)}
     assert shares["clear effects named within two visits"] == (1, 3)
-    assert shares["recorded maintenance called a defect"] == (1, 3)
+    assert shares["sites with recorded maintenance called a defect"] == (1, 1)
     assert shares["sites with a wrong name"] == (1, 3)
-    assert shares["false alarms of a change, per site-year"] == (1, 4)
+    (rate,) = (f for f in listed if isinstance(f, Rate))
+    assert (rate.k, rate.years) == (1, pytest.approx(3 * 248 / 365.25))
+
+
+def test_each_false_alarm_counts_when_it_begins_and_those_after_work_are_found():
+    """Four visits without an effect: two alarms of a pad are one, a gain after it and work before are a second."""
+    gain = {**PAD, "term": "sensor_gain", "channel": "A1"}
+    intact = {**TRUTH, "pattern": "none", "effects": [], "severities": [0.0] * 4, "onset": None}
+    work = [{"day": "2023-07-01", "kind": "tamping"}]
+    result = judge_history({**intact, "maintenance": work}, rows(NOTHING, PAD, PAD, gain))
+    assert result.alarms == {"change": ("2022-10-12", "2024-01-29")}
+    assert (result.n_works, result.maintenance_alarms) == (1, 1)
+    again = judge_history(intact, rows(PAD, NOTHING, PAD, PAD))
+    assert again.alarms == {"change": ("2022-02-06", "2023-06-13")} and again.n_works == 0
+    unknown = {**NOTHING, "verdict": "unknown"}
+    assert judge_history(intact, rows(unknown, unknown, gain, gain)).alarms["change"] == ("2022-02-06", "2023-06-13")
+    figures = {f.name: f for f in history_figures([result, again])}
+    rate, worked = figures["false alarms of a change, per site-year"], "sites with recorded maintenance called a defect"
+    assert (rate.k, rate.years) == (4, pytest.approx(2 * 722 / 365.25)) and not rate.is_met
+    assert rate.interval == pytest.approx((100 * 1.0899 / rate.years, 100 * 10.2416 / rate.years), rel=1e-4)  # Garwood
+    assert (figures[worked].k, figures[worked].n) == (1, 1)
+
+
+def test_nothing_is_exposed_at_a_visit_with_the_effect():
+    """The effect is present but not clear from the second visit on: a wrong name then is no false alarm."""
+    truth = {**TRUTH, "severities": [0.0, 0.3, 1.0, 1.0], "maintenance": [{"day": "2022-10-12", "kind": "tamping"}]}
+    result = judge_history(truth, rows(NOTHING, {**PAD, "term": "sensor_gain", "channel": "A1"}, PAD, PAD))
+    assert not result.alarms and result.years == 0.0 and result.n_works == 0
+    assert result.wrong_names == ("sensor_gain",)
+    (rate,) = (f for f in history_figures([result]) if isinstance(f, Rate))
+    assert rate.is_met is None
 
 
 def test_an_effect_of_the_first_day_is_asked_of_the_file():
@@ -156,7 +188,7 @@ def test_an_effect_of_the_first_day_is_asked_of_the_file():
     change = judge_history(
         truth, [{**PAD, "visit": TRUTH["visits"][1], "question": "change", "term": "sensor_gain", "channel": "A1"}]
     )
-    assert change.alarms == {"change": "2022-10-12"}
+    assert change.alarms == {"change": ("2022-10-12",)}
 
 
 def test_times_of_campaigns_and_passages_of_single_cases_stay(tmp_path):

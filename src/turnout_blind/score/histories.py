@@ -8,9 +8,8 @@ from datetime import date
 from typing import TYPE_CHECKING, Any
 
 from turnout_blind.reveal import read_revealed
-from turnout_blind.score.intervals import clopper_pearson
 from turnout_blind.score.matching import MAX_POSITION_ERROR, MIN_CLEAR_GAIN, gain_of
-from turnout_blind.score.metrics import Share
+from turnout_blind.score.metrics import Rate, Share
 from turnout_blind.score.names import right_names
 
 if TYPE_CHECKING:
@@ -29,9 +28,10 @@ class HistoryResult:
     ``clear_visit`` is the first visit at which the effect is clear, None if it never is. ``named`` is "named", "a_or_b"
     or "" within ``MAX_VISITS_LATE`` visits, ``is_located`` whether the position or sensor of that answer is right.
     ``onset_covered``: whether the interval of the last answer contains the onset, None without one. ``wrong_names`` are
-    names of answers with no right one among them. ``alarms`` are the first visits of false alarms by question,
-    ``maintenance_alarms`` the number of those after recorded work since the visit before. ``years`` is the time from
-    the first visit to the last in which a change alarm is false.
+    names of answers with no right one among them. ``alarms`` are the visits at which a false alarm begins, by question;
+    one that is repeated at the next visit is the same. ``n_works`` counts the visits without the effect after recorded
+    work, ``maintenance_alarms`` those of them at which a false alarm of a change begins. ``years`` is the time from the
+    first visit to the last in which a change alarm is false.
     """
 
     case: str
@@ -44,7 +44,8 @@ class HistoryResult:
     is_located: bool
     onset_covered: bool | None
     wrong_names: tuple[str, ...]
-    alarms: Mapping[str, str]
+    alarms: Mapping[str, tuple[str, ...]]
+    n_works: int
     maintenance_alarms: int
     years: float
     last_answer: str
@@ -79,13 +80,13 @@ def judge_history(truth: Mapping[str, Any], rows: Sequence[Mapping[str, Any]] | 
     best = next((r for r in right if r["verdict"] == "named"), right[0] if right else None)
     restated = [r for r in stated if r["visit"] in present and _restates(r, question, effect, names)]
     false = [r for r in stated if r not in relevant and r not in restated]
-    alarms: dict[str, str] = {}
-    for row in false:
-        alarms.setdefault(row["question"], row["visit"])
+    alarms = _episodes(false, visits)
     onset_row = next((r for r in reversed(relevant) if set(_names(r)) & set(names) and r.get("onset_after")), None)
     wrong = [_names(r)[0] for r in stated if _names(r) and not (set(_names(r)) & set(names) and r in relevant)]
     wrong = [n for n in wrong if not (effect and n in names)]
-    end = next(iter(clear or present), visits[-1]) if pattern in ("step", "growth") else visits[-1]
+    # at a visit with the effect no row of this question is a false alarm: nothing is exposed after the last one without
+    absent = visits[: visits.index(present[0])] if present and question == "change" else visits
+    works = [v for v in absent if _has_work(truth, visits, v)]
     last = next((r for r in reversed(rows or ()) if r["question"] == (question or "change")), None)
     return HistoryResult(
         truth["case"], pattern, truth["panel"], effect["kind"] if effect else "", rows is not None,
@@ -93,10 +94,26 @@ def judge_history(truth: Mapping[str, Any], rows: Sequence[Mapping[str, Any]] | 
         best is not None and effect is not None and _is_located(effect, best),
         None if onset_row is None or truth["onset"] is None
         else onset_row["onset_after"] <= truth["onset"] <= onset_row["onset_by"],
-        tuple(dict.fromkeys(wrong)), alarms,
-        sum(_has_work(truth, visits, visit) for question, visit in alarms.items() if question == "change"),
-        (date.fromisoformat(end) - date.fromisoformat(visits[0])).days / DAYS_PER_YEAR, _words(last),
+        tuple(dict.fromkeys(wrong)), alarms, len(works), len(set(works) & set(alarms.get("change", ()))),
+        (date.fromisoformat(absent[-1]) - date.fromisoformat(visits[0])).days / DAYS_PER_YEAR if absent else 0.0,
+        _words(last),
     )  # fmt: skip
+
+
+def _episodes(false: Sequence[Mapping[str, Any]], visits: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Visits at which a false alarm begins, by question: the visit before has none, or one of other names."""
+    alarms: dict[str, tuple[str, ...]] = {}
+    for question in dict.fromkeys(r["question"] for r in false):
+        stated = {r["visit"]: (r["verdict"], set(_names(r))) for r in false if r["question"] == question}
+        before = dict(zip(visits[1:], visits))
+        begins = [v for v in visits if v in stated and not _is_repeated(stated[v], stated.get(before.get(v, "")))]
+        alarms[question] = tuple(begins)
+    return alarms
+
+
+def _is_repeated(now: tuple[str, set[str]], before: tuple[str, set[str]] | None) -> bool:
+    """Whether an alarm is that of the visit before: a common name, or no name in both."""
+    return before is not None and bool(now[1] & before[1] or not (now[1] or before[1]))
 
 
 def _names(row: Mapping[str, Any]) -> tuple[str, ...]:
@@ -150,7 +167,7 @@ def score_histories(out: str | Path) -> tuple[list[HistoryResult], dict[str, Any
     return [judge_history(truths[c], rows[c]) for c in sorted(truths) if c in diagnosis["cases"]], diagnosis
 
 
-def history_figures(results: Sequence[HistoryResult]) -> list[Share]:
+def history_figures(results: Sequence[HistoryResult]) -> list[Share | Rate]:
     """Figures of the histories with their bars.
 
     Parameters
@@ -160,22 +177,23 @@ def history_figures(results: Sequence[HistoryResult]) -> list[Share]:
 
     Returns
     -------
-    list of Share
+    list of Share or Rate
         In the order of the page.
     """
     clear = [r for r in results if r.clear_visit]
     named = [r for r in clear if r.named]
     onsets = [r for r in results if r.onset_covered is not None]
-    years = round(sum(r.years for r in results))
-    false_alarms = sum("change" in r.alarms for r in results)
-    after_work = sum(r.maintenance_alarms for r in results)
+    years = sum(r.years for r in results)
+    false_alarms = sum(len(r.alarms.get("change", ())) for r in results)
+    worked = [r for r in results if r.n_works]
+    after_work = sum(r.maintenance_alarms > 0 for r in worked)
     return [
         Share("clear effects named within two visits", sum(r.named == "named" for r in clear), len(clear), 85.0),
         Share("... named, or half of an a or b", len(named), len(clear)),
         Share("position or sensor right where named", sum(r.is_located for r in named), len(named), 98.0),
         Share("onset inside its 95 % interval", sum(bool(r.onset_covered) for r in onsets), len(onsets), 90.0),
-        Share("false alarms of a change, per site-year", false_alarms, years, 2.0, "<="),
-        Share("recorded maintenance called a defect", after_work, len(results), 0.0, "<="),
+        Rate("false alarms of a change, per site-year", false_alarms, years, 2.0),
+        Share("sites with recorded maintenance called a defect", after_work, len(worked), 0.0, "<="),
         Share("sites with a wrong name", sum(bool(r.wrong_names) for r in results), len(results), 0.0, "<="),
         Share("sites that falsely differ from the file", sum("file" in r.alarms for r in results), len(results)),
         Share("sites without an answer", sum(not r.answered for r in results), len(results), 0.0, "<="),
@@ -203,17 +221,25 @@ def history_text(out: str | Path) -> str:
         "", "| figure | cases | share | 95 % interval | bar | met |", "|---|---|---|---|---|---|",
     ]  # fmt: skip
     for f in history_figures(results):
-        low, high = (100.0 * v for v in clopper_pearson(min(f.k, f.n), f.n))
-        bar = "" if f.bar is None else f"{f.sense} {f.bar:g} %"
+        low, high = f.interval
         met = {None: "", True: "yes", False: "no"}[f.is_met]
+        if isinstance(f, Rate):
+            share = f"{f.rate:.0f} % a year | {low:.0f} to {high:.0f} % a year" if f.years else "- | -"
+            lines.append(f"| {f.name} | {f.k} in {f.years:.1f} years | {share} | <= {f.bar:g} % a year | {met} |")
+            continue
+        bar = "" if f.bar is None else f"{f.sense} {f.bar:g} %"
         share = f"{f.share:.0f} %" if f.n else "-"
         lines.append(f"| {f.name} | {f.k} of {f.n} | {share} | {low:.0f} to {high:.0f} % | {bar} | {met} |")
-    lines += ["", "False alarms of a change are counted per site-year until the effect is clear.", ""]
+    lines += [
+        "",
+        "False alarms of a change are counted up to the last visit without the effect, each once when it begins.",
+        "",
+    ]
     lines += ["| site | panel | concealed | clear from | last answer | named in time | onset | wrong |"]
     lines += ["|---|---|---|---|---|---|---|---|"]
     for r in results:
         onset = {None: "", True: "inside", False: "outside"}[r.onset_covered]
-        wrong = ", ".join([*r.wrong_names, *(f"alarm ({q}) {v}" for q, v in r.alarms.items())])
+        wrong = ", ".join([*r.wrong_names, *(f"alarm ({q}) {v}" for q, begins in r.alarms.items() for v in begins)])
         lines.append(
             f"| {r.case} | {r.panel} | {r.kind or '-'} ({r.pattern}) | {r.clear_visit or '-'} | {r.last_answer} | "
             f"{r.named.replace('_', ' ') or '-'} | {onset} | {wrong} |"

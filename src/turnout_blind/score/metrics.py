@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout_blind.score.intervals import clopper_pearson
+from turnout_blind.score.intervals import clopper_pearson, poisson_interval
 from turnout_blind.score.matching import MIN_CLEAR_GAIN
 
 if TYPE_CHECKING:
@@ -49,6 +49,32 @@ class Share:
         if self.bar is None or self.n == 0:
             return None
         return self.share >= self.bar if self.sense == ">=" else self.share <= self.bar
+
+
+@dataclass(frozen=True)
+class Rate:
+    """``k`` events in ``years``; ``bar`` is the highest rate [% a year], None if the figure is only printed."""
+
+    name: str
+    k: int
+    years: float
+    bar: float | None = None
+
+    @property
+    def rate(self) -> float:
+        """Events in a hundred years, nan without exposure."""
+        return 100.0 * self.k / self.years if self.years else float("nan")
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Two-sided 95 % interval of a Poisson rate [% a year]."""
+        low, high = poisson_interval(self.k, self.years)
+        return 100.0 * low, 100.0 * high
+
+    @property
+    def is_met(self) -> bool | None:
+        """Whether the bar is met, None without bar or exposure."""
+        return None if self.bar is None or not self.years else self.rate <= self.bar
 
 
 @dataclass(frozen=True)
