@@ -325,7 +325,13 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
         separator = next((s for s in ("\t", ";") if s in line), ",")
         cells = _cells(line, separator)
         if any(cells) and all(_is_number(cell) or is_unreadable_number(cell) or cell == "" for cell in cells):
-            names, units = _names([_cells(text, separator) for text in text_lines], cells)
+            texts = [_cells(text, separator) for text in text_lines]
+            names, units = _names(texts, cells)
+            notes |= {
+                _plain(a): b
+                for a, b, *rest in (t for t in texts if len(t) > 1)
+                if b and not any(rest) and a not in names and _is_scale(a)
+            }
             return notes, names, units, position, separator, tuple(_entries(head_lines, separator, names))
         match = HEAD_LINE.match(line.strip())
         name = match[1].strip() if match else ""
@@ -357,8 +363,12 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
 
 
 def _states_scale(name: str, value: str) -> bool:
-    """Whether a line states a scale: such a word, and a number."""
-    return plain_word(name) in SCALE_WORDS and _is_number(re.split(r"[\s;,]", value)[0])
+    """Whether a line states a scale: such a word, and a value that begins with a number."""
+    return _is_scale(name) and re.match(r"[+-]?[.,]?\d", value) is not None
+
+
+def _is_scale(name: str) -> bool:
+    return plain_word(name) in SCALE_WORDS
 
 
 def _plain(name: str) -> str:

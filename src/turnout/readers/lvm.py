@@ -165,8 +165,7 @@ def _records(
     entries = (*_entries(fields, steps[0]), *entries_of(head, "the file's header"))
     has_x = x is not None and len(x) == n_row and bool(np.isfinite(x).all())
     n_sample = n_row // n_write
-    scales = {name: values if len(values) == count else values[:1] for name, values in fields.items() if values}
-    listed = {name: ";".join(value.replace(",", ".") for value in values) for name, values in scales.items()}
+    listed = {name: _scales_of_channels(values, count) for name, values in fields.items() if any(values)}
     problems = enumerate(map(scale_problem, scale_statements({**head, **listed}, count)))
     undecided = {i: problem for i, problem in problems if problem}
     return [
@@ -188,6 +187,16 @@ def _records(
 def _cells_of_channels(cells: list[str]) -> list[str]:
     """Cells of the channels in a header line with one X column each: every second cell, if those between are empty."""
     return cells[::2] if not any(cells[1::2]) else cells
+
+
+def _scales_of_channels(cells: list[str], count: int) -> list[str]:
+    """Cells of a header line, one per channel; a single cell holds for all channels.
+
+    Behind them a line may have empty cells and a comment.
+    """
+    if not any(cells[1:]):
+        return cells[:1]
+    return [*cells, *[""] * count][:count]
 
 
 def _per_channel(fields: Mapping[str, list[str]], name: str, count: int) -> list[str]:

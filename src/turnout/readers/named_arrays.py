@@ -200,7 +200,11 @@ class Metadata:
     @cached_property
     def scale_facts(self) -> dict[str, Any]:
         """Variables of this group and its parent groups whose names speak of a scale; those of the group count."""
-        own = {name: value for name, value in self.lower.items() if is_scale_name(name)}
+        own = {
+            name: value
+            for name, value in self.lower.items()
+            if is_scale_name(name) and not _is_nested_text(value)  # nested
+        }
         return {**(self.parent.scale_facts if self.parent else {}), **own}
 
     def get(self, names: Sequence[str]) -> Any:
@@ -325,20 +329,31 @@ class Metadata:
         }
         return (*entries_of(own, self.place), *(self.parent.entries if self.parent else ()))
 
-    def nested_scales(self, n_channel: int) -> dict[int, str]:
+    def nested_scales(self, names: Sequence[str]) -> dict[int, str]:
         """Problems about scales that nested metadata state; attributes of single variables take no part.
+
+        An entry of a parent group does not count if this group has one in the same place.
 
         Parameters
         ----------
-        n_channel : int
-            Number of channels.
+        names : sequence of str
+            Names of the channels.
 
         Returns
         -------
         dict of int to str
             Index of the channel -> problem.
         """
-        return entry_statements((e for e in self.entries if ATTRIBUTES_MARK not in e.place), n_channel)
+        level: Metadata | None = self
+        nested: list[Entry] = []
+        while level:
+            inner = {entry.place.casefold() for entry in nested}
+            n_outer = len(level.parent.entries) if level.parent else 0
+            own = level.entries[: len(level.entries) - n_outer]
+            nested += [e for e in own if ATTRIBUTES_MARK not in e.place and e.place.casefold() not in inner]
+            level = level.parent
+        direct = set(self.scale_facts)  # judged by the group itself
+        return entry_statements((e for e in nested if e.place.casefold() not in direct), names)
 
     def conditions(self, k: int, n: int) -> dict[str, Any]:
         """Conditions that are stored with the samples.
@@ -357,6 +372,12 @@ class Metadata:
         """
         values = {name: self.record_value((name,), k, n) for name in CONDITIONS}
         return {name: value for name, value in values.items() if value is not None}
+
+
+def _is_nested_text(value: Any) -> bool:
+    """Whether a value is the text of a JSON mapping, whose entries are judged each by itself."""
+    is_text = isinstance(value, str) or (isinstance(value, np.ndarray) and value.size == 1 and value.dtype.kind == "U")
+    return is_text and str(np.ravel(value)[0]).lstrip().startswith("{")
 
 
 def list_of_texts(value: Any) -> list[str]:
@@ -594,6 +615,6 @@ def _raw_record(
 def _undecided_scales(names: Sequence[str], facts: Metadata) -> dict[int, str]:
     """Statements about the scale of channels, by index: of the group, its parents and the channels themselves."""
     texts = scale_statements(facts.scale_facts, len(names))
-    problems = facts.nested_scales(len(names)) | {i: scale_problem(text) for i, text in enumerate(texts) if text}
+    problems = facts.nested_scales(names) | {i: scale_problem(text) for i, text in enumerate(texts) if text}
     by_name = dict(facts.get((STATED_SCALES,)) or ())
     return problems | {i: by_name[name] for i, name in enumerate(names) if name in by_name}

@@ -60,7 +60,7 @@ def read_raw(source: Source) -> RawFile:
     fields = {f"column {f.name!r}": _field_notes(f) for f in schema}
     common = tuple(entries_of(_metadata(schema), "metadata"))
     entries = (*common, *entries_of(fields, ""))
-    nested = entry_statements(common, len(names))
+    nested = entry_statements(common, names)
     n = len(edges) - 1
     records: list[RawRecord | ReadError] = []
     for k in range(n):

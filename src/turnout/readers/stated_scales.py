@@ -4,6 +4,7 @@ A gain or an offset may already be in the numbers or not. Where nothing defines 
 unit in the layout ends with "!".
 """
 
+import math
 import re
 import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
@@ -13,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from turnout.constants import STANDARD_GRAVITY
-from turnout.readers.statements import Entry
-from turnout.units import to_si
+from turnout.readers.source import MEANINGLESS_UNITS
+from turnout.readers.statements import PLACEHOLDERS, Entry
+from turnout.units import conversion, to_si
 
 # Words for a factor and an offset of the ordinate: lower case, without accents and separators.
 FACTOR_WORDS = frozenset(
@@ -84,44 +86,210 @@ def scale_statements(facts: Mapping[str, Any], n_channel: int = 1) -> tuple[str,
     Returns
     -------
     tuple of str
-        Text for each channel, as in "gain = 0.4"; "" where nothing or a neutral scale is stated.
+        Text for each channel, as in "gain = 0.4"; "" where nothing or a neutral scale is stated. A value that is not
+        understood is not neutral.
 
     Examples
     --------
     >>> scale_statements({"gain": [0.4, 1.0], "Offset": 0.0, "speed": 30.0}, 2)
     ('gain = 0.4', '')
+    >>> scale_statements({"gain": "0dB", "Slope": "1:10"})
+    ("Slope = '1:10'",)
     """
     texts: list[list[str]] = [[] for _ in range(n_channel)]
     for name, value in facts.items():
-        word = plain_word(str(name))
-        if word not in SCALE_WORDS or (numbers := _numbers(value)) is None:
-            continue
-        neutral = 1.0 if word in FACTOR_WORDS else 0.0
-        values = numbers if numbers.size == n_channel else np.resize(numbers, n_channel)
-        for text, number in zip(texts, values):
-            if number != neutral:
-                text.append(f"{name} = {number:g}")
+        for text, stated in zip(texts, _stated_by_channel(str(name), str(name), value, n_channel)):
+            text.extend(stated)
     return tuple(", ".join(text) for text in texts)
 
 
-def entry_statements(entries: Iterable[Entry], n_channel: int = 1) -> dict[int, str]:
+def _stated_by_channel(label: str, name: str, value: Any, n_channel: int) -> list[list[str]]:
+    """Texts of the scales that one entry states for each channel, without neutral ones."""
+    word = plain_word(name)
+    if word not in SCALE_WORDS:
+        return [[] for _ in range(n_channel)]
+    stated = [_scale_text(label, x, 1.0 if word in FACTOR_WORDS else 0.0) for x in _scale_values(value)]
+    if len(stated) == n_channel:
+        return [[text] if text else [] for text in stated]
+    return [list(filter(None, dict.fromkeys(stated))) for _ in range(n_channel)]
+
+
+def _scale_text(label: str, value: float | str, neutral: float) -> str:
+    """Text of one scale, as in "gain = 0.4"; "" for a neutral one."""
+    if isinstance(value, str):
+        return f"{label} = {value[:40]!r}"
+    return "" if value == neutral or math.isnan(value) else f"{label} = {value:g}"
+
+
+def _scale_values(value: Any) -> list[float | str]:
+    """Numbers of a stated scale; a text that is not understood stays a text. Empty for an array of samples."""
+    if isinstance(value, bytes):
+        value = value.decode("utf-8", "replace")
+    if isinstance(value, (bool, np.bool_)):
+        return ["true"] if value else []
+    if isinstance(value, str):
+        return _scales_of_text(value)
+    numbers = _numbers(value)
+    if numbers is not None:
+        return [float(x) for x in numbers]
+    if isinstance(value, np.ndarray):
+        value = value.ravel().tolist() if value.dtype.kind in "SUOf" else []
+    if isinstance(value, (list, tuple)) and len(value) <= MAX_CHANNELS:
+        return [cells[0] if len(cells) == 1 else str(x) for x in value if (cells := _scale_values(x) or [math.nan])]
+    return [str(value)] if isinstance(value, (float, np.floating)) and not np.isnan(value) else []
+
+
+NO_SCALE = PLACEHOLDERS | {"unity", "linear", "off", "1:1", "1/1"}
+NUMBER_AND_UNIT = re.compile(r"([+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
+
+
+def _number_and_unit(text: str) -> tuple[float, str] | None:
+    """The number at the beginning of a text and what follows; None without one. A comma is a decimal mark."""
+    match = NUMBER_AND_UNIT.fullmatch(text.strip())
+    return (float(match[1].replace(",", ".")), match[2].strip()) if match else None
+
+
+def _scales_of_text(text: str) -> list[float | str]:
+    """Scales of a text: one number with its unit, or a list of these; pieces that are not understood stay texts."""
+    pieces = text.strip().strip(";").split(";")
+    if len(pieces) == 1 and (numbers := _numbers(text)) is not None and not re.search(r"[^\d\s.,;eE+-]", text):
+        return [float(x) for x in numbers]
+    return [_scale_of_piece(piece.strip()) for piece in pieces if len(pieces) > 1 or piece.strip()]
+
+
+def _scale_of_piece(text: str) -> float | str:
+    """The number of a scale; the text itself if it is not understood, nan if it says that there is none."""
+    if text.casefold() in NO_SCALE:
+        return math.nan
+    parts = _number_and_unit(text)
+    if parts is None:
+        return text
+    number, unit = parts
+    if unit.casefold() == "db":
+        return 10 ** (number / 20)
+    if unit.casefold() in ("x", "\u00d7", *MEANINGLESS_UNITS) or (not number and re.match(r"[^\W\d]|[%°(\[]", unit)):
+        return number
+    try:
+        factors = [conversion(part.strip(" ()")).scale for part in unit.strip("[]").split("/", 1)]
+    except ValueError:
+        try:
+            factors = [conversion(unit).scale]
+        except ValueError:
+            return text
+    return number * factors[0] / (factors[1] if len(factors) > 1 else factors[0])
+
+
+def entry_statements(entries: Iterable[Entry], names: Sequence[str]) -> dict[int, str]:
     """Problems of a message about the scales that entries of the metadata state, nested ones too.
+
+    Each entry is judged by itself. An entry concerns the channel that its place or an entry beside it names, else all;
+    it overrules one of the same name in a group above only for a channel that it names.
 
     Parameters
     ----------
     entries : iterable of Entry
-        Metadata that concern all of the channels.
-    n_channel : int
-        Number of channels, as in ``scale_statements``.
+        Metadata that concern the channels.
+    names : sequence of str
+        Names of the channels.
 
     Returns
     -------
     dict of int to str
         Index of the channel -> problem; without channels of which nothing or a neutral scale is stated.
     """
-    facts = {entry.name: entry.value for entry in entries if is_scale_name(entry.name)}
-    texts = scale_statements(facts, n_channel) if facts else ()
-    return {i: scale_problem(text) for i, text in enumerate(texts) if text}
+    entries = list(entries)
+    scales = [(entry, _scale_name(entry, names)) for entry in entries]
+    scales = [(entry, name) for entry, name in scales if name]
+    if not scales:
+        return {}
+    texts: list[list[str]] = [[] for _ in names]
+    named = [(entry, name, _container(entry), _owners(entry, entries, names)) for entry, name in scales]
+    for entry, name, container, owners in named:
+        label = entry.name if entry.name == name else f"{name} of {entry.name}"
+        stated = _stated_by_channel(label, name, entry.value, 1 if owners else len(names))
+        for i, text in enumerate(texts):
+            if owners and i not in owners:
+                continue
+            is_overruled = any(
+                i in inner and plain_word(inner_name) == plain_word(name) and _is_inside(inner_container, container)
+                for _, inner_name, inner_container, inner in named
+            )
+            if not is_overruled:
+                text.extend(stated[0 if owners else i])
+    return {i: scale_problem(", ".join(dict.fromkeys(text))) for i, text in enumerate(texts) if text}
+
+
+def _scale_name(entry: Entry, names: Sequence[str]) -> str:
+    """The name of a scale under which an entry is: its own, or that of its group if the entry is called as a channel.
+
+    "" if it states no scale.
+    """
+    if is_scale_name(entry.name):
+        return entry.name
+    group = _container(entry).rpartition("/")[2]
+    is_channel = entry.name.strip().casefold() in {name.strip().casefold() for name in names}
+    return group if is_channel and is_scale_name(group) else ""
+
+
+def _container(entry: Entry) -> str:
+    """The place of an entry without its own name."""
+    return entry.place.removesuffix(entry.name).rstrip("/: ")
+
+
+def _is_inside(inner: str, outer: str) -> bool:
+    """Whether a place lies in a group of another place."""
+    return inner != outer and inner.startswith(f"{outer}/" if outer else "")
+
+
+def _owners(entry: Entry, entries: Sequence[Entry], names: Sequence[str]) -> frozenset[int]:
+    """Indices of the channels that the place of an entry, its name or a text beside it name; empty without any."""
+    if owners := named_channels(f"{entry.place} {entry.name}", names):
+        return owners
+    container = _container(entry)
+    if not container:
+        return frozenset()
+    beside = {
+        other.value.strip().casefold()
+        for other in entries
+        if isinstance(other.value, str) and _container(other) == container
+    }
+    return frozenset(i for i, name in enumerate(names) if name.strip().casefold() in beside)
+
+
+def named_channels(text: str, names: Sequence[str]) -> frozenset[int]:
+    """Channels whose name is in a text, word by word; of "rail" and "rail 2" the longer one counts.
+
+    Parameters
+    ----------
+    text : str
+        Place and name of an entry.
+    names : sequence of str
+        Names of the channels; those of digits only are not searched.
+
+    Returns
+    -------
+    frozenset of int
+        Indices of the channels.
+
+    Examples
+    --------
+    >>> sorted(named_channels("sensors/rail 2/gain", ["rail", "rail 2", "force"]))
+    [1]
+    """
+    words = f" {_words_of(text)} "
+    spaced = {i: name for i, name in enumerate(map(_words_of, names)) if name and not name.isdigit()}
+    found = {i: name for i, name in spaced.items() if f" {name} " in words}
+    return frozenset(
+        i
+        for i, name in found.items()
+        if not any(f" {name} " in f" {other} " and name != other for other in found.values())
+    )
+
+
+@lru_cache(maxsize=4096)
+def _words_of(text: str) -> str:
+    """Words of a text in lower case with one blank between them."""
+    return " ".join(re.split(r"[\W_]+", text.casefold())).strip()
 
 
 def scale_text(facts: Mapping[str, Any]) -> str:

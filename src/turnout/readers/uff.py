@@ -226,7 +226,7 @@ def _record(
         time=None if first.x is None else first.x * _seconds_per_x(first),
         is_time_in_seconds=True,
         aliases=aliases,
-        undecided={i: of[0] for i, s in enumerate(sets) if (of := entry_statements(_entries([s])))},
+        undecided={i: of[0] for i, s in enumerate(sets) if (of := entry_statements(_entries([s]), [""]))},
     )
 
 

@@ -74,11 +74,11 @@ def read_raw(source: Source) -> RawFile:
         **start_fields(facts.record_value(START_NAMES, 0, 1), _broadcast_start(further.get(b"bext", b""))),
         conditions=facts.conditions(0, 1),
         aliases=tuple((str(i),) for i in range(n)),
-        undecided=entry_statements(entries, n),
+        undecided=entry_statements(entries, names if len(names) == n else [str(i) for i in range(n)]),
         is_floating_audio=is_float,
     )
     remarks = []
-    if comment.lstrip().startswith("{") and not _notes(comment):
+    if comment.lstrip().startswith("{") and not _is_json(comment):
         problem = (
             f"its comment {comment.strip()[:40]!r} begins like JSON and cannot be decoded: names and times are lost"
         )
@@ -224,6 +224,14 @@ def _entries(texts: dict[str, str], comment: str) -> Iterator[Entry]:
     for name, text in texts.items():
         if name != "comment" or not notes:
             yield from entries_of_text(text, name)
+
+
+def _is_json(text: str) -> bool:
+    try:
+        json.loads(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _notes(comment: str) -> dict[str, Any]:

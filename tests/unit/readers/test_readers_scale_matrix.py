@@ -3,13 +3,14 @@
 Each file is read to within rounding or rejected by name; nothing is misread without a message.
 """
 
+import json
 from dataclasses import replace
 
 import h5py
 import nptdms
 import numpy as np
 import pytest
-from tests.unit.readers.test_readers_rate_matrix import FORMATS, SAMPLES, SENSORS, TRUE, plain, write_csv
+from tests.unit.readers.test_readers_rate_matrix import FORMATS, SAMPLES, SENSORS, TRUE, plain, write_csv, write_lvm
 
 from turnout.errors import ReadError
 from turnout.readers import read
@@ -142,3 +143,87 @@ def test_a_sensitivity_in_the_head_of_text_in_volts_is_compared(tmp_path):
         force = RawChannel("force", "force", "force", unit="V", sensitivity=sensitivity, sensitivity_unit="mV/N")
         found = outcome("a.csv", tmp_path, RawDescription((force, SENSORS[1]), rate=TRUE))
         assert (found[0] is not None) == is_right
+
+
+NESTED = [  # metadata of a file, and the channels whose scale is undecided
+    ({"sensors": {"force": {"gain": 10}, "rail": {"gain": 1}}}, {"force"}),
+    ({"sensors": {"force": {"gain": 1}, "rail": {"gain": 10}}}, {"rail"}),
+    ({"sensors": [{"name": "force", "gain": 10}, {"name": "rail", "gain": 1}]}, {"force"}),
+    ({"sensors": [{"name": "spare", "gain": 10}, {"name": "rail", "gain": 1}]}, {"force", "rail"}),
+    ({"gain": {"force": 10, "rail": 1}}, {"force"}),
+    ({"setup": {"gain": 10, "force": {"gain": 1}, "rail": {"gain": 1}}}, set()),
+    ({"setup": {"gain": 1, "force": {"gain": 10}}}, {"force"}),
+    ({"amplifier": {"gain": 10}, "logger": {"gain": 1}}, {"force", "rail"}),
+]
+
+
+@pytest.mark.parametrize("format", ["hdf5", "parquet", "npz", "wav"])
+@pytest.mark.parametrize(("facts", "undecided"), NESTED)
+def test_each_nested_scale_counts_for_the_channel_that_its_place_names(format, facts, undecided, tmp_path):
+    path = tmp_path / FORMATS[format][1]
+    FORMATS[format][0](path, [(k, v if format == "wav" else json.dumps(v)) for k, v in facts.items()][:1])
+    if len(facts) > 1:
+        FORMATS[format][0](path, [("about", facts if format == "wav" else json.dumps(facts))])
+    if format == "hdf5":
+        with h5py.File(path, "r+") as file:
+            del file["about"]
+            file.attrs.update({name: json.dumps(value) for name, value in facts.items()})
+    for sensor in SENSORS:
+        others = [replace(s, quantity="ignored") for s in SENSORS if s is not sensor]
+        found = outcome(path.name, tmp_path, RawDescription((sensor, *others), rate=TRUE))
+        if sensor.name in undecided:
+            assert is_rejected(found, "scale_unknown", "gain of force = 10" if "gain" in facts else "gain = 10")
+        else:
+            assert is_read(found, SAMPLES[[SENSORS.index(sensor)]])
+
+
+def test_the_scale_of_a_group_overrules_that_of_its_parent(tmp_path):
+    for outer, inner in ((10.0, 1.0), (1.0, 10.0)):
+        for nested in (False, True):
+            with h5py.File(tmp_path / "a.h5", "w") as file:
+                group = file.create_group("record_000")
+                for place, gain in ((file, outer), (group, inner)):
+                    place.attrs.update({"setup": json.dumps({"gain": gain})} if nested else {"gain": gain})
+                group["force"], group["rail"] = SAMPLES
+            found = outcome("a.h5", tmp_path, LAYOUT)
+            assert is_read(found) if inner == 1.0 else is_rejected(found, "scale_unknown", "gain = 10")
+
+
+NOT_UNDERSTOOD = ["10:1", "1:10", "ten", "1 of 10", "auto", "1 k", "10 per V"]
+
+
+@pytest.mark.parametrize("format", FORMATS)
+def test_a_stated_scale_that_is_not_understood_is_rejected_with_its_value(format, tmp_path):
+    for value in NOT_UNDERSTOOD:
+        if format == "uff" and value in ("ten", "auto", "10:1", "1:10", "1 of 10", "10 per V"):
+            continue  # free text: only pieces of a word and a number are entries
+        found = outcome(written(format, tmp_path, [("gain", value)]), tmp_path, LAYOUT)
+        assert is_rejected(found, "scale_unknown", repr(value)), value
+    for value, text in (("20dB", "10"), ("10x", "10"), ("1 kN/V", "1000"), ("-6.0206dB", "0.5")):
+        found = outcome(written(format, tmp_path, [("gain", value)]), tmp_path, LAYOUT)
+        assert is_rejected(found, "scale_unknown", f"gain = {text}"), value
+    for value in ("0dB", "1x", "1 V/V", "unity", "n/a"):
+        assert is_read(outcome(written(format, tmp_path, [("gain", value)]), tmp_path, LAYOUT)), value
+
+
+@pytest.mark.parametrize(
+    ("line", "undecided"),
+    [
+        ("Gain\t1\t10\t", {"rail"}),
+        ("Gain\t10\t1\t", {"force"}),
+        ("Gain\t1\t10", {"rail"}),
+        ("Gain\t\t10\t\t", {"rail"}),
+        ("Gain\t10\t\t", {"force", "rail"}),
+        ("Gain\t1\t1\tchecked 10", set()),
+    ],
+)
+def test_a_scale_per_channel_in_the_header_of_a_segment_holds_whatever_follows_it(line, undecided, tmp_path):
+    write_lvm(tmp_path / "a.lvm", [])
+    text = (tmp_path / "a.lvm").read_text(encoding="utf-8").replace("\nY_Unit_Label", f"\n{line}\nY_Unit_Label")
+    assert line in text
+    (tmp_path / "a.lvm").write_text(text, encoding="utf-8")
+    for sensor in SENSORS:
+        others = [replace(s, quantity="ignored") for s in SENSORS if s is not sensor]
+        found = outcome("a.lvm", tmp_path, RawDescription((sensor, *others), rate=TRUE))
+        rejected = is_rejected(found, "scale_unknown", "Gain = 10")
+        assert rejected if sensor.name in undecided else is_read(found, SAMPLES[[SENSORS.index(sensor)]])
