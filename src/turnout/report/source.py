@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from typing import TYPE_CHECKING
 
+from turnout.config.settings.trend import TrendSettings
 from turnout.registry.as_of import list_day, whole_list
 from turnout.report.trains import train_rows
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 
     import duckdb
 
+BASELINE = TrendSettings()  # of which the page states what a baseline needs
 # One row per section: that of the newest model, accepted or not.
 NEWEST_MODEL = "qualify row_number() over (partition by section_id order by measured_at_utc desc, model_id) = 1"
 ID_GIVEN = "turnout_id in (select unnest($turnouts))"
@@ -128,11 +130,44 @@ class FleetSource:
         sql = "select turnout_id, state, count(*) as n from chart_states_on(:today) group by all order by all"
         return self._fetch(sql) if self.has("chart_states") else []
 
+    def chart_kinds(self) -> list[dict[str, Any]]:
+        """Number of charts by what they follow: "resonance", "damping" or "amplitude" of a section, "whole turnout"."""
+        sql = """select case when section_id = '*' then 'whole turnout' when contains(band, 'damping') then 'damping'
+            when band in ('ballast', 'railpad') then 'resonance' else 'amplitude' end as kind, count(*) as n
+            from chart_states_on(:today) group by all order by n desc, kind"""
+        return self._fetch(sql) if self.has("chart_states") else []
+
     def learning(self) -> dict[str, Any]:
-        """Number of charts without a baseline yet, and the most campaigns that one of them has; both 0 without any."""
-        sql = """select count(*) as n, coalesce(max(n_campaigns), 0) as n_campaigns
-            from chart_states_on(:today) where state = 'learning'"""
-        return self._fetch(sql)[0] if self.has("chart_states") else {"n": 0, "n_campaigns": 0}
+        """Numbers of charts without a baseline yet (``n``), and of those that learn again after work (``n_again``).
+
+        ``n_campaigns`` and ``n_days`` are what the most advanced baseline has, that with the least part still missing.
+        """
+        if not self.has("chart_states"):
+            return {"n": 0, "n_again": 0, "n_campaigns": 0, "n_days": 0}
+        sql = f"""
+            with since as (
+                select turnout_id, section_id, band, source, min(measured_at_utc) as first_utc,
+                    max(measured_at_utc) as last_utc
+                from charts where state in ('baseline', 'learning') group by all
+            ),
+            known as (
+                select c.reason, coalesce(s.n_baseline, 0) as has_campaigns,
+                    coalesce(date_diff('day', first_utc, last_utc), 0) as has_days
+                from chart_states_on(:today) c
+                left join chart_status s using (turnout_id, section_id, band, source)
+                left join since using (turnout_id, section_id, band, source)
+                where c.state = 'learning'
+            ),
+            learners as (
+                select *, least(has_campaigns / {BASELINE.baseline_campaigns}, has_days / {BASELINE.baseline_days}, 1)
+                    + 1e-6 * least(has_campaigns, 1000) as progress
+                from known
+            )
+            select count(*) filter (reason <> 'after_event') as n, count(*) filter (reason = 'after_event') as n_again,
+                coalesce(max_by(has_campaigns, progress) filter (reason <> 'after_event'), 0) as n_campaigns,
+                coalesce(max_by(has_days, progress) filter (reason <> 'after_event'), 0) as n_days
+            from learners"""
+        return self._fetch(sql)[0]
 
     def worklist(self) -> list[dict[str, Any]]:
         """Tomorrow's worklist; empty before the first trend."""

@@ -3,6 +3,7 @@
 import math
 import re
 
+from turnout.config.settings.trend import TrendSettings
 from turnout.report.pages.fleet import fleet_page
 from turnout.report.panels.lines import line_diagrams
 from turnout.report.site import page_environment, shared_by_pages
@@ -13,9 +14,10 @@ class Source:
 
     day = "timestamp '2026-07-25'"
 
-    def __init__(self, turnouts, states=(), listed=(), scores=(), learning=None):
+    def __init__(self, turnouts, states=(), listed=(), scores=(), learning=None, kinds=()):
         self.rows = {"turnouts": turnouts, "states": states, "listed_states": listed, "scores": scores}
-        self.learned = learning or {"n": 0, "n_campaigns": 0}
+        self.rows["chart_kinds"] = kinds
+        self.learned = {"n": 0, "n_again": 0, "n_campaigns": 0, "n_days": 0} | (learning or {})
 
     def __getattr__(self, name):
         return lambda: list(self.rows.get(name, []))
@@ -50,11 +52,13 @@ def test_the_cards_add_up_to_the_turnouts_and_the_charts_to_their_number():
         state("c", "not measured", 4),
     ]
     listed = [state("d", "cannot tell")]
-    text = page([turnout(name) for name in "abcde"], states, listed)
+    kinds = [{"kind": "resonance", "n": 6}, {"kind": "damping", "n": 3}, {"kind": "whole turnout", "n": 1}]
+    text = page([turnout(name) for name in "abcde"], states, listed, kinds=kinds)
     counts = cards(text)
     expected = {"inspect this week": 1, "plan": 0, "cannot tell": 1, "not measured": 1, "ok": 1, "no chart yet": 1}
     assert counts == expected and sum(counts.values()) == 5
-    assert "10 charts, one for each resonance of a section: 2 inspect this week, 1 plan, 4 not measured, 3 ok" in text
+    kinds_said = "10 charts (6 frequencies of resonances, 3 damping ratios, 1 of a whole turnout)"
+    assert kinds_said + ": 2 inspect this week, 1 plan, 4 not measured, 3 ok" in text
 
 
 def test_the_most_urgent_turnout_comes_first_and_of_two_alike_the_one_that_drifts_faster():
@@ -75,8 +79,18 @@ def test_the_most_urgent_turnout_comes_first_and_of_two_alike_the_one_that_drift
 def test_a_first_campaign_is_progress_and_no_failure():
     states = [state("a", "learning", 2), state("a", "not measured", 10)]
     text = page([turnout("a")], states, learning={"n": 2, "n_campaigns": 1})
-    assert "Your measurements are in. 2 charts learn what is normal: 1 of 12 campaigns" in text
+    assert "Your measurements are in. 2 charts learn what is normal. The most advanced one has 1 campaign in" in text
     assert "Nothing to do" not in text and "10 charts without a recent campaign" in text
+
+
+def test_weekly_campaigns_of_half_a_year_are_more_than_a_baseline_needs_but_not_long_enough():
+    learning = {"n": 2, "n_campaigns": 20, "n_days": 133, "n_again": 3}
+    text = page([turnout("a")], [state("a", "learning", 5)], learning=learning)
+    needs = f"at least {TrendSettings().baseline_campaigns} campaigns with a rail temperature, over at least 357 days"
+    assert "has 20 campaigns in 133 days; with " + needs in text and "20 of 12" not in text
+    assert "3 charts learn the level after recorded work." in text
+    after_work = page([turnout("a")], [state("a", "learning", 3)], learning={"n_again": 3})
+    assert "Your measurements are in" not in after_work and "No chart is outside" not in after_work
 
 
 def test_a_line_is_drawn_to_scale_with_a_link_for_each_turnout():

@@ -9,6 +9,7 @@ from turnout.errors import REASONS
 from turnout.report.formatting import badge, day
 from turnout.report.panels.diagram import HATCH
 from turnout.report.panels.lines import line_diagrams
+from turnout.report.source import BASELINE
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
@@ -31,7 +32,13 @@ STATES = (
 )
 NO_CHART = "no chart yet"
 ALWAYS_COUNTED = ("inspect this week", "plan", "ok")
-N_BASELINE_CAMPAIGNS = 12  # of the rule that docs/trends.md states
+# What a chart follows -> its words, for one and for several
+CHART_KINDS = {
+    "resonance": ("frequency of a resonance", "frequencies of resonances"),
+    "damping": ("damping ratio", "damping ratios"),
+    "amplitude": ("amplitude under trains", "amplitudes under trains"),
+    "whole turnout": ("of a whole turnout", "of whole turnouts"),
+}
 
 
 def fleet_page(source: FleetSource, template: Template, shared: Mapping[str, Any]) -> str:
@@ -81,7 +88,9 @@ def fleet_page(source: FleetSource, template: Template, shared: Mapping[str, Any
         n_suppressed=of_charts["suppressed"],
         n_unmeasured=of_charts["not measured"],
         learning=source.learning(),
-        n_baseline=N_BASELINE_CAMPAIGNS,
+        kinds=[f"{k['n']} {CHART_KINDS[k['kind']][k['n'] != 1]}" for k in source.chart_kinds()],
+        n_baseline=BASELINE.baseline_campaigns,
+        n_baseline_days=round(BASELINE.baseline_days),
         diagrams=line_diagrams(lines),
         hatch=HATCH,
         turnouts=sorted(lines, key=lambda t: (t["urgency"], -t["score"], t["turnout_id"])),
