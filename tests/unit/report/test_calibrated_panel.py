@@ -44,3 +44,13 @@ def test_without_values_along_the_track_nothing_is_drawn(states):
 
 def test_the_page_of_the_turnout_has_them():
     assert "Calibrated model</h2>" in page(calibrated=STATES) and "Calibrated model" not in page()
+
+
+def test_the_page_says_which_visits_count_and_what_red_means():
+    """The second of three visits had an open finding: the newest values rest on two."""
+    later = [state(f"pad@{0.6 * k:.2f}", 0.6 * k, 0.0, 0.05, n_visits=2, day=3) for k in range(4)]
+    held = [{**row, "n_visits": 1} for row in STATES]
+    text = page(calibrated=[*FIRST, *held, *later])
+    assert "from the 2 visits without an open finding or an unexpected change (1 left out)" in text
+    assert "Red: the whole interval lies outside." in text and "all visits" not in text
+    assert "from the 1 visit without an open finding or an unexpected change; shaded" in page(calibrated=FIRST)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from turnout.report import panels
 from turnout.report.formatting import badge, count_of, day, number_ranges, with_interval
-from turnout.report.panels.calibrated_model import calibrated_panels
+from turnout.report.panels.calibrated_model import calibrated_panels, visits_in_words
 from turnout.report.panels.diagram import diagram
 from turnout.report.panels.hammer import HammerTest
 from turnout.report.panels.history import DAMPING, FREQUENCY, history_panel
@@ -67,6 +67,7 @@ def turnout_page(
         summary=[_summary(s, models.get(s["section_id"]), _rows_of(rows, "modes", s)) for s in rows["sections"]],
         sections=[_section(rows, s, models, states) for s in rows["sections"]],
         calibrated=calibrated_panels(rows.get("calibrated", [])),
+        calibrated_visits=visits_in_words(rows.get("calibrated", [])),
         part=trains_part(rows, rows["sections"]),
         quarantine=_by_file(rows["quarantine"]),
         unshown=_hidden_counts(rows["quarantine"]),

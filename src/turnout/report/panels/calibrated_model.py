@@ -68,6 +68,27 @@ def along_track_panels(states: States, width: int = 462) -> str:
     )
 
 
+def visits_in_words(states: States) -> str:
+    """How many visits the newest values rest on, and how many of those with a diagnosis were left out.
+
+    Parameters
+    ----------
+    states : sequence of mapping
+        Rows of ``twin_states`` of one turnout, of all visits.
+
+    Returns
+    -------
+    str
+        "" without a state.
+    """
+    if not states:
+        return ""
+    newest = max(states, key=lambda s: s["found_at_utc"])
+    n, n_known = newest["n_visits"], len({s["visit"] for s in states})
+    left_out = f" ({n_known - n} left out)" if n_known > n else ""
+    return f"the {count_of(n, 'visit')} without an open finding or an unexpected change{left_out}"
+
+
 def _newest(states: States) -> list[Mapping[str, Any]]:
     """The newest state of each parameter: sections are calibrated in groups, and not all at each visit."""
     newest: dict[str, Mapping[str, Any]] = {}
