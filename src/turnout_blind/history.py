@@ -28,9 +28,9 @@ from turnout_blind.site import CROSSING, PLAIN, PlannedPassage, draw_site
 from turnout_blind.visibility import effect_visibility
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
-    from turnout_blind.effect import Effect
+    from turnout_blind.effect import ConcealedEffect, Effect
     from turnout_blind.instrument import Fault
     from turnout_blind.site import Site
     from turnout_blind.true_site import World
@@ -39,12 +39,14 @@ NONE, START, STEP, GROWTH = PATTERNS = ("none", "start", "step", "growth")
 PATTERN_WEIGHTS = (0.25, 0.125, 0.3125, 0.3125)  # 20, 10, 25 and 25 of 80 sites
 HISTORY_EFFECTS = ("ballast", "pad", "gain", "position", "void", "dip")
 FIRST_DAY, N_DAYS = datetime(2022, 2, 1), 730
-VISIT_JITTER = 20.0  # sd of the day of a visit [d]
+VISIT_JITTER = 20.0  # half the range of the uniform error of the day of a visit [d]
 GROWTH_DAYS = 365.0  # time from the first to the full size of an effect that grows [d]
 WEAR_RATE, WEAR_SCATTER = 0.02, 0.01  # loss of ballast stiffness [ln per year], mean and sd over supports
 TAMPING_SD, TAMPING_SCATTER = 0.12, 0.08  # change of ballast stiffness by tamping [ln], of all and of each support
 MEAN_TEMPERATURE, SEASON, WEATHER = 10.0, 11.0, 3.0  # rail temperature, its yearly amplitude and its sd [°C]
 VISIT_TRAINS = (("locomotive", 33.0), ("loaded", 25.0), ("railcar", 33.0))  # trains of a visit in turn, speed [m/s]
+# Kind of recorded work -> effects that it would repair: the exchange of a sensor those of that sensor alone
+REPAIRED = {"tamping": ("ballast", "void"), "sensor_change": ("gain", "position")}
 # Parameter of an effect -> its value at a share s of the full size, from the full value
 GROWING = {
     "ballast": {"factor": lambda v, s: v**s},
@@ -139,6 +141,8 @@ def make_history(folder: str | Path, case: str, plan: HistoryPlan, effects: Mapp
     work = _draw_maintenance(rng, site)
     concealed = effects[plan.effect[0]].draw_concealed(rng, site, plan.effect[1]) if plan.effect else None
     onset = _draw_onset(rng, site, plan.pattern)
+    while has_repair(concealed, onset, work):
+        work = _draw_maintenance(rng, site)
     decoys, decoy_truth = draw_decoys(rng, site)
     folder = Path(folder) / case
     write_configuration(folder / "config", case, site)
@@ -237,6 +241,37 @@ def _severity(pattern: str, when: datetime, onset: datetime | None) -> float:
     return 1.0 if pattern != GROWTH else min((when - onset).total_seconds() / 86400.0 / GROWTH_DAYS, 1.0)
 
 
+def has_repair(concealed: ConcealedEffect | None, onset: datetime | None, work: Sequence[Maintenance]) -> bool:
+    """Whether recorded work from the day of the onset on would repair the effect. Such work is drawn again.
+
+    Parameters
+    ----------
+    concealed : ConcealedEffect or None
+        The effect.
+    onset : datetime or None
+        Time from which it is there.
+    work : sequence of tuple
+        Recorded work: day, kind, section or "", and the changes of the world.
+
+    Returns
+    -------
+    bool
+        False without an effect.
+    """
+    if concealed is None or onset is None:
+        return False
+    sensor = concealed.where.get("sensor")
+    return any(
+        concealed.kind in REPAIRED[kind] and change.get("sensor") == sensor and day.date() >= onset.date()
+        for day, kind, _, change in work
+    )
+
+
+def _is_done(day: datetime, when: datetime) -> bool:
+    """Whether work of a day is in the world at a time: ``events.csv`` dates it to the start of its day."""
+    return day.date() <= when.date()
+
+
 # day, kind, section or "", and the changes of the world
 Maintenance = tuple[datetime, str, str, dict[str, Any]]
 
@@ -264,7 +299,7 @@ def _world_at(site: Site, when: datetime, wear: np.ndarray, work: list[Maintenan
     years = (when - site.campaigns[0]).total_seconds() / 86400.0 / 365.25
     world.ballast = world.ballast * np.exp(-wear * years)
     for day, kind, _, change in work:
-        if day >= when:
+        if not _is_done(day, when):
             continue
         if kind == "tamping":
             world.ballast = world.ballast * change["ballast"]

@@ -4,14 +4,14 @@ import csv
 import json
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from datetime import date, datetime
+from datetime import date, datetime, timedelta
 
 import numpy as np
 import pytest
 
 from turnout.config.events import read_events
 from turnout_blind import history
-from turnout_blind.effect import load_effects
+from turnout_blind.effect import ConcealedEffect, load_effects
 from turnout_blind.history import HistoryPlan, make_history, parameters_at, plan_histories
 from turnout_blind.make import make_set
 from turnout_blind.score.histories import history_figures, judge_history
@@ -69,6 +69,54 @@ def test_the_owner_has_the_notes_of_all_visits_and_its_events_but_not_the_effect
     )
     written = "".join(p.read_text() for p in folder.rglob("*") if p.is_file())
     assert "growth" not in written and truth["onset"] not in written
+
+
+def test_work_is_in_the_world_from_the_start_of_its_day_as_the_events_say():
+    site = history.draw_site(np.random.default_rng(3))
+    n = site.world.position.size
+    when = site.campaigns[0].replace(hour=9)
+    for hour, day in ((0, 0), (9, 0), (23, 0), (23, -1)):
+        at = when.replace(hour=hour) + timedelta(days=day)
+        work = [(at, "tamping", "", {"ballast": np.full(n, 0.5), "damping": np.ones(n)})]
+        world = history._world_at(site, when, np.zeros(n), work)
+        assert world.ballast == pytest.approx(0.5 * site.world.ballast)
+    work = [(when.replace(hour=0) + timedelta(days=1), "tamping", "", work[0][3])]
+    assert history._world_at(site, when, np.zeros(n), work).ballast == pytest.approx(site.world.ballast)
+
+
+@pytest.mark.parametrize("kind", history.HISTORY_EFFECTS)
+def test_no_recorded_work_repairs_what_is_concealed(kind, tmp_path, monkeypatch):
+    """The first draw has tamping and the exchange of every sensor, the second none."""
+    for name in ("write_campaign", "write_passage", "write_configuration", "write_notes", "set_file_times"):
+        monkeypatch.setattr(history, name, lambda *a: None)
+    monkeypatch.setattr(history, "effect_visibility", lambda *a: {"hammer_pct": 30.0, "passage_pct": 0.0})
+    draws = []
+
+    def draw_maintenance(rng, site):
+        draws.append(site)
+        day, n = site.campaigns[0] + timedelta(days=200), site.world.position.size
+        tamping = (day, "tamping", "", {"ballast": np.ones(n), "damping": np.ones(n)})
+        others = [
+            (day, "sensor_change", f"S{k + 1}", {"sensor": name, "gain": 1.0, "shift": 0.0})
+            for k, name in enumerate(site.names())
+        ]
+        return [tamping, *others] if len(draws) == 1 else []
+
+    monkeypatch.setattr(history, "_draw_maintenance", draw_maintenance)
+    (tmp_path / "T1" / "config").mkdir(parents=True)
+    truth = make_history(tmp_path, "T1", HistoryPlan("start", (kind, 4), (4, 2)), EFFECTS)
+    is_repaired = kind in ("ballast", "void", "gain", "position")
+    assert len(draws) == (2 if is_repaired else 1) and bool(truth["maintenance"]) != is_repaired
+
+
+def test_work_elsewhere_or_before_the_effect_repairs_nothing():
+    onset = datetime(2023, 3, 1, 15)
+    gain = ConcealedEffect("gain", "sensor", {"sensor": "A2"})
+    for sensor, day, expected in (("A2", 2, True), ("A2", 1, True), ("A3", 2, False), ("A2", -1, False)):
+        when = datetime(2023, 3, 1) + timedelta(days=day - 1)
+        work = [(when, "sensor_change", f"S{sensor[1:]}", {"sensor": sensor, "gain": 1.0, "shift": 0.0})]
+        assert history.has_repair(gain, onset, work) == expected
+    assert not history.has_repair(None, onset, work) and not history.has_repair(gain, None, work)
 
 
 def test_parameters_of_a_growing_effect_end_at_their_full_size():
