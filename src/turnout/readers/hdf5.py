@@ -27,7 +27,7 @@ from turnout.readers.named_arrays import (
     raw_file,
 )
 from turnout.readers.source import RawFile, Source
-from turnout.readers.stated_scales import apply_packing, is_scale_name, scale_text
+from turnout.readers.stated_scales import apply_packing, is_fill_name, is_scale_name, scale_text
 
 UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units")
 
@@ -103,7 +103,9 @@ def _variables(group: h5py.Group, path: str, source: Source, claims: Hdf5Claims)
         except ReadError as error:
             variables[name] = error
             continue
-        variables[f"{name}{ATTRIBUTES_MARK}"] = Attributes(name, attributes)
+        applied = _fill_names(attributes) if isinstance(numbers, PackedDataset) else ()
+        others = {k: v for k, v in attributes.items() if k not in applied}
+        variables[f"{name}{ATTRIBUTES_MARK}"] = Attributes(name, others)
         for key, value in attributes.items():
             if key in UNIT_ATTRIBUTES and isinstance(value, str):
                 units[name] = value
@@ -143,16 +145,26 @@ class PackedDataset:
         return apply_packing(self.dataset[selection], self.factor, self.offset, self.fills)
 
 
+def _fill_names(attributes: Mapping[str, Any]) -> list[str]:
+    """Attributes of a dataset that state its fill value: of netCDF, and numbers under other such names."""
+    return [
+        k
+        for k, v in attributes.items()
+        if k in FILL_ATTRIBUTES or (is_fill_name(k) and np.asarray(v).dtype.kind in "fiu")
+    ]
+
+
 def _with_packing(
     dataset: h5py.Dataset, all_attributes: Mapping[str, Any], source: Source
 ) -> h5py.Dataset | PackedDataset:
     """The dataset itself, or with its attributes of packing applied; ReadError if they are no numbers."""
-    attributes = {k: all_attributes[k] for k in (*PACKING_ATTRIBUTES, *FILL_ATTRIBUTES) if k in all_attributes}
+    fill_names = _fill_names(all_attributes)
+    attributes = {k: all_attributes[k] for k in (*PACKING_ATTRIBUTES, *fill_names) if k in all_attributes}
     if not attributes or dataset.dtype.kind not in "fiu":
         return dataset
     try:
         factor, offset = (float(attributes.get(k, d)) for k, d in zip(PACKING_ATTRIBUTES, (1.0, 0.0)))
-        fills = tuple(float(x) for k in FILL_ATTRIBUTES if k in attributes for x in np.ravel(attributes[k]))
+        fills = tuple(float(x) for k in fill_names for x in np.ravel(attributes[k]))
     except (TypeError, ValueError) as error:
         problem = f"its attributes {attributes} are no numbers"
         remedy = "Write one number each, or export the numbers unpacked"

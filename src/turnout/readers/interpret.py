@@ -172,12 +172,14 @@ def _channel_mapping(index: int, record: RawRecord, raw: RawChannel, where: str,
     if (statement := record.undecided.get(index)) and not (raw.unit or "").endswith("!"):
         raise source.error(place, statement, stated_scales.remedy(file_unit), reason="scale_unknown")
     is_overruled = (raw.unit or "").endswith("!")
-    if (other_unit := _unit_in_name(record.names[index], file_unit)) and not is_overruled:
+    if (other_unit := _unit_in_name(record.names[index], file_unit, raw)) and not is_overruled:
         problem = f"its name {record.names[index]!r} says {other_unit!r}, its unit {file_unit!r}"
-        remedy = f"Find out which is right; then set it in the layout as 'unit: {other_unit}!' or 'unit: {file_unit}!'"
+        choices = " or ".join(f"'unit: {unit}!'" for unit in (other_unit, file_unit) if _is_usable(unit, raw))
+        remedy = f"Find out which is right; then set it in the layout as {choices}"
         raise source.error(place, problem, remedy, reason="unit_unknown")
     if raw.sensitivity is not None and not is_overruled:
-        if problem := stated_scales.sensitivity_problem(record.entries, raw.sensitivity, raw.sensitivity_unit):
+        stated = record.entries, raw.sensitivity, raw.sensitivity_unit, raw.quantity, record.names, index
+        if problem := stated_scales.sensitivity_problem(*stated):
             remedy = f"Correct the layout; if it is right, set 'unit: {raw.unit or file_unit}!' for this channel"
             raise source.error(place, problem, remedy, reason="scale_unknown")
     is_fraction = record.is_floating_audio and not is_overruled and FULL_SCALE_UNIT.match(raw.unit or "")
@@ -201,10 +203,15 @@ def _channel_mapping(index: int, record: RawRecord, raw: RawChannel, where: str,
 UNIT_IN_NAME = re.compile(r"[\[(]([^\[\]()]+)[\])]\s*$")
 
 
-def _unit_in_name(name: str, file_unit: str) -> str:
-    """Unit in brackets behind the name of a channel if it contradicts the unit that the file states, else ""."""
+def _unit_in_name(name: str, file_unit: str, raw: RawChannel) -> str:
+    """Unit in brackets behind the name of a channel if it contradicts the unit that the file states, else "".
+
+    A number in the brackets is a range. Where only the stated unit can be that of the quantity, it holds.
+    """
     match = UNIT_IN_NAME.search(name)
-    if not match or _is_meaningless(file_unit.strip()):
+    if not match or _is_meaningless(file_unit.strip()) or FULL_SCALE_UNIT.match(match[1]):
+        return ""
+    if not _is_usable(match[1], raw) and _is_usable(file_unit, raw):
         return ""
     try:
         in_name, stated = conversion(match[1]), conversion(file_unit)
@@ -214,11 +221,21 @@ def _unit_in_name(name: str, file_unit: str) -> str:
     return "" if same else match[1]
 
 
+def _is_usable(unit: str, raw: RawChannel) -> bool:
+    """Whether numbers in a unit can become the quantity of the channel, by its sensitivity if it has one."""
+    try:
+        to_si(raw.quantity, unit, raw.sensitivity, raw.sensitivity_unit)
+    except ValueError:
+        return False
+    return True
+
+
 def _check_fill_values(record: RawRecord, mappings: Sequence[ChannelMapping], where: str, source: Source) -> None:
     """ReadError if samples equal a number that the file states for missing samples."""
-    for fill in stated_scales.fill_values(record.entries):
-        for mapping in mappings:
-            column = record.samples[mapping.index]
+    fills = stated_scales.fill_values(record.entries, record.names)
+    for mapping in mappings:
+        column = record.samples[mapping.index]
+        for fill in fills[mapping.index]:
             blocks = (column[start : start + BLOCK_SIZE] for start in range(0, len(column), BLOCK_SIZE))
             if n := sum(int(np.count_nonzero(block == fill)) for block in blocks):
                 problem = f"{n} samples are {fill:g}, which the file states for missing ones"
@@ -386,6 +403,7 @@ class Assignments:
 
     def __init__(self, channels: Sequence[RawChannel], source: Source):
         self.channels, self.source = channels, source
+        self._has_sensitivity = any(c.sensitivity is not None for c in channels)
         self._rows: dict[tuple, set[int]] = {}
         self._mappings: dict[tuple, tuple[ChannelMapping, ...]] = {}
 
@@ -410,9 +428,16 @@ class Assignments:
         return self._rows[key]
 
     def _key(self, record: RawRecord) -> tuple:
-        """What the assignment depends on; aliases only if a channel of the layout is called by one."""
+        """What the assignment depends on; aliases only if a channel of the layout is called by one.
+
+        Only entries that state a sensitivity count, with those that may name its channel.
+        """
         is_named = all(isinstance(c.source, int) or c.source in record.names for c in self.channels)
-        return record.names, record.units, () if is_named else record.aliases, tuple(record.undecided.items())
+        sensitivities: tuple[str, ...] = ()
+        if self._has_sensitivity and stated_scales.sensitivity_entries(record.entries):
+            sensitivities = tuple(f"{entry.place}: {entry.name}: {entry.value}" for entry in record.entries)
+        aliases = () if is_named else record.aliases
+        return record.names, record.units, aliases, tuple(record.undecided.items()), sensitivities
 
     def mappings(self, record: RawRecord, where: str) -> tuple[ChannelMapping, ...]:
         """As ``channel_mappings``.

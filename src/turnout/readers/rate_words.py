@@ -63,7 +63,7 @@ POSSIBLE = {
 }  # fmt: skip
 # Names of other frequencies, of settings, counts and times of day.
 OTHER = re.compile(
-    r"filt|pass(?!o)|cut|grenz|band|coup|cort|tagli|gra?en?s|eigen|reson|natur|modal|netz|mains|calib|kalib|tarat|etalonn"
+    r"filt|pass(?!o)|cut|grenz|band|coup|cort|tagli|gra?en?s|eigen|reson|natur|modal|netz|mains|calib|kalib|tarat|etalonn|sensitiv"
     r"|servic|wart|inspec|trigg|bit|baud|start|begin|debut|inicio|inizio|stop|date|datum|number|anzahl|count|nombre"
     r"|antal|numero|aantal|cantidad|max|range|bereich|nyquist|carrier|refresh|update|oversampl|decim|ratio|heart|rot"
     r"|anreg|excit|signal|sinus|sweep|mode$|source|quelle|unit|einheit|label|dimension|counter|zahler|filename|block|buffer|spectr|fft|offset"

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from turnout.constants import STANDARD_GRAVITY
 from turnout.readers.source import MEANINGLESS_UNITS
 from turnout.readers.statements import PLACEHOLDERS, Entry
 from turnout.units import conversion, to_si
@@ -348,17 +347,81 @@ MAX_CHANNELS = 64  # a longer array is no list of scales but one of samples
 
 
 FILL_WORDS = frozenset(
-    "fillvalue missingvalue missing nodata nodatavalue invalidvalue novalue nanvalue fehlwert ersatzwert "
+    "fillvalue missingvalue nodata nodatavalue invalidvalue novalue nanvalue fehlwert ersatzwert "
     "valeurmanquante manglendevaerdi valoremancante valorfaltante".split()
 )
 SENSITIVITY = re.compile(r"sensitiv|empfindlich|sensibi|folsom|gevoelig")
+# What is beside a sensitivity: the frequency and the day at which it was measured, its tolerance, that of the trigger.
+BESIDE_SENSITIVITY = re.compile(r"trigger|seuil|freq|toler|temp|date|datum|uncertain|unsicher|deviation|abweich")
+# Words beside that of the sensitivity that speak of no sensor in particular, without case and accents.
+GENERAL_WORDS = frozenset(
+    "sensor sensors transducer channel channels kanal kanale capteur aufnehmer sensitivity nominal calibrated "
+    "calibration kalibriert nenn value wert of the der des du de".split()
+)
+# Words for the sensors of a quantity.
+SENSOR_WORDS = {
+    "force": re.compile(r"hammer|force|kraft|load"),
+    "acceleration": re.compile(r"acc|beschl"),
+    "velocity": re.compile(r"velocity|geophon|geschw|vitesse"),
+    "displacement": re.compile(r"displ|deflection|weg"),
+    "strain": re.compile(r"strain|dehnung"),
+}
 MAX_SENSITIVITY_DEVIATION = 0.1  # relative: a certificate and a logger's nominal sensitivity differ by less
-# Ratios of units of one sensitivity: prefixes, and g against m/s².
-UNIT_RATIOS = tuple(10.0**p * g for p in (-6, -3, 0, 3, 6) for g in (1.0, STANDARD_GRAVITY, 1.0 / STANDARD_GRAVITY))
+PREFIX_RATIOS = tuple(10.0**p for p in (-6, -3, 0, 3, 6))  # of units of one sensitivity
 
 
-def fill_values(entries: Iterable[Entry]) -> tuple[float, ...]:
-    """Numbers that stand for a missing sample, as the metadata state.
+def fill_values(entries: Iterable[Entry], names: Sequence[str]) -> tuple[tuple[float, ...], ...]:
+    """Numbers that stand for a missing sample of each channel, as the metadata state.
+
+    Parameters
+    ----------
+    entries : iterable of Entry
+        Metadata of a record.
+    names : sequence of str
+        Names of the channels.
+
+    Returns
+    -------
+    tuple of tuple of float
+        For each channel the values of the entries that are named like a fill value and concern it.
+
+    Examples
+    --------
+    >>> fill_values([Entry("head", "_FillValue", -999), Entry("rail/NoData", "NoData", -1)], ["force", "rail"])
+    ((-999.0,), (-999.0, -1.0))
+    """
+    entries = list(entries)
+    fills: list[list[float]] = [[] for _ in names]
+    for entry in entries:
+        if not is_fill_name(entry.name) or (numbers := _numbers(entry.value)) is None:
+            continue
+        owners = _owners(entry, entries, names)
+        for i, fill in enumerate(fills):
+            if not owners and numbers.size == len(names):
+                fill.append(float(numbers[i]))
+            elif not owners or i in owners:
+                fill.extend(map(float, numbers))
+    return tuple(map(tuple, fills))
+
+
+def is_fill_name(name: str) -> bool:
+    """Whether a name speaks of the number that stands for a missing sample.
+
+    Parameters
+    ----------
+    name : str
+        Name of an attribute, a property or a head line.
+
+    Returns
+    -------
+    bool
+        True for "_FillValue", "NoData" and the like.
+    """
+    return plain_word(name) in FILL_WORDS
+
+
+def sensitivity_entries(entries: Iterable[Entry]) -> tuple[Entry, ...]:
+    """Entries of the metadata that state the sensitivity of a sensor.
 
     Parameters
     ----------
@@ -367,20 +430,19 @@ def fill_values(entries: Iterable[Entry]) -> tuple[float, ...]:
 
     Returns
     -------
-    tuple of float
-        Values of the entries that are named like a fill value.
-
-    Examples
-    --------
-    >>> fill_values([Entry("head", "_FillValue", -999), Entry("head", "gain", 2.0)])
-    (-999.0,)
+    tuple of Entry
+        Without those about a trigger, a frequency, a tolerance, a temperature or a date.
     """
-    lists = (_numbers(entry.value) for entry in entries if plain_word(entry.name) in FILL_WORDS)
-    return tuple(float(x) for numbers in lists if numbers is not None for x in numbers)
+    words = ((entry, plain_word(entry.name)) for entry in entries)
+    return tuple(e for e, word in words if SENSITIVITY.search(word) and not BESIDE_SENSITIVITY.search(word))
 
 
-def sensitivity_problem(entries: Iterable[Entry], sensitivity: float, unit: str) -> str:
-    """The problem of a message if the metadata state sensitivities and none is that of the layout.
+def sensitivity_problem(
+    entries: Iterable[Entry], sensitivity: float, unit: str, quantity: str, names: Sequence[str] = ("",), index: int = 0
+) -> str:
+    """The problem of a message if the metadata state sensitivities of a channel and none is that of the layout.
+
+    Only entries count whose unit can be that of the quantity, or that belong to the channel.
 
     Parameters
     ----------
@@ -390,39 +452,90 @@ def sensitivity_problem(entries: Iterable[Entry], sensitivity: float, unit: str)
         Sensitivity of the channel in the layout.
     unit : str
         Its unit.
+    quantity : str
+        Quantity of the channel in the layout.
+    names : sequence of str
+        Names of the channels of the file.
+    index : int
+        The channel among them.
 
     Returns
     -------
     str
-        "" if the file states none, or one that agrees within a tenth in any unit of the same kind.
+        "" if the file states none, or one that agrees within a tenth; without a unit, up to a prefix such as "m".
 
     Examples
     --------
     >>> stated = [Entry("head", "Sensitivity", "10.2 mV/(m/s²)")]
-    >>> sensitivity_problem(stated, 100.0, "mV/g"), bool(sensitivity_problem(stated, 35.3, "mV/g"))
-    ('', True)
+    >>> sensitivity_problem(stated, 100.0, "mV/g", "acceleration")
+    ''
+    >>> bool(sensitivity_problem(stated, 35.3, "mV/g", "acceleration"))
+    True
     """
-    stated = [entry for entry in entries if SENSITIVITY.search(plain_word(entry.name))]
-    numbers = [(entry, float(x)) for entry in stated if (n := _numbers(entry.value)) is not None for x in n if x != 0.0]
-    if not numbers or any(_is_same_sensitivity(entry, x, sensitivity, unit) for entry, x in numbers):
+    entries = list(entries)
+    compared: list[Entry] = []
+    for entry in sensitivity_entries(entries):
+        owners = _owners(entry, entries, names)
+        if owners and index not in owners:
+            continue
+        for number, own_unit in _sensitivities(entry):
+            agrees = _agrees(number, own_unit, sensitivity, unit, quantity, bool(owners), entry)
+            if agrees:
+                return ""
+            if agrees is False:
+                compared.append(entry)
+    if not compared:
         return ""
-    listed = "; ".join(f"{entry.name}: {entry.value}" for entry in stated[:3])
+    listed = "; ".join(dict.fromkeys(f"{entry.name}: {entry.value}" for entry in compared[:3]))
     return f"the file states {listed[:100]!r}, and the layout's sensitivity of {sensitivity:g} {unit} is none of these"
 
 
-def _is_same_sensitivity(entry: Entry, stated: float, sensitivity: float, unit: str) -> bool:
-    """Whether a number is the sensitivity of the layout, in its own unit or, without one, in any of the kind."""
+def _sensitivities(entry: Entry) -> list[tuple[float, str]]:
+    """Numbers of an entry with their unit: behind the number, else in brackets behind the name, else ""."""
     in_name = re.search(r"[\[(](.+)[\])]\s*$", entry.name)
-    behind = re.sub(r"^[\s\d.,eE+-]*", "", str(entry.value)) if isinstance(entry.value, str) else ""
-    own_unit = behind.strip() or (in_name[1] if in_name else "")
-    for quantity in ("force", "acceleration", "velocity", "displacement", "strain") if own_unit else ():
+    unit = in_name[1] if in_name else ""
+    parts = _number_and_unit(entry.value) if isinstance(entry.value, str) else None
+    if parts and re.match(r"[^\d\s.,;+-]", parts[1]):
+        return [(parts[0], parts[1].replace(" per ", "/"))] if parts[0] else []
+    numbers = _numbers(entry.value)
+    return [] if numbers is None else [(float(x), unit) for x in numbers if x]
+
+
+def _agrees(
+    number: float, own_unit: str, sensitivity: float, unit: str, quantity: str, is_own: bool, entry: Entry
+) -> bool | None:
+    """Whether a stated sensitivity is that of the layout; None if it cannot be compared or is of another sensor."""
+    if not own_unit:
+        if not is_own and not _is_general(entry.name, quantity):
+            return None
+        ratio = abs(number) / sensitivity
+        is_tenfold = abs(ratio / 10.0 ** round(math.log10(ratio)) - 1.0) <= MAX_SENSITIVITY_DEVIATION
+        # Where the ratio is a power of ten, the reciprocal would make a factor of ten look like another unit.
+        ratios = (ratio,) if is_tenfold else (ratio, 1.0 / (abs(number) * sensitivity))
+        return any(abs(r / prefix - 1.0) <= MAX_SENSITIVITY_DEVIATION for r in ratios for prefix in PREFIX_RATIOS)
+    stated, in_layout = _sensitivity_scale(quantity, number, own_unit), _sensitivity_scale(quantity, sensitivity, unit)
+    if stated and in_layout:
+        same_kind = stated[0] == in_layout[0]
+        return abs(stated[1] / in_layout[1] - 1.0) <= MAX_SENSITIVITY_DEVIATION if same_kind else None
+    is_of_other_quantity = any(_sensitivity_scale(other, number, own_unit) for other in SENSOR_WORDS)
+    return False if is_own and is_of_other_quantity else None
+
+
+def _sensitivity_scale(quantity: str, number: float, unit: str) -> tuple[str, float] | None:
+    """(electrical unit, SI per electrical unit) of a sensitivity; None if the unit is none of the quantity."""
+    for electrical in ("V", "count"):
         try:
-            ratio = to_si(quantity, "V", abs(stated), own_unit).scale / to_si(quantity, "V", sensitivity, unit).scale
+            return electrical, to_si(quantity, electrical, abs(number), unit).scale
         except ValueError:
             continue
-        return abs(ratio - 1.0) <= MAX_SENSITIVITY_DEVIATION
-    ratios = (abs(stated) / sensitivity, 1.0 / (abs(stated) * sensitivity))
-    return any(abs(r / unit_ratio - 1.0) <= MAX_SENSITIVITY_DEVIATION for r in ratios for unit_ratio in UNIT_RATIOS)
+    return None
+
+
+def _is_general(name: str, quantity: str) -> bool:
+    """Whether the name of a sensitivity speaks of no other sensor than one of the quantity."""
+    words = [plain_word(word) for word in _words_of(re.sub(r"[\[(].*?[\])]", "", name)).split()]
+    specific = [w for w in words if w not in GENERAL_WORDS and not SENSITIVITY.search(w) and not w.isdigit()]
+    return not specific or any(SENSOR_WORDS[quantity].search(w) for w in specific if quantity in SENSOR_WORDS)
 
 
 def remedy(unit: str) -> str:

@@ -10,7 +10,16 @@ import h5py
 import nptdms
 import numpy as np
 import pytest
-from tests.unit.readers.test_readers_rate_matrix import FORMATS, SAMPLES, SENSORS, TRUE, plain, write_csv, write_lvm
+from tests.unit.readers.test_readers_rate_matrix import (
+    FORMATS,
+    SAMPLES,
+    SENSORS,
+    TRUE,
+    UNITS,
+    plain,
+    write_csv,
+    write_lvm,
+)
 
 from turnout.errors import ReadError
 from turnout.readers import read
@@ -227,3 +236,109 @@ def test_a_scale_per_channel_in_the_header_of_a_segment_holds_whatever_follows_i
         found = outcome("a.lvm", tmp_path, RawDescription((sensor, *others), rate=TRUE))
         rejected = is_rejected(found, "scale_unknown", "Gain = 10")
         assert rejected if sensor.name in undecided else is_read(found, SAMPLES[[SENSORS.index(sensor)]])
+
+
+HAMMER = RawChannel("force", "force", "force", unit="V", sensitivity=2.25, sensitivity_unit="mV/N")
+SENSOR = RawChannel("rail", "rail", "acceleration", unit="V", sensitivity=100.0, sensitivity_unit="mV/g")
+
+
+def sensitivity_words(facts, tmp_path, channels=(HAMMER, SENSOR)):
+    """ "read", or the channel of the first error."""
+    np.savez(tmp_path / "a.npz", **dict(zip(UNITS, SAMPLES)), info=np.array(json.dumps(facts)))
+    samples, errors = outcome("a.npz", tmp_path, RawDescription(channels, rate=TRUE))
+    if not errors:
+        return "read"
+    assert samples is None and errors[0].reason == "scale_unknown"
+    return next(c.name for c in channels if f"channel '{c.name}'" in str(errors[0]))
+
+
+@pytest.mark.parametrize(
+    ("facts", "found"),
+    [
+        ({"hammer_sensitivity": "2.25 mV/N"}, "read"),
+        ({"hammer_sensitivity": "2.25mV/N"}, "read"),
+        ({"hammer_sensitivity": 2.25}, "read"),
+        ({"hammer_sensitivity": 1.1}, "force"),
+        ({"hammer_sensitivity": "1.1 mV/N"}, "force"),
+        ({"trigger_sensitivity": 5.0}, "read"),
+        ({"sensitivity frequency": "159.2 Hz", "Sensitivity tolerance": "5 %", "sensitivity_date": 2024}, "read"),
+        ({"Temperature of sensitivity": "23 °C"}, "read"),
+        ({"microphone sensitivity": 50.0}, "read"),
+        ({"rail": {"sensitivity": "100 mV/g"}, "force": {"sensitivity": "2.25 mV/N"}}, "read"),
+        ({"rail": {"sensitivity": "2.25 mV/N"}}, "rail"),  # of another quantity
+        ({"rail": {"sensitivity": "10.2 mV/(m/s²)"}}, "read"),  # 100 / 9.80665
+        ({"rail": {"sensitivity": 0.1}}, "read"),  # V/g
+        ({"rail": {"sensitivity": 10.2}}, "rail"),  # a tenth, or the same in m/s²
+        ({"rail": {"sensitivity": 1000.0}}, "rail"),
+        ({"force": {"sensitivity": 2.25 * 9.81}}, "force"),
+        ({"force": {"sensitivity": 2.25 / 9.81}}, "force"),
+        ({"force": {"sensitivity": 22.5}}, "force"),
+        ({"sensors": [{"name": "force", "sensitivity": 100}, {"name": "rail", "sensitivity": 100}]}, "force"),
+    ],
+)
+def test_a_stated_sensitivity_is_compared_with_the_channel_to_which_it_belongs(facts, found, tmp_path):
+    assert sensitivity_words(facts, tmp_path) == found
+
+
+def test_the_sensitivity_of_each_record_is_compared(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for k, stated in enumerate(("100 mV/g", "1000 mV/g", "100 mV/g")):
+            group = file.create_group(f"record_{k:03d}")
+            group["force"], group["rail"] = SAMPLES + k
+            group.attrs["rail_sensitivity"] = stated
+    result = read("a.h5", tmp_path, RawDescription((HAMMER, SENSOR), rate=TRUE))
+    assert [r.record for r in result.recordings] == [0, 2]
+    (error,) = result.errors
+    assert "record 2 of 3, channel 'rail': the file states 'rail_sensitivity: 1000 mV/g'" in str(error)
+
+
+@pytest.mark.parametrize("name", ["_FillValue", "missing_value", "NoData"])
+def test_a_fill_value_that_was_applied_before_unpacking_is_not_compared_with_the_numbers(name, tmp_path):
+    packed = np.arange(-1000, 1000, dtype="int16")
+    packed[packed == -1] = 1
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for sensor in UNITS:
+            file[sensor] = packed
+            file[sensor].attrs.update({"scale_factor": 1e-3, name: -1})
+    assert is_read(outcome("a.h5", tmp_path, LAYOUT), [packed * 1e-3] * 2)  # holds -1000, which is -1.0
+    with h5py.File(tmp_path / "a.h5", "r+") as file:
+        file["rail"][5] = -1
+    assert is_rejected(outcome("a.h5", tmp_path, LAYOUT), "not_finite", "channel 'rail': 1 of 2000")
+
+
+def test_a_fill_value_holds_for_the_channel_that_its_place_names(tmp_path):
+    samples = SAMPLES.copy()
+    samples[0, 7] = 0.0
+    for facts, is_rejected_now in (
+        ({"missing": 0}, False),
+        ({"rail": {"missing_value": 0}}, False),
+        ({"missing_value": [-999, 0]}, False),
+        ({"force": {"missing_value": 0}}, True),
+        ({"missing_value": 0}, True),
+    ):
+        np.savez(tmp_path / "a.npz", **dict(zip(UNITS, samples)), info=np.array(json.dumps(facts)))
+        found = outcome("a.npz", tmp_path, LAYOUT)
+        if is_rejected_now:
+            assert is_rejected(found, "not_finite", "channel 'force': 1 samples are 0")
+        else:
+            assert is_read(found, samples), facts
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "sensitivity", "choices"),
+    [
+        ("rail (50 g)", "g", None, None),
+        ("rail (+-50 g)", "m/s²", None, None),
+        ("rail (V)", "m/s²", None, None),
+        ("rail [g]", "m/s²", None, "as 'unit: g!' or 'unit: m/s²!'."),
+        ("rail [mm]", "m/s²", None, None),
+        ("rail [g]", "V", 100.0, "as 'unit: g!' or 'unit: V!'."),
+    ],
+)
+def test_only_units_of_the_quantity_in_a_name_contradict_the_stated_unit(name, unit, sensitivity, choices, tmp_path):
+    with nptdms.TdmsWriter(str(tmp_path / "a.tdms")) as writer:
+        writer.write_segment([nptdms.ChannelObject("impact", name, SAMPLES[1], {"unit_string": unit})])
+    rail = RawChannel("rail", name, "acceleration", sensitivity=sensitivity, sensitivity_unit="mV/g")
+    found = outcome("a.tdms", tmp_path, RawDescription((rail,), rate=TRUE))
+    scale = 9.80665 if unit == "g" else 1.0
+    assert is_rejected(found, "unit_unknown", choices) if choices else is_read(found, scale * SAMPLES[1:])
