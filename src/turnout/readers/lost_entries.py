@@ -5,14 +5,12 @@ entry that most records of a file have and some lack, and a name that nearly equ
 """
 
 from collections.abc import Iterator, Sequence
-from difflib import get_close_matches
 from functools import lru_cache
 
 from turnout.errors import ReadError
 from turnout.readers.named_arrays import START_NAMES
 from turnout.readers.source import CONDITIONS, RawRecord, Source
 
-MIN_SIMILARITY = 0.85  # of two names by difflib: one changed character in seven
 MIN_NAME_SIZE = 5  # characters: shorter names resemble many
 START = "start time"
 REMEDY = "Copy the file again; if it is whole, correct the entry in the logger's settings"
@@ -87,8 +85,29 @@ def similar_name(name: str) -> str:
     plain = name.strip().lower()
     if plain in KNOWN or len(plain) < MIN_NAME_SIZE or len(plain) > MAX_NAME_SIZE:
         return ""
-    match = get_close_matches(plain, KNOWN, n=1, cutoff=MIN_SIMILARITY)
-    return KNOWN[match[0]] if match else ""
+    return next((KNOWN[known] for known in KNOWN if _is_damaged(plain, known)), "")
+
+
+def _is_damaged(name: str, known: str) -> bool:
+    """Whether a name is a known one with one character changed, missing or added, or two neighbours swapped.
+
+    A changed word of one character ("sensor_a", "sensor_b") and a further letter or digit at the end of a word (as in
+    a plural) make another name, not a damaged one.
+    """
+    start = next((i for i, (a, b) in enumerate(zip(name, known)) if a != b), min(len(name), len(known)))
+    a, b = name[start:], known[start:]
+    if len(a) == len(b) + 1:  # added
+        return a[1:] == b and not (a[0].isalnum() and a[1:2] in ("", *WORD_ENDS))
+    if len(a) + 1 == len(b):
+        return a == b[1:]
+    if len(a) != len(b):
+        return False
+    is_swap = a[:2] == b[1::-1] and len(b) > 1 and a[2:] == b[2:]
+    is_word = (start == 0 or known[start - 1] in WORD_ENDS) and b[1:2] in ("", *WORD_ENDS)
+    return is_swap or (a[1:] == b[1:] and not is_word)
+
+
+WORD_ENDS = ("_", " ", "-", ".")
 
 
 KNOWN = {name: name for name in CONDITIONS} | {name: START for name in START_NAMES}

@@ -11,6 +11,7 @@ from benchmarks.mutations import cases
 
 from turnout.errors import ReadError
 from turnout.readers import read
+from turnout.readers.lost_entries import KNOWN, similar_name
 from turnout.readers.writing import write
 from turnout.records import RawChannel, RawDescription
 
@@ -70,3 +71,34 @@ def test_a_matlab_array_with_a_false_size_is_rejected(tmp_path):
     (tmp_path / "a.mat").write_bytes(data[:128] + struct.pack("<II", 15, len(packed)) + packed)
     with pytest.raises(ReadError, match="1024 bytes of type 9 for 1280 numbers"):
         read("a.mat", tmp_path, LAYOUT)
+
+
+DAMAGED = ["rail_temqerature", "started_ad", "operatr", "operatro", "oper4ator", "ail_temperature"]
+OTHER_NAMES = ["oil_temperature", "operators", "operators_name", "restart_time", "start_times", "start_time2",
+               "train_ids", "rail_temperature", "operator"]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", DAMAGED + OTHER_NAMES)
+def test_a_name_of_one_changed_character_is_a_lost_entry_and_another_word_is_not(name):
+    assert bool(similar_name(name)) == (name in DAMAGED)
+
+
+@pytest.mark.parametrize("known", sorted(KNOWN))
+def test_every_changed_character_of_a_known_name_is_found_unless_it_is_a_word(known):
+    if len(known) < 6:
+        pytest.skip("shorter names resemble many")
+    for i in range(len(known)):
+        names = [known[:i] + "#" + known[i + 1 :], known[:i] + known[i + 1 :], known[:i] + "#" + known[i:]]
+        assert all(similar_name(n) or n in KNOWN for n in names), names
+
+
+@pytest.mark.parametrize(("comment", "is_lost"), [("{}", False), (' {"a": []} ', False), ('{"a": 1', True)])
+def test_only_a_comment_that_cannot_be_decoded_is_reported(comment, is_lost, tmp_path):
+    import soundfile
+
+    with soundfile.SoundFile(tmp_path / "a.wav", "w", 1000, 1, "DOUBLE") as file:
+        file.comment = comment
+        file.write(np.sin(np.arange(500.0)))
+    channel = RawChannel("rail", 0, "acceleration", unit="g")
+    result = read("a.wav", tmp_path, RawDescription((channel,), rate=1000.0))
+    assert len(result.recordings) == 1 and [e.reason for e in result.errors] == ["condition_lost"] * is_lost
