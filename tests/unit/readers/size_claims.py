@@ -1,6 +1,7 @@
 """Small intact files of every format, and copies of them in which one number that states a size is false."""
 
 import struct
+from datetime import datetime
 from itertools import islice
 
 import numpy as np
@@ -14,6 +15,16 @@ ENDINGS = {
 }  # fmt: skip
 N_SAMPLE, RATE = 1237, 5003.0  # primes: what equals them, or 2, 4, 8 times as many bytes, states a size
 CLAIMS = (2**27, 2**30, 2**31 - 1, 2**32 - 2, 2**40, 2**62)
+ACCEPTED = {
+    "read",
+    "unreadable",
+    "truncated",
+    "claims_too_much",
+    "wrong_length",
+    "empty",
+    "wrong_rate",
+    "channel_missing",
+}
 INTEGERS = ("<H", ">H", "<I", ">I", "<Q", ">Q")
 
 
@@ -31,7 +42,8 @@ def intact(folder, format):
 
         scipy.io.savemat(path, {"a": samples[0], "b": samples[1], "fs": RATE})
         return path
-    recording = Recording(samples, RATE, (Channel("a", "acceleration"), Channel("b", "acceleration")))
+    channels = (Channel("a", "acceleration"), Channel("b", "acceleration"))
+    recording = Recording(samples, RATE, channels, started_at=datetime(2024, 5, 13, 10))
     return write([recording], path, format)
 
 
@@ -60,22 +72,43 @@ def _places(content, old):
         at = content.find(old, at + 1)
 
 
+def layout(format):
+    """The layout of the intact file: channels a and b, which WAV and FLAC number."""
+    from turnout.records import RawChannel, RawDescription
+
+    sources = (0, 1) if format in ("wav", "flac") else ("a", "b")
+    return RawDescription(tuple(RawChannel(n, s, "acceleration", unit="m/s²!") for n, s in zip("ab", sources)), RATE)
+
+
+def lengths(folder, format):
+    """Numbers of samples of the recordings of the intact file and its errors, read at once and lazily."""
+    from turnout.readers import read
+
+    name = intact(folder, format).name
+    found = [read(name, folder, layout(format), **lazily) for lazily in LAZILY]
+    return [[r.n_sample for r in (*f.recordings, *f.long_recordings)] + list(f.errors) for f in found]
+
+
+LAZILY = ({}, {"max_duration": 1e-3, "max_whole_file_size": 0})
+
+
 def outcomes(folder, format, most=60):
     """{place: outcome} of the false claims of a format, at most ``most``, spread evenly over the file."""
     from turnout.errors import ReadError
     from turnout.readers import read
-    from turnout.records import RawDescription
 
     path = intact(folder, format)
     cases = list(false_claims(path.read_bytes()))
     found = {}
     for place, content in cases[:: -(-len(cases) // most) or 1]:
         path.write_bytes(content)
-        for lazily in ({}, {"max_duration": 1e-3, "max_whole_file_size": 0}):
+        for lazily in LAZILY:
             try:
-                result = read(path.name, folder, RawDescription(channels=()), **lazily)
+                result = read(path.name, folder, layout(format), **lazily)
                 longest = max((r.n_sample for r in (*result.recordings, *result.long_recordings)), default=0)
+                reasons = sorted({error.reason for error in result.errors} - ACCEPTED)
                 outcome = "read" if longest <= N_SAMPLE else f"{longest} samples"
+                outcome = f"{outcome}, {reasons}" if reasons else outcome
             except ReadError as error:
                 outcome = error.reason if path.name in str(error) else f"no name: {error}"
             except BaseException as error:

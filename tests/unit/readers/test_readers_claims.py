@@ -15,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from size_claims import ENDINGS
+from size_claims import ACCEPTED, ENDINGS, N_SAMPLE, lengths
 
 from turnout.errors import ReadError
 from turnout.readers import read
@@ -131,7 +131,6 @@ def test_no_claim_costs_memory(tmp_path):
     assert done.returncode == 0, done.stderr[-2000:]
 
 
-ACCEPTED = {"read", "unreadable", "truncated", "claims_too_much", "wrong_length", "empty", "wrong_rate"}
 LIMITED = """
 import json, logging, re, resource, sys
 from pathlib import Path
@@ -142,6 +141,11 @@ size = int(re.search(r"VmSize:\\s*(\\d+)", Path("/proc/self/status").read_text()
 resource.setrlimit(resource.RLIMIT_AS, (size + 700 * 2**20,) * 2)
 print(json.dumps({format: outcomes(Path(sys.argv[1]), format) for format in ENDINGS}))
 """
+
+
+@pytest.mark.parametrize("format", ENDINGS)
+def test_the_intact_file_whose_sizes_are_changed_is_read(format, tmp_path):
+    assert lengths(tmp_path, format) == [[N_SAMPLE], [N_SAMPLE]]
 
 
 def test_a_false_size_anywhere_in_a_file_of_any_format_costs_no_memory_and_gives_no_longer_record(tmp_path):
