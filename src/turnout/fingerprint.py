@@ -165,7 +165,7 @@ def _data_digest(folder: Path) -> str:
 def _memory_files() -> list[Path]:
     """Where parsed modules are remembered: beside the source, else in the user's cache."""
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    return [folder / "fingerprints.json" for folder in (ROOT / "__pycache__", Path(home) / PACKAGE)]
+    return [folder / "fingerprints.cache" for folder in (ROOT / "__pycache__", Path(home) / PACKAGE)]
 
 
 @cache

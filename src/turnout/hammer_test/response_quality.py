@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.constants import MAD_TO_SD
 from turnout.hammer_test.best_subset import select_best
 from turnout.hammer_test.impacts import find_impacts
 from turnout.records import Rejection
@@ -64,7 +63,6 @@ def find_track_impacts(
     impacts = find_impacts(recordings, force, response, replace(settings, best_impacts=0))
     impacts = judge_causality(impacts, response)
     impacts = judge_saturation(impacts, response)
-    impacts = judge_partial_saturation(impacts, response)
     impacts = judge_response_scale(impacts, response) if settings.softest_blow > 0.0 else impacts
     return select_best(impacts, settings)  # among those that no other test has rejected
 
@@ -137,9 +135,9 @@ def judge_saturation(impacts: Sequence[Impact], response: str) -> tuple[Impact, 
     if np.std(x) < MIN_FORCE_SPREAD:
         return tuple(impacts)
     deviations = x - x.mean()
-    for name in MIN_DEFICITS:
+    for name in ("peak", "steepest slope"):
         with np.errstate(divide="ignore"):
-            y = np.log(_largest_and_late(used, name == "steepest slope")[0])
+            y = np.log(_largest_values(used, name == "steepest slope"))
         if not np.isfinite(y).all():
             continue
         slope = float(deviations @ y / (deviations @ deviations))
@@ -155,71 +153,10 @@ def judge_saturation(impacts: Sequence[Impact], response: str) -> tuple[Impact, 
     return tuple(impacts)
 
 
-# Least deficits of the logarithms of peak and of steepest slope, over those of the weaker impacts, that show a limit.
-# Peaks of intact impacts scatter by 0.01, slopes by 0.03, as sampling can miss the steepest part.
-MIN_DEFICITS = {"peak": 0.05, "steepest slope": 0.1}
-MAX_DEVIATION = 5.0  # robust standard deviations of the weaker impacts
-LIMIT_SHARE = 0.8  # of the largest peak or slope: a limit is where the largest are
-LATE_DECAY = 0.02  # s behind the contact: the part of the decay with which peak and slope are compared
-
-
-def judge_partial_saturation(impacts: Sequence[Impact], response: str) -> tuple[Impact, ...]:
-    r"""Reject impacts whose response is limited at its beginning, in height or in slope, while weaker impacts are not.
-
-    The peak of a linear response, and its steepest slope, are in proportion to its later decay. An amplifier that
-    saturates, or follows only to a highest slope, reduces both at the beginning of strong impacts.
-
-    .. math:: q_i = \ln\frac{\max|a_i|}{\mathrm{rms}(a_i, \mathrm{late})}
-
-    An impact is rejected if q lies ``MIN_DEFICITS`` and ``MAX_DEVIATION`` standard deviations below the median of the
-    weaker half of the test.
-
-    Parameters
-    ----------
-    impacts : sequence of Impact
-        All impacts of a test; the accepted ones are compared.
-    response : str
-        Name of the response's channel, for the message.
-
-    Returns
-    -------
-    tuple of Impact
-        The impacts, with a rejection "overload" in those that are limited.
-    """
-    used = [i for i in impacts if i.accepted]
-    if len(used) < MIN_SLOPE_IMPACTS:
-        return tuple(impacts)
-    weaker = np.argsort([abs(i.peak) for i in used])[: (len(used) + 1) // 2]
-    rejections: dict[int, Rejection] = {}
-    for name, least in MIN_DEFICITS.items():
-        largest, q = _largest_and_late(used, name == "steepest slope")
-        if not np.isfinite(q).all():
-            continue
-        deficits = float(np.median(q[weaker])) - q
-        spread = MAD_TO_SD * float(np.median(np.abs(deficits[weaker]))) * (1.0 + 1.2 / np.sqrt(len(weaker)))
-        limit = max(least, MAX_DEVIATION * spread)
-        for k in np.flatnonzero((deficits > limit) & (largest >= LIMIT_SHARE * largest.max())):
-            detail = (
-                f"the {name} of {response} is {100.0 * (1.0 - np.exp(-deficits[k])):.0f} % below that of weaker "
-                "impacts, compared by the later decay: the channel is limited there, so choose a larger range"
-            )
-            rejections.setdefault(id(used[k]), Rejection("overload", float(deficits[k]), limit, detail, response))
-    return tuple(replace(i, rejections=(rejections[id(i)],)) if id(i) in rejections else i for i in impacts)
-
-
-def _largest_and_late(impacts: Sequence[Impact], is_slope: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Largest value of each response or of its differences, and the logarithm of its ratio to the later decay."""
-    largest, q = np.zeros(len(impacts)), np.full(len(impacts), np.nan)
-    for k, impact in enumerate(impacts):
-        x = impact.acceleration[impact.onset :]
-        x = np.diff(x) if is_slope else x
-        late_at = impact.contact_end - impact.onset + 2 * max(2, round(impact.contact * impact.rate))
-        late = x[late_at : late_at + round(LATE_DECAY * impact.rate)]
-        if x.size:
-            largest[k] = float(np.max(np.abs(x)))
-        if late.size and np.any(late) and largest[k] > 0.0:
-            q[k] = float(np.log(largest[k] / np.sqrt(np.mean(late**2))))
-    return largest, q
+def _largest_values(impacts: Sequence[Impact], is_slope: bool) -> np.ndarray:
+    """Largest value of each response, or of its differences."""
+    responses = (i.acceleration[i.onset :] for i in impacts)
+    return np.array([np.max(np.abs(np.diff(x) if is_slope else x), initial=0.0) for x in responses])
 
 
 # Share of its largest value at which a response has begun: a filter of linear phase rings before it with less.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -340,3 +341,22 @@ def channel_error(
         problem = f"all {n_sample} samples are {value:.6g}: the channel is dead"
         return source.error(place, problem, "Check sensor, cable and channel map", reason="dead_channel")
     return None
+
+
+def open_hdf5(source: Source) -> AbstractContextManager[Any]:
+    """The HDF5 file as a context; with a lazy source the datasets keep it open.
+
+    Parameters
+    ----------
+    source : Source
+        The HDF5 file.
+
+    Returns
+    -------
+    context manager of h5py.File
+        The open file.
+    """
+    import h5py
+
+    file = h5py.File(source.path, "r")
+    return nullcontext(file) if source.lazy else file

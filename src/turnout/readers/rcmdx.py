@@ -17,8 +17,7 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.claims import check_hdf5
-from turnout.readers.hdf5 import open_file
-from turnout.readers.lazy import is_large, lazy_array
+from turnout.readers.lazy import is_large, lazy_array, open_hdf5
 from turnout.readers.named_arrays import Metadata
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
 from turnout.readers.stated_scales import scale_text
@@ -51,7 +50,7 @@ def read_raw(source: Source) -> RawFile:
     ReadError
         If the file cannot be opened, or has no group RCMDX.
     """
-    with source.parsed_by("HDF5"), open_file(source) as file:
+    with source.parsed_by("HDF5"), open_hdf5(source) as file:
         check_hdf5(file, source)
         if "RCMDX" not in file:
             raise source.error("the root", "there is no group RCMDX", "Set the format in the layout to hdf5")

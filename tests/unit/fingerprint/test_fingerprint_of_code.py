@@ -129,7 +129,7 @@ def test_equal_modules_are_parsed_once(package, monkeypatch):
 @pytest.mark.parametrize("damage", [b"", b"{}", b'{"sha256": "", "modules": []}', None])
 def test_a_damaged_memory_is_no_fingerprint(package, damage):
     first = fp.fingerprint("turnout.core")
-    file = package / "__pycache__" / "fingerprints.json"
+    file = package / "__pycache__" / "fingerprints.cache"
     if damage is None:  # a digest that does not belong to the module
         digest = fp.json.loads(file.read_text())["modules"]["turnout.low"][1]
         damage = file.read_bytes().replace(digest.encode(), digest[::-1].encode())

@@ -99,21 +99,6 @@ def slew_limited(x, limit):
     return limited
 
 
-@pytest.mark.parametrize("quantile", [0.4, 0.6, 0.8])
-def test_impacts_that_saturate_while_weaker_ones_do_not_are_rejected_alone(hits, quantile):
-    """Clipped by at least 8 %, behind a filter that rounds the top: all found; not clipped: all used."""
-    peaks = np.abs(hits[:, 1]).max(axis=1)
-    limit = np.quantile(peaks, quantile)
-    clipped = hits.copy()
-    clipped[:, 1] = signal.sosfiltfilt(signal.butter(6, 0.9, output="sos"), np.clip(hits[:, 1], -limit, limit))
-    impacts = impacts_of(clipped)
-    for impact, peak in zip(impacts, peaks):
-        if peak > 1.08 * limit:
-            assert impact.rejections[0].reason == "overload" and "below that of weaker" in impact.rejections[0].detail
-        elif peak < limit:
-            assert impact.accepted
-
-
 def test_a_response_whose_slope_is_limited_in_all_impacts_is_found(hits):
     slopes = np.abs(np.diff(hits[:, 1], axis=1)).max(axis=1)
     limited = hits.copy()

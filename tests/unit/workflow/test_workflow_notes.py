@@ -14,7 +14,7 @@ def raw(tmp_path, repository, monkeypatch):
     """The raw folder of the first of two turnouts, with the files of two campaigns."""
     import shutil
 
-    shutil.copytree(repository / "config", tmp_path / "config")
+    shutil.copytree(repository / "config", tmp_path / "config", ignore=shutil.ignore_patterns("overrides"))
     monkeypatch.chdir(tmp_path)
     (tmp_path / "config/turnouts.tsv").write_text("turnout\tlayout\traw\ntommerup_s1\ttommerup\tline_7/s1\n")
     (tmp_path / "config/events.csv").unlink(missing_ok=True)

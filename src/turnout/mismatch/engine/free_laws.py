@@ -46,6 +46,8 @@ def free_law_share(search: Search, base: Fit, fit: Fit) -> float:
         0 if the case has no free laws, or if they explain nothing; 1 if the names alone explain nothing.
     """
     case = search.case
+    if not case.free_laws:
+        return 0.0
     first = _first_of_component(fit)
     laws = tuple(c for c in case.free_laws if c.family not in {named.family for named in first})
     if not laws or not first:
