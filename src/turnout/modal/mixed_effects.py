@@ -7,8 +7,9 @@ import numpy as np
 from turnout.modal.least_squares import Linearisation, linearise
 
 MAX_STEP = np.array([0.2, 0.15])  # of ln f and of zeta in one iteration
-SEARCH_RSS_STEPS = 2  # iterations over which an improvement is measured: steps may alternate between two values
+SEARCH_RSS_STEPS = 4  # iterations over which an improvement is measured: steps may alternate between two values
 SEARCH_RSS_STEP = 1.0  # improvement in variances of the noise that no choice depends on: limits are chi-squared of 2 n
+SEARCH_EXCURSION = 0.02  # share by which the sum of squares may lie above its smallest value on a plateau
 SEARCH_RSS_SHARE = 0.1  # improvement in shares of the distance to go
 MAX_PRINCIPAL = 8  # combinations of the decays that hold the signal
 RIDGE = 1e-10  # keeps matrices of two nearly equal modes invertible; distinct modes differ by 1e-6 and more
@@ -221,11 +222,11 @@ def fit_mixed(
         theta = np.repeat(np.asarray(start, dtype=float)[None], len(decays), axis=0)
     n_decay, n_mode = theta.shape[:2]
     dof = degrees_of_freedom(decays, n_mode, len(drift))
-    lowest_rss: list[float] = []
+    rss: list[float] = []
     for count in range(1, iterations + 1):
         linearisation = linearise(theta, decays, rate, drift)
         sigma2 = max(linearisation.rss.sum() / dof, 1e-300)
-        lowest_rss.append(min([float(linearisation.rss.sum()), *lowest_rss[-1:]]))
+        rss.append(float(linearisation.rss.sum()))
         inverse = _inverse(linearisation.information)
         step = np.einsum("ijk,ik->ij", inverse, linearisation.score).reshape(theta.shape)
         free = (theta + np.where(np.isfinite(step), step, 0.0)).reshape(n_decay, -1)
@@ -246,30 +247,34 @@ def fit_mixed(
         theta = shrunken
         if change < tolerance and count > 1:
             return result
-        if is_search and _is_decided(lowest_rss, sigma2, target_rss):
+        if is_search and _is_decided(rss, sigma2, target_rss):
             return result
     return result if n_decay == 1 else MixedFit(**{**result.__dict__, "converged": False})
 
 
-def _is_decided(lowest_rss: list[float], sigma2: float, target_rss: float | None) -> bool:
+def _is_decided(rss: list[float], sigma2: float, target_rss: float | None) -> bool:
     """Whether more iterations cannot change a choice of modes.
 
-    The sum of squares either no longer falls by ``SEARCH_RSS_STEP`` variances of the noise, or it falls by less than
-    ``SEARCH_RSS_SHARE`` of its distance from ``target_rss``: a sequence whose improvements each are at most nine
-    tenths of the one before never arrives there.
+    The smallest sum of squares either no longer falls by ``SEARCH_RSS_STEP`` variances of the noise, or it falls by
+    less than ``SEARCH_RSS_SHARE`` of its distance from ``target_rss``: a sequence whose improvements each are at most
+    nine tenths of the one before never arrives there. A step that leads away from it says nothing yet.
 
-    >>> rss = [200.0, 120.0, 110.0, 108.0]
-    >>> [_is_decided(rss, 1.0, target) for target in (None, 50.0, 0.0)]  # 12 is more than a tenth of 58
-    [False, False, False]
-    >>> [_is_decided([*rss, 106.0], 1.0, target) for target in (50.0, 100.0)], _is_decided([*rss, 107.9], 1.0, None)
-    ([True, False], False)
+    >>> rss = [200.0, 112.0, 110.0, 109.0, 108.5]
+    >>> [_is_decided([*rss, 108.2], 1.0, target) for target in (None, 50.0)]  # 3.8 is less than a tenth of 58.2
+    [False, True]
+    >>> plateau = [200.0, 108.5, 108.4, 108.3, 108.2]
+    >>> _is_decided([*plateau, 108.1], 1.0, None), _is_decided([*plateau, 120.0], 1.0, None)
+    (True, False)
     """
-    if len(lowest_rss) < 2 + SEARCH_RSS_STEPS:
+    if len(rss) < 2 + SEARCH_RSS_STEPS:
         return False
-    improvement = lowest_rss[-1 - SEARCH_RSS_STEPS] - lowest_rss[-1]
+    lowest = min(rss)
+    if max(rss[-SEARCH_RSS_STEPS:]) > (1.0 + SEARCH_EXCURSION) * lowest:
+        return False
+    improvement = min(rss[:-SEARCH_RSS_STEPS]) - lowest
     if improvement < SEARCH_RSS_STEP * sigma2:
         return True
-    return target_rss is not None and improvement < SEARCH_RSS_SHARE * (lowest_rss[-1] - target_rss)
+    return target_rss is not None and improvement < SEARCH_RSS_SHARE * (lowest - target_rss)
 
 
 def _limit_to_domain(free: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
