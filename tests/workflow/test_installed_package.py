@@ -57,7 +57,7 @@ def test_the_wheel_holds_workflow_configuration_and_templates(archives, reposito
     data = [p for p in package.rglob("*") if p.suffix in (".sql", ".csv", ".html", ".css", ".j2", ".json", ".typed")]
     assert not {str(p.relative_to(package.parent)) for p in data} - names
     assert f"Version: {turnout.__version__}" in metadata
-    for minor in (11, 12, 13, 14):
+    for minor in (11, 12, 13):
         assert f"Programming Language :: Python :: 3.{minor}" in metadata
 
 
