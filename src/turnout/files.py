@@ -185,13 +185,13 @@ def sparse_size(path: os.PathLike | str, status: os.stat_result) -> int:
 
 def _has_data(path: os.PathLike | str) -> bool:
     """Whether a file has any data that is no hole; True where the system does not say."""
-    handle = os.open(path, os.O_RDONLY)
+    if not hasattr(os, "SEEK_DATA"):
+        return True
     try:
-        os.lseek(handle, 0, os.SEEK_DATA)
-    except (AttributeError, OSError) as error:
-        return getattr(error, "errno", None) != errno.ENXIO
-    finally:
-        os.close(handle)
+        with open(path, "rb") as stream:
+            os.lseek(stream.fileno(), 0, os.SEEK_DATA)
+    except OSError as error:  # what else cannot be opened is said by those who read it
+        return error.errno != errno.ENXIO
     return True
 
 

@@ -9,7 +9,7 @@ from turnout.modal.least_squares import Linearisation, linearise
 MAX_STEP = np.array([0.2, 0.15])  # of ln f and of zeta in one iteration
 SEARCH_RSS_STEPS = 4  # iterations over which an improvement is measured: steps may alternate between two values
 SEARCH_RSS_STEP = 1.0  # improvement in variances of the noise that no choice depends on: limits are chi-squared of 2 n
-SEARCH_EXCURSION = 0.02  # share by which the sum of squares may lie above its smallest value on a plateau
+SEARCH_EXCURSION = 0.002  # share of the sum of squares above its smallest value, of the order of a test's limit
 SEARCH_RSS_SHARE = 0.1  # improvement in shares of the distance to go
 MAX_PRINCIPAL = 8  # combinations of the decays that hold the signal
 RIDGE = 1e-10  # keeps matrices of two nearly equal modes invertible; distinct modes differ by 1e-6 and more
@@ -259,11 +259,11 @@ def _is_decided(rss: list[float], sigma2: float, target_rss: float | None) -> bo
     less than ``SEARCH_RSS_SHARE`` of its distance from ``target_rss``: a sequence whose improvements each are at most
     nine tenths of the one before never arrives there. A step that leads away from it says nothing yet.
 
-    >>> rss = [200.0, 112.0, 110.0, 109.0, 108.5]
-    >>> [_is_decided([*rss, 108.2], 1.0, target) for target in (None, 50.0)]  # 3.8 is less than a tenth of 58.2
+    >>> rss = [2000.0, 1012.0, 1010.0, 1009.5, 1008.5]
+    >>> [_is_decided([*rss, 1008.2], 1.0, target) for target in (None, 950.0)]  # 3.8 is less than a tenth of 58.2
     [False, True]
-    >>> plateau = [200.0, 108.5, 108.4, 108.3, 108.2]
-    >>> _is_decided([*plateau, 108.1], 1.0, None), _is_decided([*plateau, 120.0], 1.0, None)
+    >>> plateau = [2000.0, 1008.5, 1008.4, 1008.3, 1008.2]
+    >>> _is_decided([*plateau, 1008.1], 1.0, None), _is_decided([*plateau, 1020.0], 1.0, None)
     (True, False)
     """
     if len(rss) < 2 + SEARCH_RSS_STEPS:

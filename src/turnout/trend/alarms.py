@@ -200,8 +200,9 @@ def _changes_of_sections(status: pd.DataFrame, changes: Mapping[int, Change]) ->
     members: dict[tuple, list[int]] = {}
     for i in changes:
         row = status.iloc[i]
-        name = ("", "", "", row["band"], i) if row["band"] not in RESONANCES else ()
-        members.setdefault((row["turnout_id"], row["section_id"], row["source"], *name), []).append(i)
+        is_resonance = row["band"] in RESONANCES
+        key = (row["turnout_id"], row["section_id"], row["source"]) if is_resonance else (i,)
+        members.setdefault(key, []).append(i)
 
     def clearness(i: int) -> float:
         width = changes[i].high - changes[i].low

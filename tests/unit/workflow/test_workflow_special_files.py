@@ -313,3 +313,4 @@ def test_a_file_system_that_reports_no_blocks_has_files_with_content(tmp_path):
     os.truncate(empty, 2**27)
     no_blocks = SimpleNamespace(st_size=2**27, st_blocks=0)
     assert sparse_size(full, no_blocks) == -1 and sparse_size(empty, no_blocks) == 0
+    assert sparse_size(tmp_path / "cannot be opened", no_blocks) == -1

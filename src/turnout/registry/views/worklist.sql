@@ -139,7 +139,7 @@ not_silenced as (
             and coalesce(k.until_utc, timestamp '9999-01-01') > "asof"
     )
 ),
-heard as (
+rows_to_list as (
     select * exclude (has_other) replace (
         follows_other and has_other as follows_other,
         case when follows_other and not has_other and acknowledged is null and not is_small
@@ -154,7 +154,7 @@ heard as (
 listed as (
     select
         *, case when section_id = '*' then 'whole turnout' else split_part(section_id, '/', -1) end as sections
-    from heard
+    from rows_to_list
     where why is null
     union all by name
     select
@@ -170,7 +170,7 @@ listed as (
             end) as why,
         max_by(direction, abs(change_pct)) as direction, max_by(change_pct, abs(change_pct)) as change_pct,
         max_by(low_pct, abs(change_pct)) as low_pct, max_by(high_pct, abs(change_pct)) as high_pct
-    from heard
+    from rows_to_list
     where why is not null
     group by turnout_id, band, source, state, case band when 'all' then why end
 ),
