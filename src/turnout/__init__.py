@@ -3,7 +3,7 @@
 The names below are for scripts and notebooks; docs/api.md describes them. Each is imported when it is first used.
 """
 
-from turnout.former_names import announce_former_names
+import sys
 
 TYPE_CHECKING = False  # as in typing, which takes longer to import than all of this module
 if TYPE_CHECKING:
@@ -60,4 +60,17 @@ def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
 
 
-announce_former_names()
+class _FormerNames:
+    """The last finder of the import system: it is asked only about modules that no other finder knows."""
+
+    @staticmethod
+    def find_spec(fullname: str, path: object = None, target: object = None) -> object:
+        """Tell who imports a module by its former name the present one."""
+        if not fullname.startswith(("turnout.", "turnout_blind.")):
+            return None
+        from turnout.former_names import find_former_name
+
+        return find_former_name(fullname)
+
+
+sys.meta_path.append(_FormerNames)  # type: ignore[arg-type]

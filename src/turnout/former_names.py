@@ -15,44 +15,35 @@ def former_names() -> dict[str, str]:
         return {row["former"]: row["now"] for row in csv.DictReader(stream)}
 
 
-class FormerNames:
-    """The last finder of the import system: it is asked only about modules that no other finder knows."""
+def find_former_name(fullname: str) -> object | None:
+    """Find no module but an empty package in place of a former one, so that its modules are asked for by name.
 
-    def find_spec(self, fullname: str, path: object = None, target: ModuleType | None = None) -> object | None:
-        """Find no module but an empty package in place of a former one, so that its modules are asked for by name.
+    Parameters
+    ----------
+    fullname : str
+        Dotted name of the module that is imported.
 
-        Parameters
-        ----------
-        fullname : str
-            Dotted name of the module that is imported.
-        path : any
-            Ignored; part of the protocol of finders.
-        target : ModuleType or None
-            Ignored; part of the protocol of finders.
+    Returns
+    -------
+    any or None
+        Specification of an empty package, None for every other name.
 
-        Returns
-        -------
-        any or None
-            Specification of an empty package, None for every other name.
+    Raises
+    ------
+    ModuleNotFoundError
+        With the present name, where ``fullname`` is a former one.
+    """
+    names = former_names()
+    now = names.get(fullname)
+    if now is None:
+        return None
+    if any(name.startswith(f"{fullname}.") for name in names):
+        from importlib.machinery import ModuleSpec
 
-        Raises
-        ------
-        ModuleNotFoundError
-            With the present name, where ``fullname`` is a former one.
-        """
-        if not fullname.startswith(("turnout.", "turnout_blind.")):
-            return None
-        names = former_names()
-        now = names.get(fullname)
-        if now is None:
-            return None
-        if any(name.startswith(f"{fullname}.") for name in names):
-            from importlib.machinery import ModuleSpec
-
-            return ModuleSpec(fullname, _EmptyPackage(now), is_package=True)  # type: ignore[arg-type]
-        _forget_empty_packages(fullname)
-        message = f"{fullname} was renamed in Turnout 0.2. Import {now} instead"
-        raise ModuleNotFoundError(message, name=fullname)
+        return ModuleSpec(fullname, _EmptyPackage(now), is_package=True)  # type: ignore[arg-type]
+    _forget_empty_packages(fullname)
+    message = f"{fullname} was renamed in Turnout 0.2. Import {now} instead"
+    raise ModuleNotFoundError(message, name=fullname)
 
 
 class _EmptyPackage:
@@ -84,8 +75,3 @@ def _forget_empty_packages(fullname: str) -> None:
         if isinstance(getattr(getattr(module, "__spec__", None), "loader", None), _EmptyPackage):
             del sys.modules[".".join(parts[:n])]
             vars(sys.modules[".".join(parts[: n - 1])]).pop(parts[n - 1], None)
-
-
-def announce_former_names() -> None:
-    """Install ``FormerNames`` behind all other finders of this process."""
-    sys.meta_path.append(FormerNames())  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Who may know whom: read from the imports of every file, so that the house keeps its shape."""
+"""Which packages may import which: read from the syntax trees of all files."""
 
 import ast
 
@@ -18,8 +18,8 @@ ALLOWED = {
     "records": {"errors", "plots"},
     "threads": set(),
     "units": {"constants", "errors", "records"},
-    **{room: LOWEST for room in FLOOR},
-    **{room: LOWEST | FLOOR for room in PARTS},
+    **{package: LOWEST for package in FLOOR},
+    **{package: LOWEST | FLOOR for package in PARTS},
     "physics": LOWEST | FLOOR | PARTS,
     "workflow": LOWEST | FLOOR,
     "trend": LOWEST | FLOOR | PARTS | {"physics"},
@@ -68,8 +68,8 @@ def imports_of(path):
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
-def room_of(module):
-    """The part of the house that ``turnout.x.y`` lies in."""
+def package_of(module):
+    """The package of ``turnout.x.y``."""
     return module.split(".")[1] if module.startswith("turnout.") else None
 
 
@@ -81,13 +81,13 @@ def sources(repository):
             yield parts[0], path
 
 
-def test_each_room_imports_only_what_it_may(repository):
+def test_each_package_imports_only_what_it_may(repository):
     wrong = []
-    for room, path in sources(repository):
-        assert room in ALLOWED, f"{path}: no rule for {room!r}; give it a line in ALLOWED"
+    for package, path in sources(repository):
+        assert package in ALLOWED, f"{path}: no rule for {package!r}; give it a line in ALLOWED"
         for module in imports_of(path):
-            other = room_of(module)
-            if other in ALLOWED and other != room and other not in ALLOWED[room]:
+            other = package_of(module)
+            if other in ALLOWED and other != package and other not in ALLOWED[package]:
                 wrong.append(f"{path.relative_to(repository)} imports {module}")
     assert not wrong, "\n".join(wrong)
 
@@ -107,8 +107,8 @@ def test_only_the_report_and_the_plots_import_a_plotting_library(repository):
     plotting = {"matplotlib", "plotly", "altair", "seaborn"}
     wrong = [
         str(p)
-        for room, p in sources(repository)
-        if room not in ("report", "plots") and any(m.split(".")[0] in plotting for m in imports_of(p))
+        for package, p in sources(repository)
+        if package not in ("report", "plots") and any(m.split(".")[0] in plotting for m in imports_of(p))
     ]
     assert not wrong, "\n".join(wrong)
 
@@ -116,10 +116,10 @@ def test_only_the_report_and_the_plots_import_a_plotting_library(repository):
 OPENING_CALLS = {"open", "read_text", "write_text", "read_bytes", "write_bytes"}
 
 
-def test_only_the_named_rooms_open_files(repository):
+def test_only_the_named_packages_open_files(repository):
     wrong = []
-    for room, path in sources(repository):
-        if room in OPENS_FILES:
+    for package, path in sources(repository):
+        if package in OPENS_FILES:
             continue
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.Call):
