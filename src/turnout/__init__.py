@@ -66,7 +66,7 @@ class _FormerNames:
     @staticmethod
     def find_spec(fullname: str, path: object = None, target: object = None) -> object:
         """Tell who imports a module by its former name the present one."""
-        if not fullname.startswith(("turnout.", "turnout_blind.")):
+        if not fullname.startswith("turnout"):
             return None
         from turnout.former_names import find_former_name
 
