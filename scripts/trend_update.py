@@ -8,4 +8,5 @@ from turnout.workflow.retries import attempt
 logging.basicConfig(filename=snakemake.log[0], filemode="w", level="INFO", format="%(levelname)s %(message)s")
 with attempt("trend", snakemake.params.again):
     configuration, day = snakemake.params.job["configuration"], snakemake.params.day
-    print(trend_job(snakemake.input.registry, *snakemake.output, configuration, day)["rows"])
+    rows = trend_job(snakemake.input.registry, *snakemake.output, configuration, day)["rows"]
+    print(f"trend: {', '.join(f'{n} rows of {table}' for table, n in rows.items())}")

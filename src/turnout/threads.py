@@ -1,4 +1,4 @@
-"""One BLAS thread per process, because the processes share the cores."""
+"""One BLAS thread per process: the processes share the cores, and results do not depend on the number of cores."""
 
 import os
 

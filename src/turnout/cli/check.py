@@ -8,13 +8,13 @@ stiffness and acceleration are those of a track.
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from turnout.cli.options import RAW_HELP, add_configuration, add_raw, add_result
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator
-    from pathlib import Path
 
     from turnout.config import Configuration, Event
     from turnout.units import Conversion
@@ -51,8 +51,6 @@ def run(args: argparse.Namespace) -> int:
     int
         Exit code.
     """
-    from pathlib import Path
-
     from turnout.config import load_configuration
     from turnout.errors import ConfigError
     from turnout.readers.formats import FORMATS
@@ -126,7 +124,17 @@ def _report_left_out(configuration: Configuration, raw: Path) -> int:
     print(f"{raw}: {n_files} files in {n_units} units, {len(problems)} left out or unsound.")
     for problem in problems:
         print(f"  {problem}")
+    for folder in _folders_without_turnout(configuration, raw):
+        print(f"  {folder}: no turnout reads this folder. `turnout add ID LAYOUT --raw {folder.name}` adds one")
     return len(problems)
+
+
+def _folders_without_turnout(configuration: Configuration, raw: Path) -> list[Path]:
+    """Folders directly below the raw root from which no turnout reads and into which no turnout's folder leads."""
+    first = {Path(configuration.turnout(name).raw).parts[:1] for name in configuration.ids}
+    if () in first:  # a turnout whose folder is the raw root itself
+        return []
+    return sorted(p for p in raw.iterdir() if p.is_dir() and not p.name.startswith(".") and (p.name,) not in first)
 
 
 def _report_readings(configuration: Configuration, raw: Path, only: str | None) -> int:

@@ -18,6 +18,7 @@ from turnout import __version__
 from turnout.cli import COMMANDS, GROUPS
 from turnout.cli.options import add_common, leaf_parsers
 from turnout.errors import TurnoutError
+from turnout.threads import use_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -91,6 +92,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     int
         Exit code, see ``EXIT_CODES``.
     """
+    use_one_thread()
     args = build_parser().parse_args(argv)
     started = time.monotonic()
     if args.quiet:

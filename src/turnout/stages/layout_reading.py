@@ -137,7 +137,9 @@ def _hammer_faults(
     # the scale of the response is wrong in all impacts at once: the stiffness shows by which factor
     measured = [replace(i, rejections=tuple(r for r in i.rejections if r.channel != response)) for i in impacts]
     stiffness = median_stiffness(measured)
-    stiffness_text = "" if stiffness is None else f", dynamic stiffness {stiffness / 1e6:.3g} MN/m"
+    low, high = STIFFNESS_BAND
+    band_text = f", dynamic stiffness (median of {low:g} to {high:g} Hz)"
+    stiffness_text = "" if stiffness is None else f"{band_text} {stiffness / 1e6:.3g} MN/m"
     return faults, f", {len(impacts)} impacts{stiffness_text}"
 
 

@@ -36,10 +36,10 @@ workflow.default_target = "all"  # an included file does not set it
 README = """\
 # Turnouts
 
-1. Describe sections, sensors and file names in `config/layouts/`; `tommerup.yaml` is an example with comments.
-2. Enter each turnout: `turnout add my_turnout tommerup`. The row is in `config/turnouts.tsv`.
-3. Put its recordings below `raw/my_turnout/`, as `hammer/2026-05-13/A7_1.uff`, and `campaigns.csv` beside them.
-4. `turnout check` says what does not fit together, with file, line and remedy.
+1. Put the recordings of a turnout below `raw/ID/`, as `hammer/2026-05-13/A7_1.uff`, and `campaigns.csv` beside them.
+2. `turnout inspect FILE` shows what a file contains. `turnout layout new --from FILE...` drafts its description.
+3. Enter the turnout: `turnout add ID LAYOUT`. The layout `tommerup` is an example with comments.
+4. `turnout check --read` says what does not fit together, with file, line and remedy.
 5. `turnout nightly` computes what is new. The pages are in `results/pages/index.html`.
 6. `turnout worklist` says which turnouts need attention; `turnout --help` lists all commands.
 7. Settings of the method are in `config/config.yaml`, each with its unit, limits and reason.

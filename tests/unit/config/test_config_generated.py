@@ -97,6 +97,18 @@ def test_check_names_files_that_no_pattern_knows(copy, capsys):
     assert "tommerup_s2, folder: no file matches a pattern of the layout" in said
 
 
+def test_check_names_folders_that_no_turnout_reads(copy, capsys):
+    for name in ("raw/tommerup_s1", "raw/line_7/v7", "raw/W 12"):
+        (copy / name).mkdir(parents=True)
+    main(["check"])
+    said = capsys.readouterr().out
+    assert "raw/W 12: no turnout reads this folder" in said and "raw/line_7: no turnout reads this folder" in said
+    assert "raw/tommerup_s1: no turnout" not in said
+    assert main(["add", "odense_v7", "tommerup", "--raw", "line_7/v7"]) == 0
+    main(["check"])
+    assert "raw/line_7: no turnout" not in capsys.readouterr().out
+
+
 def test_show_and_plan_and_formats_speak(copy, capsys):
     assert main(["config", "show", "aarup_n4", "--only", "sections.A9"]) == 0
     assert "config/layouts/tommerup.yaml, line" in capsys.readouterr().out

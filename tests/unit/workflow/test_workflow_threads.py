@@ -1,4 +1,4 @@
-"""A stage job starts one BLAS thread, whatever Snakemake has set."""
+"""A stage job and a command start one BLAS thread, whatever the environment has set."""
 
 import os
 import subprocess
@@ -25,3 +25,9 @@ def test_one_thread_is_asked_for_before_numpy_comes(repository):
         line for line in (repository / "scripts/stage.py").read_text().splitlines() if "(" in line or "import" in line
     ]
     assert calls[:2] == ["from turnout.threads import use_one_thread", "use_one_thread()"]
+
+
+def test_a_command_asks_for_one_thread_before_numpy_comes():
+    code = "import sys, turnout.cli.main as m; m.use_one_thread = lambda: sys.exit('numpy' in sys.modules)"
+    code += "; m.main(['check'])"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
