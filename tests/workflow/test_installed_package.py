@@ -94,7 +94,7 @@ def test_version_is_that_of_the_package(installed):
 TUTORIAL = "docs/tutorial.md"
 FENCED = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 NUMBER = re.compile(r"\d+\.\d+")
-# A number with decimals may differ by 2 %: the ninth digit of a fit depends on the processor, the last shown ones on it.
+# A number with decimals may differ by 2 %: the last digits of a fit depend on the processor.
 RELATIVE_TOLERANCE = 0.02
 
 
