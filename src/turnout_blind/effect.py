@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from turnout_blind.site import Site
 
 LOCKS = ("place", "wheel", "train", "sensor", "wavelength", "frequency", "clock", "condition", "amplitude")
-STRATA = ("single", "outside", "unidentifiable")
+STRATA = ("single", "outside", "unidentifiable", "history")  # "history": in sites that are visited for years alone
 
 
 @dataclass(frozen=True)

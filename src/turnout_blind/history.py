@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 NONE, START, STEP, GROWTH = PATTERNS = ("none", "start", "step", "growth")
 PATTERN_WEIGHTS = (0.25, 0.125, 0.3125, 0.3125)  # 20, 10, 25 and 25 of 80 sites
-HISTORY_EFFECTS = ("ballast", "pad", "gain", "position", "void", "dip")
+HISTORY_EFFECTS = ("ballast", "pad", "gain", "position", "void", "dip", "nose")
 FIRST_DAY, N_DAYS = datetime(2022, 2, 1), 730
 VISIT_JITTER = 20.0  # half the range of the uniform error of the day of a visit [d]
 GROWTH_DAYS = 365.0  # time from the first to the full size of an effect that grows [d]
@@ -55,6 +55,7 @@ GROWING = {
     "position": {"shift": lambda v, s: v * s},
     "void": {"gap": lambda v, s: v * s, "seated": lambda v, s: 1.0 - (1.0 - v) * s, "growth": lambda v, s: 0.0},
     "dip": {"depth": lambda v, s: v * s},
+    "nose": {"depth": lambda v, s: v * s},
 }
 
 
@@ -73,7 +74,7 @@ class HistoryPlan:
 def plan_histories(
     seed: int, n_sites: int, effects: Mapping[str, Effect], n_passages: int = 1, n_visits: int = 4
 ) -> list[HistoryPlan]:
-    """Plans of a set of histories in shuffled order, half of them in crossing panels.
+    """Plans of a set of histories in shuffled order, half of them in crossing panels, as all with a worn nose.
 
     Parameters
     ----------
@@ -112,8 +113,11 @@ def plan_histories(
         rung = int(rng.integers(n_rungs // 2, n_rungs))
         effect = None if patterns[k] == NONE else (kind, rung)
         plans.append(HistoryPlan(patterns[k], effect, (seed, 37, number), PLAIN, n_visits, n_passages))
-    half = rng.permutation(n_sites)
-    return [replace(p, panel=CROSSING if half[k] % 2 else PLAIN) for k, p in enumerate(plans)]
+    has_nose = [p.effect is not None and effects[p.effect[0]].site.get("panel") == CROSSING for p in plans]
+    without_nose = rng.permutation([k for k, nose in enumerate(has_nose) if not nose]).tolist()
+    crossings = {k for k, nose in enumerate(has_nose) if nose}
+    crossings |= set(without_nose[: max(n_sites // 2 - len(crossings), 0)])
+    return [replace(p, panel=CROSSING if k in crossings else PLAIN) for k, p in enumerate(plans)]
 
 
 def make_history(folder: str | Path, case: str, plan: HistoryPlan, effects: Mapping[str, Effect]) -> dict[str, Any]:

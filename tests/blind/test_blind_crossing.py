@@ -91,3 +91,25 @@ def test_the_story_of_a_case_at_a_crossing_is_drawn_there(monkeypatch, tmp_path)
     truth = {"stratum": "control", "effects": [], "seed": [1], "panel": "crossing"}
     with pytest.raises(Staged, match="crossing"):
         case_reports.draw_case(truth, [], None, tmp_path / "story.svg", {})
+
+
+def test_a_nose_wears_at_its_tip_by_as_much_as_it_says_and_nowhere_else(site):
+    """Parabolic slopes of 0.25 and 0.75 of the length: the depth at the tip, a quarter of it half way to either end."""
+    effect = load_effects()["nose"]
+    where, p = effect.draw(np.random.default_rng(2), site, 1.5e-3)
+    assert abs(where["position"] - site.crossing.nose) < 0.2  # 4 sd of the file's error of 5 cm
+    p |= {"length": 0.8, "share": 0.25}
+    world = site.world.copy()
+    effect.act(world, site, where, p)
+    assert len(world.surface) == len(site.world.surface) + 1
+
+    def wear(x):
+        return sum(f(np.array(x)) for f in world.surface) - sum(f(np.array(x)) for f in site.world.surface)
+
+    at = where["position"]
+    assert wear([at]) == pytest.approx(1.5e-3)
+    assert wear([at - 0.24, at + 0.64, at - 3.0]) == pytest.approx(0.0)
+    assert 0.25 * 1.5e-3 < wear([at + 0.3]) < 0.4 * 1.5e-3  # rounded over 3 cm: a little more than a quarter
+    plain = draw_site(np.random.default_rng(1))
+    with pytest.raises(ValueError, match="only a crossing"):
+        effect.draw(np.random.default_rng(2), plain, 1e-3)

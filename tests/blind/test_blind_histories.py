@@ -20,6 +20,10 @@ from turnout_blind.score.metrics import Rate, Share
 EFFECTS = load_effects()
 
 
+def panel(kind):
+    return EFFECTS[kind].site.get("panel", "plain")
+
+
 def test_a_set_has_its_patterns_effects_and_panels_in_shares():
     plans = plan_histories(5, 80, EFFECTS)
     assert [sum(p.pattern == n for p in plans) for n in history.PATTERNS] == [20, 10, 25, 25]
@@ -27,6 +31,7 @@ def test_a_set_has_its_patterns_effects_and_panels_in_shares():
     kinds = [p.effect[0] for p in plans if p.effect]
     assert set(kinds) == set(history.HISTORY_EFFECTS) and max(map(kinds.count, kinds)) <= 14
     assert all(p.effect is None for p in plans if p.pattern == "none")
+    assert all(p.panel == "crossing" for p in plans if p.effect and p.effect[0] == "nose")
     assert plans == plan_histories(5, 80, EFFECTS) != plan_histories(6, 80, EFFECTS)
 
 
@@ -104,7 +109,7 @@ def test_no_recorded_work_repairs_what_is_concealed(kind, tmp_path, monkeypatch)
 
     monkeypatch.setattr(history, "_draw_maintenance", draw_maintenance)
     (tmp_path / "T1" / "config").mkdir(parents=True)
-    truth = make_history(tmp_path, "T1", HistoryPlan("start", (kind, 4), (4, 2)), EFFECTS)
+    truth = make_history(tmp_path, "T1", HistoryPlan("start", (kind, 4), (4, 2), panel(kind)), EFFECTS)
     is_repaired = kind in ("ballast", "void", "gain", "position")
     assert len(draws) == (2 if is_repaired else 1) and bool(truth["maintenance"]) != is_repaired
 
@@ -121,7 +126,7 @@ def test_work_elsewhere_or_before_the_effect_repairs_nothing():
 
 def test_parameters_of_a_growing_effect_end_at_their_full_size():
     for kind in history.HISTORY_EFFECTS:
-        site = history.draw_site(np.random.default_rng(3))
+        site = history.draw_site(np.random.default_rng(3), panel=panel(kind))
         full = EFFECTS[kind].draw_concealed(np.random.default_rng(1), site, 5).parameters
         assert parameters_at(kind, full, 1.0) == pytest.approx({**full, **({"growth": 0.0} if kind == "void" else {})})
     assert parameters_at("void", {"gap": 2e-3, "seated": 0.2, "close": 1e-4, "growth": 0.02}, 0.5) == pytest.approx(

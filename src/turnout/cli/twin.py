@@ -10,6 +10,7 @@ recordings is fitted again. Visits with an open finding of ``turnout diagnose`` 
 from __future__ import annotations
 
 import argparse
+import math
 from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_configuration, add_raw, add_result, add_track, add_turnout, add_work
@@ -94,7 +95,7 @@ def model_text(turnout_id: str, model: CalibratedModel, show_all: bool = False) 
         yield f"visit {visit} is not used: its diagnosis is {answer.replace('_', ' ')}, and not accepted"
     yield from (f"note: {note}" for note in model.notes)
     yield from _table(model, show_all)
-    yield "against the file: " + ("; ".join(_deviations(model)) or "nothing differs")
+    yield "against the file: " + ("; ".join(_differences(model)) or "nothing differs")
     for change in (a for a in model.answers if a.question == "change"):
         yield f"changes up to {change.visit}: {_change(change)}"
     yield from _strongest(model)
@@ -122,28 +123,38 @@ def _unit(parameter: StateParameter | Deviation) -> str:
     return "ln" if parameter.unit == "-" and parameter.group != "gain" else parameter.unit
 
 
-def _deviations(model: CalibratedModel) -> Iterator[str]:
+def _differences(model: CalibratedModel) -> Iterator[str]:
+    """The answer against the file in words, and all deviations of single values and runs."""
+    for answer in [a for a in model.answers if a.question == "file" and a.verdict != "none"][-1:]:
+        yield _effect(answer)
     for d in model.deviations:
         extent = d.names[0] if len(d.names) == 1 else f"{d.names[0]} to {d.names[-1]}"
-        yield f"{extent}: {d.size:+.3g} ± {d.sd:.2g} {_unit(d)}".removesuffix(" -")
+        unit = _unit(d)
+        factor = f", {math.exp(d.size):.2g} times the file's value" if unit == "ln" else ""
+        yield f"{extent}: {d.size:+.3g} ± {d.sd:.2g} {unit}".removesuffix(" -") + factor
 
 
 def _change(answer: ModelAnswer) -> str:
     """The change in words: effect, parameter, size and onset."""
     if answer.verdict == "none":
         return "none"
-    if answer.verdict == "unknown":
+    if answer.onset is None:
         return f"unknown, the visit differs from all before, most at {answer.parameter}"
-    assert answer.size is not None and answer.sd is not None and answer.onset is not None
     from turnout.stages.calibrated_model import day_of
 
     start, end = (day_of(t) for t in answer.onset)
+    return f"{_effect(answer)}, appeared after {start}, at the latest at {end} ({answer.gain:.0f} nats)"
+
+
+def _effect(answer: ModelAnswer) -> str:
+    """Names, parameter and size of an answer."""
+    if answer.verdict == "unknown":
+        return f"unknown effect at {answer.parameter}, no name explains it alone"
+    assert answer.size is not None and answer.sd is not None
     unit = "ln" if answer.unit == "-" and answer.group != "gain" else answer.unit
     rate = f"{unit} a year" if answer.grows else unit
-    return (
-        f"{' or '.join(answer.names).replace('_', ' ')}, {answer.parameter} {answer.size:+.3g} ± {answer.sd:.2g} "
-        f"{rate}, appeared after {start}, at the latest at {end} ({answer.gain:.0f} nats)"
-    )
+    names = " or ".join(answer.names).replace("_", " ")
+    return f"{names}, {answer.parameter} {answer.size:+.3g} ± {answer.sd:.2g} {rate}"
 
 
 def _strongest(model: CalibratedModel) -> Iterator[str]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import sys
-from collections.abc import Iterable, Mapping, MutableMapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, MutableMapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import date
 from pathlib import Path
@@ -37,8 +37,10 @@ from turnout.mismatch.calibrated import (
     deviations_from_file,
     estimate_history,
 )
+from turnout.mismatch.calibrated.answers import INTOLERABLE, NAMES
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.engine.diagnose import fit_base
+from turnout.mismatch.engine.large_values import fit_large_values
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.calibration import (
@@ -62,11 +64,11 @@ DAYS_PER_YEAR = 365.25
 USED_ANSWERS = ("none", "")  # "": not diagnosed; a visit with an open finding changes nothing until it is accepted
 # Groups of parameters that a kind of work makes uncertain again
 OPENED = {
-    "tamping": ("ballast", "ballast_damper", "wave", "surface"),
-    "ballast_cleaning": ("ballast", "ballast_damper", "wave", "surface"),
+    "tamping": ("ballast", "ballast_damper", "wave", "surface", "depth"),
+    "ballast_cleaning": ("ballast", "ballast_damper", "wave", "surface", "depth"),
     "pad_exchange": ("pad", "pad_damper"),
-    "rail_change": ("rail", "wave", "surface", "gain", "seat"),
-    "grinding": ("wave", "surface"),
+    "rail_change": ("rail", "wave", "surface", "depth", "gain", "seat"),
+    "grinding": ("wave", "surface", "depth"),
     "sleeper_change": ("sleeper", "pad", "pad_damper", "ballast", "ballast_damper", "wave"),
     "sensor_change": ("gain", "seat"),
 }
@@ -184,11 +186,18 @@ def store_visit(
     """
     search, fit = fit_base(Search.of(case, about["turnout"].settings["mismatch"], None, store))
     assert isinstance(search.case, TrackCase)
+    parameters = calibrated_parameters(search.case, group.route)
+    may_be_large = [
+        nuisance
+        for nuisance, p in parameters.items()
+        if p.group in dict(CALIBRATION.least_sizes) and NAMES[p.group] not in about.get("without", ())
+    ]
+    fit = fit_large_values(search, fit, may_be_large, CALIBRATION.change_sds)
     sections = ", ".join(group.labels)
     information = visit_groups(search.case, fit, sections, group.route)
     value = {
         "version": dict(about["version"]), "visit": about["visit"], "sections": sections, "answer": answer,
-        "parameters": [asdict(p) for p in calibrated_parameters(search.case, group.route).values()],
+        "parameters": [asdict(p) for p in parameters.values()],
         "point": dict(linearization_point(search.case, fit, group.route)),
         "groups": [
             {"group": g.group, "n": g.n_recordings, "names": list(g.names), "matrix": g.matrix, "vector": g.vector}
@@ -370,6 +379,7 @@ def calibrate_turnout(
     work: str | Path = "work",
     track: str | None = None,
     each_visit: bool = False,
+    without: Collection[str] = (),
 ) -> CalibratedModel:
     """Calibrated model of a turnout from all visits below the raw root.
 
@@ -390,6 +400,8 @@ def calibrate_turnout(
         Name or file of a track; None: the turnout's own.
     each_visit : bool
         Whether ``answers`` are those after each visit, or after the newest one alone.
+    without : collection of str
+        Names of effects that are left out of the library, to see what is said of them then.
 
     Returns
     -------
@@ -407,12 +419,13 @@ def calibrate_turnout(
             f"{turnout_id}: no hammer test and no passage below {raw_root}; nothing can be calibrated."
         )
     folder, code = Path(work) / FOLDER, fingerprint("turnout.stages.mismatch")
+    code = "-".join([code, *sorted(without)])
     units_of_visits = {v: unit_of(turnout_id, v, units, turnout.hashes["mismatch"]) for v, units in by_visit.items()}
     versions = {v: version_of(unit, turnout, raw_root, track, code) for v, unit in units_of_visits.items()}
     complete = {s.visit for s in read_visits(folder, turnout_id, versions)}
     missing, notes = [label for label in by_visit if label not in complete], []
     for label in missing:
-        about = {"turnout": turnout, "visit": label, "version": versions[label]}
+        about = {"turnout": turnout, "visit": label, "version": versions[label], "without": without}
         print(f"{turnout_id}: fit of visit {label}", file=sys.stderr, flush=True)
         notes += _fit_visit(folder, by_visit[label], raw_root, work, track, about)
     stored = read_visits(folder, turnout_id, versions)
@@ -425,8 +438,13 @@ def calibrate_turnout(
     history = estimate_history(parameters, _visits_of(_without_findings(stored)), events)
     informed = _visits_of(stored)
     changes = estimate_history(parameters, informed, events, repeats_between_visits=False, accepted=None)
-    deviations = deviations_from_file(history.belief, parameters, dict(CALIBRATION.least_sizes))
-    candidates, settings = change_candidates(parameters, dip_directions(parameters)), turnout.settings["mismatch"]
+    deviations = deviations_from_file(
+        history.belief, parameters, dict(CALIBRATION.least_sizes), intolerable=INTOLERABLE
+    )
+    candidates, settings = (
+        change_candidates(parameters, dip_directions(parameters), without),
+        turnout.settings["mismatch"],
+    )
     answers = answers_after_visits(
         parameters,
         informed,

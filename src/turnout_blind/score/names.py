@@ -17,6 +17,7 @@ RIGHT_NAMES = {
     "pad_fractional": ("zener_pad",),
     "rail_shear": ("rail_shear",),
     "dip": ("surface_dip",),
+    "nose": ("surface_dip",),
     "flat": ("wheel_flat",),
     "out_of_round": ("out_of_round",),
     "corrugation": ("rail_corrugation",),

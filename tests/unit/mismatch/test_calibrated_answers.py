@@ -6,7 +6,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from turnout.mismatch.calibrated import GroupInformation, OnsetEvidence, StateParameter, VisitInformation, answers
+from turnout.mismatch.calibrated import (
+    Event,
+    GroupInformation,
+    Innovation,
+    OnsetEvidence,
+    StateParameter,
+    VisitInformation,
+    answers,
+    compare_onsets,
+    estimate_history,
+)
 from turnout.mismatch.calibrated.answers import answers_after_visits, change_answer, change_candidates
 from turnout.mismatch.turnout.calibration import dip_directions
 from turnout.mismatch.turnout.rail_roughness import Waves
@@ -111,8 +121,9 @@ def test_a_rival_just_below_the_threshold_counts(monkeypatch):
 
     def answer(rival):
         pair = [evidence("gain_A1", 12.3, 0.3), evidence("ballast@1.20", rival, 0.5)]
-        monkeypatch.setattr(answers, "compare_onsets", lambda *a: sorted(pair, key=lambda e: -e.gain))
-        monkeypatch.setattr(answers, "evidence_from_first", lambda p, h, c: (np.zeros(len(c)),) * 3)
+        monkeypatch.setattr(
+            answers, "compare_onsets", lambda h, c: sorted(pair, key=lambda e: -e.gain) if c is CANDIDATES else []
+        )
         found = change_answer(PARAMETERS, visits, [], CANDIDATES, 12.0, 6.0)
         return found.verdict, found.names
 
@@ -195,3 +206,86 @@ def test_work_on_the_whole_turnout_opens_what_all_supports_share(tmp_path, secti
     common = [StateParameter(n, 0.0, 0.25, 0.0, "track") for n in ("ballast_stiffness", "pad_stiffness")]
     (event,) = events_of(turnout, [SUPPORTS[0], GAINS[0], *common])
     assert set(event.opened) == opened
+
+
+def test_a_parameter_without_a_name_that_explains_more_is_unknown():
+    """A damper of one support changes; there is no name for it, and what has names is no substitute."""
+    damper = StateParameter("ballast_damper@1.20", 0.0, 0.15, 0.05, "ballast_damper", 2, 1.2)
+    parameters, names = [*PARAMETERS, damper], (*NAMES, damper.name)
+    visits = []
+    for v in histories(np.random.default_rng(11), 4, step("ballast@1.20", 0.0, 0)):
+        rows = np.eye(len(names))[[NAMES.index("ballast@1.20"), len(NAMES)]]
+        rows[1, NAMES.index("ballast@1.20")] = 0.3
+        y = rows @ np.r_[np.zeros(len(NAMES)), 2.0 * (v.time >= 2 * STEP)]
+        extra = GroupInformation("A: impacts at 1.20 m", 1, names, rows.T @ rows / SD**2, rows.T @ y / SD**2)
+        visits.append(replace(v, groups=(*v.groups, extra)))
+    answer = change_answer(parameters, visits, [], change_candidates(parameters), 12.0, 6.0)
+    assert (answer.verdict, answer.names, answer.position) == ("unknown", (), 1.2)
+    assert answer.onset == (STEP, 2 * STEP)
+
+
+def test_a_name_that_needs_another_at_its_position_is_none():
+    """Ballast and the gain of the sensor above it change together: something else happened there."""
+    both = np.zeros(len(NAMES))
+    both[NAMES.index("ballast@1.80")], both[NAMES.index("gain_A3")] = -0.9, 0.4
+    visits = histories(np.random.default_rng(12), 4, lambda v: both * (v >= 2))
+    answer = change_answer(PARAMETERS, visits, [], CANDIDATES, 12.0, 6.0)
+    assert answer.verdict == "unknown" and answer.position == pytest.approx(1.8)
+    apart = np.zeros(len(NAMES))
+    apart[NAMES.index("ballast@0.00")], apart[NAMES.index("gain_A3")] = -0.9, 0.4
+    visits = histories(np.random.default_rng(12), 4, lambda v: apart * (v >= 2))
+    assert change_answer(PARAMETERS, visits, [], CANDIDATES, 12.0, 6.0).verdict == "named"
+
+
+def test_a_change_beside_recorded_tamping_is_a_change():
+    """Tamping makes the ballast uncertain between the visits; the first visit still says that it was intact."""
+    tamping = Event(1.2 * STEP, {p.name: p.sd for p in SUPPORTS})
+    visits = histories(np.random.default_rng(13), 4, step("ballast@1.20", -1.6, 2))
+    answer = change_answer(PARAMETERS, visits, [tamping], CANDIDATES, 12.0, 6.0)
+    assert answer.names == ("local_ballast",) and answer.onset == (STEP, 2 * STEP)
+
+
+def test_evidence_from_the_first_visit_is_that_of_the_density_of_all_data():
+    visits = histories(np.random.default_rng(14), 3, step("ballast@1.20", -0.8, 0))
+    history = estimate_history(PARAMETERS, visits, repeats_between_visits=False, accepted=None, repeated_share=0.0)
+    candidates = [c for c in CANDIDATES if not c.grows]
+    found = {e.effect.name: e.from_first for e in compare_onsets(history, candidates)}
+    single = [
+        estimate_history([replace(p, walk_sd=0.0) for p in PARAMETERS], visits, repeated_share=0.0, accepted=None)
+    ]
+    still = estimate_history(
+        [replace(p, walk_sd=0.0) for p in PARAMETERS], visits, (), 0.0, repeats_between_visits=False, accepted=None
+    )
+    gains, *_ = answers.evidence_from_first(single[0].parameters, still, candidates)
+    of_still = {e.effect.name: e.from_first for e in compare_onsets(still, candidates)}
+    assert [of_still[c.name] for c in candidates] == pytest.approx(gains.tolist(), abs=1e-6)
+    assert found["ballast@1.20"] == max(found.values())
+
+
+@pytest.mark.parametrize(("true", "verdict"), [(1.54, "named"), (1.1, "named"), (0.55, "none")])
+def test_a_nose_far_deeper_than_in_the_file_is_a_finding_with_its_position(true, verdict):
+    """The file has 0.43 mm with a tolerance of 40 %: 1.54 mm is three, 1.1 mm two of its standard deviations off."""
+    nose = StateParameter("ln depth of the kink at 5.50 m", 0.0, 0.4, 0.0, "depth")
+    size, sd = np.log(true / 0.43), 0.12
+    group = GroupInformation("A: locomotive", 1, (nose.name,), np.array([[sd**-2]]), np.array([size / sd**2]))
+    visits = [VisitInformation("v0", 0.0, (group,))]
+    answer = {a.question: a for a in answers_after_visits([nose], visits, [], change_candidates([nose]), 12.0, 6.0)}
+    assert answer["file"].verdict == verdict
+    if verdict == "named":
+        assert answer["file"].names == ("surface_dip",) and answer["file"].position == 5.5
+        assert answer["file"].size == pytest.approx(size, abs=2.0 * answer["file"].sd)
+
+
+def test_a_visit_is_no_unknown_change_if_earlier_ones_were_as_far_from_what_was_expected():
+    innovation = Innovation(400.0, 190, 1e-16, "wave", 5.0, 190)
+    assert not innovation.is_expected and innovation.is_expected_at(2.1)
+    assert not replace(innovation, deviates=9.0).is_expected_at(2.1)
+
+
+@pytest.mark.parametrize(("size", "name"), [(-2.9, "hanging_sleeper"), (-1.6, "local_ballast")])
+def test_a_support_that_carries_nothing_under_impacts_and_trains_hangs(size, name):
+    """A gap that no train closes: nothing differs between impacts and trains."""
+    visits = histories(np.random.default_rng(15), 4, step("ballast@1.20", size, 2))
+    assert last_answers(visits)["change"].names == (name,)
+    start = histories(np.random.default_rng(16), 4, step("ballast@1.20", size, 0))
+    assert last_answers(start)["file"].names == (name,)

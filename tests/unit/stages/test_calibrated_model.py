@@ -1,5 +1,6 @@
 """The calibrated model of a small turnout from its files: what the visits say together, and what is read again."""
 
+import re
 import shutil
 from datetime import datetime
 from functools import partial
@@ -152,7 +153,9 @@ def test_the_stage_writes_the_state_after_a_visit_and_a_finding_keeps_the_visit_
     printed = capsys.readouterr().out
     assert f"visit {DAYS[3]} A, B is not used: its diagnosis is named, and not accepted" in printed
     assert "(2 fitted now)" in printed and "against the file: nothing differs" in printed
-    assert "local pad, pad@18.00 -1.2" in printed and f"appeared after {DAYS[2]}, at the latest at {DAYS[3]}" in printed
+    size, sd = map(float, re.search(r"local pad, pad@18.00 (-[\d.]+) ± ([\d.]+) ln", printed).groups())
+    assert size == pytest.approx(np.log(small.SOFT), abs=3.0 * sd)
+    assert f"appeared after {DAYS[2]}, at the latest at {DAYS[3]}" in printed
 
 
 def test_work_on_the_track_opens_what_it_touches(turnout):

@@ -6,7 +6,7 @@ An answer after a visit rests on that visit and those before it, as one has it o
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,9 +25,10 @@ NAMES = {
     "pad": "local_pad",
     "gain": "sensor_gain",
     "seat": "sensor_position",
-    "surface": "surface_dip",
+    "depth": "surface_dip",
     "dip": "surface_dip",
 }
+INTOLERABLE = {"depth": CALIBRATION.worn_depth}
 IMPACTS = "impacts at"  # part of the name of a group of hammer tests
 
 
@@ -57,9 +58,13 @@ class ModelAnswer:
 
 
 def change_candidates(
-    parameters: Sequence[StateParameter], shapes: Mapping[str, Mapping[str, float]] | None = None
+    parameters: Sequence[StateParameter],
+    shapes: Mapping[str, Mapping[str, float]] | None = None,
+    without: Collection[str] = (),
 ) -> list[ChangeEffect]:
-    """Steps of each support, sensor and surface parameter at an unknown visit, and their growth.
+    """Steps of each parameter of a single support, sensor or nose at an unknown visit, and their growth.
+
+    Those of a group without a name compete, too: an answer that rests on one is "unknown".
 
     Parameters
     ----------
@@ -67,14 +72,18 @@ def change_candidates(
     shapes : mapping or None
         Further candidates: name -> direction (parameter -> change per unit of size), with a prior standard deviation
         of the size of ``CALIBRATION.dip_sd``.
+    without : collection of str
+        Names of effects that are left out.
 
     Returns
     -------
     list of ChangeEffect
     """
-    changing = {group for group, _ in CALIBRATION.least_sizes}
-    candidates = [(p.name, {p.name: 1.0}, CALIBRATION.change_sds * p.sd) for p in parameters if p.group in changing]
-    candidates += [(name, dict(direction), CALIBRATION.dip_sd) for name, direction in (shapes or {}).items()]
+    local = [p for p in parameters if p.group in NAMES or p.index is not None]
+    local = [p for p in local if NAMES.get(p.group) not in without]
+    shapes = {} if shapes is None or NAMES["dip"] in without else shapes
+    candidates = [(p.name, {p.name: 1.0}, CALIBRATION.change_sds * p.sd) for p in local]
+    candidates += [(name, dict(direction), CALIBRATION.dip_sd) for name, direction in shapes.items()]
     return [ChangeEffect(name, d, sd, grows) for name, d, sd in candidates for grows in (False, True)]
 
 
@@ -113,7 +122,8 @@ def answers_after_visits(
     for n in range(first, len(ordered) + 1):
         change = change_answer(parameters, ordered[:n], events, candidates, threshold, margin)
         before = _visits_before(ordered[:n], change)
-        answers += [change, file_answer(parameters, before, events, ordered[n - 1].visit, candidates, threshold)]
+        label = ordered[n - 1].visit
+        answers += [change, file_answer(parameters, before, events, label, candidates, threshold, margin)]
     return answers
 
 
@@ -161,24 +171,98 @@ def change_answer(
     by_name = {p.name: p for p in parameters}
     least = threshold + price
     material = [e for e in evidence if e.gain > least - margin and _is_material(e, by_name)]
-    if material:  # the belief takes some visits to follow what was there from the first
-        from_first, *_ = evidence_from_first(parameters, history, [e.effect for e in material])
-        material = [e for e, gain in zip(material, from_first) if e.gain >= gain]
+    material = [e for e in material if e.gain >= e.from_first]
     if not material or material[0].gain < least:
         return _answer_without_name(history, visit, by_name)
-    best = material[0]
-    names = [_name(best, by_name)]
-    if names == ["local_ballast"] and best.size[0] < 0.0:
-        names = _supported_names(parameters, visits, events, best, margin)
-    rivals = [_name(e, by_name) for e in material if e.gain > best.gain - margin]
-    names += [name for name in dict.fromkeys(rivals) if name not in names and name != _name(best, by_name)]
-    parameter = by_name.get(best.effect.name)
-    size, sd = best.size
-    return ModelAnswer(
-        visit, CHANGE, "named" if len(names) == 1 else "a_or_b", tuple(names[:2]), best.effect.name,
-        parameter.group if parameter else "dip", position_of(best.effect.name, parameter), size, sd,
-        parameter.unit if parameter else "m", best.interval(), best.gain - price, best.effect.grows,
-    )  # fmt: skip
+    leader = material[0]
+    stated = _LeadingEffect.of(leader.effect, by_name, leader.size, leader.gain - price, leader.interval())
+    if stated.name is None:
+        return stated.answer(visit, CHANGE, ())
+    with_change = estimate_history(
+        parameters, visits, [*events, *_events_of_change(leader)], repeats_between_visits=False, accepted=None
+    )
+    beside = [e.gain for e in compare_onsets(with_change, _others_beside(stated, candidates, by_name))]
+    if max(beside, default=0.0) >= least:
+        return stated.answer(visit, CHANGE, ())
+    names = [stated.name]
+    if stated.name == "local_ballast" and leader.size[0] < 0.0:
+        names = _supported_names(parameters, visits, events, leader, _present_size(leader), margin)
+    rivals = [_name(e.effect, by_name) for e in material if e.gain > leader.gain - margin]
+    return stated.answer(visit, CHANGE, _with_rivals(names, stated, rivals))
+
+
+def _with_rivals(names: Sequence[str], stated: _LeadingEffect, rivals: Iterable[str | None]) -> list[str]:
+    """The names and those of rivals, each once."""
+    return [*names, *(n for n in dict.fromkeys(rivals) if n is not None and n not in (*names, stated.name))]
+
+
+def _events_of_change(evidence: OnsetEvidence) -> list[Event]:
+    """Events that open the direction of an effect from its most probable onset on."""
+    first = int(np.argmax(evidence.gains))
+    effect, times = evidence.effect, evidence.times
+    if not effect.grows:
+        return [Event(float(times[first + 1]), {}, effect.direction, effect.sd)]
+    steps = zip(times[first:-1], times[first + 1 :])
+    return [Event(float(now), {}, effect.direction, effect.sd * float(now - before)) for before, now in steps]
+
+
+@dataclass(frozen=True)
+class _LeadingEffect:
+    """The effect with the most evidence. ``name`` is None for a parameter whose change has no name."""
+
+    parameter: str
+    name: str | None
+    group: str
+    position: float | None
+    unit: str
+    size: tuple[float, float]
+    gain: float
+    onset: tuple[float, float] | None
+    grows: bool
+
+    @classmethod
+    def of(
+        cls,
+        effect: ChangeEffect,
+        by_name: Mapping[str, StateParameter],
+        size: tuple[float, float],
+        gain: float,
+        onset: tuple[float, float] | None = None,
+    ) -> _LeadingEffect:
+        parameter = by_name.get(effect.name)
+        group, unit = (parameter.group, parameter.unit) if parameter else ("dip", "m")
+        position = position_of(effect.name, parameter)
+        return cls(
+            effect.name, _name(effect, by_name), group, position, unit, size, gain, onset,
+            onset is not None and effect.grows,
+        )  # fmt: skip
+
+    def answer(self, visit: str, question: str, names: Sequence[str]) -> ModelAnswer:
+        """Answer with these names; "unknown" without any."""
+        if not names:
+            return ModelAnswer(
+                visit, question, "unknown", (), self.parameter, self.group, self.position, onset=self.onset,
+                gain=self.gain,
+            )  # fmt: skip
+        return ModelAnswer(
+            visit, question, "named" if len(names) == 1 else "a_or_b", tuple(names[:2]), self.parameter, self.group,
+            self.position, *self.size, self.unit, self.onset, self.gain, self.grows,
+        )  # fmt: skip
+
+
+def _others_beside(
+    stated: _LeadingEffect, candidates: Sequence[ChangeEffect], by_name: Mapping[str, StateParameter]
+) -> list[ChangeEffect]:
+    """Candidates of other names at the position of the effect: it is no name if one of them is needed beside it."""
+    if stated.position is None:
+        return []
+    candidates_beside = []
+    for c in candidates:
+        name, position = _name(c, by_name), position_of(c.name, by_name.get(c.name))
+        if name not in (stated.name, None) and position is not None:
+            if abs(position - stated.position) <= CALIBRATION.same_position:
+                candidates_beside.append(c)
+    return candidates_beside
 
 
 def position_of(name: str, parameter: StateParameter | None) -> float | None:
@@ -199,45 +283,64 @@ def position_of(name: str, parameter: StateParameter | None) -> float | None:
     return float(number.group(1)) if number else None
 
 
-def _name(evidence: OnsetEvidence, by_name: Mapping[str, StateParameter]) -> str:
-    parameter = by_name.get(evidence.effect.name)
-    return NAMES[parameter.group if parameter else "dip"]
+def _name(effect: ChangeEffect, by_name: Mapping[str, StateParameter]) -> str | None:
+    parameter = by_name.get(effect.name)
+    return NAMES.get(parameter.group if parameter else "dip")
 
 
 def _is_material(evidence: OnsetEvidence, by_name: Mapping[str, StateParameter]) -> bool:
-    """Whether the present size causes any action: of growth, that since its most probable onset."""
-    parameter = by_name.get(evidence.effect.name)
-    least = dict(CALIBRATION.least_sizes)[parameter.group] if parameter else CALIBRATION.least_dip
+    """Whether the present size causes any action."""
+    return abs(_present_size(evidence)[0]) >= _least_size(evidence.effect, by_name)
+
+
+def _present_size(evidence: OnsetEvidence) -> tuple[float, float]:
+    """Size at the last visit and its standard deviation: of growth, that since its most probable onset."""
     start = evidence.times[int(np.argmax(evidence.gains))]
     elapsed = float(evidence.times[-1] - start) if evidence.effect.grows else 1.0
-    return abs(evidence.size[0]) * elapsed >= least
+    return elapsed * evidence.size[0], elapsed * evidence.size[1]
+
+
+def _least_size(effect: ChangeEffect, by_name: Mapping[str, StateParameter]) -> float:
+    """Least size of a change; of a parameter without a name the prior standard deviation of a change."""
+    parameter = by_name.get(effect.name)
+    if parameter is None:
+        return CALIBRATION.least_dip
+    return dict(CALIBRATION.least_sizes).get(parameter.group, CALIBRATION.finding_sds * parameter.sd)
 
 
 def _supported_names(
     parameters: Sequence[StateParameter],
     visits: Sequence[VisitInformation],
     events: Sequence[Event],
-    best: OnsetEvidence,
+    best: OnsetEvidence | ChangeEffect,
+    size: tuple[float, float],
     margin: float,
 ) -> list[str]:
     """Names of softer ballast: a gap is felt by impacts on the unloaded track, and less by trains that close it.
 
     In one fit trains have a size of their own: that of impacts, or the shares of it that a gap leaves, which are
     equally probable before. The prior of the size is so wide that it favours none: without trains, or without impacts,
-    the evidence decides nothing.
+    the evidence decides nothing. A gap that no train closes feels alike under both: it leaves less of the
+    stiffness than ballast that carries anything. An effect without onsets is one of the first visit.
     """
-    (name,) = best.effect.direction
+    if size[0] + CALIBRATION.finding_sds * size[1] < np.log(CALIBRATION.least_support):
+        return ["hanging_sleeper"]
+    effect = best.effect if isinstance(best, OnsetEvidence) else best
+    (name,) = effect.direction
     felt = next(p for p in parameters if p.name == name)
     offset = replace(felt, name=f"{name} as trains feel it", mean=0.0)
     opened = [replace(e, opened={**e.opened, offset.name: e.opened[name]}) if name in e.opened else e for e in events]
     split = [replace(v, groups=tuple(_with_offset(g, name, offset.name) for g in v.groups)) for v in visits]
-    history = estimate_history([*parameters, offset], split, opened, repeats_between_visits=False, accepted=None)
-    sd = CALIBRATION.gap_size_sds * max(best.effect.sd, abs(best.size[0]))
+    sd = CALIBRATION.gap_size_sds * max(effect.sd, abs(size[0]))
     effects = [
-        ChangeEffect(f"{share:g}", {name: 1.0, offset.name: share - 1.0}, sd, best.effect.grows)
+        ChangeEffect(f"{share:g}", {name: 1.0, offset.name: share - 1.0}, sd, effect.grows)
         for share in (1.0, *CALIBRATION.gap_shares)
     ]
-    gains = {e.effect.name: e.gain for e in compare_onsets(history, effects)}
+    history = estimate_history([*parameters, offset], split, opened, repeats_between_visits=False, accepted=None)
+    if isinstance(best, OnsetEvidence):
+        gains = {e.effect.name: e.gain for e in compare_onsets(history, effects)}
+    else:
+        gains = dict(zip((e.name for e in effects), evidence_from_first([*parameters, offset], history, effects)[0]))
     equal, *of_gaps = (gains[e.name] for e in effects)
     difference = float(np.logaddexp.reduce(of_gaps)) - float(np.log(len(of_gaps))) - equal
     if abs(difference) < margin:
@@ -257,9 +360,10 @@ def _with_offset(group: GroupInformation, name: str, offset: str) -> GroupInform
 
 
 def _answer_without_name(history: History, visit: str, by_name: Mapping[str, StateParameter]) -> ModelAnswer:
-    """ "none", or "unknown" if the last visit differs from all before."""
-    innovation = history.steps[-1].innovation
-    if len(history.steps) < 2 or innovation.is_expected:
+    """ "none", or "unknown" if the last visit differs from all before by more than those from what was expected."""
+    *before, innovation = (s.innovation for s in history.steps)
+    level = max([1.0, *(i.statistic / max(i.n_directions, 1) for i in before)])
+    if not before or innovation.is_expected_at(level):
         return ModelAnswer(visit, CHANGE, "none")
     parameter = by_name.get(innovation.parameter)
     return ModelAnswer(
@@ -273,10 +377,11 @@ def file_answer(
     visits: Sequence[VisitInformation],
     events: Sequence[Event],
     visit: str,
-    candidates: Sequence[ChangeEffect] = (),
-    threshold: float = np.inf,
+    candidates: Sequence[ChangeEffect],
+    threshold: float,
+    margin: float,
 ) -> ModelAnswer:
-    """What differs from the file, the clearest deviation first; without one, a dip that was there from the first visit.
+    """What differs from the file: the effect of the first visit with the most evidence, else the clearest deviation.
 
     Parameters
     ----------
@@ -287,49 +392,76 @@ def file_answer(
     visit : str
         Visit after which the answer is given.
     candidates : sequence of ChangeEffect
-        As ``change_candidates``. Those of more than one parameter are asked.
+        As ``change_candidates``.
     threshold : float
-        Evidence that such a candidate needs. [nats]
+        Evidence that an effect needs. [nats]
+    margin : float
+        A rival of another name within it makes the answer "a or b". [nats]
 
     Returns
     -------
     ModelAnswer
+        "unknown" where a value differs whose group is not among the candidates, or has no name.
     """
-    history = estimate_history(parameters, visits, events, accepted=None)
-    deviations = deviations_from_file(history.belief, parameters, dict(CALIBRATION.least_sizes))
-    if not deviations:
-        return _dip_answer(parameters, history, visit, candidates, threshold)
-    first: Deviation = deviations[0]
     by_name = {p.name: p for p in parameters}
+    steps = [c for c in candidates if not c.grows]
+    history = estimate_history(parameters, visits, events, accepted=None)
+    price = float(np.log(max(len(steps), 1)))
+    least = threshold + price
+    gains, sizes, sds = evidence_from_first(parameters, history, steps)
+    order = [
+        k for k in np.argsort(-gains) if gains[k] > least - margin and abs(sizes[k]) >= _least_size(steps[k], by_name)
+    ]
+    if not order or gains[order[0]] < least:
+        return _deviation_answer(parameters, history, visit, steps)
+    first = order[0]
+    stated = _LeadingEffect.of(
+        steps[first], by_name, (float(sizes[first]), float(sds[first])), float(gains[first]) - price
+    )
+    if stated.name is None or _needs_another_from_first(parameters, visits, events, steps, steps[first], stated, least):
+        return stated.answer(visit, FILE, ())
+    names = [stated.name]
+    if stated.name == "local_ballast" and sizes[first] < 0.0:
+        names = _supported_names(parameters, visits, events, steps[first], stated.size, margin)
+    rivals = [_name(steps[k], by_name) for k in order if gains[k] > gains[first] - margin]
+    return stated.answer(visit, FILE, _with_rivals(names, stated, rivals))
+
+
+def _needs_another_from_first(
+    parameters: Sequence[StateParameter],
+    visits: Sequence[VisitInformation],
+    events: Sequence[Event],
+    candidates: Sequence[ChangeEffect],
+    effect: ChangeEffect,
+    stated: _LeadingEffect,
+    least: float,
+) -> bool:
+    """Whether an effect of another name at the same position has the evidence of a name beside this one."""
+    by_name = {p.name: p for p in parameters}
+    rivals = _others_beside(stated, candidates, by_name)
+    if not rivals or effect.name not in by_name:
+        return False
+    wide = [replace(p, sd=float(np.hypot(p.sd, effect.sd))) if p.name == effect.name else p for p in parameters]
+    gains, *_ = evidence_from_first(wide, estimate_history(wide, visits, events, accepted=None), rivals)
+    return float(gains.max()) >= least
+
+
+def _deviation_answer(
+    parameters: Sequence[StateParameter], history: History, visit: str, candidates: Sequence[ChangeEffect]
+) -> ModelAnswer:
+    """The clearest deviation from the file; "unknown" if its group is not among the candidates."""
+    by_name = {p.name: p for p in parameters}
+    groups = {by_name[c.name].group for c in candidates if c.name in by_name}
+    least = {g: size for g, size in CALIBRATION.least_sizes if g in groups}
+    deviations = deviations_from_file(history.belief, parameters, least, intolerable=INTOLERABLE)
+    if not deviations:
+        return ModelAnswer(visit, FILE, "none")
+    first: Deviation = deviations[0]
     middle = None if first.positions is None else 0.5 * sum(first.positions)
     position = middle if middle is not None else position_of(first.names[0], by_name[first.names[0]])
     return ModelAnswer(
         visit, FILE, "named", (NAMES[first.group],), ", ".join(first.names), first.group,
         position, first.size, first.sd, first.unit,
-    )  # fmt: skip
-
-
-def _dip_answer(
-    parameters: Sequence[StateParameter],
-    history: History,
-    visit: str,
-    candidates: Sequence[ChangeEffect],
-    threshold: float,
-) -> ModelAnswer:
-    """A dip in the running surface of which the file says nothing: it raises many waves together."""
-    shapes = [c for c in candidates if len(c.direction) > 1 and not c.grows]
-    nothing = ModelAnswer(visit, FILE, "none")
-    if not shapes:
-        return nothing
-    gain, size, sd = evidence_from_first(parameters, history, shapes)
-    gain = gain - np.log(len(shapes))
-    k = int(np.argmax(gain))
-    if gain[k] < threshold or abs(size[k]) < CALIBRATION.least_dip:
-        return nothing
-    name = shapes[k].name
-    return ModelAnswer(
-        visit, FILE, "named", (NAMES["dip"],), name, "dip", position_of(name, None), float(size[k]), float(sd[k]), "m",
-        None, float(gain[k]),
     )  # fmt: skip
 
 

@@ -53,8 +53,23 @@ class Innovation:
     @property
     def is_expected(self) -> bool:
         """Whether the visit agrees with the belief, in all and at each parameter."""
-        single = 2.0 * float(stats.norm.sf(abs(self.deviates))) * max(self.n_parameters, 1)
-        return min(self.chance, single) >= 0.5 * CALIBRATION.max_chance
+        return self.is_expected_at(1.0)
+
+    def is_expected_at(self, level: float) -> bool:
+        """Whether the visit agrees with the belief where errors of the model have this variance.
+
+        Parameters
+        ----------
+        level : float
+            Variance over the expected one: what intact visits have left.
+
+        Returns
+        -------
+        bool
+        """
+        single = 2.0 * float(stats.norm.sf(abs(self.deviates) / np.sqrt(level))) * max(self.n_parameters, 1)
+        chance = float(stats.chi2.sf(self.statistic / level, self.n_directions)) if self.n_directions else 1.0
+        return min(chance, single) >= 0.5 * CALIBRATION.max_chance
 
 
 @dataclass(frozen=True)
@@ -105,19 +120,19 @@ class Belief:
         """
         return float(self.mean[self.names.index(name)])
 
-    def with_variance(self, variance: np.ndarray) -> Belief:
+    def with_noise(self, covariance: np.ndarray) -> Belief:
         """The belief after process noise: the mean stays.
 
         Parameters
         ----------
-        variance : (n,) array of float
-            Variance that is added to each parameter.
+        covariance : (n, n) array of float
+            What is added.
 
         Returns
         -------
         Belief
         """
-        return Belief(self.names, self.mean, self.covariance + np.diag(variance))
+        return Belief(self.names, self.mean, self.covariance + covariance)
 
     def update(self, matrix: np.ndarray, vector: np.ndarray) -> Belief:
         r"""The belief after a visit with this information.

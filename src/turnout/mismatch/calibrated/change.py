@@ -31,6 +31,7 @@ class OnsetEvidence:
 
     ``gains`` (n_visit - 1,): evidence of an onset before each visit from the second on, over no change. [nats]
     ``sizes`` and ``size_sds`` of the same shape: size of the effect with that onset. ``times`` (n_visit,) [years].
+    ``from_first`` is the evidence of the effect in all visits, with the same size. [nats]
     """
 
     effect: ChangeEffect
@@ -39,6 +40,7 @@ class OnsetEvidence:
     gains: np.ndarray
     sizes: np.ndarray
     size_sds: np.ndarray
+    from_first: float = -np.inf
 
     @property
     def gain(self) -> float:
@@ -124,18 +126,17 @@ def compare_onsets(history: History, effects: Sequence[ChangeEffect]) -> list[On
         return []
     directions = np.column_stack([_direction(history, e) for e in effects])
     grows = np.array([e.grows for e in effects])
-    information, score = (np.zeros((len(steps) - 1, len(effects))) for _ in range(2))
-    for j in range(1, len(steps)):
+    information, score = (np.zeros((len(steps), len(effects))) for _ in range(2))
+    for j in range(len(steps)):
         absorbed = np.zeros_like(directions)
-        start = steps[j - 1].time
         for step in steps[j:]:
-            elapsed = np.where(grows, step.time - start, 1.0)
+            elapsed = np.where(grows & (j > 0), step.time - steps[j - 1].time, 1.0)
             missing = elapsed * directions - absorbed
             seen = step.matrix @ missing
             nu = step.vector - step.matrix @ step.predicted.mean
             gained = step.belief.covariance @ seen if step.is_used else _updated_covariance(step) @ seen
-            information[j - 1] += np.sum(missing * seen, axis=0) - np.sum(seen * gained, axis=0)
-            score[j - 1] += nu @ missing - nu @ gained
+            information[j] += np.sum(missing * seen, axis=0) - np.sum(seen * gained, axis=0)
+            score[j] += nu @ missing - nu @ gained
             if step.is_used:
                 absorbed = absorbed + gained
     precision = np.array([e.sd**-2 for e in effects])
@@ -143,7 +144,10 @@ def compare_onsets(history: History, effects: Sequence[ChangeEffect]) -> list[On
     gains = 0.5 * score * sizes - 0.5 * np.log1p(information / precision)
     sds = 1.0 / np.sqrt(information + precision)
     visits, times = tuple(s.visit for s in steps), np.array([s.time for s in steps])
-    evidence = [OnsetEvidence(e, visits, times, gains[:, k], sizes[:, k], sds[:, k]) for k, e in enumerate(effects)]
+    evidence = [
+        OnsetEvidence(e, visits, times, gains[1:, k], sizes[1:, k], sds[1:, k], float(gains[0, k]))
+        for k, e in enumerate(effects)
+    ]
     return sorted(evidence, key=lambda e: -e.gain)
 
 

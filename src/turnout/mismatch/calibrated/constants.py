@@ -26,7 +26,7 @@ class CalibrationConstants:
     )  # fmt: skip
     default_walk_share: float = threshold(0.1, "prior sd per root year", "random walk of all other parameters", PAGE)
     least_sizes: tuple[tuple[str, float], ...] = threshold(
-        (("ballast", 0.2), ("pad", 0.35), ("gain", 0.08), ("seat", 0.1), ("surface", 0.3)),
+        (("ballast", 0.2), ("pad", 0.35), ("gain", 0.08), ("seat", 0.1), ("depth", 0.3)),
         "unit of the group", "deviations from the file below which nobody would act", PAGE,
     )  # fmt: skip
     change_sds: float = threshold(5.0, "prior sd", "prior standard deviation of a change of a parameter", PAGE)
@@ -45,6 +45,13 @@ class CalibrationConstants:
         10.0, "prior sd or size", "of a softening whose share under trains is asked: wide, to favour no share", PAGE
     )
     finding_sds: float = threshold(3.0, "standard deviations", "beyond which a value differs from the file", PAGE)
+    least_support: float = threshold(
+        0.1, "share", "of its stiffness, below which ballast carries nothing: the sleeper hangs", PAGE
+    )
+    same_position: float = threshold(0.6, "m", "a bay: effects within it are at one position", "convention")
+    worn_depth: float = threshold(
+        0.7, "ln", "a dip twice as deep as in the file is a finding, whatever tolerance the file states", PAGE
+    )
     min_prior_share: float = threshold(
         1e-9, "share of the prior variance", "of a mean over components, below which data say nothing", "numerical"
     )

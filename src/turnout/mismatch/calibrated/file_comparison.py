@@ -40,6 +40,7 @@ def deviations_from_file(
     parameters: Sequence[StateParameter],
     least_sizes: Mapping[str, float],
     sds: float = CALIBRATION.finding_sds,
+    intolerable: Mapping[str, float] | None = None,
 ) -> list[Deviation]:
     r"""Deviations from the file, the clearest first. Adjacent components of a group are one deviation.
 
@@ -58,6 +59,8 @@ def deviations_from_file(
         Group -> least size that causes any action, in the unit of the group. Other groups are not compared.
     sds : float
         Standard deviations beyond which a difference is stated.
+    intolerable : mapping or None
+        Group -> size from which a difference is stated although the file allows for it; None: no group.
 
     Returns
     -------
@@ -77,7 +80,8 @@ def deviations_from_file(
         size, sd = means @ difference, _sds(means, belief.covariance)
         floor = np.sqrt(CALIBRATION.min_prior_share) * _sds(means, prior.covariance)
         ordinary_sd = np.maximum(_sds(means, ordinary), floor)
-        is_clear = (abs(size) >= least_size) & (abs(size) >= sds * sd) & (abs(size) > limit * ordinary_sd)
+        beyond = (abs(size) > limit * ordinary_sd) | (abs(size) >= (intolerable or {}).get(group, np.inf))
+        is_clear = (abs(size) >= least_size) & (abs(size) >= sds * sd) & beyond
         taken: set[int] = set()
         for r in sorted(np.flatnonzero(is_clear), key=lambda r: -abs(size[r]) / ordinary_sd[r]):
             if taken.isdisjoint(runs[r]):

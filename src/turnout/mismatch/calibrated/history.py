@@ -7,7 +7,7 @@ which recordings arrived, and a withdrawn visit leaves no trace.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -21,10 +21,13 @@ class Event:
     """Maintenance or a change of the measurement at ``time`` [years], which makes these parameters uncertain again.
 
     ``opened``: parameter -> standard deviation of the change. Tamping opens the ballast of its stretch, for example.
+    ``direction``: parameter -> change per unit of one common size, whose standard deviation is ``sd``.
     """
 
     time: float
     opened: Mapping[str, float]
+    direction: Mapping[str, float] = field(default_factory=dict)
+    sd: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -109,7 +112,7 @@ def estimate_history(
     noise, steps = _ProcessNoise(parameters, events), list[Step]()
     belief, time = Belief.of_file(parameters), ordered[0].time if ordered else 0.0
     for visit in ordered:
-        predicted = belief.with_variance(noise.variance(time, visit.time)) if steps else belief
+        predicted = belief.with_noise(noise.covariance(time, visit.time)) if steps else belief
         own_weights = repeated_error_weights([visit], repeated_share)
         matrix, vector = visit.total(names, {**own_weights, **(weights or {})})
         test = tested.get(visit.visit)
@@ -202,24 +205,26 @@ def _in_order(visits: Iterable[VisitInformation]) -> list[VisitInformation]:
 
 
 class _ProcessNoise:
-    """Variance that each parameter gains from one time to another: its random walk and the events between them."""
+    """Covariance that the parameters gain from one time to another: its random walk and the events between them."""
 
     def __init__(self, parameters: Sequence[StateParameter], events: Sequence[Event]):
         self.rate = np.array([p.walk_sd**2 for p in parameters])
         number = {p.name: k for k, p in enumerate(parameters)}
         self.events = []
         for event in sorted(events, key=lambda e: e.time):
-            if unknown := [name for name in event.opened if name not in number]:
+            if unknown := [name for name in (*event.opened, *event.direction) if name not in number]:
                 raise ValueError(f"event at {event.time:g} years: {unknown[0]!r} is no parameter of this model")
-            variance = np.zeros(len(parameters))
+            variance, direction = np.zeros((2, len(parameters)))
             for name, sd in event.opened.items():
                 variance[number[name]] = sd**2
-            self.events.append((event.time, variance))
+            for name, change in event.direction.items():
+                direction[number[name]] = event.sd * change
+            self.events.append((event.time, np.diag(variance) + np.outer(direction, direction)))
 
-    def variance(self, start: float, end: float) -> np.ndarray:
-        """(n,) variances gained after ``start`` up to ``end`` [years]."""
-        gained = (end - start) * self.rate
-        for time, variance in self.events:
+    def covariance(self, start: float, end: float) -> np.ndarray:
+        """(n, n) covariance gained after ``start`` up to ``end`` [years]."""
+        gained = np.diag((end - start) * self.rate)
+        for time, covariance in self.events:
             if start < time <= end:
-                gained = gained + variance
+                gained = gained + covariance
         return gained

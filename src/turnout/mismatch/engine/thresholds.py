@@ -200,6 +200,16 @@ class Thresholds:
     max_free_law_share: float = threshold(
         0.05, "share of the gain", "on held-out recordings, that a name may miss beside a free law", GUIDE
     )
+    max_large_values: int = threshold(2, "values", "far beyond their priors in a fit without effects", "convention")
+    n_large_starts: int = threshold(
+        4, "fits", "of single large values, those with the most evidence in the linear model", "numerical"
+    )
+    large_start_sds: tuple[float, ...] = threshold(
+        (1.5, 3.0), "wide prior sds", "at which a large value starts, with all others where fits start", "numerical"
+    )
+    min_large_information: float = threshold(
+        1e-6, "1 / prior variance", "of a value in the data, below which its large values are not sought", "numerical"
+    )
     stall: float = threshold(
         5e-4, "of minus twice the log posterior per sample", "a fit of an expensive case that gains less ends", FITS
     )

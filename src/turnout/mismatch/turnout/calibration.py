@@ -49,7 +49,7 @@ def calibrated_parameters(case: TrackCase, route: str = "main") -> dict[str, Sta
     parameters: dict[str, StateParameter] = {}
     used: Counter[str] = Counter()
     for nuisance in _shared_nuisances(case):
-        name, position, index = nuisance.name, None, None
+        name, group, position, index = nuisance.name, nuisance.group, None, None
         if nuisance.index is not None:
             position = float(support[nuisance.index])
             index = int(np.argmin(np.abs(whole - position)))
@@ -64,12 +64,13 @@ def calibrated_parameters(case: TrackCase, route: str = "main") -> dict[str, Sta
             name = f"{name}@{waves.start:.2f}-{waves.end:.2f}"
         elif nuisance.group == "surface":
             name = nuisance.meaning.removesuffix(" less its file's")
+            group = "depth" if name.startswith("ln depth of") else group
         name = name if route == "main" else f"{route} {name}"
         used[name] += 1
         name = name if used[name] == 1 else f"{name} #{used[name]}"
         walk = walks.get(nuisance.group, CALIBRATION.default_walk_share * nuisance.sd)
         parameters[nuisance.name] = StateParameter(
-            name, nuisance.mean, nuisance.sd, walk, nuisance.group, index, position, nuisance.unit
+            name, nuisance.mean, nuisance.sd, walk, group, index, position, nuisance.unit
         )
     return parameters
 

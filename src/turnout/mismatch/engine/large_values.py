@@ -1,0 +1,182 @@
+"""A few nuisances with values far beyond their prior, in a fit without effects.
+
+Under normal priors many small deviations are more probable than a single large one, and a fit explains a broken railpad
+by softer ballast beside it. Here each value may be large with a small probability (a normal mixture, George and
+McCulloch 1993, Variable selection via Gibbs sampling). Each explanation by a single large value is fitted to its own
+maximum, and their evidences are compared there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from copy import copy
+from dataclasses import replace
+from operator import itemgetter
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from turnout.errors import SimulationError
+from turnout.mismatch.engine.map_fit import cost_at
+from turnout.mismatch.engine.thresholds import THRESHOLDS
+
+if TYPE_CHECKING:
+    from turnout.mismatch.engine.case import Case, Nuisance
+    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.search import Search
+
+
+def fit_large_values(search: Search, fit: Fit, names: Collection[str], widening: float) -> Fit:
+    """The fit, continued with wide priors for those nuisances whose large values have the most evidence.
+
+    One value after the other is added, as long as its evidence exceeds that of the fit without it by the logarithm of
+    the number of ``names``, which are equally probable before, and ``THRESHOLDS.simpler_form_lead``.
+
+    Parameters
+    ----------
+    search : Search
+        Of the case that was fitted.
+    fit : Fit
+        Without effects, with its Jacobian.
+    names : collection of str
+        Nuisances that may have large values.
+    widening : float
+        Wide prior standard deviation of such a value, over its own.
+
+    Returns
+    -------
+    Fit
+        Its evidence is that with the wide priors.
+    """
+    price = float(np.log(max(len(names), 1))) + THRESHOLDS.simpler_form_lead
+    large: tuple[str, ...] = ()
+    for _ in range(THRESHOLDS.max_large_values):
+        gains = evidence_of_large_values(search.case, fit, names, widening, large)
+        promising = sorted((n for n, g in gains.items() if g > price), key=lambda n: -gains[n])
+        fits = {}
+        for name in promising[: THRESHOLDS.n_large_starts]:
+            try:
+                fits[name] = _fit_with(search, fit, (*large, name), widening)
+            except SimulationError:
+                continue
+        leader = max(fits, key=lambda n: fits[n].evidence, default=None)
+        if leader is None or fits[leader].evidence - price <= fit.evidence:
+            break
+        large, fit = (*large, leader), fits[leader]
+    return fit
+
+
+def with_wide_priors(case: Case, names: Collection[str], widening: float) -> Case:
+    """The case with wide priors and bounds of some nuisances.
+
+    Parameters
+    ----------
+    case : Case
+    names : collection of str
+    widening : float
+        Factor on standard deviations and bounds.
+
+    Returns
+    -------
+    Case
+    """
+    wide = copy(case)
+    wide.nuisances = tuple(_with_wide_prior(n, widening) if n.name in names else n for n in case.nuisances)
+    return wide
+
+
+def _with_wide_prior(nuisance: Nuisance, widening: float) -> Nuisance:
+    low, high = (nuisance.mean + widening * (bound - nuisance.mean) for bound in nuisance.bounds)
+    return replace(nuisance, sd=widening * nuisance.sd, bounds=(low, high))
+
+
+def evidence_of_large_values(
+    case: Case, fit: Fit, names: Collection[str], widening: float, large: Collection[str] = ()
+) -> dict[str, float]:
+    r"""Evidence that a single value has a wide prior, if the model were linear about the fit.
+
+    Of the data alone the value is :math:`N(\mu, v)`, all others integrated out. With its prior :math:`N(m, s^2)` and a
+    wide one of :math:`w s`
+
+    .. math:: g = \ln N(\mu; m, v + w^2 s^2) - \ln N(\mu; m, v + s^2)
+
+    Parameters
+    ----------
+    case : Case
+    fit : Fit
+        With its Jacobian.
+    names : collection of str
+    widening : float
+        w.
+    large : collection of str
+        Those that have wide priors already. They have no entry.
+
+    Returns
+    -------
+    dict
+        Name -> evidence [nats].
+    """
+    wide = with_wide_priors(case, large, widening)
+    precision, score = _posterior(wide, fit)
+    covariance = np.linalg.inv(precision)
+    mean = covariance @ score
+    gains = {}
+    for k, n in enumerate(wide.nuisances):
+        information = 1.0 / covariance[k, k] - n.sd**-2
+        if n.name not in names or n.name in large or information * n.sd**2 < THRESHOLDS.min_large_information:
+            continue
+        v = 1.0 / information
+        distance = v * mean[k] / covariance[k, k] + (1.0 - v / covariance[k, k]) * n.mean - n.mean
+        near, far = v + n.sd**2, v + (widening * n.sd) ** 2
+        gains[n.name] = float(0.5 * (distance**2 / near - distance**2 / far) - 0.5 * np.log(far / near))
+    return gains
+
+
+def _posterior(case: Case, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+    """Precision (n, n) of all nuisances and its product with their mean, with the model linear about the fit.
+
+    The noise has its own scale and not that of the fit, which a large value that is missing has raised.
+    """
+    values = np.array([fit.values[n.name] for n in case.nuisances])
+    mean, sd = (np.array([getattr(n, field) for n in case.nuisances]) for field in ("mean", "sd"))
+    precision, score = np.diag(sd**-2), mean / sd**2
+    for o, jacobian, white in zip(case.observations, fit.jacobian, fit.white):
+        rows = np.asarray(jacobian, dtype=float)
+        precision += o.effective * rows.T @ rows
+        score += o.effective * rows.T @ (white + rows @ values)
+    return precision, score
+
+
+def _fit_with(search: Search, fit: Fit, large: tuple[str, ...], widening: float) -> Fit:
+    """Fit with wide priors of these values: the best of several starts.
+
+    One is on the way to the maximum of the linear model. In the others the last value is large, and the rest is where
+    fits of the case start: the fit without it has moved them to hide it, and may be in another valley.
+    """
+    wide = replace(search, case=with_wide_priors(search.case, large, widening))
+    solution = dict(zip((n.name for n in wide.case.nuisances), np.linalg.solve(*_posterior(wide.case, fit))))
+    costs: list[tuple[float, dict[str, float]]] = []
+    for share in (*THRESHOLDS.size_factors, 0.0):
+        at = {
+            n.name: float(np.clip(fit.values[n.name] + share * (solution[n.name] - fit.values[n.name]), *n.bounds))
+            for n in wide.case.nuisances
+        }
+        try:
+            costs.append((cost_at(wide.case, (), np.zeros(0), at), at))
+        except SimulationError:
+            continue
+    starts = [min(costs, key=itemgetter(0))[1]] if costs else []
+    (value,) = (n for n in wide.case.nuisances if n.name == large[-1])
+    kept = {name: fit.values[name] for name in large[:-1]}
+    for sds in THRESHOLDS.large_start_sds:
+        size = np.copysign(sds * value.sd, solution[value.name] - value.mean)
+        starts.append({**kept, value.name: float(np.clip(value.mean + size, *value.bounds))})
+    fits = []
+    for at in starts:
+        try:
+            fits.append(wide.fit((), np.zeros(0), at))
+        except SimulationError:
+            continue
+    if not fits:
+        raise SimulationError(f"no fit with a large value of {large[-1]}: the simulation fails at every start.")
+    return wide.converge(max(fits, key=lambda f: f.evidence))

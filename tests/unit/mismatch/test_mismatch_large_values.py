@@ -1,0 +1,112 @@
+"""A single value far beyond its prior: what normal priors spread over neighbours is found where it is."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.large_values import evidence_of_large_values, fit_large_values, with_wide_priors
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.search import Search
+
+N, PRIOR, NOISE, WIDE = 7, 0.1, 0.1, 5.0
+MIXING = np.tile([[0.75 ** abs(i - j) for j in range(N)] for i in range(9)], (6, 1))  # six recordings of nine sensors
+
+
+class Springs(Case):
+    """Springs in a row, each with the logarithm of its stiffness; sensors feel neighbours, too."""
+
+    def __init__(self, truth, power=1.0, seed=1):
+        rng = np.random.default_rng(seed)
+        self.power = power
+        bound = 6.0 * PRIOR
+        self.nuisances = tuple(Nuisance(f"k{j}", "-", 0.0, PRIOR, bounds=(-bound, bound), group="k") for j in range(N))
+        y = self.response(np.asarray(truth)) + NOISE * rng.normal(size=len(MIXING))
+        self.observations = (Observation("o", "o", y, NOISE),)
+
+    def response(self, x):
+        return MIXING @ (x if self.power == 0.0 else np.exp(-self.power * x) - 1.0)
+
+    def predict(self, values, terms, observations):
+        return [self.response(np.array([values[f"k{j}"] for j in range(N)])) for _ in observations]
+
+
+NAMES = [f"k{j}" for j in range(N)]
+
+
+def base_of(case):
+    search = Search.of(case)
+    return search, fit_jointly(case, iterations=60)
+
+
+def test_the_evidence_of_a_large_value_is_that_of_the_density_of_all_data():
+    """A linear model: the ratio of the normal densities of the data with the wide and with the ordinary prior."""
+    case = Springs([0.0, 0.0, -0.3, 0.1, 0.0, 0.05, 0.0], power=0.0)
+    _, fit = base_of(case)
+    noise = NOISE**2 * np.eye(len(MIXING))
+    prior = np.full(N, PRIOR**2)
+
+    def density(variance):
+        covariance = noise + MIXING @ np.diag(variance) @ MIXING.T
+        return stats.multivariate_normal(np.zeros(len(MIXING)), covariance).logpdf(case.observations[0].data)
+
+    gains = evidence_of_large_values(case, fit, NAMES, WIDE)
+    for j, name in enumerate(NAMES):
+        wide = np.where(np.arange(N) == j, WIDE**2, 1.0) * prior
+        assert gains[name] == pytest.approx(density(wide) - density(prior), abs=1e-6)
+    assert NAMES[2] not in evidence_of_large_values(case, fit, NAMES, WIDE, ["k2"])
+
+
+@pytest.mark.parametrize("size", [-1.6, 1.6])
+@pytest.mark.parametrize("where", [1, 3])
+def test_one_spring_with_a_fifth_or_five_times_its_stiffness_is_found_with_its_size(size, where):
+    """The base fit cannot leave its bound of six prior sd; a wide prior lets it, and leaves the neighbours."""
+    truth = np.zeros(N)
+    truth[where] = size
+    case = Springs(truth)
+    search, base = base_of(case)
+    assert abs(base.values[f"k{where}"]) <= 0.6 + 1e-9  # what it is about
+    fit = fit_large_values(search, base, NAMES, WIDE)
+    assert fit.evidence > base.evidence + np.log(N)
+    others = [abs(fit.values[n]) for j, n in enumerate(NAMES) if j != where]
+    sd = np.sqrt(fit.covariance[where, where])
+    assert fit.values[f"k{where}"] == pytest.approx(size, abs=4.0 * sd + 0.1 * (size > 0.0)) and max(others) < PRIOR
+
+
+def test_two_large_values_are_found_one_after_the_other():
+    case = Springs([0.0, -0.9, 0.0, 0.0, 0.0, -0.8, 0.0])
+    fit = fit_large_values(*base_of(case), NAMES, WIDE)
+    assert [fit.values["k1"], fit.values["k5"]] == pytest.approx([-0.9, -0.8], abs=0.15)
+
+
+def test_ordinary_scatter_has_no_large_value():
+    """Ordinary springs, n = 20: the fit is the base fit itself."""
+    rng = np.random.default_rng(3)
+    for seed in range(20):
+        search, base = base_of(Springs(PRIOR * rng.normal(size=N), seed=seed))
+        assert fit_large_values(search, base, NAMES, WIDE) is base
+
+
+def test_wide_priors_leave_the_case_and_the_other_values_as_they_are():
+    case = Springs(np.zeros(N))
+    wide = with_wide_priors(case, ["k2"], WIDE)
+    assert wide.nuisances[2].sd == pytest.approx(0.5) and wide.nuisances[2].bounds == pytest.approx((-3.0, 3.0))
+    assert wide.nuisances[:2] == case.nuisances[:2] and case.nuisances[2].sd == PRIOR
+
+
+class TwoValleys(Springs):
+    """Beyond 0.6 the response of the third spring first falls, and agrees with the data only at 1.3 and more."""
+
+    def response(self, x):
+        y = np.array(x, dtype=float)
+        y[2] = x[2] - 2.0 * np.exp(-0.5 * ((x[2] - 0.8) / 0.15) ** 2)
+        return MIXING @ y
+
+
+def test_a_large_value_behind_a_ridge_is_found_from_a_start_of_its_own():
+    truth = np.zeros(N)
+    truth[2] = 1.4
+    case = TwoValleys(truth)
+    search, base = base_of(case)
+    fit = fit_large_values(search, base, NAMES, WIDE)
+    assert fit.values["k2"] == pytest.approx(1.4, abs=0.1)
