@@ -5,7 +5,7 @@ import ast
 import pytest
 
 LOWEST = {"constants", "content", "errors", "files", "installation", "plots", "records", "threads", "units"}
-FLOOR = {"config", "readers", "signal", "registry", "fingerprint"}
+FLOOR = {"config", "readers", "signal", "registry", "fingerprint", "kernel_cache"}
 PARTS = {"hammer_test", "modal", "passage", "simulate"}
 ALLOWED = {
     "constants": set(),

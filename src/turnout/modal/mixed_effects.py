@@ -220,6 +220,9 @@ def fit_mixed(
     """
     if theta is None:  # do not fit shared modes first: the spread between impacts would look like a second mode
         theta = np.repeat(np.asarray(start, dtype=float)[None], len(decays), axis=0)
+    # At the first use, since numba takes a third of a second to import.
+    from turnout.modal.mixed_kernels import shrink
+
     n_decay, n_mode = theta.shape[:2]
     dof = degrees_of_freedom(decays, n_mode, len(drift))
     rss: list[float] = []
@@ -227,17 +230,9 @@ def fit_mixed(
         linearisation = linearise(theta, decays, rate, drift)
         sigma2 = max(linearisation.rss.sum() / dof, 1e-300)
         rss.append(float(linearisation.rss.sum()))
-        inverse = _inverse(linearisation.information)
-        step = np.einsum("ijk,ik->ij", inverse, linearisation.score).reshape(theta.shape)
-        free = (theta + np.where(np.isfinite(step), step, 0.0)).reshape(n_decay, -1)
-        covariance = sigma2 * inverse
-        # Never below the variance with all other parameters known: rounding may turn that of twin poles negative.
-        known = np.maximum(np.einsum("ijj->ij", linearisation.information), 1e-300)
-        variance = np.maximum(np.einsum("ijj->ij", covariance), sigma2 / known)
-        spread = between_variance(free, variance)
-        weight = _inverse(covariance + np.diag(spread))
-        centre = np.linalg.solve(weight.sum(axis=0), np.einsum("ijk,ik->j", weight, free))
-        shrunken = centre + spread * np.einsum("ijk,ik->ij", weight, free - centre)
+        free, covariance, variance, spread, centre, shrunken = shrink(
+            theta.reshape(n_decay, -1), linearisation.information, linearisation.score, sigma2
+        )
         shrunken = _limit_step(shrunken.reshape(theta.shape), theta)
         change = np.max(np.abs((shrunken - theta).reshape(n_decay, -1)) / np.sqrt(variance + spread))
         # The steps are free, as the modes that they lead to are limited. What is reported is in its domain.

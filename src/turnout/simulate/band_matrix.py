@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from turnout.simulate.kernel_cache import kernel
+from turnout.kernel_cache import kernel
 
 
 @kernel

@@ -8,7 +8,7 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.simulate.band_matrix import factorise, factorise4, solve, upper_rows
-from turnout.simulate.kernel_cache import kernel
+from turnout.kernel_cache import kernel
 from turnout.simulate.matrices import link_vector
 
 if TYPE_CHECKING:

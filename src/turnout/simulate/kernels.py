@@ -3,7 +3,7 @@
 import numpy as np
 
 from turnout.simulate.force_laws import FRICTION, GAP, LIFT, LINEAR, POWER
-from turnout.simulate.kernel_cache import kernel
+from turnout.kernel_cache import kernel
 
 
 @kernel

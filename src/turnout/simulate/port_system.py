@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.simulate.kernel_cache import inline_kernel
+from turnout.kernel_cache import inline_kernel
 from turnout.simulate.kernels import law_force, path_at, rail_weights, ramp_at, solve_dense, window_product
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.simulate.kernel_cache import kernel
+from turnout.kernel_cache import kernel
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -16,8 +16,8 @@ from turnout.fingerprint import fingerprint
 Function = TypeVar("Function", bound=Callable)
 FASTMATH_FLAGS = {"contract", "reassoc", "nsz", "arcp"}
 # numba only checks whether the file of the function itself has changed. But a kernel contains the code of the kernels
-# it calls and the constants they import. So the cache folder has the fingerprint of all modules of the march.
-FINGERPRINTED_MODULE = "turnout.simulate.march"
+# it calls and the constants they import. So the cache folder has the fingerprint of all modules with kernels.
+FINGERPRINTED_MODULES = ("turnout.simulate.march", "turnout.modal.mixed_kernels")
 
 
 def kernel(function: Function) -> Function:
@@ -68,7 +68,7 @@ def _compile(function: Function, **options: Any) -> Function:
 @cache
 def cache_folder() -> Path | None:
     """First writable cache folder, or None: that of numba's setting, beside the source, in the user's cache."""
-    name = f"kernels-{fingerprint(FINGERPRINTED_MODULE)}"
+    name = f"kernels-{fingerprint(*FINGERPRINTED_MODULES)}"
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     source_cache = Path(__file__).resolve().parent / "__pycache__"
     for base in (config.CACHE_DIR, source_cache, Path(home) / "turnout"):  # type: ignore[attr-defined]
