@@ -5,7 +5,8 @@ import ast
 import pytest
 
 LOWEST = {"constants", "content", "errors", "files", "installation", "plots", "records", "threads", "units"}
-FLOOR = {"config", "readers", "signal", "registry", "fingerprint", "kernel_cache"}
+FLOOR = {"config", "readers", "signal", "registry", "fingerprint"}
+COMPILED = {"kernel_cache"}
 PARTS = {"hammer_test", "modal", "passage", "simulate"}
 ALLOWED = {
     "constants": set(),
@@ -19,11 +20,12 @@ ALLOWED = {
     "threads": set(),
     "units": {"constants", "errors", "records"},
     **{package: LOWEST for package in FLOOR},
-    **{package: LOWEST | FLOOR for package in PARTS},
+    "kernel_cache": {"fingerprint"},
+    **{package: LOWEST | FLOOR | COMPILED for package in PARTS},
     "physics": LOWEST | FLOOR | PARTS,
     "workflow": LOWEST | FLOOR,
     "trend": LOWEST | FLOOR | PARTS | {"physics"},
-    "mismatch": LOWEST | FLOOR | PARTS | {"physics"},
+    "mismatch": LOWEST | FLOOR | COMPILED | PARTS | {"physics"},
     "stages": LOWEST | FLOOR | PARTS | {"physics", "workflow", "trend", "mismatch"},
 }
 ALLOWED["report"] = set(ALLOWED) | {"report"}
@@ -42,6 +44,7 @@ OPENS_FILES = LOWEST | {
     "cli",
     "demo",
     "fingerprint",
+    "kernel_cache",
 }
 
 

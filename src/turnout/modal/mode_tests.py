@@ -283,7 +283,7 @@ def fit_and_prune(
     columns: np.ndarray,
     settings: IdentifySettings,
     rejected: list[dict],
-    previous: MixedFit | None = None,
+    theta: np.ndarray | None = None,
     max_damping: float | None = None,
     indispensable: set | None = None,
 ) -> tuple[MixedFit | None, list[Candidate]]:
@@ -305,8 +305,8 @@ def fit_and_prune(
         Settings of the identification.
     rejected : list of dict
         Rows of rejected candidates, to which those dropped here are added.
-    previous : MixedFit or None
-        Fit of the same candidates whose modes are the start.
+    theta : (n_decay, n_mode, 2) array of float or None
+        Modes of each decay at which the first fit starts; None: those of the candidates.
     max_damping : float or None
         Damping up to which a pole may stay in the fit although it is no mode; None: only modes stay.
     indispensable : set or None
@@ -320,7 +320,6 @@ def fit_and_prune(
     if not candidates:
         return None, candidates
     indispensable = set() if indispensable is None else indispensable
-    theta = None if previous is None else previous.theta
     fit = fit_mixed(start_values(candidates), decays, rate, columns, theta=theta, **SEARCH_OPTIONS)
     while True:
         failures = mode_failures(fit, settings, max_damping)

@@ -32,6 +32,7 @@ from turnout.modal.noise import (
     significant_background,
     whiten,
 )
+from turnout.modal.similar_decays import combine, group_similar
 from turnout.modal.stabilization import DAMPING_RANGE, Stabilisation, candidates, likely_poles, stabilisation
 
 if TYPE_CHECKING:
@@ -143,7 +144,7 @@ def _refine_noise(
             white_columns,
             settings,
             explanation.rejected,
-            explanation.fit,
+            explanation.fit.theta,
             max_damping,
             indispensable,
         )
@@ -347,11 +348,7 @@ def select_modes(decays: np.ndarray, rate: float, settings: IdentifySettings) ->
         settings,
         largest_background,
     )
-    explanations = [explanation]
-    if explanation.fit is not None and explanation.is_doubtful:
-        explanations += _alternative_explanations(explanation, table, decays, rate, settings)
-        explanation = likeliest_explanation(explanations, decays, settings)
-    rival_modes = [e.fit.mean for e in explanations if e is not explanation and e.fit is not None]
+    explanation, rival_modes = _choose(explanation, table, decays, rate, settings)
     explanation = polish(explanation, decays, rate)
     result = Selection(table, rejected + explanation.rejected, rival_modes=rival_modes)
     if explanation.fit is not None:
@@ -363,6 +360,65 @@ def select_modes(decays: np.ndarray, rate: float, settings: IdentifySettings) ->
         raw = linearise(fit.theta, decays, rate, explanation.background.columns(n, rate))
         result.amplitude, result.residual_power = raw.amplitude, raw.rss
         result.energy = energy_shares(raw.amplitude, fit.theta)
+    return result
+
+
+def _choose(
+    first: Explanation, table: Stabilisation, decays: np.ndarray, rate: float, settings: IdentifySettings
+) -> tuple[Explanation, list[np.ndarray]]:
+    """The likeliest explanation of ``decays``, and the modes (n_mode, 2) of the others.
+
+    Others than the first are searched for in the combined decays of impacts with similar poles.
+    """
+    if first.fit is None or not first.is_doubtful:
+        return first, []
+    # The phase of hum is another one in each impact, so combined decays would hide it.
+    group = np.arange(len(decays)) if first.background.hum else group_similar(first.fit)
+    is_combined = group.max() + 1 < len(decays)
+    combined, of_combined = decays, first
+    if is_combined:
+        combined = combine(decays, group)
+        of_combined = _refit(first, combined, _group_means(first.fit.theta, group), rate, settings)
+    explanations = [of_combined, *_alternative_explanations(of_combined, table, combined, rate, settings)]
+    usable = [e for e in explanations if e.fit is not None]
+    chosen = likeliest_explanation(usable, combined, settings) if usable else first
+    rival_modes = [e.fit.mean for e in usable if e is not chosen and e.fit is not None]
+    if chosen is of_combined:
+        return first, rival_modes
+    if is_combined and chosen.fit is not None:
+        chosen = _refit(chosen, decays, chosen.fit.theta[group], rate, settings, DAMPING_RANGE[1])
+    return chosen, rival_modes
+
+
+def _group_means(theta: np.ndarray, group: np.ndarray) -> np.ndarray:
+    """(n_group, n_mode, 2) means of the modes (n_decay, n_mode, 2) of the decays in each group."""
+    return np.array([theta[group == number].mean(axis=0) for number in range(group.max() + 1)])
+
+
+def _refit(
+    explanation: Explanation,
+    decays: np.ndarray,
+    theta: np.ndarray,
+    rate: float,
+    settings: IdentifySettings,
+    max_damping: float | None = None,
+) -> Explanation:
+    """The same explanation fitted to other decays from modes ``theta``, its noise and the tests of its modes anew."""
+    columns = explanation.background.columns(decays.shape[1], rate)
+    result = replace(explanation, rejected=list(explanation.rejected))
+    result.whitening = noise_filter(linearise(theta, decays, rate, columns).residual, settings.noise_order_maximum)
+    white = whiten(decays, result.whitening)
+    result.fit, result.candidates = fit_and_prune(
+        explanation.candidates,
+        white,
+        rate,
+        explanation.background.columns(white.shape[1], rate),
+        settings,
+        result.rejected,
+        theta,
+        max_damping,
+        {id(candidate) for candidate in explanation.candidates},
+    )
     return result
 
 

@@ -207,16 +207,16 @@ def fit_waves(
                     plus, minus = sums[0, 1, m, j], sums[1, 1, m, j]
                     # Re and Im of a times a complex sum, written out
                     across[j, i] = 0.5 * (a.real * (plus.real + minus.real) - a.imag * (plus.imag + minus.imag))
-                    across[n_mode + j, i] = 0.5 * (a.real * (plus.imag - minus.imag) + a.imag * (plus.real - minus.real))
+                    across[n_mode + j, i] = 0.5 * (
+                        a.real * (plus.imag - minus.imag) + a.imag * (plus.real - minus.real)
+                    )
                 for c in range(n_column):
                     across[p + c, i] = a.real * of_ramp[m, c] - a.imag * of_ramp[n_mode + m, c]
                 for j in range(i + 1):
                     b = tilt[j]
                     both, mixed = a * b, a * b.conjugate()
                     plus, minus = sums[0, 2, m, j // 2], sums[1, 2, m, j // 2]
-                    square[i, j] = 0.5 * (
-                        both.real * plus.real - both.imag * plus.imag + mixed.real * minus.real - mixed.imag * minus.imag
-                    )
+                    square[i, j] = 0.5 * (both * plus + mixed * minus).real
             for r in range(size):
                 for k in range(r):
                     for i in range(p):

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.simulate.band_matrix import factorise, factorise4, solve, upper_rows
 from turnout.kernel_cache import kernel
+from turnout.simulate.band_matrix import factorise, factorise4, solve, upper_rows
 from turnout.simulate.matrices import link_vector
 
 if TYPE_CHECKING:

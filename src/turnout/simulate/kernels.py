@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from turnout.simulate.force_laws import FRICTION, GAP, LIFT, LINEAR, POWER
 from turnout.kernel_cache import kernel
+from turnout.simulate.force_laws import FRICTION, GAP, LIFT, LINEAR, POWER
 
 
 @kernel

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.simulate.band_matrix import momentum_minus_force, multiply, solve, solve_from_both_ends
 from turnout.kernel_cache import inline_kernel, kernel
+from turnout.simulate.band_matrix import momentum_minus_force, multiply, solve, solve_from_both_ends
 from turnout.simulate.port_system import evaluate, flexibility, locate_ports, newton_update
 
 if TYPE_CHECKING:

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.sparse import csr_array
 
+from turnout.kernel_cache import kernel
 from turnout.mismatch.turnout.receptance_observation import LINES, SHIFTED_LINES
 from turnout.mismatch.turnout.track_parameters import COMMON_PARAMETERS, SUPPORT_PARAMETERS, casting_elements
-from turnout.kernel_cache import kernel
 from turnout.simulate.rail import element_mass
 
 if TYPE_CHECKING:
