@@ -138,12 +138,12 @@ def _change(answer: ModelAnswer) -> str:
     """The change in words: effect, parameter, size and onset."""
     if answer.verdict == "none":
         return "none"
-    if answer.onset is None:
-        return f"unknown, the visit differs from all before, most at {answer.parameter}"
+    assert answer.onset is not None
     from turnout.stages.calibrated_model import day_of
 
     start, end = (day_of(t) for t in answer.onset)
-    return f"{_effect(answer)}, appeared after {start}, at the latest at {end} ({answer.gain:.0f} nats)"
+    evidence = "" if answer.gain is None else f" ({answer.gain:.0f} nats)"
+    return f"{_effect(answer)}, appeared after {start}, at the latest at {end}{evidence}"
 
 
 def _effect(answer: ModelAnswer) -> str:

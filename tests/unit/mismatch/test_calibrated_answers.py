@@ -289,3 +289,33 @@ def test_a_support_that_carries_nothing_under_impacts_and_trains_hangs(size, nam
     assert last_answers(visits)["change"].names == (name,)
     start = histories(np.random.default_rng(16), 4, step("ballast@1.20", size, 0))
     assert last_answers(start)["file"].names == (name,)
+
+
+def test_an_effect_that_explains_little_of_a_jump_is_no_name():
+    """Half of the excess over the 100 directions of a visit, which leave 100 where nothing happened."""
+    jump = Innovation(1100.0, 100, 0.0, "seat_A3", 50.0, 190)
+    assert answers._is_explained(jump, replace(jump, statistic=600.0))
+    assert not answers._is_explained(jump, replace(jump, statistic=601.0))
+    expected = replace(jump, statistic=90.0)
+    assert answers._is_explained(expected, expected)
+
+
+@pytest.mark.parametrize("question", ["change", "file"])
+@pytest.mark.parametrize(("name", "parameter"), [("local_ballast", "ballast@1.20"), ("sensor_gain", "gain_A3")])
+def test_without_its_effect_in_the_library_a_site_has_no_other_name(question, name, parameter):
+    """Open world, n = 5 each: the answer is "unknown" where the effect is."""
+    candidates = change_candidates(PARAMETERS, without=(name,))
+    position = next(p.position for p in PARAMETERS if p.name == parameter)
+    for seed in range(5):
+        first = 0 if question == "file" else 2
+        size = 0.5 if name == "sensor_gain" else -1.6
+        visits = histories(np.random.default_rng(seed), 4, step(parameter, size, first))
+        stated = answers_after_visits(PARAMETERS, visits, [], candidates, 12.0, 6.0, 4)
+        assert {a.verdict for a in stated if a.question == question} == {"unknown"}
+        assert not any(a.names for a in stated)
+        assert abs(next(a.position for a in stated if a.question == question) - position) <= 0.6
+
+
+def test_a_wave_has_a_stretch_and_no_position():
+    assert answers.position_of(SURFACE[0].name, SURFACE[0]) is None
+    assert answers.position_of("dip of 0.8 m@5.00", None) == 5.0

@@ -8,10 +8,11 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
-from turnout.mismatch.calibrated.belief import Belief, StateParameter
+from turnout.mismatch.calibrated.belief import Belief, Innovation, StateParameter
 from turnout.mismatch.calibrated.change import ChangeEffect, OnsetEvidence, compare_onsets
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.file_comparison import Deviation, deviations_from_file
@@ -162,7 +163,7 @@ def change_answer(
     Returns
     -------
     ModelAnswer
-        "unknown" if the last visit differs from all before, and no candidate has the evidence of a name.
+        "unknown" if a visit differs from all before, and no name explains it.
     """
     visit = visits[-1].visit
     history = estimate_history(parameters, visits, events, repeats_between_visits=False, accepted=None)
@@ -176,19 +177,30 @@ def change_answer(
         return _answer_without_name(history, visit, by_name)
     leader = material[0]
     stated = _LeadingEffect.of(leader.effect, by_name, leader.size, leader.gain - price, leader.interval())
+    jump = history.steps[1 + int(np.argmax(leader.gains))].innovation
     if stated.name is None:
-        return stated.answer(visit, CHANGE, ())
+        return stated.unknown(visit, CHANGE, by_name[jump.parameter])
     with_change = estimate_history(
         parameters, visits, [*events, *_events_of_change(leader)], repeats_between_visits=False, accepted=None
     )
     beside = [e.gain for e in compare_onsets(with_change, _others_beside(stated, candidates, by_name))]
-    if max(beside, default=0.0) >= least:
-        return stated.answer(visit, CHANGE, ())
+    explained = next(s.innovation for s in with_change.steps if s.visit == leader.onset)
+    if max(beside, default=0.0) >= least or not _is_explained(jump, explained):
+        return stated.unknown(visit, CHANGE, by_name[jump.parameter])
     names = [stated.name]
     if stated.name == "local_ballast" and leader.size[0] < 0.0:
         names = _supported_names(parameters, visits, events, leader, _present_size(leader), margin)
     rivals = [_name(e.effect, by_name) for e in material if e.gain > leader.gain - margin]
     return stated.answer(visit, CHANGE, _with_rivals(names, stated, rivals))
+
+
+def _is_explained(before: Innovation, after: Innovation) -> bool:
+    """Whether an effect explains the innovation of its first visit: at least a share of the excess over the expected.
+
+    A substitute for an effect that has no name explains little of it, however much evidence it has.
+    """
+    excess = [i.statistic - i.n_directions for i in (before, after)]
+    return excess[1] <= max((1.0 - CALIBRATION.min_explained_share) * excess[0], 0.0)
 
 
 def _with_rivals(names: Sequence[str], stated: _LeadingEffect, rivals: Iterable[str | None]) -> list[str]:
@@ -237,13 +249,15 @@ class _LeadingEffect:
             onset is not None and effect.grows,
         )  # fmt: skip
 
+    def unknown(self, visit: str, question: str, jump: StateParameter) -> ModelAnswer:
+        """Answer "unknown", at the parameter whose jump explains most."""
+        return ModelAnswer(
+            visit, question, "unknown", (), jump.name, jump.group, position_of(jump.name, jump), onset=self.onset,
+            gain=self.gain,
+        )  # fmt: skip
+
     def answer(self, visit: str, question: str, names: Sequence[str]) -> ModelAnswer:
-        """Answer with these names; "unknown" without any."""
-        if not names:
-            return ModelAnswer(
-                visit, question, "unknown", (), self.parameter, self.group, self.position, onset=self.onset,
-                gain=self.gain,
-            )  # fmt: skip
+        """Answer with these names."""
         return ModelAnswer(
             visit, question, "named" if len(names) == 1 else "a_or_b", tuple(names[:2]), self.parameter, self.group,
             self.position, *self.size, self.unit, self.onset, self.gain, self.grows,
@@ -266,7 +280,7 @@ def _others_beside(
 
 
 def position_of(name: str, parameter: StateParameter | None) -> float | None:
-    """Position of a candidate [m]: that of its parameter, or the number behind "@" or "at" in its name.
+    """Position of a candidate [m]: that of its parameter, or the number behind "@" or "at" in its name; none of a wave.
 
     Parameters
     ----------
@@ -279,6 +293,8 @@ def position_of(name: str, parameter: StateParameter | None) -> float | None:
     """
     if parameter is not None and parameter.position is not None:
         return parameter.position
+    if parameter is not None and parameter.group == "wave":  # it names its stretch
+        return None
     number = re.search(r"(?:@| at )(-?\d+(?:\.\d+)?)", name)
     return float(number.group(1)) if number else None
 
@@ -360,16 +376,17 @@ def _with_offset(group: GroupInformation, name: str, offset: str) -> GroupInform
 
 
 def _answer_without_name(history: History, visit: str, by_name: Mapping[str, StateParameter]) -> ModelAnswer:
-    """ "none", or "unknown" if the last visit differs from all before by more than those from what was expected."""
-    *before, innovation = (s.innovation for s in history.steps)
-    level = max([1.0, *(i.statistic / max(i.n_directions, 1) for i in before)])
-    if not before or innovation.is_expected_at(level):
-        return ModelAnswer(visit, CHANGE, "none")
-    parameter = by_name.get(innovation.parameter)
-    return ModelAnswer(
-        visit, CHANGE, "unknown", (), innovation.parameter, parameter.group if parameter else "",
-        position_of(innovation.parameter, parameter),
-    )  # fmt: skip
+    """ "none", or "unknown" since the first visit that differs from all before by more than those from the expected."""
+    level = 1.0
+    for before, step in pairwise(history.steps):
+        level = max(level, before.innovation.statistic / max(before.innovation.n_directions, 1))
+        if not step.innovation.is_expected_at(level):
+            at = by_name[step.innovation.parameter]
+            return ModelAnswer(
+                visit, CHANGE, "unknown", (), at.name, at.group, position_of(at.name, at),
+                onset=(before.time, step.time),
+            )  # fmt: skip
+    return ModelAnswer(visit, CHANGE, "none")
 
 
 def file_answer(
@@ -401,7 +418,7 @@ def file_answer(
     Returns
     -------
     ModelAnswer
-        "unknown" where a value differs whose group is not among the candidates, or has no name.
+        "unknown" where what differs has no name, or no name explains it.
     """
     by_name = {p.name: p for p in parameters}
     steps = [c for c in candidates if not c.grows]
@@ -412,14 +429,16 @@ def file_answer(
     order = [
         k for k in np.argsort(-gains) if gains[k] > least - margin and abs(sizes[k]) >= _least_size(steps[k], by_name)
     ]
+    jump = history.steps[0].innovation if history.steps else None
     if not order or gains[order[0]] < least:
-        return _deviation_answer(parameters, history, visit, steps)
+        return _deviation_answer(parameters, history, visit, steps, jump)
     first = order[0]
     stated = _LeadingEffect.of(
         steps[first], by_name, (float(sizes[first]), float(sds[first])), float(gains[first]) - price
     )
     if stated.name is None or _needs_another_from_first(parameters, visits, events, steps, steps[first], stated, least):
-        return stated.answer(visit, FILE, ())
+        assert jump is not None  # without a visit nothing has evidence
+        return stated.unknown(visit, FILE, by_name[jump.parameter])
     names = [stated.name]
     if stated.name == "local_ballast" and sizes[first] < 0.0:
         names = _supported_names(parameters, visits, events, steps[first], stated.size, margin)
@@ -436,26 +455,34 @@ def _needs_another_from_first(
     stated: _LeadingEffect,
     least: float,
 ) -> bool:
-    """Whether an effect of another name at the same position has the evidence of a name beside this one."""
+    """Whether this effect explains too little, or one of another name at its position has the evidence of a name."""
     by_name = {p.name: p for p in parameters}
     rivals = _others_beside(stated, candidates, by_name)
     if not rivals or effect.name not in by_name:
         return False
     wide = [replace(p, sd=float(np.hypot(p.sd, effect.sd))) if p.name == effect.name else p for p in parameters]
-    gains, *_ = evidence_from_first(wide, estimate_history(wide, visits, events, accepted=None), rivals)
-    return float(gains.max()) >= least
+    before, after = (estimate_history(p, visits, events, accepted=None) for p in (parameters, wide))
+    gains, *_ = evidence_from_first(wide, after, rivals)
+    return float(gains.max()) >= least or not _is_explained(before.steps[0].innovation, after.steps[0].innovation)
 
 
 def _deviation_answer(
-    parameters: Sequence[StateParameter], history: History, visit: str, candidates: Sequence[ChangeEffect]
+    parameters: Sequence[StateParameter],
+    history: History,
+    visit: str,
+    candidates: Sequence[ChangeEffect],
+    jump: Innovation | None,
 ) -> ModelAnswer:
-    """The clearest deviation from the file; "unknown" if its group is not among the candidates."""
+    """The clearest deviation from the file; without one "unknown" if the first visit is not what the file expects."""
     by_name = {p.name: p for p in parameters}
     groups = {by_name[c.name].group for c in candidates if c.name in by_name}
     least = {g: size for g, size in CALIBRATION.least_sizes if g in groups}
     deviations = deviations_from_file(history.belief, parameters, least, intolerable=INTOLERABLE)
     if not deviations:
-        return ModelAnswer(visit, FILE, "none")
+        if jump is None or jump.is_expected:
+            return ModelAnswer(visit, FILE, "none")
+        at = by_name[jump.parameter]
+        return ModelAnswer(visit, FILE, "unknown", (), at.name, at.group, position_of(at.name, at))
     first: Deviation = deviations[0]
     middle = None if first.positions is None else 0.5 * sum(first.positions)
     position = middle if middle is not None else position_of(first.names[0], by_name[first.names[0]])

@@ -48,6 +48,9 @@ class CalibrationConstants:
     least_support: float = threshold(
         0.1, "share", "of its stiffness, below which ballast carries nothing: the sleeper hangs", PAGE
     )
+    min_explained_share: float = threshold(
+        0.5, "share of the excess", "of the innovation of its first visit, that an effect explains at least", PAGE
+    )
     same_position: float = threshold(0.6, "m", "a bay: effects within it are at one position", "convention")
     worn_depth: float = threshold(
         0.7, "ln", "a dip twice as deep as in the file is a finding, whatever tolerance the file states", PAGE
