@@ -111,7 +111,7 @@ def _work(row: Mapping[str, Any]) -> dict[str, Any]:
         "turnout_id": row["turnout_id"],
         "label": row["sections"],
         "anchor": (row["section_id"] or "").split("/")[-1].replace("*", ""),
-        "component": row["component"],
+        "component": row["component"].replace("_", " "),
         "state": row["state"],
         "badge": badge(row["state"]),
         "what": row["sentence"],
