@@ -46,7 +46,6 @@ from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.calibration import (
     calibrated_parameters,
     dip_directions,
-    linearization_point,
     visit_groups,
 )
 from turnout.stages.checkpoint import SUFFIX, read_value, write_value
@@ -92,7 +91,6 @@ class StoredVisit:
     answer: str
     groups: tuple[GroupInformation, ...]
     parameters: tuple[StateParameter, ...]
-    point: Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -198,7 +196,6 @@ def store_visit(
     value = {
         "version": dict(about["version"]), "visit": about["visit"], "sections": sections, "answer": answer,
         "parameters": [asdict(p) for p in parameters.values()],
-        "point": dict(linearization_point(search.case, fit, group.route)),
         "groups": [
             {"group": g.group, "n": g.n_recordings, "names": list(g.names), "matrix": g.matrix, "vector": g.vector}
             for g in information
@@ -243,9 +240,7 @@ def read_visits(folder: Path, turnout_id: str, versions: Mapping[str, Mapping[st
             GroupInformation(g["group"], g["n"], tuple(g["names"]), g["matrix"], g["vector"]) for g in value["groups"]
         )
         parameters = tuple(StateParameter(**p) for p in value["parameters"])
-        stored.append(
-            StoredVisit(value["visit"], value["sections"], value["answer"], information, parameters, value["point"])
-        )
+        stored.append(StoredVisit(value["visit"], value["sections"], value["answer"], information, parameters))
     return sorted(stored, key=lambda s: (s.visit, s.sections))
 
 
@@ -272,8 +267,7 @@ def _visits_of(stored: Iterable[StoredVisit]) -> list[VisitInformation]:
     visits_used = []
     for visit, parts in members.items():
         information = tuple(g for s in parts for g in s.groups)
-        point = {name: value for s in parts for name, value in s.point.items()}
-        visits_used.append(VisitInformation(visit, years_of(visit), information, point))
+        visits_used.append(VisitInformation(visit, years_of(visit), information))
     return visits_used
 
 

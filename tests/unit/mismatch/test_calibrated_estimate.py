@@ -11,9 +11,7 @@ from turnout.mismatch.calibrated import (
     StateParameter,
     VisitInformation,
     estimate_history,
-    relinearized_history,
 )
-from turnout.mismatch.calibrated.history import visits_to_linearize
 from turnout.mismatch.calibrated.information import marginalize, repeated_error_weights
 
 N_MASS = 4
@@ -236,60 +234,6 @@ def test_a_slipped_sensor_teaches_nothing_of_itself_and_little_beside_it():
     assert belief.value("gain") == 0.0 and belief.sd[0] == pytest.approx(0.02)
     assert belief.value("stiffness") == pytest.approx(0.1 / (1.0 + (0.01 / 0.2) ** 2))
     assert estimate_history(parameters, [visit], accepted=None).belief.value("stiffness") < 0.03  # 0.1
-
-
-class Nonlinear:
-    """A stiffness that is measured through its exponential, by one visit."""
-
-    def __init__(self, value):
-        self.value, self.calls = value, 0
-
-    def __call__(self, point):
-        self.calls += 1
-        x0 = point["x"]
-        slope = np.exp(x0)
-        data = self.value - np.exp(x0) + slope * x0
-        return VisitInformation("v", 0.0, (GroupInformation("g", 1, ("x",), np.array([[slope**2 / 0.01]]),
-                                                            np.array([slope * data / 0.01])),))  # fmt: skip
-
-
-def test_two_orders_of_arrival_of_a_nonlinear_model_give_the_same_belief():
-    rng = np.random.default_rng(8)
-    parameters = (StateParameter("x", 0.0, 0.5, 0.05),)
-    models = {f"v{k}": Nonlinear(np.exp(1.2) + rng.normal(0.0, 0.1)) for k in range(5)}
-
-    def linearizers(visits):
-        def at(visit):
-            def linearize(point):
-                v = models[visit](point)
-                return VisitInformation(visit, 0.1 * int(visit[1]), v.groups, point)
-
-            return linearize
-
-        return {visit: (0.1 * int(visit[1]), at(visit)) for visit in visits}
-
-    beliefs = []
-    for order in (["v0", "v1", "v2", "v3", "v4"], ["v4", "v2", "v0", "v3", "v1"]):
-        stored = {}
-        for n in range(1, 6):
-            history = relinearized_history(parameters, linearizers(order[:n]), stored=stored, accepted=None)
-        beliefs.append(history.belief)
-    assert same_bits(*beliefs)
-    assert beliefs[0].value("x") == pytest.approx(1.2, abs=0.1)
-    calls = sum(m.calls for m in models.values())
-    relinearized_history(parameters, linearizers(order), stored=stored, accepted=None)
-    assert sum(m.calls for m in models.values()) == calls  # nothing is linearized twice about one point
-
-
-def test_a_visit_is_linearized_again_when_the_mean_has_left_its_point():
-    parameters = (StateParameter("x", 0.0, 1.0),)
-
-    def visit(point):
-        return VisitInformation("v", 0.0, (GroupInformation("g", 1, ("x",), np.eye(1) * 1e4, np.ones(1) * 7e3),), point)
-
-    for point, expected in (({}, ["v"]), ({"x": 0.5}, []), ({"x": 1.3}, ["v"])):  # the mean is 0.7
-        history = estimate_history(parameters, [visit(point)], accepted=None)
-        assert visits_to_linearize(history, [visit(point)]) == expected
 
 
 def test_wrong_input_is_named():

@@ -4,7 +4,7 @@ from turnout.mismatch.calibrated.answers import ModelAnswer, answers_after_visit
 from turnout.mismatch.calibrated.belief import Belief, Innovation, StateParameter
 from turnout.mismatch.calibrated.change import ChangeEffect, OnsetEvidence, compare_onsets, drift_since
 from turnout.mismatch.calibrated.file_comparison import Deviation, deviations_from_file
-from turnout.mismatch.calibrated.history import Event, History, estimate_history, relinearized_history
+from turnout.mismatch.calibrated.history import Event, History, estimate_history
 from turnout.mismatch.calibrated.information import GroupInformation, VisitInformation
 
 __all__ = [
@@ -25,5 +25,4 @@ __all__ = [
     "deviations_from_file",
     "drift_since",
     "estimate_history",
-    "relinearized_history",
 ]

@@ -65,8 +65,6 @@ def change_candidates(
 ) -> list[ChangeEffect]:
     """Steps of each parameter of a single support, sensor or nose at an unknown visit, and their growth.
 
-    Those of a group without a name compete, too: an answer that rests on one is "unknown".
-
     Parameters
     ----------
     parameters : sequence of StateParameter
@@ -80,8 +78,7 @@ def change_candidates(
     -------
     list of ChangeEffect
     """
-    local = [p for p in parameters if p.group in NAMES or p.index is not None]
-    local = [p for p in local if NAMES.get(p.group) not in without]
+    local = [p for p in parameters if p.group in NAMES and NAMES[p.group] not in without]
     shapes = {} if shapes is None or NAMES["dip"] in without else shapes
     candidates = [(p.name, {p.name: 1.0}, CALIBRATION.change_sds * p.sd) for p in local]
     candidates += [(name, dict(direction), CALIBRATION.dip_sd) for name, direction in shapes.items()]
@@ -178,14 +175,11 @@ def change_answer(
     leader = material[0]
     stated = _LeadingEffect.of(leader.effect, by_name, leader.size, leader.gain - price, leader.interval())
     jump = history.steps[1 + int(np.argmax(leader.gains))].innovation
-    if stated.name is None:
-        return stated.unknown(visit, CHANGE, by_name[jump.parameter])
     with_change = estimate_history(
         parameters, visits, [*events, *_events_of_change(leader)], repeats_between_visits=False, accepted=None
     )
-    beside = [e.gain for e in compare_onsets(with_change, _others_beside(stated, candidates, by_name))]
     explained = next(s.innovation for s in with_change.steps if s.visit == leader.onset)
-    if max(beside, default=0.0) >= least or not _is_explained(jump, explained):
+    if not _is_explained(jump, explained):
         return stated.unknown(visit, CHANGE, by_name[jump.parameter])
     names = [stated.name]
     if stated.name == "local_ballast" and leader.size[0] < 0.0:
@@ -203,9 +197,9 @@ def _is_explained(before: Innovation, after: Innovation) -> bool:
     return excess[1] <= max((1.0 - CALIBRATION.min_explained_share) * excess[0], 0.0)
 
 
-def _with_rivals(names: Sequence[str], stated: _LeadingEffect, rivals: Iterable[str | None]) -> list[str]:
+def _with_rivals(names: Sequence[str], stated: _LeadingEffect, rivals: Iterable[str]) -> list[str]:
     """The names and those of rivals, each once."""
-    return [*names, *(n for n in dict.fromkeys(rivals) if n is not None and n not in (*names, stated.name))]
+    return [*names, *(n for n in dict.fromkeys(rivals) if n not in (*names, stated.name))]
 
 
 def _events_of_change(evidence: OnsetEvidence) -> list[Event]:
@@ -220,10 +214,10 @@ def _events_of_change(evidence: OnsetEvidence) -> list[Event]:
 
 @dataclass(frozen=True)
 class _LeadingEffect:
-    """The effect with the most evidence. ``name`` is None for a parameter whose change has no name."""
+    """The effect with the most evidence."""
 
     parameter: str
-    name: str | None
+    name: str
     group: str
     position: float | None
     unit: str
@@ -264,21 +258,6 @@ class _LeadingEffect:
         )  # fmt: skip
 
 
-def _others_beside(
-    stated: _LeadingEffect, candidates: Sequence[ChangeEffect], by_name: Mapping[str, StateParameter]
-) -> list[ChangeEffect]:
-    """Candidates of other names at the position of the effect: it is no name if one of them is needed beside it."""
-    if stated.position is None:
-        return []
-    candidates_beside = []
-    for c in candidates:
-        name, position = _name(c, by_name), position_of(c.name, by_name.get(c.name))
-        if name not in (stated.name, None) and position is not None:
-            if abs(position - stated.position) <= CALIBRATION.same_position:
-                candidates_beside.append(c)
-    return candidates_beside
-
-
 def position_of(name: str, parameter: StateParameter | None) -> float | None:
     """Position of a candidate [m]: that of its parameter, or the number behind "@" or "at" in its name; none of a wave.
 
@@ -299,9 +278,9 @@ def position_of(name: str, parameter: StateParameter | None) -> float | None:
     return float(number.group(1)) if number else None
 
 
-def _name(effect: ChangeEffect, by_name: Mapping[str, StateParameter]) -> str | None:
+def _name(effect: ChangeEffect, by_name: Mapping[str, StateParameter]) -> str:
     parameter = by_name.get(effect.name)
-    return NAMES.get(parameter.group if parameter else "dip")
+    return NAMES[parameter.group if parameter else "dip"]
 
 
 def _is_material(evidence: OnsetEvidence, by_name: Mapping[str, StateParameter]) -> bool:
@@ -317,11 +296,8 @@ def _present_size(evidence: OnsetEvidence) -> tuple[float, float]:
 
 
 def _least_size(effect: ChangeEffect, by_name: Mapping[str, StateParameter]) -> float:
-    """Least size of a change; of a parameter without a name the prior standard deviation of a change."""
     parameter = by_name.get(effect.name)
-    if parameter is None:
-        return CALIBRATION.least_dip
-    return dict(CALIBRATION.least_sizes).get(parameter.group, CALIBRATION.finding_sds * parameter.sd)
+    return dict(CALIBRATION.least_sizes)[parameter.group] if parameter else CALIBRATION.least_dip
 
 
 def _supported_names(
@@ -436,8 +412,8 @@ def file_answer(
     stated = _LeadingEffect.of(
         steps[first], by_name, (float(sizes[first]), float(sds[first])), float(gains[first]) - price
     )
-    if stated.name is None or _needs_another_from_first(parameters, visits, events, steps, steps[first], stated, least):
-        assert jump is not None  # without a visit nothing has evidence
+    assert jump is not None  # without a visit nothing has evidence
+    if not _explains_first_visit(parameters, visits, events, steps[first], jump):
         return stated.unknown(visit, FILE, by_name[jump.parameter])
     names = [stated.name]
     if stated.name == "local_ballast" and sizes[first] < 0.0:
@@ -446,24 +422,18 @@ def file_answer(
     return stated.answer(visit, FILE, _with_rivals(names, stated, rivals))
 
 
-def _needs_another_from_first(
+def _explains_first_visit(
     parameters: Sequence[StateParameter],
     visits: Sequence[VisitInformation],
     events: Sequence[Event],
-    candidates: Sequence[ChangeEffect],
     effect: ChangeEffect,
-    stated: _LeadingEffect,
-    least: float,
+    jump: Innovation,
 ) -> bool:
-    """Whether this effect explains too little, or one of another name at its position has the evidence of a name."""
-    by_name = {p.name: p for p in parameters}
-    rivals = _others_beside(stated, candidates, by_name)
-    if not rivals or effect.name not in by_name:
-        return False
+    """Whether an effect explains how far the first visit is from the file. A dip is taken at its evidence."""
+    if effect.name not in {p.name for p in parameters}:
+        return True
     wide = [replace(p, sd=float(np.hypot(p.sd, effect.sd))) if p.name == effect.name else p for p in parameters]
-    before, after = (estimate_history(p, visits, events, accepted=None) for p in (parameters, wide))
-    gains, *_ = evidence_from_first(wide, after, rivals)
-    return float(gains.max()) >= least or not _is_explained(before.steps[0].innovation, after.steps[0].innovation)
+    return _is_explained(jump, estimate_history(wide, visits, events, accepted=None).steps[0].innovation)
 
 
 def _deviation_answer(

@@ -16,9 +16,6 @@ class CalibrationConstants:
         0.9, "share of the tolerated variance", "that repeats in all recordings of a group; not yet measured", PAGE
     )
     max_chance: float = threshold(1e-4, "probability", "that an innovation of an intact visit is larger", PAGE)
-    relinearization_step: float = threshold(
-        0.5, "prior sd", "by which the mean may move from where derivatives were computed", PAGE
-    )
     speed_step: float = threshold(10.0, "km/h", "trains of one type within it share the error of the model", PAGE)
     walk_sds: tuple[tuple[str, float], ...] = threshold(
         (("ballast", 0.03), ("ballast_damper", 0.05), ("pad", 0.02), ("pad_damper", 0.04), ("gain", 0.003)),
@@ -51,7 +48,6 @@ class CalibrationConstants:
     min_explained_share: float = threshold(
         0.5, "share of the excess", "of the innovation of its first visit, that an effect explains at least", PAGE
     )
-    same_position: float = threshold(0.6, "m", "a bay: effects within it are at one position", "convention")
     worn_depth: float = threshold(
         0.7, "ln", "a dip twice as deep as in the file is a finding, whatever tolerance the file states", PAGE
     )

@@ -6,7 +6,7 @@ which recordings arrived, and a withdrawn visit leaves no trace.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -122,78 +122,6 @@ def estimate_history(
         n = visit.n_recordings
         steps.append(Step(visit.visit, time, matrix, vector, predicted, belief, innovation, is_used, n))
     return History(tuple(parameters), tuple(steps))
-
-
-def relinearized_history(
-    parameters: Sequence[StateParameter],
-    linearizers: Mapping[str, tuple[float, Callable[[Mapping[str, float]], VisitInformation]]],
-    events: Sequence[Event] = (),
-    stored: dict[tuple[str, tuple[int, ...]], VisitInformation] | None = None,
-    **options: bool | float | Collection[str] | None,
-) -> History:
-    """``estimate_history`` of a nonlinear model, linear about a point near the belief before each visit.
-
-    The point is the mean before the visit, rounded to a grid of ``CALIBRATION.relinearization_step`` prior standard
-    deviations about the file. It depends on earlier visits alone and not on the order of arrival. A visit is
-    linearized again only if the mean has moved to another point of the grid.
-
-    Parameters
-    ----------
-    parameters : sequence of StateParameter
-    linearizers : mapping
-        Visit -> its time [years], and a callable that gives its information about a point (parameter -> value).
-    events : sequence of Event
-    stored : dict or None
-        Information by visit and point of the grid from earlier calls; filled by this one.
-    **options
-        Further arguments of ``estimate_history``.
-
-    Returns
-    -------
-    History
-    """
-    known = {} if stored is None else stored
-    step = CALIBRATION.relinearization_step * np.array([p.sd for p in parameters])
-    origin = np.array([p.mean for p in parameters])
-    names = [p.name for p in parameters]
-    visits: list[VisitInformation] = []
-    mean = origin
-    for visit, (_, linearize) in sorted(linearizers.items(), key=lambda item: (item[1][0], item[0])):
-        cell = tuple(int(k) for k in np.rint((mean - origin) / step))
-        if (visit, cell) not in known:
-            known[visit, cell] = linearize(dict(zip(names, origin + step * np.array(cell))))
-        visits.append(known[visit, cell])
-        mean = estimate_history(parameters, visits, events, **options).belief.mean  # type: ignore[arg-type]
-    return estimate_history(parameters, visits, events, **options)  # type: ignore[arg-type]
-
-
-def visits_to_linearize(history: History, visits: Iterable[VisitInformation]) -> list[str]:
-    """Visits whose model was linear about a point that the belief has left.
-
-    Parameters
-    ----------
-    history : History
-        Of these visits.
-    visits : iterable of VisitInformation
-
-    Returns
-    -------
-    list of str
-        Those of which the mean after the visit is ``CALIBRATION.relinearization_step`` prior standard deviations or
-        more from the ``point`` of the visit, in a parameter that the visit informs on.
-    """
-    parameters = {p.name: p for p in history.parameters}
-    after = {s.visit: s.belief for s in history.used_steps}
-    moved = []
-    for visit in _in_order(visits):
-        informed = {name for g in visit.groups for name in g.names}
-        if visit.visit in after and any(
-            abs(after[visit.visit].value(name) - visit.point.get(name, parameters[name].mean))
-            >= CALIBRATION.relinearization_step * parameters[name].sd
-            for name in informed
-        ):
-            moved.append(visit.visit)
-    return moved
 
 
 def _in_order(visits: Iterable[VisitInformation]) -> list[VisitInformation]:

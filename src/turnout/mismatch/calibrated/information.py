@@ -8,7 +8,7 @@ The log likelihood of a visit is :math:`-\frac12 x^T \Lambda x + \eta^T x` up to
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -98,16 +98,11 @@ class GroupInformation:
 
 @dataclass(frozen=True)
 class VisitInformation:
-    """Information of one ``visit``, by group; ``time`` is that of the visit in years.
-
-    ``point``: parameter -> value about which the model was linear; parameters that are missing were at their prior
-    mean.
-    """
+    """Information of one ``visit``, by group; ``time`` is that of the visit in years."""
 
     visit: str
     time: float
     groups: tuple[GroupInformation, ...]
-    point: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def n_recordings(self) -> int:

@@ -16,7 +16,7 @@ from turnout.mismatch.turnout.priors import ROUGHNESS
 from turnout.mismatch.turnout.rail_roughness import Waves
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from turnout.mismatch.engine.case import Nuisance, Observation
     from turnout.mismatch.engine.map_fit import Fit
@@ -155,22 +155,6 @@ def _recording_information(case: TrackCase, fit: Fit, members: Sequence[int]) ->
         vector += weight * rows.T @ (fit.white[k] + rows @ point)
     owned = nuisances[n_shared:]
     return marginalize(matrix, vector, range(n_shared, len(order)), np.array([n.sd**-2 for n in owned]))
-
-
-def linearization_point(case: TrackCase, fit: Fit, route: str = "main") -> Mapping[str, float]:
-    """Parameter -> value about which the model of a visit is linear.
-
-    Parameters
-    ----------
-    case : TrackCase
-    fit : Fit
-    route : str
-
-    Returns
-    -------
-    mapping
-    """
-    return {p.name: float(fit.values[n]) for n, p in calibrated_parameters(case, route).items()}
 
 
 def dip_directions(parameters: Sequence[StateParameter]) -> dict[str, dict[str, float]]:
