@@ -10,10 +10,12 @@ import math
 import textwrap
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
-from html import escape
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from turnout.report.formatting import escape
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -230,6 +232,7 @@ def reduce_points(px: np.ndarray, py: np.ndarray) -> tuple[np.ndarray, np.ndarra
 LEFT, RIGHT, TOP, BOTTOM = 62, 14, 26, 40  # px, margins around the plot area
 LETTER, TITLE_LETTER = 6.2, 6.9  # px, mean width of a letter of a label and of a title
 LINE = 13  # px, height of a further line of a title
+N_AXES = 256  # axes whose ticks are remembered: those of one turnout's charts
 
 
 @dataclass
@@ -275,16 +278,22 @@ class Axis:
         """Pairs of value and text of the ticks."""
         if self.scale == "names":
             return [(k, escape(name)) for k, name in enumerate(self.names, start=1)]
-        if self.scale == "time":
-            middle = (self.low + self.high) / 2
-            day = (datetime(1970, 1, 1) + timedelta(seconds=middle)).strftime("%Y-%m-%d")
-            # an axis of a few days has no start of a month: its middle is named
-            return [(t, format_day(t)) for t in time_ticks(self.low, self.high)] or [(middle, day)]
-        if self.scale == "log":
-            return [(v, format_number(v)) for v in log_ticks(self.low, self.high)]
-        values = linear_ticks(self.low, self.high)
-        step = values[1] - values[0] if len(values) > 1 else None
-        return [(v, format_number(v, step)) for v in values]
+        return _ticks(float(self.low), float(self.high), self.scale)
+
+
+@lru_cache(maxsize=N_AXES)
+def _ticks(low: float, high: float, scale: str) -> list[tuple[float, str]]:
+    """Value and text of the ticks of an axis of numbers or times."""
+    if scale == "time":
+        middle = (low + high) / 2
+        day = (datetime(1970, 1, 1) + timedelta(seconds=middle)).strftime("%Y-%m-%d")
+        # an axis of a few days has no start of a month: its middle is named
+        return [(t, format_day(t)) for t in time_ticks(low, high)] or [(middle, day)]
+    if scale == "log":
+        return [(v, format_number(v)) for v in log_ticks(low, high)]
+    values = linear_ticks(low, high)
+    step = values[1] - values[0] if len(values) > 1 else None
+    return [(v, format_number(v, step)) for v in values]
 
 
 @dataclass
@@ -332,7 +341,7 @@ class Chart:
     top: int = TOP
 
     def __post_init__(self) -> None:
-        self.title_lines = textwrap.wrap(self.title, max(8, int((self.width - LEFT) / TITLE_LETTER))) or [""]
+        self.title_lines = _wrap_title(self.title, max(8, int((self.width - LEFT) / TITLE_LETTER)))
         self.grow_top(LINE * (len(self.title_lines) - 1))
         self._labels: list[VerticalLabel] = []
 
@@ -462,7 +471,8 @@ class Chart:
                 self.elements.append(f'<path class="{style} bar"{_series(series)} d="{path}"/>')
         texts = [""] * len(px) if labels is None else [_title(label) for label in labels]
         dot = f'<circle class="{style}"{_series(series)} r="{radius:g}" cx="%.2f" cy="%.2f">%s</circle>'
-        self.elements += [dot % (px[i], py[i], texts[i]) for i in np.flatnonzero(is_finite).tolist()]
+        dots = zip(px.tolist(), py.tolist(), texts, is_finite.tolist())
+        self.elements += [dot % (x, y, text) for x, y, text, is_drawn in dots if is_drawn]
 
     def vertical(self, x: float, style: str, label: str = "", row: int = 0) -> None:
         """Draw a vertical line with a label at its top, or along the line where it would lie on another line or label.
@@ -520,7 +530,7 @@ class Chart:
         label : str
             Text on hovering.
         """
-        x_left, x_right = (float(np.clip(self.px(v), LEFT, self.width - RIGHT)) for v in (x_low, x_high))
+        x_left, x_right = (min(max(float(self.px(v)), LEFT), self.width - RIGHT) for v in (x_low, x_high))
         if x_right > x_left:
             self.elements.append(
                 f'<rect class="{style}" data-span="" x="{x_left:.1f}" y="{self.top}" width="{x_right - x_left:.1f}" '
@@ -590,10 +600,43 @@ class Chart:
         return "".join(elements)
 
 
+MIN_TOGETHER = 50  # points from which it is faster to write all numbers of a path together than one by one
+MAX_PIXEL = 1000  # px, numbers written together are below it
+TIE = 1e-6  # distance from the middle of two hundredths, within which the error of a product could turn the rounding
+# Text of a number with two decimals: whole part and point, filled with null bytes in front; decimals; what follows.
+NUMBER = np.dtype([("whole", "S4"), ("decimals", "S2"), ("end", "S1")])
+WHOLE = np.array([f"{k}.".rjust(4, "\0") for k in range(MAX_PIXEL)], dtype="S4")
+DECIMALS = np.array([f"{k:02d}" for k in range(100)], dtype="S2")
+ENDS = np.array([b" ", b"L"], dtype="S1")
+
+
 def _path_points(px: np.ndarray, py: np.ndarray) -> str:
     """Path data of the points: ``x y`` of each, with the letter L of a straight line between them."""
-    numbers = np.column_stack([px, py]).ravel().tolist()
-    return ("%.2f %.2fL" * len(px) % tuple(numbers))[:-1]
+    numbers = np.empty((len(px), 2))
+    numbers[:, 0], numbers[:, 1] = px, py
+    text = _format_together(numbers) if len(px) >= MIN_TOGETHER else None
+    return (text or "%.2f %.2fL" * len(px) % tuple(numbers.ravel().tolist()))[:-1]
+
+
+def _format_together(numbers: np.ndarray) -> str | None:
+    """``x yL`` of each row with two decimals; None where a number is no pixel, or so near to a tie that it may differ
+    from the correctly rounded one."""
+    hundredths = 100.0 * numbers
+    nearest = np.rint(hundredths)
+    inside = numbers.min() > 0.0 and nearest.max() < 100 * MAX_PIXEL
+    if not (inside and np.abs(hundredths - nearest).max() < 0.5 - TIE):
+        return None
+    whole, decimals = np.divmod(nearest.astype(np.int32), 100)
+    texts = np.empty(numbers.shape, NUMBER)
+    texts["whole"], texts["decimals"], texts["end"] = WHOLE[whole], DECIMALS[decimals], ENDS
+    return texts.tobytes().translate(None, b"\0").decode("ascii")
+
+
+def _wrap_title(title: str, n_letters: int) -> list[str]:
+    """Lines of a title of at most ``n_letters`` each, at least one."""
+    if len(title) <= n_letters and title.isprintable() and title == title.strip():  # the usual case
+        return [title]
+    return textwrap.wrap(title, n_letters) or [""]
 
 
 def _title(words: str) -> str:

@@ -82,7 +82,8 @@ def history_panel(
     time = np.array([seconds(m["measured_at_utc"]) for m in modes])
     value = np.array([m[quantity.value] for m in modes])
     error = np.array([_half_width(m, quantity) for m in modes])
-    low, high = value - np.nan_to_num(error), value + np.nan_to_num(error)
+    half = np.where(np.isnan(error), 0.0, error)
+    low, high = value - half, value + half
     expected = [c for c in charts if c[quantity.low] is not None and c[quantity.high] is not None]
     lowest = min([low.min(), *(c[quantity.low] for c in expected)])
     highest = max([high.max(), *(c[quantity.high] for c in expected)])
@@ -113,21 +114,23 @@ def history_panel(
         for m, e in zip(modes, error)
     ]
     styles = _point_styles(modes, charts)
-    for style, series in SERIES.items():
-        some = np.flatnonzero(styles == style)
+    for style in (style for style in SERIES if style in styles):
+        some, series = np.flatnonzero(np.array(styles) == style), SERIES[style]
         chart.points(time[some], value[some], style, 3.0, low[some], high[some], [labels[i] for i in some], series)
     return chart.svg()
 
 
-def _point_styles(modes: Sequence[Mapping[str, Any]], charts: Sequence[Mapping[str, Any]]) -> np.ndarray:
+def _point_styles(modes: Sequence[Mapping[str, Any]], charts: Sequence[Mapping[str, Any]]) -> list[str]:
     """Style of each value: in alarm, far outside its expected value, or neither.
 
     The campaign of a value is the last one that began before it, for one may last two days.
     """
+    if not charts:
+        return ["point"] * len(modes)
     rows = sorted(charts, key=lambda c: c["measured_at_utc"])
     began = np.array([seconds(c["measured_at_utc"]) for c in rows])
     of = np.searchsorted(began, [seconds(m["measured_at_utc"]) for m in modes], side="right") - 1
-    return np.array([_style(rows[k]) if k >= 0 else "point" for k in of])
+    return [_style(rows[k]) if k >= 0 else "point" for k in of.tolist()]
 
 
 def _style(row: Mapping[str, Any]) -> str:
