@@ -43,7 +43,7 @@ def _cost_bars(plans, effects):
 
 def _proof_bars(out):
     if not (out / "revealed").exists():
-        yield Bar("scores of the proof", float("nan"), note=f"no revealed set in {out}/: see docs/blind.md")
+        yield Bar("scores of the proof", float("nan"), note=f"no revealed set in {out}/: see docs/blind_method.md")
         return
     results, diagnosis = score_set(out)
     cpu = [run["cpu_s"] for run in diagnosis["cases"].values()]

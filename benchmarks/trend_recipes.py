@@ -32,7 +32,7 @@ def examples(registry) -> str:
     texts = []
     with open_registry(registry) as con:
         for title, sql in QUERIES.items():
-            texts.append(f"{title}:\n\n```sql\n{sql}\n```\n```\n{format_table(con.sql(sql))}\n```\n")
+            texts.append(f"{title}:\n\n```sql\n{sql}\n```\n```text\n{format_table(con.sql(sql))}\n```\n")
     return "\n".join(texts)
 
 

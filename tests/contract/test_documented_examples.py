@@ -1,65 +1,190 @@
-"""What the pages and the help tell people to type: queries that the registry understands, commands that exist."""
+"""What the pages and the help tell people to type runs: every block of code, every command, every query.
 
+A block that cannot run says why in a comment in front of it: ``<!-- not run: reason -->``. A YAML block says which
+file it is part of: ``<!-- file: config/config.yaml -->``.
+"""
+
+import argparse
+import ast
+import importlib.util
+import inspect
+import json
 import re
 import shlex
-from pathlib import Path
+import shutil
+import tomllib
 
+import jsonschema
 import pytest
+from benchmarks.trend_fleet import Fleet, modes
+from benchmarks.trend_registry import small_registry
+from ruamel.yaml import YAML
+from snakemake.cli import get_argument_parser
+from tests.contract.documented_blocks import PAGES, ROOT, blocks, commands, loose_commands
+from tests.unit.stages.small_turnout import TRACK
 
+import turnout
+from turnout.api import reference_page
 from turnout.cli.main import build_parser
+from turnout.config.settings.trend import TrendSettings
 from turnout.registry.database import open_registry
-from turnout.registry.job import register
+from turnout.simulate import load_track
+from turnout.trend.update import update
 
-ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 HELP = sorted((ROOT / "src" / "turnout" / "cli").glob("*.py"))
-FENCED = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 QUERY = re.compile(r'(?:turnout query|-c) "((?:from|select) [^"]*)"')
-INLINE = re.compile(r"`((?:from|select) (?!turnout\.)[^`]*)`")
-TYPED = re.compile(r"^ *(?:\$ )?turnout (\S.*)$", re.MULTILINE)
+INLINE_QUERY = re.compile(r"`((?:from|select) (?!turnout\.)[^`]*)`")
+NO_CODE = ("text", "mermaid")  # outputs, tables, drawings
+NOT_RUN = 2  # blocks that cannot run; a new one needs a reason as good
+BLOCKS = blocks()
+RUN = [block for block in BLOCKS if block.key != "not run"]
 
 
-def queries(text):
-    """SQL of fenced blocks, of `turnout query "..."` and of code within a line."""
-    blocks = [re.sub(r"--.*", "", body) for kind, body in FENCED.findall(text) if kind == "sql"]
-    return [q for block in blocks for q in block.split(";") if q.strip()] + QUERY.findall(text) + INLINE.findall(text)
-
-
-def commands(text):
-    """Words behind ``turnout`` of every whole command: no comment or explanation behind it."""
-    lines = (re.split(r"\s{3,}(?![-\s])|\s+[#>]", line)[0] for line in TYPED.findall(text.replace("\\\n", " ")))
-    return [shlex.split(line) for line in lines]
+def of(*languages):
+    return pytest.mark.parametrize("block", [b for b in RUN if b.language in languages], ids=str)
 
 
 @pytest.fixture(scope="module")
-def empty(tmp_path_factory):
-    root = tmp_path_factory.mktemp("documented") / "registry"
-    register([], root, read=iter)
-    with open_registry(root) as connection:
+def folder(tmp_path_factory):
+    """A project with the configuration, the example's recording and a registry of two turnouts."""
+    root = tmp_path_factory.mktemp("documented")
+    shutil.copytree(ROOT / "config", root / "config")
+    (root / "config" / "tracks" / "small.yaml").write_text(TRACK)
+    reference_page.write_example_file(root / "OT_1.uff")
+    small_registry(root / "results" / "registry", modes(Fleet(turnouts=2, weeks=70), 1))
+    update(root / "results" / "registry", TrendSettings())
+    return root
+
+
+@pytest.fixture(scope="module")
+def registry(folder):
+    with open_registry(folder / "results" / "registry") as connection:
         yield connection
 
 
-@pytest.mark.parametrize("page", [*PAGES, *HELP], ids=lambda p: p.name)
-def test_every_query_that_is_shown_is_one_the_registry_understands(page, empty):
-    for query in queries(page.read_text(encoding="utf-8")):
-        empty.execute(f"explain {query}")  # binds every table, column and macro
+def test_every_block_has_a_language_that_is_checked():
+    known = {"python", "sql", "yaml", "sh", "console", *NO_CODE}
+    assert not [str(block) for block in BLOCKS if block.language not in known]
+    n_fences = sum(len(re.findall(r"^```", page.read_text(encoding="utf-8"), re.M)) for page in PAGES)
+    assert n_fences == 2 * len(BLOCKS), "a fence that the collector does not see"
+    assert not [str(b) for b in BLOCKS if (b.language == "yaml") != (b.key == "file")], "a YAML block names its file"
+
+
+def test_blocks_that_are_not_run_are_few():
+    assert [str(block) for block in BLOCKS if block.key == "not run"][NOT_RUN:] == []
+    assert len([block for block in RUN if block.language not in NO_CODE]) > 60
+
+
+@of("python")
+def test_generated_python(block):
+    """docs/api.md is made from the docstrings: its examples run as doctests, its headings are signatures."""
+    if block.body.startswith(">>> "):
+        documented = [inspect.getdoc(getattr(turnout, name)) for name in turnout.__all__]
+        assert any(block.body.rstrip() in text for text in documented), "no doctest of the package"
+    elif block.body.startswith("turnout."):
+        (function,) = ast.parse(f"def {block.body.strip().removeprefix('turnout.')}: pass").body
+        named = function.args.args + function.args.kwonlyargs
+        assert [a.arg for a in named] == list(inspect.signature(getattr(turnout, function.name)).parameters)
+
+
+@pytest.mark.parametrize("page", sorted({b.page for b in RUN if b.language == "python"}), ids=lambda p: p.name)
+def test_python(page, folder, monkeypatch):
+    """The blocks of a page run one after the other, with the names of those before."""
+    monkeypatch.chdir(folder)
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    names: dict = {}
+    for block in (b for b in RUN if b.page == page and b.language == "python"):
+        if not block.body.startswith((">>> ", "turnout.")):
+            exec(compile(block.body, str(block), "exec"), names)
+
+
+@of("sql")
+def test_sql(block, registry):
+    for query in re.sub(r"--.*", "", block.body).split(";"):
+        if query.strip():
+            registry.execute(query).fetchall()
+
+
+@of("yaml")
+def test_yaml(block, folder):
+    file = folder / block.value
+    kind = file.parent.name
+    if kind == "tracks":
+        file.write_text(block.body, encoding="utf-8")
+        assert load_track(file.stem, folder=file.parent).name in (file.stem, "small")  # or that which it extends
+        return
+    schema = {"config": "config", "layouts": "layout", "overrides": "override"}[kind]
+    text = json.loads((ROOT / "config" / "schema" / f"{schema}.json").read_text(encoding="utf-8"))
+    text.pop("required", None)  # the block is a part of the file
+    jsonschema.Draft202012Validator(text).validate(YAML(typ="safe").load(block.body))
+
+
+def check_command(words):
+    """The command exists and takes its options; it is not run."""
+    program, *rest = words
+    if program.split("/")[-1] == "turnout":
+        build_parser().parse_args(rest)
+    elif program == "python":
+        assert rest[0] == "-m" and importlib.util.find_spec(rest[1]), words
+        if rest[1] == "benchmarks":
+            assert all(importlib.util.find_spec(f"benchmarks.bench_{part}") for part in rest[2:] if part[0] != "-")
+    elif program == "make":
+        targets = re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M)
+        assert rest[0] in targets, words
+    elif program == "pip":
+        project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+        named = set(re.findall(r"\[(\w+)\]", " ".join(rest)))
+        assert rest[0] == "install" and named <= set(project["optional-dependencies"]), words
+    elif program == "snakemake":
+        get_argument_parser().parse_args(rest)
+    else:
+        assert program in ("cd", "mkdir", "duckdb"), words  # the query of duckdb is run with all others
+
+
+@of("sh", "console")
+def test_commands(block):
+    assert commands(block), "a block without a command"
+    for words in commands(block):
+        check_command(words)
+
+
+def unknown_words(words):
+    """Command or options of a mention that the program does not have; what the command needs may be left out."""
+    parser, wrong = build_parser(), []
+    for n, word in enumerate(words):
+        groups = [a.choices for a in parser._actions if isinstance(a, argparse._SubParsersAction)]
+        if word == "--":
+            break
+        if word.startswith("-"):
+            wrong += [] if word.split("=")[0] in parser._option_string_actions else [word]
+        elif groups and word in groups[0]:
+            parser = groups[0][word]
+        elif n == 0 and not word.isupper():  # else it stands for any command
+            wrong.append(word)
+    return wrong
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
-def test_every_command_that_is_shown_is_one_the_program_takes(page):
-    for _, body in FENCED.findall(page.read_text(encoding="utf-8")):
-        for words in commands(body):
-            build_parser().parse_args(words)
+def test_commands_within_the_text(page):
+    assert not [(words, wrong) for words in loose_commands(page) if (wrong := unknown_words(words))]
+
+
+@pytest.mark.parametrize("page", [*PAGES, *HELP], ids=lambda p: p.name)
+def test_queries_within_the_text(page, registry):
+    text = page.read_text(encoding="utf-8")
+    for query in QUERY.findall(text) + INLINE_QUERY.findall(text):
+        registry.execute(f"explain {query}")  # binds every table, column and macro
 
 
 @pytest.mark.parametrize("module", HELP, ids=lambda p: p.stem)
 def test_every_command_of_the_help_is_one_the_program_takes(module):
     text = module.read_text(encoding="utf-8").split('"""')[1]
-    for words in commands(text):
-        build_parser().parse_args(words)
+    typed = re.findall(r"^ *(?:\$ )?turnout (\S.*)$", text.replace("\\\n", " "), re.MULTILINE)
+    for line in typed:
+        check_command(["turnout", *shlex.split(re.split(r"\s{3,}(?![-\s])|\s+[#>]", line)[0])])
 
 
-def test_the_pages_show_queries_and_commands_at_all():
+def test_the_text_shows_queries_and_commands_at_all():
     shown = "\n".join(page.read_text(encoding="utf-8") for page in PAGES)
-    bodies = [body for _, body in FENCED.findall(shown)]
-    assert len(queries(shown)) > 40 and sum(len(commands(body)) for body in bodies) > 30
+    assert len(QUERY.findall(shown) + INLINE_QUERY.findall(shown)) > 30
+    assert sum(len(loose_commands(page)) for page in PAGES) > 30

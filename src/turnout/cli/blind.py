@@ -70,7 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     score.add_argument("--histories", action="store_true", help="the set has histories")
     score.add_argument("--names", help="JSON file {effect: [names of the tool that are right]} to add")
     score.add_argument("--report", help="file to write the report to, as Markdown")
-    score.add_argument("--page", help="page between whose marks report, pictures and stories go, as docs/blind.md")
+    score.add_argument("--page", help="page with marks for report, pictures and stories, as docs/blind_figures.md")
     score.add_argument("--stories", help="cases to be told on the page, by commas (default: three are chosen)")
     score.add_argument("--effects", action="append", default=[], help="folder with effects of your own")
     keep = steps.add_parser("keep", help="keep a revealed set small: seals, truths, findings")
