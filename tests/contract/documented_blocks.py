@@ -11,8 +11,8 @@ PAGES = [
     *sorted((ROOT / "docs").glob("*.md")),
     *sorted((ROOT / "docs" / "decisions").glob("*.md")),
 ]
-# A comment in front of a block says why it is not run, or of which kind a YAML file is.
-COMMENT = r"(?:<!-- (?P<key>not run|file): (?P<value>[^\n]+) -->\n+)?"
+# A comment in front of a block says why it is not run, which test runs it, or of which file it is a part.
+COMMENT = r"(?:<!-- (?P<key>not run|run by|file): (?P<value>[^\n]+) -->\n+)?"
 BLOCK = re.compile(rf"^{COMMENT}```(?P<language>[^\n]*)\n(?P<body>.*?)^```$", re.M | re.S)
 INDENTED = re.compile(r"(?:\A|\n)\n((?: {4}\S.*\n)+)")
 INLINE = re.compile(r"`(turnout [^`\n]+)`")

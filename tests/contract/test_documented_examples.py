@@ -1,7 +1,8 @@
 """What the pages and the help tell people to type runs: every block of code, every command, every query.
 
 A block that cannot run says why in a comment in front of it: ``<!-- not run: reason -->``. A YAML block says which
-file it is part of: ``<!-- file: config/config.yaml -->``.
+file it is part of: ``<!-- file: config/config.yaml -->``. One that another test runs names that test:
+``<!-- run by: tests/... -->``.
 """
 
 import argparse
@@ -37,7 +38,7 @@ INLINE_QUERY = re.compile(r"`((?:from|select) (?!turnout\.)[^`]*)`")
 NO_CODE = ("text", "mermaid")  # outputs, tables, drawings
 NOT_RUN = 2  # blocks that cannot run; a new one needs a reason as good
 BLOCKS = blocks()
-RUN = [block for block in BLOCKS if block.key != "not run"]
+RUN = [block for block in BLOCKS if block.key not in ("not run", "run by")]
 
 
 def of(*languages):
@@ -63,11 +64,14 @@ def registry(folder):
 
 
 def test_every_block_has_a_language_that_is_checked():
-    known = {"python", "sql", "yaml", "sh", "console", *NO_CODE}
+    known = {"python", "sql", "yaml", "csv", "sh", "console", *NO_CODE}
     assert not [str(block) for block in BLOCKS if block.language not in known]
     n_fences = sum(len(re.findall(r"^```", page.read_text(encoding="utf-8"), re.M)) for page in PAGES)
     assert n_fences == 2 * len(BLOCKS), "a fence that the collector does not see"
-    assert not [str(b) for b in BLOCKS if (b.language == "yaml") != (b.key == "file")], "a YAML block names its file"
+    assert not [str(b) for b in RUN if (b.language == "yaml") != (b.key == "file")], "a YAML block names its file"
+    for block in (b for b in BLOCKS if b.key == "run by"):
+        assert f"docs/{block.page.name}" in (ROOT / block.value).read_text(encoding="utf-8"), block
+    assert not [str(b) for b in RUN if b.language == "csv"], "no test reads it"
 
 
 def test_blocks_that_are_not_run_are_few():
@@ -124,7 +128,7 @@ def check_command(words):
     program, *rest = words
     if program.split("/")[-1] == "turnout":
         build_parser().parse_args(rest)
-    elif program == "python":
+    elif program in ("python", "python3"):
         assert rest[0] == "-m" and importlib.util.find_spec(rest[1]), words
         if rest[1] == "benchmarks":
             assert all(importlib.util.find_spec(f"benchmarks.bench_{part}") for part in rest[2:] if part[0] != "-")
@@ -138,7 +142,7 @@ def check_command(words):
     elif program == "snakemake":
         get_argument_parser().parse_args(rest)
     else:
-        assert program in ("cd", "mkdir", "duckdb"), words  # the query of duckdb is run with all others
+        assert program in ("cd", "mkdir", "source", "duckdb"), words  # the query of duckdb is run with all others
 
 
 @of("sh", "console")

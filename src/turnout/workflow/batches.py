@@ -113,9 +113,10 @@ def read_results(path: os.PathLike | str, units: Container[str] | None = None) -
     if units is not None:
         groups = [k for k in groups if any(name in units for name in _units(file.read_row_group(k, columns=["unit"])))]
     for group in file.iter_batches(batch_size=64, row_groups=groups):
-        for *header, rows in zip(*(group.column(column).to_pylist() for column in COLUMNS)):
-            if units is None or header[0] in units:
-                yield UnitResult(*header, tables=decode(rows))
+        for i, name in enumerate(_units(group)):
+            if units is None or name in units:
+                row = {column: group.column(column)[i].as_py() for column in COLUMNS}
+                yield UnitResult(**{column: row[column] for column in COLUMNS[:-1]}, tables=decode(row["rows"]))
 
 
 def _units(rows: Any) -> list[str]:
