@@ -63,8 +63,8 @@ DAYS_PER_YEAR = 365.25
 USED_ANSWERS = ("none", "")  # "": not diagnosed; a visit with an open finding changes nothing until it is accepted
 # Groups of parameters that a kind of work makes uncertain again
 OPENED = {
-    "tamping": ("ballast", "ballast_damper", "wave", "surface", "depth"),
-    "ballast_cleaning": ("ballast", "ballast_damper", "wave", "surface", "depth"),
+    "tamping": ("ballast", "ballast_damper", "wave", "surface"),
+    "ballast_cleaning": ("ballast", "ballast_damper", "wave", "surface"),
     "pad_exchange": ("pad", "pad_damper"),
     "rail_change": ("rail", "wave", "surface", "depth", "gain", "seat"),
     "grinding": ("wave", "surface", "depth"),

@@ -8,6 +8,7 @@ from scipy import stats
 from turnout.mismatch.calibrated import (
     ChangeEffect,
     GroupInformation,
+    OnsetEvidence,
     StateParameter,
     VisitInformation,
     compare_onsets,
@@ -211,3 +212,19 @@ def test_what_is_not_known_or_too_small_is_no_finding():
     assert [d.names for d in deviations_from_file(clear, TRACK, LEAST)] == [("pad@5",)]
     assert not deviations_from_file(clear, TRACK, {"pad": 0.7})
     assert not deviations_from_file(estimate_history(TRACK, []).belief, TRACK, LEAST)
+
+
+def test_the_interval_of_growth_reaches_to_both_sides_of_the_visit_it_is_computed_from():
+    """Onsets of four visits at 0, 1, 2 and 3 years, all weight on one, and shared with the other form."""
+    step, growth = (ChangeEffect("f", {NAMES[0]: 1.0}, 1.0, grows) for grows in (False, True))
+    times, zero = np.arange(4.0), np.zeros(3)
+
+    def evidence(effect, gains):
+        return OnsetEvidence(effect, tuple("abcd"), times, np.array(gains), zero, zero)
+
+    late = evidence(step, [-90.0, -90.0, 0.0])
+    assert late.interval() == (2.0, 3.0)
+    assert evidence(growth, [-90.0, -90.0, 0.0]).interval() == (1.0, 3.0)
+    assert evidence(growth, [0.0, -90.0, -90.0]).interval() == (0.0, 1.0)  # nothing is known before the first visit
+    assert late.interval(other_form=evidence(growth, [-90.0, -90.0, 0.0])) == (1.0, 3.0)
+    assert late.interval(other_form=evidence(growth, [-90.0, -90.0, -9.0])) == (2.0, 3.0)

@@ -168,6 +168,7 @@ def test_work_on_the_track_opens_what_it_touches(turnout):
         StateParameter("ballast@30.00", 0.0, 0.1, 0.0, "ballast", 50, 30.0),
         StateParameter("gain_A", 0.0, 0.02, 0.0, "gain", None, 18.0),
         StateParameter("pad@18.00", 0.0, 0.1, 0.0, "pad", 30, 18.0),
+        StateParameter("ln depth of the kink at 18.20 m", 0.0, 0.4, 0.0, "depth"),  # no work on ballast mends a nose
     ]
     tamping, sensors = calibrated.events_of(load_configuration("config").turnout("t1"), parameters)
     assert tamping.opened == {"ballast@18.00": 0.1} and sensors.opened == {"gain_A": 0.02}

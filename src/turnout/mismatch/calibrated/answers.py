@@ -173,7 +173,10 @@ def change_answer(
     if not material or material[0].gain < least:
         return _answer_without_name(history, visit, by_name)
     leader = material[0]
-    stated = _LeadingEffect.of(leader.effect, by_name, leader.size, leader.gain - price, leader.interval())
+    other_form = next((e for e in evidence if e.effect.name == leader.effect.name and e is not leader), None)
+    stated = _LeadingEffect.of(
+        leader.effect, by_name, leader.size, leader.gain - price, leader.interval(other_form=other_form)
+    )
     jump = history.steps[1 + int(np.argmax(leader.gains))].innovation
     with_change = estimate_history(
         parameters, visits, [*events, *_events_of_change(leader)], repeats_between_visits=False, accepted=None

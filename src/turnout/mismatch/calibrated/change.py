@@ -59,12 +59,19 @@ class OnsetEvidence:
         """First visit with the effect, the most probable one."""
         return self.visits[1 + int(np.argmax(self.gains))]
 
-    def interval(self, probability: float = CALIBRATION.interval_probability) -> tuple[float, float]:
+    def interval(
+        self, probability: float = CALIBRATION.interval_probability, other_form: OnsetEvidence | None = None
+    ) -> tuple[float, float]:
         """Shortest range of time that contains the onset with at least this probability.
+
+        A step has its onset in the interval before its first visit. Growth that is computed from a visit on may begin
+        in the intervals on both sides of that visit, with equal probability.
 
         Parameters
         ----------
         probability : float
+        other_form : OnsetEvidence or None
+            The same change as growth, or as a step: both forms are equally probable before.
 
         Returns
         -------
@@ -73,11 +80,24 @@ class OnsetEvidence:
         end : float
             First visit that certainly has it. [years]
         """
-        total = np.concatenate([[0.0], np.cumsum(self.posterior)])
+        forms = [self] if other_form is None else [self, other_form]
+        top = max(float(form.gains.max()) for form in forms)
+        weights = np.sum([form._interval_weights(top) for form in forms], axis=0)
+        total = np.concatenate([[0.0], np.cumsum(weights / weights.sum())])
         n = total.size - 1
         ranges = [(i, j) for i in range(n) for j in range(i + 1, n + 1) if total[j] - total[i] >= probability - 1e-12]
         i, j = min(ranges, key=lambda r: (self.times[r[1]] - self.times[r[0]], total[r[0]] - total[r[1]]))
         return float(self.times[i]), float(self.times[j])
+
+    def _interval_weights(self, top: float) -> np.ndarray:
+        """(n_visit - 1,) weights of the intervals between visits in which the onset may lie."""
+        weights = np.exp(self.gains - top)
+        if self.effect.grows and weights.size > 1:
+            both_sides = 0.5 * weights
+            both_sides[:-1] += 0.5 * weights[1:]
+            both_sides[0] += 0.5 * weights[0]
+            return both_sides
+        return weights
 
     @property
     def size(self) -> tuple[float, float]:
