@@ -1,5 +1,6 @@
 """The list of the morning: nothing that is open goes missing, what is planned or silenced ends on its day."""
 
+import shutil
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
@@ -81,13 +82,20 @@ def test_an_open_alarm_does_not_end_because_nobody_measures(settings):
         assert "not measured since" not in con.execute(question.format("newest_measurement()")).fetchall()[0][1]
 
 
+@pytest.fixture(scope="module")
+def registry_of_fallen(tmp_path_factory):
+    root = tmp_path_factory.mktemp("fallen") / "registry"
+    small_registry(root, fallen())
+    return root
+
+
 @pytest.mark.parametrize(
     ("days", "state"),
     [(400, "inspect this week"), (1, "inspect this week"), (-40000, "inspect this week"), (0, "learning")],
 )
-def test_work_that_is_planned_resets_nothing_yet(tmp_path, settings, days, state):
+def test_work_that_is_planned_resets_nothing_yet(registry_of_fallen, tmp_path, settings, days, state):
     """An event of next year, of tomorrow, of before the first campaign, of today: that came after the last campaign."""
-    small_registry(tmp_path, fallen())
+    shutil.copytree(registry_of_fallen, tmp_path, dirs_exist_ok=True)
     at = pd.Timestamp.now("UTC").tz_localize(None).floor("D") + pd.Timedelta(days=days)
     publish(tmp_path, {"events": arrow_rows("events", work("T00001", at))})
     update(tmp_path, settings)

@@ -32,6 +32,14 @@ def registry(tmp_path_factory, rows, settings):
     return root, update(root, settings)
 
 
+@pytest.fixture(scope="module")
+def week_before(tmp_path_factory, rows, settings):
+    """The registry of a week before, and what its night remembers."""
+    root = tmp_path_factory.mktemp("week_before") / "registry"
+    small_registry(root, rows[rows["measured_at_utc"] < rows["measured_at_utc"].max()])
+    return root, update(root, settings)
+
+
 def test_every_mode_has_its_row_and_every_chart_its_state(registry, rows):
     root, done = registry
     assert done.rows["charts"] == len(rows) + 3 * 120  # and the median of each turnout
@@ -62,10 +70,9 @@ def test_rows_in_another_order_give_the_same_files(registry, rows, settings, tmp
     }
 
 
-def test_one_more_week_writes_only_its_year(rows, settings, tmp_path):
-    last = rows["measured_at_utc"].max()
-    small_registry(tmp_path, rows[rows["measured_at_utc"] < last])
-    first = update(tmp_path, settings)
+def test_one_more_week_writes_only_its_year(rows, week_before, settings, tmp_path):
+    last, (backup, first) = rows["measured_at_utc"].max(), week_before
+    shutil.copytree(backup, tmp_path, dirs_exist_ok=True)
     assert first.written == (2016, 2017, 2018)
     small_registry(tmp_path, rows, 5)
     second = update(tmp_path, settings, first.digests)
@@ -75,16 +82,14 @@ def test_one_more_week_writes_only_its_year(rows, settings, tmp_path):
         assert con.execute("select max(measured_at_utc) from charts").fetchall()[0][0] == last
 
 
-def test_charts_of_a_backup_that_was_put_back_are_written_again(rows, settings, tmp_path):
+def test_charts_of_a_backup_that_was_put_back_are_written_again(rows, week_before, settings, tmp_path):
     """The folder of the pipeline remembers the last night; the registry is that of a week before it."""
-    last = rows["measured_at_utc"].max()
-    small_registry(tmp_path / "registry", rows[rows["measured_at_utc"] < last])
-    update(tmp_path / "registry", settings)
-    shutil.copytree(tmp_path / "registry", tmp_path / "backup")
+    last, (backup, _) = rows["measured_at_utc"].max(), week_before
+    shutil.copytree(backup, tmp_path / "registry")
     small_registry(tmp_path / "registry", rows, 5)
     remembered = update(tmp_path / "registry", settings).digests
     shutil.rmtree(tmp_path / "registry")
-    shutil.copytree(tmp_path / "backup", tmp_path / "registry")
+    shutil.copytree(backup, tmp_path / "registry")
     small_registry(tmp_path / "registry", rows, 9)
     assert update(tmp_path / "registry", settings, remembered).written == (2018,)
     with open_registry(tmp_path / "registry") as con:
