@@ -21,7 +21,8 @@ from turnout.workflow.configuration_rows import configuration_rows
 from turnout.workflow.scan import scan
 
 SHARE = float(os.environ.get("TURNOUT_BENCH_SHARE", "1"))
-N_TURNOUT, N_CAMPAIGN, N_WRITTEN = max(1, int(3_500 * SHARE)), 12, max(1, int(200 * SHARE))
+N_TURNOUT, N_CAMPAIGN = max(1, int(3_500 * SHARE)), 12
+N_WRITTEN = min(N_TURNOUT, max(50, int(200 * SHARE)))  # pages that are written, of which the time of all is computed
 SINGLE_TABLES = ("receptances_current", "results_current")
 TURNOUT_TABLES = ("turnouts", "sections", "events", "quarantine_open")
 CAMPAIGN_TABLES = ("modes_current", "models_current", "impacts_current", *SINGLE_TABLES)
@@ -33,6 +34,7 @@ def bars():
     folder = Path(tempfile.mkdtemp())
     try:
         connection = _network(folder)
+        write_pages(connection, folder / "warm", turnouts=["t00000"], progress=False)  # imports, compiled templates
         with stopwatch() as nothing:
             write_pages(connection, folder / "pages", turnouts=[], progress=False)
         some = [f"t{k:05d}" for k in range(0, N_TURNOUT, N_TURNOUT // N_WRITTEN)][:N_WRITTEN]
@@ -48,7 +50,7 @@ def bars():
         yield Bar(
             f"pages of {N_TURNOUT} turnouts x 8 sections",
             nothing.cpu + N_TURNOUT * per_page,
-            120.0,
+            100.0,
             "CPU s",
             n=f"n={len(some)} pages",
         )
