@@ -18,7 +18,7 @@ def main() -> int:
     parser.add_argument("part", nargs="*", metavar="part", help="any of: " + ", ".join(available))
     parser.add_argument("--strict", action="store_true", help="exit code 1 where a bar is missed; 0 without it")
     parser.add_argument("--seeds", metavar="N", help="faults: number of seeds (20)")
-    parser.add_argument("--first", metavar="SEED", help="faults: first seed (0)")
+    parser.add_argument("--first", metavar="SEED", help="faults and mutations: first seed (0)")
     parser.add_argument("--files", metavar="N", help="mutations: number of files (2400)")
     args = parser.parse_args()
     environment = {

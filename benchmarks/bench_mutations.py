@@ -11,10 +11,11 @@ N_FILES = 2400
 def bars():
     """Bars of all formats together; then what was read silently differently, per format."""
     n = int(os.environ.get("TURNOUT_MUTATED_FILES", N_FILES))
-    found = list(cases(n))
+    first = int(os.environ.get("TURNOUT_FIRST_SEED", "0"))
+    found = list(cases(n, first))
     table = counts(found)
     total = table["all"]
-    size = f"n={n}"
+    size = f"n={n}, seeds from {first}"
     yield Bar("mutated files that end in an error of the program", total["crash"], 0, "files", n=size)
     yield Bar("mutated files that take more than 10 s of CPU time", total["hang"], 0, "files", n=size)
     yield Bar("mutated files with other samples, without a message", total["samples"], 0, "files", n=size)

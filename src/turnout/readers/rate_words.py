@@ -13,7 +13,7 @@ from fractions import Fraction
 from functools import lru_cache
 
 SAMPLING = re.compile(
-    r"sampl|sampel|abtast|tastrate|echantill|muestr|campion|bemonster|aftast|scan|acqui|adqui|erfass|prove"
+    r"samp|smpl?|abtast|tastrate|echantill|muestr|campion|bemonster|aftast|scan|acqui|adqui|erfass|prove"
 )
 WEAK_SAMPLING = re.compile(
     r"mess|mesur|medi[dc]|misur|male|maling|meas|meting|meet|record|aufzeich|enregistr|registr|logg|data|daq|adc|digiti"
@@ -23,7 +23,9 @@ RATE_TOKENS = {
     "rate", "rates", "taux", "tasa", "cadence", "cadenza", "cadencia", "velocidad", "velocita", "vitesse", "hastighed",
     "takt", "clock", "snelheid", "tasso", "hz",
 }  # fmt: skip
-STEP = re.compile(r"interval|inkrement|increment|period|schritt|skridt|xinc|tidstrin|tidssteg")
+STEP = re.compile(r"interval|inkrement|increment|period|schritt|skridt|xinc|tidstrin|tidssteg|raster")
+# A distance or a resolution is a step only with a word of time or of sampling.
+STEP_BESIDE = re.compile(r"resol|auflos|oplos|risoluz|distan|abst[ae]n|afstand|espac|separa|between|zwischen|mellem")
 STEP_TOKENS = {
     "step",
     "steps",
@@ -38,7 +40,7 @@ STEP_TOKENS = {
     "steg",
     "timestep",
 }
-TIME = re.compile(r"^(?:x|t|wf|zeit\w*|time\w*|tid|tids\w*|temps|tiempo|tempo|temporal\w*|temporel\w*|tijd\w*)$")
+TIME = re.compile(r"^(?:x|h|t|horizontal\w*|wf|zeit\w*|time\w*|tid|tids\w*|temps|tiempo|tempo|temporal\w*|temporel\w*|tijd\w*)$")
 CERTAIN_RATES = {
     "fs",
     "rate",
@@ -51,28 +53,44 @@ CERTAIN_RATES = {
     "fa",
     "fabtast",
     "abtfreq",
+    "srate",
 }
 CERTAIN_STEPS = {
     "dt", "deltat", "δt", "deltax", "dx", "xincrement", "xinc", "xincr", "increment", "inkrement", "timestep",
     "xdelta", "tdelta", "ts", "tsample", "deltatime", "timedelta", "secondspersample", "timepersample", "hinterval",
     "abtastzeit", "sampletime",
 }  # fmt: skip
-POSSIBLE = {
+POSSIBLE_RATES = {"fe", "fc"}  # of French and Italian: also other things
+RATE_WORD = re.compile(r"(?:[a-z]{1,2}|adc|dac|daq|data|daten|frame|tick|line|log)rates?")
+# What is counted per second beside samples: not a rate of sampling.
+NOT_COUNTED = re.compile(r"met|mile|foot|feet|inch|zoll|rev|umdreh|tour|gir|vuelt|rad|grad|deg|byt|okt|octet|pack|newt|volt")
+POSSIBLE = POSSIBLE_RATES | {
     "sampling", "abtastung", "echantillonnage", "muestreo", "campionamento", "bemonstering", "vzorkovani", "timebase",
     "zeitbasis", "samplingtime", "abtastzeitraum",
 }  # fmt: skip
 # Names of other frequencies, of settings, counts and times of day.
 OTHER = re.compile(
     r"filt|pass(?!o)|cut|grenz|band|coup|cort|tagli|gra?en?s|eigen|reson|natur|modal|netz|mains|calib|kalib|tarat|etalonn|sensitiv"
-    r"|servic|wart|inspec|trigg|bit|baud|start|begin|debut|inicio|inizio|stop|date|datum|number|anzahl|count|nombre"
+    r"|servic|wart|inspec|trigg|bit|baud|start|begin|debut|inicio|inizio|stop|date(?!n)|datum|number|anzahl|count|nombre"
     r"|antal|numero|aantal|cantidad|max|range|bereich|nyquist|carrier|refresh|update|oversampl|decim|ratio|heart|rot"
-    r"|anreg|excit|signal|sinus|sweep|mode$|source|quelle|unit|einheit|label|dimension|counter|zahler|filename|block|buffer|spectr|fft|offset"
+    r"|anreg|excit|sinus|sweep|mode$|unit|einheit|label|dimension|counter|zahler|filename|offset"
 )
-UNIT_PER = re.compile(r"\s*(?:/|\bper\b|\bpro\b|\bpar\b|\bpor\b)\s*")
+# What a word of sampling with a word of rate or step leaves possible: "Signal sample rate".
+BESIDE_RATE = re.compile(r"signal|source|quelle|block|buffer|spectr|fft")
+# Names of other durations: a short one under any other name may be a time step.
+DURATION = re.compile(
+    r"delay|verzog|retard|retraso|ritardo|forsink|laten|width|breite|largeur|rise|fall|anstieg|constant|konstant|tau$"
+    r"|dead|tot|hold|halte|timeout|durat|dauer|duree|durac|durat|varighed|expos|belicht|decay|abkling|window|fenster"
+    r"|pulse|puls|impact|stoss|contact|kontakt|choc|jitter|uncert|unsicher|gate|settl|warm|dwell|length|lange|longueur"
+    r"|elapsed|total|gesamt|tolera|error|fehler|skew|drift|shift|lag$"
+)
+PER = {"per", "pro", "par", "por", "al", "pr"}
+UNIT_PER = re.compile(rf"\s*(?:/|\b(?:{'|'.join(sorted(PER))})\b\.?)\s*")
 SAMPLES = re.compile(
-    r"s|sa|samples?|smpl|pts?|points?|scans?|messwerte?|abtastwerte?|werte?|punkte?|echantillons?|campioni|muestras|count"
+    r"s|sa|samp|samples?|smpl|pts?|points?|scans?|messwerte?|abtastwerte?|werte?|punkte?|puntos?|punti|malinger"
+    r"|echantillons?|campioni|muestras|count"
 )
-SECONDS = {"s", "sec", "secs", "second", "seconds", "sek", "sekunde", "sekunden", "sekunder", "seconde", "secondes",
+SECONDS = {"s", "sec", "secs", "second", "seconds", "sek", "sekund", "sekunde", "sekunden", "sekunder", "seconde", "secondes",
            "secondi", "secondo", "segundo", "segundos"}  # fmt: skip
 TIME_UNITS = {
     **dict.fromkeys(SECONDS, Fraction(1)),
@@ -209,22 +227,30 @@ def name_meaning(name: str) -> NameMeaning:
     if (match := NAME_WITH_UNIT.match(name.strip())) and match[1]:
         name, unit_text = match[1], match[2]
     unit = rate_unit(unit_text) if unit_text else None
-    words = [word for word in words_of(name) if word not in ("wf", "the")]
-    if (
-        not unit_text
-        and len(words) > 1
-        and "per" not in words
-        and words[-1] not in ("t", "d", "h", "min")
-        and "".join(words) != "fs"
-    ):
+    words = _with_per([word for word in words_of(name) if word not in ("wf", "the")])
+    is_symbol = "".join(words) in CERTAIN_RATES | CERTAIN_STEPS and len(words[0]) == 1
+    if not unit_text and len(words) > 1 and not is_symbol and "per" not in words and words[-1] not in UNITS_NOT_IN_NAMES:
         unit = rate_unit(words[-1])
         words = words[:-1] if unit else words
     certainty, is_step = _meaning(words)
-    if unit is not None and certainty == NOT and not unit.is_step and not OTHER.search(" ".join(words)):
-        certainty, is_step = (CERTAIN if unit.is_sampling else POSSIBLY), False
+    spaced = " ".join(words)
+    if unit is not None and certainty == NOT and words and not OTHER.search(spaced):
+        if not unit.is_step or unit.is_sampling:
+            certainty, is_step = (CERTAIN if unit.is_sampling else POSSIBLY), unit.is_step
+        elif unit.scale <= 1 and not DURATION.search(spaced) and not is_time_name(name):
+            certainty, is_step = POSSIBLY, True
     if unit is None and unit_text and re.fullmatch(r"[a-zA-Z]\w{0,3}", unit_text.strip()) is None:
         unit_text = ""  # an explanation, not a unit
     return NameMeaning(certainty, is_step, unit, "" if unit else unit_text)
+
+
+UNITS_NOT_IN_NAMES = ("t", "d", "h", "min")  # last words of a name that are no unit
+
+
+def _with_per(words: list[str]) -> list[str]:
+    """The words with "per" for its other languages in front of the last one, as in "Werte pro Sekunde"."""
+    is_per = len(words) > 2 and words[-2] in PER and words[-1] in SECONDS
+    return [*words[:-2], "per", words[-1]] if is_per else words
 
 
 def _meaning(words: list[str]) -> tuple[int, bool | None]:
@@ -234,24 +260,29 @@ def _meaning(words: list[str]) -> tuple[int, bool | None]:
         return CERTAIN, False
     if joined in CERTAIN_STEPS:
         return CERTAIN, True
-    is_rate = bool(RATE.search(joined)) or any(word in RATE_TOKENS for word in words)
+    if OTHER.search(spaced) or not words:
+        return NOT, None
+    counted = words[-3] if len(words) > 2 and words[-2] == "per" and words[-1] in SECONDS else ""
+    is_counted = len(counted) > 2 and bool(SAMPLES.fullmatch(counted))
+    is_rate = bool(RATE.search(joined)) or any(word in RATE_TOKENS or RATE_WORD.fullmatch(word) for word in words)
     is_rate |= any(word.endswith(("rate", "takt", "hastighed")) and SAMPLING.search(word + spaced) for word in words)
     is_rate |= any(word.endswith(("rate", "takt")) and WEAK_SAMPLING.search(word) for word in words)
-    counted = words[words.index("per") - 1] if "per" in words[1:] else ""
-    is_rate |= len(counted) > 2 and bool(SAMPLES.fullmatch(counted)) and words[-1] in SECONDS
+    is_rate |= is_counted or (len(counted) > 2 and not NOT_COUNTED.search(counted))
     is_step = bool(STEP.search(joined)) or any(word in STEP_TOKENS for word in words)
     is_step |= "per" in words and len(words) > 2 and words[-1] in ("sample", "samples", "point") and not is_rate
     is_sampling = bool(SAMPLING.search(spaced)) or any(SAMPLES.fullmatch(w) and len(w) > 2 for w in words)
-    if OTHER.search(spaced) or not words:
-        return NOT, None
-    if is_step and (is_sampling or any(TIME.match(word) for word in words)):
-        return CERTAIN, True
-    is_measuring = bool(WEAK_SAMPLING.search(spaced)) and "data" not in spaced
-    if is_rate and (is_sampling or is_measuring):
-        return CERTAIN, False
+    is_timed = any(TIME.match(word) for word in words)
+    is_measuring = bool(WEAK_SAMPLING.search(spaced)) and not re.search(r"data|daten", spaced)
+    is_certain = (is_step and (is_sampling or is_timed)) or (is_rate and (is_sampling or is_measuring))
+    if BESIDE_RATE.search(spaced):
+        return (POSSIBLY if is_certain else NOT), (is_step if is_step != is_rate else None)
+    if is_certain:
+        return CERTAIN, is_step and (is_sampling or is_timed)
+    if STEP_BESIDE.search(joined) and (is_sampling or is_timed):
+        return POSSIBLY, True
     if is_step or is_rate:
         return POSSIBLY, (is_step if is_step != is_rate else None)
-    return (POSSIBLY if joined in POSSIBLE else NOT), None
+    return (POSSIBLY if joined in POSSIBLE else NOT), (False if joined in POSSIBLE_RATES else None)
 
 
 def is_rate_name(name: str) -> bool:

@@ -281,7 +281,7 @@ def _statements(entry: Entry, value: Any) -> Iterator[Statement]:
         return
     unit = rate_unit(unit_text) if unit_text else meaning.unit
     certainty = meaning.certainty
-    if certainty == NOT and unit is not None and not unit.is_step:
+    if certainty == NOT and unit is not None:
         other = name_meaning(f"{entry.name} [{unit_text}]") if unit_text else meaning
         certainty = other.certainty
     if certainty == NOT:
@@ -335,6 +335,8 @@ def _intervals(number: Any, unit: RateUnit | None, is_step: bool | None, certain
         found = [i for i in found if USUAL_RATES[0] <= i.rate <= USUAL_RATES[1]] or found
     if unit is None and len(units) > 1:
         found = [i for i in found if PLAUSIBLE_RATES[0] <= i.rate <= PLAUSIBLE_RATES[1]]
+    if unit is not None and unit.is_step and certainty == POSSIBLY:
+        found = [i for i in found if USUAL_RATES[0] <= i.rate <= USUAL_RATES[1]]
     return tuple(found)
 
 
