@@ -90,7 +90,8 @@ SPELLINGS = {
     "kN": "Kilonewton kilonewton",
     "kgf": "kp",
     "lbf": "lb_f lbs",
-    "m/s²": "m/s^2 m/s**2 m/s2 m/s/s ms-2 m*s^-2 m·s⁻² MeterPerSecondSquared (m/s²) (m/s^2) (m/s2)",
+    "m/s²": "m/s^2 m/s**2 m/s2 m/s/s ms-2 ms^-2 ms⁻² m*s^-2 m*s-2 m·s⁻² m·s-2 m·s^-2 m.s-2 m.s^-2 m.s⁻² m/sec² "
+    "m/sec^2 m/sec2 MeterPerSecondSquared (m/s²) (m/s^2) (m/s2)",
     "mm/s²": "mm/s^2 mm/s2",
     "cm/s²": "cm/s^2 cm/s2 Gal gal",
     "ft/s²": "ft/s^2 ft/s2",
@@ -120,6 +121,7 @@ SI = {
 _CANONICAL = {name: name for units in UNITS.values() for name in units}
 _CANONICAL |= {spelling: name for name, spellings in SPELLINGS.items() for spelling in spellings.split()}
 _CANONICAL |= {"deg C": "°C", "Deg C": "°C", "deg F": "°F", "Deg F": "°F"}
+_CANONICAL |= dict.fromkeys(("m s-2", "m s^-2", "m s⁻²", "m / s²", "m / s^2"), "m/s²")
 _NUMBER = re.compile(r"^([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.+)$")
 
 

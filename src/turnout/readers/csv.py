@@ -67,6 +67,8 @@ def read_raw(source: Source) -> RawFile:
     is_utf16 = source.head[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
     lazy = source.lazy and not is_utf16
     data = source.memory_map if lazy else _in_utf8(source) if is_utf16 else source.data
+    if not lazy and b"\n" not in data:
+        data = data.replace(b"\r", b"\n")
     data, remarks = _without_cut_row(data, source)
     head, names, units, offset, separator, entries = read_head(data, source)
     read_columns = (

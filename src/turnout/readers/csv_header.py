@@ -24,6 +24,7 @@ from turnout.readers.named_arrays import (
 from turnout.readers.rate_words import is_rate_name, rate_unit
 from turnout.readers.source import COPY_AGAIN, MEANINGLESS_UNITS, Source
 from turnout.readers.stated_scales import SCALE_WORDS, plain_word
+from turnout.readers.stated_units import is_unit_name
 from turnout.readers.statements import Entry, entries_of_text
 from turnout.units import conversion
 
@@ -408,6 +409,8 @@ def _entries(lines: Sequence[str], separator: str, names: Sequence[str]) -> Iter
             name = f"{match[1]} {match[2]}" if match[2] else match[1]
             found.append((name, match[3].strip(separator + ' "')))
         entries = [Entry(place, name.strip('"# '), value.strip('"')) for name, value in found]
+        if is_unit_name(cells[0]) and len(cells) > 2:
+            entries = [Entry(place, cells[0], cells[1:])]  # a unit for each column
         yield from entries or entries_of_text(text, place)
         if found and not any(is_rate_name(entry.name) for entry in entries):
             yield from entries_of_text(text, place)

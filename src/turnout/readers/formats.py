@@ -4,11 +4,12 @@ A new format is one file with ``read_raw(source) -> RawFile`` and one line here.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 
 from turnout.readers.claims import check_claims
-from turnout.readers.source import RawFile, Source
+from turnout.readers.source import RawFile, RawRecord, Source
+from turnout.readers.stated_units import with_stated_units
 
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
@@ -41,7 +42,9 @@ class Format:
             If the file as a whole cannot be read, claims more than it can hold, or has its samples in another file.
         """
         check_claims(self.module, source)
-        return import_module(f"turnout.readers.{self.module}").read_raw(source)
+        raw = import_module(f"turnout.readers.{self.module}").read_raw(source)
+        records = tuple(with_stated_units(r) if isinstance(r, RawRecord) else r for r in raw.records)
+        return replace(raw, records=records)
 
 
 def _is_hdf5(head: bytes) -> bool:

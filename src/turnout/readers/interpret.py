@@ -18,7 +18,8 @@ from turnout.readers import stated_scales
 from turnout.readers.lazy import BlockReader, ChannelStatistics, Column, channel_error
 from turnout.readers.lost_entries import lost_entry_errors
 from turnout.readers.rate_words import is_rate_name, rate_unit
-from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, MEANINGLESS_UNITS, MIN_SAMPLES, RawFile, RawRecord, Source
+from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
+from turnout.readers.stated_units import contradicting_unit, is_meaningless, key_of_units
 from turnout.readers.statements import resolve
 from turnout.readers.time_axes import all_statements, is_axis_name
 from turnout.readers.timing import check_order, is_plausible, start_errors, start_times
@@ -172,11 +173,8 @@ def _channel_mapping(index: int, record: RawRecord, raw: RawChannel, where: str,
     if (statement := record.undecided.get(index)) and not (raw.unit or "").endswith("!"):
         raise source.error(place, statement, stated_scales.remedy(file_unit), reason="scale_unknown")
     is_overruled = (raw.unit or "").endswith("!")
-    if (other_unit := _unit_in_name(record.names[index], file_unit, raw)) and not is_overruled:
-        problem = f"its name {record.names[index]!r} says {other_unit!r}, its unit {file_unit!r}"
-        choices = " or ".join(f"'unit: {unit}!'" for unit in (other_unit, file_unit) if _is_usable(unit, raw))
-        remedy = f"Find out which is right; then set it in the layout as {choices}"
-        raise source.error(place, problem, remedy, reason="unit_unknown")
+    if not is_overruled:
+        _check_stated_units(record, index, raw, place, source)
     if raw.sensitivity is not None and not is_overruled:
         stated = record.entries, raw.sensitivity, raw.sensitivity_unit, raw.quantity, record.names, index
         if problem := stated_scales.sensitivity_problem(*stated):
@@ -200,25 +198,17 @@ def _channel_mapping(index: int, record: RawRecord, raw: RawChannel, where: str,
     return ChannelMapping(index, channel, sign * conversion_to_si.scale, sign * conversion_to_si.offset)
 
 
-UNIT_IN_NAME = re.compile(r"[\[(]([^\[\]()]+)[\])]\s*$")
-
-
-def _unit_in_name(name: str, file_unit: str, raw: RawChannel) -> str:
-    """Unit in brackets behind the name of a channel if it contradicts the unit that the file states, else "".
-
-    A number in the brackets is a range. Where only the stated unit can be that of the quantity, it holds.
-    """
-    match = UNIT_IN_NAME.search(name)
-    if not match or _is_meaningless(file_unit.strip()) or FULL_SCALE_UNIT.match(match[1]):
-        return ""
-    if not _is_usable(match[1], raw) and _is_usable(file_unit, raw):
-        return ""
-    try:
-        in_name, stated = conversion(match[1]), conversion(file_unit)
-    except ValueError:
-        return ""
-    same = in_name.dimension == stated.dimension and abs(in_name.scale - stated.scale) <= 1e-9 * abs(stated.scale)
-    return "" if same else match[1]
+def _check_stated_units(record: RawRecord, index: int, raw: RawChannel, place: str, source: Source) -> None:
+    """ReadError if the metadata or the name of a channel state another unit than the one in use."""
+    unit_in_use = record.units[index] if not is_meaningless(record.units[index]) else raw.unit or ""
+    other = contradicting_unit(record, index, raw.unit, raw.quantity, lambda unit: _is_usable(unit, raw))
+    if not other:
+        return
+    holder = "the layout" if is_meaningless(record.units[index]) else "its unit"
+    problem = f"its metadata or its name {record.names[index]!r} say {other!r}, {holder} {unit_in_use!r}"
+    choices = " or ".join(f"'unit: {unit}!'" for unit in (other, unit_in_use) if _is_usable(unit, raw))
+    remedy = f"Find out which is right; then set it in the layout as {choices or 'a unit with !'}"
+    raise source.error(place, problem, remedy, reason="unit_unknown")
 
 
 def _is_usable(unit: str, raw: RawChannel) -> bool:
@@ -285,7 +275,7 @@ def resolve_unit(file_unit: str, layout_unit: str | None) -> str:
     if layout_unit.endswith("!"):
         return layout_unit[:-1]
     stated = conversion(layout_unit)
-    if _is_meaningless(file_unit.strip().strip("[]").strip()):
+    if is_meaningless(file_unit):
         return layout_unit
     try:
         written = conversion(file_unit)
@@ -296,11 +286,6 @@ def resolve_unit(file_unit: str, layout_unit: str | None) -> str:
     if not same and not (written.dimension == "count" and of_a_count):
         raise ValueError(_conflict_text(repr(file_unit), layout_unit))
     return layout_unit
-
-
-def _is_meaningless(unit: str) -> bool:
-    """Whether a label is no unit: a placeholder, or a number that some loggers write there."""
-    return unit.casefold() in MEANINGLESS_UNITS or unit.replace(".", "", 1).isdigit()
 
 
 def _conflict_text(statement: str, layout_unit: str) -> str:
@@ -437,7 +422,8 @@ class Assignments:
         if self._has_sensitivity and stated_scales.sensitivity_entries(record.entries):
             sensitivities = tuple(f"{entry.place}: {entry.name}: {entry.value}" for entry in record.entries)
         aliases = () if is_named else record.aliases
-        return record.names, record.units, aliases, tuple(record.undecided.items()), sensitivities
+        stated = (*sensitivities, *key_of_units(record.entries))
+        return record.names, record.units, aliases, tuple(record.undecided.items()), stated
 
     def mappings(self, record: RawRecord, where: str) -> tuple[ChannelMapping, ...]:
         """As ``channel_mappings``.

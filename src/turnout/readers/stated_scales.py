@@ -202,7 +202,7 @@ def entry_statements(entries: Iterable[Entry], names: Sequence[str]) -> dict[int
     if not scales:
         return {}
     texts: list[list[str]] = [[] for _ in names]
-    named = [(entry, name, _container(entry), _owners(entry, entries, names)) for entry, name in scales]
+    named = [(entry, name, container_of(entry), owners_of(entry, entries, names)) for entry, name in scales]
     for entry, name, container, owners in named:
         label = entry.name if entry.name == name else f"{name} of {entry.name}"
         stated = _stated_by_channel(label, name, entry.value, 1 if owners else len(names))
@@ -225,12 +225,12 @@ def _scale_name(entry: Entry, names: Sequence[str]) -> str:
     """
     if is_scale_name(entry.name):
         return entry.name
-    group = _container(entry).rpartition("/")[2]
+    group = container_of(entry).rpartition("/")[2]
     is_channel = entry.name.strip().casefold() in {name.strip().casefold() for name in names}
     return group if is_channel and is_scale_name(group) else ""
 
 
-def _container(entry: Entry) -> str:
+def container_of(entry: Entry) -> str:
     """The place of an entry without its own name."""
     return entry.place.removesuffix(entry.name).rstrip("/: ")
 
@@ -240,17 +240,17 @@ def _is_inside(inner: str, outer: str) -> bool:
     return inner != outer and inner.startswith(f"{outer}/" if outer else "")
 
 
-def _owners(entry: Entry, entries: Sequence[Entry], names: Sequence[str]) -> frozenset[int]:
+def owners_of(entry: Entry, entries: Sequence[Entry], names: Sequence[str]) -> frozenset[int]:
     """Indices of the channels that the place of an entry, its name or a text beside it name; empty without any."""
     if owners := named_channels(f"{entry.place} {entry.name}", names):
         return owners
-    container = _container(entry)
+    container = container_of(entry)
     if not container:
         return frozenset()
     beside = {
         other.value.strip().casefold()
         for other in entries
-        if isinstance(other.value, str) and _container(other) == container
+        if isinstance(other.value, str) and container_of(other) == container
     }
     return frozenset(i for i, name in enumerate(names) if name.strip().casefold() in beside)
 
@@ -395,7 +395,7 @@ def fill_values(entries: Iterable[Entry], names: Sequence[str]) -> tuple[tuple[f
     for entry in entries:
         if not is_fill_name(entry.name) or (numbers := _numbers(entry.value)) is None:
             continue
-        owners = _owners(entry, entries, names)
+        owners = owners_of(entry, entries, names)
         for i, fill in enumerate(fills):
             if not owners and numbers.size == len(names):
                 fill.append(float(numbers[i]))
@@ -475,7 +475,7 @@ def sensitivity_problem(
     entries = list(entries)
     compared: list[Entry] = []
     for entry in sensitivity_entries(entries):
-        owners = _owners(entry, entries, names)
+        owners = owners_of(entry, entries, names)
         if owners and index not in owners:
             continue
         for number, own_unit in _sensitivities(entry):

@@ -451,7 +451,8 @@ def _most_precise(
     if interval is None:
         agreeing = [i for i in first.intervals if all(s.agrees_with(i) for s in ordered[1:])]
         interval = agreeing[0] if agreeing else first.usual
-        if layout is None and len(first.intervals) > 1 and not first.is_clock and len(ordered) == 1:
+        is_usual = first.is_clock and USUAL_RATES[0] <= interval.rate <= USUAL_RATES[1]
+        if layout is None and len(first.intervals) > 1 and not is_usual and len(ordered) == 1:
             problem = (
                 f"{first.text!r} in {first.place} may mean {' or '.join(f'{i.rate:.9g} Hz' for i in first.intervals)}"
             )

@@ -127,7 +127,7 @@ def test_a_unit_in_the_name_that_contradicts_the_stated_unit_is_rejected(tmp_pat
         channels += [nptdms.ChannelObject("impact", "rail", SAMPLES[1], {"unit_string": "m/s²"})]
         writer.write_segment(channels)
     layout = replace(LAYOUT, channels=(replace(SENSORS[0], source="force [kN]"), SENSORS[1]))
-    assert is_rejected(outcome("a.tdms", tmp_path, layout), "unit_unknown", "'force [kN]' says 'kN'")
+    assert is_rejected(outcome("a.tdms", tmp_path, layout), "unit_unknown", "'force [kN]' say 'kN', its unit 'N'")
 
 
 @pytest.mark.parametrize("format", FORMATS)

@@ -1,0 +1,284 @@
+"""Units that a file states in its metadata or in the names of its channels, by general rules for all formats.
+
+A unit stands where the format defines it, under a word for a unit ("Einheit", "y_unit", "EU"), in brackets behind the
+name of a channel, or as the last word of that name ("rail_g"). A unit of the layout must agree with it.
+"""
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+from turnout.readers.rate_words import rate_unit, words_of
+from turnout.readers.source import MEANINGLESS_UNITS, RawRecord
+from turnout.readers.stated_scales import container_of, owners_of
+from turnout.readers.statements import MAX_ENTRIES, Entry
+from turnout.units import Conversion, conversion
+
+# A word for a unit, or a compound that ends with one.
+UNIT_WORD = re.compile(
+    r"[a-z]*(?:(?<!comm)units?|einheit(?:en)?|eenhe(?:id|den)|enhed(?:er)?|enhet(?:er)?)|unites?|unidad(?:es)?|unita"
+    r"|jednotk[ay]|uom|eu|unit(?:string|label)"
+)
+# Units of other things than the samples of a channel.
+OTHER_UNITS = re.compile(r"time|zeit|temps|tempo|tid|x$|rate|freq|sensitiv|empfind|sensib|speed|length|range|limit|gain")
+# Units of the same channel at another place of its measuring chain.
+CHAIN_WORDS = frozenset("raw sensor input electrical signal native adc hardware transducer description roh".split())
+UNIT_IN_NAME = re.compile(r"[\[({]([^\[\](){}]+)[\])}]\s*$")
+LEVEL = re.compile(r"dB")
+
+
+@lru_cache(maxsize=4096)
+def _words(name: str) -> frozenset[str]:
+    return frozenset(words_of(name))
+
+
+@lru_cache(maxsize=4096)
+def is_unit_name(name: str) -> bool:
+    """Whether a name means the unit of samples.
+
+    Parameters
+    ----------
+    name : str
+        Name of an entry of the metadata.
+
+    Returns
+    -------
+    bool
+        False for the unit of another thing, such as a time.
+
+    Examples
+    --------
+    >>> [is_unit_name(n) for n in ("unit_string", "Einheit", "YUnit", "time unit", "Sensitivity unit", "community")]
+    [True, True, True, False, False, False]
+    """
+    words = words_of(name)
+    is_named = any(UNIT_WORD.fullmatch(word) for word in words) or "".join(words) == "dimension"
+    return is_named and not any(OTHER_UNITS.search(word) for word in words)
+
+
+@lru_cache(maxsize=4096)
+def known_unit(unit: str) -> Conversion | None:
+    """Conversion of a unit.
+
+    Parameters
+    ----------
+    unit : str
+        Unit as it is written.
+
+    Returns
+    -------
+    Conversion or None
+        None for a unit that is not known.
+    """
+    try:
+        return conversion(unit)
+    except ValueError:
+        return None
+
+
+def is_meaningless(unit: str) -> bool:
+    """Whether a label is no unit: a placeholder, or a number that some loggers write there.
+
+    Parameters
+    ----------
+    unit : str
+        Label of a unit.
+
+    Returns
+    -------
+    bool
+        True for "", "EU", "none", "1.0" and the like.
+    """
+    plain = unit.strip().strip("[]").strip()
+    return plain.casefold() in MEANINGLESS_UNITS or plain.replace(".", "", 1).isdigit()
+
+
+def same_unit(first: str, second: str) -> bool:
+    """Whether two units are equal; the value of one count, as in "0.3 mV", counts as its unit.
+
+    Parameters
+    ----------
+    first, second : str
+        Units as they are written.
+
+    Returns
+    -------
+    bool
+        False if one of them is not known.
+
+    Examples
+    --------
+    >>> same_unit("m/s^2", "m/s²"), same_unit("g", "m/s²"), same_unit("0.3 mV", "mV")
+    (True, False, True)
+    """
+    a, b = (known_unit(re.sub(r"^[\d.eE+-]+ *(?=\D)", "", unit.strip())) for unit in (first, second))
+    return a is not None and b is not None and a.dimension == b.dimension and abs(a.scale / b.scale - 1.0) < 1e-9
+
+
+def with_stated_units(record: RawRecord) -> RawRecord:
+    """The record with the units of its metadata and names for the channels whose format states none.
+
+    Parameters
+    ----------
+    record : RawRecord
+        The record as its reader returns it.
+
+    Returns
+    -------
+    RawRecord
+        With each known unit that belongs to a single channel.
+    """
+    if not any(is_meaningless(unit) for unit in record.units):
+        return record
+    entries = unit_entries(record.entries)
+    units = tuple(
+        next((u for u in own_units(record, i, entries)[0] if known_unit(u)), unit) if is_meaningless(unit) else unit
+        for i, unit in enumerate(record.units)
+    )
+    return record if units == record.units else replace(record, units=units)
+
+
+def unit_entries(entries: Sequence[Entry]) -> tuple[Entry, ...]:
+    """Entries of the metadata that state units.
+
+    Parameters
+    ----------
+    entries : sequence of Entry
+        Metadata of a record.
+
+    Returns
+    -------
+    tuple of Entry
+        Those under a name of a unit, or in a group of that name.
+    """
+    return tuple(e for e in entries if is_unit_name(e.name) or is_unit_name(container_of(e).rpartition("/")[2]))
+
+
+def own_units(record: RawRecord, index: int, entries: Sequence[Entry]) -> tuple[list[str], list[str]]:
+    """Units that are stated for a channel, and those that may be.
+
+    Parameters
+    ----------
+    record : RawRecord
+        The record.
+    index : int
+        The channel.
+    entries : sequence of Entry
+        As ``unit_entries`` returns them.
+
+    Returns
+    -------
+    tuple of (list of str, list of str)
+        Units of the channel: of its entries and in brackets behind its name. Then those of its measuring chain, of
+        no channel in particular, and the last word of its name.
+    """
+    name, n = record.names[index], len(record.names)
+    own, possible = [], []
+    for entry in entries:
+        texts = _texts(entry.value)
+        owners = owners_of(entry, record.entries, record.names)
+        in_chain = bool(_words(entry.name) & CHAIN_WORDS)
+        if owners and len(texts) == 1:
+            if index in owners:
+                (possible if in_chain or len(owners) > 1 else own).extend(texts)
+        elif len(texts) == n:  # in the order of the channels, unless the format has assigned them
+            (own if not in_chain and is_meaningless(record.units[index]) else possible).append(texts[index])
+        else:
+            possible.extend(texts)
+    if match := UNIT_IN_NAME.search(name):
+        if not re.match(r"\s*[+-]?[\d.]", match[1]) and (known_unit(match[1]) or LEVEL.match(match[1])):
+            own.append(match[1])
+    elif unit := _last_word(name, record.names):
+        possible.append(unit)
+    return [u for u in own if not is_meaningless(u)], [u for u in possible if not is_meaningless(u)]
+
+
+def _texts(value: Any) -> list[str]:
+    """The units in a value, without those of a time axis."""
+    if isinstance(value, Mapping) or getattr(value, "size", 1) > MAX_ENTRIES:
+        return []
+    values = value.ravel().tolist() if hasattr(value, "ravel") else value
+    values = values if isinstance(values, (list, tuple)) else [values]
+    texts = [v.decode("utf-8", "replace") if isinstance(v, bytes) else v for v in values]
+    texts = [text.strip() for text in texts if isinstance(text, str)]
+    return [text for text in texts if (unit := rate_unit(text)) is None or not unit.is_step]
+
+
+def _last_word(name: str, names: Sequence[str]) -> str:
+    """The last words of a name if they are a unit, as in "rail_mV" or "rail_mm_s2".
+
+    "" where they number the channels, as in "rail_f", "rail_g".
+    """
+    stem, *words = _split_name(name)
+    if not words or any(other != name and _split_name(other)[0] == stem for other in names):
+        return ""
+    units = ["/".join((stem.rpartition("_")[2], words[0])), words[0]]
+    return next((u for u in units if re.match(r"[^\W\d]", u) and (known_unit(u) or LEVEL.match(u))), "")
+
+
+def _split_name(name: str) -> list[str]:
+    """A name without its last word, and that word if there is one; words are separated by blanks or underscores."""
+    plain = re.sub(r"\s+", "_", name.strip())
+    return plain.rsplit("_", 1)
+
+
+def contradicting_unit(
+    record: RawRecord, index: int, wanted: str | None, quantity: str, is_usable: Callable[[str], bool]
+) -> str:
+    """A unit in the metadata or the name of a channel that contradicts the one in use.
+
+    Where only one of two units can be that of the channel, it holds.
+
+    Parameters
+    ----------
+    record : RawRecord
+        The record.
+    index : int
+        The channel.
+    wanted : str or None
+        Unit of the layout.
+    quantity : str
+        Quantity of the channel in the layout.
+    is_usable : callable
+        Whether numbers in a unit can become the quantity.
+
+    Returns
+    -------
+    str
+        The unit; "" if all agree, or none is stated.
+    """
+    file_unit = record.units[index]
+    own, possible = own_units(record, index, unit_entries(record.entries))
+    if not is_meaningless(file_unit):
+        rivals = [u for u in own if is_usable(u) or (known_unit(u) and not is_usable(file_unit))]
+        return next((u for u in rivals if known_unit(file_unit) and not same_unit(u, file_unit)), "")
+    if wanted is None or own:  # none of its own units is known
+        return own[0] if own else ""
+    dimensions = {quantity, getattr(known_unit(wanted), "dimension", quantity)}
+    in_name = _last_word(record.names[index], record.names)
+    candidates = [
+        u
+        for u in possible
+        if LEVEL.match(u)
+        or getattr(known_unit(u), "dimension", "") in (dimensions | {"voltage", "count"} if u == in_name else dimensions)
+    ]
+    return "" if any(same_unit(u, wanted) for u in candidates) else next(iter(candidates), "")
+
+
+def key_of_units(entries: Sequence[Entry]) -> Iterator[str]:
+    """Texts on which the units of the channels depend.
+
+    Parameters
+    ----------
+    entries : sequence of Entry
+        Metadata of a record.
+
+    Yields
+    ------
+    str
+        Place, name and value of each entry that states a unit.
+    """
+    for entry in unit_entries(entries):
+        yield f"{entry.place}: {entry.name}: {entry.value}"
