@@ -369,7 +369,8 @@ class _Run:
             return Postponed(unit_id(unit), f"{type(error).__name__}: {error}")
         elsewhere = {k for k, (path, *_) in enumerate(unit.files) if path in task.copied}
         computed = with_copy_rows(result, unit, task.copied), task.stamp, short_contents(contents, elsewhere)
-        if file_states(planned, self.raw_root) == before:
+        is_as_planned = all(state is None or state[:2] == file[1:] for state, file in zip(before, unit.files))
+        if is_as_planned and file_states(planned, self.raw_root) == before:
             return computed
         LOG.warning("%s: its files changed while it was computed: the next run computes it again", unit_id(unit))
         return _provisional(computed, CHANGED)
