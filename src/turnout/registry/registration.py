@@ -35,6 +35,7 @@ from turnout.registry.supersede import (
     remove_known_rows,
     remove_present_rows,
     supersede,
+    supersede_orphans,
 )
 
 if TYPE_CHECKING:
@@ -173,6 +174,8 @@ class Registration:
         number = before.number + 1
         run_id = self._run_id(number)
         n_superseded = supersede(self.con, number, run_id)
+        if before.incomplete:
+            n_superseded += supersede_orphans(self.con, number, run_id)
         (remove_present_rows if before.incomplete else remove_known_rows)(self.con)
         self._note_run(run_id, run_info)
         now, rows = self._write(run_id, number)

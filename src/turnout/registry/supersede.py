@@ -84,11 +84,51 @@ def supersede(con: duckdb.DuckDBPyConnection, generation: int, run_id: str) -> i
         from gone g left join heirs h on g.kind = h.kind and g.unit_id = h.unit_id and g.place = h.place
             left join causes c on c.unit_id = g.unit_id
         union all
-        select distinct p.id, $generation, null, p.kind, 'reinstated', $run, 0, 0, 0
-        from prior p semi join new_ids n on p.kind = n.kind and p.id = n.id where p.is_dead""",
+        select distinct id, $generation, null, kind, 'reinstated', $run, 0, 0, 0
+        from new_ids semi join dead on id = old_id""",
         {"generation": generation, "run": run_id},
     )
     return con.execute("select count(*) from new_supersedes").fetchall()[0][0]
+
+
+def supersede_orphans(con: duckdb.DuckDBPyConnection, generation: int, run_id: str) -> int:
+    """Supersede rows whose result is in no file any more: damage took the result away, and no work batch holds it.
+
+    Parameters
+    ----------
+    con : DuckDB connection
+        Connection with the staging tables, after ``supersede``.
+    generation : int
+        Number of the new generation.
+    run_id : str
+        Id of the run.
+
+    Returns
+    -------
+    int
+        Number of rows added to ``supersedes``.
+    """
+    with_result = [t for t in tables() if t != "results" and t not in WHOLE_TABLES and "result_id" in names(t)]
+    held = " union ".join(f"select result_id from old_{table}" for table in with_result)
+    con.execute(
+        f"""create temp table orphans as select result_id from ({held}) where result_id is not null
+        and result_id not in (select result_id from old_results union all select result_id from new_results)"""
+    )
+    selects = [
+        f"select distinct {id_column} as id, '{row_type}' as kind from old_{table} semi join orphans using (result_id)"
+        for row_type, (table, id_column, _) in KINDS.items()
+        if table != "results"
+    ]
+    ids = " union all ".join(["select result_id as id, 'result' as kind from orphans", *selects])
+    added = con.execute(
+        f"""insert into new_supersedes by name
+        select id as old_id, $generation as generation, null as new_id, kind, 'new_data' as reason, $run as run_id,
+            0 as _unit, 0 as _row, 0 as _year
+        from ({ids}) where id not in (select old_id from dead union all select old_id from new_supersedes)
+            and id not in (select id from new_ids)""",
+        {"generation": generation, "run": run_id},
+    ).fetchall()
+    return added[0][0]
 
 
 def remove_known_rows(con: duckdb.DuckDBPyConnection) -> None:

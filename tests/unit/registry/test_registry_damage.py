@@ -123,6 +123,24 @@ def test_rows_that_no_batch_holds_any_more_are_removed_and_said(spoiled, caplog)
     assert "computes its 4 rows again as far as the work batches hold them" in caplog.text
 
 
+def test_rows_of_a_result_that_no_batch_holds_do_not_count_again(tmp_path):
+    """The same night damages the file of the earlier results and that of their supersession."""
+    (tmp_path / "work").mkdir()
+    bench = Bench(tmp_path)
+    bench.register(hammer_result("t0"), tables=CONFIGURATION)
+    bench.register(hammer_result("t0", frequency=99.0, key="k2"), tables=CONFIGURATION)
+    bench.batches.pop(0)
+    questions = [
+        f"select * exclude (run_id) from {view}" for view in ("recordings_current", "models_current", "modes_current")
+    ]
+    before = [bench.ask(question) for question in questions]
+    for table in ("results", "supersedes"):
+        for file in load(bench.registry).of(table):
+            flip(bench.registry / file.path, 8 * (file.bytes // 2))
+    night(bench)
+    assert [bench.ask(question) for question in questions] == before and all(before)
+
+
 def test_most_files_gone_is_a_disk_that_is_not_mounted(spoiled):
     before = (spoiled.registry / "_generation.json").read_bytes()
     for file in load(spoiled.registry).files:
