@@ -117,7 +117,8 @@ def read_array(archive: zipfile.ZipFile, name: str, source: Source) -> np.ndarra
     stream = io.BytesIO(data)
     shape, is_fortran_order, dtype = _npy_header(stream)
     if dtype.hasobject:
-        raise ValueError("it holds objects of Python, which are not loaded")
+        problem = "it holds objects of Python, which are not loaded"
+        raise source.error(f"variable {name!r}", problem, "Save it as numbers or as text, for example in JSON")
     count, start = math.prod(shape), stream.tell()
     if count * dtype.itemsize > len(data) - start:
         problem = f"its header claims {shape} values, in {len(data)} bytes"

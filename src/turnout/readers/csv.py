@@ -67,7 +67,7 @@ def read_raw(source: Source) -> RawFile:
     is_utf16 = source.head[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
     lazy = source.lazy and not is_utf16
     data = source.memory_map if lazy else _in_utf8(source) if is_utf16 else source.data
-    if not lazy and b"\n" not in data:
+    if isinstance(data, bytes) and b"\n" not in data:
         data = data.replace(b"\r", b"\n")
     data, remarks = _without_cut_row(data, source)
     head, names, units, offset, separator, entries = read_head(data, source)
@@ -319,7 +319,9 @@ def _records(
             conditions=facts.conditions(k, n),
             time=None if seconds is None else seconds[a:b],
             undecided={
-                i: scale_problem(text) for i, text in enumerate(scale_statements(facts.lower, len(selected))) if text
+                i: scale_problem(text)
+                for i, text in enumerate(scale_statements(facts.variables, len(selected)))
+                if text
             },
             is_time_in_seconds=time is not None and bool(units[time].strip()),
             entries=entries,

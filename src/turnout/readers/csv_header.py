@@ -23,7 +23,7 @@ from turnout.readers.named_arrays import (
 )
 from turnout.readers.rate_words import is_rate_name, rate_unit
 from turnout.readers.source import COPY_AGAIN, MEANINGLESS_UNITS, Source
-from turnout.readers.stated_scales import SCALE_WORDS, plain_word
+from turnout.readers.stated_scales import is_scale_name
 from turnout.readers.stated_units import is_unit_name
 from turnout.readers.statements import Entry, entries_of_text
 from turnout.units import conversion
@@ -331,7 +331,7 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
             notes |= {
                 _plain(a): b
                 for a, b, *rest in (t for t in texts if len(t) > 1)
-                if b and not any(rest) and a not in names and _is_scale(a)
+                if b and not any(rest) and a not in names and is_scale_name(a)
             }
             return notes, names, units, position, separator, tuple(_entries(head_lines, separator, names))
         match = HEAD_LINE.match(line.strip())
@@ -353,7 +353,7 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
         head_lines.append(line)
         if match and (line.startswith("#") or is_note or is_rate):
             note = value if _states_scale(name, value) else _value(f"{value} {match[2]}" if match[2] else value)
-            notes[plain_name if is_note else name] = note
+            notes[plain_name if is_note and not _states_scale(name, value) else name] = note
         elif line.strip():
             text_lines.append(line)
         position = end + 1
@@ -365,11 +365,7 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
 
 def _states_scale(name: str, value: str) -> bool:
     """Whether a line states a scale: such a word, and a value that begins with a number."""
-    return _is_scale(name) and re.match(r"[+-]?[.,]?\d", value) is not None
-
-
-def _is_scale(name: str) -> bool:
-    return plain_word(name) in SCALE_WORDS
+    return is_scale_name(name) and re.match(r"[+-]?[.,]?\d", value) is not None
 
 
 def _plain(name: str) -> str:

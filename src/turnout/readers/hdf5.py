@@ -79,7 +79,9 @@ def _variables(group: h5py.Group, path: str, source: Source, claims: Hdf5Claims)
         try:
             with source.parsed_by("HDF5", f"dataset {name!r} in {path or '/'!r}"):
                 attributes = {k: _attribute(v) for k, v in member.attrs.items()}
-                large = source.lazy and is_large(member) and name.lower() not in TIME_NAMES
+                large = (
+                    source.lazy and is_large(member) and member.dtype.names is None and name.lower() not in TIME_NAMES
+                )
                 numbers = _with_packing(member, attributes, source)
                 variables[name] = lazy_array(numbers) if large else _values(numbers)
         except ReadError as error:
@@ -140,6 +142,9 @@ def _with_packing(
     dataset: h5py.Dataset, all_attributes: Mapping[str, Any], source: Source
 ) -> h5py.Dataset | PackedDataset:
     """The dataset itself, or with its attributes of packing applied; ReadError if they are no numbers."""
+    if dataset.dtype.kind == "i" and str(all_attributes.get("_Unsigned", "")).lower() == "true":
+        problem = "its whole numbers are unsigned by its attribute _Unsigned, and stored as signed ones"
+        raise source.error(f"dataset {dataset.name!r}", problem, "Export the numbers unpacked", reason="scale_unknown")
     fill_names = _fill_names(all_attributes)
     attributes = {k: all_attributes[k] for k in (*PACKING_ATTRIBUTES, *fill_names) if k in all_attributes}
     if not attributes or dataset.dtype.kind not in "fiu":

@@ -19,6 +19,7 @@ from turnout.readers.lazy import LazyColumn, LazyMatrix, is_large, lazy_array
 from turnout.readers.mat_elements import HEADER_SIZE, unpacked_file
 from turnout.readers.named_arrays import TIME_NAMES, Alphabetical, raw_file
 from turnout.readers.source import RawFile, Source
+from turnout.readers.stated_units import is_unit_name
 
 VERSION_5 = 1  # as scipy numbers it
 VERSION_73 = b"MATLAB 7.3"
@@ -70,14 +71,50 @@ def _lazy_arrays(source: Source) -> dict[str, LazyColumn | LazyMatrix]:
 
 
 def _plain_variables(value: Any, mapping_type: type[dict]) -> Any:
-    """The value with dictionaries of ``mapping_type`` and arrays; a structure array becomes numbered records."""
+    """The value with dictionaries of ``mapping_type`` and arrays; a structure array becomes channels or records."""
     if isinstance(value, dict):
-        members = {name: _plain_variables(v, mapping_type) for name, v in value.items()}
+        members = _structure_array(value) or value
+        members = {name: _plain_variables(v, mapping_type) for name, v in members.items()}
         return mapping_type({name: v for name, v in members.items() if v is not None})
     if isinstance(value, list):
         if value and all(isinstance(v, dict) for v in value):
             return {f"record_{i:03d}": _plain_variables(v, mapping_type) for i, v in enumerate(value)}
         if value and all(isinstance(v, np.ndarray) and v.ndim == 2 for v in value):
             return {f"record_{i:03d}": v for i, v in enumerate(value)}
+        if value and all(_is_list_of_numbers(v) for v in value):  # a cell of vectors
+            lengths = {len(v) for v in value}
+            return np.asarray(value) if len(lengths) == 1 else {str(i): np.asarray(v) for i, v in enumerate(value)}
+        if value and all(isinstance(v, (int, float)) for v in value):
+            return np.asarray(value)
         return value if all(isinstance(v, str) for v in value) else np.asarray(value, dtype=object)
     return value
+
+
+def _is_list_of_numbers(value: Any) -> bool:
+    """Whether a value is a vector of samples, as an array or a list."""
+    if isinstance(value, np.ndarray):
+        return value.ndim == 1 and value.dtype.kind in "fiu" and value.size > 1
+    return isinstance(value, list) and len(value) > 1 and all(isinstance(v, (int, float)) for v in value)
+
+
+def _structure_array(fields: dict[str, Any]) -> dict[str, Any] | None:
+    """Channels or records of a structure array, whose fields pymatreader returns as lists; None for another structure.
+
+    With one field of vectors and one of distinct names its elements are channels, else they are records.
+    """
+    lists = {name: v for name, v in fields.items() if isinstance(v, list)}
+    vectors = [name for name, v in lists.items() if len(v) > 1 and all(map(_is_list_of_numbers, v))]
+    if not vectors or len({len(v) for v in lists.values()}) > 1 or len(lists) < len(fields):
+        return None
+    texts = [n for n, v in lists.items() if all(isinstance(t, str) and t for t in v) and len(set(v)) == len(v)]
+    names = next((n for n in texts if not is_unit_name(n)), None)
+    if len(vectors) == 1 and names:
+        channels = dict(zip(lists[names], map(np.asarray, lists[vectors[0]])))
+        others = {n: v for n, v in lists.items() if n not in (names, vectors[0])}
+        units = next((n for n in others if is_unit_name(n)), None)
+        return channels | others | ({"units": dict(zip(lists[names], others.pop(units)))} if units else {})
+    n_record = len(lists[vectors[0]])
+    return {
+        f"record_{i:03d}": {n: np.asarray(v[i]) if _is_list_of_numbers(v[i]) else v[i] for n, v in lists.items()}
+        for i in range(n_record)
+    }

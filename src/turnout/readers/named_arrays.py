@@ -31,7 +31,7 @@ from turnout.readers.rate_words import is_rate_name
 from turnout.readers.source import CONDITIONS, RawFile, RawRecord, Source
 from turnout.readers.stated_scales import entry_statements, is_scale_name, scale_problem, scale_statements
 from turnout.readers.statements import MAX_ENTRIES, Entry, entries_of
-from turnout.readers.timing import start_fields
+from turnout.readers.timing import seconds_since_first, start_fields
 
 RECORD_NAME = re.compile(r"^(?:record|rec|segment|impact|hit)[_ ]?(\d+)$", re.IGNORECASE)
 
@@ -424,6 +424,7 @@ def raw_file(variables: Mapping, source: Source, parent: Metadata | None = None)
     ReadError
         If the variables do not say which arrays are the samples.
     """
+    variables = _with_fields(variables)
     facts = Metadata(variables, source, parent)
     expected = facts.count(RECORD_COUNT_NAMES)
     numbered = numbered_names(variables)
@@ -435,11 +436,42 @@ def raw_file(variables: Mapping, source: Source, parent: Metadata | None = None)
             return raw_file(variables[groups[0]], source, facts)
         entries = [(variables[name], f"group {name!r}") for name in sorted(groups, key=natural_sort_key)]
     else:
-        return RawFile(tuple(_group_records(variables, facts, source)), expected)
+        group_records = tuple(_group_records(variables, facts, source))
+        if not group_records and not expected and variables:
+            raise source.error("the file", _problem_without_samples(variables), SAMPLES_REMEDY, reason="empty")
+        return RawFile(group_records, expected)
     records = [
         _numbered_record(value, k, len(entries), where, facts, source) for k, (value, where) in enumerate(entries)
     ]
     return RawFile(tuple(records), expected)
+
+
+SAMPLES_REMEDY = (
+    "Export each channel as a vector of real numbers, or all as one matrix; if the file should hold them, copy it again"
+)
+MAX_LISTED = 6  # variables that a message names
+
+
+def _problem_without_samples(variables: Mapping[str, Any]) -> str:
+    """What a file without samples holds."""
+    listed = [
+        f"{name!r} ({value.dtype} of shape {value.shape})" if isinstance(value, ARRAYS) else repr(name)
+        for name, value in variables.items()
+        if not isinstance(value, Attributes)
+    ]
+    more = f" and {len(listed) - MAX_LISTED} more" if len(listed) > MAX_LISTED else ""
+    return f"it holds no record: no variable is an array of samples; there are {', '.join(listed[:MAX_LISTED])}{more}"
+
+
+def _with_fields(variables: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The variables, with a group of its fields for each structured array."""
+    if not any(_is_structured(value) for value in variables.values()):
+        return variables
+    return {n: {f: v[f] for f in v.dtype.names} if _is_structured(v) else v for n, v in variables.items()}
+
+
+def _is_structured(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.dtype.names is not None and value.ndim == 1
 
 
 class Attributes(dict):
@@ -600,9 +632,15 @@ def _raw_record(
 ) -> RawRecord:
     time = facts.get(TIME_NAMES)
     time = np.asarray(time, dtype=float) if isinstance(time, np.ndarray) and time.size == len(samples[0]) else None
+    clocks = {
+        name: value
+        for name, value in facts.variables.items()
+        if isinstance(value, np.ndarray) and value.dtype.kind in "mM" and value.shape == (len(samples[0]),)
+    }
     return RawRecord(
         names=tuple(names),
         samples=samples,
+        clocks=tuple((f"variable {name!r}", seconds_since_first(value)) for name, value in clocks.items()),
         entries=facts.entries,
         units=tuple(units),
         **start_fields(facts.record_value(START_NAMES, k, n)),

@@ -18,8 +18,10 @@ from turnout.readers.named_arrays import RECORD_COUNT_NAMES, START_NAMES, TIME_N
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.stated_scales import entry_statements, scale_text
 from turnout.readers.statements import entries_of
-from turnout.readers.time_axes import seconds_since_first
-from turnout.readers.timing import start_fields
+from turnout.readers.timing import seconds_since_first, start_fields
+
+ROWS_REMEDY = "Write one row for each sample and one column of numbers for each channel"
+MAX_LISTED = 6  # columns that a message names
 
 
 def read_raw(source: Source) -> RawFile:
@@ -56,6 +58,9 @@ def read_raw(source: Source) -> RawFile:
         edges = [0, *(np.flatnonzero(np.diff(numbers)) + 1), n_row]
     time = next((name for name in columns if name.lower() in TIME_NAMES), None)
     names = [name for name, x in columns.items() if name != time and x.dtype.kind in "fiu"]
+    if n_row and not names:
+        kinds = ", ".join(f"{field.name!r} ({field.type})" for field in list(schema)[:MAX_LISTED])
+        raise source.error("the columns", f"none holds one number in a row; there are {kinds}", ROWS_REMEDY, "empty")
     clocks = [name for name, x in columns.items() if name != time and x.dtype.kind in "mM" and _varies(x)]
     fields = {f"column {f.name!r}": _field_notes(f) for f in schema}
     common = tuple(entries_of(_metadata(schema), "metadata"))
@@ -92,13 +97,21 @@ def _columns(file: pq.ParquetFile, rows: "RowGroupReader | None") -> dict[str, C
     names = file.schema_arrow.names
     if rows is None:
         table = file.read(use_threads=False)
-        return {name: table.column(name).to_numpy() for name in names}
+        return {name: _to_numpy(table.column(name)) for name in names}
     lazy_names = [f.name for f in file.schema_arrow if (pa.types.is_floating(f.type) or pa.types.is_integer(f.type))]
     lazy_names = [name for name in lazy_names if name.lower() not in TIME_NAMES]
     table = file.read([name for name in names if name not in lazy_names], use_threads=False)
-    columns: dict[str, Column] = {name: table.column(name).to_numpy() for name in table.column_names}
+    columns: dict[str, Column] = {name: _to_numpy(table.column(name)) for name in table.column_names}
     columns |= {name: rows.column(name) for name in lazy_names}
     return {name: columns[name] for name in names}
+
+
+def _to_numpy(column: pa.ChunkedArray) -> np.ndarray:
+    """Values of a column; times of day become durations since midnight."""
+    if pa.types.is_time(column.type):
+        whole = column.cast(pa.int64() if column.type.bit_width == 64 else pa.int32()).to_numpy()
+        return whole.astype("int64").view(f"timedelta64[{column.type.unit}]") if whole.dtype.kind == "i" else whole
+    return column.to_numpy()
 
 
 class RowGroupReader:

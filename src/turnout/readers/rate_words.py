@@ -40,7 +40,9 @@ STEP_TOKENS = {
     "steg",
     "timestep",
 }
-TIME = re.compile(r"^(?:x|h|t|horizontal\w*|wf|zeit\w*|time\w*|tid|tids\w*|temps|tiempo|tempo|temporal\w*|temporel\w*|tijd\w*)$")
+TIME = re.compile(
+    r"^(?:x|h|t|horizontal\w*|wf|zeit\w*|time\w*|tid|tids\w*|temps|tiempo|tempo|temporal\w*|temporel\w*|tijd\w*)$"
+)
 CERTAIN_RATES = {
     "fs",
     "rate",
@@ -63,7 +65,9 @@ CERTAIN_STEPS = {
 POSSIBLE_RATES = {"fe", "fc"}  # of French and Italian: also other things
 RATE_WORD = re.compile(r"(?:[a-z]{1,2}|adc|dac|daq|data|daten|frame|tick|line|log)rates?")
 # What is counted per second beside samples: not a rate of sampling.
-NOT_COUNTED = re.compile(r"met|mile|foot|feet|inch|zoll|rev|umdreh|tour|gir|vuelt|rad|grad|deg|byt|okt|octet|pack|newt|volt")
+NOT_COUNTED = re.compile(
+    r"met|mile|foot|feet|inch|zoll|rev|umdreh|tour|gir|vuelt|rad|grad|deg|byt|okt|octet|pack|newt|volt"
+)
 POSSIBLE = POSSIBLE_RATES | {
     "sampling", "abtastung", "echantillonnage", "muestreo", "campionamento", "bemonstering", "vzorkovani", "timebase",
     "zeitbasis", "samplingtime", "abtastzeitraum",
@@ -80,9 +84,10 @@ BESIDE_RATE = re.compile(r"signal|source|quelle|block|buffer|spectr|fft")
 # Names of other durations: a short one under any other name may be a time step.
 DURATION = re.compile(
     r"delay|verzog|retard|retraso|ritardo|forsink|laten|width|breite|largeur|rise|fall|anstieg|constant|konstant|tau$"
-    r"|dead|tot|hold|halte|timeout|durat|dauer|duree|durac|durat|varighed|expos|belicht|decay|abkling|window|fenster"
+    r"|dead|tot(?:zeit)?$|hold|halte|timeout|durat|dauer|duree|durac|durat|varighed|expos|belicht|decay|abkling|window|fenster"
     r"|pulse|puls|impact|stoss|contact|kontakt|choc|jitter|uncert|unsicher|gate|settl|warm|dwell|length|lange|longueur"
-    r"|elapsed|total|gesamt|tolera|error|fehler|skew|drift|shift|lag$"
+    r"|elapsed|total|gesamt|tolera|error|fehler|skew|drift|shift|lag$|averag|mittel|weight|bewert|overlap|peak|accura"
+    r"|montee|subida|salita|stig|ping|hop$"
 )
 PER = {"per", "pro", "par", "por", "al", "pr"}
 UNIT_PER = re.compile(rf"\s*(?:/|\b(?:{'|'.join(sorted(PER))})\b\.?)\s*")
@@ -90,8 +95,10 @@ SAMPLES = re.compile(
     r"s|sa|samp|samples?|smpl|pts?|points?|scans?|messwerte?|abtastwerte?|werte?|punkte?|puntos?|punti|malinger"
     r"|echantillons?|campioni|muestras|count"
 )
-SECONDS = {"s", "sec", "secs", "second", "seconds", "sek", "sekund", "sekunde", "sekunden", "sekunder", "seconde", "secondes",
-           "secondi", "secondo", "segundo", "segundos"}  # fmt: skip
+SECONDS = set(
+    "s sec secs second seconds sek sekund sekunde sekunden sekunder seconde secondes secondi secondo segundo "
+    "segundos".split()
+)
 TIME_UNITS = {
     **dict.fromkeys(SECONDS, Fraction(1)),
     **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds", "millisekunden"), Fraction(1, 10**3)),
@@ -229,14 +236,21 @@ def name_meaning(name: str) -> NameMeaning:
     unit = rate_unit(unit_text) if unit_text else None
     words = _with_per([word for word in words_of(name) if word not in ("wf", "the")])
     is_symbol = "".join(words) in CERTAIN_RATES | CERTAIN_STEPS and len(words[0]) == 1
-    if not unit_text and len(words) > 1 and not is_symbol and "per" not in words and words[-1] not in UNITS_NOT_IN_NAMES:
+    if (
+        not unit_text
+        and len(words) > 1
+        and not is_symbol
+        and "per" not in words
+        and words[-1] not in UNITS_NOT_IN_NAMES
+    ):
         unit = rate_unit(words[-1])
         words = words[:-1] if unit else words
     certainty, is_step = _meaning(words)
     spaced = " ".join(words)
     if unit is not None and certainty == NOT and words and not OTHER.search(spaced):
         if not unit.is_step or unit.is_sampling:
-            certainty, is_step = (CERTAIN if unit.is_sampling else POSSIBLY), unit.is_step
+            is_sampled = unit.is_sampling or bool(SAMPLING.search(spaced))
+            certainty, is_step = (CERTAIN if is_sampled else POSSIBLY), unit.is_step
         elif unit.scale <= 1 and not DURATION.search(spaced) and not is_time_name(name):
             certainty, is_step = POSSIBLY, True
     if unit is None and unit_text and re.fullmatch(r"[a-zA-Z]\w{0,3}", unit_text.strip()) is None:

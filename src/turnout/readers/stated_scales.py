@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from turnout.readers.rate_words import rate_unit, words_of
 from turnout.readers.source import MEANINGLESS_UNITS
 from turnout.readers.statements import PLACEHOLDERS, Entry
 from turnout.units import conversion, to_si
@@ -31,6 +32,23 @@ OFFSET_WORDS = frozenset(
     "desplazamiento scostamento ordenada".split()
 )
 SCALE_WORDS = FACTOR_WORDS | OFFSET_WORDS
+# Words of longer names that may be a factor or an offset ("InputGain", "Kalibrierfaktor_1"): only a number counts.
+POSSIBLE_FACTOR = re.compile(
+    r"(?:^|[a-z]{2}|^b)(?<!\ba)gain$|(?:scale|skala|escala|scala|echelle)s?$|scaling|skalier|fak?tore?n?$|factors?$|facteurs?$"
+    r"|fattor[ei]$|multipl|^mult$|verstark|vorverst|forstaerk|forstark|amplificat|^preamp|guadagn|gananc|attenuat"
+    r"|abschwach|divis(?:or|eur)$|^teiler$|prescal|vorteiler|^lsb$|^pga$|^coeff?|^koeff|quantis|umrechn|conversion"
+)
+CALIBRATION_WORDS = frozenset("calibration cal calib kalibrierung kalibrering etalonnage taratura calibracion".split())
+POSSIBLE_OFFSET = re.compile(r"offset$|^bias$|intercept$|^tar[ae]$|^zero$|nullabgleich|nullpunkt|nullwert")
+STEPS_OF_CONVERTER = re.compile(r"bits?|counts?|lsb|digits?|codes?")
+# Factors and offsets of other things than the numbers of a channel.
+OTHER_SCALE = re.compile(
+    r"temp|time|zeit|trigg|date|datum|year|jahr|valid|due|number|^no$|^nr$|filt|freq|rate|crest|scheitel|power|form"
+    r"|safety|quality|window|load|damp|dampf|sampl|decim|dynamic|gps|utc|posit|byte|pixel|colou?r|plot|axis|display"
+    r"|image|zoom|print|volt|current|strom|speed|length|dist|wheel|full|range|cross|pad|sensitiv|version|limit|max|min"
+    r"|error|uncert|cover|peak|^q$|spectr|start|begin|file|data|block|buffer|header|index|mode|type|auto|cut|x$|model|map"
+)
+YEARS = (1990.0, 2060.0)  # a whole number between them behind a word of calibration is a year
 
 
 @lru_cache(maxsize=4096)
@@ -69,7 +87,26 @@ def is_scale_name(name: str) -> bool:
     bool
         True for "gain", "Scale factor", "Skalierung" and the like.
     """
-    return plain_word(name) in SCALE_WORDS
+    return _neutral_value(name) is not None
+
+
+@lru_cache(maxsize=4096)
+def _neutral_value(name: str) -> float | None:
+    """1 for the name of a factor, 0 for that of an offset, None for any other name."""
+    word = plain_word(name)
+    if word in SCALE_WORDS:
+        return 1.0 if word in FACTOR_WORDS else 0.0
+    words = words_of(re.sub(r"[\[(].*?[\])]", "", name))
+    if (bracket := re.search(r"[\[(](.*?)[\])]", name)) and rate_unit(bracket[1]):
+        return None
+    if "per" in words[1:-1]:
+        at = words.index("per", 1)
+        return 1.0 if any(STEPS_OF_CONVERTER.fullmatch(w) for w in (words[at - 1], words[at + 1])) else None
+    if any(OTHER_SCALE.search(word) for word in words):
+        return None
+    if word in CALIBRATION_WORDS or any(POSSIBLE_FACTOR.search(word) for word in words):
+        return 1.0
+    return 0.0 if any(POSSIBLE_OFFSET.search(word) for word in words) else None
 
 
 def scale_statements(facts: Mapping[str, Any], n_channel: int = 1) -> tuple[str, ...]:
@@ -104,10 +141,15 @@ def scale_statements(facts: Mapping[str, Any], n_channel: int = 1) -> tuple[str,
 
 def _stated_by_channel(label: str, name: str, value: Any, n_channel: int) -> list[list[str]]:
     """Texts of the scales that one entry states for each channel, without neutral ones."""
-    word = plain_word(name)
-    if word not in SCALE_WORDS:
+    neutral = _neutral_value(name)
+    if neutral is None:
         return [[] for _ in range(n_channel)]
-    stated = [_scale_text(label, x, 1.0 if word in FACTOR_WORDS else 0.0) for x in _scale_values(value)]
+    values = _scale_values(value)
+    if plain_word(name) not in SCALE_WORDS:
+        values = [
+            x if isinstance(x, float) and not (x.is_integer() and YEARS[0] < x < YEARS[1]) else neutral for x in values
+        ]
+    stated = [_scale_text(label, x, neutral) for x in values]
     if len(stated) == n_channel:
         return [[text] if text else [] for text in stated]
     return [list(filter(None, dict.fromkeys(stated))) for _ in range(n_channel)]

@@ -22,7 +22,9 @@ UNIT_WORD = re.compile(
     r"|jednotk[ay]|uom|eu|unit(?:string|label)"
 )
 # Units of other things than the samples of a channel.
-OTHER_UNITS = re.compile(r"time|zeit|temps|tempo|tid|x$|rate|freq|sensitiv|empfind|sensib|speed|length|range|limit|gain")
+OTHER_UNITS = re.compile(
+    r"time|zeit|temps|tempo|tid|x$|rate|freq|sensitiv|empfind|sensib|speed|length|range|limit|gain"
+)
 # Units of the same channel at another place of its measuring chain.
 CHAIN_WORDS = frozenset("raw sensor input electrical signal native adc hardware transducer description roh".split())
 UNIT_IN_NAME = re.compile(r"[\[({]([^\[\](){}]+)[\])}]\s*$")
@@ -175,24 +177,25 @@ def own_units(record: RawRecord, index: int, entries: Sequence[Entry]) -> tuple[
         no channel in particular, and the last word of its name.
     """
     name, n = record.names[index], len(record.names)
-    own, possible = [], []
+    certain: list[str] = []
+    possible: list[str] = []
     for entry in entries:
         texts = _texts(entry.value)
         owners = owners_of(entry, record.entries, record.names)
         in_chain = bool(_words(entry.name) & CHAIN_WORDS)
         if owners and len(texts) == 1:
             if index in owners:
-                (possible if in_chain or len(owners) > 1 else own).extend(texts)
+                (possible if in_chain or len(owners) > 1 else certain).extend(texts)
         elif len(texts) == n:  # in the order of the channels, unless the format has assigned them
-            (own if not in_chain and is_meaningless(record.units[index]) else possible).append(texts[index])
+            (certain if not in_chain and is_meaningless(record.units[index]) else possible).append(texts[index])
         else:
             possible.extend(texts)
     if match := UNIT_IN_NAME.search(name):
         if not re.match(r"\s*[+-]?[\d.]", match[1]) and (known_unit(match[1]) or LEVEL.match(match[1])):
-            own.append(match[1])
+            certain.append(match[1])
     elif unit := _last_word(name, record.names):
         possible.append(unit)
-    return [u for u in own if not is_meaningless(u)], [u for u in possible if not is_meaningless(u)]
+    return [u for u in certain if not is_meaningless(u)], [u for u in possible if not is_meaningless(u)]
 
 
 def _texts(value: Any) -> list[str]:
@@ -250,19 +253,20 @@ def contradicting_unit(
         The unit; "" if all agree, or none is stated.
     """
     file_unit = record.units[index]
-    own, possible = own_units(record, index, unit_entries(record.entries))
+    certain, possible = own_units(record, index, unit_entries(record.entries))
     if not is_meaningless(file_unit):
-        rivals = [u for u in own if is_usable(u) or (known_unit(u) and not is_usable(file_unit))]
+        rivals = [u for u in certain if is_usable(u) or (known_unit(u) and not is_usable(file_unit))]
         return next((u for u in rivals if known_unit(file_unit) and not same_unit(u, file_unit)), "")
-    if wanted is None or own:  # none of its own units is known
-        return own[0] if own else ""
+    if wanted is None or certain:  # none of its own units is known
+        return certain[0] if certain else ""
     dimensions = {quantity, getattr(known_unit(wanted), "dimension", quantity)}
     in_name = _last_word(record.names[index], record.names)
     candidates = [
         u
         for u in possible
         if LEVEL.match(u)
-        or getattr(known_unit(u), "dimension", "") in (dimensions | {"voltage", "count"} if u == in_name else dimensions)
+        or getattr(known_unit(u), "dimension", "")
+        in (dimensions | {"voltage", "count"} if u == in_name else dimensions)
     ]
     return "" if any(same_unit(u, wanted) for u in candidates) else next(iter(candidates), "")
 

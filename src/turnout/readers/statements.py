@@ -24,6 +24,7 @@ from turnout.readers.source import Source
 MAX_CLOCK_DRIFT = 1e-4  # relative: two clocks of one logger with separate crystals may differ by this much
 PLAUSIBLE_RATES = (10.0, 1e8)  # Hz: no vibration is sampled outside; a possible statement outside means something else
 USUAL_RATES = (100.0, 1e6)  # Hz: "25.600" is 25600 and not 25.6; a number without unit outside may have another one
+MIN_EPOCH = 10**8  # s since 1970
 MAX_WIDTH = 1e-3  # relative: a statement of fewer digits does not tell the rate; the layout or another one must
 MAX_ENTRIES = 64  # numbers of a list: longer ones are samples
 MAX_TEXT = 4000  # characters of a text that are searched
@@ -288,6 +289,8 @@ def _statements(entry: Entry, value: Any) -> Iterator[Statement]:
         return
     is_unknown = bool(unit_text or meaning.unknown_unit) and unit is None
     intervals = () if is_unknown else _intervals(number, unit, meaning.is_step, certainty)
+    if not intervals and meaning.is_step and any(r.value >= MIN_EPOCH for r in readings(number)):
+        return  # "ts: 1715587200" is a time of day
     if certainty == CERTAIN and not isinstance(value, str) and not np.isfinite(value):
         yield Statement(entry.place, shown, (), CERTAIN)
     elif intervals or certainty == CERTAIN:

@@ -7,7 +7,7 @@ import numpy as np
 from turnout.readers.rate_words import CERTAIN, POSSIBLY, TIME_UNITS, is_time_name, name_meaning, rate_unit, words_of
 from turnout.readers.source import MEANINGLESS_UNITS, RawRecord, Source
 from turnout.readers.statements import Entry, Statement, statements_of, time_statement
-from turnout.readers.timing import check_time, rate_of_time
+from turnout.readers.timing import check_time, rate_of_time, seconds_since_first
 
 HEAD_SIZE = 1000  # samples from which a column is judged before all of it is read
 MIN_AXIS_SIZE = 8  # samples: fewer do not tell a time axis from a chance sequence
@@ -128,23 +128,6 @@ def _columns(record: RawRecord, measured: Set[int]) -> Iterator[tuple[str, np.nd
         certainty = CERTAIN if by_name or is_time_unit else POSSIBLY
         place = f"column {name!r}" if by_name or is_time_unit else f"column {name!r}, which rises evenly"
         yield place, np.asarray(column[:], dtype=float) * scale, is_time_unit, certainty
-
-
-def seconds_since_first(stamps: np.ndarray) -> np.ndarray:
-    """Seconds of time stamps or durations, counted from the first one.
-
-    Parameters
-    ----------
-    stamps : (n,) array of datetime64 or timedelta64
-        Time stamps.
-
-    Returns
-    -------
-    (n,) array of float
-        NaN for a missing time stamp. [s]
-    """
-    seconds = (stamps - stamps[0]).astype("timedelta64[ns]").astype(float) * 1e-9
-    return np.where(np.isnat(stamps), np.nan, seconds)
 
 
 def _rises_evenly(head: np.ndarray) -> bool:

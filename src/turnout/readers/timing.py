@@ -476,6 +476,23 @@ def is_unread_uff_time(text: str) -> bool:
     return bool(looks_dated) and parse_uff_time(text) is None
 
 
+def seconds_since_first(stamps: np.ndarray) -> np.ndarray:
+    """Seconds of time stamps or durations, counted from the first one.
+
+    Parameters
+    ----------
+    stamps : (n,) array of datetime64 or timedelta64
+        Time stamps.
+
+    Returns
+    -------
+    (n,) array of float
+        NaN for a missing time stamp. [s]
+    """
+    seconds = (stamps - stamps[0]).astype("timedelta64[ns]").astype(float) * 1e-9
+    return np.where(np.isnat(stamps), np.nan, seconds)
+
+
 def start_offsets(stamps: Sequence[datetime | None]) -> list[float]:
     """Start of each channel relative to the first one.
 

@@ -52,6 +52,9 @@ def read_raw(source: Source) -> RawFile:
         further = _further_chunks(raw, source.size) if source.head[:4] in (b"RIFF", b"RF64") else {}
         raw.seek(0)
         with source.parsed_by("libsndfile"), soundfile.SoundFile(raw.fileno(), closefd=False) as file:
+            if not file.subtype.startswith(LOSSLESS):
+                problem = f"its samples are compressed with loss ({file.subtype_info})"
+                raise source.error("the header", problem, "Let the logger write PCM or floating-point numbers")
             rate, comment, is_float = file.samplerate, file.comment, file.subtype in FLOAT_SUBTYPES
             texts = {name: text for name, text in file.copy_metadata().items() if text}
             frames = Frames(source.path, file.frames, file.channels)
@@ -87,6 +90,7 @@ def read_raw(source: Source) -> RawFile:
 
 
 FLOAT_SUBTYPES = ("FLOAT", "DOUBLE")
+LOSSLESS = ("PCM", *FLOAT_SUBTYPES)
 
 
 @dataclass(frozen=True)

@@ -381,3 +381,55 @@ def test_an_lvm_row_may_carry_a_comment(shared_data, tmp_path):
     (recording,) = read("a.lvm", tmp_path, RawDescription(channels)).recordings
     assert recording.n_sample == 17
     assert recording.samples[0, 0] == -0.158373
+
+
+def test_structured_arrays_are_read_by_their_fields(tmp_path):
+    """HDF5 and npz; fields of a time axis and of the channels."""
+    x = np.random.default_rng(1).normal(size=(2, 60))
+    rows = np.zeros(60, dtype=[("time", "f8"), ("force", "f8"), ("rail", "f4")])
+    rows["time"], rows["force"], rows["rail"] = np.arange(60) / 5000, *x
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["table"] = rows
+    np.savez(tmp_path / "a.npz", table=rows)
+    layout = RawDescription(
+        (RawChannel("force", "force", "force", "N"), RawChannel("rail", "rail", "acceleration", "g"))
+    )
+    for name in ("a.h5", "a.npz"):
+        (recording,) = read(name, tmp_path, layout).recordings
+        assert recording.rate == 5000 and np.array_equal(recording.signal("force"), x[0])
+
+
+@pytest.mark.parametrize("kind", ["channels", "records", "cell"])
+def test_structure_arrays_and_cells_of_matlab_are_read(kind, tmp_path):
+    x = np.random.default_rng(2).normal(size=(2, 60))
+    layout = RawDescription(
+        (RawChannel("force", "force", "force", "N"), RawChannel("rail", "rail", "acceleration", "m/s²"))
+    )
+    if kind == "channels":
+        array = np.zeros(2, dtype=[(n, object) for n in ("label", "unit", "values", "fs")])
+        array[0], array[1] = ("force", "N", x[0], 5000.0), ("rail", "m/s^2", x[1], 5000.0)
+        variables = {"ch": array}
+    elif kind == "records":
+        array = np.zeros(3, dtype=[(n, object) for n in ("force", "rail")])
+        for k in range(3):
+            array[k] = (x[0] + k, x[1] + k)
+        variables = {"rec": array, "fs": 5000.0}
+    else:
+        variables = {"data": np.array(list(x), dtype=object), "channels": ["force", "rail"], "fs": 5000.0}
+        variables["data"] = np.empty(2, dtype=object)
+        variables["data"][0], variables["data"][1] = x
+    scipy.io.savemat(tmp_path / "a.mat", variables)
+    recordings = read("a.mat", tmp_path, layout).recordings
+    assert len(recordings) == (3 if kind == "records" else 1)
+    for k, recording in enumerate(recordings):
+        assert recording.rate == 5000 and np.array_equal(recording.samples, x + k)
+
+
+def test_a_file_without_samples_says_what_it_holds(tmp_path):
+    np.savez(tmp_path / "a.npz", spectrum=np.ones(50) + 1j)
+    pq.write_table(pa.table({"force": [[1.0, None, 3.0]], "rail": [[1.0, 2.0, 3.0]]}), tmp_path / "a.parquet")
+    layout = RawDescription((RawChannel("force", "force", "force", "N"),), rate=5000.0)
+    for name, words in (("a.npz", "'spectrum' (complex128 of shape (50,))"), ("a.parquet", "'force' (list")):
+        with pytest.raises(ReadError) as caught:
+            read(name, tmp_path, layout)
+        assert words in str(caught.value) and "Copy the file again" not in str(caught.value)

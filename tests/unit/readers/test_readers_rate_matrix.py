@@ -416,3 +416,62 @@ def test_a_channel_of_time_stamps_in_tdms_is_a_time_axis(tmp_path):
     write_tdms(tmp_path / "a.tdms", [], {"moment": stamps})
     assert is_true(outcome(tmp_path / "a.tdms", described(TRUE, "moment")))
     assert is_rejected(outcome(tmp_path / "a.tdms", described(OTHER, "moment")), "'moment'")
+
+
+# Names that may mean a rate or a step, beside the certain ones of WAYS: the layout must agree with one of them.
+RATE_NAMES = (
+    "Frames per second", "Ticks per second", "Punkte pro Sekunde", "Points par seconde", "Puntos por segundo",
+    "Punti al secondo", "srate", "smprate", "Datenrate", "Signal sample rate", "Fe",
+)  # fmt: skip
+STEP_NAMES = (
+    "Raster", "Time resolution", "Zeitauflösung", "Résolution temporelle", "Tidsopløsning", "HResolution",
+    "Time between samples", "Abstand der Messwerte", "Taktzyklus", "T_s",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("format", ["csv", "tdms", "hdf5", "npz", "parquet", "mat"])
+def test_what_may_be_a_rate_or_a_step_is_compared_with_the_layout(format, tmp_path):
+    write_file, name, _ = FORMATS[format]
+    failures = []
+    ways = [(n, TRUE) for n in RATE_NAMES] + [(f"{n} [µs]", 1e6 / TRUE) for n in STEP_NAMES if n != "T_s"]
+    ways += [("T_s", 1 / TRUE)]
+    if format == "mat":
+        ways = [(n, value) for n, value in ways if n.isascii() and "[" not in n]
+    for way, value in ways:
+        write_file(tmp_path / name, [(way, value)])
+        cases = {
+            "right": is_true(outcome(tmp_path / name, described(TRUE))),
+            "wrong": is_rejected(outcome(tmp_path / name, described(OTHER)), "20000 Hz"),
+        }
+        failures += [f"{way}: {case}" for case, ok in cases.items() if not ok]
+    assert failures == []
+
+
+DURATIONS = (
+    "Contact time [ms]", "Pulse width [ms]", "Rise time [ms]", "Delay [ms]", "Time constant [ms]", "Duration [ms]",
+    "Filter time [ms]", "Jitter [ms]", "Peak time [ms]", "Overlap [ms]", "ts",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("format", ["csv", "tdms", "hdf5", "npz"])
+def test_other_durations_of_a_logger_state_nothing(format, tmp_path):
+    write_file, name, _ = FORMATS[format]
+    for way in DURATIONS:
+        write_file(tmp_path / name, [(way, 1715587200.0 if way == "ts" else 1.5)])
+        assert is_true(outcome(tmp_path / name, described(TRUE))), way
+
+
+def test_a_time_in_an_unknown_unit_tells_no_implausible_rate(tmp_path):
+    write_csv(tmp_path / "a.csv", [], {"Zeit": np.arange(N_SAMPLE) * 1e6 / TRUE})
+    assert is_true(outcome(tmp_path / "a.csv", described(TRUE)))
+    assert is_rejected(outcome(tmp_path / "a.csv", described(None)), "may mean")
+
+
+def test_a_rate_in_the_comment_of_a_wav_file_contradicts_its_header(tmp_path):
+    for rate, is_right in ((TRUE, True), (OTHER, False)):
+        with soundfile.SoundFile(tmp_path / "a.wav", "w", int(TRUE), 2, "DOUBLE") as file:
+            file.comment = f"sampled at {rate:g} Hz"
+            file.write(SAMPLES.T)
+        sensors = tuple(replace(s, source=i) for i, s in enumerate(SENSORS))
+        found = outcome(tmp_path / "a.wav", RawDescription(sensors, rate=TRUE))
+        assert is_true(found) if is_right else is_rejected(found, "20000 Hz", "25600 Hz")

@@ -342,3 +342,29 @@ def test_only_units_of_the_quantity_in_a_name_contradict_the_stated_unit(name, u
     found = outcome("a.tdms", tmp_path, RawDescription((rail,), rate=TRUE))
     scale = 9.80665 if unit == "g" else 1.0
     assert is_rejected(found, "unit_unknown", choices) if choices else is_read(found, scale * SAMPLES[1:])
+
+
+POSSIBLE_SCALES = (  # of the numbers of a channel, by parts of the name
+    "InputGain", "Vorverstärkung", "Preamp", "AmplitudeScale", "Umrechnungsfaktor", "kalibreringsfaktor",
+    "fattore di calibrazione", "LSB", "volts_per_bit", "UnitsPerCount", "Divisor", "Attenuation", "DC offset", "bias",
+    "Nullabgleich", "Tara", "Calibration", "Kalibrierung",
+)  # fmt: skip
+OTHER_SCALES = (  # of other things, or no numbers
+    ("Crest factor", 3.0), ("Trigger offset", 12.0), ("UTC offset", 2.0), ("Calibration date", 20240501),
+    ("Kalibrierung", 2023), ("Calibration", "certificate 17"), ("Time scale", 2.0), ("Trigger slope", "+"),
+    ("Damping factor", 0.05), ("Bias voltage", 11.2), ("Full scale", 10.0), ("Gain control", "automatic"),
+    ("File offset", 512), ("PPS offset [µs]", 3.0), ("Track gradient", 12.0), ("Again", 3.0),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("format", ["csv", "tdms", "hdf5", "parquet", "npz"])
+def test_a_number_that_may_be_a_scale_is_rejected_by_name(format, tmp_path):
+    for name in POSSIBLE_SCALES:
+        words = ("0.25",) if format == "csv" else (name, "0.25")  # text is shown in plain letters
+        assert is_rejected(
+            outcome(written(format, tmp_path, [(name, 0.25)]), tmp_path, LAYOUT), "scale_unknown", *words
+        )
+        neutral = 0.0 if name in ("DC offset", "bias", "Nullabgleich", "Tara") else 1.0
+        assert is_read(outcome(written(format, tmp_path, [(name, neutral)]), tmp_path, LAYOUT)), name
+    for name, value in OTHER_SCALES:
+        assert is_read(outcome(written(format, tmp_path, [(name, value)]), tmp_path, LAYOUT)), name
