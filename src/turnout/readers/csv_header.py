@@ -338,6 +338,7 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
         name = match[1].strip() if match else ""
         plain_name = _plain(name)
         value = match[3].strip(separator + " ") if match else ""
+        name_with_unit = f"{name} {match[2]}" if match and match[2] else name
         is_rate = (
             bool(match)
             and is_rate_name(name)
@@ -346,14 +347,16 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
         is_note = (
             plain_name in HEAD_NAMES
             or (plain_name in NUMERIC_HEAD_NAMES and _is_number(value.split()[0] if value else ""))
-            or _states_scale(name, value)
+            or _states_scale(name_with_unit, value)
         )
         if plain_name in SAMPLE_COUNT_NAMES and (grouped := GROUPED_NUMBER.match(value)):
             value = re.sub(r"\D", "", grouped[0])
         head_lines.append(line)
         if match and (line.startswith("#") or is_note or is_rate):
-            note = value if _states_scale(name, value) else _value(f"{value} {match[2]}" if match[2] else value)
-            notes[plain_name if is_note and not _states_scale(name, value) else name] = note
+            if _states_scale(name_with_unit, value):
+                notes[name_with_unit] = value
+            else:
+                notes[plain_name if is_note else name] = _value(f"{value} {match[2]}" if match[2] else value)
         elif line.strip():
             text_lines.append(line)
         position = end + 1
@@ -393,22 +396,22 @@ def _entries(lines: Sequence[str], separator: str, names: Sequence[str]) -> Iter
         text = line.strip().lstrip("#%*/!'\" ").strip()
         if not text or _is_line_of(cells, names):
             continue
-        found = [(a, b) for a, b in pairwise(cells) if a and b and not _is_number(a)]
+        pairs = [(a, b) for a, b in pairwise(cells) if a and b and not _is_number(a)]
         for name, second, third in zip(cells, cells[1:], cells[2:]):  # "Abtastrate;25,6;kHz", "Abtastrate;kHz;25,6"
             if name and _is_number(second) and rate_unit(third):
-                found = [(name, f"{second} {third}"), *(pair for pair in found if pair != (name, second))]
+                pairs = [(name, f"{second} {third}"), *(pair for pair in pairs if pair != (name, second))]
             elif name and rate_unit(second) and _is_number(third):
-                found = [(name, f"{third} {second}"), *(pair for pair in found if pair != (name, second))]
+                pairs = [(name, f"{third} {second}"), *(pair for pair in pairs if pair != (name, second))]
         if len([cell for cell in cells if cell]) > 2 and i + 1 < len(table) and len(table[i + 1]) == len(cells):
-            found += [(a, b) for a, b in zip(cells, table[i + 1]) if a and _is_number(b)]
+            pairs += [(a, b) for a, b in zip(cells, table[i + 1]) if a and _is_number(b)]
         if (match := HEAD_LINE.match(text)) and len(cells) < 3:
             name = f"{match[1]} {match[2]}" if match[2] else match[1]
-            found.append((name, match[3].strip(separator + ' "')))
-        entries = [Entry(place, name.strip('"# '), value.strip('"')) for name, value in found]
+            pairs.append((name, match[3].strip(separator + ' "')))
+        entries = [Entry(place, name.strip('"# '), value.strip('"')) for name, value in pairs]
         if is_unit_name(cells[0]) and len(cells) > 2:
             entries = [Entry(place, cells[0], cells[1:])]  # a unit for each column
         yield from entries or entries_of_text(text, place)
-        if found and not any(is_rate_name(entry.name) for entry in entries):
+        if pairs and not any(is_rate_name(entry.name) for entry in entries):
             yield from entries_of_text(text, place)
 
 

@@ -201,12 +201,12 @@ def _channel_mapping(index: int, record: RawRecord, raw: RawChannel, where: str,
 def _check_stated_units(record: RawRecord, index: int, raw: RawChannel, place: str, source: Source) -> None:
     """ReadError if the metadata or the name of a channel state another unit than the one in use."""
     unit_in_use = record.units[index] if not is_meaningless(record.units[index]) else raw.unit or ""
-    other = contradicting_unit(record, index, raw.unit, raw.quantity, lambda unit: _is_usable(unit, raw))
-    if not other:
+    rival = contradicting_unit(record, index, raw.unit, raw.quantity, lambda unit: _is_usable(unit, raw))
+    if not rival:
         return
     holder = "the layout" if is_meaningless(record.units[index]) else "its unit"
-    problem = f"its metadata or its name {record.names[index]!r} say {other!r}, {holder} {unit_in_use!r}"
-    choices = " or ".join(f"'unit: {unit}!'" for unit in (other, unit_in_use) if _is_usable(unit, raw))
+    problem = f"its metadata or its name {record.names[index]!r} say {rival!r}, {holder} {unit_in_use!r}"
+    choices = " or ".join(f"'unit: {unit}!'" for unit in (rival, unit_in_use) if _is_usable(unit, raw))
     remedy = f"Find out which is right; then set it in the layout as {choices or 'a unit with !'}"
     raise source.error(place, problem, remedy, reason="unit_unknown")
 

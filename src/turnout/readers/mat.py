@@ -110,9 +110,9 @@ def _structure_array(fields: dict[str, Any]) -> dict[str, Any] | None:
     names = next((n for n in texts if not is_unit_name(n)), None)
     if len(vectors) == 1 and names:
         channels = dict(zip(lists[names], map(np.asarray, lists[vectors[0]])))
-        others = {n: v for n, v in lists.items() if n not in (names, vectors[0])}
-        units = next((n for n in others if is_unit_name(n)), None)
-        return channels | others | ({"units": dict(zip(lists[names], others.pop(units)))} if units else {})
+        entries = {n: v for n, v in lists.items() if n not in (names, vectors[0])}
+        units = next((n for n in entries if is_unit_name(n)), None)
+        return channels | entries | ({"units": dict(zip(lists[names], entries.pop(units)))} if units else {})
     n_record = len(lists[vectors[0]])
     return {
         f"record_{i:03d}": {n: np.asarray(v[i]) if _is_list_of_numbers(v[i]) else v[i] for n, v in lists.items()}

@@ -333,14 +333,14 @@ def _intervals(number: Any, unit: RateUnit | None, is_step: bool | None, certain
             units = tuple(u for u in ANY_UNIT if u.is_step == is_step)
     else:
         units = tuple(u for u in ANY_UNIT if is_step is None or u.is_step == is_step)
-    found = [i for u in units for r in readings(number) if (i := r.interval(u.scale, u.is_step))]
+    intervals = [i for u in units for r in readings(number) if (i := r.interval(u.scale, u.is_step))]
     if len(readings(number)) > 1:
-        found = [i for i in found if USUAL_RATES[0] <= i.rate <= USUAL_RATES[1]] or found
+        intervals = [i for i in intervals if USUAL_RATES[0] <= i.rate <= USUAL_RATES[1]] or intervals
     if unit is None and len(units) > 1:
-        found = [i for i in found if PLAUSIBLE_RATES[0] <= i.rate <= PLAUSIBLE_RATES[1]]
+        intervals = [i for i in intervals if PLAUSIBLE_RATES[0] <= i.rate <= PLAUSIBLE_RATES[1]]
     if unit is not None and unit.is_step and certainty == POSSIBLY:
-        found = [i for i in found if USUAL_RATES[0] <= i.rate <= USUAL_RATES[1]]
-    return tuple(found)
+        intervals = [i for i in intervals if USUAL_RATES[0] <= i.rate <= USUAL_RATES[1]]
+    return tuple(intervals)
 
 
 def time_statement(

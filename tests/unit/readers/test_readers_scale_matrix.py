@@ -75,7 +75,7 @@ def test_a_stated_scale_is_neutral_overruled_or_rejected_by_name(format, tmp_pat
     for name, neutral, value in SCALES:
         if format == "uff" and not name.isascii():
             continue
-        word = plain(name) if format in ("mat", "csv") else name
+        word = plain(name) if format == "mat" else name
         word = word.removeprefix("Facteur_d")
         path = written(format, tmp_path, [(name, neutral)])
         assert is_read(outcome(path, tmp_path, LAYOUT)), (name, neutral)
