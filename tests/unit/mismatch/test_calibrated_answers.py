@@ -287,6 +287,29 @@ def test_an_effect_that_explains_little_of_a_jump_is_no_name():
     assert answers._is_explained(expected, expected)
 
 
+@pytest.mark.parametrize("first", [0, 2])
+def test_a_substitute_that_explains_little_of_what_happened_is_no_name(first):
+    """A sensor moves, and its gain has the evidence of a name: part of the motion looks like gain, most does not."""
+    seat = StateParameter("seat_A3", 0.0, 0.02, 0.002, "seat", None, 1.8)
+    parameters, names = [*PARAMETERS, seat], (*NAMES, seat.name)
+    visits = []
+    for v in histories(np.random.default_rng(17), 4, step("gain_A3", 0.0, 0)):
+        rows = np.zeros((2, len(names)))
+        rows[0, NAMES.index("gain_A3")], rows[:, -1] = 1.0, (0.5, 1.0)
+        y = rows @ np.r_[MEAN, 2.0 * (v.time >= first * STEP)]
+        extra = GroupInformation("A: impacts at 1.80 m", 1, names, rows.T @ rows / SD**2, rows.T @ y / SD**2)
+        visits.append(replace(v, groups=(*v.groups, extra)))
+    question = "change" if first else "file"
+    for without, expected in (((), ("named", ("sensor_position",))), (("sensor_position",), ("unknown", ()))):
+        candidates = change_candidates(parameters, without=without)
+        stated = {a.question: a for a in answers_after_visits(parameters, visits, [], candidates, 12.0, 6.0, 4)}
+        answer = stated[question]
+        assert (answer.verdict, answer.names) == expected and answer.position == 1.8
+        history = estimate_history(parameters, visits, repeats_between_visits=False, accepted=None)
+        gains = [max(e.gain, e.from_first) for e in compare_onsets(history, candidates) if e.effect.name == "gain_A3"]
+        assert max(gains) > 12.0 + np.log(len(candidates))  # what it is about
+
+
 @pytest.mark.parametrize("question", ["change", "file"])
 @pytest.mark.parametrize(("name", "parameter"), [("local_ballast", "ballast@1.20"), ("sensor_gain", "gain_A3")])
 def test_without_its_effect_in_the_library_a_site_has_no_other_name(question, name, parameter):
