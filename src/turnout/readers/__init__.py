@@ -110,7 +110,9 @@ def read_unconverted(
     source = replace(load(path, root), lazy=is_lazy)
     with _as_read_error(source):
         found = _format_of(source, RawDescription((), format=format))
-        raw = found.read_raw(source)
+        with _collected_warnings(source) as remarks:
+            raw = found.read_raw(source)
+    raw = replace(raw, remarks=(*raw.remarks, *remarks))
     return source, next(name for name, known in FORMATS.items() if known is found), raw
 
 

@@ -354,6 +354,49 @@ def convert_records(
     return tuple(recordings), tuple(errors)
 
 
+def errors_without_layout(raw: RawFile, source: Source) -> Iterator[ReadError]:
+    """Errors about a raw file that need no layout: what ``convert_records`` would report or reject.
+
+    Parameters
+    ----------
+    raw : RawFile
+        The records as they are in the file.
+    source : Source
+        The raw file.
+
+    Yields
+    ------
+    ReadError
+        Remarks of the reader, lost entries and start times; for each channel the first record with a scale of which
+        nothing says whether it is applied, and the first with missing samples.
+    """
+    yield from raw.remarks
+    yield from lost_entry_errors(raw.records, source)
+    records = [(k, record) for k, record in enumerate(raw.records) if isinstance(record, RawRecord)]
+    unread = {k: record.unread_start for k, record in records if record.unread_start}
+    yield from start_errors([(k, record.started_at) for k, record in records], unread, "UTC", source)
+    reported: set[tuple[str, str]] = set()
+    for k, record in records:
+        fills = stated_scales.fill_values(record.entries, record.names)
+        for i, (name, unit, column) in enumerate(zip(record.names, record.units, record.samples)):
+            where = f"record {k + 1} of {len(raw.records)}, channel {name!r}"
+            if (statement := record.undecided.get(i)) and (name, "scale") not in reported:
+                reported.add((name, "scale"))
+                yield source.error(where, statement, stated_scales.remedy(unit), reason="scale_unknown")
+            if (name, "samples") not in reported and (n := _missing_count(column, fills[i])):
+                reported.add((name, "samples"))
+                problem = "1 sample is missing" if n == 1 else f"{n} samples are missing"
+                yield source.error(where, problem, "Export the record again from the logger", reason="not_finite")
+
+
+def _missing_count(column: Column, fills: Sequence[float]) -> int:
+    """Number of samples that are no finite numbers or equal a fill value."""
+    if column.dtype.kind not in "fiu":
+        return 0
+    blocks = (np.asarray(column[start : start + BLOCK_SIZE]) for start in range(0, len(column), BLOCK_SIZE))
+    return sum(int(np.count_nonzero(~np.isfinite(block) | np.isin(block, fills))) for block in blocks)
+
+
 def _count_errors(raw: RawFile, description: RawDescription, source: Source) -> Iterator[ReadError]:
     """Errors where the number of records differs from that stated by the layout or by the file itself."""
     n_present = len(raw.records)

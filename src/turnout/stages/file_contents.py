@@ -17,7 +17,8 @@ from turnout.hammer_test.segmentation import find_triggers
 from turnout.passage.segmentation import BAND, cut_passages
 from turnout.readers import FORMATS, MAX_WHOLE_FILE_SIZE, read_unconverted
 from turnout.readers.frequency_responses import FrequencyResponses, find_responses
-from turnout.readers.source import BLOCK_SIZE, RawRecord, Source
+from turnout.readers.interpret import errors_without_layout
+from turnout.readers.source import BLOCK_SIZE, RawFile, RawRecord, Source
 from turnout.stages.channel_roles import ChannelRole, channel_roles
 from turnout.stages.stated_rate import NO_RATE, StatedRate, stated_rate
 
@@ -122,7 +123,7 @@ def file_contents(path: Path | str) -> FileContents:
             return _response_contents(path, real_path, responses)
         is_large = real_path.is_file() and real_path.stat().st_size > MAX_WHOLE_FILE_SIZE
         source, format_name, raw = read_unconverted(real_path.name, real_path.parent, is_lazy=is_large)
-        return _contents(path, source, format_name, raw.records, raw.expected)
+        return _contents(path, source, format_name, raw)
     except ReadError as error:
         raise ReadError(path, error.where, error.problem, error.remedy, error.reason) from None
 
@@ -135,10 +136,10 @@ def _response_contents(path: Path, real_path: Path, responses: FrequencyResponse
     )  # fmt: skip
 
 
-def _contents(
-    path: Path, source: Source, format_name: str, found: Sequence[RawRecord | ReadError], expected: int | None
-) -> FileContents:
-    problems = [f"{e.where}: {e.problem}. {e.remedy}." for e in found if isinstance(e, ReadError)]
+def _contents(path: Path, source: Source, format_name: str, raw: RawFile) -> FileContents:
+    found, expected = raw.records, raw.expected
+    errors = [*(e for e in found if isinstance(e, ReadError)), *errors_without_layout(raw, source)]
+    problems = [f"{e.where}: {e.problem}. {e.remedy}." for e in errors]
     numbered = [(k, record) for k, record in enumerate(found) if isinstance(record, RawRecord)]
     records = tuple(record for _, record in numbered)
     if expected is not None and len(found) < expected:

@@ -155,3 +155,21 @@ def test_the_hammer_file_of_others_has_five_impacts(shared_data):
     contents = file_contents(shared_data / "hammer_pyfrf" / "impact2_response0.lvm")
     assert contents.rate.value == 51200.0 and contents.kind == "impacts" and len(contents.events) == 5
     assert {e.record for e in contents.events} == {1, 2, 3, 4, 5} and not contents.has_zone
+
+
+@pytest.mark.parametrize(
+    ("head", "end", "words"),
+    [
+        ("tip;steel", "\n", None),
+        ("started_at;2024-02-30 10:00", "\n", "'2024-02-30 10:00' cannot be read"),
+        ("InputGain;10", "\n", "states InputGain = 10"),
+        ("NoData;3.5", "\n", "1 sample is missing"),
+        ("tip;steel", "\n1;", "may be cut"),
+    ],
+)
+def test_what_reading_with_a_layout_rejects_or_remarks_is_a_problem(head, end, words, tmp_path):
+    rows = "\n".join(f"{np.sin(k):.6f};{np.cos(k):.6f}" for k in range(60))
+    text = f"rate;5000\n{head}\nforce [N];rail [g]\n3.5;0.5\n{rows}{end}"
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
+    problems = file_contents(tmp_path / "a.csv").problems
+    assert any(words in problem for problem in problems) if words else problems == ()
