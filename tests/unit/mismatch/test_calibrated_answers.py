@@ -276,6 +276,8 @@ def test_a_support_that_carries_nothing_under_impacts_and_trains_hangs(size, nam
     assert last_answers(visits)["change"].names == (name,)
     start = histories(np.random.default_rng(16), 4, step("ballast@1.20", size, 0))
     assert last_answers(start)["file"].names == (name,)
+    near = histories(np.random.default_rng(15), 4, step("ballast@1.20", np.log(0.1), 2))  # a tenth: neither is sure
+    assert last_answers(near)["change"].names == ("local_ballast", "hanging_sleeper")
 
 
 def test_an_effect_that_explains_little_of_a_jump_is_no_name():

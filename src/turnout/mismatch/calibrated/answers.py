@@ -318,7 +318,8 @@ def _supported_names(
     the evidence decides nothing. A gap that no train closes feels alike under both: it leaves less of the
     stiffness than ballast that carries anything. An effect without onsets is one of the first visit.
     """
-    if size[0] + CALIBRATION.finding_sds * size[1] < np.log(CALIBRATION.least_support):
+    smallest, largest = (size[0] + sign * CALIBRATION.finding_sds * size[1] for sign in (-1.0, 1.0))
+    if largest < np.log(CALIBRATION.least_support):
         return ["hanging_sleeper"]
     effect = best.effect if isinstance(best, OnsetEvidence) else best
     (name,) = effect.direction
@@ -338,7 +339,8 @@ def _supported_names(
         gains = dict(zip((e.name for e in effects), evidence_from_first([*parameters, offset], history, effects)[0]))
     equal, *of_gaps = (gains[e.name] for e in effects)
     difference = float(np.logaddexp.reduce(of_gaps)) - float(np.log(len(of_gaps))) - equal
-    if abs(difference) < margin:
+    may_carry_nothing = difference < 0.0 and smallest < np.log(CALIBRATION.least_support)
+    if abs(difference) < margin or may_carry_nothing:
         return ["local_ballast", "hanging_sleeper"]
     return ["hanging_sleeper"] if difference > 0.0 else ["local_ballast"]
 
