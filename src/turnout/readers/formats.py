@@ -9,6 +9,7 @@ from importlib import import_module
 
 from turnout.readers.claims import check_claims
 from turnout.readers.source import RawFile, RawRecord, Source
+from turnout.readers.stated_starts import with_stated_start
 from turnout.readers.stated_units import with_stated_units
 
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -44,6 +45,8 @@ class Format:
         check_claims(self.module, source)
         raw = import_module(f"turnout.readers.{self.module}").read_raw(source)
         records = tuple(with_stated_units(r) if isinstance(r, RawRecord) else r for r in raw.records)
+        if len(records) == 1 and isinstance(records[0], RawRecord):
+            records = (with_stated_start(records[0]),)
         return replace(raw, records=records)
 
 

@@ -475,3 +475,32 @@ def test_a_rate_in_the_comment_of_a_wav_file_contradicts_its_header(tmp_path):
         sensors = tuple(replace(s, source=i) for i, s in enumerate(SENSORS))
         found = outcome(tmp_path / "a.wav", RawDescription(sensors, rate=TRUE))
         assert is_true(found) if is_right else is_rejected(found, "20000 Hz", "25600 Hz")
+
+
+START_ENTRIES = (
+    "Recorded on",
+    "Aufnahmezeitpunkt",
+    "Trigger time",
+    "Timestamp",
+    "Date and time",
+    "Messung vom",
+    "acquired",
+)
+OTHER_TIMES = ("Calibration date", "End time", "Exported on", "Letzte Wartung", "Firmware date")
+
+
+@pytest.mark.parametrize("format", ["csv", "tdms", "hdf5", "npz", "parquet", "mat"])
+def test_a_start_time_under_any_name_is_read_or_reported(format, tmp_path):
+    """That of another event is none; one of no calendar, and two that differ, are reported."""
+    write_file, name, _ = FORMATS[format]
+    expected = datetime(2026, 5, 13, 10)
+    for entry in (*START_ENTRIES, *OTHER_TIMES):
+        for text in ("2026-05-13 10:00:00", "13.05.2026 10:00:00", "2026-02-30 10:00:00"):
+            write_file(tmp_path / name, [("rate", TRUE), (entry, text)])
+            result = read(name, tmp_path, described(TRUE))
+            is_start, is_time = entry in START_ENTRIES, "02-30" not in text
+            assert result.recordings[0].started_at == (expected if is_start and is_time else None), (entry, text)
+            assert [e.reason for e in result.errors] == (["wrong_time"] if is_start and not is_time else [])
+    write_file(tmp_path / name, [("rate", TRUE), ("Recorded on", "2026-05-13 10:00"), ("Start", "2026-05-14 10:00")])
+    (error,) = read(name, tmp_path, described(TRUE)).errors
+    assert error.reason == "wrong_time" and "2026-05-14" in error.problem

@@ -1,0 +1,66 @@
+"""Start time under a name that no format defines: "Recorded on", "Aufnahmezeitpunkt", "Date/Time"."""
+
+import re
+from dataclasses import replace
+from functools import lru_cache
+
+from turnout.readers.rate_words import words_of
+from turnout.readers.source import RawRecord
+from turnout.readers.timing import parse_time
+
+START = re.compile(
+    r"start|begin|debut|inici|inizi|zacat|trigg|record|aufnahm|aufzeich|mess|mesur|medic|misur|enregistr|registr|grab"
+    r"|acqui|erfass|optag|maling|timestamp|zeitstempel|horodat|datetime|^date$|^dato$|^datum$|^time$|^zeit$|^fecha$"
+)
+# Times of other events.
+OTHER = re.compile(
+    r"end|stop|fin$|slut|calib|kalib|etalonn|tarat|export|creat|erstell|modif|chang|saved|print|servic|install|version"
+    r"|due|valid|last|letzt|next|file|datei|software|firmware|config|import|convert|upload"
+)
+HAS_DATE_AND_TIME = re.compile(r"\d{1,4}[-.]\d{1,2}[-.]\d{1,4}\D+\d{1,2}:\d{2}")
+
+
+@lru_cache(maxsize=4096)
+def is_start_name(name: str) -> bool:
+    """Whether a name may mean the start of a recording.
+
+    Parameters
+    ----------
+    name : str
+        Name of an entry of the metadata.
+
+    Returns
+    -------
+    bool
+        False for the time of another event.
+
+    Examples
+    --------
+    >>> [is_start_name(n) for n in ("Recorded on", "Date/Time", "Calibration date", "End time", "Operator")]
+    [True, True, False, False, False]
+    """
+    words = words_of(name)
+    return any(START.search(word) for word in words) and not any(OTHER.search(word) for word in words)
+
+
+def with_stated_start(record: RawRecord) -> RawRecord:
+    """The only record of a file with the start time of its metadata if its format states none.
+
+    Parameters
+    ----------
+    record : RawRecord
+        The record as its reader returns it.
+
+    Returns
+    -------
+    RawRecord
+        With a start time if all entries under such a name agree; a text that is no time is its unread start.
+    """
+    if record.started_at is not None or record.unread_start:
+        return record
+    texts = [e.value.strip() for e in record.entries if isinstance(e.value, str) and is_start_name(e.name)]
+    texts = list(dict.fromkeys(text for text in texts if HAS_DATE_AND_TIME.match(text)))
+    if len(texts) != 1:
+        return replace(record, unread_start=" or ".join(texts)[:60]) if texts else record
+    started_at = parse_time(texts[0])
+    return replace(record, started_at=started_at, unread_start="" if started_at else texts[0][:60])
