@@ -135,26 +135,20 @@ def linearise(theta: np.ndarray, decays: np.ndarray, rate: float, drift: np.ndar
     n_mode = theta.shape[1]
     # One group of decays for each set of modes: all decays in one group, or each in its own.
     group = np.ascontiguousarray(decays, dtype=float).reshape(len(theta), -1, n)
-    pole, slope = _poles(np.ascontiguousarray(theta, dtype=float), rate)
-    gram, coefficient, residual, score, information = fit_waves(
-        pole, slope, group, np.ascontiguousarray(drift, dtype=float), _power_sums(n)
+    gram, coefficient, residual, rss, score, information = fit_waves(
+        np.ascontiguousarray(theta, dtype=float),
+        rate,
+        group,
+        np.ascontiguousarray(drift, dtype=float),
+        _power_sums(n),
     )
     coefficient, residual = coefficient.reshape(n_decay, -1), residual.reshape(n_decay, n)
     return Linearisation(
         information.reshape(n_decay, 2 * n_mode, 2 * n_mode),
         score.reshape(n_decay, 2 * n_mode),
-        np.einsum("dk,dk->d", residual, residual),
+        rss.ravel(),
         coefficient[:, :n_mode] - 1j * coefficient[:, n_mode : 2 * n_mode],
         residual,
         gram,
         coefficient,
     )
-
-
-def _poles(theta: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
-    """Logarithms (group, n_mode) of the discrete poles, and (..., 2) their derivatives by ln f and zeta."""
-    omega = 2.0 * np.pi * np.exp(theta[..., 0]) / rate
-    zeta = theta[..., 1]
-    damped = np.sqrt(1.0 - zeta**2)
-    pole = omega * (-zeta + 1j * damped)
-    return pole, np.stack([pole, omega * (-1.0 - 1j * zeta / damped)], axis=-1)

@@ -235,16 +235,17 @@ def fit_mixed(
         )
         shrunken = _limit_step(shrunken.reshape(theta.shape), theta)
         change = np.max(np.abs((shrunken - theta).reshape(n_decay, -1)) / np.sqrt(variance + spread))
-        # The steps are free, as the modes that they lead to are limited. What is reported is in its domain.
-        unshrunken, is_limited = _limit_to_domain(free.reshape(theta.shape), theta)
-        mean, _ = _limit_to_domain(centre.reshape(n_mode, 2), np.median(unshrunken, axis=0))
-        result = MixedFit(mean, theta, unshrunken, covariance, spread, sigma2, linearisation, True, is_limited)
-        theta = shrunken
-        if change < tolerance and count > 1:
-            return result
-        if is_search and _is_decided(rss, sigma2, target_rss):
-            return result
-    return result if n_decay == 1 else MixedFit(**{**result.__dict__, "converged": False})
+        converged = bool(change < tolerance) and count > 1
+        if converged or (is_search and _is_decided(rss, sigma2, target_rss)):
+            converged = True
+            break
+        if count < iterations:
+            theta = shrunken
+    # The steps are free, as the modes that they lead to are limited. What is reported is in its domain.
+    unshrunken, is_limited = _limit_to_domain(free.reshape(theta.shape), theta)
+    mean, _ = _limit_to_domain(centre.reshape(n_mode, 2), np.median(unshrunken, axis=0))
+    converged = converged or n_decay == 1
+    return MixedFit(mean, theta, unshrunken, covariance, spread, sigma2, linearisation, converged, is_limited)
 
 
 def _is_decided(rss: list[float], sigma2: float, target_rss: float | None) -> bool:

@@ -6,6 +6,7 @@ from turnout.kernel_cache import kernel
 
 # Limit of |1 - q| n below which the series is summed. At it the differences still have 14 digits, the series all 16.
 SERIES_LIMIT = 0.5
+WIDTH = 32  # samples of a block: a multiple of what a processor multiplies at once
 RIDGE = 1e-13  # relative addition to the diagonal of the Gram matrix, so that it stays invertible
 
 
@@ -61,16 +62,15 @@ def fill_waves(pole: np.ndarray, waves: np.ndarray) -> None:
         Filled with real parts, then imaginary parts.
     """
     n_mode, n = len(pole), waves.shape[1]
-    width = int(np.ceil(np.sqrt(n)))
-    fine_real, fine_imag = np.empty(width), np.empty(width)
+    fine_real, fine_imag = np.empty(WIDTH), np.empty(WIDTH)
     for m in range(n_mode):
         z, power = np.exp(pole[m]), 1.0 + 0j
-        for j in range(width):
+        for j in range(WIDTH):
             fine_real[j], fine_imag[j] = power.real, power.imag
             power = power * z
         block = 1.0 + 0j
-        for first in range(0, n, width):
-            for j in range(min(width, n - first)):
+        for first in range(0, n, WIDTH):
+            for j in range(min(WIDTH, n - first)):
                 waves[m, first + j] = block.real * fine_real[j] - block.imag * fine_imag[j]
                 waves[n_mode + m, first + j] = block.real * fine_imag[j] + block.imag * fine_real[j]
             block = block * power
@@ -102,16 +102,16 @@ def factorise(matrix: np.ndarray, least: float) -> None:
 
 @kernel
 def fit_waves(
-    pole: np.ndarray, slope: np.ndarray, decays: np.ndarray, columns: np.ndarray, power_sums: np.ndarray
+    theta: np.ndarray, rate: float, decays: np.ndarray, columns: np.ndarray, power_sums: np.ndarray
 ) -> tuple[np.ndarray, ...]:
     """Amplitudes, residuals and derivatives of the least-squares fit of waves and further columns to decays.
 
     Parameters
     ----------
-    pole : (n_group, n_mode) array of complex
-        Logarithms of the factor per sample.
-    slope : (n_group, n_mode, 2) array of complex
-        Their derivatives by the two parameters of each mode.
+    theta : (n_group, n_mode, 2) array of float
+        Ln f [Hz] and zeta of each mode.
+    rate : float
+        Sampling rate. [Hz]
     decays : (n_group, n_decay, n) array of float
         Decays of each group.
     columns : (n_column, n) array of float
@@ -121,16 +121,18 @@ def fit_waves(
 
     Returns
     -------
-    gram (n_group, k, k), coefficient (n_group, n_decay, k), residual (n_group, n_decay, n), score
-    (n_group, n_decay, p), information (n_group, n_decay, p, p)
+    gram (n_group, k, k), coefficient (n_group, n_decay, k), residual (n_group, n_decay, n), rss (n_group, n_decay),
+    score (n_group, n_decay, p), information (n_group, n_decay, p, p)
         As in ``Linearisation``, with p = 2 n_mode and k = 2 n_mode + n_column.
     """
     n_group, n_decay, n = decays.shape
-    n_mode, n_column = pole.shape[1], len(columns)
+    n_mode, n_column = theta.shape[1], len(columns)
     p = 2 * n_mode
     size = p + n_column
     gram, factor = np.empty((n_group, size, size)), np.empty((size, size))
     coefficient, residual = np.empty((n_group, n_decay, size)), np.empty((n_group, n_decay, n))
+    rss = np.empty((n_group, n_decay))
+    pole, slope = np.empty(n_mode, np.complex128), np.empty(p, np.complex128)
     score, information = np.empty((n_group, n_decay, p)), np.empty((n_group, n_decay, p, p))
     model, ramped = np.empty((size, n)), np.empty(n)
     model[p:] = columns
@@ -144,9 +146,14 @@ def fit_waves(
     column_transposed = np.ascontiguousarray(columns.T)
     tilt = np.empty(p, np.complex128)
     for g in range(n_group):
-        fill_waves(pole[g], model[:p])
-        last = np.exp(pole[g] * n)
-        z = np.exp(pole[g])
+        for m in range(n_mode):
+            omega, zeta = 2.0 * np.pi * np.exp(theta[g, m, 0]) / rate, theta[g, m, 1]
+            damped = np.sqrt(1.0 - zeta * zeta)
+            pole[m] = slope[2 * m] = omega * complex(-zeta, damped)
+            slope[2 * m + 1] = omega * complex(-1.0, -zeta / damped)
+        fill_waves(pole, model[:p])
+        last = np.exp(pole * n)
+        z = np.exp(pole)
         for i in range(n_mode):
             for j in range(i + 1):
                 for conjugate in range(2):
@@ -191,13 +198,16 @@ def fit_waves(
                     total -= factor[k, i] * value[k]
                 value[i] = total / factor[i, i]
             residual[g, d] = decays[g, d] - value @ model
+            square_sum = 0.0
             for k in range(n):
                 ramped[k] = k * residual[g, d, k]
+                square_sum += residual[g, d, k] * residual[g, d, k]
+            rss[g, d] = square_sum
             ramp_sums = waves @ ramped
             for m in range(n_mode):
                 amplitude = complex(value[m], -value[n_mode + m])
                 for i in range(2):
-                    tilt[2 * m + i] = slope[g, m, i] * amplitude
+                    tilt[2 * m + i] = slope[2 * m + i] * amplitude
                     score[g, d, 2 * m + i] = (
                         tilt[2 * m + i].real * ramp_sums[m] - tilt[2 * m + i].imag * ramp_sums[n_mode + m]
                     )
@@ -229,4 +239,4 @@ def fit_waves(
                     for r in range(size):
                         total -= across[r, i] * across[r, j]
                     information[g, d, i, j] = information[g, d, j, i] = total
-    return gram, coefficient, residual, score, information
+    return gram, coefficient, residual, rss, score, information
