@@ -11,7 +11,7 @@ from benchmarks.bar import Bar, stopwatch
 from benchmarks.published.response import paper_response
 from turnout.config import load_configuration, with_raw
 from turnout.demo.fleet import EXTENSION
-from turnout.demo.hammer import hammer_test
+from turnout.demo.hammer import hammer_test, simulated_response
 from turnout.demo.scenario import SECTIONS
 from turnout.readers import read
 from turnout.readers.writing import write
@@ -27,12 +27,33 @@ LIMITED_FORMATS = ("uff58b", "hdf5", "tdms")
 
 def bars():
     """One turnout, one campaign: 8 sections, 3 tests, 10 impacts each, in every format."""
+    for title, response, file_format in (
+        ("modes of the paper, hdf5", paper_response, "hdf5"),
+        ("simulated track, many modes, uff58b", simulated_response, "uff58b"),
+    ):
+        folder = Path(tempfile.mkdtemp())
+        try:
+            yield _files_to_rows(title, response, file_format, folder)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
     for file_format in FORMATS:
         folder = Path(tempfile.mkdtemp())
         try:
             yield from _format_bars(file_format, folder)
         finally:
             shutil.rmtree(folder)
+
+
+def _files_to_rows(title, response, file_format, folder):
+    _write_raw_files(folder, file_format, response)
+    turnout = with_raw(load_configuration("config").turnout("tommerup_s1"), folder)
+    units, times = scan(turnout, folder).units, []
+    for _ in range(4):
+        with stopwatch() as watch:
+            n = [len(hammer_unit(unit, turnout, folder, algo="bench")["modes"]) for unit in units]
+        times.append(watch.cpu)
+    name = f"8 x 30 impacts, files to rows, {title}"
+    return Bar(name, min(times[1:]), 0.5, "CPU s", "<=", "min of 3", f"first run {times[0]:.2f} s, {sum(n)} modes")
 
 
 def _format_bars(file_format, folder):
@@ -66,16 +87,18 @@ def _format_bars(file_format, folder):
         note,
     )
     if file_format == "hdf5":
-        yield Bar("one turnout, 8 x 30 impacts, files to rows", min(processing_times), 2.0, "CPU s", "<=", "min of 3")
+        yield Bar(
+            "one turnout, 8 x 30 impacts, files to registry", min(processing_times), 2.0, "CPU s", "<=", "min of 3"
+        )
 
 
-def _write_raw_files(raw, file_format):
+def _write_raw_files(raw, file_format, response=paper_response):
     folder = raw / "tommerup_s1" / "hammer" / DAY.isoformat()
     folder.mkdir(parents=True)
     for section in SECTIONS:
         rng = np.random.default_rng(len(section))
         for test in (1, 2, 3):
-            recordings, _ = hammer_test(paper_response(section, 1.0, 1.0), 12.0, DAY, test, rng)
+            recordings, _ = hammer_test(response(section, 1.0, 1.0), 12.0, DAY, test, rng)
             write(recordings, folder / f"{section}_{test}.{EXTENSION[file_format]}", file_format, single=True)
     notes = (
         "campaign,started_at_utc,rail_temperature_c,hammer_id,tip,operator\n2024-05-13,2024-05-13T09:00:00,12.0,,,\n"

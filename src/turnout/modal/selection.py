@@ -50,7 +50,8 @@ RSS_TOLERANCE = 1e-4
 class Explanation:
     """``fit`` of the modes ``candidates`` and the ``background`` to the decays whitened by ``whitening``.
 
-    ``rejected`` lists the candidates that failed a test; ``fit`` is None if all failed.
+    ``rejected`` lists the candidates that failed a test; ``fit`` is None if all failed. ``leaves_common`` says whether
+    the residuals have a part in common, which no noise of single impacts has.
     """
 
     fit: MixedFit | None
@@ -58,11 +59,12 @@ class Explanation:
     background: Background
     whitening: np.ndarray = field(default_factory=lambda: np.ones(1))
     rejected: list = field(default_factory=list)
+    leaves_common: bool = False
 
     @property
     def is_doubtful(self) -> bool:
-        """Whether there is coloured noise or a drift: it may be the remainder of overlooked modes."""
-        return len(self.whitening) > 1 or self.background.drift_degree >= 0
+        """Whether there is coloured noise, a drift or a common residual: they may be the rest of overlooked modes."""
+        return len(self.whitening) > 1 or self.background.drift_degree >= 0 or self.leaves_common
 
 
 def explain(
@@ -116,7 +118,21 @@ def explain(
         if largest_background is not None:
             explanation.background = significant_background(explanation.fit.theta, decays, rate, largest_background)
         _refine_noise(explanation, decays, rate, settings, max_damping)
+        explanation.leaves_common = _leaves_common(explanation.fit, settings)
     return explanation
+
+
+def _leaves_common(fit: MixedFit | None, settings: IdentifySettings) -> bool:
+    """Whether the part that the residuals of all impacts have in common is coloured.
+
+    It is their combination with the weights of the signal, as large as the sum of what the modes leave of each impact,
+    with the noise of one. So a rest shows that is too small to colour the noise of single impacts.
+    """
+    if fit is None:
+        return False
+    amplitude = fit.linearisation.amplitude
+    weight = np.linalg.svd(np.hstack([amplitude.real, amplitude.imag]), full_matrices=False)[0][:, 0]
+    return len(noise_filter(weight[None] @ fit.linearisation.residual, settings.noise_order_maximum)) > 1
 
 
 def _is_same_fit(fit: MixedFit, reference: MixedFit) -> bool:
@@ -419,6 +435,7 @@ def _refit(
         max_damping,
         {id(candidate) for candidate in explanation.candidates},
     )
+    result.leaves_common = _leaves_common(result.fit, settings)
     return result
 
 

@@ -6,6 +6,7 @@ import pytest
 from turnout.config.settings.identify import IdentifySettings
 from turnout.modal import identify
 from turnout.modal.state_space import continuous_pole
+from turnout.modal.summary import cramer_rao_bound
 from turnout.records import Receptance
 
 SETTINGS = IdentifySettings(null_draws=10)
@@ -96,3 +97,21 @@ def test_hum_beside_the_modes_stays_hum(size):
     decays, _ = test([BALLAST, RAILPAD], 3)
     decays = decays + 3.0 * size * np.sin(2 * np.pi * 150.0 * t + rng.uniform(0, 2 * np.pi, (10, 1)))
     assert identify(decays, RATE, SETTINGS).diagnostics["hum"] == (150.0,)
+
+
+@pytest.mark.parametrize("seed", [500, 501, 502])
+def test_a_rest_that_only_all_impacts_together_show_is_a_further_mode(seed):
+    """A mode within 7 % of the railpad, a tenth of its amplitude: the noise of single impacts stays white without it,
+    and the frequency of the railpad would be 5 Hz too high."""
+    modes = [(164.0, 0.19, 1.0 + 0.2j), (677.0, 0.087, 3.0 + 1.0j), (725.0, 0.049, 0.3 + 0.1j)]
+    decays, moved = test(modes, seed, n=30, noise=0.05)
+    mode = identify(decays, RATE, SETTINGS).mode("railpad")
+    bound = cramer_rao_bound(
+        np.stack([np.log(moved), np.broadcast_to([m[1] for m in modes], moved.shape)], axis=2),
+        decays,
+        RATE,
+        np.full(30, (0.05 * abs(modes[1][2])) ** 2),
+    )[1]
+    # four standard deviations of an estimate at the bound
+    assert abs(np.log(mode.frequency / 677.0)) < 4 * bound[0]
+    assert abs(mode.damping - 0.087) < 4 * bound[1]
