@@ -22,6 +22,7 @@ include: "rules/passage.smk"
 include: "rules/mismatch.smk"
 include: "rules/registry.smk"
 include: "rules/trend.smk"
+include: "rules/change.smk"
 include: "rules/report.smk"
 include: "rules/simulation.smk"
 

@@ -52,12 +52,13 @@ assert register([folder / sys.argv[2]], folder / 'registry', read=read_results, 
 
 TREND = """
 from pathlib import Path
-from turnout.stages.trend import trend_job
+from turnout.stages.trend import trend_job, worklist_job
 folder = Path(sys.argv[1])
 (folder / 'config').mkdir()
 (folder / 'config/turnouts.tsv').write_text('turnout\\tlayout\\n')
-paths = [str(folder / name) for name in ('registry/_generation.json', 'trend.json', 'worklist.csv', 'config')]
+paths = [str(folder / name) for name in ('registry/_generation.json', 'trend.json', 'config')]
 trend_job(*paths, '2024-06-01')
+worklist_job(paths[0], folder / 'worklist.csv', folder / 'work', '2024-06-01')
 """
 REPORT = """
 from pathlib import Path

@@ -13,6 +13,8 @@ from turnout.workflow.retries import read_postponed
 
 # Stages whose results go into the registry, in order, and the files that a whole run makes.
 STAGES, TARGETS = [], []
+# Mark of the diagnoses of open alarms, one job for all shards.
+DIAGNOSED = "work/change/00of01.done"
 
 
 wildcard_constraints:
@@ -62,3 +64,9 @@ def shards_done(wildcards):
 def shard_threads():
     """Processes of a stage job: on one machine the shards share its cores, on a cluster each job has one."""
     return RUN.threads(workflow.resource_settings.cores)
+
+
+def alarms_diagnosed(wildcards):
+    """Mark of the diagnoses of alarms; where that rule may not run, if it is there."""
+    only = workflow.dag_settings.allowed_rules
+    return [DIAGNOSED] if RUN.alarms and (not only or Path(DIAGNOSED).exists()) else []

@@ -7,6 +7,7 @@ rule report:
     input:
         generation="results/registry/_generation.json",
         trend="work/trend.json",
+        worklist="results/worklist.csv",
     output:
         update("results/pages/index.html"),
     log:

@@ -13,7 +13,6 @@ rule trend:
         acknowledged=ACKNOWLEDGED,
     output:
         state=update("work/trend.json"),
-        worklist=update("results/worklist.csv"),
     log:
         "logs/trend.log",
     benchmark:
@@ -30,3 +29,24 @@ rule trend:
         day=RUN.day,
     script:
         "../scripts/trend_update.py"
+
+
+rule worklist:
+    input:
+        trend="work/trend.json",
+        done=alarms_diagnosed,
+    output:
+        update("results/worklist.csv"),
+    log:
+        "logs/worklist.log",
+    benchmark:
+        "logs/benchmarks/worklist.tsv"
+    resources:
+        mem_mb=2000,
+        runtime=20,
+    params:
+        code=fingerprint("turnout.stages.trend"),
+        again=attempts("worklist"),
+        day=RUN.day,
+    script:
+        "../scripts/worklist.py"

@@ -1,4 +1,4 @@
-"""Rule trend: the registry as it stands in; every chart, alarm and the worklist out."""
+"""Rule trend: the registry as it stands in; every chart and alarm out."""
 
 import logging
 
@@ -8,5 +8,5 @@ from turnout.workflow.retries import attempt
 logging.basicConfig(filename=snakemake.log[0], filemode="w", level="INFO", format="%(levelname)s %(message)s")
 with attempt("trend", snakemake.params.again):
     configuration, day = snakemake.params.job["configuration"], snakemake.params.day
-    rows = trend_job(snakemake.input.registry, *snakemake.output, configuration, day)["rows"]
+    rows = trend_job(snakemake.input.registry, snakemake.output.state, configuration, day)["rows"]
     print(f"trend: {', '.join(f'{n} rows of {table}' for table, n in rows.items())}")

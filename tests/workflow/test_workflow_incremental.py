@@ -46,7 +46,7 @@ def test_the_list_and_the_pages_are_of_each_day(fleet):
     toy.run(fleet, "day=2026-03-01", **whole)
     assert "Nothing to be done" in toy.run(fleet, "day=2026-03-01", **whole).stdout
     done = toy.run(fleet, "day=2026-03-02", **whole).stdout
-    assert set(re.findall(r"^(?:localrule|rule) (\w+):", done, re.M)) == {"trend", "report"}
+    assert set(re.findall(r"^(?:localrule|rule) (\w+):", done, re.M)) == {"trend", "change", "worklist", "report"}
     assert "Nothing to be done" in toy.run(fleet, "day=2026-03-02", shards=SHARDS).stdout
 
 

@@ -21,6 +21,7 @@ USED_BY_UNIT = {
     "hammer": (("receptance", "identify"), ("sections", "hammer")),
     "passage": (("passage",), ("sections", "passages")),
     "mismatch": (("mismatch", "passage", "receptance"), ("sections", "hammer", "passages")),
+    "change": (("mismatch", "passage", "receptance"), ("sections", "hammer", "passages")),
 }
 
 

@@ -38,6 +38,10 @@ WORK_QUERY = """
 FINDING_QUERY = """
     select sentence from findings_newest where turnout_id = ? and verdict = 'named' and sections like '%' || ? || '%'"""
 
+CHANGE_QUERY = """
+    select sentence from change_findings
+    where turnout_id = ? and list_contains(string_split(sections, ', '), ?)"""
+
 
 @dataclass(frozen=True)
 class Comparison:
@@ -63,7 +67,7 @@ def compare(connection: duckdb.DuckDBPyConnection, truth: Path, worklist: str) -
     Returns
     -------
     list of Comparison
-        Changes first, then files, then impacts, then alarms where nothing changed.
+        Changes with their diagnoses first, then files, then impacts, then alarms where nothing changed.
     """
     connection.execute(f"create or replace temp table whole as select * from {worklist}")
     turnouts = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(truth.glob("*.json"))]
@@ -72,6 +76,8 @@ def compare(connection: duckdb.DuckDBPyConnection, truth: Path, worklist: str) -
     for content in turnouts:
         for change in _changes(content):
             rows.append(_change_row(connection, content, *change))
+            if not change[-1]:  # of what nobody has noted, the diagnosis of its alarm
+                rows.append(_diagnosis_row(connection, content["turnout"], *change[:3]))
             changed.add((content["turnout"], *change[:2]))
         if weld := content.get("weld"):
             rows.append(_weld_row(connection, content, weld))
@@ -148,6 +154,12 @@ def _change_row(
     found = f"{state}: frequency {change:+.1f} %, stiffness about {_stiffness(change):+.0f} %{from_day}"
     finding = connection.execute(FINDING_QUERY, [turnout, section]).fetchone()
     return Comparison(where, words, found + (f"; diagnosis: {finding[0]}" if finding else ""))
+
+
+def _diagnosis_row(connection: duckdb.DuckDBPyConnection, turnout: str, section: str, _: str, words: str) -> Comparison:
+    """What the alarm of a section is said to rest on; a diagnosis that names nothing says why."""
+    row = connection.execute(CHANGE_QUERY, [turnout, section]).fetchone()
+    return Comparison(f"{turnout} {section} diagnosis", words, "no diagnosis" if row is None else row[0])
 
 
 def _weld_row(connection: duckdb.DuckDBPyConnection, content: dict[str, Any], weld: dict[str, Any]) -> Comparison:

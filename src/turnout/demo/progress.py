@@ -19,7 +19,9 @@ STAGE_NAMES = {
     "mismatch": "diagnoses",
     "register": "registry",
     "verdict": "check of the run",
-    "trend": "trends and worklist",
+    "trend": "trends",
+    "change": "diagnoses of open alarms",
+    "worklist": "worklist",
     "report": "pages",
 }
 RULE_START = re.compile(r"^(?:local)?rule (\w+):$")

@@ -36,6 +36,10 @@ QUARANTINE_QUERY = """
     select path, reason_code, min_by(found, coalesce(record, -1)), count(*) from quarantine_open
     group by all order by path limit 8
 """
+DIAGNOSES_QUERY = """
+    select turnout_id || ' ' || sections, verdict, sentence from change_findings
+    order by list_position(['named', 'a_or_b', 'unknown', 'none', 'no_decision'], verdict), turnout_id, sections
+"""
 WORKLIST_QUERY = "select coalesce(section_id, turnout_id), band, state, sentence from worklist order by rank limit 5"
 
 
@@ -46,7 +50,7 @@ def print_summary(
     day: str | None = None,
     truth: Path | str | None = None,
 ) -> None:
-    """Print counts, quarantine, tomorrow's list, found against true, the folder of the pages, and queries to try.
+    """Print counts, quarantine, tomorrow's list, diagnoses of its alarms, found against true, pages, queries to try.
 
     Parameters
     ----------
@@ -71,12 +75,17 @@ def print_summary(
         for path, reason, observation, n in connection.execute(QUARANTINE_QUERY).fetchall():
             say(f"      {path}: {reason}, {observation}" + (f" ({n} such records)" if n > 1 else ""))
         rows = connection.execute(WORKLIST_QUERY).fetchall()
+        diagnoses = connection.execute(DIAGNOSES_QUERY).fetchall()
         table = ""
         if truth is not None and Path(truth).is_dir():
             table = comparison_table(compare(connection, Path(truth), whole_list(list_day(connection, day))))
     say("\n   Tomorrow's list, its first rows:" if rows else "\n   Tomorrow's list is empty.")
     for section, band, state, sentence in rows:
         say(f"      {section} {band}: {state}. {sentence}")
+    if diagnoses:
+        say("\n   What the open alarms rest on, by all hammer tests and the newest trains:")
+    for where, verdict, sentence in diagnoses:
+        say(f"      {where}: {verdict.replace('_', ' ')}. {sentence}")
     if table:
         say("\n   Found against true:\n      " + table.replace("\n", "\n      "))
     say(f"\n   Pages: {Path(pages).resolve() / 'index.html'}")

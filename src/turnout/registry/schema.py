@@ -24,8 +24,8 @@ ARROW_TYPES = {
     "boolean": pa.bool_(),
     "timestamp": pa.timestamp("us"),
 }
-# Computed from other tables after every run, for all charts at once.
-DERIVED_TABLES = ("charts", "baselines", "chart_status", "alarms")
+# Computed after every run: for all charts at once, and what open alarms rest on.
+DERIVED_TABLES = ("charts", "baselines", "chart_status", "alarms", "change_findings")
 # Replaced as a whole, from configuration, by hand or by computation; the others get one file per run and year.
 WHOLE_TABLES = ("turnouts", "sections", "events", "campaigns", "acknowledgements", *DERIVED_TABLES)
 # Columns of every result row that the registration fills in.

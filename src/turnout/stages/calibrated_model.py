@@ -259,7 +259,7 @@ def years_of(visit: str) -> float:
     return date.fromisoformat(visit if len(visit) > 7 else f"{visit}-15").toordinal() / DAYS_PER_YEAR
 
 
-def _visits_of(stored: Iterable[StoredVisit]) -> list[VisitInformation]:
+def visits_of(stored: Iterable[StoredVisit]) -> list[VisitInformation]:
     """One ``VisitInformation`` per visit, of all of its groups of sections."""
     members: dict[str, list[StoredVisit]] = {}
     for s in stored:
@@ -276,7 +276,7 @@ def _without_findings(stored: Iterable[StoredVisit]) -> list[StoredVisit]:
     return [s for s in stored if s.answer in USED_ANSWERS]
 
 
-def _parameters_of(stored: Iterable[StoredVisit]) -> tuple[StateParameter, ...]:
+def parameters_of(stored: Iterable[StoredVisit]) -> tuple[StateParameter, ...]:
     by_name: dict[str, StateParameter] = {}
     for s in stored:
         for p in s.parameters:
@@ -349,8 +349,8 @@ def state_rows(
     names = {path.stem.rpartition("-")[0] for path in (folder / turnout.id).glob(f"*{SUFFIX}")}
     earlier = {visit: version for visit in names if years_of(visit) <= years_of(about["visit"])}
     stored = read_visits(folder, turnout.id, earlier | {about["visit"]: about["version"]})
-    parameters = _parameters_of(stored)
-    visits_used = _visits_of(_without_findings(stored))
+    parameters = parameters_of(stored)
+    visits_used = visits_of(_without_findings(stored))
     history = estimate_history(parameters, visits_used, events_of(turnout, parameters))
     belief, n = history.belief, sum(s.n_recordings for s in history.used_steps)
     number = {p.name: k for k, p in enumerate(parameters)}
@@ -427,10 +427,10 @@ def calibrate_turnout(
         raise SimulationError(
             f"{turnout_id}: no visit can be fitted; {'; '.join(notes) or 'no section has recordings'}"
         )
-    parameters = _parameters_of(stored)
+    parameters = parameters_of(stored)
     events = events_of(turnout, parameters)
-    history = estimate_history(parameters, _visits_of(_without_findings(stored)), events)
-    informed = _visits_of(stored)
+    history = estimate_history(parameters, visits_of(_without_findings(stored)), events)
+    informed = visits_of(stored)
     changes = estimate_history(parameters, informed, events, repeats_between_visits=False, accepted=None)
     deviations = deviations_from_file(
         history.belief, parameters, dict(CALIBRATION.least_sizes), intolerable=INTOLERABLE

@@ -67,7 +67,7 @@ def groups(
     ------
     Group
     """
-    for route, labels in _neighbouring_sections(turnout, only):
+    for route, labels in neighbours_of(turnout, only):
         campaign = _campaign(turnout, track, inputs, route, labels)
         if campaign is not None and route not in ("main", *track.routes):
             inputs.notes.append(Note(f"sections {', '.join(labels)}: the track's file has no route {route}; not used"))
@@ -75,8 +75,22 @@ def groups(
             yield Group(_measured_labels(turnout, inputs, campaign, labels), route, campaign)
 
 
-def _neighbouring_sections(turnout: TurnoutConfig, only: Sequence[str]) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """(route, labels) of sections with gaps up to ``MAX_SECTION_GAP``, or of all sections in ``only``."""
+def neighbours_of(turnout: TurnoutConfig, only: Sequence[str] = ()) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Groups of neighbouring sections on each route, in order of position.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+        Configuration of the turnout.
+    only : sequence of str
+        Labels of the sections of one group, whatever their distance; () for all sections, with gaps up to
+        ``MAX_SECTION_GAP``.
+
+    Yields
+    ------
+    route : str
+    labels : tuple of str
+    """
     for route in ("main", "diverging"):
         sections = [s for s in turnout.sections if _route(s) == route and (not only or s.label in only)]
         sections.sort(key=lambda s: s.position)

@@ -3,7 +3,8 @@
 import logging
 import os
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ from typing import Any
 from turnout import __version__
 from turnout.config import load_configuration
 from turnout.errors import TurnoutError
-from turnout.files import write_text
+from turnout.files import changed_at, write_text
 from turnout.workflow.batches import read_results
 from turnout.workflow.configuration_rows import configuration_rows
 from turnout.workflow.current_results import DamagedBatch
@@ -136,6 +137,34 @@ def register_job(register: Callable, generation: PathLike | str, log: Any, param
     for batch, fault in result.faults.items():
         logging.getLogger("turnout.workflow").warning("%s: %s", batch, fault)
     _report(f"register: {result.n_units} units, {sum(result.rows.values())} rows, {result.n_refused} rejected")
+
+
+@contextmanager
+def touch_after_publication(
+    generation: PathLike | str, done: Iterable[PathLike | str], outputs: Iterable[PathLike | str]
+) -> Iterator[None]:
+    """Keep the order of times where a job publishes what it has computed from results of the same registry.
+
+    The generation must not be older than the marks of the results that are in it, and the outputs of jobs that read an
+    earlier generation must not be older than the new one: they would all run again in the next night.
+
+    Parameters
+    ----------
+    generation : path-like
+        Generation file of the registry, which the block may replace.
+    done : iterable of path-like
+        Marks of the results.
+    outputs : iterable of path-like
+        Outputs of jobs that read the generation before; those that are missing stay so.
+    """
+    before, marks = changed_at(Path(generation)), [Path(path) for path in done]
+    yield
+    if any(changed_at(mark) > changed_at(Path(generation)) for mark in marks):
+        os.utime(generation)
+    if changed_at(Path(generation)) != before:
+        for path in (*map(Path, outputs), *marks):
+            if path.exists():
+                os.utime(path)
 
 
 def _log_to(log: Any) -> None:

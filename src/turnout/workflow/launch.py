@@ -25,7 +25,7 @@ OPTIONS = {
     "turnouts": "ids, with commas between them: only these are computed",
     "shards": "number of shards, instead of that in config.yaml",
     "strict": "true: raise faults of the program instead of noting them",
-    "diagnose": "true: diagnose every turnout, whatever its settings say; false: none",
+    "diagnose": "true: diagnose every turnout, whatever its settings say; false: none, and no open alarm either",
     "accept_vanished": "true: many known files are gone on purpose",
     "day": "YYYY-MM-DD: the day of list and pages, instead of today",
     "chains": "for each stage module:function, instead of the program's own",
@@ -41,9 +41,10 @@ class Launch:
     """Parameters of a run.
 
     ``shards`` take part in it, ``every_shard`` names all; ``job`` are the parameters of stage jobs. ``diagnose`` says
-    which turnouts are diagnosed: "every", those "enabled" in their settings, or "" for none. ``learned`` are the files
-    of clusters, calibrations and axle patterns used for passages. ``day`` (YYYY-MM-DD) is that of worklist and pages, a
-    parameter because what is suppressed, planned or not measured changes with it.
+    which turnouts are diagnosed: "every", those "enabled" in their settings, or "" for none; ``alarms``, whether open
+    alarms are. ``learned`` are the files of clusters, calibrations and axle patterns used for passages. ``day``
+    (YYYY-MM-DD) is that of worklist and pages, a parameter because what is suppressed, planned or not measured changes
+    with it.
     """
 
     shards: list[str]
@@ -55,6 +56,7 @@ class Launch:
     chains: Mapping[str, str] = field(default_factory=dict)
     learned: tuple[str, ...] = ()
     day: str = ""
+    alarms: bool = True
 
     def threads(self, cores: int | None) -> int:
         """Processes per job when ``cores`` are shared among the shards.
@@ -121,7 +123,8 @@ def launch(options: Mapping, scan: bool, formats: Collection[str] | None = None,
         raw, accept = Path(job["raw"]), _flag(options, "accept_vanished")
         write_plans(configuration, raw, Path(PLAN_FOLDER), shards, turnouts, accept)
         for state in states_below(Path(PLAN_FOLDER).parent):
-            if state.stem in shard_names(shards) and is_cut_state(state):
+            is_in_use = state.stem in shard_names(shards) or state.parent.name == "change"
+            if is_in_use and is_cut_state(state):
                 request_rerun(state)
         write_text(Path(LAUNCH_FILE), started.isoformat(timespec="seconds"))
     day = _day(options.get("day"))
@@ -129,7 +132,10 @@ def launch(options: Mapping, scan: bool, formats: Collection[str] | None = None,
     chains = dict(options.get("chains") or {})
     diagnosis = _diagnosis_scope(options, configuration)
     learned = _learned_files(configuration)
-    return Launch(names, shard_names(shards), turnouts, fleet_hash(configuration), job, diagnosis, chains, learned, day)
+    alarms = "diagnose" not in options or _flag(options, "diagnose")
+    return Launch(
+        names, shard_names(shards), turnouts, fleet_hash(configuration), job, diagnosis, chains, learned, day, alarms
+    )
 
 
 def _quote_interpreter() -> None:

@@ -29,7 +29,8 @@ PUBLISHING_SHARE = 1 / 6  # share of the time limit reserved for publishing
 MAX_TURNOUTS_SHOWN = 3  # turnouts named in the report
 QUERY_HINT = 'turnout query "from quarantine_open" and "from rejected"'
 GENERATION = Path("results/registry/_generation.json")
-PUBLISHING_RULES = ("all", "register", "verdict", "trend", "report")
+WORKLIST = Path("results/worklist.csv")
+PUBLISHING_RULES = ("all", "register", "verdict", "trend", "worklist", "report")
 
 
 @dataclass(frozen=True)
@@ -178,11 +179,12 @@ def _clear(options: Sequence[str], profile: str) -> None:
 
 
 def _run(options: Sequence[str], limit: float | None, work: Path) -> int:
-    """Exit code of Snakemake; if jobs died or were ended before the registry was published, publish it afterwards."""
+    """Exit code of Snakemake; if jobs died or were ended before registry and list were published, publish them."""
     started, launched, generation = time.monotonic(), changed_at(work / "launched"), changed_at(GENERATION)
     code = _snakemake(options, None if limit is None else (1.0 - PUBLISHING_SHARE) * limit)
     had_jobs, registered = changed_at(work / "launched") != launched, changed_at(GENERATION) != generation
-    if code != 0 and had_jobs and not registered:
+    is_listed = changed_at(WORKLIST) >= changed_at(work / "trend.json")  # the list waits for the diagnoses of alarms
+    if code != 0 and had_jobs and not (registered and is_listed):
         remaining = None if limit is None else max(0.0, started + limit - time.monotonic())
         _unlock()
         _snakemake([*options, "--allowed-rules", *PUBLISHING_RULES], remaining)

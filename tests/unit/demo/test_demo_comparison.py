@@ -58,6 +58,8 @@ def connection():
             t(recording_id, record, status, reason);
         create table findings_newest as select 'W1' as turnout_id, 'named' as verdict, 'A9+ASM' as sections,
             'a hanging sleeper at 36.0 m' as sentence;
+        create table change_findings as select 'W1' as turnout_id, 'A9, ASM' as sections,
+            'hanging sleeper or local ballast at 36.0 m' as sentence;
     """)
     return con
 
@@ -73,6 +75,9 @@ def test_every_fault_and_change_has_a_row_with_what_was_found(connection, truth)
     gap = rows["W1 ASM ballast"]
     assert gap.truth == "hanging sleeper, 1.2 mm by 2026-01-01, first on 2025-01-01"
     assert gap.found.endswith("stiffness about -51 %, from 2025-01-10; diagnosis: a hanging sleeper at 36.0 m")
+    diagnosis = rows["W1 ASM diagnosis"]
+    assert (diagnosis.truth, diagnosis.found) == (gap.truth, "hanging sleeper or local ballast at 36.0 m")
+    assert rows["W1 A8 diagnosis"].found == "no diagnosis" and "W1 CLP diagnosis" not in rows  # its work is noted
     weld = rows["W1 OT trains"]
     assert weld.truth == "weld at -11.7 m dips by 0.32 mm by 2026-01-01, from 2025-11-01"
     assert weld.found == "inspect this week: weekly peak acceleration +31 %, from 2025-11-17"

@@ -17,7 +17,12 @@ from turnout.mismatch.calibrated import (
     compare_onsets,
     estimate_history,
 )
-from turnout.mismatch.calibrated.answers import answers_after_visits, change_answer, change_candidates
+from turnout.mismatch.calibrated.answers import (
+    answers_after_visits,
+    change_answer,
+    change_candidates,
+    stretch_candidates,
+)
 from turnout.mismatch.turnout.calibration import dip_directions
 from turnout.mismatch.turnout.rail_roughness import Waves
 from turnout.stages.calibrated_model import events_of
@@ -331,3 +336,51 @@ def test_without_its_effect_in_the_library_a_site_has_no_other_name(question, na
 def test_a_wave_has_a_stretch_and_no_position():
     assert answers.position_of(SURFACE[0].name, SURFACE[0]) is None
     assert answers.position_of("dip of 0.8 m@5.00", None) == 5.0
+
+
+def all_candidates():
+    return [*CANDIDATES, *stretch_candidates(PARAMETERS)]
+
+
+def test_stretches_are_adjacent_supports_of_one_group_with_their_dampers():
+    stretches = stretch_candidates(PARAMETERS)
+    assert len(stretches) == 2 * (2 * 5 + 4 + 3 + 2 + 1)  # of one to five of five supports, step and growth
+    assert {len(c.direction) for c in stretches} == {1, 2, 3, 4, 5} and {c.group for c in stretches} == {"ballast"}
+    assert stretches[-1].name == "ballast@0.00 to 2.40, dampers 0.5" and stretches[-1].position == 1.2
+    apart = [p for p in SUPPORTS if p.index != 2]
+    assert {tuple(c.direction) for c in stretch_candidates(apart) if len(c.direction) > 1} == {
+        ("ballast@0.00", "ballast@0.60"), ("ballast@1.80", "ballast@2.40"),
+    }  # fmt: skip
+    damper = StateParameter("ballast_damper@1.20", 0.0, 0.15, 0.05, "ballast_damper", 2, 1.2)
+    directions = [c.direction for c in stretch_candidates([SUPPORTS[2], damper])]
+    assert directions == [{"ballast@1.20": 1.0, damper.name: share} for share in (0.5, 0.5, 1.0, 1.0)]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_small_change_of_a_stretch_is_named_where_an_alarm_asks(seed):
+    """0.15 at three supports, less than anybody would act on at one."""
+    affected = ("ballast@0.60", "ballast@1.20", "ballast@1.80")
+    change = sum(step(name, 1.0, 0)(0) for name in affected)
+    visits = histories(np.random.default_rng(seed), 12, lambda v: -0.15 * (v >= 6) * change)
+    answer = change_answer(PARAMETERS, visits, [], all_candidates(), 12.0, 6.0, True)
+    assert answer.names[0] == "local_ballast" and answer.group == "ballast" and not answer.grows
+    assert abs(answer.position - 1.2) < 0.31 and len({*answer.changed} & {*affected}) >= 2
+    assert abs(answer.size + 0.15) < 4.0 * answer.sd + 0.03 and answer.total == answer.size
+    assert answer.onset[0] <= 6 * STEP and answer.onset[1] >= 6 * STEP
+
+
+def test_an_alarm_on_an_intact_history_gets_no_name():
+    """The mean of the likelihood ratios of all candidates exceeds e^6 in at most e^-6 = 0.25 % of intact histories."""
+    named = 0
+    for seed in range(200):
+        visits = histories(np.random.default_rng(1000 + seed), 8, lambda v: np.zeros(len(PARAMETERS)))
+        named += change_answer(PARAMETERS, visits, [], all_candidates(), 6.0, 3.0, True).verdict in ("named", "a_or_b")
+    assert named <= 3  # 0.5 expected at most, Poisson: more than 3 with a probability of 0.2 %
+
+
+def test_a_gap_of_several_sleepers_is_told_from_soft_ballast_by_trains():
+    change = sum(step(f"ballast@{x:.2f}", 1.0, 0)(0) for x in (0.6, 1.2, 1.8))
+    for trains_feel, name in ((1.0, "local_ballast"), (0.0, "hanging_sleeper")):
+        visits = histories(np.random.default_rng(7), 6, lambda v: -1.0 * (v >= 3) * change, trains_feel)
+        answer = change_answer(PARAMETERS, visits, [], all_candidates(), 12.0, 6.0, True)
+        assert answer.names == (name,) and len(answer.changed) == 3

@@ -201,3 +201,68 @@ def test_work_that_is_planned_undoes_nothing_yet(tmp_path):
     )
     assert bench.ask("select turnout_id, gap_m from hanging_sleepers_that_grow()") == [("t1", 0.93e-3)]
     assert bench.ask("select last_event, last_event_utc from fleet_state") == [("grinding", START)]
+
+
+def line_limits(days, values, errors, size):
+    """Days at which the 95 % limits of the weighted line reach a size, by root finding."""
+    from scipy.optimize import brentq
+
+    t, weights = np.array(days) / 365.25, np.array(errors) ** -2.0
+    mean = weights @ t / weights.sum()
+    slope, slope_se = straight_line(days, values, errors)
+    level = weights @ np.array(values) / weights.sum()
+
+    def limit(year, sign):
+        half = 1.959964 * np.sqrt(1.0 / weights.sum() + (slope_se * (year - mean)) ** 2)
+        return level + slope * (year - mean) + sign * half - size
+
+    return [365.25 * brentq(limit, mean, 50.0, args=(sign,)) for sign in (1.0, -1.0)]
+
+
+def test_a_gap_that_grows_has_a_date_for_its_limit(fleet):
+    rows = fleet.execute("from growth_to_limit()").df().set_index("turnout_id")
+    earliest, latest = line_limits(DAYS, *zip(*GROWING), 2e-3)
+    for column, days in (("not_before_utc", earliest), ("not_after_utc", latest)):
+        assert abs((rows[column]["t1"] - (START + timedelta(days=days))).total_seconds()) < 60.0
+    assert rows.forecast["t1"] == "date" and (rows.size_limit == 0.002).all()
+    begin = START + timedelta(days=earliest)
+    assert rows.words["t1"].startswith(f"gap reaches 2 mm not before {begin:%Y-%m-%d}, by ")
+    assert rows.words["t1"].endswith("if it goes on like this (95 %, n = 5 visits)")
+    assert rows.words["t2"].endswith("no latest date (95 %, n = 5 visits)") or rows.forecast["t2"] == "never"
+    assert "t5" not in rows.index and "t3" not in rows.index  # one visit; repaired
+    near = fleet.execute("select turnout_id, forecast from growth_to_limit(size_limit := 0.0008)").fetchall()
+    assert ("t1", "reached") in near
+    asked = "select forecast, not_before_utc from growth_to_limit(size_limit := 0.0009) where turnout_id = 't1'"
+    assert fleet.execute(asked).fetchall() == [("open", None)]
+
+
+def test_dates_of_a_limit_cover_the_true_one():
+    """Linear growth with known noise: of 2000 lines, the date at which the true line reaches the limit is inside."""
+    import duckdb
+
+    from turnout.registry.database import view_files
+
+    rng, n = np.random.default_rng(5), 2000
+    year, error, true_slope = np.arange(9) / 4.0, 0.05e-3, 0.4e-3
+    values = 0.3e-3 + true_slope * year + rng.normal(0.0, error, (n, year.size))
+    centred = year - year.mean()
+    slope, level = values @ centred / (centred @ centred), values.mean(axis=1)
+    con = duckdb.connect()
+    frame = {
+        "turnout_id": [f"t{k}" for k in range(n)], "value": values[:, -1], "per_year": slope, "mean_value": level,
+    }  # fmt: skip
+    import pandas as pd
+
+    con.register("lines", pd.DataFrame(frame))
+    con.execute(f"""create view parameter_growth as select *, 1.0 as position_m, null::varchar as channel, 'm' as unit,
+        {error} as value_se, {error / np.sqrt(centred @ centred)} as per_year_se, 9 as n_visits, 'f' as finding_id,
+        {error / 3.0} as mean_value_se, timestamp '2020-01-01' as first_at_utc, timestamp '2022-01-01' as found_at_utc,
+        timestamp '2021-01-01' as mean_at_utc, true as is_open,
+        'hanging_sleeper' as term, 'gap' as parameter from lines""")
+    con.execute("create macro in_service(turnout) as true")
+    con.execute(view_files()["growth_to_limit"])
+    true_date = datetime(2020, 1, 1) + timedelta(seconds=(2.0e-3 - 0.3e-3) / true_slope * YEAR)
+    query = "select avg((? between not_before_utc and not_after_utc)::integer), count(not_after_utc) from "
+    query += "growth_to_limit()"
+    ((share, counted),) = con.execute(query, [true_date + timedelta(days=0.25)]).fetchall()
+    assert counted == n and abs(share - 0.95) < 3.0 * np.sqrt(0.05 * 0.95 / n)

@@ -170,7 +170,7 @@ def test_a_bad_line_hides_no_alarm(configuration, tmp_path, capsys, caplog):
     from benchmarks.trend_fleet import Fleet, modes
     from benchmarks.trend_registry import small_registry
 
-    from turnout.stages.trend import trend_job
+    from turnout.stages.trend import trend_job, worklist_job
 
     turnout, _ = place_of(configuration)
     lines = "{0},,,silence,me,2026-01-01,,x\nnowhere,,,acknowledge,me,2026-01-01,,x\n"
@@ -178,7 +178,8 @@ def test_a_bad_line_hides_no_alarm(configuration, tmp_path, capsys, caplog):
     (configuration / "acknowledgements.csv").write_text(HEADER + lines.format(turnout), encoding="utf-8")
     root = tmp_path / "registry"
     small_registry(root, modes(Fleet(turnouts=1, weeks=60), 3))
-    done = trend_job(root / "_generation.json", tmp_path / "state", tmp_path / "list.csv", configuration)
+    done = trend_job(root / "_generation.json", tmp_path / "state", configuration)
+    assert worklist_job(root / "_generation.json", tmp_path / "list.csv", tmp_path / "work") == 0
     with open_registry(root) as con:
         assert con.execute("select turnout_id, action from acknowledgements").fetchall() == [(turnout, "acknowledge")]
     assert (tmp_path / "list.csv").exists()
@@ -194,7 +195,7 @@ def test_a_silence_ends_on_its_day_though_no_file_has_come(configuration, tmp_pa
     from benchmarks.trend_registry import small_registry
 
     from turnout.registry.database import open_registry
-    from turnout.stages.trend import trend_job
+    from turnout.stages.trend import trend_job, worklist_job
 
     turnout, _ = place_of(configuration)
     fleet, which = Fleet(turnouts=1, weeks=120, phi=0.1), np.zeros((1, 8), bool)
@@ -210,7 +211,8 @@ def test_a_silence_ends_on_its_day_though_no_file_has_come(configuration, tmp_pa
     publish(root, {"events": arrow_rows("events", pd.DataFrame([planned]))})
     listed = {}
     for day in ("2018-05-01", "2018-05-02", "2018-05-03", "2018-05-04"):
-        trend_job(root / "_generation.json", tmp_path / "state", tmp_path / "list.csv", configuration, day)
+        trend_job(root / "_generation.json", tmp_path / "state", configuration, day)
+        worklist_job(root / "_generation.json", tmp_path / "list.csv", tmp_path / "work", day)
         found = pd.read_csv(tmp_path / "list.csv", dtype=str).fillna("")
         assert found["asof_utc"].eq(day).all()
         listed[day] = found.loc[found["section_id"].str.endswith("S4"), "state"].tolist()

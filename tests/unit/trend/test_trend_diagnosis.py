@@ -39,3 +39,82 @@ def test_an_alarm_has_the_diagnosis_of_its_section_or_a_reason(settings, rows, w
         others = con.execute("select diagnosis from worklist where raised_at_utc is null").fetchall()
     assert state == "inspect this week" and expected in diagnosis
     assert all(d is None for (d,) in others)
+
+
+def change(found_at, verdict="named", **more):
+    """Row of ``change_findings`` of S3 and S4: soft ballast at S4, since the alarm's own time."""
+    row = {
+        "turnout_id": "T00001", "sections": "S3, S4", "found_at_utc": found_at, "verdict": verdict,
+        "visit": f"{found_at:%Y-%m-%d}", "sentence": "soft ballast at 21.6 m", "term": "local_ballast",
+        "component": "ballast", "position_m": 21.6, "first_m": 21.6, "last_m": 21.6, "change": -0.2, "grows": False,
+    }  # fmt: skip
+    return pd.DataFrame([row | more])
+
+
+def diagnosis_of(rows, settings, **tables):
+    with viewed(rows, settings, **tables) as con:
+        query = "select state, diagnosis, since_earliest_utc, since_latest_utc from worklist where section_id = ?"
+        ((state, words, *since),) = con.execute(query, [SECTION]).fetchall()
+    assert state == "inspect this week"
+    return words, since
+
+
+def test_alarm_and_diagnosis_of_change_are_one_row_with_one_result(settings, rows):
+    newest = rows["measured_at_utc"].max()
+    assert diagnosis_of(rows, settings, change_findings=change(newest))[0] == "soft ballast at 21.6 m"
+    agreeing = finding(newest, "named", "words of the file").assign(term="local_ballast")
+    none = finding(newest, "none", "")
+    for against_file in (agreeing, none):
+        words, _ = diagnosis_of(rows, settings, change_findings=change(newest), mismatch_findings=against_file)
+        assert words == "soft ballast at 21.6 m"
+
+
+@pytest.mark.parametrize(
+    ("more", "weeks_ago", "expected"),
+    [
+        ({"verdict": "no_decision", "sentence": "no diagnosis: no track file"}, 0, "no diagnosis: no track file"),
+        ({"verdict": "none", "sentence": "3 tests name no change"}, 0, "no decision: 3 tests name no change"),
+        ({"verdict": "unknown", "sentence": "no effect explains it"}, 0, "no effect explains it"),
+        ({}, 110, "is older than the change"),
+    ],
+    ids=["no track file", "cannot tell", "unknown", "too old"],
+)
+def test_a_diagnosis_without_a_result_says_why(settings, rows, more, weeks_ago, expected):
+    found_at = rows["measured_at_utc"].max() - pd.Timedelta(weeks=weeks_ago)
+    assert expected in diagnosis_of(rows, settings, change_findings=change(found_at, **more))[0]
+
+
+def test_where_alarm_and_diagnosis_differ_the_row_says_in_what(settings, rows):
+    newest = rows["measured_at_utc"].max()
+    early, late = diagnosis_of(rows, settings)[1]
+    after = {"onset_after_utc": late + pd.Timedelta(days=9), "onset_by_utc": late + pd.Timedelta(days=30)}
+    words, _ = diagnosis_of(rows, settings, change_findings=change(newest, **after))
+    assert words.startswith("soft ballast") and f"dates the change otherwise, from {early:%Y-%m-%d}" in words
+    within = {"onset_after_utc": early - pd.Timedelta(days=9), "onset_by_utc": late}
+    assert "otherwise" not in diagnosis_of(rows, settings, change_findings=change(newest, **within))[0]
+    other = finding(newest, "named", "words of the file").assign(term="local_pad")
+    words, _ = diagnosis_of(rows, settings, change_findings=change(newest), mismatch_findings=other)
+    assert words.startswith("soft ballast") and "name another effect, local pad" in words
+
+
+@pytest.mark.parametrize(
+    ("more", "expected"),
+    [
+        ({"component": "railpad"}, "the resonances point to the ballast, the diagnosis to the railpads"),
+        ({"change": 0.2}, "the resonance fell, and the diagnosis finds more stiffness"),
+        ({"position_m": 26.0, "first_m": 25.0, "last_m": 27.0}, "at 21.6 m, and what has changed is more than 3 m"),
+        ({"first_m": 20.0, "last_m": 27.0}, None),
+    ],
+    ids=["component", "direction", "position", "a stretch around it"],
+)
+def test_another_component_direction_or_position_is_no_decision(settings, rows, more, expected):
+    sections = pd.DataFrame([{"section_id": SECTION, "turnout_id": "T00001", "label": "S4", "position_m": 21.6}])
+    findings = change(rows["measured_at_utc"].max(), **more)
+    with viewed(rows, settings, change_findings=findings, sections=sections) as con:
+        query = "select * replace (case when section_id = ? then 'ballast' end as changed_component) from chart_status"
+        con.register("chart_status", con.execute(query, [SECTION]).df())
+        query = "select diagnosis from worklist where section_id = ? and raised_at_utc is not null"
+        ((diagnosis,),) = con.execute(query, [SECTION]).fetchall()
+    assert diagnosis.endswith("soft ballast at 21.6 m")
+    assert diagnosis == "soft ballast at 21.6 m" if expected is None else expected in diagnosis
+    assert diagnosis.startswith("no decision: ") == (expected is not None)

@@ -132,7 +132,7 @@ def test_a_cut_state_of_the_trend_writes_every_year_again(fleet, share, monkeypa
 
     root, state = fleet.folder / "registry", fleet.folder / "work/trend.json"
     register([], root, read=iter)
-    names = (root / "_generation.json", state, fleet.folder / "worklist.csv", fleet.folder / "config")
+    names = (root / "_generation.json", state, fleet.folder / "config")
     done = trend_job(*names)
     cut(state, share)
     assert trend_job(*names) == done == json.loads(state.read_text())

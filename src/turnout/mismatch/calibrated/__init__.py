@@ -1,6 +1,12 @@
 """The calibrated model of a turnout: its parameters, estimated recursively from all visits, and what they say."""
 
-from turnout.mismatch.calibrated.answers import ModelAnswer, answers_after_visits, change_candidates
+from turnout.mismatch.calibrated.answers import (
+    ModelAnswer,
+    answers_after_visits,
+    change_answer,
+    change_candidates,
+    stretch_candidates,
+)
 from turnout.mismatch.calibrated.belief import Belief, Innovation, StateParameter
 from turnout.mismatch.calibrated.change import ChangeEffect, OnsetEvidence, compare_onsets, drift_since
 from turnout.mismatch.calibrated.file_comparison import Deviation, deviations_from_file
@@ -20,9 +26,11 @@ __all__ = [
     "StateParameter",
     "VisitInformation",
     "answers_after_visits",
+    "change_answer",
     "change_candidates",
     "compare_onsets",
     "deviations_from_file",
     "drift_since",
     "estimate_history",
+    "stretch_candidates",
 ]

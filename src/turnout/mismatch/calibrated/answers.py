@@ -30,6 +30,8 @@ NAMES = {
     "dip": "surface_dip",
 }
 INTOLERABLE = {"depth": CALIBRATION.worn_depth}
+STRETCH_GROUPS = ("ballast", "pad")  # of which adjacent supports change together
+DAMPER_SHARES = (0.5, 1.0)  # change of the logarithm of the damping over that of the stiffness
 IMPACTS = "impacts at"  # part of the name of a group of hammer tests
 
 
@@ -40,7 +42,8 @@ class ModelAnswer:
     ``question`` of ``QUESTIONS``; ``verdict`` "none", "named", "a_or_b" or "unknown" with its ``names``.
     ``parameter`` has changed by ``size`` (standard error ``sd``, ``unit``), or by as much per year if it ``grows``.
     ``onset``: last time without and first time with the change [years], None against the file. ``gain`` is the evidence
-    less the logarithm of the number of candidates [nats], None where the answer does not rest on one.
+    less the logarithm of the number of candidates [nats], None where the answer does not rest on one. ``changed`` are
+    all parameters that change alike, ``total`` is the change of each at the visit.
     """
 
     visit: str
@@ -56,6 +59,8 @@ class ModelAnswer:
     onset: tuple[float, float] | None = None
     gain: float | None = None
     grows: bool = False
+    changed: tuple[str, ...] = ()
+    total: float | None = None
 
 
 def change_candidates(
@@ -83,6 +88,53 @@ def change_candidates(
     candidates = [(p.name, {p.name: 1.0}, CALIBRATION.change_sds * p.sd) for p in local]
     candidates += [(name, dict(direction), CALIBRATION.dip_sd) for name, direction in shapes.items()]
     return [ChangeEffect(name, d, sd, grows) for name, d, sd in candidates for grows in (False, True)]
+
+
+def stretch_candidates(parameters: Sequence[StateParameter]) -> list[ChangeEffect]:
+    """Changes of one support, and of up to ``CALIBRATION.max_stretch`` adjacent ones alike, with their dampers.
+
+    Ballast and pads often change over a stretch: drainage and traffic do not end at a sleeper. Their dampers change by
+    half the logarithm of the stiffness, as the effects of the library assume, or by all of it where a sleeper has lost
+    its support.
+
+    Parameters
+    ----------
+    parameters : sequence of StateParameter
+
+    Returns
+    -------
+    list of ChangeEffect
+        Named by the group, the first and last position, and the share of the dampers.
+    """
+    candidates = []
+    for group in STRETCH_GROUPS:
+        along = sorted((p for p in parameters if p.group == group and p.position is not None), key=_order)
+        for n in range(1, CALIBRATION.max_stretch + 1):
+            for k in range(len(along) - n + 1):
+                run = along[k : k + n]
+                if _order(run[-1]) - _order(run[0]) == n - 1:
+                    for share in DAMPER_SHARES if n == 1 else DAMPER_SHARES[:1]:
+                        candidates += _stretch(group, run, share, parameters)
+    return candidates
+
+
+def _order(parameter: StateParameter) -> int:
+    assert parameter.index is not None
+    return parameter.index
+
+
+def _stretch(
+    group: str, run: Sequence[StateParameter], share: float, parameters: Sequence[StateParameter]
+) -> list[ChangeEffect]:
+    dampers = {f"{group}_damper@" + p.name.partition("@")[2] for p in run}
+    direction = {p.name: 1.0 for p in run}
+    direction |= {
+        p.name: share for p in parameters if p.group == f"{group}_damper" and p.name.split(" ")[-1] in dampers
+    }
+    first, last = run[0].position, run[-1].position
+    assert first is not None and last is not None
+    name, sd = f"{group}@{first:.2f} to {last:.2f}, dampers {share:g}", CALIBRATION.change_sds * run[0].sd
+    return [ChangeEffect(name, direction, sd, grows, group, 0.5 * (first + last)) for grows in (False, True)]
 
 
 def answers_after_visits(
@@ -139,6 +191,7 @@ def change_answer(
     candidates: Sequence[ChangeEffect],
     threshold: float,
     margin: float,
+    is_alarmed: bool = False,
 ) -> ModelAnswer:
     """What has changed up to the last of these visits.
 
@@ -156,6 +209,9 @@ def change_answer(
         [nats]
     margin : float
         [nats]
+    is_alarmed : bool
+        Whether an open alarm asks: then a change of any size is told, and the evidence of a name is that of all of its
+        candidates together, the mean of their likelihood ratios. The inequality holds for it as well.
 
     Returns
     -------
@@ -168,14 +224,15 @@ def change_answer(
     price = float(np.log(max(len(candidates), 1)))
     by_name = {p.name: p for p in parameters}
     least = threshold + price
-    material = [e for e in evidence if e.gain > least - margin and _is_material(e, by_name)]
+    material = [e for e in evidence if e.gain > least - margin and (is_alarmed or _is_material(e, by_name))]
     material = [e for e in material if e.gain >= e.from_first]
-    if not material or material[0].gain < least:
+    gain = _evidence_of_name(material, by_name) if is_alarmed else max((e.gain for e in material), default=-np.inf)
+    if gain < least:
         return _answer_without_name(history, visit, by_name)
     leader = material[0]
     other_form = next((e for e in evidence if e.effect.name == leader.effect.name and e is not leader), None)
     stated = _LeadingEffect.of(
-        leader.effect, by_name, leader.size, leader.gain - price, leader.interval(other_form=other_form)
+        leader.effect, by_name, leader.size, gain - price, leader.interval(other_form=other_form)
     )
     jump = history.steps[1 + int(np.argmax(leader.gains))].innovation
     with_change = estimate_history(
@@ -188,7 +245,17 @@ def change_answer(
     if stated.name == "local_ballast" and leader.size[0] < 0.0:
         names = _supported_names(parameters, visits, events, leader, _present_size(leader), margin)
     rivals = [_name(e.effect, by_name) for e in material if e.gain > leader.gain - margin]
-    return stated.answer(visit, CHANGE, _with_rivals(names, stated, rivals))
+    answer = stated.answer(visit, CHANGE, _with_rivals(names, stated, rivals))
+    return replace(answer, changed=tuple(leader.effect.direction), total=_present_size(leader)[0])
+
+
+def _evidence_of_name(material: Sequence[OnsetEvidence], by_name: Mapping[str, StateParameter]) -> float:
+    """Sum of the likelihood ratios of all candidates with the name and the sign of the first one. [nats]"""
+    if not material:
+        return -np.inf
+    effect, size = material[0].effect, material[0].size[0]
+    alike = [e.gain for e in material if _name(e.effect, by_name) == _name(effect, by_name) and e.size[0] * size > 0.0]
+    return float(np.logaddexp.reduce(alike))
 
 
 def _is_explained(before: Innovation, after: Innovation) -> bool:
@@ -239,8 +306,10 @@ class _LeadingEffect:
         onset: tuple[float, float] | None = None,
     ) -> _LeadingEffect:
         parameter = by_name.get(effect.name)
-        group, unit = (parameter.group, parameter.unit) if parameter else ("dip", "m")
-        position = position_of(effect.name, parameter)
+        first = parameter or by_name.get(next(iter(effect.direction)))
+        group = _group(effect, by_name)
+        unit = first.unit if first and group != "dip" else "m"
+        position = position_of(effect.name, parameter) if effect.position is None else effect.position
         return cls(
             effect.name, _name(effect, by_name), group, position, unit, size, gain, onset,
             onset is not None and effect.grows,
@@ -282,8 +351,13 @@ def position_of(name: str, parameter: StateParameter | None) -> float | None:
 
 
 def _name(effect: ChangeEffect, by_name: Mapping[str, StateParameter]) -> str:
+    return NAMES[_group(effect, by_name)]
+
+
+def _group(effect: ChangeEffect, by_name: Mapping[str, StateParameter]) -> str:
+    """Group of the parameters that an effect changes, "dip" for the waves of a dip."""
     parameter = by_name.get(effect.name)
-    return NAMES[parameter.group if parameter else "dip"]
+    return parameter.group if parameter else effect.group or "dip"
 
 
 def _is_material(evidence: OnsetEvidence, by_name: Mapping[str, StateParameter]) -> bool:
@@ -299,8 +373,8 @@ def _present_size(evidence: OnsetEvidence) -> tuple[float, float]:
 
 
 def _least_size(effect: ChangeEffect, by_name: Mapping[str, StateParameter]) -> float:
-    parameter = by_name.get(effect.name)
-    return dict(CALIBRATION.least_sizes)[parameter.group] if parameter else CALIBRATION.least_dip
+    group = _group(effect, by_name)
+    return CALIBRATION.least_dip if group == "dip" else dict(CALIBRATION.least_sizes)[group]
 
 
 def _supported_names(
@@ -322,21 +396,30 @@ def _supported_names(
     if largest < np.log(CALIBRATION.least_support):
         return ["hanging_sleeper"]
     effect = best.effect if isinstance(best, OnsetEvidence) else best
-    (name,) = effect.direction
-    felt = next(p for p in parameters if p.name == name)
-    offset = replace(felt, name=f"{name} as trains feel it", mean=0.0)
-    opened = [replace(e, opened={**e.opened, offset.name: e.opened[name]}) if name in e.opened else e for e in events]
-    split = [replace(v, groups=tuple(_with_offset(g, name, offset.name) for g in v.groups)) for v in visits]
+    felt = [p for p in parameters if p.name in effect.direction]  # the damper of a support with its spring
+    offsets = {p.name: replace(p, name=f"{p.name} as trains feel it", mean=0.0) for p in felt}
+    all_parameters = [*parameters, *offsets.values()]
+    opened, split = list(events), list(visits)
+    for name, offset in offsets.items():
+        opened = [
+            replace(e, opened={**e.opened, offset.name: e.opened[name]}) if name in e.opened else e for e in opened
+        ]
+        split = [replace(v, groups=tuple(_with_offset(g, name, offset.name) for g in v.groups)) for v in split]
     sd = CALIBRATION.gap_size_sds * max(effect.sd, abs(size[0]))
     effects = [
-        ChangeEffect(f"{share:g}", {name: 1.0, offset.name: share - 1.0}, sd, effect.grows)
+        ChangeEffect(
+            f"{share:g}",
+            {**effect.direction, **{offsets[name].name: (share - 1.0) * d for name, d in effect.direction.items()}},
+            sd,
+            effect.grows,
+        )
         for share in (1.0, *CALIBRATION.gap_shares)
     ]
-    history = estimate_history([*parameters, offset], split, opened, repeats_between_visits=False, accepted=None)
+    history = estimate_history(all_parameters, split, opened, repeats_between_visits=False, accepted=None)
     if isinstance(best, OnsetEvidence):
         gains = {e.effect.name: e.gain for e in compare_onsets(history, effects)}
     else:
-        gains = dict(zip((e.name for e in effects), evidence_from_first([*parameters, offset], history, effects)[0]))
+        gains = dict(zip((e.name for e in effects), evidence_from_first(all_parameters, history, effects)[0]))
     equal, *of_gaps = (gains[e.name] for e in effects)
     difference = float(np.logaddexp.reduce(of_gaps)) - float(np.log(len(of_gaps))) - equal
     may_carry_nothing = difference < 0.0 and smallest < np.log(CALIBRATION.least_support)

@@ -16,13 +16,16 @@ class ChangeEffect:
     """An effect that appears at an unknown visit.
 
     ``direction``: parameter -> change per unit of size. ``sd`` is the prior standard deviation of the size; of one that
-    ``grows``, of its growth per year.
+    ``grows``, of its growth per year. ``group`` and ``position`` are those of an effect on several parameters of one
+    group; of an effect on one parameter they are known from it.
     """
 
     name: str
     direction: Mapping[str, float]
     sd: float
     grows: bool = False
+    group: str = ""
+    position: float | None = None
 
 
 @dataclass(frozen=True)

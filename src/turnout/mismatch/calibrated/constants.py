@@ -35,6 +35,7 @@ class CalibrationConstants:
     dip_step: float = threshold(
         0.02, "m", "step of the surface from which the waves of a dip are computed", "numerical"
     )
+    max_stretch: int = threshold(6, "supports", "adjacent ones that change together: 3 m of track", PAGE)
     gap_shares: tuple[float, ...] = threshold(
         (0.0, 0.25, 0.5), "share", "of the softening under impacts that trains still feel above a gap", PAGE
     )

@@ -172,15 +172,19 @@ def _refit_equivalent_forms(search: Search, fit: Fit, ranked: list[Score]) -> li
     """The scores, with equivalent families refitted from the leader's nuisances, which suit them as well.
 
     Equivalent are families that cannot be distinguished from the leader as fitted: its ``limit_form`` and
-    ``simpler_form``.
+    ``simpler_form``. A limit form equals the leader at its largest sizes, where its own fit may never have been.
     """
     leader, beside = ranked[0], search.with_label(f"{search.label}:beside")
     for k, score in enumerate(ranked[1:], 1):
         is_equivalent = score.is_limit_of(leader) or score.is_simpler_form_of(leader)
         if leader.gain > search.settings.threshold and is_equivalent:
-            refitted = _score_task(beside, fit, RefitTask(score.candidate, score.estimates[0], leader.fit.values))
-            if refitted is not None and refitted.gain > score.gain:
-                ranked[k] = refitted
+            starts = [score.estimates[0]]
+            if score.is_limit_of(leader):
+                starts.append(np.asarray(max(score.candidate.starts, key=lambda start: start[0]), dtype=float))
+            for start in starts:
+                refitted = _score_task(beside, fit, RefitTask(score.candidate, start, leader.fit.values))
+                if refitted is not None and refitted.gain > ranked[k].gain:
+                    ranked[k] = refitted
     return sorted(ranked, key=lambda s: -s.gain)
 
 

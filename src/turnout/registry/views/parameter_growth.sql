@@ -30,13 +30,15 @@ sums as (
         turnout_id, term, position_m, channel, parameter, unit, count(*)::integer as n_visits,
         min(found_at_utc) as first_at_utc, max(found_at_utc) as found_at_utc, arg_max(value, found_at_utc) as value,
         arg_max(value_se, found_at_utc) as value_se, arg_max(finding_id, found_at_utc) as finding_id,
-        sum(weight * t * value) as product,
+        sum(weight * t * value) as product, sum(weight * value) / sum(weight) as mean_value,
+        sum(weight) ** -0.5 as mean_value_se, sum(weight * year) / sum(weight) as mean_year,
         case when min(found_at_utc) < max(found_at_utc) then sum(weight * t * t) end as spread
     from centred group by all
 )
 select
     turnout_id, term, position_m, channel, parameter, unit, n_visits, first_at_utc, found_at_utc, value, value_se,
-    product / spread as per_year, spread ** -0.5 as per_year_se,
+    product / spread as per_year, spread ** -0.5 as per_year_se, mean_value, mean_value_se,
+    make_timestamp((mean_year * 31557600e6)::bigint) as mean_at_utc,
     finding_id in (select finding_id from findings_newest) as is_open, finding_id
 from sums;
 
@@ -54,5 +56,8 @@ from sums;
 -- value_se | double | | its standard error
 -- per_year | double | | growth per year, weighted least squares; empty with one visit
 -- per_year_se | double | | its standard error
+-- mean_value | double | | weighted mean of the values: the line at mean_at_utc
+-- mean_value_se | double | | its standard error, independent of that of the growth
+-- mean_at_utc | timestamp | UTC | weighted mean of the times
 -- is_open | boolean | | the newest visit of its sections still has it
 -- finding_id | varchar | | newest finding with it

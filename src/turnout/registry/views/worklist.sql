@@ -192,10 +192,21 @@ maintenance as (
                 or list_contains(string_split(h.sections, ', '), split_part(e.section_id, '/', -1)))
     group by all
 ),
+changed as (
+    select *
+    from (
+        select
+            *, unnest(string_split(sections, ', ')) as label,
+            change * case when grows then epoch(found_at_utc - onset_by_utc) else 1 end < 0 as is_softer
+        from change_findings
+        where found_at_utc < "asof" + interval 1 day
+    )
+    qualify row_number() over (partition by turnout_id, label order by found_at_utc desc, sections) = 1
+),
 diagnosed as (
     select *
     from (
-        select turnout_id, unnest(string_split(coalesce(sections, ''), ', ')) as label, finding_id, found_at_utc, visit, verdict, sentence
+        select turnout_id, unnest(string_split(coalesce(sections, ''), ', ')) as label, finding_id, found_at_utc, visit, verdict, term, sentence
         from findings_current
         where found_at_utc <= "asof"
     )
@@ -284,17 +295,55 @@ select
         else 'the section'
     end as look_at,
     case
-        when h.raised_at_utc is null then null
+        when h.raised_at_utc is null and h.state <> 'confirm now' then null
         when h.section_id = '*' then 'no decision: a diagnosis is of sections, and this is the median of all'
+        when c.found_at_utc >= coalesce(h.since_at_utc, h.raised_at_utc, c.found_at_utc) and c.verdict in ('named', 'a_or_b', 'unknown') then
+            case
+                when c.component is not null and h.changed_component in ('ballast', 'pad')
+                        and h.changed_component <> replace(c.component, 'railpad', 'pad') then
+                    'no decision: the resonances point to the ' || replace(h.changed_component, 'pad', 'railpads')
+                    || ', the diagnosis to the ' || replace(c.component, 'railpad', 'railpads') || ': '
+                when c.component is not null and h.band in ('ballast', 'railpad') and h.changed_component in ('ballast', 'pad')
+                        and c.is_softer <> (h.direction = 'down') then
+                    'no decision: the resonance ' || case h.direction when 'down' then 'fell' else 'rose' end
+                    || ', and the diagnosis finds ' || case when c.is_softer then 'less' else 'more' end || ' stiffness: '
+                when greatest(c.first_m - p.position_m, p.position_m - c.last_m) > 3 then
+                    'no decision: the section of the alarm lies at ' || printf('%.1f m', p.position_m)
+                    || ', and what has changed is more than 3 m from there: '
+                else ''
+            end
+            || c.sentence
+            || case
+                when c.onset_after_utc > h.since_latest_utc or c.onset_by_utc < h.since_earliest_utc then
+                    '; the alarm dates the change otherwise, from ' || strftime(h.since_earliest_utc, '%Y-%m-%d')
+                    || ' to ' || strftime(h.since_latest_utc, '%Y-%m-%d')
+                else ''
+            end
+            || case
+                when g.found_at_utc < coalesce(h.since_at_utc, h.raised_at_utc) or g.verdict is distinct from 'named'
+                    or g.term = c.term or c.verdict = 'unknown' then ''
+                else '; against the track file the recordings of ' || coalesce(g.visit, strftime(g.found_at_utc, '%Y-%m-%d'))
+                    || ' name another effect, ' || replace(g.term, '_', ' ')
+            end
+        when g.finding_id is not null and g.found_at_utc >= coalesce(h.since_at_utc, h.raised_at_utc) and g.verdict <> 'none' then
+            g.sentence
+        when c.verdict = 'no_decision' then c.sentence
+        when c.sentence is not null and c.found_at_utc < coalesce(h.since_at_utc, h.raised_at_utc) then
+            'no decision: the diagnosis of ' || coalesce(c.visit, strftime(c.found_at_utc, '%Y-%m-%d'))
+            || ' is older than the change'
+        when c.sentence is not null then
+            'no decision: ' || c.sentence || case
+                when h.source = 'passage' then '; the alarm is of trains: what only they show, hammer tests cannot'
+                else ''
+            end
         when g.finding_id is null then 'no decision: no diagnosis of this section yet (turnout diagnose)'
         when g.found_at_utc < coalesce(h.since_at_utc, h.raised_at_utc) then
             'no decision: the diagnosis of ' || coalesce(g.visit, strftime(g.found_at_utc, '%Y-%m-%d'))
             || ' is older than the change (turnout diagnose)'
-        when g.verdict = 'none' then
+        else
             'no decision: within the tolerances of the track file the recordings of '
             || coalesce(g.visit, strftime(g.found_at_utc, '%Y-%m-%d'))
             || ' need no effect (turnout twin compares them with earlier visits)'
-        else g.sentence
     end as diagnosis,
     t.name, t.line, t.km, count(*) over () as n_in_all
 from (
@@ -310,6 +359,8 @@ left join maintenance m
     on m.turnout_id = h.turnout_id and m.sections = h.sections and m.band = h.band and m.source = h.source
         and m.state = h.state
 left join diagnosed g on g.turnout_id = h.turnout_id and g.label = split_part(h.section_id, '/', -1)
+left join changed c on c.turnout_id = h.turnout_id and c.label = split_part(h.sections, ', ', 1)
+left join sections p on p.section_id = h.section_id
 left join turnouts t on t.turnout_id = h.turnout_id
 cross join fleet f
 window importance as (
@@ -355,7 +406,7 @@ create or replace view worklist as select * from worklist(newest_measurement());
 -- false_alarm_words | varchar | | how often an intact chart does this
 -- last_maintenance | varchar | | newest work on the section
 -- look_at | varchar | | what to look at
--- diagnosis | varchar | | of an alarm: sentence of the newest diagnosis of its section since the change, or why there is no decision; empty = no alarm
+-- diagnosis | varchar | | of an alarm or a campaign to confirm: what has changed by the diagnosis, or why there is no decision; where alarm and diagnosis differ, in what; empty = no alarm
 -- name | varchar | | name for people
 -- line | varchar | | railway line
 -- km | double | km | position along the line
@@ -390,7 +441,7 @@ create or replace view worklist as select * from worklist(newest_measurement());
 -- false_alarm_words | varchar | | how often an intact chart does this
 -- last_maintenance | varchar | | newest work on the section
 -- look_at | varchar | | what to look at
--- diagnosis | varchar | | of an alarm: sentence of the newest diagnosis of its section since the change, or why there is no decision; empty = no alarm
+-- diagnosis | varchar | | of an alarm or a campaign to confirm: what has changed by the diagnosis, or why there is no decision; where alarm and diagnosis differ, in what; empty = no alarm
 -- name | varchar | | name for people
 -- line | varchar | | railway line
 -- km | double | km | position along the line

@@ -1,0 +1,11 @@
+"""Rule change: open alarms in, what their sections show to have changed out."""
+
+from turnout.threads import use_one_thread
+
+use_one_thread()
+
+from pathlib import Path  # noqa: E402
+
+from turnout.workflow.jobs import stage_job  # noqa: E402
+
+stage_job(Path("work/plan"), snakemake.output.done, snakemake.log[0], snakemake.params, snakemake.threads)

@@ -1,0 +1,531 @@
+"""Stage change: what an open alarm rests on, from all hammer tests of its sections and the newest trains.
+
+The hammer tests of all visits say what has changed, where and since when: each visit is fitted once and kept on disk.
+Trains after the change then tell a gap from soft ballast, and held-out trains show what the effect is worth.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+from datetime import datetime, time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from turnout.constants import Z95
+from turnout.errors import SimulationError
+from turnout.mismatch.calibrated import (
+    Event,
+    ModelAnswer,
+    StateParameter,
+    VisitInformation,
+    change_answer,
+    change_candidates,
+    stretch_candidates,
+)
+from turnout.mismatch.calibrated.answers import DAMPER_SHARES, position_of
+from turnout.mismatch.calibrated.constants import CALIBRATION
+from turnout.mismatch.engine.diagnose import diagnose, fit_base
+from turnout.mismatch.engine.reserved_data import gain_error, reserved_fit
+from turnout.mismatch.engine.search import Search
+from turnout.mismatch.turnout import TrackCase
+from turnout.mismatch.turnout.calibration import calibrated_parameters, dip_directions
+from turnout.stages import calibrated_model as calibrated
+from turnout.stages.mismatch_groups import (
+    Group,
+    groups,
+    members_of,
+    neighbours_of,
+    select_passages,
+    split_by_length,
+    unit_of,
+    visits,
+)
+from turnout.stages.mismatch_inputs import gather_inputs, track_of
+from turnout.stages.mismatch_rows import finding_row
+from turnout.workflow.scan import scan
+
+if TYPE_CHECKING:
+    from turnout.config.settings.mismatch import MismatchSettings
+    from turnout.config.turnout import TurnoutConfig
+    from turnout.mismatch.turnout import CampaignInput
+    from turnout.records import Unit
+    from turnout.simulate import TurnoutTrack
+    from turnout.stages.accepted_effects import AcceptedEffect
+
+FOLDER = Path("work/impact-models")
+MIN_FIT_ERROR = 0.1  # points of fit: standard errors below it are not believed
+SUSPICION = 0.5  # share of the evidence of a name from which trains are asked for the rest
+SEASON_SD = 0.1  # ln: change of all pads between visits by their temperature, 30 K at 0.3 % per kelvin
+SUPPORTS = ("ballast", "pad")  # groups of parameters of one support, which trains can test
+# Effects at one support that are fitted to trains beside the named one, so that it has rivals
+SUPPORT_EFFECTS = ("local_ballast", "hanging_sleeper", "local_pad")
+MAX_DISTANCE = 0.35  # m from the position of the change to that of a candidate: the same support
+MAX_FITTED_TRAINS = 2
+MAX_FITTED_AXLES = 24  # of all fitted trains: the time of a fit is proportional to them
+MAX_HELD_OUT_TRAINS = 4
+MAX_HELD_OUT_AXLES = 96
+MIN_GAIN_ERRORS = 2.0  # standard errors by which held-out trains must fit better, to confirm a change of a stretch
+NO_HAMMER_TESTS = "no hammer test of these sections: turnout twin compares what trains alone show"
+
+
+@dataclass(frozen=True)
+class TrainTest:
+    """What the newest trains say of a change: row as of ``mismatch_findings``, of its own visit."""
+
+    visit: str
+    finding: Mapping[str, Any]
+
+    @property
+    def name(self) -> str | None:
+        """The effect that the trains name, None if they do not decide."""
+        return self.finding["term"] if self.finding["verdict"] == "named" else None
+
+
+def change_unit(
+    unit: Unit,
+    turnout: TurnoutConfig,
+    raw_root: str | Path,
+    context: Mapping[str, dict[str, Any]] | None = None,
+    algo: str = "",
+) -> dict[str, list[dict]]:
+    """The row of ``change_findings`` of one group of sections with an open alarm.
+
+    A diagnosis that is not possible is a row with its reason.
+
+    Parameters
+    ----------
+    unit : Unit
+        All files of the group; its label names the sections, with "+" between them.
+    turnout : TurnoutConfig
+    raw_root : path
+        Folder of all recordings.
+    context : mapping or None
+        Tables of the passage stage by unit.
+    algo : str
+        Version of the code.
+
+    Returns
+    -------
+    dict
+        "change_findings" -> one row.
+    """
+    labels = tuple(unit.label.split("+"))
+    row: dict[str, Any] = {
+        "turnout_id": turnout.id, "sections": ", ".join(labels), "found_at_utc": _newest_day(unit, turnout, raw_root),
+        "code_version": algo,
+    }  # fmt: skip
+    try:
+        row |= _diagnose(unit, turnout, raw_root, context or {}, algo, labels)
+    except (SimulationError, np.linalg.LinAlgError) as error:
+        row |= {"verdict": "no_decision", "sentence": f"no diagnosis: {error}"[:1000]}
+    return {"change_findings": [row]}
+
+
+def _newest_day(unit: Unit, turnout: TurnoutConfig, raw_root: str | Path) -> datetime:
+    """End of the day of the newest visit of the unit."""
+    newest = max(visits(members_of(unit, scan(turnout, Path(raw_root)).units)), default="1970-01")
+    return datetime.combine(datetime.fromisoformat(calibrated.day_of(calibrated.years_of(newest))), time(23, 59))
+
+
+def _diagnose(
+    unit: Unit,
+    turnout: TurnoutConfig,
+    raw_root: str | Path,
+    passage_tables: Mapping[str, dict],
+    code: str,
+    labels: Sequence[str],
+) -> dict[str, Any]:
+    try:
+        track, accepted = track_of(turnout)
+    except SimulationError as error:
+        raise SimulationError(f"no track file ({error})") from None
+    members = members_of(unit, scan(turnout, Path(raw_root)).units)
+    stored, notes = _fitted_visits(members, turnout, raw_root, track, accepted, code, labels)
+    if not stored:
+        raise SimulationError("; ".join(notes) or NO_HAMMER_TESTS)
+    threshold = turnout.settings["mismatch"].threshold
+    answer, informed = change_of(stored, turnout)
+    if answer.verdict == "none":  # trains may have the evidence that impacts lack
+        answer, _ = change_of(stored, turnout, SUSPICION * threshold)
+    test = None
+    if answer.verdict in ("named", "a_or_b") and answer.group in SUPPORTS:
+        test = _test_on_trains(answer, members, turnout, raw_root, track, accepted, passage_tables, labels)
+    n_recordings = sum(v.n_recordings for v in informed)
+    row = finding_of_change(answer, test, len(informed), n_recordings, threshold)
+    return row | {"notes": "\n".join(notes) or None}
+
+
+def _fitted_visits(
+    members: Sequence[Unit],
+    turnout: TurnoutConfig,
+    raw_root: str | Path,
+    track: TurnoutTrack,
+    accepted: Iterable[AcceptedEffect],
+    code: str,
+    labels: Sequence[str],
+) -> tuple[list[calibrated.StoredVisit], list[str]]:
+    """Information of the hammer tests of each visit, fitted once; and why a visit could not be fitted."""
+    folder = FOLDER / "+".join(labels)
+    tests = visits(u for u in members if u.kind == "hammer" and u.section in labels)
+    units = {v: unit_of(turnout.id, v, of, turnout.hashes["mismatch"]) for v, of in tests.items()}
+    versions = {v: calibrated.version_of(u, turnout, raw_root, None, code) for v, u in units.items()}
+    complete = {s.visit for s in calibrated.read_visits(folder, turnout.id, versions)}
+    notes = []
+    for label, of in tests.items():
+        if label in complete:
+            continue
+        about = {"turnout": turnout, "visit": label, "version": versions[label]}
+        inputs = gather_inputs(of, turnout, raw_root, track, {})
+        for group in groups(turnout, track, inputs):
+            try:
+                calibrated.store_visit(folder, group, _case_of(group, group.campaign, turnout, accepted), "", about)
+            except (SimulationError, np.linalg.LinAlgError) as error:
+                notes.append(f"visit {label}: {error}")
+    return calibrated.read_visits(folder, turnout.id, versions), notes
+
+
+def _case_of(
+    group: Group,
+    campaign: CampaignInput,
+    turnout: TurnoutConfig,
+    accepted: Iterable[AcceptedEffect],
+    families: Collection[str] | None = None,
+) -> TrackCase:
+    on_route = tuple(a for a in accepted if a.is_on(group.route))
+    return TrackCase(campaign, turnout.settings["mismatch"], families, accepted=on_route)
+
+
+def change_of(
+    stored: Sequence[calibrated.StoredVisit], turnout: TurnoutConfig, threshold: float | None = None
+) -> tuple[ModelAnswer, list[VisitInformation]]:
+    """What has changed up to the newest of the visits.
+
+    Parameters
+    ----------
+    stored : sequence of StoredVisit
+        At least one.
+    turnout : TurnoutConfig
+        Its settings and recorded work.
+    threshold : float or None
+        Evidence that a name needs, None: that of the settings. [nats]
+
+    Returns
+    -------
+    answer : ModelAnswer
+    informed : list of VisitInformation
+        The visits, in the order of time.
+    """
+    parameters = calibrated.parameters_of(stored)
+    informed = sorted(calibrated.visits_of(stored), key=lambda v: (v.time, v.visit))
+    settings = turnout.settings["mismatch"]
+    candidates = [*change_candidates(parameters, dip_directions(parameters)), *stretch_candidates(parameters)]
+    events = [*calibrated.events_of(turnout, parameters), *_seasons(parameters, informed)]
+    least = settings.threshold if threshold is None else threshold
+    return change_answer(parameters, informed, events, candidates, least, settings.margin, True), informed
+
+
+def _seasons(parameters: Sequence[StateParameter], informed: Sequence[VisitInformation]) -> list[Event]:
+    """The pads of the whole track are uncertain again at each visit: rubber is stiffer when it is cold."""
+    opened = {p.name: SEASON_SD for p in parameters if p.name.split(" ")[-1] in calibrated.PADS}
+    return [Event(v.time, opened) for v in informed]
+
+
+def _test_on_trains(
+    answer: ModelAnswer,
+    members: Sequence[Unit],
+    turnout: TurnoutConfig,
+    raw_root: str | Path,
+    track: TurnoutTrack,
+    accepted: Iterable[AcceptedEffect],
+    passage_tables: Mapping[str, dict],
+    labels: Sequence[str],
+) -> TrainTest | None:
+    """Diagnosis of the newest visit with trains after the change, of the effects at the changed support alone."""
+    assert answer.onset is not None and answer.position is not None
+    chosen = [u for u in members if u.kind == "passage" or u.section in labels]
+    after = {v: of for v, of in visits(chosen).items() if calibrated.years_of(v) >= answer.onset[1]}
+    for visit in sorted(after, reverse=True):
+        if {u.kind for u in after[visit]} < {"hammer", "passage"}:
+            continue
+        inputs = gather_inputs(after[visit], turnout, raw_root, track, passage_tables)
+        group = next((g for g in groups(turnout, track, inputs) if set(g.labels) <= set(labels)), None)
+        if group is None or not group.campaign.passages:
+            continue
+        campaign = with_held_out(group.campaign, [p for p in inputs.passages if p.route == group.route])
+        case = _case_of(group, campaign, turnout, accepted, SUPPORT_EFFECTS)
+        settings = turnout.settings["mismatch"]
+        assert answer.gain is not None
+        if len(supports_of(answer)) > 1 or answer.gain < settings.threshold:
+            return TrainTest(visit, stretch_finding(case, settings, answer, group.route))
+        return TrainTest(
+            visit, finding_row(diagnose(at_support(case, answer.position), replace(settings, effects=1)), {})
+        )
+    return None
+
+
+def at_support(case: TrackCase, position: float) -> TrackCase:
+    """The case with the candidates at one support alone.
+
+    Parameters
+    ----------
+    case : TrackCase
+    position : float
+        [m]
+
+    Returns
+    -------
+    TrackCase
+    """
+    near = copy(case)
+    chosen = (c for c in case.candidates if abs(c.where.get("place", np.inf) - position) <= MAX_DISTANCE)
+    near.all_candidates = near.candidates = tuple(chosen)
+    return near
+
+
+def supports_of(answer: ModelAnswer) -> list[float]:
+    """Positions of the parameters that change, each once.
+
+    Parameters
+    ----------
+    answer : ModelAnswer
+
+    Returns
+    -------
+    list of float
+        Sorted. [m]
+    """
+    positions = (position_of(name, None) for name in answer.changed)
+    return sorted({position for position in positions if position is not None})
+
+
+def stretch_finding(case: TrackCase, settings: MismatchSettings, answer: ModelAnswer, route: str) -> dict[str, Any]:
+    """Columns of ``mismatch_findings`` of a change of several supports: fit of held-out trains without and with it.
+
+    The fit of the visit has absorbed the change. Without it is the same fit with the change taken back. No effect of
+    the library acts on several supports; that trains feel the change names it if the fit of those held out rises by
+    ``MIN_GAIN_ERRORS`` standard errors. "gain_nats" is the logarithm of the ratio of their likelihoods. Trains share
+    errors of the model, so that n of them count as few.
+
+    Parameters
+    ----------
+    case : TrackCase
+    settings : MismatchSettings
+    answer : ModelAnswer
+        The change.
+    route : str
+        Route of the sections.
+
+    Returns
+    -------
+    dict
+    """
+    search, fit = fit_base(Search.of(case, settings))
+    assert answer.total is not None
+    changed = {n: p for n, p in calibrated_parameters(case, route).items() if p.name in answer.changed}
+    taken_back = {n: answer.total * (DAMPER_SHARES[0] if "damper" in p.group else 1.0) for n, p in changed.items()}
+    before = replace(fit, values={n: v - taken_back.get(n, 0.0) for n, v in fit.values.items()})
+    row: dict[str, Any] = {"verdict": "none", "term": None, "parameters_json": None}
+    row |= dict.fromkeys(("fit_before_pct", "fit_after_pct", "fit_gain_se_pct")) | {"n_held_out": 0, "gain_nats": 0.0}
+    observations = search.case.reserved
+    predictions, percents = zip(*(reserved_fit(search.case, f) for f in (before, fit)))
+    if not observations or None in percents:
+        return row
+    error = gain_error(observations, *predictions)
+    row |= {"fit_before_pct": percents[0], "fit_after_pct": percents[1], "fit_gain_se_pct": error}
+    row["n_held_out"] = n = len(observations)
+    costs = [
+        [o.effective * float(np.sum(o.whiten(o.data - p) ** 2)) for o, p in zip(observations, of)] for of in predictions
+    ]
+    level = max(1.0, sum(costs[1]) / sum(o.n_effective for o in observations))
+    count = n / (1.0 + CALIBRATION.repeated_error_share * (n - 1))  # as ``repeated_error_weights``, all of one group
+    nats = 0.5 * count * (sum(costs[0]) - sum(costs[1])) / n / level
+    # no more than the error of the difference of the fits allows, which is estimated from the residuals
+    row["gain_nats"] = min(nats, 0.5 * ((percents[1] - percents[0]) / max(error, MIN_FIT_ERROR)) ** 2)
+    if percents[1] - percents[0] > MIN_GAIN_ERRORS * error:
+        row |= {"verdict": "named", "term": answer.names[0]}
+    return row
+
+
+def with_held_out(campaign: CampaignInput, passages: Sequence[Any]) -> CampaignInput:
+    """The campaign with few fitted trains and others held out, which cost no fit.
+
+    Parameters
+    ----------
+    campaign : CampaignInput
+        Its passages are replaced; those of a diverging route are left as they are.
+    passages : sequence of PassageInput
+        All usable ones of its route at this visit.
+
+    Returns
+    -------
+    CampaignInput
+    """
+    names = {p.name for p in campaign.passages}
+    if names - {p.name for p in passages} or any(p.route != "main" for p in passages):
+        return campaign
+    trains = split_by_length(passages)
+    fitted = select_passages(trains, MAX_FITTED_TRAINS, MAX_FITTED_AXLES)
+    others = [p for p in trains if all(p is not f for f in fitted)]
+    held_out = select_passages(others, MAX_HELD_OUT_TRAINS, MAX_HELD_OUT_AXLES) if others else []
+    chosen = [p for p in trains if any(p is c for c in (*fitted, *held_out))]
+    return replace(campaign, passages=tuple(chosen), reserved=tuple(p.name for p in held_out))
+
+
+def finding_of_change(
+    answer: ModelAnswer, test: TrainTest | None, n_visits: int, n_recordings: int, threshold: float = 0.0
+) -> dict[str, Any]:
+    """Columns of ``change_findings``: hammer tests and trains together.
+
+    Trains that name one of the names of the hammer tests decide between them. Trains that name another effect make the
+    answer "a or b". Trains that decide nothing change nothing. A suspicion of the hammer tests is a name if the
+    held-out trains add the evidence that it lacks.
+
+    Parameters
+    ----------
+    answer : ModelAnswer
+        Of the hammer tests of all visits.
+    test : TrainTest or None
+        Of trains.
+    n_visits, n_recordings : int
+        Visits with hammer tests, and their recordings.
+    threshold : float
+        Evidence that a name needs. [nats]
+
+    Returns
+    -------
+    dict
+    """
+    names = answer.names
+    if test is not None and test.name is not None:
+        names = (test.name,) if test.name in names else (names[0], test.name)
+    elif test is not None and test.finding["term"] in names:  # the trains' best name first
+        names = tuple(sorted(names, key=lambda name: name != test.finding["term"]))
+    verdict = answer.verdict if not names else "named" if len(names) == 1 else "a_or_b"
+    row: dict[str, Any] = {
+        "visit": answer.visit, "verdict": verdict, "term": names[0] if names else None,
+        "rival_term": names[1] if len(names) > 1 else None,
+        "component": {"ballast": "ballast", "pad": "railpad"}.get(answer.group), "position_m": answer.position,
+        "change": answer.size, "change_se": answer.sd, "change_unit": answer.unit or None, "grows": answer.grows,
+        "gain_nats": answer.gain, "n_visits": n_visits, "n_recordings": n_recordings,
+    }  # fmt: skip
+    if supports := supports_of(answer):
+        row |= {"first_m": supports[0], "last_m": supports[-1]}
+    nats = (answer.gain or 0.0) + (test.finding.get("gain_nats", 0.0) if test is not None else 0.0)
+    if answer.gain is not None:
+        row["gain_nats"] = nats
+    if answer.onset is not None:
+        after, by = (datetime.fromisoformat(calibrated.day_of(t)) for t in answer.onset)
+        row |= {"onset_after_utc": after, "onset_by_utc": by}
+    if test is not None:
+        fits = ("fit_before_pct", "fit_after_pct", "fit_gain_se_pct", "n_held_out")
+        row |= {name: test.finding[name] for name in fits} | {"trains_visit": test.visit}
+        row |= {"trains_verdict": test.finding["verdict"], "trains_term": test.finding["term"]}
+        if test.finding["term"] == names[0]:
+            row["parameters_json"] = test.finding["parameters_json"]
+    if names and answer.gain is not None and nats < threshold:
+        words = f"no name: the evidence of what fits best is {nats:.1f} of {threshold:g} nats: {sentence_of(row, test)}"
+        return row | {"verdict": "none", "term": None, "rival_term": None, "component": None, "sentence": words}
+    return row | {"sentence": sentence_of(row, test)}
+
+
+def sentence_of(row: Mapping[str, Any], test: TrainTest | None) -> str:
+    """The finding in one sentence, every value with its interval and the number of recordings.
+
+    Parameters
+    ----------
+    row : mapping
+        Row of ``change_findings``.
+    test : TrainTest or None
+        Of trains.
+
+    Returns
+    -------
+    str
+    """
+    basis = f"{row['n_recordings']} hammer tests of {row['n_visits']} visits"
+    if row["verdict"] == "none":
+        least = "at least two visits are needed" if row["n_visits"] < 2 else "no effect at any support has the evidence"
+        return f"{basis} name no change: {least}"
+    position = "" if row["position_m"] is None else f" at {row['position_m']:.1f} m"
+    if row.get("first_m") != row.get("last_m"):
+        position = f" from {row['first_m']:.1f} to {row['last_m']:.1f} m"
+    if row["verdict"] == "unknown":
+        since = _since_words(row)
+        return (
+            f"something has changed{position}{since and f', {since}'}, and no effect of a support explains it ({basis})"
+        )
+    names = " or ".join(n.replace("_", " ") for n in (row["term"], row["rival_term"]) if n)
+    words = f"{names}{position}: {_change_words(row)}{_parameter_words(row)}, {_since_words(row)}; {basis}"
+    if test is None:
+        return f"{words}; no train since then tells more"
+    return words + _train_words(row)
+
+
+def _since_words(row: Mapping[str, Any]) -> str:
+    if row.get("onset_by_utc") is None:
+        return ""
+    return f"since {row['onset_after_utc']:%Y-%m-%d} to {row['onset_by_utc']:%Y-%m-%d} (95 %)"
+
+
+def _change_words(row: Mapping[str, Any]) -> str:
+    """Size of the change as impacts feel it, with its 95 % interval."""
+    half, per_year = Z95 * row["change_se"], " a year" if row["grows"] else ""
+    value, low, high = row["change"], row["change"] - half, row["change"] + half
+    if row["component"] is None:
+        return f"change {value:+.3g} ({low:+.3g} to {high:+.3g}, 95 %) {row['change_unit']}{per_year}"
+    value, low, high = (100.0 * float(np.expm1(end)) for end in (value, low, high))
+    what = f"stiffness of the {row['component']} under impacts"
+    return f"{what} {value:+.0f} % ({low:+.0f} to {high:+.0f}, 95 %){per_year}"
+
+
+def _parameter_words(row: Mapping[str, Any]) -> str:
+    """Size of the effect under trains with its 95 % interval, "" if they do not name it."""
+    from turnout.stages.mismatch_text import interval, number_in_words
+
+    words = ""
+    for p in json.loads(row.get("parameters_json") or "[]"):
+        low, high = interval(p["term"], p["name"], p["value"], p["se"])
+        value, low_end, high_end = (number_in_words(v, p["unit"]) for v in (p["value"], low, high))
+        words += f", {p['name']} {value} ({low_end} to {high_end}, 95 %)"
+    return words
+
+
+def _train_words(row: Mapping[str, Any]) -> str:
+    """What the trains decide, and the fit on those held out."""
+    n = row["n_held_out"] or 0
+    fit = ""
+    if n and row["fit_before_pct"] is not None and row["fit_after_pct"] is not None:
+        se = (
+            ""
+            if row["fit_gain_se_pct"] is None
+            else f" (standard error of the difference {row['fit_gain_se_pct']:.1f})"
+        )
+        before, after = row["fit_before_pct"], row["fit_after_pct"]
+        fit = f"; {n} held-out trains fit by {before:.1f} % without it, {after:.1f} % with it{se}"
+    if row["trains_verdict"] == "named":
+        return f"; trains of {row['trains_visit']} name {row['trains_term'].replace('_', ' ')}{fit}"
+    if row["trains_verdict"] == "a_or_b":
+        return f"; trains of {row['trains_visit']} fit either{fit}"
+    return f"; trains of {row['trains_visit']} do not decide ({row['trains_verdict']}){fit}"
+
+
+def group_labels(turnout: TurnoutConfig, sections: Iterable[str]) -> list[tuple[str, ...]]:
+    """Groups of neighbouring sections that contain any of these.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+    sections : iterable of str
+        Labels.
+
+    Returns
+    -------
+    list of tuple of str
+    """
+    wanted = set(sections)
+    return [labels for _, labels in neighbours_of(turnout) if wanted & set(labels)]

@@ -1,0 +1,121 @@
+"""Units of the stage change: groups of neighbouring sections with an open alarm, from plan files and registry."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from datetime import date, datetime
+from pathlib import Path
+from re import search
+
+from turnout.config import Configuration
+from turnout.config.merge import digest
+from turnout.config.turnout import TurnoutConfig
+from turnout.errors import ConfigError
+from turnout.records import Unit
+from turnout.registry.as_of import whole_list
+from turnout.registry.database import open_registry
+from turnout.stages.change_diagnosis import group_labels
+from turnout.stages.mismatch_groups import visits
+from turnout.stages.mismatch_inputs import digest_of_model
+from turnout.workflow.plan import PlannedUnit, is_cut_plan, read_plan
+
+REGISTRY = Path("results/registry")
+KIND = "change"
+MAX_TRAINS = 16  # of a unit: more trains of one visit would only compute it again
+OPEN_SQL = """
+    select distinct turnout_id, unnest(string_split(sections, ', ')) as section from {}
+    where raised_at_utc is not null or state = 'confirm now' order by all
+"""
+WHOLE_TURNOUT = "whole turnout"
+
+
+def open_alarms(registry: str | Path) -> dict[str, list[str]]:
+    """Sections with an open alarm, or with a campaign to confirm, as of the newest measurement.
+
+    Parameters
+    ----------
+    registry : path
+        Folder of the registry.
+
+    Returns
+    -------
+    dict
+        Turnout -> labels. The median of a whole turnout is no section.
+    """
+    by_turnout: dict[str, list[str]] = {}
+    if not (Path(registry) / "registry.duckdb").exists():
+        return by_turnout
+    with open_registry(registry) as connection:
+        for turnout, section in connection.execute(OPEN_SQL.format(whole_list("newest_measurement()"))).fetchall():
+            if section != WHOLE_TURNOUT:
+                by_turnout.setdefault(turnout, []).append(section)
+    return by_turnout
+
+
+def alarmed_groups(plans: Path, configuration: Configuration) -> Iterator[PlannedUnit]:
+    """A unit for each group of neighbouring sections with an open alarm.
+
+    Its note changes with the notes on its recordings, the track and vehicle files, and the recorded work.
+
+    Parameters
+    ----------
+    plans : Path
+        Folder of the plan files.
+    configuration : Configuration
+        Configuration of the fleet.
+
+    Yields
+    ------
+    PlannedUnit
+    """
+    alarms = open_alarms(REGISTRY)
+    for plan in sorted(Path(plans).glob("*of*.json")) if alarms else ():
+        if is_cut_plan(plan):
+            continue
+        planned: dict[str, list[PlannedUnit]] = {}
+        for p in read_plan(plan):
+            planned.setdefault(p.unit.turnout, []).append(p)
+        hashes = {e["turnout"]: e["hashes"] for e in json.loads(plan.read_text(encoding="utf-8"))["turnouts"]}
+        for turnout_id in sorted(planned.keys() & alarms.keys()):
+            try:
+                turnout = configuration.turnout(turnout_id)
+            except ConfigError:
+                continue
+            config_hash = hashes[turnout_id].get(KIND, "")
+            yield from _units(turnout, planned[turnout_id], alarms[turnout_id], config_hash)
+
+
+def _units(
+    turnout: TurnoutConfig, planned: Sequence[PlannedUnit], sections: Iterable[str], config_hash: str
+) -> Iterator[PlannedUnit]:
+    events = Path(turnout.folder) / "events.csv"
+    lines = events.read_text(encoding="utf-8").splitlines() if events.is_file() else []
+    own_events = [line for line in lines if line.startswith(f"{turnout.id},")]
+    for labels in group_labels(turnout, sections):
+        members = [p for p in planned if p.unit.kind == "hammer" and p.unit.section in labels]
+        members += _trains_of_newest_visit(members, [p for p in planned if p.unit.kind == "passage"])
+        if not members:
+            continue
+        files = tuple(sorted(f for p in members for f in p.unit.files))
+        note = digest([digest_of_model(turnout), own_events, *(p.note for p in members)])[:16]
+        yield PlannedUnit(Unit(turnout.id, KIND, "+".join(labels), files, config_hash), note)
+
+
+def _trains_of_newest_visit(tests: Sequence[PlannedUnit], trains: Sequence[PlannedUnit]) -> list[PlannedUnit]:
+    """Trains of the newest visit that has hammer tests and trains, those nearest to the day of the tests."""
+    by_unit = {id(p.unit): p for p in (*tests, *trains)}
+    for visit, units in reversed(visits(p.unit for p in (*tests, *trains)).items()):
+        passed = [u for u in units if u.kind == "passage"]
+        if passed and (len(passed) < len(units) or not tests):
+            day = date.fromisoformat(visit if len(visit) > 7 else f"{visit}-15")
+            passed.sort(key=lambda u: (abs((_day_of(u.label) - day).days), u.label))
+            return [by_unit[id(u)] for u in passed[:MAX_TRAINS]]
+    return []
+
+
+def _day_of(label: str) -> date:
+    """Day in the name of a passage, as ``mismatch_groups.visits`` reads it."""
+    stamp = search(r"\d{8}(?=T\d{6}Z)", label)
+    assert stamp is not None
+    return datetime.strptime(stamp[0], "%Y%m%d").date()

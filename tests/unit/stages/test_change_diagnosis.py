@@ -1,0 +1,206 @@
+"""What an open alarm rests on: hammer tests of all visits and newest trains together, or why there is no decision."""
+
+import shutil
+from datetime import datetime
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import small_turnout as small
+
+from turnout import physics
+from turnout.config import load_configuration, with_raw
+from turnout.mismatch.calibrated import ModelAnswer
+from turnout.records import Unit
+from turnout.stages import change_diagnosis, change_units
+from turnout.stages.change_diagnosis import TrainTest, change_unit, finding_of_change
+from turnout.stages.trend import worklist_job
+from turnout.workflow.plan import write_plans
+from turnout.workflow.scan import scan
+from turnout.workflow.shard import run_shard
+from turnout.workflow.tasks import Stage
+
+DAYS = ("2025-08-01", "2025-11-01", "2026-02-01", "2026-05-01")
+
+
+FACTOR = 0.4
+
+
+def soft_ballast(track, n=1, factor=FACTOR):
+    """Ballast with a share of its stiffness under ``n`` sleepers, the middle one at section A."""
+    first = track.nearest_support(small.SLEEPER) - n // 2
+    return tuple(physics.LocalBallast(first + k, factor) for k in range(n))
+
+
+def softened(folder, repository, terms):
+    """Four hammer tests; the ballast is soft in the last two. Five trains at the last visit."""
+    small.lay_out(folder, repository)
+    for k, day in enumerate(DAYS):
+        at = datetime.fromisoformat(f"{day}T09:00")
+        small.strike(folder, terms if k > 1 else None, day=at, seed=10 * k)
+    small.roll(folder, terms, (80.0, 90.0, 100.0, 110.0, 120.0), at)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def year(tmp_path_factory, repository):
+    return softened(tmp_path_factory.mktemp("softened"), repository, soft_ballast)
+
+
+@pytest.fixture
+def turnout(tmp_path, year, monkeypatch):
+    shutil.copytree(year, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def unit_of_all(configured):
+    files = tuple(sorted(f for u in scan(configured, Path("raw")).units for f in u.files))
+    return Unit("t1", "change", "A+B", files, "")
+
+
+def row_of(turnout):
+    configured = with_raw(load_configuration("config").turnout("t1"), Path("raw"))
+    (row,) = change_unit(unit_of_all(configured), configured, "raw", {}, "x")["change_findings"]
+    return row
+
+
+def test_soft_ballast_of_a_stretch_is_named_with_onset_and_fit_of_held_out_trains(tmp_path, repository, monkeypatch):
+    softened(tmp_path, repository, partial(soft_ballast, n=3, factor=0.5))
+    monkeypatch.chdir(tmp_path)
+    row = row_of(tmp_path)
+    assert (row["verdict"], row["term"], row["rival_term"]) == ("named", "local_ballast", None)
+    assert row["first_m"] <= 18.0 <= row["last_m"] and abs(row["position_m"] - 18.0) <= 0.6
+    assert row["component"] == "ballast" and not row["grows"]
+    assert [f"{row[k]:%Y-%m-%d}" for k in ("onset_after_utc", "onset_by_utc")] == [DAYS[1], DAYS[2]]
+    assert row["n_visits"] == 4 and row["n_recordings"] == 8 and row["n_held_out"] == 3
+    assert row["fit_after_pct"] > row["fit_before_pct"] + 2.0 * row["fit_gain_se_pct"]
+    assert "3 held-out trains" in row["sentence"] and "trains of 2026-05-01 name local ballast" in row["sentence"]
+
+
+def test_trains_cannot_tell_one_soft_support_from_a_seated_sleeper_whose_gap_none_closes(turnout):
+    row = row_of(turnout)
+    assert (row["verdict"], {row["term"], row["rival_term"]}) == ("a_or_b", {"local_ballast", "hanging_sleeper"})
+    assert row["position_m"] == 18.0 and "trains of 2026-05-01 fit either" in row["sentence"]
+    assert [f"{row[k]:%Y-%m-%d}" for k in ("onset_after_utc", "onset_by_utc")] == [DAYS[1], DAYS[2]]
+    assert abs(row["change"] - np.log(FACTOR)) < 3.0 * row["change_se"] + 0.05  # linear in the logarithm
+    assert row["fit_after_pct"] > row["fit_before_pct"] + 2.0 * row["fit_gain_se_pct"]
+
+
+def test_without_trains_soft_ballast_may_as_well_be_a_gap(turnout):
+    shutil.rmtree("raw/t1/passages")
+    row = row_of(turnout)
+    assert (row["verdict"], {row["term"], row["rival_term"]}) == ("a_or_b", {"local_ballast", "hanging_sleeper"})
+    assert "no train since then tells more" in row["sentence"]
+
+
+def test_without_a_track_file_or_a_simulation_the_reason_is_the_answer(turnout, monkeypatch):
+    def fails(*_, **__):
+        raise change_diagnosis.SimulationError("the matrix is singular")
+
+    monkeypatch.setattr(change_diagnosis, "change_of", fails)
+    row = row_of(turnout)
+    assert row["verdict"] == "no_decision" and row["sentence"] == "no diagnosis: the matrix is singular"
+    Path("config/tracks/small.yaml").unlink()
+    row = row_of(turnout)
+    assert row["verdict"] == "no_decision" and row["sentence"].startswith("no diagnosis: no track file")
+    assert row["found_at_utc"] == datetime(2026, 5, 1, 23, 59)
+
+
+def test_a_visit_is_fitted_once_and_a_second_night_computes_nothing(turnout, monkeypatch):
+    alarms = {"t1": ["B"]}
+    monkeypatch.setattr(change_units, "open_alarms", lambda registry: alarms)
+    monkeypatch.setattr(change_diagnosis, "_test_on_trains", lambda *_: None)
+    fitted = []
+    store = change_diagnosis.calibrated.store_visit
+    monkeypatch.setattr(
+        change_diagnosis.calibrated, "store_visit", lambda *a, **k: (fitted.append(a[4]["visit"]), store(*a, **k))
+    )
+    stage = Stage("change", change_unit, "v1", lambda turnout, settings: ("", {}), change_units.alarmed_groups)
+
+    def night():
+        configuration = load_configuration("config")
+        write_plans(configuration, Path("raw"), Path("work/plan"), 2)
+        return run_shard(Path("work/plan"), Path("work/change/00of01.json"), stage, configuration, Path("raw"))
+
+    assert night().processed == 1 and fitted == list(DAYS)
+    assert night().processed == 0 and fitted == list(DAYS)
+    small.strike(turnout, soft_ballast, day=datetime(2026, 6, 1, 9), seed=50)
+    assert night().processed == 1 and fitted == [*DAYS, "2026-06-01"]
+    alarms.clear()
+    assert night().processed == 0
+
+
+def answer(verdict="a_or_b", names=("local_ballast", "hanging_sleeper"), **more):
+    return ModelAnswer(
+        "2026-05-01", "change", verdict, names, "ballast@18.00", "ballast", 18.0, -1.0, 0.1, "-",
+        (change_diagnosis.calibrated.years_of("2026-02-01"), change_diagnosis.calibrated.years_of("2026-05-01")), 40.0,
+        changed=("ballast@18.00",), total=-1.0, **more,
+    )  # fmt: skip
+
+
+def trains(verdict, term):
+    fits = {"fit_before_pct": 40.0, "fit_after_pct": 60.0, "fit_gain_se_pct": 1.0, "n_held_out": 2}
+    return TrainTest("2026-05-01", {"verdict": verdict, "term": term, "parameters_json": None, **fits})
+
+
+@pytest.mark.parametrize(
+    ("given", "test", "expected"),
+    [
+        (answer(), None, ("a_or_b", "local_ballast", "hanging_sleeper")),
+        (answer(), trains("named", "hanging_sleeper"), ("named", "hanging_sleeper", None)),
+        (answer(), trains("a_or_b", "hanging_sleeper"), ("a_or_b", "hanging_sleeper", "local_ballast")),
+        (answer(), trains("unknown", None), ("a_or_b", "local_ballast", "hanging_sleeper")),
+        (answer("named", ("local_pad",)), trains("named", "local_ballast"), ("a_or_b", "local_pad", "local_ballast")),
+        (answer("named", ("local_pad",)), trains("none", None), ("named", "local_pad", None)),
+    ],
+    ids=["no train", "trains decide", "trains fit either", "trains fail", "trains differ", "trains say nothing"],
+)
+def test_hammer_tests_and_trains_give_one_answer(given, test, expected):
+    row = finding_of_change(given, test, 4, 8)
+    assert (row["verdict"], row["term"], row["rival_term"]) == expected
+    assert "-63 % (-70 to -55, 95 %)" in row["sentence"] and "8 hammer tests of 4 visits" in row["sentence"]
+
+
+def test_no_change_and_too_few_visits_are_no_name():
+    nothing = ModelAnswer("2026-05-01", "change", "none")
+    assert "no effect at any support has the evidence" in finding_of_change(nothing, None, 4, 8)["sentence"]
+    assert "at least two visits are needed" in finding_of_change(nothing, None, 1, 2)["sentence"]
+    unknown = ModelAnswer("2026-05-01", "change", "unknown", (), "pad@18.00", "pad", 18.0)
+    row = finding_of_change(unknown, None, 4, 8)
+    assert row["verdict"] == "unknown"
+    assert "something has changed at 18.0 m, and no effect of a support explains it" in row["sentence"]
+
+
+@pytest.mark.parametrize(("nats", "verdict"), [(3.0, "none"), (6.0, "named")])
+def test_held_out_trains_may_add_the_evidence_that_a_suspicion_lacks(nats, verdict):
+    test = trains("named", "local_ballast")
+    test.finding["gain_nats"] = nats
+    weak = ModelAnswer(**{**vars(answer("named", ("local_ballast",))), "gain": 8.0})
+    row = finding_of_change(weak, test, 4, 8, 12.0)
+    assert row["verdict"] == verdict and row["gain_nats"] == 8.0 + nats
+    is_name = verdict == "named"
+    assert (row["term"] == "local_ballast") == is_name
+    assert row["sentence"].startswith("no name: the evidence") != is_name
+    assert "local ballast at 18.0 m" in row["sentence"]
+
+
+def test_the_list_gets_the_newest_diagnoses(tmp_path, monkeypatch):
+    from turnout.registry.database import open_registry
+    from turnout.registry.job import register
+    from turnout.workflow.batches import UnitResult
+
+    root = tmp_path / "registry"
+    register([], root, read=iter, tables={"turnouts": [{"turnout_id": "t1", "layout": "small", "config_hash": "h"}]})
+    row = {"turnout_id": "t1", "sections": "A, B", "found_at_utc": pd.Timestamp("2026-05-01T23:59")}
+    row |= {"verdict": "no_decision", "sentence": "no diagnosis: no track file"}
+    result = UnitResult("t1/change/A+B", "t1", "change", "k", "v", "ok", {"change_findings": [row]})
+    monkeypatch.setattr("turnout.stages.trend.current_results", lambda work, stage, turnout: [result])
+    for _ in range(2):
+        assert worklist_job(root / "_generation.json", tmp_path / "list.csv", tmp_path) == 1
+        with open_registry(root) as connection:
+            query = "select turnout_id, sections, sentence from change_findings"
+            assert connection.execute(query).fetchall() == [("t1", "A, B", "no diagnosis: no track file")]
+    assert (tmp_path / "list.csv").exists()
