@@ -332,6 +332,7 @@ class Seeds:
         if kind == "errno":
             calls = draw.choice((OPEN, READ, WRITE, RENAME, SYNC, LIST, STAT, UNLINK, MKDIR))
             options = {"calls": calls, "action": FAIL, "code": code, "at": at(calls), "lasting": draw.random() < 0.2}
+            options["lasting"] &= code != errno.EINTR  # a call is repeated after a signal, and signals end
         elif kind == "full disk":
             code = draw.choice((errno.ENOSPC, errno.EDQUOT, errno.EROFS))
             options = {"calls": WRITING_CALLS, "action": FAIL, "code": code, "at": at(WRITING_CALLS), "lasting": True}
