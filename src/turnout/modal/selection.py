@@ -419,22 +419,34 @@ def _refit(
     settings: IdentifySettings,
     max_damping: float | None = None,
 ) -> Explanation:
-    """The same explanation fitted to other decays from modes ``theta``, its noise and the tests of its modes anew."""
+    """The same explanation fitted to other decays from modes ``theta``, its noise and the tests of its modes anew.
+
+    The noise is that of the residual after a first fit: at ``theta`` it would contain the scatter of the poles.
+    """
     columns = explanation.background.columns(decays.shape[1], rate)
     result = replace(explanation, rejected=list(explanation.rejected))
-    result.whitening = noise_filter(linearise(theta, decays, rate, columns).residual, settings.noise_order_maximum)
-    white = whiten(decays, result.whitening)
-    result.fit, result.candidates = fit_and_prune(
-        explanation.candidates,
-        white,
-        rate,
-        explanation.background.columns(white.shape[1], rate),
-        settings,
-        result.rejected,
-        theta,
-        max_damping,
-        {id(candidate) for candidate in explanation.candidates},
-    )
+    for _ in range(2):
+        white = whiten(decays, result.whitening)
+        result.fit, result.candidates = fit_and_prune(
+            result.candidates,
+            white,
+            rate,
+            explanation.background.columns(white.shape[1], rate),
+            settings,
+            result.rejected,
+            theta,
+            max_damping,
+            {id(candidate) for candidate in explanation.candidates},
+        )
+        if result.fit is None:
+            break
+        theta = result.fit.theta
+        previous = result.whitening
+        result.whitening = noise_filter(linearise(theta, decays, rate, columns).residual, settings.noise_order_maximum)
+        if len(result.whitening) == len(previous) == 1:
+            break
+    else:
+        result.whitening = previous
     result.leaves_common = _leaves_common(result.fit, settings)
     return result
 
