@@ -86,9 +86,20 @@ def compare(connection: duckdb.DuckDBPyConnection, truth: Path, worklist: str) -
         rows += [_file_row(connection, content["days"], *fault) for fault in content["file_faults"]]
     rows += _impact_rows(connection, truth)
     query = "select turnout_id, section_id, band from whole where state = 'inspect this week'"
-    alarms = [row for row in connection.execute(query).fetchall() if (row[0], _label(row[1]), row[2]) not in changed]
-    count = f"{len(alarms)} alarms" + (f": {', '.join(f'{a[1]} {a[2]}' for a in alarms)}" if alarms else "")
-    return [*rows, Comparison("all other sections", "no change", count)]
+    alarms = [(turnout, _label(section), band) for turnout, section, band in connection.execute(query).fetchall()]
+    further = [alarm for alarm in alarms if alarm not in changed]
+    sections = {chart[:2] for chart in changed}
+    beside, elsewhere = ([a for a in further if (a[:2] in sections) is inside] for inside in (True, False))
+    return [
+        *rows,
+        Comparison("other charts there", "may follow from these changes", _alarms_text(beside)),
+        Comparison("all other sections", "no change", _alarms_text(elsewhere)),
+    ]
+
+
+def _alarms_text(alarms: Sequence[tuple[str, str, str]]) -> str:
+    names = ", ".join(f"{turnout}/{section} {band.replace('_', ' ')}" for turnout, section, band in alarms)
+    return f"{len(alarms)} alarm{'' if len(alarms) == 1 else 's'}{names and ': '}{names}"
 
 
 def comparison_table(rows: Sequence[Comparison]) -> str:

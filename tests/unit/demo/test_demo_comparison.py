@@ -44,6 +44,7 @@ def connection():
         create table listed as from (values
             ('W1', 'W1/A8', 'ballast', -8.0::double, timestamp '2025-01-20', 'inspect this week'),
             ('W1', 'W1/ASM', 'ballast', -30.0, timestamp '2025-01-10', 'inspect this week'),
+            ('W1', 'W1/ASM', 'ballast_damping', -50.0, timestamp '2025-01-10', 'inspect this week'),
             ('W1', 'W1/A7', 'railpad', -2.0, timestamp '2025-02-10', 'inspect this week'),
             ('W1', 'W1/A9', 'railpad', null, null, 'cannot tell'),
             ('W1', 'W1/OT', 'amplitude', 31.4, timestamp '2025-11-17', 'inspect this week')
@@ -83,7 +84,8 @@ def test_every_fault_and_change_has_a_row_with_what_was_found(connection, truth)
     assert weld.found == "inspect this week: weekly peak acceleration +31 %, from 2025-11-17"
     assert rows["W1 SP, test 2"].found == "truncated"
     assert rows["W1 OT, test 1"].found == "nothing (another reason)"
-    assert rows["all other sections"].found == "1 alarms: W1/A7 railpad"
+    assert rows["other charts there"].found == "1 alarm: W1/ASM ballast damping"
+    assert rows["all other sections"].found == "1 alarm: W1/A7 railpad"
 
 
 def test_impacts_of_damaged_files_do_not_count(connection, truth):
