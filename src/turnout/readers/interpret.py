@@ -432,6 +432,7 @@ class Assignments:
     def __init__(self, channels: Sequence[RawChannel], source: Source):
         self.channels, self.source = channels, source
         self._has_sensitivity = any(c.sensitivity is not None for c in channels)
+        self._keyed: tuple[RawRecord, tuple] | None = None
         self._rows: dict[tuple, set[int]] = {}
         self._mappings: dict[tuple, tuple[ChannelMapping, ...]] = {}
 
@@ -458,14 +459,20 @@ class Assignments:
     def _key(self, record: RawRecord) -> tuple:
         """What the assignment depends on; aliases only if a channel of the layout is called by one.
 
-        Only entries that state a sensitivity count, with those that may name its channel.
+        Only entries that state a unit or a sensitivity count, with those that may name its channel.
         """
+        if self._keyed is not None and self._keyed[0] is record:
+            return self._keyed[1]
+        self._keyed = record, self._key_of(record)
+        return self._keyed[1]
+
+    def _key_of(self, record: RawRecord) -> tuple:
         is_named = all(isinstance(c.source, int) or c.source in record.names for c in self.channels)
         sensitivities: tuple[str, ...] = ()
         if self._has_sensitivity and stated_scales.sensitivity_entries(record.entries):
             sensitivities = tuple(f"{entry.place}: {entry.name}: {entry.value}" for entry in record.entries)
         aliases = () if is_named else record.aliases
-        stated = (*sensitivities, *key_of_units(record.entries))
+        stated = sensitivities, key_of_units(record.entries)
         return record.names, record.units, aliases, tuple(record.undecided.items()), stated
 
     def mappings(self, record: RawRecord, where: str) -> tuple[ChannelMapping, ...]:

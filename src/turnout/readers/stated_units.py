@@ -5,7 +5,7 @@ name of a channel, or as the last word of that name ("rail_g"). A unit of the la
 """
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
@@ -155,7 +155,12 @@ def unit_entries(entries: Sequence[Entry]) -> tuple[Entry, ...]:
     tuple of Entry
         Those under a name of a unit, or in a group of that name.
     """
-    return tuple(e for e in entries if is_unit_name(e.name) or is_unit_name(container_of(e).rpartition("/")[2]))
+    return tuple(e for e in entries if _states_unit(e.place, e.name))
+
+
+@lru_cache(maxsize=4096)
+def _states_unit(place: str, name: str) -> bool:
+    return is_unit_name(name) or is_unit_name(container_of(Entry(place, name, None)).rpartition("/")[2])
 
 
 def own_units(record: RawRecord, index: int, entries: Sequence[Entry]) -> tuple[list[str], list[str]]:
@@ -271,18 +276,17 @@ def contradicting_unit(
     return "" if any(same_unit(u, wanted) for u in candidates) else next(iter(candidates), "")
 
 
-def key_of_units(entries: Sequence[Entry]) -> Iterator[str]:
-    """Texts on which the units of the channels depend.
+def key_of_units(entries: Sequence[Entry]) -> tuple[tuple[str, str, tuple[str, ...]], ...]:
+    """What the units of the channels depend on.
 
     Parameters
     ----------
     entries : sequence of Entry
         Metadata of a record.
 
-    Yields
-    ------
-    str
-        Place, name and value of each entry that states a unit.
+    Returns
+    -------
+    tuple of tuple of (str, str, tuple of str)
+        Place, name and units of each entry that states a unit.
     """
-    for entry in unit_entries(entries):
-        yield f"{entry.place}: {entry.name}: {entry.value}"
+    return tuple((e.place, e.name, tuple(_texts(e.value))) for e in unit_entries(entries))

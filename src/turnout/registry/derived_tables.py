@@ -1,13 +1,11 @@
 """Check and publish tables that are computed from the registry itself and replaced as a whole."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import duckdb
+import pandas as pd
 import pyarrow as pa
 
 from turnout.errors import RegistryError
@@ -23,9 +21,6 @@ from turnout.registry.parquet import write_sorted
 from turnout.registry.publication import publish as publish_generation
 from turnout.registry.schema import WHOLE_TABLES, key, tables, time_column
 from turnout.registry.staging import connect
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 TABLES_BY_YEAR = ("charts",)
 
@@ -84,7 +79,7 @@ def _create_view(con: duckdb.DuckDBPyConnection, table: str, frame: pd.DataFrame
     """Create view ``new_<table>`` of the rows, typed and rounded; RegistryError at the first bad row."""
     if table not in WHOLE_TABLES:
         raise RegistryError(f"{table} is not a table that is replaced whole; those are {', '.join(WHOLE_TABLES)}.")
-    present = list(frame.column_names if isinstance(frame, pa.Table) else frame.columns)
+    present = list(frame.columns if isinstance(frame, pd.DataFrame) else frame.column_names)
     if unknown := sorted(set(present) - {c.name for c in tables()[table]}):
         raise RegistryError(f"{table}, column {unknown[0]}: columns.csv does not know it.")
     con.register(f"came_{table}", frame)

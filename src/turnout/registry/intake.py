@@ -10,6 +10,7 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 
 from turnout.registry.ids import content_id
@@ -205,19 +206,10 @@ def _time(value: Any) -> datetime | None:
     """Naive UTC from ISO text or a datetime; ValueError for another time zone."""
     if value is None:
         return None
-    time = datetime.fromisoformat(value) if isinstance(value, str) else _datetime_of(value)
+    time = datetime.fromisoformat(value) if isinstance(value, str) else pd.Timestamp(value).to_pydatetime()
     if time.utcoffset():
         raise ValueError("a time in another zone than UTC")
     return time.replace(tzinfo=None)
-
-
-def _datetime_of(value: Any) -> datetime:
-    """A datetime from a value of any library; pandas is imported only for others than datetimes: it takes 50 MB."""
-    if isinstance(value, datetime) and not hasattr(value, "to_pydatetime"):
-        return value
-    import pandas as pd
-
-    return pd.Timestamp(value).to_pydatetime()
 
 
 def _lists(column: Column, values: Sequence) -> pa.Array:
