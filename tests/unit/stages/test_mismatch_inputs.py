@@ -32,7 +32,7 @@ from turnout.stages.accept_finding import with_entry
 from turnout.stages.accepted_effects import AcceptedEffect
 from turnout.stages.calibrate import calibrate_to_files
 from turnout.stages.common import number, rail_temperature
-from turnout.stages.mismatch_groups import _neighbouring_sections, groups, select_passages, unit_of
+from turnout.stages.mismatch_groups import groups, neighbours_of, select_passages, unit_of
 from turnout.stages.mismatch_inputs import (
     MAX_SIMILAR_PASSAGES,
     Note,
@@ -295,8 +295,8 @@ def test_sections_that_are_asked_for_are_diagnosed_together():
     places = {"A": 2.0, "B": 15.0, "C": 40.0}
     sections = [SimpleNamespace(label=n, position=x, track="main") for n, x in places.items()]
     turnout = SimpleNamespace(sections=sections)
-    assert list(_neighbouring_sections(turnout, ())) == [("main", ("A",)), ("main", ("B",)), ("main", ("C",))]
-    assert list(_neighbouring_sections(turnout, ("A", "B"))) == [("main", ("A", "B"))]
+    assert list(neighbours_of(turnout, ())) == [("main", ("A",)), ("main", ("B",)), ("main", ("C",))]
+    assert list(neighbours_of(turnout, ("A", "B"))) == [("main", ("A", "B"))]
 
 
 def test_a_month_of_trains_keeps_the_extremes_of_speed_of_each():
