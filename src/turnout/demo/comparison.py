@@ -39,7 +39,7 @@ FINDING_QUERY = """
     select sentence from findings_newest where turnout_id = ? and verdict = 'named' and sections like '%' || ? || '%'"""
 
 CHANGE_QUERY = """
-    select sentence from change_findings
+    select split_part(sentence, '; ', 1) from change_findings
     where turnout_id = ? and list_contains(string_split(sections, ', '), ?)"""
 
 

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 from scipy.stats import t as student
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator, Mapping
+    from typing import Any
 
 BADGES = {
     "confirm now": "confirm",
@@ -219,3 +220,30 @@ def seconds(when: datetime) -> float:
     86400.0
     """
     return (when - EPOCH).total_seconds()
+
+
+def diagnoses_once(worklist: Iterable[Mapping[str, Any]]) -> Iterator[str]:
+    """The diagnosis of each row of the worklist, "as above for this turnout" where an earlier row has the same one.
+
+    Parameters
+    ----------
+    worklist : iterable of mapping
+        Rows of the worklist.
+
+    Yields
+    ------
+    str
+        "" for a row without a diagnosis.
+
+    Examples
+    --------
+    >>> rows = [{"turnout_id": "W1", "diagnosis": words} for words in ("a gap", None, "a gap")]
+    >>> list(diagnoses_once(rows))
+    ['a gap', '', 'as above for this turnout']
+    """
+    shown: set[tuple[str, str]] = set()
+    for work in worklist:
+        diagnosis = work.get("diagnosis") or ""
+        key = (work["turnout_id"], diagnosis)
+        yield "as above for this turnout" if diagnosis and key in shown else diagnosis
+        shown.add(key)

@@ -16,7 +16,7 @@ from turnout.readers.writing import write
 from turnout.registry.database import open_registry
 from turnout.registry.job import register
 from turnout.report.job import report_job
-from turnout.report.pages.turnout import line_of
+from turnout.report.pages.turnout import lines_of
 from turnout.report.panels.diagram import diagram
 from turnout.report.site import write_pages
 from turnout.stages.hammer import hammer_unit
@@ -126,10 +126,29 @@ def test_the_resonance_on_the_page_is_the_registrys_with_its_interval_and_n(page
 
 
 def test_a_line_without_a_change_says_of_which_sections_and_resonance_it_speaks():
-    silent = {"state": "cannot tell", "sections": "A8", "band": "railpad", "change_pct": None, "sentence": "too little"}
+    silent = {
+        "turnout_id": "W1",
+        "state": "cannot tell",
+        "sections": "A8",
+        "band": "railpad",
+        "change_pct": None,
+        "sentence": "too little",
+    }
     told = silent | {"state": "inspect this week", "change_pct": -9.2, "sentence": "railpad resonance of A8 fell"}
-    assert line_of(silent)["words"] == "A8, railpad: too little"
-    assert line_of(told)["words"] == told["sentence"]
+    assert [line["words"] for line in lines_of([silent, told])] == ["A8, railpad: too little", told["sentence"]]
+
+
+def test_a_diagnosis_on_which_two_alarms_rest_is_shown_once():
+    row = {
+        "turnout_id": "W1",
+        "state": "plan",
+        "sections": "A8",
+        "band": "railpad",
+        "change_pct": 1.0,
+        "sentence": "it fell",
+    }
+    rows = [row | {"diagnosis": "local pad; 4 tests"}, row, row | {"diagnosis": "local pad; 4 tests"}]
+    assert [line["diagnosis"] for line in lines_of(rows)] == ["local pad; 4 tests", "", "as above for this turnout"]
 
 
 def test_what_was_not_used_is_named_with_its_reason_and_remedy(pages):

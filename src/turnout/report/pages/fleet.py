@@ -6,7 +6,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from turnout.errors import REASONS
-from turnout.report.formatting import badge, day
+from turnout.report.formatting import badge, day, diagnoses_once
 from turnout.report.panels.diagram import HATCH
 from turnout.report.panels.lines import line_diagrams
 from turnout.report.source import BASELINE
@@ -80,7 +80,7 @@ def fleet_page(source: FleetSource, template: Template, shared: Mapping[str, Any
         latest=day(max((t["latest"] for t in turnouts if t["latest"]), default=None)),
         cards=_cards(lines),
         n_quarantined=sum(r["rows"] for r in reasons),
-        worklist=[_work(w) for w in worklist],
+        worklist=[_work(w, diagnosis) for w, diagnosis in zip(worklist, diagnoses_once(worklist))],
         n_more=worklist[0]["n_in_all"] - len(worklist) if worklist else 0,
         n_charts=of_charts.total(),
         charts=[f"{of_charts[state]} {state}" for state in STATES if of_charts[state]],
@@ -106,7 +106,8 @@ def _cards(lines: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     return [{"state": state, "n": counts[state], "badge": badge(state)} for state in shown]
 
 
-def _work(row: Mapping[str, Any]) -> dict[str, Any]:
+def _work(row: Mapping[str, Any], diagnosis: str) -> dict[str, Any]:
+    """One row of the list; of a diagnosis the first clause, the page of the turnout has all of it."""
     return {
         "turnout_id": row["turnout_id"],
         "label": row["sections"],
@@ -115,6 +116,7 @@ def _work(row: Mapping[str, Any]) -> dict[str, Any]:
         "state": row["state"],
         "badge": badge(row["state"]),
         "what": row["sentence"],
+        "diagnosis": diagnosis.partition("; ")[0],
         "how_sure": row["false_alarm_words"],
         "maintenance": row["last_maintenance"] or "none known",
         "look_at": row["look_at"],

@@ -6,7 +6,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from turnout.report import panels
-from turnout.report.formatting import badge, count_of, day, number_ranges, with_interval
+from turnout.report.formatting import badge, count_of, day, diagnoses_once, number_ranges, with_interval
 from turnout.report.panels.calibrated_model import calibrated_panels, visits_in_words
 from turnout.report.panels.diagram import diagram
 from turnout.report.panels.hammer import HammerTest
@@ -62,7 +62,7 @@ def turnout_page(
         place=_position_words(turnout),
         latest=day(max((m["measured_at_utc"] for m in models.values()), default=None)),
         diagram=diagram(rows["sections"], states) if rows["sections"] else "",
-        findings=[line_of(w) for w in rows["worklist"]],
+        findings=lines_of(rows["worklist"]),
         mismatches=[m["sentence"] for m in rows["mismatches"]],
         summary=[_summary(s, models.get(s["section_id"]), _rows_of(rows, "modes", s)) for s in rows["sections"]],
         sections=[_section(rows, s, models, states) for s in rows["sections"]],
@@ -83,25 +83,34 @@ def _rows_of(
     return [r for r in rows[table] if r["section_id"] == section["section_id"]]
 
 
-def line_of(work: Mapping[str, Any]) -> dict[str, str]:
-    """A row of the worklist as a line of the page; a sentence without a change gets the section and band in front.
+def lines_of(worklist: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
+    """Rows of the worklist as lines of the page; a sentence without a change gets the section and band in front.
 
-    Behind an alarm stands what the newest diagnosis of the section says, or why there is no decision.
+    Behind an alarm stands what the newest diagnosis of the section says, or why there is no decision. Alarms that rest
+    on the same diagnosis show it once.
 
     Parameters
     ----------
-    work : mapping
-        Row of the worklist.
+    worklist : sequence of mapping
+        Rows of the worklist of one turnout.
 
     Returns
     -------
-    dict
-        ``state``, ``badge``, ``words`` and ``anchor``, the label of the section that it concerns.
+    list of dict
+        ``state``, ``badge``, ``words``, ``diagnosis`` ("" without one) and ``anchor``, the label of the section that it
+        concerns.
     """
-    of = "" if work["change_pct"] is not None else f"{work['sections']}, {work['band']}: "
-    anchor = (work.get("section_id") or "").split("/")[-1].replace("*", "")
-    words = of + work["sentence"] + (f". Diagnosis: {work['diagnosis']}" if work.get("diagnosis") else "")
-    return {"state": work["state"], "badge": badge(work["state"]), "words": words, "anchor": anchor}
+    return [
+        {
+            "state": work["state"],
+            "badge": badge(work["state"]),
+            "words": ("" if work["change_pct"] is not None else f"{work['sections']}, {work['band']}: ")
+            + work["sentence"],
+            "diagnosis": diagnosis,
+            "anchor": (work.get("section_id") or "").split("/")[-1].replace("*", ""),
+        }
+        for work, diagnosis in zip(worklist, diagnoses_once(worklist))
+    ]
 
 
 def _position_words(turnout: Mapping[str, Any]) -> str:
