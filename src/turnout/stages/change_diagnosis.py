@@ -484,14 +484,15 @@ def _change_words(row: Mapping[str, Any]) -> str:
 
 
 def _parameter_words(row: Mapping[str, Any]) -> str:
-    """Size of the effect under trains with its 95 % interval, "" if they do not name it."""
-    from turnout.stages.mismatch_text import interval, number_in_words
+    """Size of the effect under trains with its 95 % interval, "" if they do not name it; a share by its meaning."""
+    from turnout.stages.mismatch_text import interval, number_in_words, parameter_in_words
 
     words = ""
     for p in json.loads(row.get("parameters_json") or "[]"):
         low, high = interval(p["term"], p["name"], p["value"], p["se"])
         value, low_end, high_end = (number_in_words(v, p["unit"]) for v in (p["value"], low, high))
-        words += f", {p['name']} {value} ({low_end} to {high_end}, 95 %)"
+        name = parameter_in_words(p["term"], p["name"]).rpartition(": ")[2] if p["unit"] == "-" else p["name"]
+        words += f", {name} {value} ({low_end} to {high_end}, 95 %)"
     return words
 
 
