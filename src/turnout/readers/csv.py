@@ -130,6 +130,7 @@ def _columns_in_memory(
     """All columns as arrays."""
     options = _options(data, offset, separator, len(names))
     line = _line_number(data, offset)
+    end = len(data)
     with source.parsed_by("pyarrow", f"the numbers after line {line}"), cell_errors(source, line, names):
         try:
             table = csv.read_csv(io.BytesIO(memoryview(data)[offset:]), **options)
@@ -138,6 +139,7 @@ def _columns_in_memory(
             if end == len(data):
                 raise
             table = csv.read_csv(io.BytesIO(memoryview(data)[offset:end]), **options)
+    _check_one_block(data, offset, end, source)
     columns = [column.to_numpy(zero_copy_only=False) for column in table.columns]
     for i, column in enumerate(columns):
         check_thousands(column, i, names[i], data, offset, separator, source)
@@ -167,6 +169,23 @@ def _start_of_footer(data: bytes | mmap, offset: int, separator: str) -> int:
     return end
 
 
+def _check_one_block(data: bytes | mmap, offset: int, end: int, source: Source) -> None:
+    """ReadError if an empty line separates rows from further ones: a summary of the columns, or another record.
+
+    The parser skips empty lines. They separate nothing where one follows each row.
+    """
+    empty = [i for mark in (b"\n\n", b"\n\r\n") if 0 <= (i := data.find(mark, offset, end))]
+    if not empty or not data[min(empty) : end].strip():
+        return
+    first = min(empty)
+    n_row = sum(1 for line in data[first:end].splitlines() if line.strip())
+    if b"\n" not in data[offset:first].strip(b"\r\n") and 2 * n_row <= data[first:end].count(b"\n") + 1:
+        return
+    problem = f"an empty line stands before its last {n_row} rows: they may be a summary or another record"
+    remedy = "Delete them if they are no samples; export each record to a file, or number them in a column 'record'"
+    raise source.error(f"line {_line_number(data, first) + 2}", problem, remedy, reason="wrong_length")
+
+
 def _lazy_columns(
     source: Source, data: bytes | mmap, offset: int, separator: str, names: Sequence[str], time: int | None
 ) -> list[Column]:
@@ -176,6 +195,7 @@ def _lazy_columns(
     line = _line_number(data, offset)
     with source.parsed_by("pyarrow", f"the numbers after line {line}"), cell_errors(source, line, names):
         times = rows.scan(time)
+    _check_one_block(data, offset, len(data), source)
     columns: list[Column] = [rows.column(i) for i in range(len(names))]
     if time is not None and times is not None:
         columns[time] = times

@@ -23,6 +23,7 @@ from turnout.readers.named_arrays import (
 )
 from turnout.readers.rate_words import is_rate_name, rate_unit
 from turnout.readers.source import COPY_AGAIN, MEANINGLESS_UNITS, Source
+from turnout.readers.stated_quantities import is_quantity_name
 from turnout.readers.stated_scales import is_scale_name
 from turnout.readers.stated_units import is_unit_name
 from turnout.readers.statements import Entry, entries_of_text
@@ -160,6 +161,11 @@ INVALID_VALUE = re.compile(
     r"CSV column #(\d+): (?:Row #(\d+): )?CSV conversion error to \w+: invalid value '(.*)'", re.DOTALL
 )
 
+OTHER_WIDTH = re.compile(r"CSV parse error: (?:Row #(\d+): )?Expected (\d+) columns, got (\d+): ?(.*)", re.DOTALL)
+NO_ROW_REMEDY = (
+    f"{COPY_AGAIN}; if the logger's own file has it too, delete the lines that are no samples or leave that record out"
+)
+
 
 def is_unreadable_number(cell: str) -> bool:
     """Whether a cell is a number with thousands marks or the mark of a missing number.
@@ -203,6 +209,11 @@ def cell_errors(source: Source, line: int, names: Sequence[str]) -> Iterator[Non
     try:
         yield
     except pa.ArrowInvalid as error:
+        if match := OTHER_WIDTH.search(str(error)):
+            where = f"line {line + int(match[1])}" if match[1] else f"the numbers after line {line}"
+            count = "1 cell" if match[3] == "1" else f"{match[3]} cells"
+            problem = f"a row has {count} instead of {match[2]}: {match[4].strip()[:60]!r}"
+            raise source.error(where, problem, NO_ROW_REMEDY) from error
         if not (match := INVALID_VALUE.search(str(error))):
             raise
         column, row, cell = int(match[1]), match[2], match[3]
@@ -212,8 +223,7 @@ def cell_errors(source: Source, line: int, names: Sequence[str]) -> Iterator[Non
             problem = f"{cell!r} has marks for thousands, or another decimal mark than other numbers"
             remedy = "Export all numbers with one decimal mark and without marks for thousands"
         else:
-            problem = f"{cell[:60]!r} is no number"
-            remedy = f"{COPY_AGAIN}; if it stands in the logger's own file too, leave that record out"
+            problem, remedy = f"{cell[:60]!r} is no number", NO_ROW_REMEDY
         raise source.error(where, problem, remedy) from error
 
 
@@ -408,8 +418,8 @@ def _entries(lines: Sequence[str], separator: str, names: Sequence[str]) -> Iter
             name = f"{match[1]} {match[2]}" if match[2] else match[1]
             pairs.append((name, match[3].strip(separator + ' "')))
         entries = [Entry(place, name.strip('"# '), value.strip('"')) for name, value in pairs]
-        if is_unit_name(cells[0]) and len(cells) > 2:
-            entries = [Entry(place, cells[0], cells[1:])]  # a unit for each column
+        if len(cells) > 2 and (is_unit_name(cells[0]) or is_quantity_name(cells[0])):
+            entries = [Entry(place, cells[0], cells[1:])]  # one for each column
         yield from entries or entries_of_text(text, place)
         if pairs and not any(is_rate_name(entry.name) for entry in entries):
             yield from entries_of_text(text, place)

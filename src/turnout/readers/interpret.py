@@ -19,8 +19,9 @@ from turnout.readers.lazy import BlockReader, ChannelStatistics, Column, channel
 from turnout.readers.lost_entries import lost_entry_errors
 from turnout.readers.rate_words import is_rate_name, rate_unit
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
+from turnout.readers.stated_quantities import contradicting_quantity, quantity_entries
 from turnout.readers.stated_units import contradicting_unit, is_meaningless, key_of_units
-from turnout.readers.statements import resolve
+from turnout.readers.statements import reduction_remark, resolve
 from turnout.readers.time_axes import all_statements, is_axis_name
 from turnout.readers.timing import check_order, is_plausible, start_errors, start_times
 from turnout.records import Channel, LongRecording, RawChannel, RawDescription, Recording
@@ -199,8 +200,12 @@ def _channel_mapping(index: int, record: RawRecord, raw: RawChannel, where: str,
 
 
 def _check_stated_units(record: RawRecord, index: int, raw: RawChannel, place: str, source: Source) -> None:
-    """ReadError if the metadata or the name of a channel state another unit than the one in use."""
+    """ReadError if the metadata or the name of a channel state another unit or quantity than the one in use."""
     unit_in_use = record.units[index] if not is_meaningless(record.units[index]) else raw.unit or ""
+    if quantity := contradicting_quantity(record, index, raw.quantity, unit_in_use):
+        problem = f"the file says that its quantity is {quantity}, the layout {raw.quantity} in {unit_in_use!r}"
+        remedy = f"Correct the channel map; if the layout is right, set 'unit: {unit_in_use}!' for this channel"
+        raise source.error(place, problem, remedy, reason="unit_unknown")
     rival = contradicting_unit(record, index, raw.unit, raw.quantity, lambda unit: _is_usable(unit, raw))
     if not rival:
         return
@@ -323,7 +328,8 @@ def convert_records(
     """
     if not raw.records and not raw.expected:
         raise source.error("the file", "it holds no record", COPY_AGAIN, reason="empty")
-    recordings, errors = [], []
+    recordings: list[Recording | LongRecording] = []
+    errors: list[ReadError] = []
     stamps = [(k, record.started_at) for k, record in enumerate(raw.records) if not isinstance(record, ReadError)]
     starts = start_times(stamps, description.time_zone)
     order_errors = check_order(starts, source)
@@ -342,7 +348,8 @@ def convert_records(
                 record, k, len(raw.records), started_at, assignments, description, source, limit
             )
             recordings.append(recording)
-            errors.extend(channel_errors)
+            remarked = {error.problem for error in errors if error.reason == "wrong_rate"}  # once for all records
+            errors.extend(error for error in channel_errors if error.problem not in remarked)
         except ReadError as error:
             errors.append(error)
     errors.extend(_count_errors(raw, description, source))
@@ -472,7 +479,8 @@ class Assignments:
         if self._has_sensitivity and stated_scales.sensitivity_entries(record.entries):
             sensitivities = tuple(f"{entry.place}: {entry.name}: {entry.value}" for entry in record.entries)
         aliases = () if is_named else record.aliases
-        stated = sensitivities, key_of_units(record.entries)
+        quantities = tuple((e.place, e.name, str(e.value)) for e in quantity_entries(record.entries))
+        stated = sensitivities, key_of_units(record.entries), quantities
         return record.names, record.units, aliases, tuple(record.undecided.items()), stated
 
     def mappings(self, record: RawRecord, where: str) -> tuple[ChannelMapping, ...]:
@@ -544,7 +552,8 @@ def _recording(
         "started_at": started_at,
         "conditions": MappingProxyType(dict(record.conditions)),
     }
-    channel_errors = list(faults.values())
+    remark = reduction_remark(statements, rate, where, source)
+    channel_errors = [*faults.values(), *([remark] if remark else [])]
     if is_long:
         return LongRecording(block_reader.subset(usable), n_sample, **fields), channel_errors
     return Recording(samples=samples if not faults else samples[usable], **fields), channel_errors

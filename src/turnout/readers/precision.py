@@ -54,6 +54,22 @@ class Interval:
         """The interval if the number was rounded."""
         return Interval(self.rate, self.loose_low, self.loose_high, self.loose_low, self.loose_high)
 
+    def divide(self, factor: int) -> "Interval":
+        """The interval of a rate divided by a factor.
+
+        Parameters
+        ----------
+        factor : int
+            Above 0.
+
+        Returns
+        -------
+        Interval
+            Rate and bounds divided by it.
+        """
+        bounds = (self.rate, self.low, self.high, self.loose_low, self.loose_high)
+        return Interval(*(bound / factor for bound in bounds))
+
     def overlaps(self, other: "Interval") -> bool:
         """Whether both can be the same rate.
 

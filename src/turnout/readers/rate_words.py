@@ -245,7 +245,7 @@ def name_meaning(name: str) -> NameMeaning:
     ):
         unit = rate_unit(words[-1])
         words = words[:-1] if unit else words
-    certainty, is_step = _meaning(words)
+    certainty, is_step = _meaning([w for w in words if not (REDUCTION.search(w) if unit else REDUCED.search(w))])
     spaced = " ".join(words)
     if unit is not None and certainty == NOT and words and not OTHER.search(spaced):
         if not unit.is_step or unit.is_sampling:
@@ -297,6 +297,34 @@ def _meaning(words: list[str]) -> tuple[int, bool | None]:
     if is_step or is_rate:
         return POSSIBLY, (is_step if is_step != is_rate else None)
     return (POSSIBLY if joined in POSSIBLE else NOT), (False if joined in POSSIBLE_RATES else None)
+
+
+# A reduction of the sampling rate behind the converter, and words for what is reduced.
+REDUCTION = re.compile(
+    r"decimat|decimi|dezimat|dezimier|downsampl|subsampl|oversampl|unterabtast|uberabtast|sousechant|surechant"
+    r"|submuestr|sobremuestr|sottocampion|sovracampion|nedsampl|thinning|stride"
+)
+REDUCED = re.compile(r"decimated|dezimierte|downsampled|subsampled|unterabgetastet|decimee?s?$")
+
+
+@lru_cache(maxsize=4096)
+def reduction_of_name(name: str) -> str:
+    """Whether a name speaks of a reduction of the sampling rate: samples that were left out or averaged.
+
+    Parameters
+    ----------
+    name : str
+        Name of an entry.
+
+    Returns
+    -------
+    str
+        "factor" for "Decimation" and the like, "rate" for "Decimated rate" and the like, "" for any other name.
+    """
+    words = (*(words := words_of(name)), "".join(words))
+    if any(REDUCED.search(word) for word in words):
+        return "rate"
+    return "factor" if any(REDUCTION.search(word) for word in words) else ""
 
 
 def is_rate_name(name: str) -> bool:

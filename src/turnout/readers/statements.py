@@ -7,6 +7,7 @@ A statement that contradicts it beyond rounding, and an entry that may be a rate
 """
 
 import json
+import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,7 +19,7 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.precision import EXACT_PRECISION, NUMBER, Interval, around, readings
-from turnout.readers.rate_words import CERTAIN, NOT, POSSIBLY, RateUnit, name_meaning, rate_unit
+from turnout.readers.rate_words import CERTAIN, NOT, POSSIBLY, RateUnit, name_meaning, rate_unit, reduction_of_name
 from turnout.readers.source import Source
 
 MAX_CLOCK_DRIFT = 1e-4  # relative: two clocks of one logger with separate crystals may differ by this much
@@ -42,11 +43,15 @@ TIME_SCALES = (1.0, 1e-3, 1e-6, 1e-9, 60.0, 3600.0, 86400.0)
 
 @dataclass(frozen=True)
 class Entry:
-    """An entry of the metadata: ``value`` (text, number, list, mapping) under ``name``; ``place`` is where it is."""
+    """An entry of the metadata: ``value`` (text, number, list, mapping) under ``name``; ``place`` is where it is.
+
+    ``is_defined`` is True if the format defines it: then it is about the samples as they are in the file.
+    """
 
     place: str
     name: str
     value: Any
+    is_defined: bool = False
 
 
 @dataclass(frozen=True)
@@ -54,7 +59,8 @@ class Statement:
     """A statement about the sampling rate: where it is, as it is written, and the intervals it may mean.
 
     The first of ``intervals`` is the usual meaning; without any it is not understood. ``certainty`` is CERTAIN or
-    POSSIBLY. ``is_clock`` marks a time axis, whose clock may drift.
+    POSSIBLY. ``is_clock`` marks a time axis, whose clock may drift. ``factor`` above 1 is one by which the file states
+    that samples were left out: its rate may be the one before.
     """
 
     place: str
@@ -62,6 +68,7 @@ class Statement:
     intervals: tuple[Interval, ...]
     certainty: int = CERTAIN
     is_clock: bool = False
+    factor: int = 1
 
     @property
     def usual(self) -> Interval:
@@ -120,7 +127,7 @@ def rate_entry(place: str, rate: Any) -> Entry:
     Entry
         Under a name that is understood.
     """
-    return Entry(place, "sampling rate [Hz]", rate)
+    return Entry(place, "sampling rate [Hz]", rate, is_defined=True)
 
 
 def step_entry(place: str, step: Any, unit: str = "s") -> Entry:
@@ -141,7 +148,7 @@ def step_entry(place: str, step: Any, unit: str = "s") -> Entry:
         Under a name that is understood.
     """
     known = rate_unit(unit)
-    return Entry(place, f"sampling interval [{unit if known and known.is_step else 's'}]", step)
+    return Entry(place, f"sampling interval [{unit if known and known.is_step else 's'}]", step, is_defined=True)
 
 
 def entries_of(variables: Mapping[Any, Any], place: str) -> Iterator[Entry]:
@@ -241,13 +248,28 @@ def statements_of(entries: Iterable[Entry], k: int = 0, n: int = 1) -> list[Stat
     25600.0
     """
     found: dict[tuple[str, str], Statement] = {}
+    factors: dict[str, int] = {}  # by name: each channel may state the same one
     for entry in entries:
+        reduction = reduction_of_name(entry.name)
         for value in _values(entry.value, k, n):
             if isinstance(value, (bool, np.bool_)) or not isinstance(value, (str, int, float, np.number)):
                 continue
+            if reduction == "factor":
+                factors[entry.name.strip().casefold()] = reduction_factor(value)
             for statement in _statements_of_value(entry.name, value, type(value).__name__):
-                found.setdefault((entry.place, statement.text), replace(statement, place=entry.place))
-    return list(found.values())
+                is_final = bool(reduction) or entry.is_defined
+                statement = replace(statement, place=entry.place, factor=0 if is_final else 1)
+                found.setdefault((entry.place, statement.text), statement)
+    factor = math.prod(factors.values())
+    return [_with_factor(statement, factor) for statement in found.values()]
+
+
+def _with_factor(statement: Statement, factor: int) -> Statement:
+    """The statement with the rate behind a reduction as a further meaning, unless it is about the samples."""
+    if not statement.factor or factor == 1 or statement.certainty != CERTAIN:
+        return replace(statement, factor=1)
+    reduced = tuple(i.divide(factor) for i in statement.intervals)
+    return replace(statement, intervals=statement.intervals + reduced, factor=factor)
 
 
 @lru_cache(maxsize=4096)
@@ -264,6 +286,32 @@ def _values(value: Any, k: int, n: int) -> list[Any]:
     else:
         values = [value]
     return [v.decode("utf-8", "replace") if isinstance(v, bytes) else v for v in values]
+
+
+MAX_FACTOR = 10**5  # samples of the converter for each sample of the file
+
+
+def reduction_factor(value: Any) -> int:
+    """The factor of a reduction of the sampling rate, as in 4, "4", "4x" or "1:4".
+
+    Parameters
+    ----------
+    value : any
+        Value of an entry.
+
+    Returns
+    -------
+    int
+        1 for any other value.
+
+    Examples
+    --------
+    >>> reduction_factor(4.0), reduction_factor("1:8"), reduction_factor("none"), reduction_factor("6400 Hz")
+    (4, 8, 1, 1)
+    """
+    match = re.fullmatch(r"(?:x|1[:/])?\s*(\d+)(?:[.,]0*)?\s*(?:x|:1|fold)?", str(value).strip().casefold())
+    factor = int(match[1]) if match else 1
+    return factor if 1 <= factor <= MAX_FACTOR else 1
 
 
 def _statements(entry: Entry, value: Any) -> Iterator[Statement]:
@@ -414,6 +462,8 @@ def resolve(statements: Sequence[Statement], promised: float | None, where: str,
         return float(layout.rate)
     statement, interval = holding
     _check_axes(statements, interval.widen(MAX_CLOCK_DRIFT if statement.is_clock else 0.0), where, source)
+    if layout is None and len(_common_meanings(certain)) > 1 and statement.factor > 1:
+        raise source.error(where, _reduction_problem(statement), RATE_REMEDY, reason="wrong_rate")
     if layout is not None:
         drift = MAX_CLOCK_DRIFT if statement.is_clock else 0.0
         if not interval.widen(drift).overlaps(layout):
@@ -433,6 +483,47 @@ def resolve(statements: Sequence[Statement], promised: float | None, where: str,
     is_unique = interval.rate * interval.width < 0.5
     is_within = max(interval.low, whole * (1 - 1e-12)) <= min(interval.high, whole * (1 + 1e-12))
     return float(whole) if is_unique and is_within else interval.rate
+
+
+def _common_meanings(certain: Sequence[Statement]) -> list[Interval]:
+    """The meanings of the first statement with which all others agree."""
+    return [i for i in certain[0].intervals if all(s.agrees_with(i) for s in certain[1:])]
+
+
+def _reduction_problem(statement: Statement) -> str:
+    before, after = statement.intervals[0].rate, statement.intervals[-1].rate
+    return (
+        f"{statement} may be the rate before a reduction by {statement.factor}, which the file states as well: its "
+        f"samples may be at {before:.9g} or {after:.9g} Hz"
+    )
+
+
+def reduction_remark(statements: Sequence[Statement], rate: float, where: str, source: Source) -> ReadError | None:
+    """Remark on a record whose rate in the layout is the one before a reduction, if nothing else confirms it.
+
+    Parameters
+    ----------
+    statements : sequence of Statement
+        All statements of the file about the record.
+    rate : float
+        Rate with which it is read. [Hz]
+    where : str
+        The record, for the message.
+    source : Source
+        The raw file.
+
+    Returns
+    -------
+    ReadError or None
+        None without a reduction, or if a time axis or the format itself states this rate.
+    """
+    certain = [s for s in statements if s.certainty == CERTAIN and s.intervals]
+    if not any(s.factor > 1 for s in certain) or len(meanings := _common_meanings(certain)) < 2:
+        return None
+    if meanings[-1].loose.overlaps(around(rate, EXACT_PRECISION)):
+        return None
+    problem = f"{_reduction_problem(certain[0])}; {rate:.9g} Hz is used"
+    return source.error(where, problem, "Find out which it is, and correct the rate in the layout", reason="wrong_rate")
 
 
 RATE_REMEDY = "Give the rate in the layout, or as hammer_rate_hz or passage_rate_hz in turnouts.tsv"
@@ -456,9 +547,9 @@ def _most_precise(
         interval = agreeing[0] if agreeing else first.usual
         is_usual = first.is_clock and USUAL_RATES[0] <= interval.rate <= USUAL_RATES[1]
         if layout is None and len(first.intervals) > 1 and not is_usual and len(ordered) == 1:
-            problem = (
-                f"{first.text!r} in {first.place} may mean {' or '.join(f'{i.rate:.9g} Hz' for i in first.intervals)}"
-            )
+            meanings = " or ".join(f"{i.rate:.9g} Hz" for i in first.intervals)
+            problem = f"{first.text!r} in {first.place} may mean {meanings}"
+            problem = _reduction_problem(first) if first.factor > 1 else problem
             raise source.error(where, problem, RATE_REMEDY, reason="wrong_rate")
     drift = MAX_CLOCK_DRIFT if first.is_clock else 0.0
     for other in ordered[1:]:

@@ -221,7 +221,9 @@ def _entries(channels: Sequence[nptdms.TdmsChannel], groups: Mapping[str, Mappin
     places += [(f"property of the channel {c.name!r}", c.properties) for c in channels]
     for place, values in places:
         stated = {name: value for name, value in values.items() if name != "wf_increment" or value != 0}
-        yield from (Entry(f"{place}: {entry.name}", entry.name, entry.value) for entry in entries_of(stated, ""))
+        for entry in entries_of(stated, ""):
+            is_step = entry.name == "wf_increment"
+            yield Entry(f"{place}: {entry.name}", entry.name, entry.value, is_defined=is_step)
 
 
 def _check_steps(channels: Sequence[nptdms.TdmsChannel], where: str, source: Source) -> None:

@@ -15,6 +15,7 @@ from turnout.errors import ReadError
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.rate_words import rate_unit
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, Source, load, number_or_text
+from turnout.readers.stated_quantities import DEFINED_NAME
 from turnout.readers.stated_scales import entry_statements
 from turnout.readers.statements import Entry, entries_of_text, step_entry
 from turnout.readers.timing import check_simultaneous, is_unread_uff_time, parse_uff_time
@@ -27,6 +28,7 @@ PROMISED_RECORDS = re.compile(r"record \d+ of (\d+)$")
 TIME_RESPONSE, FREQUENCY_RESPONSE, TIME_AXIS = 1, 4, 17
 # Unit of a specific data type (records 9 and 10) without a label, where dataset 164 states SI.
 SI_OF_TYPE = {8: "m", 9: "N", 11: "m/s", 12: "m/s²", 13: "N", 15: "Pa"}
+QUANTITY_OF_TYPE = {8: "displacement", 9: "force", 11: "velocity", 12: "acceleration", 13: "force"}
 DIRECTIONS = {0: "", 1: "+X", 2: "+Y", 3: "+Z", -1: "-X", -2: "-Y", -3: "-Z", 4: "+RX", 5: "+RY", 6: "+RZ"}
 
 
@@ -176,8 +178,19 @@ def _records(
     n = len(ordered)
     for k, group in enumerate(ordered):
         yield _record(group, channels, k, n, stated_units, source)
+    last = max((s.offset for s in named), default=-1)
+    trailing = [s for s in nameless if not s.dataset_type and s.offset > last]
     for dataset in nameless:
-        yield source.error(f"record {n + 1}, byte {dataset.offset}", dataset.damage, COPY_AGAIN, reason="truncated")
+        if dataset not in trailing:
+            yield source.error(f"record {n + 1}, byte {dataset.offset}", dataset.damage, COPY_AGAIN, reason="truncated")
+    if trailing and _promised_count(named) != n:
+        problem = f"{trailing[0].damage}, behind its last set"
+        yield source.error(f"record {n + 1}, byte {trailing[0].offset}", problem, TRAILING_REMEDY, reason="truncated")
+
+
+TRAILING_REMEDY = (
+    "If the analyser's own file has more sets, copy it again; if it ends so too, delete what follows the last set"
+)
 
 
 def _channel_key(dataset: UffDataset) -> ChannelKey:
@@ -218,7 +231,7 @@ def _record(
     return RawRecord(
         names=names,
         samples=[s.data for s in sets],
-        entries=tuple(_entries(sets)),
+        entries=(*_entries(sets), *_quantities(sets, names)),
         units=tuple(_unit(s.labels[1], stated_units) for s in sets),
         started_at=parse_uff_time(first.ids[2]),
         unread_start=first.ids[2] if is_unread_uff_time(first.ids[2]) else "",
@@ -258,8 +271,7 @@ def _distinct_names(channels: Sequence[ChannelKey]) -> tuple[tuple[str, ...], tu
 def _unit(axis: tuple[int, str, str], stated_units: FileUnits | None) -> str:
     """Unit of an ordinate: its label, else that of its data type in the units of dataset 164."""
     data_type, _, label = axis
-    blank = label.upper() in ("", "NONE", "UNKNOWN")
-    if not blank:
+    if not _is_blank(label):
         return label
     si = SI_OF_TYPE.get(data_type, "")
     if not si or stated_units is None:
@@ -267,6 +279,10 @@ def _unit(axis: tuple[int, str, str], stated_units: FileUnits | None) -> str:
     scale = {"N": stated_units.force, "Pa": stated_units.force / stated_units.length**2}.get(si, stated_units.length)
     candidates = UNITS[conversion(si).dimension]
     return next((u for u, (s, _) in candidates.items() if abs(s / scale - 1.0) < FACTOR_PRECISION), f"{scale:.9g} {si}")
+
+
+def _is_blank(label: str) -> bool:
+    return label.upper() in ("", "NONE", "UNKNOWN")
 
 
 FACTOR_PRECISION = 1e-5  # relative: factors of dataset 164 are printed with few digits
@@ -280,6 +296,14 @@ def _entries(sets: Sequence[UffDataset]) -> Iterator[Entry]:
         for i, text in enumerate(dataset.ids, 1):
             if i != 3 and text not in ("", "NONE"):
                 yield from entries_of_text(text, f"ID line {i}")
+
+
+def _quantities(sets: Sequence[UffDataset], names: Sequence[str]) -> Iterator[Entry]:
+    """The quantity of each ordinate by its data type (record 9); a label of its unit counts more than the type."""
+    for dataset, name in zip(sets, names):
+        quantity = QUANTITY_OF_TYPE.get(dataset.labels[1][0])
+        if quantity and _is_blank(dataset.labels[1][2]):
+            yield Entry(f"data type of the ordinate {name!r}", DEFINED_NAME, quantity)
 
 
 def _seconds_per_x(dataset: UffDataset) -> float:

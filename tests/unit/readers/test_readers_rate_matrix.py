@@ -504,3 +504,32 @@ def test_a_start_time_under_any_name_is_read_or_reported(format, tmp_path):
     write_file(tmp_path / name, [("rate", TRUE), ("Recorded on", "2026-05-13 10:00"), ("Start", "2026-05-14 10:00")])
     (error,) = read(name, tmp_path, described(TRUE)).errors
     assert error.reason == "wrong_time" and "2026-05-14" in error.problem
+
+
+@pytest.mark.parametrize("format", FORMATS)
+@pytest.mark.parametrize("name", ["Decimation", "Downsampling factor", "Unterabtastung", "Facteur de décimation"])
+def test_a_reduction_beside_a_rate_is_applied_or_reported(format, name, tmp_path):
+    """The file states twice the true rate and a reduction by two; a format that states the true rate decides."""
+    write_file, file_name, states_rate = FORMATS[format]
+    if format == "uff" and not name.isascii():
+        pytest.skip("the text is in ASCII")
+    path = tmp_path / file_name
+    word = plain(name) if format == "mat" else name
+    write_file(path, [("Sample rate", 2 * TRUE), (word, 2)])
+    assert is_true(outcome(path, described(TRUE)))
+    if states_rate:
+        assert is_true(outcome(path, described(None))) and is_rejected(outcome(path, described(2 * TRUE)))
+        return
+    assert is_rejected(outcome(path, described(None)), "reduction by 2", "51200 or 25600 Hz")
+    rate, remark = outcome(path, described(2 * TRUE))
+    assert rate == 2 * TRUE and remark.reason == "wrong_rate" and "reduction by 2" in str(remark)
+    write_file(path, [("Sample rate", TRUE), (word, 1)])
+    assert is_true(outcome(path, described(None)))
+
+
+def test_a_reduced_rate_beside_the_one_before_decides(tmp_path):
+    for entries in ([("Sample rate", 2 * TRUE), ("Decimated rate", "25600 Hz")], [("Rate", TRUE), ("dt", 1 / TRUE)]):
+        write_csv(tmp_path / "a.csv", [*entries, ("Decimation", 2)])
+        assert is_true(outcome(tmp_path / "a.csv", described(TRUE))) == (len(entries[0][0]) > 4)
+    write_csv(tmp_path / "a.csv", [("Sample rate", 2 * TRUE), ("Decimation", 2)], {"t": np.arange(N_SAMPLE) / TRUE})
+    assert is_true(outcome(tmp_path / "a.csv", described(None, "t")))

@@ -272,8 +272,8 @@ def test_a_word_among_the_numbers_is_said_with_its_line_and_column(tmp_path):
     with pytest.raises(ReadError) as caught:
         read("a.csv", tmp_path, NAMED)
     assert str(caught.value) == (
-        "a.csv, line 53, column 'force': 'overload' is no number. Copy the file again from the logger; if it stands in "
-        "the logger's own file too, leave that record out."
+        "a.csv, line 53, column 'force': 'overload' is no number. Copy the file again from the logger; if the logger's "
+        "own file has it too, delete the lines that are no samples or leave that record out."
     )
 
 
@@ -397,3 +397,29 @@ def test_half_a_letter_of_utf16_is_said(tmp_path):
     (tmp_path / "a.csv").write_bytes("force,acc\n1,2\n".encode("utf-16")[:-1])
     with pytest.raises(ReadError, match="the text in UTF-16"):
         read("a.csv", tmp_path, NAMED)
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_rows_behind_an_empty_line_are_no_samples(end, tmp_path):
+    rows = [f"{x:.4f};{y:.4f}" for x, y in X]
+    texts = {
+        "summary": [*rows, "", "-9.1000;9.3000"],
+        "second block": [*rows, "", *rows],
+        "in the middle": [*rows[:20], "", *rows[20:]],
+    }
+    for label, lines in texts.items():
+        (tmp_path / "a.csv").write_bytes(end.join(["rate: 20000", "force;acc", *lines, ""]).encode())
+        with pytest.raises(ReadError, match="an empty line stands before its last") as caught:
+            read("a.csv", tmp_path, NAMED)
+        assert caught.value.reason == "wrong_length", label
+    for lines in ([*rows, "", ""], ["", *rows], [line for row in rows for line in (row, "")]):
+        (tmp_path / "a.csv").write_bytes(end.join(["rate: 20000", "force;acc", *lines, ""]).encode())
+        assert read("a.csv", tmp_path, NAMED).recordings[0].n_sample == len(rows)
+
+
+def test_a_footer_of_another_width_is_said_with_its_line(tmp_path):
+    (tmp_path / "a.csv").write_text(f"rate: 20000\nforce;acc\n{COMMAS}Mean\n0,5;0,4\n")
+    with pytest.raises(ReadError) as caught:
+        read("a.csv", tmp_path, NAMED)
+    assert caught.value.where == "line 53" and "'Mean'" in caught.value.problem
+    assert "delete the lines that are no samples" in caught.value.remedy

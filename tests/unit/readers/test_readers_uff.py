@@ -260,3 +260,63 @@ def test_ordinates_without_a_label_are_in_the_units_of_dataset_164(code, length,
     assert (not result.errors) == (code == 1)
     if code != 1:
         assert result.errors[0].reason == "unit_unknown"
+
+
+def universal_file(tmp_path, *changes):
+    """Two records of a force [N, type 13] and a rail [m/s², type 12], with replacements in the text."""
+    channels = (Channel("force", "force"), Channel("rail", "acceleration"))
+    samples = np.random.default_rng(5).normal(size=(2, 64)) * [[900.0], [30.0]]
+    write([Recording(samples, 25600.0, channels)] * 2, tmp_path / "a.uff", "uff58")
+    text = (tmp_path / "a.uff").read_text(encoding="utf-8")
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    (tmp_path / "a.uff").write_text(text, encoding="utf-8")
+    return samples
+
+
+LABELS = ((f"{'N':<20}", f"{'NONE':<20}"), (f"{'m/s²':<20}", f"{'NONE':<20}"))
+
+
+@pytest.mark.parametrize("code, quantity", [(8, "displacement"), (11, "velocity"), (13, "force")])
+def test_the_data_type_of_an_ordinate_is_the_quantity_of_the_layout(code, quantity, tmp_path):
+    """Without dataset 164 and label nothing says the unit, and still the numbers are no accelerations."""
+    samples = universal_file(tmp_path, *LABELS, (f"{12:10d}{0:5d}{0:5d}{0:5d}", f"{code:10d}{0:5d}{0:5d}{0:5d}"))
+    force = RawChannel("force", "force", "force", unit="N")
+    rail = RawChannel("rail", "rail", "acceleration", unit="m/s²")
+    result = read("a.uff", tmp_path, RawDescription((force, rail)))
+    assert result.recordings == ()
+    assert result.errors[0].reason == "unit_unknown" and quantity in str(result.errors[0])
+    (recording, _) = read("a.uff", tmp_path, RawDescription((force, replace(rail, unit="m/s²!")))).recordings
+    np.testing.assert_allclose(recording.samples, samples, rtol=1e-6)
+
+
+def test_the_layout_states_the_unit_that_a_data_type_leaves_open(tmp_path):
+    samples = universal_file(tmp_path, *LABELS)
+    channels = [RawChannel("force", "force", "force"), RawChannel("rail", "rail", "acceleration", unit="g")]
+    assert "says the unit" in str(read("a.uff", tmp_path, RawDescription(tuple(channels))).errors[0])
+    channels[0] = replace(channels[0], unit="kN")
+    (recording, _) = read("a.uff", tmp_path, RawDescription(tuple(channels))).recordings
+    np.testing.assert_allclose(recording.samples, samples * [[1000.0], [9.80665]], rtol=1e-6)
+    volts = replace(channels[1], unit="V", sensitivity=10.0, sensitivity_unit="mV/g")
+    (error, _) = read("a.uff", tmp_path, RawDescription((channels[0], volts))).errors
+    assert error.reason == "unit_unknown" and "acceleration" in error.problem
+
+
+DELIMITER = "    -1\n"
+TAILS = [DELIMITER, 2 * DELIMITER, f"{DELIMITER}End\n{DELIMITER}", "End\n", "\x1a", DELIMITER + "text\n" * 99]
+
+
+@pytest.mark.parametrize("tail", TAILS)
+def test_text_behind_the_last_set_is_no_damage(tail, tmp_path):
+    """The file states its records; without such a number a further set may be missing."""
+    universal_file(tmp_path)
+    description = RawDescription((RawChannel("force", "force", "force"), RawChannel("rail", "rail", "acceleration")))
+    path = tmp_path / "a.uff"
+    path.write_text(path.read_text(encoding="utf-8") + tail, encoding="utf-8")
+    result = read("a.uff", tmp_path, description)
+    assert len(result.recordings) == 2 and result.errors == ()
+    path.write_text(path.read_text(encoding="utf-8").replace(" of 2 ", " /// "), encoding="utf-8")
+    result = read("a.uff", tmp_path, description)
+    assert len(result.recordings) == 2 and len(result.errors) <= 1
+    assert all("delete what follows the last set" in error.remedy for error in result.errors)

@@ -10,7 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import scipy.io
-from tests.unit.readers.test_readers_rate_matrix import SAMPLES, SENSORS, TRUE
+from tests.unit.readers.test_readers_rate_matrix import SAMPLES, SENSORS, TRUE, plain
 
 from turnout.errors import ReadError
 from turnout.readers import names_and_units, read
@@ -152,3 +152,28 @@ def test_two_units_of_one_channel_are_reported(tmp_path):
         file["force"].attrs["Einheit"] = "kN"
     found = outcome(tmp_path / "a.h5")
     assert is_rejected(found, "kN") and "'N'" in str(found)
+
+
+QUANTITIES = {
+    "Quantity": ("Force", "Acceleration"),
+    "Messgröße": ("Kraft", "Beschleunigung"),
+    "sensor_type": ("force", "IEPE accelerometer"),
+    "grandeur": ("force", "accélération"),
+}
+
+
+@pytest.mark.parametrize("format", FORMATS)
+@pytest.mark.parametrize("key", QUANTITIES)
+def test_a_stated_quantity_must_be_that_of_the_layout(format, key, tmp_path):
+    """Right; the rail as a displacement; the sensors exchanged; overruled."""
+    writer, name = FORMATS[format]
+    key_in_file = plain(key) if format == "mat" else key
+    right = QUANTITIES[key]
+    for texts, is_right in ((right, True), ((right[0], "Displacement"), False), (right[::-1], False)):
+        writer(tmp_path / name, key_in_file, texts)
+        found = outcome(tmp_path / name)
+        if is_right:
+            assert is_read(found), (key, texts)
+        else:
+            assert isinstance(found, ReadError) and found.reason == "unit_unknown" and "quantity" in str(found), texts
+            assert is_read(outcome(tmp_path / name, tuple(replace(s, unit=f"{s.unit}!") for s in SENSORS)))
