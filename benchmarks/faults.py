@@ -24,7 +24,7 @@ from pathlib import Path
 
 from turnout.config import load_configuration
 from turnout.content import sha256_of
-from turnout.registry import database, schema
+from turnout.registry import database, schema, view_texts
 from turnout.registry.compaction import compact
 from turnout.registry.generation import load
 from turnout.registry.ids import content_id
@@ -177,7 +177,7 @@ def use_small_schema():
     for table in columns:
         if table not in TABLES_IN_USE:
             columns[table] = type(columns[table])(c for c in columns[table] if c.key or c.name in COLUMNS_OF_VIEWS)
-    texts = dict(database.view_files())
+    texts = dict(view_texts.view_files())
     needed, waiting = set(), list(VIEWS)
     while waiting:
         name = waiting.pop()
@@ -186,8 +186,7 @@ def use_small_schema():
             lines = re.findall(r"^--\s*needs:(.*)$", texts[name], re.M)
             waiting += [n.strip() for line in lines for n in line.split(",")]
     chosen = {n: t for n, t in texts.items() if n in needed}
-    database.view_files = lambda: chosen
-    database._comment = lambda con: None
+    view_texts.view_files = lambda: chosen
 
 
 def in_child(function, arm=None):

@@ -6,12 +6,13 @@ import pytest
 
 from turnout.errors import REASONS
 from turnout.registry import documentation
-from turnout.registry.database import open_registry, view_files
+from turnout.registry.database import open_registry
 from turnout.registry.documentation import views
 from turnout.registry.job import register
 from turnout.registry.schema import ARROW_TYPES, FILLED_BY_REGISTER, key, sort_order, tables, time_column
 from turnout.registry.staging import CHILDREN
 from turnout.registry.supersede import KINDS, LARGE_TABLES
+from turnout.registry.view_texts import view_files
 
 UNIT_SUFFIX = {
     "_hz": "Hz", "_pct": "%", "_c": "°C", "_t": "t", "_kmh": "km/h", "_ms2": "m/s²", "_at_utc": "UTC", "_utc": "UTC",

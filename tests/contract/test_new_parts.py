@@ -10,7 +10,7 @@ import pytest
 import turnout.readers
 from turnout.readers import formats, read
 from turnout.records import RawChannel, RawDescription
-from turnout.registry import database
+from turnout.registry import view_texts
 from turnout.registry.job import register
 
 READER = '''"""Reader of a format with one channel: the rate in the first line, then one sample in each line."""
@@ -57,9 +57,11 @@ def views_folder(tmp_path, monkeypatch):
     """A folder of views to which a file can be added."""
     folder = tmp_path / "registry_package"
     shutil.copytree(str(files("turnout.registry")), folder, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
-    monkeypatch.setattr(database, "files", lambda package: folder if package == "turnout.registry" else files(package))
+    monkeypatch.setattr(
+        view_texts, "files", lambda package: folder if package == "turnout.registry" else files(package)
+    )
     for function in ("view_files", "view_columns"):
-        monkeypatch.setattr(database, function, getattr(database, function).__wrapped__)
+        monkeypatch.setattr(view_texts, function, getattr(view_texts, function).__wrapped__)
     return folder / "views"
 
 

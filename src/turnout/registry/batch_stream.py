@@ -17,7 +17,8 @@ from turnout.registry.intake import Arrival
 if TYPE_CHECKING:
     from typing import Any
 
-CHUNK_SIZE = 1024  # units per chunk that is in memory at once
+CHUNK_SIZE = 4096  # units per chunk that is in memory at once
+CHUNK_ROWS = 16_384  # rows of a chunk, from which on it takes no further unit
 
 
 def token(path: str | PathLike) -> str:
@@ -153,8 +154,12 @@ def table_arrivals(tables: Mapping[str, list[dict]], first_index: int) -> list[A
     ]  # fmt: skip
 
 
-def chunks(arrivals: Iterable[Arrival], size: int = CHUNK_SIZE) -> Iterator[list[Arrival]]:
-    """Lists of at most ``size`` units, which limits the memory.
+def chunks(
+    arrivals: Iterable[Arrival], size: int = CHUNK_SIZE, n_most_rows: int = CHUNK_ROWS
+) -> Iterator[list[Arrival]]:
+    """Lists of units, of which each but the last has ``size`` units or at least ``n_most_rows`` rows.
+
+    That limits the memory, and small units come in large lists, because each list has a cost of its own.
 
     Parameters
     ----------
@@ -162,18 +167,28 @@ def chunks(arrivals: Iterable[Arrival], size: int = CHUNK_SIZE) -> Iterator[list
         Units.
     size : int
         Largest number of units in a list.
+    n_most_rows : int
+        Number of rows after which a list ends.
 
     Yields
     ------
     list[Arrival]
         Units, in their order.
+
+    Examples
+    --------
+    >>> units = [Arrival(k, "", "", "", "", "", {"impacts": [{}] * n}) for k, n in enumerate((1, 1, 9, 1, 1, 1))]
+    >>> [[arrival.index for arrival in chunk] for chunk in chunks(units, 2, 9)]
+    [[0, 1], [2], [3, 4], [5]]
     """
     chunk: list[Arrival] = []
+    n_row = 0
     for arrival in arrivals:
         chunk.append(arrival)
-        if len(chunk) == size:
+        n_row += sum(map(len, arrival.tables.values()))
+        if len(chunk) == size or n_row >= n_most_rows:
             yield chunk
-            chunk = []
+            chunk, n_row = [], 0
     if chunk:
         yield chunk
 

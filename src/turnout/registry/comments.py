@@ -17,7 +17,7 @@ OWN_MEANINGS = {
     "newest_measurement": "Time of the newest plausible measurement. [UTC]",
     "published_at": "Day on which this generation was published.",
 }
-SPLIT_PARTS = {  # of a large table, see ``create_split_views``
+SPLIT_PARTS = {  # of a large table, see ``supersede.split_files``
     "settled": "Part of {} without results that were computed again.",
     "touched": "Part of {} in which results were computed again.",
 }
@@ -50,6 +50,29 @@ def row_meaning(name: str, sqls: Iterable[str]) -> str:
                 comment = head.rstrip().rpartition("\n\n")[2].splitlines()
                 return " ".join(c[2:].strip() for c in comment if c.startswith("--") and "needs:" not in c)
     return OWN_MEANINGS.get(name, "")
+
+
+def column_comment(meaning: str, unit: str) -> str:
+    """Comment of a column: its meaning, and its unit if it has one.
+
+    Parameters
+    ----------
+    meaning : str
+        What a value is.
+    unit : str
+        Its unit, "" without one.
+
+    Returns
+    -------
+    str
+        The text.
+
+    Examples
+    --------
+    >>> column_comment("natural frequency", "Hz")
+    'natural frequency [Hz]'
+    """
+    return f"{meaning} [{unit}]" if unit else meaning
 
 
 def add_comments(
@@ -86,7 +109,7 @@ def add_comments(
     statements = ["begin"]
     for view, column, unit, meaning in described:
         if (view, column) in present:
-            text = literal(f"{meaning} [{unit}]" if unit else meaning)
+            text = literal(column_comment(meaning, unit))
             statements.append(f'comment on column "{view}"."{column}" is {text}')
     for view in sorted({view for view, _ in present}):
         if meaning := meanings.get(view) or row_meaning(view, sqls):

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from turnout.errors import REASONS, RegistryError
 from turnout.registry.comments import row_meaning
-from turnout.registry.database import view_columns, view_files
 from turnout.registry.schema import Column, tables
+from turnout.registry.view_texts import view_columns, view_files
 
 
 @cache

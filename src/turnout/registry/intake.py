@@ -90,7 +90,7 @@ def unit_year(unit: str, rows: Mapping[str, list[dict]]) -> int:
 
 
 def gather(table: str, arrivals: Iterable[Arrival]) -> tuple[pa.Table, list[Refusal]]:
-    """Typed columns of one table over all units, with additional columns ``_unit``, ``_row`` and ``_year``.
+    """Typed columns of one table over all units, and columns ``_unit``, ``_row``, ``_year`` and ``_result_id``.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def gather(table: str, arrivals: Iterable[Arrival]) -> tuple[pa.Table, list[Refu
         ``columns.csv``, or with a value of another type.
     """
     column_names = frozenset(names(table))
-    units, row_numbers, years, rows, refusals = [], [], [], [], []
+    units, row_numbers, years, result_ids, rows, refusals = [], [], [], [], [], []
     for arrival in arrivals:
         for row_number, row in enumerate(arrival.tables.get(table, ())):
             if not isinstance(row, dict) or not column_names.issuperset(row):
@@ -115,6 +115,7 @@ def gather(table: str, arrivals: Iterable[Arrival]) -> tuple[pa.Table, list[Refu
             units.append(arrival.index)
             row_numbers.append(row_number)
             years.append(arrival.year)
+            result_ids.append(arrival.result_id)
             rows.append(row)
     columns = [c for c in tables()[table] if c.name not in FILLED_BY_REGISTER]
     arrays: dict[str, pa.Array] = {}
@@ -125,7 +126,8 @@ def gather(table: str, arrivals: Iterable[Arrival]) -> tuple[pa.Table, list[Refu
             value = repr(values[i])[:200]
             bad.setdefault(i, Refusal(units[i], table, row_numbers[i], column.name, value, f"of type {column.type}"))
     marks = {"_unit": pa.array(units, pa.int32()), "_row": pa.array(row_numbers, pa.int32())}
-    gathered = pa.table(arrays | marks | {"_year": pa.array(years, pa.int32())})
+    marks |= {"_year": pa.array(years, pa.int32()), "_result_id": pa.array(result_ids, pa.string())}
+    gathered = pa.table(arrays | marks)
     if bad:
         gathered = gathered.filter(pa.array([i not in bad for i in range(len(rows))]))
     return gathered, refusals + [bad[i] for i in sorted(bad)]

@@ -245,10 +245,35 @@ def read_live(con: duckdb.DuckDBPyConnection, registry_dir: Path, table: str, fi
     str
         A SELECT statement.
     """
+    paths, same_schema = live_paths(con, registry_dir, table, files)
+    return read_list(registry_dir, table, paths, same_schema)
+
+
+def live_paths(
+    con: duckdb.DuckDBPyConnection, registry_dir: Path, table: str, files: list[DataFile]
+) -> tuple[list[str], bool]:
+    """Paths of the files to read for a table, and whether their columns are the same; an empty file only if needed.
+
+    Parameters
+    ----------
+    con : DuckDB connection
+        Any connection; it writes the empty file.
+    registry_dir : Path
+        Folder of the registry.
+    table : str
+        Name of the table.
+    files : list of DataFile
+        Live files of the table.
+
+    Returns
+    -------
+    (list of str, bool)
+        Paths in the registry, and whether all files have the present columns.
+    """
     present = f"{table}:{schema_hash(table)}"
     same_schema = all(f.schema == present for f in files)
     empty = [] if files and same_schema else [write_empty(con, registry_dir, table)]
-    return read_list(registry_dir, table, [f.path for f in files] + empty, same_schema)
+    return [f.path for f in files] + empty, same_schema
 
 
 def _newest(con: duckdb.DuckDBPyConnection, table: str, path: Path) -> str | None:

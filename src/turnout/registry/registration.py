@@ -186,7 +186,8 @@ class Registration:
         return RegistrationResult(run_id, number, len(self.result_ids), rows, self.n_refused, n_superseded, faults)
 
     def _select_changed(self, arrivals: list[Arrival]) -> list[Arrival]:
-        if self.before.incomplete or not arrivals:  # a result that is live may have lost rows
+        # a result that is live may have lost rows
+        if self.before.incomplete or not arrivals or not self.before.of("results"):
             return arrivals
         offered_ids = pa.table({"result_id": pa.array([a.result_id for a in arrivals], pa.string())})
         self.con.register("_asked", offered_ids)

@@ -156,8 +156,7 @@ def _select(table: str, run_id: str) -> str:
     """SELECT of rounded values in the order of the table, with the columns that the registration fills in."""
     filled = {"run_id": f"'{run_id}'", "result_id": "_result_id"}
     expressions = [f'{filled.get(c.name, c.rounded)} as "{c.name}"' for c in tables()[table]]
-    came = "(select _unit, result_id as _result_id from came)"
-    return f"select {', '.join(expressions)}, _unit, _row, _year from _gathered join {came} using (_unit)"
+    return f"select {', '.join(expressions)}, _unit, _row, _year from _gathered"
 
 
 def _bad_values(con: duckdb.DuckDBPyConnection, table: str) -> list[Refusal]:

@@ -10,7 +10,6 @@ from pathlib import Path
 import duckdb
 
 from turnout.registry.generation import DataFile
-from turnout.registry.parquet import read_live
 from turnout.registry.schema import WHOLE_TABLES, file_literal, key, names, tables
 from turnout.registry.staging import CHILDREN
 
@@ -272,24 +271,20 @@ def count_superseded(con: duckdb.DuckDBPyConnection, root: Path, files: list[Dat
     return [replace(f, dead=counted.get(f.path, 0)) if f.table in LARGE_TABLES else f for f in files]
 
 
-def create_split_views(con: duckdb.DuckDBPyConnection, root: Path, table: str, files: list[DataFile]) -> None:
-    """Create view ``<table>_settled`` of files without superseded rows, ``<table>_touched`` of files with some.
+def split_files(files: list[DataFile]) -> tuple[list[DataFile], list[DataFile]]:
+    """Files of a large table without superseded rows, and those with some; one without valid rows is in neither.
 
     Parameters
     ----------
-    con : DuckDB connection
-        Connection with the views of the registry.
-    root : Path
-        Folder of the registry.
-    table : str
-        One of ``LARGE_TABLES``.
     files : list of DataFile
-        Live files of the table.
+        Live files of one of ``LARGE_TABLES``.
+
+    Returns
+    -------
+    (list of DataFile, list of DataFile)
+        Settled and touched files.
     """
-    settled = [f for f in files if f.dead == 0]
-    touched = [f for f in files if 0 < f.dead < f.rows]
-    for suffix, chosen in (("settled", settled), ("touched", touched)):
-        con.execute(f"create view {table}_{suffix} as {read_live(con, root, table, chosen)}")
+    return [f for f in files if f.dead == 0], [f for f in files if 0 < f.dead < f.rows]
 
 
 def split_superseded(table: str, select: str) -> tuple[str, str]:

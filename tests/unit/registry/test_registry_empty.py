@@ -8,9 +8,10 @@ from benchmarks import bench_registry
 
 from turnout.cli.main import main
 from turnout.errors import REASONS
-from turnout.registry.database import open_registry, view_columns
+from turnout.registry.database import open_registry
 from turnout.registry.documentation import views
 from turnout.registry.job import register
+from turnout.registry.view_texts import view_columns
 
 # DuckDB writes its storage version behind the magic bytes of the main header; 64 was written by all of 0.9.2 to 1.2.
 MAGIC, OLDEST_READ_BY_1_2 = b"DUCK", 64 + 3

@@ -1,18 +1,6 @@
 """Small runs of ``python -m benchmarks robustness``: readers during nightly runs, and bits that flip in live files."""
 
-import pytest
 
-from turnout.registry import database
-
-
-@pytest.fixture
-def _few_views(monkeypatch):
-    """Registries without views, which take most of the time."""
-    database.views_version()  # keep that of all views, it is cached
-    monkeypatch.setattr(database, "view_files", dict)
-
-
-@pytest.mark.usefixtures("_few_views")
 def test_bits_that_flip_in_live_files_change_no_row_and_each_file_is_named(repository, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(repository))
     from benchmarks.bit_flips import flip_bits

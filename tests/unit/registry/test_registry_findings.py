@@ -240,7 +240,7 @@ def test_dates_of_a_limit_cover_the_true_one():
     """Linear growth with known noise: of 2000 lines, the date at which the true line reaches the limit is inside."""
     import duckdb
 
-    from turnout.registry.database import view_files
+    from turnout.registry.view_texts import view_files
 
     rng, n = np.random.default_rng(5), 2000
     year, error, true_slope = np.arange(9) / 4.0, 0.05e-3, 0.4e-3

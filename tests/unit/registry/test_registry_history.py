@@ -9,7 +9,6 @@ from registry_rows import Bench, hammer_result
 
 from turnout.cli.main import main
 from turnout.errors import RegistryError
-from turnout.registry import database
 from turnout.registry.compaction import compact
 from turnout.registry.database import open_registry
 from turnout.registry.generation import load
@@ -32,15 +31,6 @@ def parquet_files(registry):
 def count_as_of(registry, as_of):
     with open_registry(registry, as_of=as_of) as connection:
         return connection.execute(COUNT).fetchall()[0][0]
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _few_views():
-    """Registries without views: their tables are enough here, and views take most of the time."""
-    database.views_version()  # keep that of all views, it is cached
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(database, "view_files", dict)
-        yield
 
 
 @pytest.fixture(scope="module")

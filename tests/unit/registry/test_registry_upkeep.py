@@ -9,11 +9,12 @@ import pytest
 from registry_rows import Bench, hammer_result
 
 from turnout.errors import RegistryError
-from turnout.registry import database, publication
+from turnout.registry import database, publication, view_texts
 from turnout.registry.compaction import compact, rebuild
-from turnout.registry.database import open_registry, rebuild_database, sort_by_needs
+from turnout.registry.database import open_registry, rebuild_database
 from turnout.registry.generation import GENERATION_FILE, load
 from turnout.registry.integrity import check, vacuum
+from turnout.registry.view_texts import sort_by_needs
 
 ALL_MODES = "select * from modes order by model_id, band"
 
@@ -227,10 +228,10 @@ def test_views_that_cannot_be_ordered_are_refused(texts, said):
 def test_views_of_an_older_program_are_made_anew_though_there_is_no_new_row(bench, hammer, monkeypatch):
     bench.register(hammer())
     generation = bench.ask("select generation from registry_info")
-    monkeypatch.setattr("turnout.registry.database.views_version", lambda: "older")
+    monkeypatch.setattr("turnout.registry.view_texts.views_version", lambda: "older")
     database.build_database(bench.registry, load(bench.registry))
     monkeypatch.undo()
     assert bench.ask("select views_version from registry_info") == [("older",)]
     bench.register()
-    assert bench.ask("select views_version from registry_info") == [(database.views_version(),)]
+    assert bench.ask("select views_version from registry_info") == [(view_texts.views_version(),)]
     assert bench.ask("select generation from registry_info") == generation

@@ -250,7 +250,7 @@ def test_every_view_answers_an_empty_registry():
 
 def test_no_view_uses_what_an_older_duckdb_cannot_open():
     # DuckDB 2 stores if(...) in the database file as a function call, which DuckDB 1.5 does not have.
-    from turnout.registry.database import view_files
+    from turnout.registry.view_texts import view_files
 
     assert not [name for name, sql in view_files().items() if re.search(r'(?<![\w"])if\s*\(', sql)]
 
