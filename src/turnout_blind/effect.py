@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from turnout_blind.site import Site
 
 LOCKS = ("place", "wheel", "train", "sensor", "wavelength", "frequency", "clock", "condition", "amplitude")
-STRATA = ("single", "outside", "unidentifiable", "history")  # "history": in sites that are visited for years alone
+# "history": in sites that are visited for years alone; "switch": in switch panels alone
+STRATA = ("single", "outside", "unidentifiable", "history", "switch")
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-    from turnout_blind.march_inputs import AttachedMasses, Beam, Cars, Hammer, Supports, WheelMotion, Wheels
+    from turnout_blind.march_inputs import AttachedMasses, Beam, Blade, Cars, Hammer, Supports, WheelMotion, Wheels
 
 TIME_STEP = 1.0 / 60000.0
 Function = TypeVar("Function", bound=Callable)
@@ -165,13 +165,13 @@ def _attached_mass_step(
 
 
 @compile_function()
-def _path_height(wheels: Wheels, i: int, x: float) -> float:
+def _path_height(wheels: Wheels, path: np.ndarray, i: int, x: float) -> float:
     coordinate = (x - wheels.path_start) / wheels.path_step
     k = int(np.floor(coordinate))
-    if k < 1 or k > wheels.path.shape[1] - 3:
+    if k < 1 or k > path.shape[1] - 3:
         return 0.0
     s = coordinate - k
-    a, b, c, d = wheels.path[i, k - 1], wheels.path[i, k], wheels.path[i, k + 1], wheels.path[i, k + 2]
+    a, b, c, d = path[i, k - 1], path[i, k], path[i, k + 1], path[i, k + 2]
     return b + 0.5 * s * (c - a + s * (2.0 * a - 5.0 * b + 4.0 * c - d + s * (3.0 * (b - c) + d - a)))
 
 
@@ -251,9 +251,116 @@ def _wheel_forces(
         stencil[1] = (3.0 * s**3 - 6.0 * s**2 + 4.0) / 6.0
         stencil[2] = (-3.0 * s**3 + 3.0 * s**2 + 3.0 * s + 1.0) / 6.0
         stencil[3] = s**3 / 6.0
-        height = _interpolate(w, k - 1, stencil) + _path_height(wheels, i, x)
+        height = _interpolate(w, k - 1, stencil) + _path_height(wheels, wheels.path, i, x)
         contact[i] = hertz_force(wheels.stiffness[i], wheels.local, z[i] - share * height + static_approach, contact[i])
         _add_force(f, k - 1, stencil, share * contact[i])
+
+
+@compile_function(fastmath=True)
+def _blade_step(
+    blade: Blade,
+    h: float,
+    dt: float,
+    v: np.ndarray,
+    turn: np.ndarray,
+    q: np.ndarray,
+    moment: np.ndarray,
+    w: np.ndarray,
+    f: np.ndarray,
+) -> None:
+    """As ``_rail_step``, but the first node is free: no moment, and half a cell of mass under the first shear force."""
+    n = v.size
+    d = 0.5 * dt * blade.rate[0]
+    v[0] = (v[0] * (1.0 - d) + 2.0 * dt / (blade.mass[0] * h) * (q[0] + f[0])) / (1.0 + d)
+    for i in range(1, n - 1):
+        d = 0.5 * dt * blade.rate[i]
+        v[i] = (v[i] * (1.0 - d) + dt / (blade.mass[i] * h) * (q[i] - q[i - 1] + f[i])) / (1.0 + d)
+    for i in range(n - 1):
+        d = 0.5 * dt * blade.rate_between[i]
+        push = (moment[i + 1] - moment[i]) / h + q[i]
+        turn[i] = (turn[i] * (1.0 - d) + dt / blade.rotary[i] * push) / (1.0 + d)
+    for i in range(n - 1):
+        q[i] += dt * blade.shear[i] * ((v[i + 1] - v[i]) / h - turn[i])
+    for i in range(1, n - 1):
+        moment[i] += dt * blade.bending[i] / h * (turn[i] - turn[i - 1])
+    for i in range(n - 1):
+        w[i] += dt * v[i]
+
+
+@compile_function()
+def _chair_forces(
+    blade: Blade,
+    s: Supports,
+    dt: float,
+    w: np.ndarray,
+    v: np.ndarray,
+    f: np.ndarray,
+    y: np.ndarray,
+    rate: np.ndarray,
+) -> None:
+    """Forces of the chairs on blade and bearers; that on a bearer changes its velocity at once."""
+    for c in range(blade.support.size):
+        j, k = blade.support[c], blade.stiffness[c]
+        d = _interpolate(w, blade.first[c], blade.weights[c]) - y[j]
+        force = k * d + blade.damping[c] * (_interpolate(v, blade.first[c], blade.weights[c]) - rate[j])
+        if blade.gap[c] >= 0.0:
+            at_rest = max(0.0, blade.load[c] - k * blade.gap[c])
+            pressed = force - k * blade.gap[c] + blade.load[c]
+            force = max(0.0, pressed) - at_rest
+        _add_force(f, blade.first[c], blade.weights[c], -force)
+        rate[j] += dt * force / s.mass[j]
+
+
+@compile_function()
+def _wheel_forces_of_two_rails(
+    wheels: Wheels,
+    motion: WheelMotion,
+    blade: Blade,
+    grid_start: float,
+    h: float,
+    t: float,
+    w: np.ndarray,
+    f: np.ndarray,
+    w2: np.ndarray,
+    f2: np.ndarray,
+    z: np.ndarray,
+    contact: np.ndarray,
+    contact2: np.ndarray,
+    stencil: np.ndarray,
+) -> None:
+    """As ``_wheel_forces``, on the stock rail before the change, on the blade after it, on both between.
+
+    ``contact2`` (2, n_wheel) are the forces on stock rail and blade, ``contact`` their sum.
+    """
+    for i in range(z.size):
+        x = motion.start + motion.speed * t - wheels.distance_behind[i]
+        share = _contact_share(motion, x)
+        approach = z[i] + (wheels.load[i] / wheels.stiffness[i]) ** (2.0 / 3.0) + wheels.local * wheels.load[i]
+        if share == 0.0:
+            contact[i] = hertz_force(wheels.stiffness[i], wheels.local, approach, contact[i])
+            continue
+        coordinate = (x - grid_start) / h
+        k = int(np.floor(coordinate))
+        s = coordinate - k
+        stencil[0] = (1.0 - s) ** 3 / 6.0
+        stencil[1] = (3.0 * s**3 - 6.0 * s**2 + 4.0) / 6.0
+        stencil[2] = (-3.0 * s**3 + 3.0 * s**2 + 3.0 * s + 1.0) / 6.0
+        stencil[3] = s**3 / 6.0
+        contact[i] = 0.0
+        for line in range(2):
+            on_line = x < blade.change_end if line == 0 else x > blade.change_start + 4.0 * h
+            if not on_line:
+                contact2[line, i] = 0.0
+                continue
+            path = wheels.path if line == 0 else wheels.blade_path
+            node = k - 1 if line == 0 else k - 1 - blade.start
+            deflection = _interpolate(w if line == 0 else w2, node, stencil)
+            height = share * (deflection + _path_height(wheels, path, i, x))
+            guess = contact2[line, i] if contact2[line, i] > 0.0 else 1000.0
+            force = hertz_force(wheels.stiffness[i], wheels.local, approach - height, guess)
+            contact2[line, i] = force
+            contact[i] += force
+            _add_force(f if line == 0 else f2, node, stencil, share * force)
 
 
 @compile_function()
@@ -312,6 +419,7 @@ def march(
     first: np.ndarray,
     weights: np.ndarray,
     every: int,
+    blade: Blade,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
     """March ``n_step`` steps.
 
@@ -346,6 +454,8 @@ def march(
         Weights of its four nodes.
     every : int
         Steps between two stored wheel forces.
+    blade : Blade
+        A second rail; without nodes: none.
 
     Returns
     -------
@@ -363,16 +473,27 @@ def march(
     ry, rrate = np.zeros(attached_masses.mass.size), np.zeros(attached_masses.mass.size)
     z, zv, contact = np.zeros(wheels.mass.size), np.zeros(wheels.mass.size), wheels.load.copy()
     b, bv = np.zeros(6 * cars.body.size), np.zeros(6 * cars.body.size)
+    nb = blade.mass.size
+    w2, v2, q2, moment2, f2 = np.zeros(nb), np.zeros(nb), np.zeros(max(nb - 1, 0)), np.zeros(nb), np.zeros(nb)
+    turn2, contact2 = np.zeros(max(nb - 1, 0)), np.zeros((2, z.size))
     stencil, n_impacts, head_position, head_speed = np.zeros(4), 0, 0.0, 0.0
     out, hammer_force = np.zeros((n_step, first.size)), np.zeros(n_step)
     wheel_forces = np.zeros((n_step // every + 1, z.size))
     for step in range(n_step):
         t = step * dt
         f[:] = 0.0
+        if nb:
+            f2[:] = 0.0
+            _chair_forces(blade, supports, dt, w2, v2, f2, y, rate)
         _support_step(supports, dt, t, w, v, f, y, rate, branch, last, decay, grow, force)
         _attached_mass_step(attached_masses, dt, w, v, f, ry, rrate)
         if z.size:
-            _wheel_forces(wheels, motion, grid_start, beam.step, n, t, w, f, z, contact, stencil)
+            if nb:
+                _wheel_forces_of_two_rails(
+                    wheels, motion, blade, grid_start, beam.step, t, w, f, w2, f2, z, contact, contact2, stencil
+                )
+            else:
+                _wheel_forces(wheels, motion, grid_start, beam.step, n, t, w, f, z, contact, stencil)
             _car_step(cars, wheels, dt, z, zv, b, bv, contact)
             if step % every == 0:
                 wheel_forces[step // every] = contact
@@ -388,6 +509,8 @@ def march(
             head_speed -= dt * hammer_force[step] / hammer.mass
             head_position += dt * head_speed
         _rail_step(beam, dt, v, turn, q, moment, w, f)
+        if nb:
+            _blade_step(blade, beam.step, dt, v2, turn2, q2, moment2, w2, f2)
         for k in range(first.size):
             out[step, k] = _interpolate(v, first[k], weights[k])
     return out, hammer_force, wheel_forces, (w, v, turn, q, moment, y, rate)

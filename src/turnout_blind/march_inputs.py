@@ -50,6 +50,43 @@ class Supports(NamedTuple):
     branch_rate: np.ndarray
 
 
+class Blade(NamedTuple):
+    """Second rail from node ``start`` of the grid on, its first node free; no values: none.
+
+    ``bending`` and ``mass`` belong to its nodes, ``shear`` and ``rotary`` to the intervals between them, as the rates.
+    ``first`` and ``weights`` (n, 4) are the nodes above the chairs, ``support`` their supports. A ``gap`` [m] below 0
+    is a fastening; others press only, with a preload ``load`` [N] if they are closed. Wheels change to it between
+    ``change_start`` and ``change_end`` [m].
+    """
+
+    start: int
+    bending: np.ndarray
+    shear: np.ndarray
+    mass: np.ndarray
+    rotary: np.ndarray
+    rate: np.ndarray
+    rate_between: np.ndarray
+    first: np.ndarray
+    weights: np.ndarray
+    support: np.ndarray
+    stiffness: np.ndarray
+    damping: np.ndarray
+    gap: np.ndarray
+    load: np.ndarray
+    change_start: float
+    change_end: float
+
+
+def no_blade() -> Blade:
+    """Inputs of the march without a second rail."""
+    none = np.zeros(0)
+    index = np.zeros(0, dtype=np.int64)
+    weights = np.zeros((0, 4))
+    return Blade(
+        0, none, none, none, none, none, none, index, weights, index, none, none, none, none, 0.0, 0.0
+    )  # fmt: skip
+
+
 class AttachedMasses(NamedTuple):
     """Masses attached to the rail by a spring, with stops of stiffness ``stop`` at ``play`` [m] on both sides."""
 
@@ -80,7 +117,8 @@ class Cars(NamedTuple):
 class Wheels(NamedTuple):
     """(4 n_car,) mass, static load [N] and distance behind the first wheel [m].
 
-    ``path`` (n, m) is the surface under each wheel, from ``path_start`` in steps of ``path_step`` [m]. ``stiffness`` is
+    ``path`` (n, m) is the surface under each wheel, from ``path_start`` in steps of ``path_step`` [m],
+    ``blade_path`` that of a second rail. ``stiffness`` is
     the Hertz constant [N/m^1.5], ``local`` a compliance of the rail [m/N].
     """
 
@@ -92,6 +130,7 @@ class Wheels(NamedTuple):
     path: np.ndarray
     path_start: float
     path_step: float
+    blade_path: np.ndarray
 
 
 class WheelMotion(NamedTuple):

@@ -13,9 +13,11 @@ if TYPE_CHECKING:
     from turnout_blind.crossing import Crossing
     from turnout_blind.instrument import MeasurementChain
     from turnout_blind.site import Site
+    from turnout_blind.switch import Switch
     from turnout_blind.vehicle import Train
 
 SOURCE = "the owner's register"
+MEAN_SECTION = 0.85  # of the planed blade over its length, as a share of the rail
 RAIL = (("youngs_modulus", 210.0, "GPa"), ("second_moment", 3037.0, "cm⁴"), ("area", 76.7, "cm²"),
         ("mass", 60.2, "kg/m"), ("shear_modulus", 80.77, "GPa"), ("shear_coefficient", 0.393, "-"),
         ("density", 7850.0, "kg/m³"), ("damping", RAIL_DAMPING, "N s/m²"))  # fmt: skip
@@ -107,6 +109,7 @@ def track(site: Site) -> str:
     lines += ["rail:", "  name: 60E1", "  beam: timoshenko"]
     lines += [f"  {name}: {_value(value, unit)}" for name, value, unit in RAIL]
     lines += _casting(site.crossing) if site.crossing else []
+    lines += _blade(site.switch) if site.switch else []
     lines += ["support:", *_support(site.nominal[0]), "sections:"]
     for label, zone, values in zip(("west", "east"), site.zones, site.nominal):
         lines += [f"  - label: {label}", "    panel: CLP"]
@@ -114,6 +117,8 @@ def track(site: Site) -> str:
         lines += ["  " + line for line in _support(values)]
     lines += ["locations:"]
     lines += [f"  S{i}: {{place: {_value(x, 'm', 0.02)}}}" for i, x in enumerate(site.sensors, 1)]
+    if site.switch:
+        return "\n".join([*lines, "routes:", "  main:", "    surfaces:", *_tops(site.switch)]) + "\n"
     lines += ["routes:", f"  main: [{_nose(site.crossing) if site.crossing else ''}]"]
     return "\n".join(lines) + "\n"
 
@@ -125,6 +130,28 @@ def _casting(crossing: Crossing) -> list[str]:
     lines = ["stretches:", f"  - from: {_value(start, 'm')}", f"    to: {_value(end, 'm')}", "    rail:"]
     lines += ["      name: crossing", "      beam: timoshenko"]
     return lines + [f"      {name}: {_value(value * factors.get(name, 1.0), unit)}" for name, value, unit in RAIL]
+
+
+def _blade(switch: Switch) -> list[str]:
+    """The blade, of the section of the rail, up to 6 m behind the last sensor."""
+    lines = ["blade:", f"  toe: {_value(switch.toe, 'm')}", f"  heel: {_value(switch.heel, 'm')}"]
+    lines += [f"  end: {_value(36.0, 'm')}", f"  chair_stiffness: {_value(switch.chair / 1e6, 'MN/m')}"]
+    lines += [f"  chair_damping: {_value(switch.chair_damping / 1e3, 'kN s/m')}", "  rail:"]
+    lines += ["    name: blade", "    beam: timoshenko"]
+    factors = {"second_moment": MEAN_SECTION, "area": MEAN_SECTION, "mass": MEAN_SECTION}
+    return lines + [f"    {name}: {_value(value * factors.get(name, 1.0), unit)}" for name, value, unit in RAIL]
+
+
+def _tops(switch: Switch) -> list[str]:
+    """Both surfaces of the route, with priors as wide as an estimate deserves."""
+    fall_start = _value(switch.fall_start, "m", round(0.05 / abs(switch.fall_start), 4))
+    fall = f"depth: {_value(1e3 * switch.fall, 'mm', 0.12)}, length: {_value(switch.fall_length, 'm')}"
+    top = f"start: {_value(switch.toe, 'm')}, depth: {_value(1e3 * switch.depth, 'mm', 0.12)}"
+    length = _value(switch.length, "m", 0.06)
+    return [
+        f"      - [{{kind: stock_fall, start: {fall_start}, {fall}}}]",
+        f"      - [{{kind: blade_top, {top}, length: {length}}}]",
+    ]
 
 
 def _nose(c: Crossing) -> str:

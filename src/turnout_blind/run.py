@@ -95,7 +95,7 @@ def simulate_impacts(
     sensors = interpolation_weights(world.grid, sensor_positions)
     velocity, force, _, state = march(
         round(duration / dt), dt, world.grid.start, world.beam(), world.supports(temperature),
-        world.attached_mass_inputs(), cars, wheels, NO_MOTION, hammer, *sensors, 1,
+        world.attached_mass_inputs(), cars, wheels, NO_MOTION, hammer, *sensors, 1, world.blade_inputs(),
     )  # fmt: skip
     return force, accelerations(velocity, dt), state
 
@@ -179,9 +179,13 @@ def simulate_passage(
     """
     local_compliance = lost_compliance(world.grid, world.rail)
     path = wheel_paths(world, train, roughness, phase)
-    wheels = wheels_of(
-        train, path, world.grid.start, PATH_STEP, local_compliance, world.wheel_mass.get(train.name, 1.0)
-    )
+    blade_path = None
+    if world.blade is not None:
+        x = np.arange(world.grid.start, world.grid.end, PATH_STEP)
+        on_stock, on_blade = world.blade.paths(x, train)
+        path, blade_path = path + on_stock, path + on_blade
+    factor = world.wheel_mass.get(train.name, 1.0)
+    wheels = wheels_of(train, path, world.grid.start, PATH_STEP, local_compliance, factor, blade_path)
     low, high = world.grid.start + GRID_MARGIN, world.grid.end - GRID_MARGIN
     motion = WheelMotion(
         min(sensor_positions) - speed * lead, speed, low, low + ENGAGE_LENGTH, high - ENGAGE_LENGTH, high
@@ -189,6 +193,6 @@ def simulate_passage(
     sensors = interpolation_weights(world.grid, sensor_positions)
     velocity, _, force, state = march(
         round(duration / dt), dt, world.grid.start, world.beam(), world.supports(temperature, n_passages),
-        world.attached_mass_inputs(), cars_of(train), wheels, motion, NO_HAMMER, *sensors, 60,
+        world.attached_mass_inputs(), cars_of(train), wheels, motion, NO_HAMMER, *sensors, 60, world.blade_inputs(),
     )  # fmt: skip
     return accelerations(velocity, dt), force.T, state

@@ -13,6 +13,7 @@ from turnout_blind.crossing import Crossing, add_crossing, draw_bearer_mass_rati
 from turnout_blind.grid import Grid, Rail
 from turnout_blind.instrument import MeasurementChain
 from turnout_blind.roughness import rail_roughness, wheel_roughness
+from turnout_blind.switch import Switch, add_switch, draw_switch
 from turnout_blind.true_site import SPACING, World
 from turnout_blind.vehicle import Car, Train
 
@@ -32,7 +33,7 @@ SUPPORT_SCATTER = {"pad": 0.08, "pad_damping": 0.15, "mass": 0.02, "ballast": 0.
 RAIL_DAMPING = 4000.0  # [N s/m²], loss factor 0.010 at 1040 Hz; Thompson 2009, Railway Noise and Vibration: 0.02
 CAMPAIGNS = (datetime(2024, 2, 6, 9, 0), datetime(2024, 7, 16, 9, 0))
 FIRST_PASSAGE, PASSAGE_INTERVAL = datetime(2024, 7, 16, 11, 0), timedelta(minutes=30)
-PLAIN, CROSSING = PANELS = ("plain", "crossing")
+PLAIN, CROSSING, SWITCH = PANELS = ("plain", "crossing", "switch")
 COMMON_ERROR = {"pad": 0.08, "pad_damping": 0.2, "mass": 0.02, "ballast": 0.08, "ballast_damping": 0.2}
 
 
@@ -56,7 +57,7 @@ class Site:
 
     ``nominal`` holds the values of the two ``zones`` [(from, to)]; ``trains`` are as filed, ``true_trains`` as they
     run. ``sensors`` and ``hammer_positions`` are nominal positions [m]; ``chains`` has one entry per sensor.
-    ``temperatures`` are those of the ``campaigns`` [°C]. ``crossing`` is as drawn, None on plain track.
+    ``temperatures`` are those of the ``campaigns`` [°C]. ``crossing`` and ``switch`` are as filed, None on other track.
     """
 
     zones: tuple[tuple[float, float], ...]
@@ -73,6 +74,7 @@ class Site:
     roughness: dict[Any, Callable[..., np.ndarray]] = field(default_factory=dict)
     tip: float = 1.1e9
     crossing: Crossing | None = None
+    switch: Switch | None = None
     campaigns: tuple[datetime, ...] = CAMPAIGNS
 
     def passage_time(self, k: int) -> datetime:
@@ -145,7 +147,7 @@ def draw_site(
     )  # fmt: skip
     site.world.sensor_shift = {c.name: float(0.015 * rng.normal()) for c in chains}
     site.roughness = _draw_roughness(rng, site.true_trains)
-    return with_crossing(rng, site) if panel == CROSSING else site
+    return {CROSSING: with_crossing, SWITCH: with_switch}[panel](rng, site) if panel != PLAIN else site
 
 
 def with_crossing(rng: np.random.Generator, site: Site) -> Site:
@@ -170,6 +172,31 @@ def with_crossing(rng: np.random.Generator, site: Site) -> Site:
     true_crossing, site.crossing = draw_crossing(rng, boundary)
     add_crossing(rng, site.world, true_crossing, site.trains)
     site.chains = tuple(replace(c, full_scale=5.0 * c.full_scale) for c in site.chains)  # impacts at the nose are hard
+    return site
+
+
+def with_switch(rng: np.random.Generator, site: Site) -> Site:
+    """The site with long bearers from the zone boundary on, and a blade whose toe lies before it.
+
+    Parameters
+    ----------
+    rng : Generator
+        Source of the random numbers.
+    site : Site
+        The site.
+
+    Returns
+    -------
+    Site
+        The same site, changed.
+    """
+    (west, east), boundary = site.nominal, site.zones[1][0]
+    nominal_factor, true_factor = draw_bearer_mass_ratio(rng)
+    site.nominal = west, {**east, "mass": round(nominal_factor * east["mass"])}
+    site.world.mass[site.world.position > boundary - 0.3] *= true_factor
+    true_switch, site.switch = draw_switch(rng, boundary)
+    add_switch(rng, site.world, true_switch, site.trains)
+    site.chains = tuple(replace(c, full_scale=5.0 * c.full_scale) for c in site.chains)  # impacts at the change
     return site
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout_blind.site import PLAIN
+from turnout_blind.site import PLAIN, SWITCH
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
@@ -69,6 +69,8 @@ def plan_cases(
     effect_types = {
         s: [k for k, e in sorted(effects.items()) if e.stratum == s] for s in ("single", "outside", "unidentifiable")
     }
+    if panel == SWITCH:
+        effect_types["single"] += [k for k, e in sorted(effects.items()) if e.stratum == "switch"]
     counts = FULL_COUNTS if full else FAST_COUNTS
     cases: list[tuple[str, tuple[tuple[str, int], ...]]] = [("control", ())] * counts["control"]
     if full:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from turnout_blind.grid import Grid, Rail, spread
 from turnout_blind.instrument import Fault
-from turnout_blind.march_inputs import AttachedMasses, Beam, Supports
+from turnout_blind.march_inputs import AttachedMasses, Beam, Blade, Supports, no_blade
+
+if TYPE_CHECKING:
+    from turnout_blind.switch import TrueBlade
 
 SPACING = 0.6
 PER_SUPPORT = ("place", "pad", "pad_damping", "mass", "ballast", "ballast_damping")
@@ -30,7 +33,7 @@ class World:
     1) to functions of position, phase and radius. ``attached_masses`` holds (position, mass, stiffness, damping, play,
     stop). ``channels`` maps a sensor to functions (recording type, rng) -> (function (signal, rate) -> signal).
     ``passage_noise`` is a list of functions (time, sensor positions, k, rng) -> accelerations (n_sensor, n) of another
-    source.
+    source. ``blade`` is that of a switch, None without one.
     """
 
     grid: Grid
@@ -62,6 +65,7 @@ class World:
     channels: dict[str, list[Callable[[str, np.random.Generator], Fault]]] = field(default_factory=dict)
     sensor_shift: dict[str, float] = field(default_factory=dict)
     passage_noise: list[Callable[..., np.ndarray]] = field(default_factory=list)
+    blade: TrueBlade | None = None
 
     def __post_init__(self) -> None:
         n = self.position.size
@@ -78,6 +82,8 @@ class World:
                 values[name] = value.copy()
             elif isinstance(value, list):
                 values[name] = list(value)
+            elif name == "blade" and value is not None:
+                values[name] = value.copy()
             elif isinstance(value, dict):
                 values[name] = {k: list(v) if isinstance(v, list) else v for k, v in value.items()}
         return replace(self, **values)
@@ -139,6 +145,10 @@ class World:
             self.ballast_damping, gap, self.seated, self.close, self.hardening, self.drift,
             np.full(n, self.shear), np.full(n, self.shear_damping), self.branch_share, self.branch_rate,
         )  # fmt: skip
+
+    def blade_inputs(self) -> Blade:
+        """Inputs of the march: the blade of a switch."""
+        return no_blade() if self.blade is None else self.blade.inputs(self.grid, self.rail, self.position)
 
     def attached_mass_inputs(self) -> AttachedMasses:
         """Inputs of the march: masses attached to the rail."""

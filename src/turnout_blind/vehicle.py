@@ -90,7 +90,13 @@ def cars_of(train: Train) -> Cars:
 
 
 def wheels_of(
-    train: Train, path: np.ndarray, path_start: float, path_step: float, local: float, factor: float = 1.0
+    train: Train,
+    path: np.ndarray,
+    path_start: float,
+    path_step: float,
+    local: float,
+    factor: float = 1.0,
+    blade_path: np.ndarray | None = None,
 ) -> Wheels:
     """Inputs of the march: wheels with their paths.
 
@@ -108,6 +114,8 @@ def wheels_of(
         Compliance of the rail that the grid lacks. [m/N]
     factor : float
         Factor on the unsprung mass.
+    blade_path : (n_wheel, m) array of float or None
+        Dips on a second rail. [m]
 
     Returns
     -------
@@ -118,13 +126,15 @@ def wheels_of(
     sprung = np.repeat([0.125 * c.body + 0.25 * c.bogie for c in train.cars], 4)
     axles = train.axles()
     contact = np.full(mass.size, train.contact)
-    return Wheels(mass, GRAVITY * (mass + sprung), axles - axles[0], contact, local, path, path_start, path_step)
+    second = np.zeros((0, 8)) if blade_path is None else blade_path
+    load = GRAVITY * (mass + sprung)
+    return Wheels(mass, load, axles - axles[0], contact, local, path, path_start, path_step, second)
 
 
 def no_train() -> tuple[Cars, Wheels]:
     """Inputs of the march without a train."""
     none = np.zeros(0)
-    return Cars(*([none] * 10)), Wheels(none, none, none, none, 0.0, np.zeros((0, 8)), 0.0, 1.0)
+    return Cars(*([none] * 10)), Wheels(none, none, none, none, 0.0, np.zeros((0, 8)), 0.0, 1.0, np.zeros((0, 8)))
 
 
 COACH = Car(32e3, 1.97e6, 2615.0, 1476.0, 1813.0, 2.44e6, 8e3, 0.86e6, 40e3, 2.56, 19.0, 26.4)

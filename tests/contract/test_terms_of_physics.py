@@ -10,6 +10,7 @@ import pytest
 from turnout.mismatch.turnout.candidates.rail_defects import SCANS
 from turnout.physics import TERMS, PhysicsTerm, effects_by_name
 from turnout.physics.hypothesis import (
+    BladeSite,
     ChannelSite,
     ContactSite,
     SaturatedChannelSite,
@@ -20,15 +21,20 @@ from turnout.physics.hypothesis import (
 )
 from turnout.physics.term import COLUMN_TYPES, EFFECT_TYPES, FORCE_TARGETS, FRAMES
 from turnout.simulate import Sensor, car, simulate_hammer, simulate_passage, uniform_track
+from turnout.simulate.blade import Blade
 from turnout.simulate.preparation import prepare
 from turnout.simulate.run import run
 from turnout.simulate.sensor import record_signal
 from turnout.simulate.turnout_track import TurnoutTrack
-from turnout.simulate.wheel_path import Cosine
+from turnout.simulate.wheel_path import BladeTop, Cosine, StockFall
 from turnout.units import PARAMETER_UNITS
 
 TRACK = uniform_track(24.0)
 TURNOUT = TurnoutTrack(TRACK, {"main": ((Cosine(13.0, 1e-3, 1.0),),)})
+SWITCH = TurnoutTrack(
+    TRACK.with_(name="switch", blade=Blade(9.0, 12.3, 18.0, TRACK.rail, 3e8, 3e4)),
+    {"main": ((StockFall(9.6, 3.0, 0.02),), (BladeTop(9.0, 3.0, 0.015),))},
+)
 SENSORS = (Sensor("A", 12.1), Sensor("B", 12.0, "sleeper"))
 SITES = (
     SupportSite(20, 12.0, 30, 5, 35, True),
@@ -37,26 +43,42 @@ SITES = (
     SaturatedChannelSite("A", 50.0, 1.0, 20.0),
     ContactSite((10.0, 12.1, 14.0)),
     TrainSite("heavy", 2),
+    BladeSite(((18, 10.8), (20, 12.0)), ((21, 12.6), (22, 13.2)), 11.4, True),
 )
 EXTRA_UNITS = {"-", "1/K", "s", "rad", "Hz", "N", "m/s²", "°C", "V", "N/m per N"}
 
 
-def passage(*terms):
+def passage(*terms, turnout=TURNOUT):
     """A light bogie over a dip: sleepers are pressed under the wheels and lifted between and ahead of them."""
     bogie = car(half_pivot=2.6, half_base=1.0)
     return simulate_passage(
-        TURNOUT, bogie, 40.0, SENSORS, terms=terms, rate=10e3, lead=0.05, tail=0.02, entry=3.0
+        turnout, bogie, 40.0, SENSORS, terms=terms, rate=10e3, lead=0.05, tail=0.02, entry=3.0
     ).samples
 
 
-def hammer(*terms):
+def hammer(*terms, turnout=TURNOUT):
     quiet = [Sensor("A", 12.1), Sensor("B", 12.3)]
-    return simulate_hammer(TRACK, 12.0, sensors=quiet, n_impacts=1, duration=0.06, terms=terms)[0].samples[1:]
+    return simulate_hammer(turnout.track, 12.0, sensors=quiet, n_impacts=1, duration=0.06, terms=terms)[0].samples[1:]
+
+
+def recordings(term):
+    turnout = turnout_of(type(term))
+    return passage(term, turnout=turnout), hammer(term, turnout=turnout)
+
+
+def turnout_of(term):
+    """Effects of a blade need one."""
+    return SWITCH if BladeSite in term.site_types else TURNOUT
 
 
 @pytest.fixture(scope="module")
-def base():
-    return passage(), hammer()
+def bases():
+    return {t.name: (passage(turnout=t), hammer(turnout=t)) for t in (TURNOUT, SWITCH)}
+
+
+@pytest.fixture
+def base(term, bases):
+    return bases[turnout_of(term).name]
 
 
 @pytest.mark.parametrize("term", TERMS, ids=lambda t: t.name)
@@ -135,19 +157,19 @@ class TestTerm:
 
     def test_it_vanishes_at_its_neutral_value(self, term, base):
         neutral = term.example().neutral()
-        for found, expected in zip((passage(neutral), hammer(neutral)), base):
+        for found, expected in zip(recordings(neutral), base):
             assert np.max(np.abs(found - expected)) <= 1e-9 * np.max(np.abs(expected))
 
     def test_it_changes_something(self, term, base):
         example = term.example()
         changes = [
             np.max(np.abs(found - expected)) / np.max(np.abs(expected))
-            for found, expected in zip((passage(example), hammer(example)), base)
+            for found, expected in zip(recordings(example), base)
         ]
         assert max(changes) > 1e-4, "the example changes neither a passage nor a hammer test"
 
     def test_a_resting_track_stays_at_rest(self, term):
-        prepared = prepare(TRACK, 1e-4, terms=(term.example(),))
+        prepared = prepare(turnout_of(term).track, 1e-4, terms=(term.example(),))
         motion = run(prepared, 0.005).motion
         assert np.all(motion.u == 0.0) and np.all(motion.v == 0.0)
         if term.effect_type == "channel":
@@ -164,7 +186,8 @@ class TestTerm:
         )
         assert neutral is not None
         small, whole = (
-            np.linalg.norm(passage(t) - base[0]) + np.linalg.norm(hammer(t) - base[1]) for t in (near, example)
+            sum(np.linalg.norm(found - expected) for found, expected in zip(recordings(t), base))
+            for t in (near, example)
         )
         assert small < 0.2 * whole
 

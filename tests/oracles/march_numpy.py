@@ -74,7 +74,7 @@ def march_numpy(track, scheme, bodies, ports, run, motion, n_step, out, out_forc
         d, columns = solved[:, 0].copy(), solved[:, 1:]
         e, e_stand_in = _bodies_free(scheme, bodies, motion)
         d0 = _free(scheme, ports, motion, b, u, d, e, e_stand_in, share, dip)
-        g = _flexibility(scheme, bodies, ports, b, columns, local, share)
+        g = _flexibility(scheme, bodies, ports, b, columns, local, share, rows)
         status, count, where, worst, deformed = _newton(scheme, ports, g, d0, force, motion.deformation, run.tolerance)
         total += count
         if status != CONVERGED:
@@ -116,7 +116,7 @@ def _free(scheme, ports, motion, b, u, d, e, e_stand_in, share, dip):
     return d0
 
 
-def _flexibility(scheme, bodies, ports, b, columns, local, share):
+def _flexibility(scheme, bodies, ports, b, columns, local, share, rows):
     stages, n = scheme.node.size, b.shape[0]
     body, wheel = np.repeat(ports.body, stages), np.repeat(ports.wheel, stages)
     h = (b @ columns).astype(complex)
@@ -132,6 +132,7 @@ def _flexibility(scheme, bodies, ports, b, columns, local, share):
     g = scheme.scale * (t[:, None] * tau[None, :] * h).real
     stage = np.arange(n) % stages
     together = (stage[:, None] == stage[None, :]) & (wheel[:, None] == wheel[None, :]) & (wheel[:, None] >= 0)
+    together &= rows[:, :1] == rows[:, 0]
     return g + np.where(together, np.sqrt(np.outer(local, local)), 0.0)
 
 

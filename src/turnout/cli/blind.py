@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     make.add_argument("--only", help="kinds to keep beside the controls, by commas, as void,dip")
     make.add_argument("--limit", type=at_least_one, help="the first so many cases of the shuffled set")
     make.add_argument(
-        "--panel", choices=("plain", "crossing"), default="plain", help="where all cases lie (default: plain track)"
+        "--panel", choices=("plain", "crossing", "switch"), default="plain", help="where all cases lie (default plain)"
     )
     make.add_argument("--workers", type=at_least_one, default=1, help="processes (default 1)")
     make.add_argument("--histories", type=at_least_one, metavar="N", help="N sites with a history of two years")

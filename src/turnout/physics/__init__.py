@@ -13,6 +13,7 @@ from turnout.physics.clock_drift import ClockDrift
 from turnout.physics.contact_stiffness import ContactStiffness
 from turnout.physics.dry_friction import DryFriction
 from turnout.physics.hanging_sleeper import HangingSleeper
+from turnout.physics.heel_support import HeelSupport
 from turnout.physics.high_pass import HighPass
 from turnout.physics.hum import Hum
 from turnout.physics.lifting_sleepers import LiftingSleepers
@@ -30,11 +31,13 @@ from turnout.physics.roughness_level import RoughnessLevel
 from turnout.physics.sensor_gain import SensorGain
 from turnout.physics.sensor_position import SensorPosition
 from turnout.physics.sleeper_mode import SleeperMode
+from turnout.physics.slide_chair_gap import SlideChairGap
 from turnout.physics.surface_dip import SurfaceDip
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.physics.time_offset import TimeOffset
 from turnout.physics.unsprung_mass import UnsprungMass
 from turnout.physics.wheel_flat import WheelFlat
+from turnout.physics.worn_toe import WornToe
 from turnout.physics.zener_pad import ZenerPad
 
 # In the order in which a diagnosis tests them at one site. Where two explain the recordings alike, the first one leads:
@@ -67,6 +70,9 @@ TERMS: tuple[type[PhysicsTerm], ...] = (
     UnsprungMass,
     WheelFlat,
     OutOfRound,
+    SlideChairGap,
+    HeelSupport,
+    WornToe,
     LiftingSleepers,
     RailBending,
     RoughnessLevel,

@@ -140,7 +140,29 @@ class TrainSite:
         return {"train": self.train}
 
 
-Site = SupportSite | TrackSite | ChannelSite | SaturatedChannelSite | ContactSite | TrainSite
+@dataclass(frozen=True)
+class BladeSite:
+    """The blade of a switch near the sensors; there is one if the track file has it.
+
+    Attributes
+    ----------
+    slide_chairs : tuple of (int, float)
+        Number and position [m] of the supports on which the blade only rests.
+    heel_supports : tuple of (int, float)
+        The same of those to which it is fastened, the one at the heel first.
+    transfer : float or None
+        Where the tops of stock rail and blade are level in the file [m]; None if no route changes to the blade.
+    has_passages : bool
+        Whether there are passages beside hammer tests.
+    """
+
+    slide_chairs: tuple[tuple[int, float], ...]
+    heel_supports: tuple[tuple[int, float], ...]
+    transfer: float | None
+    has_passages: bool
+
+
+Site = SupportSite | TrackSite | ChannelSite | SaturatedChannelSite | ContactSite | TrainSite | BladeSite
 
 
 @dataclass(frozen=True)

@@ -137,10 +137,12 @@ def ramp_at(ramp: np.ndarray, stand_in: bool, x: float) -> tuple[float, float]:
 @kernel
 def rail_weights(
     node: np.ndarray,
-    node_row: np.ndarray,
+    first_row: np.ndarray,
+    last_row: np.ndarray,
     shear_ratio: np.ndarray,
     flexible: np.ndarray,
     shear_flexible: np.ndarray,
+    line: int,
     e: int,
     x: float,
     share: float,
@@ -154,14 +156,16 @@ def rail_weights(
     ----------
     node : (n_node,) array of float
         Positions of the nodes. [m]
-    node_row : (n_node,) array of int
-        Row of the deflection of each node; its rotation is the next row.
-    shear_ratio : (n_element,) array of float
+    first_row, last_row : (2, n_element) array of int
+        Row of the deflection of both nodes of each element; its rotation is the next row.
+    shear_ratio : (2, n_element) array of float
         Shear ratio P of each element. [-]
-    flexible : (n_element,) array of float
+    flexible : (2, n_element) array of float
         1 / EI. [1/(N m²)]
-    shear_flexible : (n_element,) array of float
+    shear_flexible : (2, n_element) array of float
         1 / κGA, 0 for an Euler-Bernoulli beam. [1/N]
+    line : int
+        0: the rail; 1: the line that changes to the blade.
     e : int
         Element that holds ``x``.
     x : float
@@ -181,16 +185,17 @@ def rail_weights(
         Local compliance for the share of the force. [m/N]
     """
     h = node[e + 1] - node[e]
-    s, p = (x - node[e]) / h, shear_ratio[e]
+    s, p = (x - node[e]) / h, shear_ratio[line, e]
     f = share / (1.0 + p)
     q = s * (1.0 - s)
-    rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3] = node_row[e], node_row[e] + 1, node_row[e + 1], node_row[e + 1] + 1
+    first, last = first_row[line, e], last_row[line, e]
+    rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3] = first, first + 1, last, last + 1
     weights[k, 0] = f * (1.0 - 3.0 * s * s + 2.0 * s * s * s + p * (1.0 - s))
     weights[k, 1] = f * h * (s - 2.0 * s * s + s * s * s + 0.5 * p * q)
     weights[k, 2] = f * (3.0 * s * s - 2.0 * s * s * s + p * s)
     weights[k, 3] = f * h * (-s * s + s * s * s - 0.5 * p * q)
     bend = q * q * (q / 3.0 + p * (1.0 - 2.0 * s) ** 2 / (12.0 * (1.0 + p)))
-    return share * share * (q * h * shear_flexible[e] + h * h * h * flexible[e] * bend)
+    return share * share * (q * h * shear_flexible[line, e] + h * h * h * flexible[line, e] * bend)
 
 
 @kernel

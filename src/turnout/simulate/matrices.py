@@ -27,7 +27,9 @@ class TrackMatrices:
     """Matrices as upper diagonals, (half + 1, n): ``mass[k, i]`` is M[i, i + k]; ``node`` (n_node,) [m].
 
     ``index`` maps the name of a degree of freedom to its row. ``node_index`` (n_node,) is the row of a node's
-    deflection; its rotation is the next row. ``rails`` has the profile of each element, ``links`` all links.
+    deflection; its rotation is the next row. ``rails`` has the profile of each element, ``links`` all links. A blade
+    has the rows ``blade_rows`` of its nodes, from the node ``blade_start`` of the rail on, and the section
+    ``blade_rail``.
     """
 
     mass: np.ndarray
@@ -39,6 +41,9 @@ class TrackMatrices:
     index: dict[tuple, int]
     rails: tuple[Rail, ...]
     links: tuple[Link, ...]
+    blade_rail: Rail | None = None
+    blade_start: int = 0
+    blade_rows: tuple[int, ...] = ()
 
     @property
     def n(self) -> int:
@@ -58,6 +63,42 @@ class TrackMatrices:
         ei = np.array([r.bending_stiffness for r in self.rails])
         kga = np.array([np.inf if r.beam == "euler" else r.shear_stiffness for r in self.rails])
         return h, p, ei, kga
+
+    @cached_property
+    def line_elements(self) -> tuple[np.ndarray, ...]:
+        """Elements under a wheel on the rail (line 0) and on the line that changes to the blade (line 1).
+
+        Rows of the first and of the second node, shear ratio, 1 / EI and 1 / κGA, each (2, n_element). Beside the
+        blade, and without one, both lines are the same.
+        """
+        h, p, ei, kga = self.elements
+        table = [np.stack([v, v]) for v in (self.node_index[:-1], self.node_index[1:], p, 1.0 / ei, 1.0 / kga)]
+        if self.blade_rail is not None:
+            rail, rows, inside = self.blade_rail, self.blade_rows, self._blade_elements
+            shear = 0.0 if rail.beam == "euler" else 1.0 / rail.shear_stiffness
+            values = rows[:-1], rows[1:], rail.shear_ratio(h[inside]), 1.0 / rail.bending_stiffness, shear
+            for line, value in zip(table, values):
+                line[1, inside] = value
+        return tuple(table)
+
+    @property
+    def _blade_elements(self) -> slice:
+        return slice(self.blade_start, self.blade_start + max(len(self.blade_rows) - 1, 0))
+
+    def is_on_blade(self, x: np.ndarray) -> np.ndarray:
+        """Whether a wheel at ``x`` on the line that changes to the blade presses the blade.
+
+        Parameters
+        ----------
+        x : array of float
+            Positions. [m]
+
+        Returns
+        -------
+        array of bool
+        """
+        inside = self._blade_elements
+        return (x >= self.node[inside.start]) & (x < self.node[inside.stop])
 
     def rail_weights(self, x: float) -> tuple[np.ndarray, np.ndarray]:
         """Rows (4,) and weights (4,) that give the rail's deflection at ``x`` [m] between two nodes.
@@ -216,6 +257,7 @@ def link_matrices(track: Track, links: Sequence[Link]) -> TrackMatrices:
     node, node_index, index = _number_rows(track, links)
     vectors = [link_vector(link, index) for link in links]
     half = max([1 + int(np.max(np.diff(node_index))), *(int(np.ptp(rows)) for rows, _ in vectors)])
+    half = max(half, _blade_reach(track, node_index, index))
     n = max(max(index.values()) + 1, int(node_index[-1]) + 2)
     mass, damping, stiffness, hysteresis = (np.zeros((half + 1, n)) for _ in range(4))
     for link, (rows, weights) in zip(links, vectors):
@@ -227,6 +269,16 @@ def link_matrices(track: Track, links: Sequence[Link]) -> TrackMatrices:
                     mass[b - a, a] += link.mass * wa * wb
                     hysteresis[b - a, a] += link.loss_factor * link.stiffness * wa * wb
     return TrackMatrices(mass, damping, stiffness, hysteresis, node, node_index, index, (), tuple(links))
+
+
+def _blade_reach(track: Track, node_index: np.ndarray, index: Mapping[tuple, int]) -> int:
+    """Half bandwidth that the elements of a blade need; 0 without one."""
+    if track.blade is None:
+        return 0
+    first, last = track.blade.nodes(track)
+    names = [divmod(k, track.elements_per_bay) for k in range(first, last + 1)]
+    rows = [index.get(("blade", *name), index[("rail", *name)]) for name in names]
+    return 1 + int(np.max(np.abs(np.diff(rows))))
 
 
 def add_rails(matrices: TrackMatrices, track: Track) -> TrackMatrices:
@@ -247,11 +299,33 @@ def add_rails(matrices: TrackMatrices, track: Track) -> TrackMatrices:
     rails = tuple(track.element_rail(a, b) for a, b in pairwise(matrices.node.tolist()))
     mass, damping, stiffness = (x.copy() for x in (matrices.mass, matrices.damping, matrices.stiffness))
     _add_rail(track, rails, matrices.node, matrices.node_index, mass, damping, stiffness)
-    return replace(matrices, mass=mass, damping=damping, stiffness=stiffness, rails=rails)
+    changed = replace(matrices, mass=mass, damping=damping, stiffness=stiffness, rails=rails)
+    if track.blade is None:
+        return changed
+    first, last = track.blade.nodes(track)
+    per_bay, on_blade = track.elements_per_bay, _blade_nodes(track)
+    rows = tuple(
+        matrices.index[("blade", *divmod(k, per_bay)) if k in on_blade else ("rail", *divmod(k, per_bay))]
+        for k in range(first, last + 1)
+    )
+    blade_rails, node = (track.blade.rail,) * (last - first), matrices.node[first : last + 1]
+    _add_rail(track, blade_rails, node, np.array(rows), mass, damping, stiffness)
+    return replace(changed, blade_rail=track.blade.rail, blade_start=first, blade_rows=rows)
+
+
+def _blade_nodes(track: Track) -> range:
+    """Nodes of the rail beside which the blade has one of its own: all but that of its end."""
+    if track.blade is None:
+        return range(0)
+    first, last = track.blade.nodes(track)
+    return range(first, last) if track.blade.direction > 0 else range(first + 1, last + 1)
 
 
 def _number_rows(track: Track, links: Sequence[Link]) -> tuple[np.ndarray, np.ndarray, dict[tuple, int]]:
-    """Nodes, their rows and the row of every named degree of freedom; those of a support follow its node."""
+    """Nodes, their rows and the row of every named degree of freedom; those of a support follow its node.
+
+    The node of a blade follows the node of the rail beside it. At its end both have one.
+    """
     per_bay = track.elements_per_bay
     bays = [np.linspace(a, b, per_bay + 1)[:-1] for a, b in zip(track.support[:-1], track.support[1:])]
     node = np.append(np.concatenate(bays), track.support[-1])
@@ -260,13 +334,16 @@ def _number_rows(track: Track, links: Sequence[Link]) -> tuple[np.ndarray, np.nd
         for name, _ in link.ends:
             if not 0 <= name[1] < track.support.size:
                 raise SimulationError(f"link {link.tag!r}: support {name[1]} of {track.support.size}.")
-            if name[0] != "rail":
+            if name[0] not in ("rail", "blade"):
                 extra[name[1]].add(name)
     index: dict[tuple, int] = {}
     node_index, row = np.empty(node.size, dtype=np.int64), 0
+    on_blade = _blade_nodes(track)
     for k in range(node.size):
         node_index[k], row = row, row + 2
         j, node_in_bay = divmod(k, per_bay)
+        if k in on_blade:
+            index[("blade", j, node_in_bay)], row = row, row + 2
         index[("rail", j, node_in_bay)] = node_index[k]
         if node_in_bay:
             if j + 1 < track.support.size:

@@ -65,9 +65,10 @@ def locate_ports(
     stages, n_port = scheme.node.size, ports.body.size
     # Local names here and below: taking an array out of a tuple counts a reference, which is slow inside a loop.
     body, start, fixed_rows, fixed_weights, gap = ports.body, ports.place, ports.rows, ports.weights, ports.gap
-    node, node_row, shear_ratio = track.node, track.node_row, track.shear_ratio
+    node, first_row, last_row, shear_ratio = track.node, track.first_row, track.last_row, track.shear_ratio
     flexible, shear_flexible = track.flexibility, track.shear_flexibility
     time, path, path_index, ramp, last = scheme.node, run.path, ports.path, run.ramp, track.node.size - 2
+    line = ports.line
     first_position, last_position = node[0], node[last + 1]
     for i in range(n_port):
         for a in range(stages):
@@ -95,8 +96,9 @@ def locate_ports(
                 e += 1
             element[i] = e
             local[k] = rail_weights(
-                node, node_row, shear_ratio, flexible, shear_flexible, e, position, r, k, rows, weights
-            )
+                node, first_row, last_row, shear_ratio, flexible, shear_flexible, line[i], e, position, r, k,
+                rows, weights,
+            )  # fmt: skip
     return -1
 
 
@@ -158,7 +160,7 @@ def flexibility(
                     g[q, p] = scheme.scale * (t[b] * tau[a] * value).real
                     if a == b and i == j:
                         g[p, q] += local[p]
-                    elif a == b and same_wheel:
+                    elif a == b and same_wheel and rows[p, 0] == rows[q, 0]:
                         shared = np.sqrt(local[p] * local[q])
                         g[p, q] += shared
                         g[q, p] += shared

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.errors import SimulationError
+from turnout.simulate.blade import is_on_blade
 from turnout.simulate.force_laws import ForceLaw, TableLaw
 from turnout.simulate.links import ports_of
 from turnout.simulate.state import PortArrays
@@ -19,14 +20,14 @@ if TYPE_CHECKING:
     from turnout.simulate.vehicle import Vehicle
     from turnout.simulate.wheel_path import PathPart
 
-# position at time 0 [m], row of the body, wheel, surface, law
-Contact = tuple[float, int, int, int, ForceLaw]
+# position at time 0 [m], row of the body, wheel, surface, line, law
+Contact = tuple[float, int, int, int, int, ForceLaw]
 
 
 def contact_ports(
     vehicle: Vehicle, surfaces: Sequence[Sequence[PathPart]], start: float, direction: int
 ) -> list[Contact]:
-    """(position, body row, wheel, surface, law) of each contact: every wheel on every surface of the route.
+    """(position, body row, wheel, surface, line, law) of each contact: every wheel on every surface of the route.
 
     Parameters
     ----------
@@ -42,17 +43,19 @@ def contact_ports(
     Returns
     -------
     list of tuple
-        Position at time 0 [m], row of the body, number of wheel and surface, force law.
+        Position at time 0 [m], row of the body, number of wheel, surface and line, force law. A surface with a part of
+        the path that is ``on_blade`` belongs to line 1.
     """
     rows, contacts = vehicle.wheel_rows, []
     for wheel, (offset, law) in enumerate(zip(vehicle.wheel_positions, vehicle.wheel_values("contact"))):
         for surface in range(len(surfaces)):
-            contacts.append((start - direction * offset, int(rows[wheel]), wheel, surface, law))
+            line = int(is_on_blade(surfaces[surface]))
+            contacts.append((start - direction * offset, int(rows[wheel]), wheel, surface, line, law))
     return contacts
 
 
 def fixed_ports(prepared: Prepared) -> list[Port]:
-    """Ports that the terms of a prepared track add.
+    """Ports that the terms of a prepared track add, and those of the slide chairs of a blade.
 
     Parameters
     ----------
@@ -62,9 +65,11 @@ def fixed_ports(prepared: Prepared) -> list[Port]:
     Returns
     -------
     list of Port
-        Ports in the order of the terms.
+        Ports in the order of the terms, then of the chairs.
     """
-    return ports_of(prepared.terms, prepared.track)
+    ports = ports_of(prepared.terms, prepared.track)
+    blade = prepared.track.blade
+    return ports if blade is None else [*ports, *blade.ports(prepared.track, {port.ends for port in ports})]
 
 
 def port_arrays(
@@ -96,21 +101,22 @@ def port_arrays(
         For a port at more than 4 degrees of freedom, at none, or at one that the track does not have.
     """
     entries = []
-    for position, row, wheel, surface, law in contacts:
+    for position, row, wheel, surface, line, law in contacts:
         entries.append(
-            (position, row, wheel, path_of[wheel, surface], np.zeros(4, dtype=np.int64), np.zeros(4), 0.0, law)
+            (position, row, wheel, path_of[wheel, surface], np.zeros(4, dtype=np.int64), np.zeros(4), 0.0, law, line)
         )
     for port in fixed:
         rows, weights, position = _fixed_entry(prepared, port)
-        entries.append((position, -1, -1, -1, rows, -weights, port.gap, port.law))
+        entries.append((position, -1, -1, -1, rows, -weights, port.gap, port.law, 0))
     order = sorted(range(len(entries)), key=lambda k: entries[k][0])
     entries = [entries[k] for k in order]
     tables = [_law_table(e[7]) for e in entries]
-    column = [np.array([e[k] for e in entries]) for k in (0, 1, 2, 3, 6)]
+    column = [np.array([e[k] for e in entries]) for k in (0, 1, 2, 3, 6, 8)]
     arrays = PortArrays(
         column[1].astype(np.int64),
         column[2].astype(np.int64),
         column[3].astype(np.int64),
+        column[5].astype(np.int64),
         column[0].astype(float),
         np.array([e[4] for e in entries], dtype=np.int64).reshape(-1, 4),
         np.array([e[5] for e in entries]).reshape(-1, 4),

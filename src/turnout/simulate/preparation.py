@@ -144,7 +144,6 @@ def prepare(
     reach = _reach(track, matrices, s, decay)
     window = inverse_windows(lower, upper, inverse_pivot, reach)
     lower_back, upper_back, pivot_back, middle = _two_sided_factors(system, window, reach)
-    _, p, ei, kga = matrices.elements
     arrays = TrackArrays(
         matrices.n,
         reach,
@@ -159,10 +158,7 @@ def prepare(
         pivot_back,
         middle,
         matrices.node,
-        matrices.node_index,
-        p,
-        1.0 / ei,
-        1.0 / kga,
+        *matrices.line_elements,
     )
     return Prepared(track, terms, dt, scheme, matrices, arrays, _scheme_arrays(integration_scheme, dt), static)
 
@@ -193,7 +189,7 @@ def _two_sided_factors(
 
 def _reach(track: Track, matrices: TrackMatrices, s: complex, exponent: float) -> int:
     """Half width of the windows: decay of EI w'''' + s² m w = 0 down to exp(-``exponent``), in rows."""
-    rails = {*matrices.rails}
+    rails = {*matrices.rails, *([matrices.blade_rail] if matrices.blade_rail else [])}
     decay = min(float(np.min(np.abs(np.roots([r.bending_stiffness, 0, 0, 0, s * s * r.mass]).real))) for r in rails)
     span = exponent / decay
     node = matrices.node

@@ -10,12 +10,13 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.simulate.between_nodes import element_deflection, is_between_nodes, rail_loads, step_mean
+from turnout.simulate.blade import is_on_blade
 from turnout.simulate.march import CONVERGED, LEFT_TRACK, march
 from turnout.simulate.port_system import locate_ports
 from turnout.simulate.ports import contact_ports, fixed_ports, port_arrays
 from turnout.simulate.state import Motion, PortArrays, RunArrays, stand_in_of, vehicle_arrays
 from turnout.simulate.statics import equilibrium, motion_at_rest
-from turnout.simulate.wheel_path import Surfaces, spline_pieces
+from turnout.simulate.wheel_path import PathPart, Surfaces, spline_pieces
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -156,7 +157,8 @@ def run(
     shape = (len(vehicle.wheels), len(drive.surfaces)) if vehicle else (0, 1)
     surface = by_port[: len(contacts)].reshape(*shape, port_forces.shape[1])
     force = surface.sum(axis=1)
-    for loads in _applied_loads(prepared, vehicle, drive, pulses, arrays, force) if between_nodes else ():
+    on_rail = force - _blade_force(prepared, vehicle, drive, surface, arrays.speed) if between_nodes else force
+    for loads in _applied_loads(prepared, vehicle, drive, pulses, arrays, on_rail) if between_nodes else ():
         for k, position, derivative in between_nodes:
             deflection = element_deflection(prepared.matrices, position, loads)
             signals[k] += step_mean(deflection, derivative, prepared.dt, loads.from_rest)
@@ -207,7 +209,11 @@ def _wheel_paths(
     path_of: dict[tuple, int] = {}
     for wheel in range(len(vehicle.wheels)):
         for surface, surface_parts in enumerate(drive.surfaces):
-            wheel_parts = [p for p in (*surface_parts, *term_parts) if getattr(p, "wheel", None) in (None, wheel)]
+            wheel_parts = [
+                p
+                for p in (*surface_parts, *_on_surface(term_parts, surface_parts))
+                if getattr(p, "wheel", None) in (None, wheel)
+            ]
             wheel_specific = any(
                 getattr(p, "wheel", None) is not None or getattr(p, "per_wheel", False) for p in wheel_parts
             )
@@ -217,6 +223,11 @@ def _wheel_paths(
                 pieces.append(spline_pieces(wheel_parts, wheel, low, high, drive.path_step))
             path_of[wheel, surface] = piece_index[key]
     return np.array(pieces), path_of, low
+
+
+def _on_surface(of_terms: Sequence[PathPart], surface: Sequence[PathPart]) -> list[PathPart]:
+    """Components of terms that lie on a surface: those of the blade on no other, all others on every surface."""
+    return [component for component in of_terms if is_on_blade(surface) or not is_on_blade([component])]
 
 
 def _run_arrays(
@@ -261,6 +272,22 @@ def _run_arrays(
         float(tolerance),
         CLUSTER_CUT,
     )
+
+
+def _blade_force(
+    prepared: Prepared, vehicle: Vehicle | None, drive: Drive, surface_force: np.ndarray, speed: float
+) -> np.ndarray:
+    """(n_wheel, n_step) forces [N] of wheels on the blade, from ``surface_force`` (n_wheel, n_surface, n_step)."""
+    total = np.zeros((surface_force.shape[0], surface_force.shape[2]))
+    if vehicle is None or prepared.matrices.blade_rail is None:
+        return total
+    time = (np.arange(total.shape[1]) + 0.5) * prepared.dt
+    position = drive.start - drive.direction * np.asarray(vehicle.wheel_positions)[:, None] + speed * time
+    on_blade = prepared.matrices.is_on_blade(position)
+    for surface, components in enumerate(drive.surfaces):
+        if is_on_blade(components):
+            total += on_blade * surface_force[:, surface]
+    return total
 
 
 def _applied_loads(

@@ -18,6 +18,8 @@ class TrackArrays(NamedTuple):
     """Factorised track; vectors carry ``pad`` zeros at both ends. ``window`` (n, 2 pad + 1) of the inverse.
 
     ``lower_back`` ... ``middle`` are for the solution from both ends, ``middle`` (0, 0) where it cannot be used.
+    ``first_row`` to ``shear_flexibility`` (2, n_element) are those of the rail and of the line that changes to the
+    blade.
     """
 
     n: int
@@ -33,7 +35,8 @@ class TrackArrays(NamedTuple):
     pivot_back: np.ndarray
     middle: np.ndarray
     node: np.ndarray
-    node_row: np.ndarray
+    first_row: np.ndarray
+    last_row: np.ndarray
     shear_ratio: np.ndarray
     flexibility: np.ndarray
     shear_flexibility: np.ndarray
@@ -74,7 +77,8 @@ class VehicleArrays(NamedTuple):
 
 
 class PortArrays(NamedTuple):
-    """Ports in order of their position; ``body`` -1: between track and ground, else a wheel on path ``path``.
+    """Ports in order of their position; ``body`` -1: between track and ground, else a wheel on path ``path`` of
+    the ``line`` 0, the rail, or 1, the line that changes to the blade.
 
     ``place`` [m] at time 0, ``rows``, ``weights`` (n, 4) for fixed ports, ``gap`` [m]; ``law_code`` and ``numbers``
     (n, 3) of the force law, ``table_start`` (n + 1,) into the three table columns.
@@ -83,6 +87,7 @@ class PortArrays(NamedTuple):
     body: np.ndarray
     wheel: np.ndarray
     path: np.ndarray
+    line: np.ndarray
     place: np.ndarray
     rows: np.ndarray
     weights: np.ndarray

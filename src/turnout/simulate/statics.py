@@ -95,8 +95,11 @@ def equilibrium(
     flexibility = np.array([[weights[i] @ columns[j][rows[i]] for j in range(n_port)] for i in range(n_port)])
     flexibility = flexibility.reshape(n_port, n_port)
     same_wheel = (ports.wheel[:, None] == ports.wheel[None, :]) & (ports.wheel[:, None] >= 0)
+    same_element = rows[:, :1] == rows[:, 0]
     flexibility += np.where(
-        same_wheel, np.outer(share, share) / stand_in_stiffness + np.sqrt(np.outer(local, local)), 0.0
+        same_wheel,
+        np.outer(share, share) / stand_in_stiffness + np.where(same_element, np.sqrt(np.outer(local, local)), 0.0),
+        0.0,
     )
     on_level_rail = vehicle.static_loads
     stiff, load, touches = _wheel_stiffness(vehicle, ports)

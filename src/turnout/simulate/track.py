@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from turnout.errors import SimulationError
+from turnout.simulate.blade import Blade
 from turnout.simulate.links import Link
 from turnout.simulate.rail import Rail, in_series
 
@@ -52,7 +53,8 @@ class Track:
     ``bay_shear_stiffness``, ``bay_shear_damping``. Loss factors act in the frequency domain only.
     ``pad_width`` [m] spreads a pad over three nodes; ``layers`` 1 is a rail on pads on rigid ground.
     ``end_length`` [m] and ``end_damping`` [1/s] make both ends absorb. ``section`` (n,) labels.
-    ``elements_per_bay`` >= 4 keeps the pinned-pinned resonance within 1 %.
+    ``elements_per_bay`` >= 4 keeps the pinned-pinned resonance within 1 %. ``blade``: that of a switch, a
+    second rail on the same supports.
     """
 
     rail: Rail
@@ -77,6 +79,7 @@ class Track:
     end_damping: float = 0.0
     section: tuple[str, ...] = ()
     name: str = "track"
+    blade: Blade | None = None
 
     def __repr__(self) -> str:
         n_support, extent = len(self.support), f"{self.support[0]:g} to {self.support[-1]:g} m"
@@ -102,6 +105,10 @@ class Track:
                 raise SimulationError(f"{self.name}: {self.layers} layers need {name} above 0 at every support.")
 
         self._check_pad_width()
+        if self.blade is not None:
+            if self.layers == 1:
+                raise SimulationError(f"{self.name}: a blade needs sleepers, the track has one layer.")
+            self.blade.nodes(self)
 
     def _check_pad_width(self) -> None:
         """A pad on three nodes is at most 8/3 elements wide: then all three nodes carry the same."""
@@ -205,10 +212,12 @@ class Track:
         return in_series(rails, np.diff(cuts) / (end - start)) if inside else rails[0]
 
     def links(self) -> list[Link]:
-        """All springs, dampers and masses of the supports as links."""
+        """All springs, dampers and masses of the supports as links, and the chairs of a blade."""
         links = []
         for j in range(self.support.size):
             links.extend(self.support_links(j))
+        if self.blade is not None:
+            links.extend(self.blade.chair_link(j) for j in self.blade.chairs(self))
         return links
 
     def pad_link(self, j: int) -> Link:

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from turnout.simulate.blade import Blade
 from turnout.simulate.rail import Rail
 from turnout.simulate.track import RailStretch, Track
 from turnout.simulate.turnout_track import TurnoutTrack
-from turnout.simulate.wheel_path import Corrugation, Cosine, Dip, Kink, Sections
+from turnout.simulate.wheel_path import BladeTop, Corrugation, Cosine, Dip, Kink, Sections, StockFall
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
@@ -57,6 +58,7 @@ TRACK_KEYS = (
     "routes",
     "locations",
     "terms",
+    "blade",
 )
 
 
@@ -187,8 +189,21 @@ def _track(p: ParameterSet, route: str, routes: tuple[str, ...], seed: int) -> T
         end_length=end.number("length", "m") if end else 0.0,
         end_damping=end.number("rate", "1/s") if end else 0.0,
         section=tuple(section),
+        blade=_blade(p),
         name=str(p["name"]),
     )
+
+
+BLADE_UNITS = {"toe": "m", "heel": "m", "end": "m", "chair_stiffness": "N/m", "chair_damping": "N s/m"}
+
+
+def _blade(p: ParameterSet) -> Blade | None:
+    """The blade of a switch, None without one."""
+    entry = p.optional_mapping_at("blade").allow_only(*BLADE_UNITS, "rail")
+    if not entry:
+        return None
+    values = {name: entry.number(name, unit) for name, unit in BLADE_UNITS.items()}
+    return entry.build(Blade, rail=_rail(entry.mapping_at("rail")), **values)
 
 
 def _supports(p: ParameterSet) -> np.ndarray:
@@ -270,6 +285,8 @@ PATHS = {
     "dip": (Dip, {"place": "m", "depth": "m", "length": "m"}),
     "cosine": (Cosine, {"place": "m", "depth": "m", "length": "m"}),
     "kink": (Kink, {"place": "m", "depth": "m", "length": "m", "share": "-", "power": "-"}),
+    "blade_top": (BladeTop, {"start": "m", "length": "m", "depth": "m", "power": "-"}),
+    "stock_fall": (StockFall, {"start": "m", "length": "m", "depth": "m"}),
     "corrugation": (Corrugation, {"start": "m", "end": "m", "amplitude": "m", "wavelength": "m"}),
 }
 OPTIONAL_KEYS = ("share", "power")

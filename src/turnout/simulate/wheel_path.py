@@ -188,6 +188,52 @@ class Sections:
 
 
 @dataclass(frozen=True)
+class BladeTop:
+    r"""Top of a blade: ``depth`` d below the stock rail at its toe, level with it after ``length``.
+
+    .. math:: p = d\,(1 - s)^n, \quad s = (x - x_0) / L \text{ within } 0..1
+
+    The toe is at ``start`` [m]; ``length`` L [m] is negative where the blade points to larger x; ``power`` n. It
+    belongs to the blade: the wheel on it presses that rail. EN 13232-5 (from memory, unverified): 14 to 23 mm at the
+    toe.
+    """
+
+    start: float
+    length: float
+    depth: float
+    power: float = 1.5
+    on_blade = True
+
+    def __post_init__(self) -> None:
+        _check_length("blade top", self.start, abs(self.length))
+        if not self.power >= 1.0:
+            raise SimulationError(f"blade top at {self.start:.3f} m: power {self.power!r} is below 1.")
+
+    def __call__(self, x: ArrayLike, wheel: int = 0) -> np.ndarray:
+        share = (np.asarray(x, dtype=float) - self.start) / self.length
+        return self.depth * np.clip(1.0 - share, 0.0, 1.0) ** self.power
+
+
+@dataclass(frozen=True)
+class StockFall:
+    r"""Stock rail from which the wheel moves off, :math:`p = d\,s^2` from ``start`` over ``length`` to ``depth``.
+
+    The contact runs outwards on the cone of the wheel, which so sinks. ``start`` [m]; ``length`` [m] is negative where
+    the wheel moves off towards smaller x; ``depth`` d [m], beyond which the wheel is on the other rail.
+    """
+
+    start: float
+    length: float
+    depth: float
+
+    def __post_init__(self) -> None:
+        _check_length("stock rail", self.start, abs(self.length))
+
+    def __call__(self, x: ArrayLike, wheel: int = 0) -> np.ndarray:
+        return self.depth * np.clip((np.asarray(x, dtype=float) - self.start) / self.length, 0.0, 1.0) ** 2
+
+
+@dataclass(frozen=True)
 class Corrugation:
     r"""Waves :math:`p = A \sin 2\pi(x - x_0)/\lambda` between ``start`` and ``end``, faded over a wavelength."""
 

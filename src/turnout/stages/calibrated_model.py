@@ -10,7 +10,7 @@ import hashlib
 import json
 import sys
 from collections.abc import Collection, Iterable, Mapping, MutableMapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -271,6 +271,14 @@ def visits_of(stored: Iterable[StoredVisit]) -> list[VisitInformation]:
     return visits_used
 
 
+def _with_library(answer: ModelAnswer, without: Collection[str]) -> ModelAnswer:
+    """The answer in a library ``without`` some effects: one that could only name these is "unknown"."""
+    names = tuple(name for name in answer.names if name not in without)
+    if names == answer.names:
+        return answer
+    return replace(answer, names=names, verdict={0: "unknown", 1: "named"}.get(len(names), answer.verdict))
+
+
 def _without_findings(stored: Iterable[StoredVisit]) -> list[StoredVisit]:
     """Stored visits without an open finding: only these change the belief."""
     return [s for s in stored if s.answer in USED_ANSWERS]
@@ -455,7 +463,7 @@ def calibrate_turnout(
         {f"{s.visit} {s.sections}": s.answer for s in stored if s.answer not in USED_ANSWERS},
         tuple(missing),
         tuple(notes),
-        tuple(answers),
+        tuple(_with_library(answer, without) for answer in answers),
     )
 
 

@@ -37,6 +37,9 @@ RIGHT_NAMES = {
     "beyond_reach": ("local_pad",),
     "bottomless_void": ("hanging_sleeper",),
     "common_gain": ("sensor_gain",),
+    "chair_gap": ("slide_chair_gap",),
+    "heel": ("heel_support",),
+    "toe": ("worn_toe",),
 }
 
 # Kind -> right locks. A delay belongs to the sensor or its clock. An effect of amplitude at one position is locked to
@@ -72,6 +75,9 @@ SAME_PARAMETERS = {
     "position": {"shift": "shift"},
     "clipping": {"limit": "limit"},
     "corrugation": {"wavelength": "wavelength"},
+    "chair_gap": {"gap": "gap"},
+    "heel": {"factor": "factor"},
+    "toe": {"depth": "depth"},
 }
 
 

@@ -54,7 +54,7 @@ def matrices_of(track: Track, terms: Sequence[PhysicsTerm] = ()) -> TrackMatrice
     joins = frozenset(tuple(name for name, _ in link.ends) for link in links if len(link.ends) > 1)
     key = (
         track.support.tobytes(), track.elements_per_bay, track.pad_width, track.pad_loss_factor.tobytes(),
-        track.ballast_loss_factor.tobytes(), extra, joins,
+        track.ballast_loss_factor.tobytes(), track.blade, extra, joins,
     )  # fmt: skip
     return _get_or_compute(_templates, key, lambda: MatrixTemplate(track, links)).fill(track, links)
 
@@ -146,7 +146,6 @@ class MatrixTemplate:
         """
         base = self._base_with_rail(track)
         matrices = {what: getattr(base, what).copy() for what in ("stiffness", "damping", "mass")}
-        hysteresis = base.hysteresis
         for name, what, tag in SUPPORT_FIELDS:
             diagonal, row, weight, support = self.support_entries[tag]
             np.add.at(matrices[what], (diagonal, row), weight * (getattr(track, name) - 1.0)[support])
@@ -156,9 +155,6 @@ class MatrixTemplate:
             diagonal, row, weight, which = self._link_entries(links)
             for what, matrix in matrices.items():
                 np.add.at(matrix, (diagonal, row), weight * np.array([getattr(k, what) for k in links])[which])
-        track_matrices = TrackMatrices(
-            matrices["mass"], matrices["damping"], matrices["stiffness"], hysteresis,
-            base.node, base.node_index, base.index, base.rails, base.links,
-        )  # fmt: skip
+        track_matrices = replace(base, **matrices)
         track_matrices.__dict__["elements"] = base.elements
         return track_matrices

@@ -49,9 +49,8 @@ class SurfaceParameter:
         )
         if self.field in POSITION_FIELDS:
             sd = self.spread * abs(getattr(self.component, self.field))
-            trust = min(
-                SURFACE.max_step_sd, SURFACE.max_relative_step * _field_values(self.component, LENGTH_FIELDS)[0] / sd
-            )
+            length = abs(_field_values(self.component, LENGTH_FIELDS)[0])
+            trust = min(SURFACE.max_step_sd, SURFACE.max_relative_step * length / sd)
             return Nuisance(
                 self.name,
                 "m",

@@ -115,7 +115,9 @@ def zone_of(turnout: TurnoutTrack, positions: Sequence[float]) -> Zone:
         keep = (track.support >= low - TRACK.track_margin) & (track.support <= high + TRACK.track_margin)
         values = {name: getattr(track, name)[keep] for name in PER_SUPPORT}
         section = tuple(s for s, k in zip(track.section, keep) if k)
-        return replace(track, support=track.support[keep], section=section, **values)
+        support = track.support[keep]
+        blade = track.blade.inside(float(support[0]), float(support[-1])) if track.blade else None
+        return replace(track, support=support, section=section, blade=blade, **values)
 
     tracks = {name: cut(track) for name, track in turnout.tracks.items()}
     smaller = replace(turnout, track=cut(turnout.track), tracks=tracks)

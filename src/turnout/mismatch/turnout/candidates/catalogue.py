@@ -16,6 +16,7 @@ from turnout import physics
 from turnout.mismatch.engine.candidate import Candidate, Effect, EffectSite, NamingRules, RefitStarts
 from turnout.mismatch.turnout.priors import SATURATION
 from turnout.physics.hypothesis import (
+    BladeSite,
     ChannelSite,
     ContactSite,
     Hypothesis,
@@ -25,6 +26,7 @@ from turnout.physics.hypothesis import (
     TrackSite,
     TrainSite,
 )
+from turnout.simulate.blade import transfer_position
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.map_fit import Fit
@@ -122,6 +124,7 @@ def sites_of(data: CaseData) -> Iterator[Site]:
     yield from _support_sites(data)
     yield TrackSite(data.site.nominal.turnout.track.rail, bool(data.aligned_passages))
     yield from channel_sites(data)
+    yield from _blade_sites(data)
     if data.aligned_passages:
         yield ContactSite(tuple(s.place for s in data.campaign.sensors))
         for train in data.site.trains:
@@ -134,6 +137,23 @@ def _support_sites(data: CaseData) -> Iterator[SupportSite]:
     for j in zone.effect_supports:
         place = round(float(positions[j]), 3)
         yield SupportSite(j, place, len(zone.effect_supports), zone.first, zone.last, bool(data.aligned_passages))
+
+
+def _blade_sites(data: CaseData) -> Iterator[BladeSite]:
+    """The blade on the route of the passages, with its supports near the sensors."""
+    zone = data.site.nominal
+    route = next((p.passage.route for p in data.aligned_passages.values()), "main")
+    track = zone.turnout.track_of(route)
+    if track.blade is None:
+        return
+    near, slide_chairs = set(zone.effect_supports), track.blade.slide_chairs(track)
+    fastened = [j for j in track.blade.chairs(track) if j not in slide_chairs]
+
+    def near_sensors(supports: Iterable[int]) -> tuple[tuple[int, float], ...]:
+        return tuple((j, round(float(track.support[j]), 3)) for j in supports if j in near)
+
+    transfer = transfer_position(zone.turnout.surfaces(route), track.blade)
+    yield BladeSite(near_sensors(slide_chairs), near_sensors(fastened), transfer, bool(data.aligned_passages))
 
 
 def channel_sites(data: CaseData) -> Iterator[ChannelSite | SaturatedChannelSite]:

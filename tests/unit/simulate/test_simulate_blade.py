@@ -1,0 +1,161 @@
+"""A blade beside its stock rail: closed forms of two beams on common bearers, energy, limits, a wheel changing rail."""
+
+import numpy as np
+import pytest
+from tests.oracles.march_numpy import march_numpy
+
+from turnout.errors import SimulationError
+from turnout.physics import LocalPad
+from turnout.simulate.blade import GRAVITY, Blade
+from turnout.simulate.frequency_response import receptance
+from turnout.simulate.preparation import prepare
+from turnout.simulate.rail import Rail, shape_functions
+from turnout.simulate.run import Drive, Probe, run
+from turnout.simulate.track import uniform_track
+from turnout.simulate.vehicle import lone_wheels
+from turnout.simulate.wheel_path import BladeTop, StockFall
+
+EULER = Rail(6.42e6, 60.21, 2.5e8, 0.0, beam="euler")
+TRACK = uniform_track(30.0)
+BLADE = Blade(9.0, 15.0, 24.0, TRACK.rail, 3e8, 3e4)
+SWITCH = TRACK.with_(blade=BLADE)
+SURFACES = ((StockFall(10.5, 3.0, 0.02),), (BladeTop(9.0, 3.0, 0.015),))
+
+
+def pulse(t):
+    return np.where((t > 0.0) & (t < 1.2e-3), 300.0 * np.sin(np.pi * t / 1.2e-3) ** 2, 0.0)
+
+
+def winkler(stiffness, spacing, rail=EULER):
+    """Deflection per newton under a point load on an endless beam: 1 / (8 EI b³)."""
+    b = (stiffness / spacing / (4.0 * rail.bending_stiffness)) ** 0.25
+    return 1.0 / (8.0 * rail.bending_stiffness * b**3)
+
+
+def test_two_rails_share_a_load_as_the_symmetric_and_the_antisymmetric_case_say():
+    """Half the load on both rails: each on pad and half the ballast. Half against half: each on its pad alone."""
+    spacing, pad, ballast = 0.1, 5e7, 2e7
+    track = uniform_track(40.0, spacing, EULER, pad_stiffness=pad, ballast_stiffness=ballast, elements_per_bay=1)
+    switch = track.with_(blade=Blade(2.0, 2.1, 38.0, EULER, pad, 3e4))
+    matrices = prepare(switch, 1e-4).matrices
+    j = track.nearest_support(20.0)
+    on_blade = prepare(switch, 1e-4).static_response(*matrices.weights(("blade", j, 0)))
+    together = winkler(1.0 / (1.0 / pad + 2.0 / ballast), spacing)
+    against = winkler(pad, spacing)
+    assert on_blade[matrices.index[("blade", j, 0)]] == pytest.approx(0.5 * (together + against), rel=2e-3)
+    assert on_blade[matrices.index[("rail", j)]] == pytest.approx(0.5 * (together - against), rel=2e-3)
+
+
+def test_a_blade_of_nothing_leaves_the_plain_track():
+    ghost = TRACK.with_(blade=Blade(9.0, 15.0, 24.0, Rail(1.0, 1e-6, 1e3, 1e-9), 1e-2, 0.0))
+    frequency = np.linspace(20.0, 1000.0, 50)
+    plain, changed = (receptance(prepare(t, 1e-4).matrices, frequency, 12.0, 13.5) for t in (TRACK, ghost))
+    assert np.max(np.abs(changed / plain - 1.0)) < 1e-6
+    drive = Drive(6.0, 40.0)
+    a, b = (run(prepare(t, 1e-4), 0.2, [Probe(12.0)], lone_wheels(600.0), drive) for t in (TRACK, ghost))
+    assert np.max(np.abs(a.force - b.force)) < 1e-3
+    assert np.max(np.abs(a.signals - b.signals)) < 1e-5 * np.max(np.abs(a.signals))
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_rail_and_blade_are_reciprocal(mirrored):
+    """Betti, marched, with chairs that stay closed; a blade may point either way."""
+    blade = Blade(24.0, 18.0, 9.0, TRACK.rail, 3e8, 3e4) if mirrored else BLADE
+    prepared = prepare(TRACK.with_(blade=blade), 1e-4)
+    there = run(prepared, 0.03, [Probe(10.5)], pulses=[(("blade", 23, 0), pulse)]).signals[0]
+    back = run(prepared, 0.03, [Probe(("blade", 23, 0))], pulses=[(10.5, pulse)]).signals[0]
+    assert np.max(np.abs(there)) > 1e-3
+    assert np.max(np.abs(there - back)) < 1e-9 * np.max(np.abs(there))
+
+
+def test_the_work_of_an_impact_on_the_blade_is_the_energy_of_both_rails():
+    rail = Rail(6.42e6, 60.21, 2.485e8, 0.24)
+    still = {"pad_damping": 0.0, "ballast_damping": 0.0}
+    track = uniform_track(30.0, rail=rail, **still, blade=Blade(9.0, 9.1, 24.0, rail, 3e8, 0.0))
+    prepared = prepare(track, 2e-5, "gauss")
+    point = ("blade", 20, 0)
+    outcome = run(prepared, 0.012, [Probe(point, 1)], pulses=[(point, pulse)])
+    work = float(np.sum(pulse(outcome.time) * outcome.signals[0]) * prepared.dt)
+    m, pad = prepared.matrices, prepared.arrays.pad
+    u, v = (x[pad : pad + m.n] for x in (outcome.motion.u, outcome.motion.v))
+    energy = 0.0
+    for upper, x in ((m.mass, v), (m.stiffness, u)):
+        for k, row in enumerate(upper):
+            energy += (0.5 if k == 0 else 1.0) * float(np.sum(row[: m.n - k] * x[: m.n - k] * x[k:]))
+    assert energy == pytest.approx(work, rel=2e-3)
+
+
+def test_a_wheel_changes_to_the_blade_and_carries_its_load_over():
+    """At walking pace both rails together carry the wheel; the stock rail before the change, the blade after it."""
+    prepared = prepare(TRACK.with_(blade=Blade(9.0, 9.1, 24.0, TRACK.rail, 3e8, 3e4)), 2e-4)
+    drive = Drive(9.9, 3.0, surfaces=SURFACES)
+    outcome = run(prepared, 1.2, vehicle=lone_wheels(6000.0), drive=drive)
+    weight = 6000.0 * GRAVITY
+    x, stock, blade = 9.9 + 3.0 * outcome.time, *outcome.surface_force[0]
+    before, after = x < 10.6, x > 12.2
+    assert np.all(blade[before] == 0.0) and np.all(stock[after] == 0.0)
+    assert np.mean(stock[before]) == pytest.approx(weight, rel=0.02)
+    assert np.mean(blade[after]) == pytest.approx(weight, rel=0.02)
+    both = np.flatnonzero((stock > 0.0) & (blade > 0.0))
+    first, last = both[0], both[-1]
+    level = [np.sum([part(x, 0) for part in surface], axis=0) for surface in SURFACES]
+    assert level[1][first] - level[0][first] == pytest.approx(reach_of_a_loaded_wheel(prepared, x[first], 0), rel=0.05)
+    assert level[0][last] - level[1][last] == pytest.approx(reach_of_a_loaded_wheel(prepared, x[last], 1), rel=0.05)
+
+
+def reach_of_a_loaded_wheel(prepared, x, line):
+    """How far the other rail may lie below the one that carries the wheel and be touched: approach and deflection."""
+    m, weight = prepared.matrices, 6000.0 * GRAVITY
+    first, last, p, _, _ = (v[:, m.element_at(x)] for v in m.line_elements)
+    h, s = m.node[m.element_at(x) + 1] - m.node[m.element_at(x)], (x - m.node[m.element_at(x)])
+    shape = shape_functions(s / h, h, p[0])
+    rows = [np.array([first[k], first[k] + 1, last[k], last[k] + 1]) for k in (0, 1)]
+    deflection = prepared.static_response(rows[line], shape * weight)
+    own, other = (float(shape @ deflection[rows[k]]) for k in (line, 1 - line))
+    return own - other + m.compliance(x) * weight + (weight / lone_wheels(1.0).contact.stiffness) ** (2.0 / 3.0)
+
+
+def test_the_compiled_march_and_plain_numpy_agree_over_the_change():
+    """Whole columns of the inverse and one dense Newton system, with slide chairs that open."""
+    prepared = prepare(SWITCH, 1e-4, terms=(LocalPad(19, 0.5),))
+    drive = Drive(10.6, 30.0, surfaces=SURFACES)
+    probes = [Probe(12.05), Probe(("blade", 19, 0))]
+    outcomes = [
+        run(prepared, 0.04, probes, lone_wheels(6000.0), drive, **kind) for kind in ({}, {"marcher": march_numpy})
+    ]
+    force, other = (o.surface_force for o in outcomes)
+    assert np.all(force.max(axis=2) > 3e4)
+    assert np.max(np.abs(force - other)) < 1e-9 * np.max(force)
+    signals, others = (o.signals for o in outcomes)
+    assert np.max(np.abs(signals - others)) < 1e-9 * np.max(np.abs(signals))
+
+
+def test_slide_chairs_press_but_do_not_pull():
+    """With the blade's own weight a chair never carries less than nothing; a fastened one does."""
+    prepared = prepare(SWITCH, 2.5e-5)
+    j, k = 16, 27
+    names = [("blade", j, 0), ("sleeper", j), ("blade", k, 0), ("sleeper", k)]
+    probes = [Probe(name, order) for name in names for order in (0, 1)]
+    drive = Drive(7.0, 40.0, surfaces=SURFACES)
+    outcome = run(prepared, 0.3, probes, lone_wheels(6000.0), drive)
+    s = outcome.signals
+    spring = [BLADE.chair_stiffness * (a - c) + BLADE.chair_damping * (b - d) for a, b, c, d in (s[:4], s[4:])]
+    weight = GRAVITY * BLADE.rail.mass * 0.6
+    port = outcome.port_force[BLADE.slide_chairs(SWITCH).index(j)]
+    assert spring[0].min() < -2.0 * weight, "the blade lifts off here: the test would prove nothing otherwise"
+    assert (spring[0] + port).min() > -1.05 * weight
+    assert spring[1].min() < -1.05 * weight
+
+
+@pytest.mark.parametrize(
+    ("blade", "message"),
+    [
+        ({"toe": 15.0, "heel": 9.0}, "not in this order"),
+        ({"end": 31.0}, "the end at 31.000 m is not from 0.000 to 30.000 m"),
+        ({"chair_stiffness": -1.0}, "chair_stiffness must not be negative"),
+    ],
+)
+def test_a_blade_that_cannot_be_is_rejected(blade, message):
+    values = {"toe": 9.0, "heel": 15.0, "end": 24.0, "rail": TRACK.rail, "chair_stiffness": 3e8, "chair_damping": 3e4}
+    with pytest.raises(SimulationError, match=message):
+        TRACK.with_(blade=Blade(**{**values, **blade}))
