@@ -46,8 +46,10 @@ from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.calibration import (
     calibrated_parameters,
     dip_directions,
+    nose_errors,
     visit_groups,
 )
+from turnout.mismatch.turnout.further_passages import names_beyond, with_reserved_passages
 from turnout.stages.checkpoint import SUFFIX, read_value, write_value
 from turnout.stages.mismatch_groups import groups, unit_of, visits
 from turnout.stages.mismatch_inputs import digest_of_model, gather_inputs, mismatch_context, track_of
@@ -79,6 +81,8 @@ OPENED_COMMON = {
     "pad_exchange": PADS,
     "sleeper_change": ("sleeper_mass", *BALLAST, *PADS),
 }
+MAX_FITTED_AXLES = 8  # of all fitted passages of a visit: the others are linear about the fit, and cost little
+MAX_PASSAGES_AND_AXLES = (60, 1000)  # of a group of sections at one visit
 EVENT_REACH = 6.0  # m from a section that work there may touch
 
 
@@ -188,11 +192,13 @@ def store_visit(
     may_be_large = [
         nuisance
         for nuisance, p in parameters.items()
-        if p.group in dict(CALIBRATION.least_sizes) and NAMES[p.group] not in about.get("without", ())
+        if p.may_change and p.group in dict(CALIBRATION.least_sizes) and NAMES[p.group] not in about.get("without", ())
     ]
-    fit = fit_large_values(search, fit, may_be_large, CALIBRATION.change_sds)
+    dampers = {f"{p.group}_{p.index}": n for n, p in parameters.items() if p.group.endswith("_damper")}
+    partners = {n: dampers[key] for n in may_be_large if (key := _damper_key(parameters[n])) in dampers}
+    fit = fit_large_values(search, fit, may_be_large, CALIBRATION.change_sds, partners)
     sections = ", ".join(group.labels)
-    information = visit_groups(search.case, fit, sections, group.route)
+    information = visit_groups(*with_reserved_passages(search.case, fit), sections, group.route)
     value = {
         "version": dict(about["version"]), "visit": about["visit"], "sections": sections, "answer": answer,
         "parameters": [asdict(p) for p in parameters.values()],
@@ -204,6 +210,10 @@ def store_visit(
     path = _path(folder, about["turnout"].id, about["visit"], group.labels)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_value(path, value)
+
+
+def _damper_key(spring: StateParameter) -> str:
+    return f"{spring.group}_damper_{spring.index}"
 
 
 def _path(folder: Path, turnout_id: str, visit: str, labels: Sequence[str]) -> Path:
@@ -359,7 +369,8 @@ def state_rows(
     stored = read_visits(folder, turnout.id, earlier | {about["visit"]: about["version"]})
     parameters = parameters_of(stored)
     visits_used = visits_of(_without_findings(stored))
-    history = estimate_history(parameters, visits_used, events_of(turnout, parameters))
+    events = [*events_of(turnout, parameters), *nose_errors(parameters, dip_directions(parameters))]
+    history = estimate_history(parameters, visits_used, events)
     belief, n = history.belief, sum(s.n_recordings for s in history.used_steps)
     number = {p.name: k for k, p in enumerate(parameters)}
     key = {k: finding[k] for k in ("finding_id", "turnout_id", "found_at_utc")}
@@ -436,7 +447,8 @@ def calibrate_turnout(
             f"{turnout_id}: no visit can be fitted; {'; '.join(notes) or 'no section has recordings'}"
         )
     parameters = parameters_of(stored)
-    events = events_of(turnout, parameters)
+    directions = dip_directions(parameters)
+    events = [*events_of(turnout, parameters), *nose_errors(parameters, directions)]
     history = estimate_history(parameters, visits_of(_without_findings(stored)), events)
     informed = visits_of(stored)
     changes = estimate_history(parameters, informed, events, repeats_between_visits=False, accepted=None)
@@ -444,7 +456,7 @@ def calibrate_turnout(
         history.belief, parameters, dict(CALIBRATION.least_sizes), intolerable=INTOLERABLE
     )
     candidates, settings = (
-        change_candidates(parameters, dip_directions(parameters), without),
+        change_candidates(parameters, directions, without),
         turnout.settings["mismatch"],
     )
     answers = answers_after_visits(
@@ -480,10 +492,11 @@ def _fit_visit(
     turnout_track, accepted = track_of(turnout, track)
     _, passage_tables = mismatch_context(turnout.id, work=work)
     inputs = gather_inputs(units, turnout, raw_root, turnout_track, passage_tables)
-    for group in groups(turnout, turnout_track, inputs):
+    for group in groups(turnout, turnout_track, inputs, limits=MAX_PASSAGES_AND_AXLES):
         try:
             on_route = tuple(a for a in accepted if a.is_on(group.route))
-            case = TrackCase(group.campaign, turnout.settings["mismatch"], accepted=on_route)
+            campaign = replace(group.campaign, reserved=names_beyond(group.campaign, MAX_FITTED_AXLES))
+            case = TrackCase(campaign, turnout.settings["mismatch"], accepted=on_route)
             store_visit(folder, group, case, "", about)
         except (SimulationError, np.linalg.LinAlgError) as error:
             notes.append(f"visit {about['visit']}, sections {', '.join(group.labels)}: {error}")

@@ -19,9 +19,7 @@ import numpy as np
 from turnout.constants import Z95
 from turnout.errors import SimulationError
 from turnout.mismatch.calibrated import (
-    Event,
     ModelAnswer,
-    StateParameter,
     VisitInformation,
     change_answer,
     change_candidates,
@@ -60,7 +58,6 @@ if TYPE_CHECKING:
 FOLDER = Path("work/impact-models")
 MIN_FIT_ERROR = 0.1  # points of fit: standard errors below it are not believed
 SUSPICION = 0.5  # share of the evidence of a name from which trains are asked for the rest
-SEASON_SD = 0.1  # ln: change of all pads between visits by their temperature, 30 K at 0.3 % per kelvin
 SUPPORTS = ("ballast", "pad")  # groups of parameters of one support, which trains can test
 # Effects at one support that are fitted to trains beside the named one, so that it has rivals
 SUPPORT_EFFECTS = ("local_ballast", "hanging_sleeper", "local_pad")
@@ -224,15 +221,9 @@ def change_of(
     informed = sorted(calibrated.visits_of(stored), key=lambda v: (v.time, v.visit))
     settings = turnout.settings["mismatch"]
     candidates = [*change_candidates(parameters, dip_directions(parameters)), *stretch_candidates(parameters)]
-    events = [*calibrated.events_of(turnout, parameters), *_seasons(parameters, informed)]
+    events = calibrated.events_of(turnout, parameters)
     least = settings.threshold if threshold is None else threshold
     return change_answer(parameters, informed, events, candidates, least, settings.margin, True), informed
-
-
-def _seasons(parameters: Sequence[StateParameter], informed: Sequence[VisitInformation]) -> list[Event]:
-    """The pads of the whole track are uncertain again at each visit: rubber is stiffer when it is cold."""
-    opened = {p.name: SEASON_SD for p in parameters if p.name.split(" ")[-1] in calibrated.PADS}
-    return [Event(v.time, opened) for v in informed]
 
 
 def _test_on_trains(

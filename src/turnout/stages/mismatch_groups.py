@@ -48,7 +48,11 @@ class Group:
 
 
 def groups(
-    turnout: TurnoutConfig, track: TurnoutTrack, inputs: VisitInputs, only: Sequence[str] = ()
+    turnout: TurnoutConfig,
+    track: TurnoutTrack,
+    inputs: VisitInputs,
+    only: Sequence[str] = (),
+    limits: tuple[int, int] = (MAX_PASSAGES, MAX_AXLES),
 ) -> Iterator[Group]:
     """Groups of a visit in order of position; sections without a recording are left out.
 
@@ -62,13 +66,15 @@ def groups(
         Recordings of the visit; notes are added.
     only : sequence of str
         Labels of the sections, () for all.
+    limits : (int, int)
+        Largest number of passages of a group, and of all their axles.
 
     Yields
     ------
     Group
     """
     for route, labels in neighbours_of(turnout, only):
-        campaign = _campaign(turnout, track, inputs, route, labels)
+        campaign = _campaign(turnout, track, inputs, route, labels, limits)
         if campaign is not None and route not in ("main", *track.routes):
             inputs.notes.append(Note(f"sections {', '.join(labels)}: the track's file has no route {route}; not used"))
         elif campaign is not None:
@@ -118,7 +124,12 @@ def _route(section: Section) -> str:
 
 
 def _campaign(
-    turnout: TurnoutConfig, track: TurnoutTrack, inputs: VisitInputs, route: str, labels: Sequence[str]
+    turnout: TurnoutConfig,
+    track: TurnoutTrack,
+    inputs: VisitInputs,
+    route: str,
+    labels: Sequence[str],
+    limits: tuple[int, int],
 ) -> CampaignInput | None:
     tests = tuple(t for t in inputs.tests if inputs.sections[t.name] in labels)
     sensors = _sensors(turnout, labels)
@@ -127,7 +138,7 @@ def _campaign(
     passages = [
         p for p in inputs.passages if (shared or p.route == route) and names & {c.name for c in p.recording.channels}
     ]
-    passages = select_passages(split_by_length(passages))
+    passages = select_passages(split_by_length(passages), *limits)
     recorded = {c.name for p in passages for c in p.recording.channels} & names
     sensors = tuple(s for s in sensors if s.name in recorded)
     if not tests and not passages:

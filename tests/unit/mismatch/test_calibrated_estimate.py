@@ -12,7 +12,7 @@ from turnout.mismatch.calibrated import (
     VisitInformation,
     estimate_history,
 )
-from turnout.mismatch.calibrated.information import marginalize, repeated_error_weights
+from turnout.mismatch.calibrated.information import marginalize, repeated_error_weights, with_own_values
 
 N_MASS = 4
 CHAIN = tuple(
@@ -196,6 +196,16 @@ def test_marginalized_information_is_the_inverse_of_the_marginal_covariance():
     remaining, right = marginalize(matrix, vector, [4, 5], prior)
     assert_allclose(remaining, expected, rtol=1e-9)
     assert_allclose(np.linalg.solve(remaining, right), (covariance @ vector)[:4], rtol=1e-9)
+
+
+def test_deviations_of_a_visit_add_to_the_covariance_of_its_data():
+    """Data y = A (x + d) + noise, d of the visit alone: the generalized least squares information of x."""
+    rng = np.random.default_rng(5)
+    rows, y, sds = rng.normal(size=(8, 4)), rng.normal(size=8), np.array([0.0, 0.7, 0.0, 2.0])
+    precision = np.linalg.inv(np.eye(8) + rows @ np.diag(sds**2) @ rows.T)
+    matrix, vector = with_own_values(rows.T @ rows, rows.T @ y, sds)
+    assert_allclose(matrix, rows.T @ precision @ rows, atol=1e-12)
+    assert_allclose(vector, rows.T @ precision @ y, atol=1e-12)
 
 
 def test_innovations_of_intact_visits_are_chi_squared_and_a_jump_is_named():

@@ -70,6 +70,8 @@ def change_candidates(
 ) -> list[ChangeEffect]:
     """Steps of each parameter of a single support, sensor or nose at an unknown visit, and their growth.
 
+    A spring changes alone, or with its damper, see ``stretch_candidates``.
+
     Parameters
     ----------
     parameters : sequence of StateParameter
@@ -83,19 +85,22 @@ def change_candidates(
     -------
     list of ChangeEffect
     """
-    local = [p for p in parameters if p.group in NAMES and NAMES[p.group] not in without]
+    local = [p for p in parameters if p.may_change and p.group in NAMES and NAMES[p.group] not in without]
     shapes = {} if shapes is None or NAMES["dip"] in without else shapes
     candidates = [(p.name, {p.name: 1.0}, CALIBRATION.change_sds * p.sd) for p in local]
     candidates += [(name, dict(direction), CALIBRATION.dip_sd) for name, direction in shapes.items()]
-    return [ChangeEffect(name, d, sd, grows) for name, d, sd in candidates for grows in (False, True)]
+    steps = [ChangeEffect(name, d, sd, grows) for name, d, sd in candidates for grows in (False, True)]
+    springs = [p for p in local if p.group in STRETCH_GROUPS and p.position is not None]
+    with_dampers = [e for p in springs for share in DAMPER_SHARES for e in _stretch(p.group, [p], share, parameters)]
+    return steps + [e for e in with_dampers if len(e.direction) > 1]
 
 
 def stretch_candidates(parameters: Sequence[StateParameter]) -> list[ChangeEffect]:
-    """Changes of one support, and of up to ``CALIBRATION.max_stretch`` adjacent ones alike, with their dampers.
+    """Changes of two to ``CALIBRATION.max_stretch`` adjacent supports alike, with their dampers.
 
     Ballast and pads often change over a stretch: drainage and traffic do not end at a sleeper. Their dampers change by
-    half the logarithm of the stiffness, as the effects of the library assume, or by all of it where a sleeper has lost
-    its support.
+    half the logarithm of the stiffness, as the effects of the library assume. That of a single support may also change
+    by all of it, where a sleeper has lost its support.
 
     Parameters
     ----------
@@ -108,13 +113,13 @@ def stretch_candidates(parameters: Sequence[StateParameter]) -> list[ChangeEffec
     """
     candidates = []
     for group in STRETCH_GROUPS:
-        along = sorted((p for p in parameters if p.group == group and p.position is not None), key=_order)
-        for n in range(1, CALIBRATION.max_stretch + 1):
+        along = [p for p in parameters if p.may_change and p.group == group and p.position is not None]
+        along.sort(key=_order)
+        for n in range(2, CALIBRATION.max_stretch + 1):
             for k in range(len(along) - n + 1):
                 run = along[k : k + n]
                 if _order(run[-1]) - _order(run[0]) == n - 1:
-                    for share in DAMPER_SHARES if n == 1 else DAMPER_SHARES[:1]:
-                        candidates += _stretch(group, run, share, parameters)
+                    candidates += _stretch(group, run, DAMPER_SHARES[0], parameters)
     return candidates
 
 
@@ -389,11 +394,11 @@ def _supported_names(
 
     In one fit trains have a size of their own: that of impacts, or the shares of it that a gap leaves, which are
     equally probable before. The prior of the size is so wide that it favours none: without trains, or without impacts,
-    the evidence decides nothing. A gap that no train closes feels alike under both: it leaves less of the
-    stiffness than ballast that carries anything. An effect without onsets is one of the first visit.
+    the evidence decides nothing. A gap that no train closes feels alike under both, as a softer bed does. It is known
+    only where less of the stiffness is left than ballast has that carries anything.
+    An effect without onsets is one of the first visit.
     """
-    smallest, largest = (size[0] + sign * CALIBRATION.finding_sds * size[1] for sign in (-1.0, 1.0))
-    if largest < np.log(CALIBRATION.least_support):
+    if size[0] + CALIBRATION.finding_sds * size[1] < np.log(CALIBRATION.least_support):
         return ["hanging_sleeper"]
     effect = best.effect if isinstance(best, OnsetEvidence) else best
     felt = [p for p in parameters if p.name in effect.direction]  # the damper of a support with its spring
@@ -422,10 +427,7 @@ def _supported_names(
         gains = dict(zip((e.name for e in effects), evidence_from_first(all_parameters, history, effects)[0]))
     equal, *of_gaps = (gains[e.name] for e in effects)
     difference = float(np.logaddexp.reduce(of_gaps)) - float(np.log(len(of_gaps))) - equal
-    may_carry_nothing = difference < 0.0 and smallest < np.log(CALIBRATION.least_support)
-    if abs(difference) < margin or may_carry_nothing:
-        return ["local_ballast", "hanging_sleeper"]
-    return ["hanging_sleeper"] if difference > 0.0 else ["local_ballast"]
+    return ["hanging_sleeper"] if difference > margin else ["local_ballast", "hanging_sleeper"]
 
 
 def _with_offset(group: GroupInformation, name: str, offset: str) -> GroupInformation:
@@ -518,9 +520,9 @@ def _explains_first_visit(
     jump: Innovation,
 ) -> bool:
     """Whether an effect explains how far the first visit is from the file. A dip is taken at its evidence."""
-    if effect.name not in {p.name for p in parameters}:
+    if _group(effect, {p.name: p for p in parameters}) == "dip":
         return True
-    wide = [replace(p, sd=float(np.hypot(p.sd, effect.sd))) if p.name == effect.name else p for p in parameters]
+    wide = [replace(p, sd=float(np.hypot(p.sd, effect.sd * effect.direction.get(p.name, 0.0)))) for p in parameters]
     return _is_explained(jump, estimate_history(wide, visits, events, accepted=None).steps[0].innovation)
 
 
@@ -570,16 +572,18 @@ def evidence_from_first(
     gains, sizes, sds : (n_candidate,) array of float
     """
     names = [p.name for p in parameters]
-    prior, belief = Belief.of_file(parameters), history.belief
+    prior, belief = history.prior, history.belief
+    factor = np.linalg.cholesky(prior.covariance)
     precision = np.linalg.inv(belief.covariance)
     score = precision @ (belief.mean - prior.mean)  # information vector about the mean of the file
-    scaled = prior.sd[:, None] * precision * prior.sd - np.eye(len(names))
+    scaled = factor.T @ precision @ factor - np.eye(len(names))
     eigenvalues, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
     informed = eigenvalues > CALIBRATION.min_prior_share  # not what an event made less certain than the file
     w, vectors = eigenvalues[informed], vectors[:, informed]
-    directions = np.array([[c.direction.get(name, 0.0) for name in names] for c in candidates]) / prior.sd @ vectors
+    changes = np.array([[c.direction.get(name, 0.0) for name in names] for c in candidates])
+    directions = np.linalg.solve(factor, changes.T).T @ vectors
     information = directions**2 @ (w / (1.0 + w))
-    b = directions @ (vectors.T @ (prior.sd * score) / (1.0 + w))
+    b = directions @ (vectors.T @ (factor.T @ score) / (1.0 + w))
     variance = np.array([c.sd**2 for c in candidates])
     sizes, sds = b / (information + 1.0 / variance), 1.0 / np.sqrt(information + 1.0 / variance)
     return 0.5 * b * sizes - 0.5 * np.log1p(variance * information), sizes, sds

@@ -17,8 +17,9 @@ class StateParameter:
     """One parameter of the calibrated model.
 
     ``mean`` and ``sd`` are those of the file, in ``unit``. ``walk_sd`` is the standard deviation of its random walk
-    after one year. Parameters of one ``group`` are alike, at different ``position`` [m] along the track; ``index``
-    numbers adjacent ones.
+    after one year, ``visit_sd`` that of what each visit adds of its own: another train of the type comes, for example.
+    Parameters of one ``group`` are alike, at different ``position`` [m] along the track; ``index`` numbers adjacent
+    ones. ``may_change``: whether a change of it may be told; not of supports that absorb what lies beyond them.
     """
 
     name: str
@@ -29,10 +30,12 @@ class StateParameter:
     index: int | None = None
     position: float | None = None
     unit: str = "-"
+    visit_sd: float = 0.0
+    may_change: bool = True
 
     def __post_init__(self) -> None:
-        if not (self.sd > 0.0 and self.walk_sd >= 0.0 and np.isfinite(self.mean)):
-            raise ValueError(f"parameter {self.name!r}: sd must be above 0 and walk_sd at least 0")
+        if not (self.sd > 0.0 and self.walk_sd >= 0.0 and self.visit_sd >= 0.0 and np.isfinite(self.mean)):
+            raise ValueError(f"parameter {self.name!r}: sd must be above 0, walk_sd and visit_sd at least 0")
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,13 @@ class CalibrationConstants:
         (("ballast", 0.2), ("pad", 0.35), ("gain", 0.08), ("seat", 0.1), ("depth", 0.3)),
         "unit of the group", "deviations from the file below which nobody would act", PAGE,
     )  # fmt: skip
+    model_errors: tuple[tuple[str, float], ...] = threshold(
+        (("depth", 0.1),), "unit of the group", "of a value, the same in all recordings: the wheels of all trains meet "
+        "a nose of one shape", "decisions/running-surface-priors.md",
+    )  # fmt: skip
+    pad_visit_sd: float = threshold(
+        0.1, "ln", "change of all pads between visits by their temperature: 30 K at 0.3 % per kelvin", PAGE
+    )
     change_sds: float = threshold(5.0, "prior sd", "prior standard deviation of a change of a parameter", PAGE)
     dip_sd: float = threshold(5e-4, "m", "prior standard deviation of the depth of a dip that appears", PAGE)
     least_dip: float = threshold(1e-4, "m", "depth of a dip below which nobody would act", PAGE)
@@ -37,10 +44,17 @@ class CalibrationConstants:
     )
     max_stretch: int = threshold(6, "supports", "adjacent ones that change together: 3 m of track", PAGE)
     gap_shares: tuple[float, ...] = threshold(
-        (0.0, 0.25, 0.5), "share", "of the softening under impacts that trains still feel above a gap", PAGE
-    )
+        (0.0, 0.25, 0.5, 0.75, 1.0), "share", "of the softening under impacts that trains still feel above a gap: all "
+        "of it where no train closes the gap", PAGE,
+    )  # fmt: skip
     gap_size_sds: float = threshold(
         10.0, "prior sd or size", "of a softening whose share under trains is asked: wide, to favour no share", PAGE
+    )
+    nose_reach: float = threshold(
+        0.6, "m", "from a nose, within which the surface is that of the nose: published lengths are 0.5 to 1.2 m", PAGE
+    )
+    nose_error: float = threshold(
+        1.5e-4, "m", "of the file's surface of a nose over the shortest dip: a fifth of a depth of 0.4 to 1.6 mm", PAGE
     )
     finding_sds: float = threshold(3.0, "standard deviations", "beyond which a value differs from the file", PAGE)
     least_support: float = threshold(
@@ -50,7 +64,7 @@ class CalibrationConstants:
         0.5, "share of the excess", "of the innovation of its first visit, that an effect explains at least", PAGE
     )
     worn_depth: float = threshold(
-        0.7, "ln", "a dip twice as deep as in the file is a finding, whatever tolerance the file states", PAGE
+        0.7, "ln", "a dip that is certainly twice as deep as in the file is a finding, whatever its tolerance", PAGE
     )
     min_prior_share: float = threshold(
         1e-9, "share of the prior variance", "of a mean over components, below which data say nothing", "numerical"

@@ -44,6 +44,7 @@ def deviations_from_file(
 ) -> list[Deviation]:
     r"""Deviations from the file, the clearest first. Adjacent components of a group are one deviation.
 
+    The posterior standard deviation of a value includes the error of the model, ``CALIBRATION.model_errors``.
     With the difference :math:`d = m - m_0` of the belief from the file, the mean over a run of components is tested
     three times. It must be as large as the least size of the group. It must be ``sds`` times its posterior standard
     deviation. And it must be larger than intact components leave: there :math:`d` has the covariance
@@ -60,7 +61,8 @@ def deviations_from_file(
     sds : float
         Standard deviations beyond which a difference is stated.
     intolerable : mapping or None
-        Group -> size from which a difference is stated although the file allows for it; None: no group.
+        Group -> size from which a difference is stated although the file allows for it. It must exceed this by ``sds``
+        standard deviations. None: no group.
 
     Returns
     -------
@@ -72,15 +74,16 @@ def deviations_from_file(
     difference = belief.mean - prior.mean
     deviations: list[Deviation] = []
     for group, least_size in least_sizes.items():
-        runs = _runs([k for k, p in enumerate(parameters) if p.group == group], parameters)
+        runs = _runs([k for k, p in enumerate(parameters) if p.group == group and p.may_change], parameters)
         means = np.zeros((len(runs), len(parameters)))  # each row takes the mean over a run
         for row, run in zip(means, runs):
             row[run] = 1.0 / len(run)
         limit = float(stats.norm.isf(stats.norm.sf(sds) / max(len(runs), 1)))
-        size, sd = means @ difference, _sds(means, belief.covariance)
+        size = means @ difference
+        sd = np.hypot(_sds(means, belief.covariance), dict(CALIBRATION.model_errors).get(group, 0.0))
         floor = np.sqrt(CALIBRATION.min_prior_share) * _sds(means, prior.covariance)
         ordinary_sd = np.maximum(_sds(means, ordinary), floor)
-        beyond = (abs(size) > limit * ordinary_sd) | (abs(size) >= (intolerable or {}).get(group, np.inf))
+        beyond = (abs(size) > limit * ordinary_sd) | (abs(size) - sds * sd >= (intolerable or {}).get(group, np.inf))
         is_clear = (abs(size) >= least_size) & (abs(size) >= sds * sd) & beyond
         taken: set[int] = set()
         for r in sorted(np.flatnonzero(is_clear), key=lambda r: -abs(size[r]) / ordinary_sd[r]):

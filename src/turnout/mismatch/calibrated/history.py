@@ -13,7 +13,10 @@ import numpy as np
 
 from turnout.mismatch.calibrated.belief import Belief, Innovation, StateParameter
 from turnout.mismatch.calibrated.constants import CALIBRATION
-from turnout.mismatch.calibrated.information import VisitInformation, repeated_error_weights
+from turnout.mismatch.calibrated.information import VisitInformation, repeated_error_weights, with_own_values
+
+
+BEFORE_ALL = -np.inf  # time of an event before all visits
 
 
 @dataclass(frozen=True)
@@ -21,7 +24,8 @@ class Event:
     """Maintenance or a change of the measurement at ``time`` [years], which makes these parameters uncertain again.
 
     ``opened``: parameter -> standard deviation of the change. Tamping opens the ballast of its stretch, for example.
-    ``direction``: parameter -> change per unit of one common size, whose standard deviation is ``sd``.
+    ``direction``: parameter -> change per unit of one common size, whose standard deviation is ``sd``. An event at
+    ``BEFORE_ALL`` makes the file itself uncertain.
     """
 
     time: float
@@ -50,15 +54,16 @@ class Step:
 
 @dataclass(frozen=True)
 class History:
-    """The ``steps`` of all visits in the order of time, and the ``parameters``."""
+    """The ``steps`` of all visits in the order of time, the ``parameters``, and the belief ``prior`` to all visits."""
 
     parameters: tuple[StateParameter, ...]
     steps: tuple[Step, ...]
+    prior: Belief
 
     @property
     def belief(self) -> Belief:
         """Belief after the last visit; that of the file without any."""
-        return self.steps[-1].belief if self.steps else Belief.of_file(self.parameters)
+        return self.steps[-1].belief if self.steps else self.prior
 
     @property
     def used_steps(self) -> tuple[Step, ...]:
@@ -109,19 +114,22 @@ def estimate_history(
         tested = {s.visit: s for s in alone.steps}
         weights = repeated_error_weights([v for v in ordered if tested[v.visit].is_used], repeated_share)
     names = tuple(p.name for p in parameters)
+    own_sds = np.array([p.visit_sd for p in parameters])
     noise, steps = _ProcessNoise(parameters, events), list[Step]()
-    belief, time = Belief.of_file(parameters), ordered[0].time if ordered else 0.0
+    prior = Belief.of_file(parameters).with_noise(noise.before_all())
+    belief, time = prior, ordered[0].time if ordered else 0.0
     for visit in ordered:
         predicted = belief.with_noise(noise.covariance(time, visit.time)) if steps else belief
         own_weights = repeated_error_weights([visit], repeated_share)
-        matrix, vector = visit.total(names, {**own_weights, **(weights or {})})
+        total = visit.total(names, {**own_weights, **(weights or {})})
+        matrix, vector = with_own_values(*total, own_sds)
         test = tested.get(visit.visit)
         innovation = test.innovation if test else predicted.innovation(matrix, vector)
         is_used = test.is_used if test else accepted is None or visit.visit in accepted or innovation.is_expected
         belief, time = predicted.update(matrix, vector) if is_used else predicted, visit.time
         n = visit.n_recordings
         steps.append(Step(visit.visit, time, matrix, vector, predicted, belief, innovation, is_used, n))
-    return History(tuple(parameters), tuple(steps))
+    return History(tuple(parameters), tuple(steps), prior)
 
 
 def _in_order(visits: Iterable[VisitInformation]) -> list[VisitInformation]:
@@ -148,6 +156,10 @@ class _ProcessNoise:
             for name, change in event.direction.items():
                 direction[number[name]] = event.sd * change
             self.events.append((event.time, np.diag(variance) + np.outer(direction, direction)))
+
+    def before_all(self) -> np.ndarray:
+        """(n, n) covariance that the file has beside the standard deviations of its parameters."""
+        return sum((c for time, c in self.events if time == BEFORE_ALL), np.zeros((self.rate.size,) * 2))
 
     def covariance(self, start: float, end: float) -> np.ndarray:
         """(n, n) covariance gained after ``start`` up to ``end`` [years]."""

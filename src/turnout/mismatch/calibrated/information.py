@@ -53,6 +53,44 @@ def marginalize(
     return 0.5 * (remaining + remaining.T), vector[a] - weights @ vector[b]
 
 
+def with_own_values(matrix: np.ndarray, vector: np.ndarray, sds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    r"""Information of a visit on values to which it adds deviations of its own, which are integrated out.
+
+    .. math:: \Lambda' = \Lambda - \Lambda S (1 + S \Lambda S)^{-1} S \Lambda, \quad
+              \eta' = \eta - \Lambda S (1 + S \Lambda S)^{-1} S \eta
+
+    with the diagonal matrix S of their standard deviations.
+
+    Parameters
+    ----------
+    matrix : (n, n) array of float
+        Information matrix.
+    vector : (n,) array of float
+        Information vector.
+    sds : (n,) array of float
+        0: the value is the same at all visits.
+
+    Returns
+    -------
+    matrix : (n, n) array of float
+    vector : (n,) array of float
+
+    Examples
+    --------
+    >>> matrix, vector = with_own_values(np.array([[4.0]]), np.array([8.0]), np.array([0.5]))
+    >>> matrix.tolist(), vector.tolist()  # the variance 1/4 of the data and 1/4 of the visit add up
+    ([[2.0]], [4.0])
+    """
+    own = np.flatnonzero(sds)
+    if own.size == 0:
+        return matrix, vector
+    columns = matrix[:, own] * sds[own]  # (n, n_own)
+    inner = np.eye(own.size) + sds[own, None] * columns[own]
+    weights = np.linalg.solve(inner, columns.T)  # (n_own, n)
+    remaining = matrix - columns @ weights
+    return 0.5 * (remaining + remaining.T), vector - weights.T @ (sds[own] * vector[own])
+
+
 @dataclass(frozen=True)
 class GroupInformation:
     """Information of recordings that share the error of the model, as trains of one type at one speed do.

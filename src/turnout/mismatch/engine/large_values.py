@@ -8,7 +8,7 @@ maximum, and their evidences are compared there.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from copy import copy
 from dataclasses import replace
 from operator import itemgetter
@@ -26,7 +26,9 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.search import Search
 
 
-def fit_large_values(search: Search, fit: Fit, names: Collection[str], widening: float) -> Fit:
+def fit_large_values(
+    search: Search, fit: Fit, names: Collection[str], widening: float, partners: Mapping[str, str] | None = None
+) -> Fit:
     """The fit, continued with wide priors for those nuisances whose large values have the most evidence.
 
     One value after the other is added, as long as its evidence exceeds that of the fit without it by the logarithm of
@@ -42,21 +44,23 @@ def fit_large_values(search: Search, fit: Fit, names: Collection[str], widening:
         Nuisances that may have large values.
     widening : float
         Wide prior standard deviation of such a value, over its own.
+    partners : mapping or None
+        Nuisance -> another that changes with it, as a damper with its spring: it has a wide prior as well.
 
     Returns
     -------
     Fit
         Its evidence is that with the wide priors.
     """
-    price = float(np.log(max(len(names), 1))) + THRESHOLDS.simpler_form_lead
+    price, partners = float(np.log(max(len(names), 1))) + THRESHOLDS.simpler_form_lead, partners or {}
     large: tuple[str, ...] = ()
     for _ in range(THRESHOLDS.max_large_values):
-        gains = evidence_of_large_values(search.case, fit, names, widening, large)
+        gains = evidence_of_large_values(search.case, fit, names, widening, _with_partners(large, partners))
         promising = sorted((n for n, g in gains.items() if g > price), key=lambda n: -gains[n])
         fits = {}
         for name in promising[: THRESHOLDS.n_large_starts]:
             try:
-                fits[name] = _fit_with(search, fit, (*large, name), widening)
+                fits[name] = _fit_with(search, fit, (*large, name), widening, partners)
             except SimulationError:
                 continue
         leader = max(fits, key=lambda n: fits[n].evidence, default=None)
@@ -147,13 +151,19 @@ def _posterior(case: Case, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     return precision, score
 
 
-def _fit_with(search: Search, fit: Fit, large: tuple[str, ...], widening: float) -> Fit:
+def _with_partners(names: Collection[str], partners: Mapping[str, str]) -> tuple[str, ...]:
+    return (*names, *(partners[n] for n in names if n in partners))
+
+
+def _fit_with(
+    search: Search, fit: Fit, large: tuple[str, ...], widening: float, partners: Mapping[str, str]
+) -> Fit:
     """Fit with wide priors of these values: the best of several starts.
 
     One is on the way to the maximum of the linear model. In the others the last value is large, and the rest is where
     fits of the case start: the fit without it has moved them to hide it, and may be in another valley.
     """
-    wide = replace(search, case=with_wide_priors(search.case, large, widening))
+    wide = replace(search, case=with_wide_priors(search.case, _with_partners(large, partners), widening))
     solution = dict(zip((n.name for n in wide.case.nuisances), np.linalg.solve(*_posterior(wide.case, fit))))
     costs: list[tuple[float, dict[str, float]]] = []
     for share in (*THRESHOLDS.size_factors, 0.0):

@@ -9,18 +9,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.constants import KMH
+from turnout.mismatch.calibrated.answers import position_of
 from turnout.mismatch.calibrated.belief import StateParameter
 from turnout.mismatch.calibrated.constants import CALIBRATION
+from turnout.mismatch.calibrated.history import BEFORE_ALL, Event
 from turnout.mismatch.calibrated.information import GroupInformation, marginalize
 from turnout.mismatch.turnout.priors import ROUGHNESS
 from turnout.mismatch.turnout.rail_roughness import Waves
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from turnout.mismatch.engine.case import Nuisance, Observation
     from turnout.mismatch.engine.map_fit import Fit
     from turnout.mismatch.turnout.case import TrackCase
+
+
+COMMON_PADS = ("pad_stiffness", "pad_damping")  # of the whole track
 
 
 def calibrated_parameters(case: TrackCase, route: str = "main") -> dict[str, StateParameter]:
@@ -40,10 +45,11 @@ def calibrated_parameters(case: TrackCase, route: str = "main") -> dict[str, Sta
     dict
         Nuisance of the case -> parameter, in the order of the nuisances.
     """
-    support = case.data.site.nominal.turnout.track.support
+    zone = case.data.site.nominal
+    support = zone.turnout.track.support
     whole = case.campaign.turnout.track.support
     sensors = {s.name: float(s.place) for s in case.campaign.sensors}
-    castings = case.data.site.nominal.castings
+    castings = zone.castings
     waves = case.data.site.waves
     walks = dict(CALIBRATION.walk_sds)
     parameters: dict[str, StateParameter] = {}
@@ -69,10 +75,19 @@ def calibrated_parameters(case: TrackCase, route: str = "main") -> dict[str, Sta
         used[name] += 1
         name = name if used[name] == 1 else f"{name} #{used[name]}"
         walk = walks.get(nuisance.group, CALIBRATION.default_walk_share * nuisance.sd)
+        is_outer = nuisance.index is not None and nuisance.index not in zone.effect_supports
         parameters[nuisance.name] = StateParameter(
-            name, nuisance.mean, nuisance.sd, walk, group, index, position, nuisance.unit
-        )
+            name, nuisance.mean, nuisance.sd, walk, group, index, position, nuisance.unit, _visit_sd(nuisance, is_outer),
+            not is_outer,
+        )  # fmt: skip
     return parameters
+
+
+def _visit_sd(nuisance: Nuisance, is_outer: bool) -> float:
+    """What each visit adds of its own: another train of the type, the temperature of pads, what lies farther out."""
+    if nuisance.name in COMMON_PADS:
+        return CALIBRATION.pad_visit_sd
+    return nuisance.sd if is_outer or nuisance.group == "wheels" else 0.0
 
 
 def _shared_nuisances(case: TrackCase) -> list[Nuisance]:
@@ -155,6 +170,33 @@ def _recording_information(case: TrackCase, fit: Fit, members: Sequence[int]) ->
         vector += weight * rows.T @ (fit.white[k] + rows @ point)
     owned = nuisances[n_shared:]
     return marginalize(matrix, vector, range(n_shared, len(order)), np.array([n.sd**-2 for n in owned]))
+
+
+def nose_errors(
+    parameters: Sequence[StateParameter], directions: Mapping[str, Mapping[str, float]]
+) -> list[Event]:
+    """What the file does not know of the running surface at noses: there it has an estimate of another shape.
+
+    Parameters
+    ----------
+    parameters : sequence of StateParameter
+        Those of group "depth" are noses.
+    directions : mapping
+        As ``dip_directions``.
+
+    Returns
+    -------
+    list of Event
+        Before all visits: the shortest dips within ``CALIBRATION.nose_reach`` of a nose, each of an unknown depth.
+    """
+    noses = [position for p in parameters if p.group == "depth" and (position := position_of(p.name, p)) is not None]
+    errors = []
+    for name, direction in directions.items():
+        position = position_of(name, None)
+        is_short = f"dip of {min(CALIBRATION.dip_lengths):g} m" in name
+        if is_short and any(abs(position - nose) <= CALIBRATION.nose_reach for nose in noses):
+            errors.append(Event(BEFORE_ALL, {}, direction, CALIBRATION.nose_error))
+    return errors
 
 
 def dip_directions(parameters: Sequence[StateParameter]) -> dict[str, dict[str, float]]:

@@ -153,6 +153,7 @@ class ReceptancePriors:
 class PassagePriors:
     """Passages as observations: band, samples and errors."""
 
+    own_steps: int = prior(2, "steps", "to time, speed and load of a passage that is linear about a fit", "numerical")
     shortest_wave: float = prior(
         0.3, "m", "of the modelled roughness of the rail: shorter waves are not fitted", ERROR_MODES)
     band_low: float = prior(5.0, "Hz", "lower end of the band of a passage", ERROR_MODES)
