@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from turnout.mismatch.calibrated.belief import Belief, Innovation, StateParameter
+from turnout.mismatch.calibrated.belief import Innovation, StateParameter
 from turnout.mismatch.calibrated.change import ChangeEffect, OnsetEvidence, compare_onsets
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.file_comparison import Deviation, deviations_from_file
@@ -138,7 +138,8 @@ def _stretch(
     }
     first, last = run[0].position, run[-1].position
     assert first is not None and last is not None
-    name, sd = f"{group}@{first:.2f} to {last:.2f}, dampers {share:g}", CALIBRATION.change_sds * run[0].sd
+    where = run[0].name if len(run) == 1 else f"{group}@{first:.2f} to {last:.2f}"
+    name, sd = f"{where}, dampers {share:g}", CALIBRATION.change_sds * run[0].sd
     return [ChangeEffect(name, direction, sd, grows, group, 0.5 * (first + last)) for grows in (False, True)]
 
 
@@ -316,7 +317,7 @@ class _LeadingEffect:
         unit = first.unit if first and group != "dip" else "m"
         position = position_of(effect.name, parameter) if effect.position is None else effect.position
         return cls(
-            effect.name, _name(effect, by_name), group, position, unit, size, gain, onset,
+            effect.name.partition(",")[0], _name(effect, by_name), group, position, unit, size, gain, onset,
             onset is not None and effect.grows,
         )  # fmt: skip
 

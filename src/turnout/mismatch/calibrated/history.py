@@ -15,7 +15,6 @@ from turnout.mismatch.calibrated.belief import Belief, Innovation, StateParamete
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.information import VisitInformation, repeated_error_weights, with_own_values
 
-
 BEFORE_ALL = -np.inf  # time of an event before all visits
 
 

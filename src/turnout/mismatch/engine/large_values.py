@@ -155,9 +155,7 @@ def _with_partners(names: Collection[str], partners: Mapping[str, str]) -> tuple
     return (*names, *(partners[n] for n in names if n in partners))
 
 
-def _fit_with(
-    search: Search, fit: Fit, large: tuple[str, ...], widening: float, partners: Mapping[str, str]
-) -> Fit:
+def _fit_with(search: Search, fit: Fit, large: tuple[str, ...], widening: float, partners: Mapping[str, str]) -> Fit:
     """Fit with wide priors of these values: the best of several starts.
 
     One is on the way to the maximum of the linear model. In the others the last value is large, and the rest is where

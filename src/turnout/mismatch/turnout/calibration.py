@@ -77,8 +77,8 @@ def calibrated_parameters(case: TrackCase, route: str = "main") -> dict[str, Sta
         walk = walks.get(nuisance.group, CALIBRATION.default_walk_share * nuisance.sd)
         is_outer = nuisance.index is not None and nuisance.index not in zone.effect_supports
         parameters[nuisance.name] = StateParameter(
-            name, nuisance.mean, nuisance.sd, walk, group, index, position, nuisance.unit, _visit_sd(nuisance, is_outer),
-            not is_outer,
+            name, nuisance.mean, nuisance.sd, walk, group, index, position, nuisance.unit,
+            _visit_sd(nuisance, is_outer), not is_outer,
         )  # fmt: skip
     return parameters
 
@@ -87,7 +87,9 @@ def _visit_sd(nuisance: Nuisance, is_outer: bool) -> float:
     """What each visit adds of its own: another train of the type, the temperature of pads, what lies farther out."""
     if nuisance.name in COMMON_PADS:
         return CALIBRATION.pad_visit_sd
-    return nuisance.sd if is_outer or nuisance.group == "wheels" else 0.0
+    if is_outer:
+        return CALIBRATION.change_sds * nuisance.sd
+    return nuisance.sd if nuisance.group == "wheels" else 0.0
 
 
 def _shared_nuisances(case: TrackCase) -> list[Nuisance]:
@@ -172,9 +174,7 @@ def _recording_information(case: TrackCase, fit: Fit, members: Sequence[int]) ->
     return marginalize(matrix, vector, range(n_shared, len(order)), np.array([n.sd**-2 for n in owned]))
 
 
-def nose_errors(
-    parameters: Sequence[StateParameter], directions: Mapping[str, Mapping[str, float]]
-) -> list[Event]:
+def nose_errors(parameters: Sequence[StateParameter], directions: Mapping[str, Mapping[str, float]]) -> list[Event]:
     """What the file does not know of the running surface at noses: there it has an estimate of another shape.
 
     Parameters
@@ -194,7 +194,7 @@ def nose_errors(
     for name, direction in directions.items():
         position = position_of(name, None)
         is_short = f"dip of {min(CALIBRATION.dip_lengths):g} m" in name
-        if is_short and any(abs(position - nose) <= CALIBRATION.nose_reach for nose in noses):
+        if is_short and position is not None and any(abs(position - nose) <= CALIBRATION.nose_reach for nose in noses):
             errors.append(Event(BEFORE_ALL, {}, direction, CALIBRATION.nose_error))
     return errors
 
