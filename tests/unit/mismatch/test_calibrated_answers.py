@@ -322,6 +322,23 @@ def test_the_surface_at_a_nose_is_that_of_the_nose_and_no_dip_of_the_rail():
         assert (answer.question, answer.verdict) == ("file", verdict)
 
 
+def test_a_nose_that_wears_unevenly_is_named_at_the_nose():
+    """The surface falls by two dips of different depth, of which one alone explains less than half."""
+    rng, names, sd = np.random.default_rng(19), tuple(p.name for p in SURFACE), WAVES.sd
+    nose = StateParameter("ln depth of the kink at 5.30 m", 0.0, 0.4, 0.0, "depth")
+    directions = dip_directions(SURFACE)
+    shape = [1e-3 * (directions["dip of 0.4 m@5.00"][n] - 0.9 * directions["dip of 0.4 m@5.50"][n]) for n in names]
+    parameters, visits = [*SURFACE, nose], []
+    truth = sd * rng.normal(size=len(sd))
+    for v in range(4):
+        y = truth + np.array(shape) * (v >= 2) + 0.2 * sd * rng.normal(size=len(sd))
+        group = GroupInformation("A: locomotive", 1, names, np.diag(25.0 / sd**2), 25.0 * y / sd**2)
+        visits.append(VisitInformation(f"v{v}", STEP * v, (group,)))
+    answer = change_answer(parameters, visits, [], change_candidates(parameters, directions), 12.0, 6.0)
+    assert (answer.verdict, answer.names, answer.position) == ("named", ("surface_dip",), 5.3)
+    assert answer.onset == (STEP, 2 * STEP)
+
+
 def test_a_visit_is_no_unknown_change_if_earlier_ones_were_as_far_from_what_was_expected():
     innovation = Innovation(400.0, 190, 1e-16, "wave", 5.0, 190)
     assert not innovation.is_expected and innovation.is_expected_at(2.1)

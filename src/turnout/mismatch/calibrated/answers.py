@@ -242,7 +242,11 @@ def change_answer(
     )
     jump = history.steps[1 + int(np.argmax(leader.gains))].innovation
     with_change = estimate_history(
-        parameters, visits, [*events, *_events_of_change(leader)], repeats_between_visits=False, accepted=None
+        parameters,
+        visits,
+        [*events, *_events_of_change(leader, parameters, candidates)],
+        repeats_between_visits=False,
+        accepted=None,
     )
     explained = next(s.innovation for s in with_change.steps if s.visit == leader.onset)
     if not _is_explained(jump, explained):
@@ -278,14 +282,36 @@ def _with_rivals(names: Sequence[str], stated: _LeadingEffect, rivals: Iterable[
     return [*names, *(n for n in dict.fromkeys(rivals) if n not in (*names, stated.name))]
 
 
-def _events_of_change(evidence: OnsetEvidence) -> list[Event]:
-    """Events that open the direction of an effect from its most probable onset on."""
+def _events_of_change(
+    evidence: OnsetEvidence, parameters: Sequence[StateParameter], candidates: Sequence[ChangeEffect]
+) -> list[Event]:
+    """Events that open the directions of an effect from its most probable onset on."""
     first = int(np.argmax(evidence.gains))
-    effect, times = evidence.effect, evidence.times
-    if not effect.grows:
-        return [Event(float(times[first + 1]), {}, effect.direction, effect.sd)]
-    steps = zip(times[first:-1], times[first + 1 :])
-    return [Event(float(now), {}, effect.direction, effect.sd * float(now - before)) for before, now in steps]
+    times, directions = evidence.times, _free_shape(evidence.effect, parameters, candidates)
+    if not evidence.effect.grows:
+        return [Event(float(times[first + 1]), {}, *d) for d in directions]
+    steps = list(zip(times[first:-1], times[first + 1 :]))
+    return [Event(float(now), {}, d, sd * float(now - before)) for before, now in steps for d, sd in directions]
+
+
+def _free_shape(
+    effect: ChangeEffect, parameters: Sequence[StateParameter], candidates: Sequence[ChangeEffect]
+) -> list[tuple[Mapping[str, float], float]]:
+    """Directions of an effect with their standard deviations. A dip of the surface may have any shape.
+
+    Wear lowers a nose unevenly: beside the dip, all dips and numbers of the file's surface within
+    ``CALIBRATION.nose_reach`` may change.
+    """
+    by_name = {p.name: p for p in parameters}
+    at = position_of(effect.name, by_name.get(effect.name))
+    directions: list[tuple[Mapping[str, float], float]] = [(effect.direction, effect.sd)]
+    if _group(effect, by_name) not in ("dip", "depth") or at is None:
+        return directions
+    dips = [c for c in candidates if _group(c, by_name) == "dip" and c.grows == effect.grows]
+    numbers = [p for p in parameters if p.group in ("surface", "depth")]
+    near = [(position_of(c.name, None), (c.direction, c.sd)) for c in dips]
+    near += [(position_of(p.name, p), ({p.name: 1.0}, CALIBRATION.change_sds * p.sd)) for p in numbers]
+    return directions + [d for x, d in near if x is not None and abs(x - at) <= CALIBRATION.nose_reach]
 
 
 @dataclass(frozen=True)
@@ -316,6 +342,7 @@ class _LeadingEffect:
         group = _group(effect, by_name)
         unit = first.unit if first and group != "dip" else "m"
         position = position_of(effect.name, parameter) if effect.position is None else effect.position
+        position = _nose_near(position, by_name.values()) if group == "dip" else position
         return cls(
             effect.name.partition(",")[0], _name(effect, by_name), group, position, unit, size, gain, onset,
             onset is not None and effect.grows,
@@ -334,6 +361,16 @@ class _LeadingEffect:
             visit, question, "named" if len(names) == 1 else "a_or_b", tuple(names[:2]), self.parameter, self.group,
             self.position, *self.size, self.unit, self.onset, self.gain, self.grows,
         )  # fmt: skip
+
+
+def _nose_near(position: float | None, parameters: Iterable[StateParameter]) -> float | None:
+    """Position of the nose whose surface a dip changes, else that of the dip itself."""
+    if position is None:
+        return None
+    at = position
+    noses = [x for p in parameters if p.group == "depth" and (x := position_of(p.name, p)) is not None]
+    nose = min(noses, key=lambda x: abs(x - at), default=at)
+    return nose if abs(nose - at) <= CALIBRATION.nose_reach else at
 
 
 def position_of(name: str, parameter: StateParameter | None) -> float | None:
