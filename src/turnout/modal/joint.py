@@ -16,6 +16,7 @@ from turnout.modal.noise import whiten
 from turnout.modal.selection import Selection, select_modes
 from turnout.modal.state_space import assemble, no_decays, no_model
 from turnout.modal.summary import ImpactEstimates, cramer_rao_bound
+from turnout.modal.systematic_error import own_estimates, systematic_error
 from turnout.records import ModalModel, Rejection
 
 if TYPE_CHECKING:
@@ -95,48 +96,6 @@ def fit_diagnostics(
         "explanations": 1 + len(selection.rival_modes),
         "impacts_without_mode": tuple((int(index[i]), float(np.exp(fit.mean[m, 0]))) for i, m in absent),
     }
-
-
-def choice_error(mode: np.ndarray, rival_modes: Sequence[np.ndarray], max_distance: float) -> np.ndarray:
-    r"""Root mean square distance of a mode in all explanations from its value in the chosen one.
-
-    .. math:: \sqrt{\frac{1}{J} \sum_{j=1}^{J} (\theta_j - \theta)^2}, \quad \theta_1 = \theta
-
-    All explanations have the same weight. Weights from their criteria would be nearly 1 for one of them: 18,000 samples
-    distinguish two wrong models with certainty, but do not show which of them has this mode right.
-
-    Parameters
-    ----------
-    mode : (2,) array of float
-        ln f [Hz] and zeta in the chosen explanation.
-    rival_modes : list of (n_mode, 2) arrays of float
-        Modes of the other explanations.
-    max_distance : float
-        Distance in ln f beyond which it is another mode. An explanation without this mode does not count.
-
-    Returns
-    -------
-    (2,) array of float
-        Of ln f and zeta; 0 without other explanations.
-
-    References
-    ----------
-    Buckland, Burnham and Augustin 1997, Model selection: an integral part of inference, eq. 9, with equal weights.
-
-    Examples
-    --------
-    >>> mode, other = np.array([4.60, 0.20]), np.array([[4.64, 0.17], [6.0, 0.05]])
-    >>> print(choice_error(mode, [other, other, other], 0.15).round(3), choice_error(mode, [], 0.15))
-    [0.035 0.026] [0. 0.]
-    """
-    square, n = np.zeros(2), 1
-    for modes in rival_modes:
-        distance = np.abs(modes - mode)
-        nearest = int(np.argmin(distance @ [1.0, 0.5]))
-        if distance[nearest, 0] < max_distance:
-            square += distance[nearest] ** 2
-            n += 1
-    return np.sqrt(square / n)
 
 
 MAX_POWER_RATIO = 9.0  # residual power of an impact over that of the median impact
@@ -344,6 +303,7 @@ def _estimates(
     bound = cramer_rao_bound(fit.theta, white, rate, fit.sigma2, columns)
     error = np.sqrt(np.einsum("ijj->ij", fit.covariance)).reshape(fit.unshrunken.shape)
     strength = np.linalg.norm(records, axis=1)
+    systematic = systematic_error(own_estimates(fit, rate), selection.rival_modes, settings.spread_maximum)
     return [
         ImpactEstimates(
             band,
@@ -353,7 +313,7 @@ def _estimates(
             strength[visible],
             float(selection.energy[m]),
             bound[m],
-            choice_error(fit.mean[m], selection.rival_modes, settings.spread_maximum),
+            systematic[m],
         )
         for band, m in choice.modes.items()
         for visible in (selection.is_visible[:, m],)

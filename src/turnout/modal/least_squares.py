@@ -124,10 +124,18 @@ def linearise(theta: np.ndarray, decays: np.ndarray, rate: float, drift: np.ndar
     Linearisation
         Residual and derivatives of each decay.
 
+    Raises
+    ------
+    ValueError
+        For a damping ratio of 1 or more in magnitude: such a mode does not oscillate, and the derivative of its pole
+        is infinite.
+
     References
     ----------
     Golub and Pereyra 1973; Kaufman 1975.
     """
+    if np.any(np.abs(theta[..., 1]) >= 1.0):
+        raise ValueError(f"need damping ratios below 1, the highest is {np.max(np.abs(theta[..., 1])):.3g}")
     # At the first use, since numba takes a third of a second to import.
     from turnout.modal.wave_kernels import fit_waves
 

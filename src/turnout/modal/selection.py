@@ -34,12 +34,14 @@ from turnout.modal.noise import (
 )
 from turnout.modal.similar_decays import combine, group_similar
 from turnout.modal.stabilization import DAMPING_RANGE, Stabilisation, candidates, likely_poles, stabilisation
+from turnout.modal.systematic_error import common_residual, own_estimates
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from turnout.config.settings.identify import IdentifySettings
     from turnout.modal.stabilization import Candidate
+    from turnout.modal.systematic_error import OwnEstimates
 
 MAX_NOISE_PASSES = 3  # fits with a new whitening filter
 # Relative difference of residual sums up to which two fits are the same. Two distinct optima differ by more.
@@ -130,9 +132,7 @@ def _leaves_common(fit: MixedFit | None, settings: IdentifySettings) -> bool:
     """
     if fit is None:
         return False
-    amplitude = fit.linearisation.amplitude
-    weight = np.linalg.svd(np.hstack([amplitude.real, amplitude.imag]), full_matrices=False)[0][:, 0]
-    return len(noise_filter(weight[None] @ fit.linearisation.residual, settings.noise_order_maximum)) > 1
+    return len(noise_filter(common_residual(fit)[None], settings.noise_order_maximum)) > 1
 
 
 def _is_same_fit(fit: MixedFit, reference: MixedFit) -> bool:
@@ -295,7 +295,7 @@ class Selection:
     ``fit`` is None if there are no modes. Per mode of it: ``presence`` over orders and starts, ``energy`` share,
     ``chi_squared`` and ``amplitude`` (n_decay, n_mode). ``residual_power`` (n_decay,) is the power of the residual.
     ``failed_tests`` maps modes that stay in the fit but belong to no band to (reason, value, limit).
-    ``rival_modes`` are the modes (n_mode, 2) of the explanations that were not chosen.
+    ``rival_modes`` are the modes of the explanations that were not chosen, with their own errors.
     ``rejected`` lists mappings of frequency, damping, reason, value and limit. ``whitening`` and ``background``
     describe the rest of the model.
     """
@@ -311,7 +311,7 @@ class Selection:
     whitening: np.ndarray = field(default_factory=lambda: np.ones(1))
     background: Background = field(default_factory=Background)
     failed_tests: dict = field(default_factory=dict)
-    rival_modes: list = field(default_factory=list)
+    rival_modes: list[OwnEstimates] = field(default_factory=list)
 
     @property
     def mode_fit(self) -> MixedFit:
@@ -381,8 +381,8 @@ def select_modes(decays: np.ndarray, rate: float, settings: IdentifySettings) ->
 
 def _choose(
     first: Explanation, table: Stabilisation, decays: np.ndarray, rate: float, settings: IdentifySettings
-) -> tuple[Explanation, list[np.ndarray]]:
-    """The likeliest explanation of ``decays``, and the modes (n_mode, 2) of the others.
+) -> tuple[Explanation, list[OwnEstimates]]:
+    """The likeliest explanation of ``decays``, and the modes of the others.
 
     Others than the first are searched for in the combined decays of impacts with similar poles.
     """
@@ -398,7 +398,7 @@ def _choose(
     explanations = [of_combined, *_alternative_explanations(of_combined, table, combined, rate, settings)]
     usable = [e for e in explanations if e.fit is not None]
     chosen = likeliest_explanation(usable, combined, settings) if usable else first
-    rival_modes = [e.fit.mean for e in usable if e is not chosen and e.fit is not None]
+    rival_modes = [own_estimates(e.fit, rate) for e in usable if e is not chosen and e.fit is not None]
     if chosen is of_combined:
         return first, rival_modes
     if is_combined and chosen.fit is not None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.stats import norm, t
 
-from turnout.modal.least_squares import drift_columns, linearise
+from turnout.modal.least_squares import Linearisation, drift_columns, linearise
 from turnout.modal.mixed_effects import between_variance
 from turnout.records import Mode
 
@@ -200,8 +200,25 @@ def cramer_rao_bound(
     Rao 1945; for damped sinusoids Yao and Pandit 1995.
     """
     columns = drift_columns(decays.shape[1], -1) if columns is None else columns
-    linearisation = linearise(theta, decays, rate, columns)
-    weight = 1.0 / np.broadcast_to(sigma2, len(decays))
+    return shared_bound(linearise(theta, decays, rate, columns), sigma2)
+
+
+def shared_bound(linearisation: Linearisation, sigma2: float | np.ndarray) -> np.ndarray:
+    """The same bound from the sums of a fit.
+
+    Parameters
+    ----------
+    linearisation : Linearisation
+        Sums of all decays at their modes.
+    sigma2 : float or (n_decay,) array
+        Variance of the white noise of each decay.
+
+    Returns
+    -------
+    (n_mode, 2) array of float
+        Standard errors of ln f (relative) and of zeta.
+    """
+    weight = 1.0 / np.broadcast_to(sigma2, len(linearisation.information))
     information = np.einsum("i,ijk->jk", weight, linearisation.information)
     scale = np.sqrt(np.diag(information))
     covariance = np.linalg.inv(information / np.outer(scale, scale)) / np.outer(scale, scale)

@@ -66,3 +66,11 @@ def test_a_linearisation_is_that_of_the_matrices_it_does_not_form(degree, shared
         np.testing.assert_allclose(at.residual[i], residual, atol=1e-9)
         np.testing.assert_allclose(at.score[i], derivative @ residual, rtol=1e-7)
         np.testing.assert_allclose(at.information[i], projected @ projected.T, rtol=1e-7)
+
+
+@pytest.mark.parametrize("damping", [1.0, -1.0, 1.2])
+def test_a_wave_that_does_not_oscillate_is_refused(damping):
+    """The derivative of its pole is infinite: the sums were nan or a ZeroDivisionError."""
+    theta = np.array([[[np.log(100.0), 0.1], [np.log(300.0), damping]]])
+    with pytest.raises(ValueError, match="damping ratios below 1"):
+        linearise(theta, np.ones((2, N)), 20e3, drift_columns(N, -1))

@@ -1,0 +1,78 @@
+"""What the modes leave of all impacts alike moves them by as much as the stated systematic error."""
+
+import numpy as np
+
+from turnout.modal.least_squares import drift_columns
+from turnout.modal.mixed_effects import fit_mixed
+from turnout.modal.state_space import continuous_pole
+from turnout.modal.systematic_error import OwnEstimates, common_error, common_residual, systematic_error
+
+RATE, N, N_IMPACT = 20e3, 600, 20
+TRUTH = np.array([[np.log(120.0), 0.2], [np.log(600.0), 0.06]])
+START = TRUTH + 0.005
+
+
+def decays(rng, left_out, noise=0.01):
+    """Two modes, a part that the model leaves out (amplitude, frequency, damping), the same in all, and white noise."""
+    amplitude, frequency, damping = left_out
+    pole = continuous_pole(np.append(np.exp(TRUTH[:, 0]), frequency), np.append(TRUTH[:, 1], damping))
+    size = np.array([1.0, 1.0, amplitude * np.exp(2j * np.pi * rng.uniform())])
+    clean = (size[:, None] * np.exp(pole[:, None] * np.arange(N) / RATE)).real.sum(axis=0)
+    return clean + noise * rng.standard_normal((N_IMPACT, N))
+
+
+def fitted(rng, left_out):
+    return fit_mixed(START, decays(rng, left_out), RATE, drift_columns(N, -1), iterations=30)
+
+
+def noise_error(fit):
+    """(2, 2) standard errors of ln f and zeta from the noise of all impacts alone."""
+    information = fit.linearisation.information.sum(axis=0)
+    return np.sqrt(fit.sigma2 * np.diag(np.linalg.inv(information))).reshape(2, 2)
+
+
+def test_a_mode_that_is_left_out_shows_in_the_common_error_of_its_neighbour():
+    """The fit absorbs a part of it: the error that is made is up to five times the stated one, not fifty."""
+    errors, stated, noise = [], [], []
+    for seed in range(30):
+        fit = fitted(np.random.default_rng(seed), (0.1, 700.0, 0.05))
+        errors.append(fit.mean[1] - TRUTH[1])
+        stated.append(common_error(fit, RATE)[1])
+        noise.append(noise_error(fit)[1])
+    made, stated, noise = (np.sqrt(np.mean(np.square(x), axis=0)) for x in (errors, stated, noise))
+    assert np.all(made > 4.0 * noise)  # the noise alone explains a fraction of it
+    assert np.all((made / stated > 0.5) & (made / stated < 5.0)), made / stated
+
+
+def test_noise_of_single_impacts_has_no_common_error():
+    """A fit of the right modes: what is common by chance stays below the error of the noise itself."""
+    common, bound = [], []
+    for seed in range(30):
+        fit = fitted(np.random.default_rng(100 + seed), (0.0, 700.0, 0.15))
+        common.append(common_error(fit, RATE))
+        bound.append(noise_error(fit))
+    assert np.all(np.median(common, axis=0) < np.mean(bound, axis=0))
+
+
+def test_what_is_left_far_from_a_mode_does_not_count_for_it():
+    fit = fitted(np.random.default_rng(3), (0.3, 1500.0, 0.02))
+    assert np.all(common_error(fit, RATE) < 2.0 * noise_error(fit))
+
+
+def test_the_common_residual_has_the_sum_of_the_power_of_all_impacts():
+    rng = np.random.default_rng(4)
+    fit = fit_mixed(START, decays(rng, (0.3, 1500.0, 0.02), noise=1e-9), RATE, drift_columns(N, -1))
+    np.testing.assert_allclose(np.sum(common_residual(fit) ** 2), fit.rss, rtol=1e-6)
+
+
+def test_an_explanation_that_leaves_much_says_little_about_the_choice():
+    """The same distance from a rival that is ten times as uncertain adds a hundredth of the weight."""
+    own = OwnEstimates(np.array([[4.6, 0.2]]), np.zeros((1, 2)), np.full((1, 2), 1e-4))
+
+    def error(variance):
+        rival = OwnEstimates(np.array([[4.65, 0.25]]), np.zeros((1, 2)), np.full((1, 2), variance))
+        return systematic_error(own, [rival], 0.15)
+
+    np.testing.assert_allclose(error(1e-4), np.sqrt(0.5 * 0.05**2 / 2))
+    np.testing.assert_allclose(error(1e-2), np.sqrt(0.5 * 0.05**2 / 101))
+    np.testing.assert_allclose(systematic_error(own, [], 0.15), 0.0)
