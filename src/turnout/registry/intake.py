@@ -10,7 +10,6 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 
 from turnout.registry.ids import content_id
@@ -208,10 +207,18 @@ def _time(value: Any) -> datetime | None:
     """Naive UTC from ISO text or a datetime; ValueError for another time zone."""
     if value is None:
         return None
-    time = datetime.fromisoformat(value) if isinstance(value, str) else pd.Timestamp(value).to_pydatetime()
+    time = datetime.fromisoformat(value) if isinstance(value, str) else _as_datetime(value)
     if time.utcoffset():
         raise ValueError("a time in another zone than UTC")
     return time.replace(tzinfo=None)
+
+
+def _as_datetime(value: Any) -> datetime:
+    if type(value) is datetime:
+        return value
+    import pandas as pd  # results of the workflow are text; pandas takes 0.3 CPU s and 50 MB
+
+    return pd.Timestamp(value).to_pydatetime()
 
 
 def _lists(column: Column, values: Sequence) -> pa.Array:

@@ -9,7 +9,7 @@ from datetime import datetime
 from functools import cache
 from typing import TYPE_CHECKING
 
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -74,7 +74,7 @@ def student_quantile(n: int) -> float:
     >>> round(student_quantile(30), 3)
     2.045
     """
-    return float(student.ppf(0.975, n - 1))
+    return float(stdtrit(n - 1, 0.975))
 
 
 def with_interval(value: float | None, standard_error: float | None, n: int, digits: int = 1) -> str:

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.kernel_cache import kernel
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,19 +20,6 @@ if TYPE_CHECKING:
 
 PathPart = Callable[[np.ndarray, int], np.ndarray]  # position [m] and wheel -> dip [m]
 Surfaces = tuple[tuple[PathPart, ...], ...]  # of a route: the parts of the path on each surface
-
-
-@kernel
-def _second_differences(value: np.ndarray, out: np.ndarray) -> None:
-    """Solve m[i-1] + 4 m[i] + m[i+1] = 6 (value[i-1] - 2 value[i] + value[i+1]), m = 0 at both ends."""
-    n = value.size
-    factor = np.zeros(n)
-    for i in range(1, n - 1):
-        pivot = 1.0 / (4.0 - factor[i - 1])
-        factor[i] = pivot
-        out[i] = (6.0 * (value[i - 1] - 2.0 * value[i] + value[i + 1]) - out[i - 1]) * pivot
-    for i in range(n - 2, 0, -1):
-        out[i] -= factor[i] * out[i + 1]
 
 
 def uniform_pieces(value: np.ndarray | Sequence[float]) -> np.ndarray:
@@ -55,9 +41,12 @@ def uniform_pieces(value: np.ndarray | Sequence[float]) -> np.ndarray:
     >>> bool(np.allclose(pieces, [[0, 0, 1, 0], [0, 0, 1, 1], [0, 0, 1, 2]]))
     True
     """
+    # imported here, because it loads numba, which the text of an effect need not
+    from turnout.simulate.spline_kernel import second_differences
+
     value = np.ascontiguousarray(value, dtype=float)
     m = np.zeros(value.size)
-    _second_differences(value, m)
+    second_differences(value, m)
     a, b = m[:-1], m[1:]
     slope = np.diff(value) - (2.0 * a + b) / 6.0
     return np.column_stack([(b - a) / 6.0, 0.5 * a, slope, value[:-1]])

@@ -1,7 +1,7 @@
 """Fit the slope of residuals over time, with autocorrelated errors, and control the false-discovery rate."""
 
 import numpy as np
-from scipy import stats
+from scipy.special import stdtr
 
 
 def slopes(
@@ -49,7 +49,7 @@ def slopes(
         rss = np.sum((y - slope[:, None] * x) ** 2, axis=1)
         error = np.sqrt(rss / (count * shrink - 2.0) / sxx)
         is_valid = (freedom >= 3.0) & (sxx > 0.0)
-        p_value = 2.0 * stats.t.sf(np.abs(slope / error), np.maximum(freedom, 1.0))
+        p_value = 2.0 * stdtr(np.maximum(freedom, 1.0), -np.abs(slope / error))
     slope, error, p_value = (np.where(is_valid, value, np.nan) for value in (slope, error, p_value))
     return slope, error, p_value
 
@@ -99,5 +99,9 @@ def adjusted_p_values(p_value: np.ndarray) -> np.ndarray:
     adjusted = np.full(p_value.shape, np.nan)
     is_valid = np.isfinite(p_value)
     if is_valid.any():
-        adjusted[is_valid] = stats.false_discovery_control(p_value[is_valid])
+        p = p_value[is_valid]
+        order = np.argsort(p)
+        scaled = p[order] * (p.size / np.arange(1, p.size + 1))
+        p[order] = np.minimum(np.minimum.accumulate(scaled[::-1])[::-1], 1.0)
+        adjusted[is_valid] = p
     return adjusted

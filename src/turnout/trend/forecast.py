@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import stats
+from scipy.special import stdtrit
 
 if TYPE_CHECKING:
     from turnout.config.settings.trend import TrendSettings
@@ -205,7 +205,7 @@ def crossing_interval(
     >>> print(*(f"{t:.2f}" for t in crossing_interval(np.array([0.0, -1.0]), np.eye(2) * 1e-12, 50, -5.0, 0.8)))
     5.00 5.00
     """
-    q = stats.t.isf((1.0 - level) / 2.0, freedom)
+    q = -stdtrit(freedom, (1.0 - level) / 2.0)
     a, b = float(coefficient[0]) - limit, float(coefficient[1])
     square = b * b - q * q * covariance[1, 1]
     half = a * b - q * q * covariance[0, 1]

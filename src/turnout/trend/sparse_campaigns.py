@@ -12,8 +12,7 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import stats
-from scipy.special import logsumexp
+from scipy.special import logsumexp, stdtr
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -289,7 +288,7 @@ def steps(block: Block, splits: Sequence[int]) -> tuple[np.ndarray, np.ndarray, 
     for column, s in enumerate([s for s, k in enumerate(splits) if k], start=n_section):
         table[0, :, s], table[1, :, s] = coefficient[:, column], error[:, column]
     with np.errstate(invalid="ignore"):
-        table[2] = 2.0 * stats.t.sf(np.abs(table[0] / table[1]), freedom)
+        table[2] = 2.0 * stdtr(freedom, -np.abs(table[0] / table[1]))
     return table[0], table[1], table[2], coefficient[:, -1], error[:, -1]
 
 

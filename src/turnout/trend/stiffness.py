@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import stats
+from scipy.special import chdtri, ndtri
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -24,7 +24,7 @@ COMPONENTS = ("ballast", "pad")  # the spring that holds most of the energy of e
 MIN_MASS_RATIO = 1.2
 REJECTION_PROBABILITY = 0.002  # a single component is ruled out below it: the true one is, in one case of 500
 MAX_DEVIATION = 4.0  # errors between a value and the fit of the change
-NORMAL_QUANTILE = float(stats.norm.isf(0.025))
+NORMAL_QUANTILE = -float(ndtri(0.025))
 
 
 @dataclass(frozen=True)
@@ -242,7 +242,7 @@ def judged_change(x: np.ndarray, variance: np.ndarray, coupling: tuple[float, fl
     ('ballast', -10.1, (0.0, 0.0, 0.0))
     """
     shares = np.linspace(*coupling, 33)
-    limit = stats.chi2.isf(REJECTION_PROBABILITY, 1)
+    limit = chdtri(1, REJECTION_PROBABILITY)
     is_possible = [
         np.min((shares * x[i] - (1.0 - shares) * x[1 - i]) ** 2
                / (shares**2 * variance[i] + (1.0 - shares) ** 2 * variance[1 - i])) <= limit

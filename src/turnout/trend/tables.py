@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 import pyarrow as pa
-from scipy import stats
+from scipy.special import ndtri
 
 from turnout.registry.schema import arrow_schema, tables
 from turnout.trend.epochs import by_epoch
@@ -30,7 +30,7 @@ TABLE_KEYS = ["turnout_id", "section_id", "band", "source"]
 CELL_STATES = np.array(
     ["ok", "baseline", "learning", "alarm_down", "alarm_up", "no_temperature", "not_judged", "wrong_time"]
 )
-NORMAL_QUANTILE = float(stats.norm.isf(0.025))
+NORMAL_QUANTILE = -float(ndtri(0.025))
 
 
 def cell_states(charts: Charts) -> np.ndarray:
