@@ -105,7 +105,7 @@ def test_a_finding_names_it_and_says_what_to_do(box):
 
 
 def test_the_page_of_effects_has_it(box):
-    row = "| A box on one sleeper | `sleeper_box` | a place | mass on one sleeper [kg] | 10 kg | Look for a box"
+    row = "| A box on one sleeper | `sleeper_box` | a position | mass on one sleeper [kg] | 10 kg | Look for a box"
     assert row in page()
 
 

@@ -115,10 +115,10 @@ def _description_of_layout(
     if section is None:
         if turnout.passages is None:
             remedy = "Give a section, for a file of a hammer test"
-            raise ConfigError(turnout.layout, "passages", "nothing about passages", remedy)
+            raise ConfigError(turnout.layout, "passages", "the layout describes no passages", remedy)
         return turnout.passages.description
     if turnout.hammer is None:
-        raise ConfigError(turnout.layout, "hammer", "nothing about hammer tests", "Add them to the layout")
+        raise ConfigError(turnout.layout, "hammer", "the layout describes no hammer tests", "Add the part hammer")
     if section not in turnout.hammer.descriptions:
         remedy = f"Write one of {', '.join(turnout.hammer.descriptions)}"
         raise ConfigError(turnout.layout, "section", f"there is no section {section!r}", remedy)

@@ -1,10 +1,10 @@
-"""Say that an alarm has been seen, or silence a chart until a date. The reason stays in the record.
+"""Acknowledge an alarm, or suppress a chart until a date. The reason is stored.
 
   turnout acknowledge tommerup_s1/A7 --band ballast --by "M. Jensen" --reason "tamping ordered for week 14"
   turnout acknowledge tommerup_s1 --suppress-until 2030-05-01 --by "M. Jensen" --reason "track works"
 
 An acknowledged alarm moves from "inspect this week" to "plan"; an alarm raised later is a new one. A suppressed
-chart is off the list until the date. Both are lines of config/acknowledgements.csv and count from the next run.
+chart is not on the list until the date. Both are lines of config/acknowledgements.csv and count from the next run.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ OPEN_ALARMS_QUERY = """
     where closed_at_utc is null and turnout_id = $1 and section_id = coalesce($2, section_id)
         and band = coalesce($3, band) and raised_at_utc <= $4
     limit 1"""
-GROUP = "Set up"
-HELP = "say that an alarm has been seen, or silence it until a date"
+GROUP = "Worklist and maintenance"
+HELP = "acknowledge an alarm, or suppress a chart until a date"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -38,8 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     parser.add_argument("place", help="turnout, or turnout/section")
     parser.add_argument("--band", default="", help=f"{', '.join(BANDS)} (under trains); all if not given")
-    parser.add_argument("--by", required=True, help="who says so")
-    parser.add_argument("--reason", required=True, help="why")
+    parser.add_argument("--by", required=True, help="name of the person")
+    parser.add_argument("--reason", required=True, help="reason, stored with it")
     parser.add_argument("--suppress-until", metavar="DATE", default="", help="silence it until then, YYYY-MM-DD")
     parser.add_argument("--at", default="", help="when it was said, UTC; now if not given")
     add_registry(parser, help="where open alarms are looked up (%(default)s)")

@@ -1,4 +1,4 @@
-"""Add a turnout: one row of turnouts.tsv. The whole configuration is checked before it stays.
+"""Add a turnout: one row of turnouts.tsv. The row is written only if the whole configuration is valid with it.
 
 turnout add tommerup_s3 tommerup --raw line_7/T00043 --name "Tommerup, switch 3" --km 13.1
 """

@@ -11,7 +11,7 @@ import argparse
 
 from turnout.cli.options import add_configuration, add_registry, add_result
 
-GROUP = "Ask"
+GROUP = "Worklist and maintenance"
 HELP = "send new entries of the worklist by mail and webhook"
 
 

@@ -1,14 +1,14 @@
-"""Prove the diagnosis on recordings in which an effect is concealed; everything again on your own machine.
+"""Test the diagnosis on recordings in which an effect is concealed, on your own machine.
 
-  turnout blind make --out proof --truth proof-truth           campaigns, and truths under seal
+  turnout blind make --out proof --truth proof-truth           campaigns, and the sealed true effects
   turnout blind diagnose --out proof --truth proof-truth       the tool reads the campaigns and cannot read the truth
   turnout blind reveal --out proof --truth proof-truth         opens the envelopes, verifies every hash
   turnout blind score --out proof                              every figure with its interval
 
-An interrupted make or diagnose goes on where it stopped. --fast makes 40 cases instead of 235. --effects FOLDER adds
-effects of your own, one file each; --panel crossing puts all cases into crossing panels. --histories N makes N sites
-that are visited for two years; with --histories, diagnose asks the calibrated model and score judges its answers.
-Print commit.json's hash (make does) and publish it before anybody diagnoses.
+An interrupted make or diagnose continues where it stopped. --fast makes 40 cases instead of 235. --effects FOLDER adds
+effects of your own, one file each. --panel crossing puts all cases into crossing panels. --histories N makes N sites
+that are visited for two years; diagnose --histories uses the calibrated model, and score --histories its answers.
+make prints the hash of commit.json: publish it before the diagnosis.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 GROUP = "Simulate and diagnose"
-HELP = "prove the diagnosis on concealed effects: make, diagnose, reveal, score"
+HELP = "test the diagnosis on concealed effects: make, diagnose, reveal, score"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -38,32 +38,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     make = steps.add_parser("make", help="make a set and seal its truth")
     make.add_argument(
         "--seed", type=_seed,
-        help="the same seed gives the same set; 'tool': that of the tool as it is, which nobody chose (default: drawn)",
+        help="seed of the set; 'tool': the hash of the tool's sources, which nobody can choose (default: random)",
     )  # fmt: skip
     make.add_argument("--fast", action="store_true", help="the fast tier of 40 cases")
     make.add_argument("--effects", action="append", default=[], help="folder with effects of your own")
-    make.add_argument("--only", help="kinds to keep beside the controls, by commas, as void,dip")
+    make.add_argument("--only", help="kinds of effects beside the controls, separated by commas, such as void,dip")
     make.add_argument("--limit", type=at_least_one, help="the first so many cases of the shuffled set")
     make.add_argument(
-        "--panel", choices=("plain", "crossing", "switch"), default="plain", help="where all cases lie (default plain)"
+        "--panel", choices=("plain", "crossing", "switch"), default="plain", help="panel of all cases (default: plain)"
     )
     make.add_argument("--workers", type=at_least_one, default=1, help="processes (default 1)")
     make.add_argument("--histories", type=at_least_one, metavar="N", help="N sites with a history of two years")
     make.add_argument(
         "--passages", type=at_least_one, default=1, help="passages at each visit of a history (default 1)"
     )
-    diagnose = steps.add_parser("diagnose", help="let the tool diagnose every case, the truth out of its reach")
+    diagnose = steps.add_parser("diagnose", help="diagnose every case without access to the truth")
     diagnose.add_argument(
         "--command", dest="tool", help="command of the tool; {python}, {case}, {folder}, {out} are filled in"
     )
-    diagnose.add_argument("--histories", action="store_true", help="the set has histories: ask the calibrated model")
-    diagnose.add_argument("--cases", help="only these, by commas")
-    diagnose.add_argument("--timeout", type=float, default=1800.0, help="seconds of the clock per case (default 1800)")
-    diagnose.add_argument("--cpu", type=float, default=900.0, help="seconds of the processor per case (default 900)")
+    diagnose.add_argument("--histories", action="store_true", help="the set has histories: use the calibrated model")
+    diagnose.add_argument("--cases", help="only these cases, separated by commas")
+    diagnose.add_argument("--timeout", type=float, default=1800.0, help="elapsed time per case [s] (default 1800)")
+    diagnose.add_argument("--cpu", type=float, default=900.0, help="CPU time per case [s] (default 900)")
     diagnose.add_argument("--again", action="store_true", help="also cases that failed or exceeded their budget")
-    diagnose.add_argument(
-        "--ablation", metavar="NAME", help="keep beside the tool's findings, as those of a lesser one"
-    )
+    diagnose.add_argument("--ablation", metavar="NAME", help="store the findings as those of a reduced tool")
     diagnose.add_argument("--workers", type=at_least_one, default=1, help="cases at a time (default 1)")
     reveal = steps.add_parser("reveal", help="open the envelopes and verify every hash")
     score = steps.add_parser("score", help="print every figure with its interval")
@@ -71,14 +69,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     score.add_argument("--names", help="JSON file {effect: [names of the tool that are right]} to add")
     score.add_argument("--report", help="file to write the report to, as Markdown")
     score.add_argument("--page", help="page with marks for report, pictures and stories, as docs/blind_figures.md")
-    score.add_argument("--stories", help="cases to be told on the page, by commas (default: three are chosen)")
+    score.add_argument("--stories", help="cases described on the page, separated by commas (default: three)")
     score.add_argument("--effects", action="append", default=[], help="folder with effects of your own")
-    keep = steps.add_parser("keep", help="keep a revealed set small: seals, truths, findings")
-    keep.add_argument("--folder", required=True, help="where it goes")
+    keep = steps.add_parser("keep", help="store a revealed set without recordings: seals, truths, findings")
+    keep.add_argument("--folder", required=True, help="folder to write")
     for sub in (make, diagnose, reveal, score, keep):
         sub.add_argument("--out", required=True, help="folder of the set")
         if sub is not score:
-            sub.add_argument("--truth", help="folder of the truth (default: --out with -truth behind it)")
+            sub.add_argument("--truth", help="folder of the truth (default: --out followed by -truth)")
 
 
 def run(args: argparse.Namespace) -> None:

@@ -1,11 +1,11 @@
-"""Fit pads, ballast and damping of a section to its hammer tests, and say what the data cannot tell.
+"""Fit pads, ballast and damping of a section to its hammer tests, and state which values the data do not determine.
 
   turnout calibrate --turnout tommerup_s1 --section A7 raw/tommerup_s1/hammer/2024-01-23/A7_*.uff
   turnout calibrate --track tommerup --section A7 --modes ballast=99.6/0.292 railpad=616.4/0.066
 
-The first meets the measured receptance line by line (gradients, priors, covariance); the second looks for
-parameters whose simulated test has these resonances [Hz] and damping ratios. Nothing is changed on disk: the values
-are printed as they stand in the track's file. Without --track it is that of the turnout.
+The first form fits the measured receptance line by line. The second finds parameters whose simulated test has these
+resonances [Hz] and damping ratios. No file is changed: the values are printed in the form of the track file. Without
+--track the track file is that of the turnout.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
 GROUP = "Simulate and diagnose"
-HELP = "fit a simulated section to measured receptances"
+HELP = "fit a section of a track file to hammer tests"
 PRINTED_UNITS = {
     "pad_stiffness": "MN/m",
     "pad_damping": "kN s/m",

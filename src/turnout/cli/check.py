@@ -1,8 +1,8 @@
-"""Check the configuration and, where the raw files are at hand, their names.
+"""Check the configuration and, if the raw files are available, their names.
 
-Every error is one line: file, line, column, what stands there, what to write instead. --read opens the newest file of
-every section and of the passages, and compares all of it with the layout: rate, channels, units, counts, and whether
-stiffness and acceleration are those of a track.
+Every error is one line: file, line, column, the present value, and what to write instead. --read opens the newest file
+of every section and of the passages and compares rate, channels, units and counts with the layout. It also checks
+whether stiffness and acceleration are in the range of a track.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from turnout.units import Conversion
 
 GROUP = "Set up"
-HELP = "check configuration and file names"
+HELP = "check the configuration and the names of raw files"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -73,7 +73,9 @@ def run(args: argparse.Namespace) -> int:
         print(f"  {event}")
     raw = Path(args.raw or "raw")
     if not raw.is_dir() and args.raw:
-        raise ConfigError(args.raw, "--raw", "no such folder", "Write the folder that holds those of the turnouts")
+        raise ConfigError(
+            args.raw, "--raw", "no such folder", "Write the folder that holds the folders of the turnouts"
+        )
     if not raw.is_dir():
         print(f"{raw}: no such folder, file names not checked.")
         return 1 if faults or args.read else 0

@@ -1,4 +1,4 @@
-"""Print what a shell needs to complete commands and options.
+"""Print the completion script of a shell for commands and options.
 
   bash   turnout completion bash > ~/.local/share/bash-completion/completions/turnout
   zsh    turnout completion zsh > ~/.zfunc/_turnout      (a folder of $fpath)

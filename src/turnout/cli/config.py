@@ -1,9 +1,9 @@
-"""Show the merged configuration of a turnout with the file each value comes from, or make the generated files.
+"""Show the merged configuration of a turnout with the source of each value, or write the generated files.
 
 turnout config show tommerup_s1
 turnout config show tommerup_s1 --only receptance
 turnout config generate            config.yaml, JSON schemas for editors, the tables of docs/configuration.md
-turnout config generate --check    say what is out of date, change nothing
+turnout config generate --check    show what is out of date, change nothing
 """
 
 import argparse
@@ -12,7 +12,7 @@ import sys
 from turnout.cli.options import add_configuration, add_result
 
 GROUP = "Set up"
-HELP = "show or generate configuration"
+HELP = "show or generate the configuration"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -1,19 +1,18 @@
-"""Make a demonstration fleet, run the whole pipeline on it, and say what was found.
+"""Make a demonstration fleet, run the whole workflow on it, and compare the results with the truth.
 
 Three turnouts with the paper's eight locations over three years: raw files in five formats below raw/,
 with double impacts, overloads, a cut-off file, a dead channel, a reversed sign, a missing temperature, maintenance,
 one true drift and one sleeper that comes to hang. One turnout has five trains a week for 70 weeks, and a weld that
-becomes a dip, which trains alone record. What is true lies below truth/, where the pipeline does not read.
-The same seed gives the same samples. The configuration that comes with the program (config/) describes these
-turnouts.
+becomes a dip, which only trains show. The true values are below truth/, which the workflow does not read. The same seed
+gives the same samples. The configuration that comes with the program (config/) describes these turnouts.
 """
 
 import argparse
 
 from turnout.cli.options import add_cores
 
-GROUP = "Try"
-HELP = "make a demonstration fleet and run everything on it"
+GROUP = "Examples"
+HELP = "make a demonstration fleet and run the whole workflow on it"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -1,13 +1,13 @@
-"""Say what the simulation of a turnout leaves out, from its hammer tests and passages.
+"""Find what the simulation of a turnout lacks, from its hammer tests and passages.
 
   turnout diagnose --turnout tommerup_s1
   turnout diagnose --turnout tommerup_s1 --sections A7 A8 --budget 10
   turnout diagnose --turnout tommerup_s1 --accept
 
-The newest visit is diagnosed, neighbouring sections together, and a page is written. An interrupted diagnosis, or one
-whose budget is spent, goes on where it stopped; the groups that are done have their findings by then. --accept writes
-the term that was named into the turnout's track file, from then on the simulation contains it; nothing is diagnosed
-again for that.
+The newest visit is diagnosed, neighbouring sections together as one group, and a page is written. An interrupted
+diagnosis, or one whose --budget is used up, continues where it stopped; groups that are done have their findings.
+--accept writes the named effect into the track file of the turnout and diagnoses nothing. From then on the simulation
+contains the effect.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from turnout.stages.mismatch_results import Results
 
 GROUP = "Simulate and diagnose"
-HELP = "say what the simulation of a turnout leaves out"
+HELP = "find what the simulation of a turnout lacks"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -51,17 +51,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--sections", nargs="+", default=(), help="only these sections")
     parser.add_argument(
         "--visit",
-        help="YYYY-MM-DD, YYYY-MM, or 'all' together (effects of temperature need several days): default the newest",
+        help="YYYY-MM-DD, YYYY-MM, or 'all' visits together (for effects of temperature); default: the newest",
     )
     add_track(parser, help="file in config/tracks; default: the turnout's own, else its layout's")
     add_configuration(parser)
     add_raw(parser)
-    add_work(parser, "where fits and results are kept (%(default)s)")
-    add_registry(parser, help="what --accept looks in, too (%(default)s)")
-    add_pages(parser, "where the page goes (%(default)s)")
-    parser.add_argument("--budget", type=float, metavar="MINUTES", help="stop after so long and keep what is done")
-    parser.add_argument("--accept", action="store_true", help="write what was named into the turnout's track file")
-    parser.add_argument("--finding", metavar="ID", help="which finding to accept, where several are named")
+    add_work(parser, "folder of fits and results (%(default)s)")
+    add_registry(parser, help="folder of the registry, for --accept (%(default)s)")
+    add_pages(parser, "folder of the page (%(default)s)")
+    parser.add_argument(
+        "--budget", type=float, metavar="MINUTES", help="stop after so many minutes; a next run continues"
+    )
+    parser.add_argument("--accept", action="store_true", help="write the named effect into the turnout's track file")
+    parser.add_argument("--finding", metavar="ID", help="finding to accept, if several are named")
     parser.add_argument("--anyway", action="store_true", help="accept a finding that is not named with grade A or B")
 
 
@@ -134,7 +136,7 @@ def _findings_text(rows: dict[str, list[dict]]) -> str:
         lines.append(f"sections {row['sections']}: {verdict}, probability {row['probability']:.2f}. {row['sentence']}")
         lines += [f"   {line}" for line in _details(row)]
     for row in rows["quarantine"]:
-        lines.append(f"nothing can be said of {row['place']}: {row['found']}")
+        lines.append(f"no answer for {row['place']}: {row['found']}")
     notes = dict.fromkeys(n for row in rows["mismatch_findings"] for n in (row["notes"] or "").splitlines())
     return "\n".join([*lines, *(f"note: {note}" for note in notes)])
 

@@ -1,11 +1,11 @@
-"""Before measuring: which effects a planned campaign can tell apart, and what would add most.
+"""Show which effects a planned campaign can distinguish, and which further measurement would add most.
 
 turnout distinguish --track tommerup --sensors 23.4 26.4 --impacts 24.6 --temperatures 5 25
 turnout distinguish --track tommerup --sensors 23.4 26.4 --trains ic3 --speeds 160 100
 
-A figure is the log evidence in nats that is lost when the effect of the row is explained by that of the column, at the
-column's best strength and with all nuisances free; "none" is the base model. Below 5 nats they cannot be distinguished;
-a name needs 12 in the column "none" and 6 against each rival: plan for that.
+A figure is the evidence [nats] that is lost if the effect of the row is explained by that of the column, with the best
+size of the latter and all nuisance parameters free; "none" is the base model. Below 5 nats two effects cannot be
+distinguished. A name needs 12 in the column "none" and 6 against each rival.
 """
 
 import argparse
@@ -13,7 +13,7 @@ import argparse
 from turnout.cli.options import add_configuration, add_former, add_track
 
 GROUP = "Simulate and diagnose"
-HELP = "which effects a planned campaign can tell apart"
+HELP = "show which effects a planned campaign can distinguish"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

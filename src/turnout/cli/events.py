@@ -1,19 +1,19 @@
-"""List maintenance, or enter it: tamping, exchanged pads, another sensor, another method.
+"""List maintenance, enter it, or show whether it helped: tamping, exchanged pads, another sensor, another method.
 
-  turnout events                                      all that is entered
-  turnout events --effect                             did the work help, and for how long
+  turnout events                                      everything that is entered
+  turnout events --effect                             whether the work helped, and for how long
   turnout events tommerup_s1/A7 tamping 2026-04-02 --note "machine 09-3X"
 
-An event that resets a resonance starts a new epoch of its charts: they learn the new level before they alarm
-again. Which resonance a kind resets is the program's choice unless --resets says otherwise.
+An event that resets a resonance starts a new epoch of its charts: they learn the new level before they raise an alarm
+again. Each kind of work resets certain resonances (docs/configuration.md); --resets states others.
 """
 
 import argparse
 
 from turnout.cli.options import add_configuration, add_registry, add_result
 
-GROUP = "Set up"
-HELP = "list maintenance, or enter it"
+GROUP = "Worklist and maintenance"
+HELP = "list or enter maintenance, and show whether it helped"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -1,4 +1,4 @@
-"""Hand tables and views on to other tools: Parquet or CSV files, or Delta Lake tables.
+"""Write tables and views for other tools: Parquet or CSV files, or Delta Lake tables.
 
 turnout export out                            every table as one Parquet file
 turnout export out --format csv --only worklist chart_states
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     import duckdb
 
-GROUP = "Ask"
+GROUP = "Results"
 HELP = "write tables and views as Parquet, CSV or Delta Lake"
 DEFAULT_TABLES = ("turnouts", "sections", "events", "campaigns", "modes_current", "charts", "baselines", "alarms",
          "chart_states", "worklist")  # fmt: skip
@@ -74,7 +74,9 @@ def run(args: argparse.Namespace) -> int:
                 raise RegistryError(f"no table or view {name!r}. 'turnout query --list' names them.") from None
             except duckdb.Error as error:
                 reason = str(error).splitlines()[0]
-                raise RegistryError(f"{name} cannot be written to {folder}: {reason}. Make room or allow it.") from None
+                raise RegistryError(
+                    f"{name} cannot be written to {folder}: {reason}. Free disk space or give write permission."
+                ) from None
             print(f"{path}: {n} rows")
     return 0
 

@@ -1,17 +1,18 @@
-"""Look at a hammer test that was just recorded: is it good enough, and what are the resonances?
+"""Analyse one hammer test: whether it is good enough, and its resonances.
 
   turnout hammer raw/tommerup_s1/hammer/2024-01-23/A7_*.uff --turnout tommerup_s1
   turnout hammer /media/stick/log_17.uff --turnout tommerup_s1 --section A7 --campaign 2024-05-13 --figure a7.svg
 
-Says which files and records were read, which impacts are accepted and which rejected and why, how far the coherence
-reaches, and frequency, damping and dynamic stiffness at the two resonances with their 95 % intervals, or why there is
-none. Impacts and records are counted from 1. It computes as the nightly run does, with the same settings, so give all
-files of a section: impacts are judged against each other. Files that do not lie in the raw folder need --section and
---campaign where their names and times do not say them. Files of averaged frequency responses (UFF58 function type 4,
-text with complex columns, npz) give modes with errors; no impact can then be judged. Nothing is written but the figure
-that is asked for.
+It shows which files and records were read, which impacts are accepted or rejected and why, the coherence, and
+frequency, damping and dynamic stiffness of both resonances with their 95 % intervals, or why there is none. Impacts and
+records are counted from 1. Nothing is written except the figure of --figure.
 
-Exit code 1 where a test gives no resonance, 2 where the command cannot be followed.
+The computation and the settings are those of the nightly run. Name all files of a section, because impacts are compared
+with each other. Files outside the raw folder need --section and --campaign if their names and times do not state them.
+Files of averaged frequency responses (UFF58 function type 4, text with complex columns, npz) give modes with errors,
+but no impact can be judged.
+
+Exit code 1 if a test gives no resonance, 2 if the command line or an input is wrong.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from turnout.stages.hammer_adhoc import RequestedUnit
 
 GROUP = "Look at recordings"
-HELP = "analyse one hammer test and say what is in it"
+HELP = "analyse one hammer test, without storing results"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,13 +42,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     parser.add_argument("file", nargs="+", help="files of the test, in any format that is read")
     add_turnout(parser, "id of the turnout, for its sections and channels")
-    parser.add_argument("--section", help="label of the section, where the file's name does not say it")
-    parser.add_argument("--campaign", help="day of the campaign, YYYY-MM-DD, where neither name nor file says it")
+    parser.add_argument("--section", help="label of the section, if the file name does not state it")
+    parser.add_argument("--campaign", help="day of the campaign, YYYY-MM-DD, if neither name nor file states it")
     parser.add_argument(
         "--figure", metavar="OUT.svg", help="draw receptance, coherence, decay and impacts into this file"
     )
     add_configuration(parser)
-    add_raw(parser, help="raw root, for what was noted of the campaign (raw)", default=None)
+    add_raw(parser, help="raw root, with the campaigns.csv of the turnout (raw)", default=None)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -71,7 +72,9 @@ def run(args: argparse.Namespace) -> int:
     from turnout.stages.hammer_adhoc import requested_units
 
     if args.raw and not Path(args.raw).is_dir():
-        raise ConfigError(args.raw, "--raw", "no such folder", "Write the folder that holds those of the turnouts")
+        raise ConfigError(
+            args.raw, "--raw", "no such folder", "Write the folder that holds the folders of the turnouts"
+        )
     configuration = load_configuration(args.configuration)
     folders = {name: row.raw for name, row in configuration.rows.items()}
     turnout, raw = configuration.turnout(args.turnout), Path(args.raw or "raw")
@@ -96,7 +99,7 @@ def _check_figure(path: Path, tests: Sequence[RequestedUnit]) -> None:
 
     if path.suffix.lower() != ".svg":
         remedy = "Write a name that ends in .svg; every browser shows and prints it"
-        raise ConfigError(path, "--figure", f"the ending {path.suffix!r} is no drawing that is made here", remedy)
+        raise ConfigError(path, "--figure", f"{path.suffix!r} is not a supported figure format", remedy)
     if path.is_dir():
         raise ConfigError(path, "--figure", "it is a folder", "Write the name of a file")
     if not path.parent.is_dir():

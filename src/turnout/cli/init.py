@@ -2,13 +2,13 @@
 
 turnout init my_turnouts
 
-All other commands run in this folder. Nothing that is there is changed.
+All other commands run in this folder. Existing files are not changed.
 """
 
 import argparse
 
 GROUP = "Set up"
-HELP = "make a folder with configuration and a place for recordings"
+HELP = "make a project folder with configuration"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -4,11 +4,11 @@
   turnout inspect /media/stick --json
   turnout inspect A7_1.tdms --plot
 
-Of each file: format, records, rate with every place that states it, times, channels with their units and extremes,
-which channel may be the force and which the response, impacts or trains. For a folder, one line per file. --plot
-draws every channel into <name of the file>.svg in the present folder. Nothing else is written.
+For each file it shows the format, records, times, the sampling rate with every line that states it, the channels with
+units and extremes, which channel may be force or response, and impacts or trains. A folder gives one line per file.
+--plot draws every channel into <name of the file>.svg in the present folder. Nothing else is written.
 
-Exit code 1 where a file cannot be read or has a problem.
+Exit code 1 if a file cannot be read or has a problem.
 """
 
 from __future__ import annotations

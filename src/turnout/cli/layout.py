@@ -3,9 +3,9 @@
   turnout layout new --from A7_1.uff A8_1.uff --name my_layout
   turnout layout new --from /media/stick/20260513T100000Z.h5
 
-Writes config/layouts/<name>.yaml with everything that the files tell, and a comment with DECIDE at everything that
-they do not. `turnout check` accepts the draft; a unit or rate that no file states stays null, so that nothing is read
-with a guess. `turnout check --read` then compares the finished layout with the files.
+Writes config/layouts/<name>.yaml with everything that the files state, and a comment with DECIDE at everything that
+they do not. `turnout check` accepts the draft. A unit or rate that no file states stays null, so nothing is guessed.
+`turnout check --read` then compares the finished layout with the files.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import argparse
 from turnout.cli.options import add_configuration
 
 GROUP = "Set up"
-HELP = "make a layout from raw files"
+HELP = "draft a layout from raw files"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -51,11 +51,13 @@ def build_parser() -> argparse.ArgumentParser:
         usage="turnout [-h] [--version] command ...",
         description="Monitor railway switches and crossings with hammer tests and train passages.",
         epilog=f"{_command_list(groups_and_texts)}\n\n"
-        f"turnout command --help says more. Every command has --json, -q and -v.\n\n{EXIT_CODES}",
+        f"turnout COMMAND --help shows the options of a command. Every command has --json, -q and -v.\n\n{EXIT_CODES}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"turnout {__version__}")
-    subparsers = parser.add_subparsers(dest="command", metavar="command", required=True, help=argparse.SUPPRESS)
+    subparsers = parser.add_subparsers(
+        dest="command", metavar="command", required=True, help=argparse.SUPPRESS, prog=parser.prog
+    )
     for name, module in modules.items():
         sub = subparsers.add_parser(
             name.replace("_", "-"),
@@ -71,11 +73,11 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def _command_list(commands: dict[str, tuple[str, str]]) -> str:
-    """The commands by group, one line each."""
+    """The commands by group, one line each, in the order of ``COMMANDS``."""
     lines = []
     for group in GROUPS:
         lines.append(f"{group}:")
-        lines += [f"  {n.replace('_', '-'):<12} {text}" for n, (own, text) in sorted(commands.items()) if own == group]
+        lines += [f"  {n.replace('_', '-'):<12} {text}" for n, (own, text) in commands.items() if own == group]
     return "\n".join(lines)
 
 
@@ -133,7 +135,7 @@ def _message(error: TurnoutError | OSError, command: str) -> str:
     if isinstance(error, TurnoutError):
         return "\n".join(line.removeprefix(f"{command}, ") for line in str(error).splitlines())
     where = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error)
-    return f"{where}. Put that right, or name another file or folder, then run again."
+    return f"{where}. Correct this, or name another file or folder, then run again."
 
 
 def _run_for_json(args: argparse.Namespace) -> int:

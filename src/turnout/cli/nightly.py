@@ -1,13 +1,13 @@
-"""Run the whole workflow unattended: one run at a time, remains of a killed one cleared, one line at the end.
+"""Run the whole workflow unattended. Only one run is possible at a time. The last line states the result.
 
   0 2 * * *   cd /srv/turnouts && mkdir -p logs && .venv/bin/turnout nightly --limit-hours 6 >> logs/nightly.log 2>&1
   0 14 1 * *  cd /srv/turnouts && .venv/bin/turnout registry vacuum && .venv/bin/turnout registry compact
   turnout nightly --profile profiles/slurm
   turnout nightly -- --config accept_vanished=true
 
-The exit code is 0 only where every job ran and the results may be trusted. The registry is published either way,
-with what was computed until a job died or was ended. Of the limit of time the last sixth is kept for that; the next
-run goes on where this one was ended.
+The exit code is 0 only if every job ran and the results may be trusted. The registry is published in any case, with
+what was computed until a job failed or was ended. The last sixth of --limit-hours is reserved for publishing. The next
+run continues where this one ended.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     parser.add_argument("--profile", default="profiles/default", help="folder of the profile (%(default)s)")
     parser.add_argument("--limit-hours", type=float, default=None, help="end a run that takes longer")
-    parser.add_argument("options", nargs="*", help="handed on to Snakemake, after --")
+    parser.add_argument("options", nargs="*", help="options of Snakemake, after --")
 
 
 def run(args: argparse.Namespace) -> int:

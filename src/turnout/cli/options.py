@@ -214,7 +214,7 @@ def add_common(parser: argparse.ArgumentParser, default: object = argparse.SUPPR
     common = (
         (("--json",), "print one JSON object: command, exit_code, text, result, error"),
         (("-q", "--quiet"), "no progress and no warnings"),
-        (("-v", "--verbose"), "say what is done; the place in the program of an error"),
+        (("-v", "--verbose"), "show what is done, and where in the program an error arose"),
     )
     group = parser.add_argument_group("options of every command")
     for names, text in common:

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
     import duckdb
 
-GROUP = "Simulate and diagnose"
-HELP = "print Tables 1 to 4 of the paper for a turnout and a campaign"
+GROUP = "Results"
+HELP = "print the tables of the paper for a turnout and a campaign"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

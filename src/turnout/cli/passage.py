@@ -1,10 +1,10 @@
-"""Look at one passage file: axles, speed, type, and what the model of each section predicts.
+"""Analyse one passage file: axles, speed, type of the train, and what the model of each section predicts.
 
-Nothing is written, unless --out names a page: for each sensor the passage as measured and as predicted, whole and two
-wheelsets, and its spectrogram with the axles. The models are those that the last run identified (--work); without
-them, or with --no-fit, only the train is described.
+Nothing is written without --out, the name of a page. For each sensor the page shows the passage as measured and as
+predicted, whole and for two wheelsets, and its spectrogram with the axles. The models are those that the last run
+identified (--work). Without them, or with --no-fit, only the train is described.
 
-Exit code 1 where no train is found, 2 where the command cannot be followed.
+Exit code 1 if no train is found, 2 if the command line or an input is wrong.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from turnout.stages.passage import PassageContext
 
 GROUP = "Look at recordings"
-HELP = "analyse one passage file and say what is in it"
+HELP = "analyse one passage file, without storing results"
 FIT_HEAD = "  sensor      fit / null   forecast / null  left out / null   along b  peak m/s²  status"
 
 
@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
 
     turnout = load_configuration(args.configuration).turnout(args.turnout)
     if turnout.passages is None:
-        raise ConfigError(turnout.layout, "passages", "nothing about passages", "Add them to the layout")
+        raise ConfigError(turnout.layout, "passages", "the layout describes no passages", "Add the part passages")
     path = Path(args.file).resolve()  # a link may lead anywhere
     settings = turnout.settings["passage"]
     result = read(path.name, path.parent, turnout.passages.description, settings.longest)

@@ -1,9 +1,9 @@
-"""Say what a run would find: units per stage, which are new or changed, and which files were left out. Changes nothing.
+"""List what a run would compute: units per stage, new, changed or left out. Changes nothing.
 
-A unit is new where it was never computed, changed where one of its files, its settings, what was noted beside it or
-the code of its stage is another than it was computed from. A file that was only touched counts as changed here; the run
-then compares its content and computes nothing. Files that the last run knew and that are gone are said, too, and
-whether the next run will stop because of them.
+A unit is new if it was never computed. It is changed if its files, its settings, the notes of its campaign or the code
+of its stage differ from those of its result. A file with only a new time counts as changed here; the run then compares
+its content and computes nothing. Files that have vanished since the last run are listed, with whether the next run will
+stop because of them.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from turnout.workflow.plan import PlannedUnit
 
 GROUP = "Run"
-HELP = "say what is new, without computing"
+HELP = "list what is new, without computing"
 STAGES = {
     "hammer": ("turnout.stages.hammer", None),
     "passage": ("turnout.stages.passage", "turnout.stages.passage_context:passage_context"),
@@ -70,7 +70,9 @@ def run(args: argparse.Namespace) -> int:
     if shards < 1:
         raise ConfigError("--shards", "number", str(shards), "Write the number of shards of the runs, 1 or more")
     if args.raw and not Path(args.raw).is_dir():
-        raise ConfigError(args.raw, "--raw", "no such folder", "Write the folder that holds those of the turnouts")
+        raise ConfigError(
+            args.raw, "--raw", "no such folder", "Write the folder that holds the folders of the turnouts"
+        )
     counts = dict.fromkeys(("all", "new", "changed"), 0)
     earlier = _EarlierResults(Path(args.work), shards)
     for turnout in map(configuration.turnout, args.turnout or configuration.ids):

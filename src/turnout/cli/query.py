@@ -1,4 +1,4 @@
-"""Ask the registry in SQL.
+"""Query the registry in SQL.
 
   turnout query "from resonance_drift(365)"
   turnout query "select * from section_trend('tommerup_s1/A7', 'ballast')" --csv trend.csv
@@ -6,7 +6,7 @@
   turnout query --list
 
 docs/registry.md lists every table, view and macro with its columns and units. Only queries are allowed, and only the
-files of the registry are read. In a CSV, an apostrophe precedes text that a spreadsheet would take for a formula.
+files of the registry are read. In CSV output an apostrophe precedes text that a spreadsheet would take for a formula.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
     import duckdb
 
-GROUP = "Ask"
-HELP = "ask the registry in SQL"
+GROUP = "Results"
+HELP = "query the registry in SQL"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

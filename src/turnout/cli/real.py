@@ -1,8 +1,8 @@
-"""Run the pipeline on recordings that nobody here made, and compare with what their makers say of them.
+"""Run the workflow on published recordings of others, and compare the results with what their authors state.
 
-Fetches three source distributions by package name, checks their sha256, and takes the recordings out:
-a hammer test of five impacts (impact 0 overloaded, impact 2 double, its authors say), the frequency responses of two
-beams with published modes, and vendors' UFF files. Everything lies below real/.
+Downloads three source distributions by package name, checks their SHA-256, and extracts the recordings:
+a hammer test of five impacts (impact 0 overloaded, impact 2 double, according to its authors), the frequency responses
+of two beams with published modes, and UFF files of vendors. Everything is below real/.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from turnout.demo.published_modes import Beam
 
-GROUP = "Try"
-HELP = "run everything on recordings made by others"
+GROUP = "Examples"
+HELP = "run the workflow on published recordings of others"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser : argparse.ArgumentParser
         Parser of the command.
     """
-    parser.add_argument("--folder", default="real", help="where everything goes (default real)")
+    parser.add_argument("--folder", default="real", help="folder of all output (default real)")
     add_cores(parser, "processors to use (default 2)", default=2)
 
 

@@ -1,11 +1,11 @@
-"""Look after the registry.
+"""Maintain the registry.
 
-check      compare every live file with the list: size, hash, row count, types
+check      compare every valid file with the list: size, hash, row count, types
 compact    merge the many files of a table and year into one
-vacuum     delete what killed runs left behind
-relocate   make registry.duckdb again, after the folder was moved
-rebuild    write all files under the present columns, after an update that changed them
-describe   tables, views and macros with their columns, units and meanings
+vacuum     delete files that interrupted runs have left
+relocate   write registry.duckdb again after the folder was moved
+rebuild    write all files again after an update that changed columns
+describe   show tables, views and macros with their columns, units and meanings
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-GROUP = "Ask"
+GROUP = "Results"
 HELP = "check, compact, move or describe the registry"
 ACTIONS = ("check", "compact", "vacuum", "relocate", "rebuild", "describe")
 

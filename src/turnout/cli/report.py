@@ -10,7 +10,7 @@ import argparse
 from turnout.cli.options import add_cores, add_pages, add_registry
 
 GROUP = "Run"
-HELP = "write the pages of fleet and turnouts"
+HELP = "write the pages of the fleet and of each turnout"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -1,12 +1,12 @@
-"""Simulate a hammer test or a train passage and leave the raw file a measuring system would have left.
+"""Simulate a hammer test or a train passage, and write a raw file like that of a measuring system.
 
   turnout simulate hammer  --track tommerup --section A7 --tests 3
   turnout simulate passage --track tommerup --vehicle ic3 --speed 160 --turnout tommerup_s1
   turnout simulate figures --out docs/gallery
 
-With --turnout the channels are those of the turnout's configuration and the file goes to its raw folder, where the
-pipeline finds it; what is true of it goes to a file of the same name below --truth: the track and its effects, where
-each impact fell and how hard, or the wheels' forces.
+With --turnout the channels are those of the configuration, and the file goes to the raw folder of the turnout, where
+the workflow finds it. A file of the same name below --truth holds the true values: the track and its effects, position
+and force of each impact, or the forces of the wheels.
 """
 
 import argparse
@@ -28,14 +28,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     subcommands = parser.add_subparsers(dest="kind", metavar="kind", required=True)
     hammer = subcommands.add_parser("hammer", help="impacts of a hammer at one section")
     hammer.add_argument(
-        "--section", required=True, help="location of the track file, or, without --turnout, a place in metres"
+        "--section", required=True, help="location of the track file, or, without --turnout, a position [m]"
     )
     hammer.add_argument("--tests", type=int, default=1, help="tests, one file each; --out takes one (default 1)")
     hammer.add_argument("--impacts", type=int, default=10, help="impacts per test (default 10)")
     add_former(hammer, "--blows", "--impacts", type=int)
     passage = subcommands.add_parser("passage", help="one train over the turnout")
     passage.add_argument("--vehicle", default="ic3", help="file in config/vehicles, or its path (default ic3)")
-    passage.add_argument("--speed", type=float, default=160.0, help="km/h (default 160)")
+    passage.add_argument("--speed", type=float, default=160.0, help="speed [km/h] (default 160)")
     passage.add_argument(
         "--load",
         type=float,
@@ -50,8 +50,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         add_turnout(sub, "id in config/turnouts.tsv", required=False)
         add_configuration(sub, dest="config")
         add_raw(sub)
-        sub.add_argument("--truth", help="folder for what is true; the pipeline does not read it")
-        sub.add_argument("--out", help="file to write instead of a place below --raw")
+        sub.add_argument("--truth", help="folder of the true values; the workflow does not read it")
+        sub.add_argument("--out", help="file to write, instead of one below --raw")
         sub.add_argument("--format", help="format of the file (default: by the ending of --out, else hdf5)")
         sub.add_argument("--at", default="2024-05-13T09:00:00", help="UTC of the first sample, no zone (%(default)s)")
         sub.add_argument("--temperature", type=float, help="rail temperature to note [°C]")
@@ -59,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             "--seed",
             type=int,
             default=0,
-            help="of noise, supports' scatter and the rail's roughness: trains over one rail share it (default 0)",
+            help="seed of noise, scatter of supports and roughness; the same for trains on one rail (default 0)",
         )
     figures = subcommands.add_parser("figures", help="the figures of docs/simulation.md")
     figures.add_argument("--out", default="docs/gallery", help="folder (default docs/gallery)")

@@ -1,10 +1,10 @@
-"""Learn from the trains so far: what axle load a sensor's slow part means, and which passages are alike.
+"""Calibrate the sensors for axle loads, and find clusters of similar passages, from the trains so far.
 
   turnout trains                           all turnouts: calibrate loads, find clusters
   turnout trains --turnout tommerup_s1     loads of this turnout only, and clusters
 
-Loads need trains of known weight (axle_load_t in raw/<id>/trains.csv). Both are written into the folder that the
-setting passage.assets names; the next run uses them, and computes the passages that depend on them again.
+Loads need trains of known weight (axle_load_t in raw/<id>/trains.csv). Both results are written into the folder of the
+setting passage.assets. The next run uses them, and computes the passages that depend on them again.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from turnout.passage.clusters import Clusters
 
 GROUP = "Run"
-HELP = "learn axle loads and clusters from the trains so far"
+HELP = "calibrate axle loads and find clusters, from the trains so far"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

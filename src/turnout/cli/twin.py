@@ -1,10 +1,10 @@
-"""The calibrated model of a turnout: its parameters from all visits, what differs from the file, and what has changed.
+"""Show the calibrated model of a turnout: its parameters from all visits, differences from the track file, and changes.
 
   turnout twin --turnout tommerup_s1
   turnout twin --turnout tommerup_s1 --each-visit
 
-Each visit is fitted once and kept below the work folder; a visit of another code version, track file or set of
-recordings is fitted again. Visits with an open finding of ``turnout diagnose`` are not used.
+The fit of each visit is stored in the work folder. It is computed again if the code, the track file or the recordings
+have changed. Visits with an open finding of ``turnout diagnose`` are not used.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_configuration(parser)
     add_raw(parser)
     add_work(parser, "where the information of each visit is kept (%(default)s)")
-    parser.add_argument("--each-visit", action="store_true", help="say what was known after each visit, too")
+    parser.add_argument("--each-visit", action="store_true", help="show the result after each visit, too")
     parser.add_argument("--all", action="store_true", help="list parameters that recordings hardly determine, too")
 
 

@@ -1,8 +1,8 @@
-"""Tomorrow's list: what to inspect, what to plan, where nothing can be said.
+"""Show the worklist: what to inspect, what to plan, and where the data allow no answer.
 
 turnout worklist                      the list of today
-turnout worklist --asof 2026-03-01    the list as it would have been then
-turnout worklist --all                everything, not only what a person can act on in a day
+turnout worklist --asof 2026-03-01    the list of that day, from what was measured and entered by then
+turnout worklist --all                every row, also beyond the limit of the list
 turnout worklist --csv list.csv
 """
 
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     import duckdb
 
 FIRST_MEASUREMENT_QUERY = "select min(measured_at_utc) from charts where state <> 'wrong_time'"
-GROUP = "Ask"
-HELP = "tomorrow's list: what to inspect, what to plan, where nothing can be said"
+GROUP = "Worklist and maintenance"
+HELP = "show what to inspect, what to plan, and where the data allow no answer"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -173,7 +173,7 @@ def _numbered_lines(path: Path, name: str) -> list[tuple[int, str]]:
     except OSError as error:
         if not os.path.lexists(path):
             raise
-        raise TableError(Place(name, 1, 1), str(error.strerror), "Put a file there that may be read") from None
+        raise TableError(Place(name, 1, 1), str(error.strerror), "Put a readable file there") from None
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

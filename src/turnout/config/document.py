@@ -49,12 +49,12 @@ def as_config_errors(path: Path | str, where: str, syntax_remedy: str = "") -> I
         yield
     except OSError as error:
         problem = f"cannot be read: {error.strerror}"
-        raise ConfigError(path, where, problem, "Put a file of that name there, or take it away") from None
+        raise ConfigError(path, where, problem, "Put a file of that name there, or remove it") from None
     except UnicodeDecodeError as error:
         raise ConfigError(path, f"byte {error.start}", "a byte that is not UTF-8", "Save the file as UTF-8") from None
     except ReaderError as error:
         problem = f"the character {chr(error.character)!r}, which no YAML file may hold"
-        raise ConfigError(path, f"character {error.position + 1}", problem, "Take it away") from None
+        raise ConfigError(path, f"character {error.position + 1}", problem, "Remove it") from None
     except MarkedYAMLError as error:
         if not syntax_remedy:
             raise

@@ -273,7 +273,7 @@ class _ConfigurationReader:
             for path in sorted(self.folder.joinpath(*parts).glob("*")):
                 if path.suffix.lower() in (".yml", ".yaml") and path.suffix != ".yaml":
                     place = Place(self.name(*parts, path.name), 1, 1)
-                    remedy = f"Rename it to {path.stem}.yaml, or take it away"
+                    remedy = f"Rename it to {path.stem}.yaml, or remove it"
                     self.errors.append(place.error(f"it ends in {path.suffix} and would not be read", remedy))
 
     def document(self, path: Path, spec: dict, whole: bool = False) -> Branch:

@@ -94,7 +94,9 @@ def _download(source: Source, folder: Path) -> Path:
     archive = folder / source.file
     if process.returncode or not archive.exists():
         reason = (process.stderr.strip().splitlines() or ["pip said nothing"])[-1]
-        raise TurnoutError(f"{source.package} {source.version} could not be fetched: {reason}. Is there a network?")
+        raise TurnoutError(
+            f"{source.package} {source.version} could not be downloaded: {reason}. Check the network connection."
+        )
     digest = sha256_of(archive)
     if digest != source.sha256:
         raise TurnoutError(

@@ -50,7 +50,7 @@ def print_summary(
     day: str | None = None,
     truth: Path | str | None = None,
 ) -> None:
-    """Print counts, quarantine, tomorrow's list, diagnoses of its alarms, found against true, pages, queries to try.
+    """Print counts, quarantine, worklist, diagnoses of its alarms, found against true, pages, queries to try.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def print_summary(
         table = ""
         if truth is not None and Path(truth).is_dir():
             table = comparison_table(compare(connection, Path(truth), whole_list(list_day(connection, day))))
-    say("\n   Tomorrow's list, its first rows:" if rows else "\n   Tomorrow's list is empty.")
+    say("\n   Worklist, first rows:" if rows else "\n   The worklist is empty.")
     for section, band, state, sentence in rows:
         say(f"      {section} {band}: {state}. {sentence}")
     if diagnoses:

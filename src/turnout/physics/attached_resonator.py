@@ -1,4 +1,4 @@
-"""A part on the rail that swings by itself: absorber, loose clip, guard rail, a mode the base model lacks."""
+"""A part attached to the rail that resonates: absorber, loose clip, guard rail, a mode the base model lacks."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class AttachedResonator(PhysicsTerm):
     name = "attached_resonator"
     left_out = "{mass:.1f} kg resonate at {frequency:.0f} Hz on the rail over sleeper {support}"
     message = "A mass of {mass} swings at {frequency} on the track at {place}"
-    site_check = "Look for what hangs on the rail there: a box, a rod, a heater"
+    site_check = "Look for parts attached to the rail there: a box, a rod, a heater"
     separating_test = "a hammer test above and beside this place"
     effect_type = "matrix"
     frame = "frequency"
@@ -43,7 +43,7 @@ class AttachedResonator(PhysicsTerm):
     smallest_reportable = 5.0
     min_significance = 1.0
     parameters = (
-        Parameter("mass", "kg", 0.0, (0.0, 150.0), "mass that swings on the rail", SOURCE),
+        Parameter("mass", "kg", 0.0, (0.0, 150.0), "mass attached to the rail", SOURCE),
         Parameter("frequency", "Hz", 300.0, (40.0, 1200.0), "its resonance on a fixed rail", SOURCE),
         Parameter("damping", "-", 0.03, (0.005, 0.3), "its damping ratio", SOURCE),
     )

@@ -31,7 +31,7 @@ class BallastInertia(PhysicsTerm):
     name = "ballast_inertia"
     left_out = "{mass:.0f} kg of ballast move with every half sleeper and {damping:.0f} N s/m radiate"
     message = "The ballast moves with the sleepers, {mass} of it under each"
-    site_check = "Check the sleepers' mass and the ballast's depth in the track's file"
+    site_check = "Check sleeper mass and ballast depth in the track file"
     effect_type = "matrix"
     frame = "condition"
     site_types = (TrackSite,)
@@ -40,7 +40,7 @@ class BallastInertia(PhysicsTerm):
     prescreen_group = name  # common values of the base model change first to hide it
     parameters = (
         Parameter("mass", "kg", 0.0, (0.0, 600.0), "ballast that moves with half a sleeper", SOURCE),
-        Parameter("damping", "N s/m", 0.0, (-3e4, 3e5), "radiation beyond the base model's damping", SOURCE),
+        Parameter("damping", "N s/m", 0.0, (-3e4, 3e5), "radiation damping added to that of the base model", SOURCE),
     )
 
     @classmethod

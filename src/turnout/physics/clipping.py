@@ -28,7 +28,7 @@ class Clipping(PhysicsTerm):
     name = "clipping"
     left_out = "channel {channel_name} clips at {limit:.3g} m/s²"
     message = "Channel {channel} is cut off at {limit}"
-    site_check = "Raise the range of this channel"
+    site_check = "Increase the range of this channel"
     effect_type = "channel"
     frame = "sensor"
     site_types = (ChannelSite, SaturatedChannelSite)
@@ -36,7 +36,7 @@ class Clipping(PhysicsTerm):
     model_error_share = 0.0
     nonlinear_in_size = True
     parameters = (
-        Parameter("limit", "m/s²", 1e5, (0.01, 1e5), "largest value that is shown",
+        Parameter("limit", "m/s²", 1e5, (0.01, 1e5), "largest recorded value",
                   "IEC 61260-1:2014 and data sheets of accelerometers: 50 to 5000 g"),
     )  # fmt: skip
 

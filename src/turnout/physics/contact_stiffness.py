@@ -1,4 +1,4 @@
-"""A contact softer or stiffer than Hertz's for the nominal profiles."""
+"""A wheel-rail contact softer or stiffer than the Hertz contact of the nominal profiles."""
 
 from __future__ import annotations
 

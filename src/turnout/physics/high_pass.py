@@ -1,4 +1,4 @@
-"""A channel that loses its low end: integrator, charge amplifier, AC coupling."""
+"""A channel that loses low frequencies: integrator, charge amplifier, AC coupling."""
 
 from __future__ import annotations
 

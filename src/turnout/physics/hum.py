@@ -33,7 +33,7 @@ class Hum(PhysicsTerm):
     name = "hum"
     left_out = "channel {channel_name} hums at {frequency:.1f} Hz with an amplitude of {amplitude:.3g} m/s²"
     message = "Channel {channel} hums"
-    site_check = "Check the shield and the ground of this channel"
+    site_check = "Check shielding and grounding of this channel"
     effect_type = "channel"
     frame = "clock"
     site_types = (ChannelSite,)

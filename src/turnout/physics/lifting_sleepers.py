@@ -1,4 +1,4 @@
-"""Sleepers that the ballast presses but does not pull."""
+"""Sleepers that can lift off the ballast, which takes no tension."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ class LocalPad(PhysicsTerm):
     name = "local_pad"
     left_out = "the pad on sleeper {sleeper} has {factor:.2f} times its stiffness"
     message = "The rail pad on the sleeper at {place} is {factor} times as stiff as its neighbours'"
-    site_check = "Take out the pad of this sleeper"
+    site_check = "Remove and inspect the pad of this sleeper"
     separating_test = "a hammer test at this sleeper and at its neighbours"
     effect_type = "matrix"
     scales_track = True

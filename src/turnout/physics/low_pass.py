@@ -1,4 +1,4 @@
-"""A channel that loses its high end: a too short or too low anti-alias filter."""
+"""A channel that loses high frequencies: a too short or too low anti-alias filter."""
 
 from __future__ import annotations
 

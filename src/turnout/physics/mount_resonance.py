@@ -30,7 +30,7 @@ class MountResonance(TransferTerm):
     name = "mount_resonance"
     left_out = "the mounting of channel {channel_name} resonates at {frequency:.0f} Hz with Q {quality:.1f}"
     message = "Sensor {channel} is not fastened firmly: its mounting resonates"
-    site_check = "Fasten this sensor again and do a hammer test on the rail beside it"
+    site_check = "Fasten this sensor again and repeat a hammer test on the rail beside it"
     separating_test = "a hammer test beside this sensor"
     site_types = (ChannelSite,)
     column_type = "channel"

@@ -39,13 +39,13 @@ class OutOfRound(PhysicsTerm):
     name = "out_of_round"
     left_out = "wheel {number} of {who} has {order} waves around it with an amplitude of {amplitude:.2e} m"
     message = "A wheel on {wheel} is out of round"
-    site_check = "Measure this wheelset's run-out; the track needs nothing"
+    site_check = "Measure the run-out of this wheelset; no work on the track"
     effect_type = "path"
     frame = "wheel"
     parameters = (
-        Parameter("cosine", "m", 0.0, (-1e-3, 1e-3), "amplitude in phase with the place", SOURCE),
-        Parameter("sine", "m", 0.0, (-1e-3, 1e-3), "amplitude a quarter wave on", SOURCE),
-        Parameter("turned", "-", 0.0, (-0.03, 0.03), "radius beyond that given, relative", SOURCE, (0.0, 0.005)),
+        Parameter("cosine", "m", 0.0, (-1e-3, 1e-3), "cosine amplitude of the out-of-roundness", SOURCE),
+        Parameter("sine", "m", 0.0, (-1e-3, 1e-3), "sine amplitude of the out-of-roundness", SOURCE),
+        Parameter("turned", "-", 0.0, (-0.03, 0.03), "relative error of the nominal radius", SOURCE, (0.0, 0.005)),
     )
 
     @classmethod

@@ -34,7 +34,7 @@ class PadPreload(PhysicsTerm):
     message = "The rail pads stiffen under load"
     message_negative = "The rail pads soften under load"
     site_check = (
-        "Do a hammer test on the rail beside a standing train: what an impact on unloaded track says is too soft"
+        "Do a hammer test on the rail beside a standing train: on unloaded track it shows pads that are too soft"
     )
     separating_test = "a hammer test beside a standing train, or passages of another axle load"
     effect_type = "matrix"

@@ -29,7 +29,7 @@ class PadTemperature(PhysicsTerm):
     left_out_negative = "pads gain a share of {coefficient_size:.4f} of their stiffness per kelvin"
     message = "The rail pads soften by {coefficient} of rail temperature"
     message_negative = "The rail pads stiffen by {coefficient_size} of rail temperature"
-    site_check = "Nothing to repair: compare campaigns at one temperature only"
+    site_check = "No repair: compare only campaigns at the same temperature"
     separating_test = "a hammer test at another rail temperature, 15 K away"
     effect_type = "matrix"
     scales_track = True

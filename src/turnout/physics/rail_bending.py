@@ -23,7 +23,7 @@ class RailBending(PhysicsTerm):
     name = "rail_bending"
     left_out = "the rail from {start:.1f} to {end:.1f} m has {factor:.2f} times its bending stiffness"
     message = "The rail at {place} is {factor} times as stiff in bending"
-    site_check = "Check the rail profile in the track's file"
+    site_check = "Check the rail profile in the track file"
     effect_type = "matrix"
     frame = "place"
     asked = False

@@ -1,4 +1,4 @@
-"""Waves on a stretch of rail."""
+"""Corrugation on a stretch of rail."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Shear of the rail that the base model lacks or has wrong."""
+"""Shear flexibility of the rail that the base model lacks or has wrong."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class RailShear(PhysicsTerm):
     left_out_negative = "the rail yields in shear by {flexibility_size:.2f} per giganewton less"
     message = "The rail gives more in shear than the simulation's"
     message_negative = "The rail gives less in shear than the simulation's"
-    site_check = "Check the rail profile in the track's file"
+    site_check = "Check the rail profile in the track file"
     effect_type = "matrix"
     frame = "condition"
     site_types = (TrackSite,)

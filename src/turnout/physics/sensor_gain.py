@@ -33,7 +33,7 @@ class SensorGain(TransferTerm):
     left_out = "channel {channel_name} shows {gain:.3f} times the true signal"
     message = "Sensor {channel} reads {gain} times what it should"
     message_negative = "Sensor {channel} has the wrong polarity: it reads {gain} times what it should"
-    site_check = "Calibrate this sensor, look at its polarity, swap it with its neighbour"
+    site_check = "Calibrate this sensor, check its polarity, exchange it with its neighbour"
     site_types = (ChannelSite,)
     column_type = "channel"
     smallest_reportable = 0.04

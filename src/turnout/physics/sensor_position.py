@@ -1,4 +1,4 @@
-"""A sensor that sits elsewhere than its description says."""
+"""A sensor that is not at its described position."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class SensorPosition(PhysicsTerm):
     name = "sensor_position"
     left_out = "channel {channel_name} sits {shift:+.2f} m from where its description says"
     message = "Sensor {channel} sits {shift} from where the layout has it"
-    site_check = "Measure where this sensor sits"
+    site_check = "Measure the position of this sensor"
     separating_test = "passages at another speed"
     effect_type = "channel"
     frame = "sensor"
@@ -36,7 +36,7 @@ class SensorPosition(PhysicsTerm):
     exact = True
     sign_ambiguous = True
     parameters = (
-        Parameter("shift", "m", 0.0, (-1.2, 1.2), "true place minus described place",
+        Parameter("shift", "m", 0.0, (-1.2, 1.2), "true position minus described position",
                   "EN 13848-1:2019, position along the track known to 10 m by trains, to 0.1 m by tape", (0.0, 0.3)),
     )  # fmt: skip
 

@@ -23,8 +23,8 @@ COLUMN_TYPES = ("support", "track", "path", "channel", "")
 FORCE_TARGETS = ("rail", "sleeper", "pad")  # the force of a pad acts on the rail and reversed on the sleeper
 # What an effect is fixed to, and how the page of effects describes it.
 FRAMES = {
-    "place": "a place", "amplitude": "a place, and how far it moves", "frequency": "a frequency band",
-    "condition": "the whole track, under a condition", "sensor": "a sensor", "clock": "a channel's clock",
+    "place": "a position", "amplitude": "a position, and the deflection there", "frequency": "a frequency band",
+    "condition": "the whole track", "sensor": "a sensor", "clock": "the clock of a channel",
     "wheel": "a wheel", "train": "a train", "wavelength": "a stretch of rail",
 }  # fmt: skip
 APPROXIMATE = 0.15  # error of an effect's size by its form; nine of another simulator: median 0.12

@@ -1,4 +1,4 @@
-"""A channel that comes late."""
+"""A channel with a delay."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Wheels heavier or lighter than the vehicle file says."""
+"""Wheelsets heavier or lighter than in the vehicle file."""
 
 from __future__ import annotations
 

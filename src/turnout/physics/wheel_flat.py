@@ -36,7 +36,7 @@ class WheelFlat(PhysicsTerm):
     name = "wheel_flat"
     left_out = "wheel {number} of {who} has a flat of {length:.3f} m"
     message = "A wheel on {wheel} has a flat of {length}"
-    site_check = "Send the wheelset to the lathe; the track needs nothing"
+    site_check = "Reprofile the wheelset; no work on the track"
     separating_test = "another passage of this train"
     effect_type = "path"
     frame = "wheel"

@@ -36,7 +36,7 @@ class ZenerPad(PhysicsTerm):
     name = "zener_pad"
     left_out = "pads stiffen by {ratio:.2f} of their static stiffness above 1/(2 pi {relaxation_time:.2g} s)"
     message = "The rail pads are stiffer at high frequency than at low"
-    site_check = "Ask for the pads' dynamic stiffness; take one to the laboratory"
+    site_check = "Obtain the dynamic stiffness of these pads; test one in the laboratory"
     separating_test = "a hammer test with a hard tip up to 1.2 kHz"
     effect_type = "matrix"
     frame = "frequency"

@@ -101,7 +101,7 @@ def detect_format(source: Source) -> Format:
     names = ", ".join(FORMATS)
     raise source.error(
         "byte 0",
-        f"neither its first bytes ({head[:8]!r}) nor its extension {extension!r} tells a known format",
+        f"neither its first bytes ({head[:8]!r}) nor its extension {extension!r} belong to a known format",
         f"Set the format in the layout to one of {names}",
     )
 

@@ -37,7 +37,7 @@ def registry_lock(registry_dir: Path, patience: float = 600.0) -> Iterator[None]
         lock.acquire()
     except Timeout:
         raise RegistryError(
-            f"{registry_dir}: another run holds the registry and did not let go within {patience:g} s. "
+            f"{registry_dir}: another run has locked the registry for more than {patience:g} s. "
             f"Nothing was changed: wait for it to end, then run again."
         ) from None
     except OSError as error:

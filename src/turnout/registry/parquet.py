@@ -100,7 +100,7 @@ def write_sorted(
     except (duckdb.IOException, OSError) as error:
         raise RegistryError(
             f"cannot write {folder_of(table, year)}/{prefix}: {str(error).splitlines()[0]}. Nothing was changed: "
-            "make room or give write permission, then run again."
+            "free disk space or give write permission, then run again."
         ) from error
     finally:
         unfinished.unlink(missing_ok=True)

@@ -146,7 +146,7 @@ def score_words(scores: Sequence[Mapping[str, Any]]) -> str:
         sentences.append(
             f"The own section's model predicts more than that of any other section in {n_best} of {n_compared}."
         )
-    sentences.append("A score inside its null tells nothing about the track, neither good nor bad.")
+    sentences.append("A score within its null carries no information about the track, neither good nor bad.")
     return " ".join(sentences)
 
 

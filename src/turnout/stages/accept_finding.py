@@ -81,7 +81,7 @@ def accept(
 def _check_acceptable(finding: Mapping[str, Any], turnout_id: str, anyway: bool) -> None:
     prefix = f"{turnout_id}, {finding['sections']}: the verdict is {finding['verdict'].replace('_', ' ')}"
     if not finding["term_json"]:
-        raise SimulationError(f"{prefix}; it carries no term that could be accepted.")
+        raise SimulationError(f"{prefix}; it has no effect that could be accepted.")
     names = {t["term"] for t in json.loads(finding["term_json"])}
     # An effect of a wheelset does not belong in a track's file: the wheelset leaves with its train.
     if on_wheelset := names & {effect.name for effect in TERMS if effect.frame == "wheel"}:
@@ -92,7 +92,9 @@ def _check_acceptable(finding: Mapping[str, Any], turnout_id: str, anyway: bool)
         raise SimulationError(f"{prefix}, not named with grade A or B; --anyway accepts it all the same.")
     ambiguous = next((t for t in json.loads(finding["term_json"]) if t.get("or")), None)
     if ambiguous and not anyway:
-        raise SimulationError(f"{prefix}; {ambiguous['term']} may as well be {ambiguous['or']}; --anyway accepts it.")
+        raise SimulationError(
+            f"{prefix}; {ambiguous['term']} is as probable as {ambiguous['or']}; --anyway accepts it."
+        )
 
 
 def _is_significant(term: Mapping[str, Any]) -> bool:

@@ -18,9 +18,7 @@ class BudgetSpentError(TurnoutError):
     """The time of a diagnosis is spent; ``rows`` are those of the ``n_done`` finished groups, by table."""
 
     def __init__(self, n_done: int = 0, n_groups: int = 1, rows: dict[str, list[dict[str, Any]]] | None = None) -> None:
-        super().__init__(
-            f"the time given is up, {n_done} of {n_groups} groups done; the same command goes on from there."
-        )
+        super().__init__(f"the budget is used up, {n_done} of {n_groups} groups done; the same command continues.")
         self.n_done, self.rows = n_done, rows or {}
 
 

@@ -201,7 +201,7 @@ def _channels(
     turnout = load_configuration(config).turnout(turnout_id)
     hammer = turnout.hammer
     if hammer is None:
-        raise ConfigError(turnout.layout, "hammer", "nothing about hammer tests", "Add them to the layout")
+        raise ConfigError(turnout.layout, "hammer", "the layout describes no hammer tests", "Add the part hammer")
     names = tuple(n for n in (hammer.response[section], hammer.validation[section]) if n)
     return hammer.descriptions[section], hammer.force[section], names, turnout.settings["receptance"]
 

@@ -151,7 +151,7 @@ def _recorded_train(path: Path, turnout: TurnoutConfig) -> tuple[Recording, Pass
     recording = result.recordings[0]
     passage = analyse(recording, sensors_of(turnout), known_patterns(settings.axle_patterns), settings)
     if not passage.n_axle:
-        raise ConfigError(str(path), "recording", "no train was found", "turnout passage FILE says why")
+        raise ConfigError(str(path), "recording", "no train was found", "turnout passage FILE states the reason")
     return recording, passage
 
 

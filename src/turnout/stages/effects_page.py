@@ -17,16 +17,15 @@ PAGE_HEAD = """# What a diagnosis can name
 
 This page lists every effect that `turnout diagnose` can name, and what to check on site then.
 
-The list comes from the catalogue (`turnout.physics`, one file each). "Least": how far
-the first number has to be from what it is in an intact track to get a name; for less nobody would go to the site.
-What is in no row is located and called "unknown". Which of them were found where they were concealed, and how small:
-[blind proof](blind.md).
+"Least" is the smallest deviation of the first parameter from its value in an intact track that gets a name.
+A smaller one would cause no action. An effect that is not in the table is located and called "unknown".
+The [blind proof](blind.md) states which concealed effects were named, and at which size.
 
-| effect | name | fixed to | numbers found | least | what to check on site |
+| effect | name | fixed to | parameters | least | what to check on site |
 |---|---|---|---|---|---|
 """
 PAGE_FOOT = """
-Not asked for, but known to the simulation and to track files: {}.
+Three more effects are possible in simulations and track files, but are not tested by a diagnosis: {}.
 """
 
 

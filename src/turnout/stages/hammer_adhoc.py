@@ -42,7 +42,7 @@ def check_request(turnout: TurnoutConfig, section: str | None, campaign: str | N
         A turnout without hammer tests, an unknown section, or an invalid day.
     """
     if turnout.hammer is None:
-        raise ConfigError(turnout.layout, "hammer", "nothing about hammer tests", "Add them to the layout")
+        raise ConfigError(turnout.layout, "hammer", "the layout describes no hammer tests", "Add the part hammer")
     if section is not None and section not in (labels := turnout.hammer.descriptions):
         raise ConfigError(
             "turnout hammer", "--section", f"{section!r} is no section of {turnout.id}", suggestion(section, labels)
@@ -401,7 +401,9 @@ def _real_path(path: Path) -> str:
         remedy = f"Name the files in it, such as {path.name}/*"
         raise ReadError(path, "the path", "it is a folder", remedy)
     if not os.path.exists(path):
-        raise ReadError(path, "the path", "there is no such file, or none that may be seen", "Correct it", "vanished")
+        raise ReadError(
+            path, "the path", "there is no such file, or no permission to read it", "Correct it", "vanished"
+        )
     return os.path.realpath(path)
 
 

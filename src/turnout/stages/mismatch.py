@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 FITS_FOLDER = "work/mismatch-fits"
 TABLES = ("mismatch_findings", "mismatch_parameters", "mismatch_curves", "twin_states", "quarantine")
-BUDGET_SPENT = "the time given was up with {} of {} groups done; the same command goes on from there"
+BUDGET_SPENT = "the budget was used up with {} of {} groups done; the same command continues"
 SEVERITY_ORDER = ("named", "a_or_b", "unknown", "numerics", "none")
 
 

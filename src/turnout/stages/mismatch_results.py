@@ -119,7 +119,7 @@ def _visit(
     turnout_id: str, by_visit: Mapping[str, list[Unit]], requested: str | None, raw_root: str | Path
 ) -> tuple[str, list[Unit]]:
     if not by_visit:
-        raise SimulationError(f"{turnout_id}: no hammer test and no passage below {raw_root}; nothing can be said.")
+        raise SimulationError(f"{turnout_id}: no hammer test and no passage below {raw_root}; one is needed.")
     if requested is None:
         return list(by_visit.items())[-1]
     if requested == ALL_VISITS:

@@ -42,6 +42,11 @@ def test_help_lists_each_command_once_in_its_group():
 
 
 @pytest.mark.parametrize("leaf", [*leaf_parsers(PARSER)], ids=lambda leaf: leaf.prog)
+def test_the_usage_of_a_command_begins_as_it_is_typed(leaf):
+    assert leaf.format_usage().startswith(f"usage: {leaf.prog}") and re.match(r"turnout [a-z-]+( [a-z-]+)?$", leaf.prog)
+
+
+@pytest.mark.parametrize("leaf", [*leaf_parsers(PARSER)], ids=lambda leaf: leaf.prog)
 def test_every_command_and_action_has_the_common_options(leaf):
     assert {"--json", "-q", "--quiet", "-v", "--verbose"} <= set(leaf._option_string_actions)
 
@@ -82,7 +87,7 @@ def raising(error):
     [
         (ConfigError("plan", "number", "none", "Write one"), 2, "turnout plan: number: none. Write one.\n"),
         (ConfigError("planned.csv", "line 1", "none", "Write one"), 2, "turnout plan: planned.csv, line 1: none."),
-        (FileNotFoundError(2, "No such file", "a.h5"), 2, "turnout plan: a.h5: No such file. Put that right"),
+        (FileNotFoundError(2, "No such file", "a.h5"), 2, "turnout plan: a.h5: No such file. Correct this"),
         (ZeroDivisionError("of the program"), 3, "turnout plan: a fault of the program, ZeroDivisionError"),
         (KeyboardInterrupt(), 130, "turnout plan: interrupted"),
     ],

@@ -58,7 +58,7 @@ def test_a_table_that_may_not_be_written_is_one_sentence(config, capsys, monkeyp
 
     monkeypatch.setattr("turnout.config.turnouts_table._write", refuse)  # we may be root
     assert main(COMMANDS["events.csv"]) == 2
-    said = "turnout events: config/events.csv: Permission denied. Put that right, or name another file or folder"
+    said = "turnout events: config/events.csv: Permission denied. Correct this, or name another file or folder"
     assert capsys.readouterr().err.startswith(said)
 
 

@@ -52,5 +52,5 @@ def test_the_page_says_which_visits_count_and_what_red_means():
     held = [{**row, "n_visits": 1} for row in STATES]
     text = page(calibrated=[*FIRST, *held, *later])
     assert "from the 2 visits without an open finding or an unexpected change (1 left out)" in text
-    assert "Red: the whole interval lies outside." in text and "all visits" not in text
+    assert "Red: the whole interval is outside." in text and "all visits" not in text
     assert "from the 1 visit without an open finding or an unexpected change; shaded" in page(calibrated=FIRST)

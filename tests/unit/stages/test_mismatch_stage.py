@@ -130,7 +130,7 @@ def test_a_spent_budget_keeps_what_is_done(soft):
         def simulations(self, count):
             self.count = count
 
-    with pytest.raises(BudgetSpentError, match="goes on from there"):
+    with pytest.raises(BudgetSpentError, match="the same command continues"):
         diagnose_turnout("t1", budget=0.0)
     whole, again = Bar(), Bar()
     first = diagnose_turnout("t1", bar=whole)
@@ -147,8 +147,8 @@ def test_a_spent_budget_shows_the_groups_that_are_done(soft, monkeypatch, capsys
     (first,) = diagnose_turnout("t1", sections=("A",))["mismatch_findings"]
     assert main(["diagnose", "--turnout", "t1", "--budget", "0"]) == 2
     told = capsys.readouterr()
-    assert first["sentence"] in told.out and "nothing can be said of sections B: the time given was up" in told.out
-    assert "1 of 2 groups done; the same command goes on from there" in told.err
+    assert first["sentence"] in told.out and "no answer for sections B: the budget was used up" in told.out
+    assert "1 of 2 groups done; the same command continues" in told.err
     assert "2 groups: neighbouring sections together; a group takes a minute to ten" in told.err
     page = (soft / "results/pages/findings/t1.html").read_text()
     assert "with 1 of 2 groups done" in page
