@@ -6,8 +6,8 @@
   turnout blind score --out proof                              every figure with its interval
 
 An interrupted make or diagnose continues where it stopped. --fast makes 40 cases instead of 235. --effects FOLDER adds
-effects of your own, one file each. --panel crossing puts all cases into crossing panels. --histories N makes N sites
-that are visited for two years; diagnose --histories uses the calibrated model, and score --histories its answers.
+effects of your own, one file each. --panel crossing or switch puts all cases into such panels. --histories N makes N
+sites that are visited for two years; diagnose --histories uses the calibrated model, and score --histories its answers.
 make prints the hash of commit.json: publish it before the diagnosis.
 """
 

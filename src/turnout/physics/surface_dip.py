@@ -51,7 +51,7 @@ class SurfaceDip(PhysicsTerm):
         Parameter("depth", "m", 0.0, (-3e-3, 6e-3), "depth of the dip, negative a bump", SOURCE, (0.0, 1e-3)),
         Parameter("length", "m", 0.6, (0.1, 2.0), "length of the dip", SOURCE),
         Parameter("sharpness", "-", 0.5, (0.0, 1.0), "share of a kink in its shape", SOURCE),
-        Parameter("shift", "m", 0.0, (-0.5, 0.5), "position minus the tested position", SOURCE),
+        Parameter("shift", "m", 0.0, (-0.5, 0.5), "shift from the tested position", SOURCE),
     )
 
     @classmethod

@@ -59,7 +59,7 @@ class WornToe(PhysicsTerm):
         Parameter("depth", "m", 0.0, (0.0, 8e-3), "height that the top of the blade has lost",
                   "EN 13232-9 2006, limits of wear of switches; from memory", (0.0, 2e-3)),
         Parameter("length", "m", 0.8, (0.1, 3.0), "length of the worn part", "as the depth, EN 13232-9 2006"),
-        Parameter("shift", "m", 0.0, (-1.0, 1.0), "position minus the tested position", "as the depth, EN 13232-9 2006"),
+        Parameter("shift", "m", 0.0, (-1.0, 1.0), "shift from the tested position", "as the depth, EN 13232-9 2006"),
     )  # fmt: skip
 
     @classmethod
