@@ -368,7 +368,8 @@ class _Run:
             LOG.warning("%s: left for the next run\n%s", unit_id(unit), traceback.format_exc())
             return Postponed(unit_id(unit), f"{type(error).__name__}: {error}")
         elsewhere = {k for k, (path, *_) in enumerate(unit.files) if path in task.copied}
-        computed = with_copy_rows(result, unit, task.copied), task.stamp, short_contents(contents, elsewhere)
+        stamp = task.stamp if all(contents) else ""  # a file that was gone may come back with the planned size and time
+        computed = with_copy_rows(result, unit, task.copied), stamp, short_contents(contents, elsewhere)
         is_as_planned = all(state is None or state[:2] == file[1:] for state, file in zip(before, unit.files))
         if is_as_planned and file_states(planned, self.raw_root) == before:
             return computed

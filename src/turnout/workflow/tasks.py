@@ -372,5 +372,6 @@ class Tasks:
         except OSError:  # reported when the unit is computed
             return False
         if same := entry.key == key_of(task.planned, contents):
-            self.state.units[name] = replace(entry, stamp=task.stamp, contents=short_contents(contents))
+            stamp = task.stamp if all(contents) else ""
+            self.state.units[name] = replace(entry, stamp=stamp, contents=short_contents(contents))
         return same

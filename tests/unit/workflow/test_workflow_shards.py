@@ -233,6 +233,54 @@ def test_a_file_that_vanishes_during_the_run_is_a_row_or_an_error_of_its_unit_al
     assert (summary.processed, summary.quarantined) == (3, 1)
 
 
+@pytest.mark.parametrize("has_its_time", [True, False])
+def test_a_file_that_was_gone_and_comes_back_as_it_was_is_computed(has_its_time, fleet):
+    """Copied back with its time, it is as the plan of the night without it had it."""
+    write_plans(fleet.configuration, fleet.raw, fleet.plan.parent, 1)
+    path = fleet.raw / "t0/2024-05-13/A_1.txt"
+    content, times = path.read_bytes(), (path.stat().st_atime_ns, path.stat().st_mtime_ns)
+    path.unlink()
+    assert fleet.run(plan=False).quarantined == 1
+    assert fleet.run(plan=False).processed == 0  # still gone: nothing new
+    path.write_bytes(content)
+    if has_its_time:
+        os.utime(path, ns=times)
+    assert fleet.run().processed == 1 and fleet.lengths()["t0/hammer/A/2024-05-13"] == [9]
+    assert fleet.run().processed == 0
+
+
+def test_a_file_that_changed_since_the_plan_is_computed_again(fleet):
+    """The result is of the new content, and the next night computes it once more: it may have been half written."""
+    write_plans(fleet.configuration, fleet.raw, fleet.plan.parent, 1)
+    fleet.put("t0/2024-05-13/A_1.txt", "longer than it was")
+    assert fleet.run(plan=False).processed == 3
+    assert fleet.run().processed == 1 and CALLS == ["t0/A/2024-05-13"]
+    assert fleet.lengths()["t0/hammer/A/2024-05-13"] == [18]
+    assert fleet.run().processed == 0
+
+
+def test_a_file_that_changes_while_it_is_computed_is_computed_again(fleet):
+    """A writer gives the file other content of the same size and time: only its number differs."""
+    path = fleet.raw / "t0/2024-05-13/A_1.txt"
+    times = (path.stat().st_atime_ns, path.stat().st_mtime_ns)
+
+    def compute(unit, turnout, raw_root, algo):
+        rows = {
+            "recordings": [{"recording_id": unit.turnout, "path": path.read_text() if unit.turnout == "t0" else ""}]
+        }
+        if unit.turnout == "t0" and path.read_text() != "TURNOUT 0":
+            (path.parent / "new").write_text("TURNOUT 0")
+            os.utime(path.parent / "new", ns=times)
+            os.replace(path.parent / "new", path)
+        return rows
+
+    stage = Stage("hammer", compute, "1")
+    assert fleet.run(stage=stage).processed == 3
+    assert fleet.run(stage=stage).processed == 1
+    assert fleet.rows()["t0/hammer/A/2024-05-13"]["recordings"][0]["path"] == "TURNOUT 0"
+    assert fleet.run(stage=stage).processed == 0
+
+
 def test_one_turnout_alone(fleet):
     assert fleet.run(only=["t1"]).processed == 1 and CALLS == ["t1/A/2024-05-13"]
     assert fleet.run().processed == 2
