@@ -27,7 +27,7 @@ demo: $(STAMP)
 	$(BIN)/turnout demo
 
 test: $(STAMP)
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 real: $(STAMP)
 	$(BIN)/turnout real

@@ -4,6 +4,8 @@ import ast
 import subprocess
 import sys
 
+import pytest
+
 
 def modules(repository):
     for path in sorted((repository / "src").rglob("*.py")):
@@ -71,6 +73,7 @@ def test_missing_types_are_found():
     assert list(fields_of_any_object(tree)) == [(3, "A.x")]
 
 
+@pytest.mark.slow
 def test_declared_types_are_sound(repository):
     process = subprocess.run([sys.executable, "-m", "mypy"], cwd=repository, capture_output=True, text=True)
     assert process.returncode == 0, process.stdout + process.stderr

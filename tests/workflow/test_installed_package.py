@@ -135,6 +135,7 @@ def test_a_shown_output_can_disagree():
     assert not agree("x 8 Hz, y", ["x 7 ..."]) and not agree("a\nb", ["...", "c"])
 
 
+@pytest.mark.slow
 def test_the_tutorial_leads_from_init_to_pages(installed, repository):
     call, folder = installed
     project, where = folder / "railway", "."
