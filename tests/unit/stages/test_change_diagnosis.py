@@ -1,6 +1,8 @@
 """What an open alarm rests on: hammer tests of all visits and newest trains together, or why there is no decision."""
 
+import os
 import shutil
+import signal
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -17,9 +19,11 @@ from turnout.records import Unit
 from turnout.stages import change_diagnosis, change_units
 from turnout.stages.change_diagnosis import TrainTest, change_unit, finding_of_change
 from turnout.stages.trend import worklist_job
+from turnout.workflow.batches import read_results
 from turnout.workflow.plan import write_plans
 from turnout.workflow.scan import scan
 from turnout.workflow.shard import run_shard
+from turnout.workflow.state import batch_paths
 from turnout.workflow.tasks import Stage
 
 DAYS = ("2025-08-01", "2025-11-01", "2026-02-01", "2026-05-01")
@@ -109,6 +113,14 @@ def test_without_a_track_file_or_a_simulation_the_reason_is_the_answer(turnout, 
     assert row["found_at_utc"] == datetime(2026, 5, 1, 23, 59)
 
 
+def night():
+    """The stage of open alarms, in the present folder."""
+    stage = Stage("change", change_unit, "v1", lambda turnout, settings: ("", {}), change_units.alarmed_groups)
+    configuration = load_configuration("config")
+    write_plans(configuration, Path("raw"), Path("work/plan"), 2)
+    return run_shard(Path("work/plan"), Path("work/change/00of01.json"), stage, configuration, Path("raw"))
+
+
 def test_a_visit_is_fitted_once_and_a_second_night_computes_nothing(turnout, monkeypatch):
     alarms = {"t1": ["B"]}
     monkeypatch.setattr(change_units, "open_alarms", lambda registry: alarms)
@@ -118,19 +130,45 @@ def test_a_visit_is_fitted_once_and_a_second_night_computes_nothing(turnout, mon
     monkeypatch.setattr(
         change_diagnosis.calibrated, "store_visit", lambda *a, **k: (fitted.append(a[4]["visit"]), store(*a, **k))
     )
-    stage = Stage("change", change_unit, "v1", lambda turnout, settings: ("", {}), change_units.alarmed_groups)
-
-    def night():
-        configuration = load_configuration("config")
-        write_plans(configuration, Path("raw"), Path("work/plan"), 2)
-        return run_shard(Path("work/plan"), Path("work/change/00of01.json"), stage, configuration, Path("raw"))
-
     assert night().processed == 1 and fitted == list(DAYS)
     assert night().processed == 0 and fitted == list(DAYS)
     small.strike(turnout, soft_ballast, day=datetime(2026, 6, 1, 9), seed=50)
     assert night().processed == 1 and fitted == [*DAYS, "2026-06-01"]
     alarms.clear()
     assert night().processed == 0
+
+
+def test_a_killed_diagnosis_goes_on_behind_the_last_visit_and_ends_as_without_the_kill(year, tmp_path, monkeypatch):
+    monkeypatch.setattr(change_units, "open_alarms", lambda registry: {"t1": ["B"]})
+    monkeypatch.setattr(change_diagnosis, "_test_on_trains", lambda *_: None)
+    store, fitted, deadly = change_diagnosis.calibrated.store_visit, tmp_path / "fitted", tmp_path / "deadly"
+
+    def store_visit(*args, **more):
+        store(*args, **more)
+        with open(fitted, "a") as stream:  # a unit that was killed is computed in a process of its own
+            stream.write(f"{args[4]['visit']}\n")
+        if deadly.exists() and args[4]["visit"] == DAYS[1]:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    monkeypatch.setattr(change_diagnosis.calibrated, "store_visit", store_visit)
+    rows = {}
+    for name in ("killed", "calm"):
+        shutil.copytree(year, tmp_path / name)
+        monkeypatch.chdir(tmp_path / name)
+        if name == "killed":
+            deadly.touch()
+            if (child := os.fork()) == 0:
+                night()
+                os._exit(0)
+            assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == -signal.SIGKILL
+            assert not Path("work/change/00of01.json").exists() or not batch_paths([Path("work/change/00of01.json")])
+            deadly.unlink()
+        assert night().processed == 1 and night().processed == 0
+        (batch,) = batch_paths([Path("work/change/00of01.json")])
+        (result,) = read_results(batch)
+        rows[name] = result.tables
+    assert fitted.read_text().split() == [*DAYS, *DAYS]  # no visit twice
+    assert rows["killed"] == rows["calm"] and len(rows["calm"]["change_findings"]) == 1
 
 
 def answer(verdict="a_or_b", names=("local_ballast", "hanging_sleeper"), **more):
