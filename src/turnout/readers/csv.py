@@ -41,7 +41,7 @@ from turnout.readers.csv_header import (
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.named_arrays import RECORD_COUNT_NAMES, SAMPLE_COUNT_NAMES, START_DATE_NAMES, START_NAMES, Metadata
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, RawFile, RawRecord, Source
-from turnout.readers.stated_scales import scale_problem, scale_statements
+from turnout.readers.stated_scales import entry_statements, scale_problem, scale_statements
 from turnout.readers.statements import Entry
 from turnout.readers.timing import start_fields
 
@@ -322,6 +322,8 @@ def _records(
     promised, rows = facts.count(("n_samples",)), facts.number(SAMPLE_COUNT_NAMES)
     if promised is None and rows is not None and rows > n_row:
         promised = int(rows)
+    of_notes = enumerate(map(scale_problem, scale_statements(facts.variables, len(selected))))
+    undecided = entry_statements(entries, [names[i] for i in selected]) | {i: text for i, text in of_notes if text}
     for k, (a, b) in enumerate(pairwise(edges)):
         if promised is not None and b - a != promised:
             problem = f"has {b - a} of the {promised} samples that its head promises"
@@ -338,11 +340,7 @@ def _records(
             **start_fields(date if start is None else start, f"{date} {start}" if date and start else None),
             conditions=facts.conditions(k, n),
             time=None if seconds is None else seconds[a:b],
-            undecided={
-                i: scale_problem(text)
-                for i, text in enumerate(scale_statements(facts.variables, len(selected)))
-                if text
-            },
+            undecided=undecided,
             is_time_in_seconds=time is not None and bool(units[time].strip()),
             entries=entries,
         )

@@ -22,9 +22,9 @@ from turnout.readers.named_arrays import (
     TIME_NAMES,
 )
 from turnout.readers.rate_words import is_rate_name, rate_unit
+from turnout.readers.scale_words import is_scale_name, scale_meaning, value_of_word
 from turnout.readers.source import COPY_AGAIN, MEANINGLESS_UNITS, Source
 from turnout.readers.stated_quantities import is_quantity_name
-from turnout.readers.stated_scales import is_scale_name
 from turnout.readers.stated_units import is_unit_name
 from turnout.readers.statements import Entry, entries_of_text
 from turnout.units import conversion
@@ -377,8 +377,10 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
 
 
 def _states_scale(name: str, value: str) -> bool:
-    """Whether a line states a scale: such a word, and a value that begins with a number."""
-    return is_scale_name(name) and re.match(r"[+-]?[.,]?\d", value) is not None
+    """Whether a line states a scale: such a word, and a value that begins with a number or is a word for one."""
+    if not is_scale_name(name):
+        return False
+    return re.match(r"[+-]?[.,]?\d", value) is not None or value_of_word(scale_meaning(name), value) not in (None, 1.0)
 
 
 def _plain(name: str) -> str:

@@ -25,8 +25,9 @@ from turnout.readers.named_arrays import (
     matrices,
     raw_file,
 )
+from turnout.readers.scale_words import is_fill_name, is_scale_name
 from turnout.readers.source import RawFile, Source
-from turnout.readers.stated_scales import apply_packing, is_fill_name, is_scale_name, scale_text
+from turnout.readers.stated_scales import apply_packing, scale_text, scales_in_text
 
 UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units")
 
@@ -95,7 +96,9 @@ def _variables(group: h5py.Group, path: str, source: Source, claims: Hdf5Claims)
                 units[name] = value
             elif key.lower() in ("channels", "channel_names", "units"):
                 variables.setdefault(key, value)
-            elif is_scale_name(key) and key not in PACKING_ATTRIBUTES:
+            elif key not in PACKING_ATTRIBUTES and (
+                is_scale_name(key) or (isinstance(value, str) and scales_in_text(value))
+            ):
                 stated.setdefault(name, {})[key] = value
     for name in matrices(variables):
         variables |= stated.pop(name, {})  # of all channels of the matrix

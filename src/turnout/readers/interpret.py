@@ -21,7 +21,7 @@ from turnout.readers.rate_words import is_rate_name, rate_unit
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
 from turnout.readers.stated_quantities import contradicting_quantity, quantity_entries
 from turnout.readers.stated_units import contradicting_unit, is_meaningless, key_of_units
-from turnout.readers.statements import reduction_remark, resolve
+from turnout.readers.statements import rate_remark, resolve
 from turnout.readers.time_axes import all_statements, is_axis_name
 from turnout.readers.timing import check_order, is_plausible, start_errors, start_times
 from turnout.records import Channel, LongRecording, RawChannel, RawDescription, Recording
@@ -552,7 +552,7 @@ def _recording(
         "started_at": started_at,
         "conditions": MappingProxyType(dict(record.conditions)),
     }
-    remark = reduction_remark(statements, rate, where, source)
+    remark = rate_remark(statements, rate, where, source)
     channel_errors = [*faults.values(), *([remark] if remark else [])]
     if is_long:
         return LongRecording(block_reader.subset(usable), n_sample, **fields), channel_errors

@@ -4,6 +4,7 @@ A bit that changes in a name such as "rail_temperature" removes the condition wi
 entry that most records of a file have and some lack, and a name that nearly equals a known one.
 """
 
+import re
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
@@ -83,7 +84,7 @@ def similar_name(name: str) -> str:
     ('rail_temperature', 'start time', '')
     """
     plain = name.strip().lower()
-    if plain in KNOWN or len(plain) < MIN_NAME_SIZE or len(plain) > MAX_NAME_SIZE:
+    if re.sub(r"[ -]", "_", plain) in KNOWN or len(plain) < MIN_NAME_SIZE or len(plain) > MAX_NAME_SIZE:
         return ""
     return next((KNOWN[known] for known in KNOWN if _is_damaged(plain, known)), "")
 

@@ -28,8 +28,9 @@ import numpy as np
 from turnout.errors import ReadError
 from turnout.readers.lazy import ARRAYS, Array, Column
 from turnout.readers.rate_words import is_rate_name
+from turnout.readers.scale_words import is_scale_name
 from turnout.readers.source import CONDITIONS, RawFile, RawRecord, Source
-from turnout.readers.stated_scales import entry_statements, is_scale_name, scale_problem, scale_statements
+from turnout.readers.stated_scales import entry_statements, scale_problem, scale_statements
 from turnout.readers.statements import MAX_ENTRIES, Entry, entries_of
 from turnout.readers.timing import seconds_since_first, start_fields
 
@@ -321,10 +322,11 @@ class Metadata:
     def entries(self) -> tuple[Entry, ...]:
         """All metadata of the group and of its parents, with their places; records beside this one take no part."""
         samples = {*vectors(self.variables), *matrices(self.variables)}
+        longest = max((self.variables[name].size for name in samples), default=0)
         own = {
             name: value
             for name, value in self.variables.items()
-            if not isinstance(value, Mapping) or not _holds_samples(value)
+            if not isinstance(value, Mapping) or 2 * _longest(value) < longest or not _holds_samples(value)
             if not isinstance(value, Attributes) or not _is_slow(self.variables.get(value.owner), value.owner, samples)
         }
         return (*entries_of(own, self.place), *(self.parent.entries if self.parent else ()))
@@ -370,7 +372,7 @@ class Metadata:
         dict of str to any
             Name -> value of the conditions that are stored with the samples of record ``k``.
         """
-        values = {name: self.record_value((name,), k, n) for name in CONDITIONS}
+        values = {name: self.record_value((name, name.replace("_", " ")), k, n) for name in CONDITIONS}
         return {name: value for name, value in values.items() if value is not None}
 
 
@@ -493,6 +495,12 @@ class Attributes(dict):
 def _is_slow(value: Any, name: str, samples: set[str]) -> bool:
     """Whether a variable is an array beside the samples, for example one that is sampled at a lower rate."""
     return isinstance(value, ARRAYS) and value.size > 1 and name not in samples and name.lower() not in TIME_NAMES
+
+
+def _longest(value: Mapping) -> int:
+    """Size of the largest array in a group or one of its groups."""
+    sizes = (_longest(v) if isinstance(v, Mapping) else v.size if isinstance(v, ARRAYS) else 0 for v in value.values())
+    return max(sizes, default=0)
 
 
 def _holds_samples(value: Mapping) -> bool:

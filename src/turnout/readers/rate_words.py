@@ -13,19 +13,21 @@ from fractions import Fraction
 from functools import lru_cache
 
 SAMPLING = re.compile(
-    r"samp|smpl?|abtast|tastrate|echantill|muestr|campion|bemonster|aftast|scan|acqui|adqui|erfass|prove"
+    r"samp|smpl?|abtast|tastrate|echantill|muestr|campion|bemonster|aftast|scan|acq|adqui|erfass|prove"
 )
 WEAK_SAMPLING = re.compile(
-    r"mess|mesur|medi[dc]|misur|male|maling|meas|meting|meet|record|aufzeich|enregistr|registr|logg|data|daq|adc|digiti"
+    r"mess|mesur|medi[dc]|misur|male|maling|meas|meting|meet|record|aufzeich|enregistr|registr|logg|data|daq|adc|digit|conver|output"
 )
 RATE = re.compile(r"freq|frekv|frequ|frec|kmitoc")
 RATE_TOKENS = {
     "rate", "rates", "taux", "tasa", "cadence", "cadenza", "cadencia", "velocidad", "velocita", "vitesse", "hastighed",
     "takt", "clock", "snelheid", "tasso", "hz",
 }  # fmt: skip
-STEP = re.compile(r"interval|inkrement|increment|period|schritt|skridt|xinc|tidstrin|tidssteg|raster")
+STEP = re.compile(r"interval|inkr|incr|period|schritt|skridt|xinc|tidstrin|tidssteg|raster")
 # A distance or a resolution is a step only with a word of time or of sampling.
-STEP_BESIDE = re.compile(r"resol|auflos|oplos|risoluz|distan|abst[ae]n|afstand|espac|separa|between|zwischen|mellem")
+STEP_BESIDE = re.compile(
+    r"resol|auflos|oplos|risoluz|spacing|distan|abst[ae]n|afstand|espac|separa|between|zwischen|mellem"
+)
 STEP_TOKENS = {
     "step",
     "steps",
@@ -34,14 +36,14 @@ STEP_TOKENS = {
     "passo",
     "paso",
     "delta",
-    "spacing",
     "inc",
     "trin",
     "steg",
     "timestep",
+    "tick",
 }
 TIME = re.compile(
-    r"^(?:x|h|t|horizontal\w*|wf|zeit\w*|time\w*|tid|tids\w*|temps|tiempo|tempo|temporal\w*|temporel\w*|tijd\w*)$"
+    r"^(?:x|h|horz?|t|horizontal\w*|wf|zeit\w*|time\w*|tid|tids\w*|temps|tiempo|tempo|temporal\w*|temporel\w*|tijd\w*)$"
 )
 CERTAIN_RATES = {
     "fs",
@@ -56,9 +58,14 @@ CERTAIN_RATES = {
     "fabtast",
     "abtfreq",
     "srate",
+    "odr",
 }
 CERTAIN_STEPS = {
-    "dt", "deltat", "δt", "deltax", "dx", "xincrement", "xinc", "xincr", "increment", "inkrement", "timestep",
+    "dt",
+    "tstep",
+    "tinc",
+    "dtime",
+    "deltat", "δt", "deltax", "dx", "xincrement", "xinc", "xincr", "increment", "inkrement", "timestep",
     "xdelta", "tdelta", "ts", "tsample", "deltatime", "timedelta", "secondspersample", "timepersample", "hinterval",
     "abtastzeit", "sampletime",
 }  # fmt: skip
@@ -77,7 +84,7 @@ OTHER = re.compile(
     r"filt|pass(?!o)|cut|grenz|band|coup|cort|tagli|gra?en?s|eigen|reson|natur|modal|netz|mains|calib|kalib|tarat|etalonn|sensitiv"
     r"|servic|wart|inspec|trigg|bit|baud|start|begin|debut|inicio|inizio|stop|date(?!n)|datum|number|anzahl|count|nombre"
     r"|antal|numero|aantal|cantidad|max|range|bereich|nyquist|carrier|refresh|update|oversampl|decim|ratio|heart|rot"
-    r"|anreg|excit|sinus|sweep|mode$|unit|einheit|label|dimension|counter|zahler|filename|offset"
+    r"|anreg|excit|sinus|sweep|\bspan\b|\bcpu\b|crystal|qu?artz|quarz|mode$|unit|einheit|label|dimension|counter|zahler|filename|offset"
 )
 # What a word of sampling with a word of rate or step leaves possible: "Signal sample rate".
 BESIDE_RATE = re.compile(r"signal|source|quelle|block|buffer|spectr|fft")
@@ -89,7 +96,8 @@ DURATION = re.compile(
     r"|elapsed|total|gesamt|tolera|error|fehler|skew|drift|shift|lag$|averag|mittel|weight|bewert|overlap|peak|accura"
     r"|montee|subida|salita|stig|ping|hop$"
 )
-PER = {"per", "pro", "par", "por", "al", "pr"}
+AXIS_UNIT = re.compile(r"x|t|time|units?|s|secs?|seconds?|[mun]?s|sek(?:unden)?")
+PER = {"per", "pro", "par", "por", "al", "pr", "je"}
 UNIT_PER = re.compile(rf"\s*(?:/|\b(?:{'|'.join(sorted(PER))})\b\.?)\s*")
 SAMPLES = re.compile(
     r"s|sa|samp|samples?|smpl|pts?|points?|scans?|messwerte?|abtastwerte?|werte?|punkte?|puntos?|punti|malinger"
@@ -230,10 +238,16 @@ def name_meaning(name: str) -> NameMeaning:
     >>> name_meaning("dt_ms").unit.scale, name_meaning("Pas de temps [µs]").is_step
     (Fraction(1, 1000), True)
     """
+    if (path := re.split(r"[.:/\\]", name.strip("./:\\ ")))[1:] and path[-1].strip() in PATH_SYMBOLS:
+        name = path[-1].strip()  # "settings.dt"
     unit_text = ""
     if (match := NAME_WITH_UNIT.match(name.strip())) and match[1]:
         name, unit_text = match[1], match[2]
+    if (whole := rate_unit(name)) and whole.is_sampling:  # "s/pt"
+        return NameMeaning(CERTAIN, whole.is_step, whole)
     unit = rate_unit(unit_text) if unit_text else None
+    if unit_text and unit is None and SAMPLING.search(unit_text.casefold()):
+        name, unit_text = f"{name} {unit_text}", ""  # "Clock rate (acquisition)"
     words = _with_per([word for word in words_of(name) if word not in ("wf", "the")])
     is_symbol = "".join(words) in CERTAIN_RATES | CERTAIN_STEPS and len(words[0]) == 1
     if (
@@ -253,11 +267,16 @@ def name_meaning(name: str) -> NameMeaning:
             certainty, is_step = (CERTAIN if is_sampled else POSSIBLY), unit.is_step
         elif unit.scale <= 1 and not DURATION.search(spaced) and not is_time_name(name):
             certainty, is_step = POSSIBLY, True
+    if unit is not None and certainty == NOT and unit.is_step and unit.scale <= SHORT_UNIT and SHORT.search(spaced):
+        certainty, is_step = POSSIBLY, True  # whatever else the name says
     if unit is None and unit_text and re.fullmatch(r"[a-zA-Z]\w{0,3}", unit_text.strip()) is None:
         unit_text = ""  # an explanation, not a unit
     return NameMeaning(certainty, is_step, unit, "" if unit else unit_text)
 
 
+SHORT = re.compile(f"{STEP.pattern}|{SAMPLING.pattern}")
+SHORT_UNIT = Fraction(1, 10**6)  # s: an interval in such a unit may be that of the samples under any name
+PATH_SYMBOLS = ("fs", "sr", "dt", "delta", "dx", "rate")  # last part of a path of names
 UNITS_NOT_IN_NAMES = ("t", "d", "h", "min")  # last words of a name that are no unit
 
 
@@ -273,6 +292,8 @@ def _meaning(words: list[str]) -> tuple[int, bool | None]:
     if joined in CERTAIN_RATES:
         return CERTAIN, False
     if joined in CERTAIN_STEPS:
+        return CERTAIN, True
+    if "per" in words[1:-1] and words[-1] in ("sample", "samples", "point") and AXIS_UNIT.fullmatch(words[-3]):
         return CERTAIN, True
     if OTHER.search(spaced) or not words:
         return NOT, None
@@ -292,8 +313,10 @@ def _meaning(words: list[str]) -> tuple[int, bool | None]:
         return (POSSIBLY if is_certain else NOT), (is_step if is_step != is_rate else None)
     if is_certain:
         return CERTAIN, is_step and (is_sampling or is_timed)
-    if STEP_BESIDE.search(joined) and (is_sampling or is_timed):
+    if (STEP_BESIDE.search(joined) and (is_sampling or is_timed)) or (is_sampling and is_timed):
         return POSSIBLY, True
+    if not (is_step or is_rate) and {"fs", "sr"} & set(words):
+        return POSSIBLY, False
     if is_step or is_rate:
         return POSSIBLY, (is_step if is_step != is_rate else None)
     return (POSSIBLY if joined in POSSIBLE else NOT), (False if joined in POSSIBLE_RATES else None)

@@ -6,8 +6,9 @@ from functools import lru_cache
 from typing import Any
 
 from turnout.readers.rate_words import words_of
+from turnout.readers.scale_words import plain_word
 from turnout.readers.source import RawRecord
-from turnout.readers.stated_scales import owners_of, plain_word
+from turnout.readers.stated_scales import owners_of
 from turnout.readers.statements import Entry
 from turnout.units import conversion
 

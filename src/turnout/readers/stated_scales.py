@@ -6,107 +6,30 @@ unit in the layout ends with "!".
 
 import math
 import re
-import unicodedata
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from turnout.readers.rate_words import rate_unit, words_of
+from turnout.readers.scale_words import (
+    FACTOR,
+    NEUTRAL,
+    OFFSET,
+    POLYNOMIAL,
+    POSSIBLY_FACTOR,
+    POSSIBLY_OFFSET,
+    is_fill_name,
+    is_scale_name,
+    plain_word,
+    scale_meaning,
+    value_of_word,
+)
 from turnout.readers.source import MEANINGLESS_UNITS
-from turnout.readers.statements import PLACEHOLDERS, Entry
+from turnout.readers.statements import PLACEHOLDERS, Entry, entries_of_text
 from turnout.units import conversion, to_si
 
-# Words for a factor and an offset of the ordinate: lower case, without accents and separators.
-FACTOR_WORDS = frozenset(
-    (
-        "scale scaling scalefactor scalingfactor factor calibrationfactor calfactor conversionfactor multiplier gain "
-        "slope ymult ygain yscale ordinatescale skalierung skalierungsfaktor faktor kalibrierfaktor verstarkung "
-        "facteur facteurdechelle echelle pente skala skalafaktor forstaerkning forstarkning factordeescala escala "
-        "ganancia pendiente fattore fattorediscala scala guadagno pendenza"
-    ).split()
-)
-OFFSET_WORDS = frozenset(
-    "offset addoffset yoffset intercept yintercept nullpunkt nullpunktverschiebung decalage forskydning "
-    "desplazamiento scostamento ordenada".split()
-)
-SCALE_WORDS = FACTOR_WORDS | OFFSET_WORDS
-# Words of longer names that may be a factor or an offset ("InputGain", "Kalibrierfaktor_1"): only a number counts.
-POSSIBLE_FACTOR = re.compile(
-    r"(?:^|[a-z]{2}|^b)(?<!\ba)gain$|(?:scale|skala|escala|scala|echelle)s?$|scaling|skalier|fak?tore?n?$|factors?$|facteurs?$"
-    r"|fattor[ei]$|multipl|^mult$|verstark|vorverst|forstaerk|forstark|amplificat|^preamp|guadagn|gananc|attenuat"
-    r"|abschwach|divis(?:or|eur)$|^teiler$|prescal|vorteiler|^lsb$|^pga$|^coeff?|^koeff|quantis|umrechn|conversion"
-)
-CALIBRATION_WORDS = frozenset("calibration cal calib kalibrierung kalibrering etalonnage taratura calibracion".split())
-POSSIBLE_OFFSET = re.compile(r"offset$|^bias$|intercept$|^tar[ae]$|^zero$|nullabgleich|nullpunkt|nullwert")
-STEPS_OF_CONVERTER = re.compile(r"bits?|counts?|lsb|digits?|codes?")
-# Factors and offsets of other things than the numbers of a channel.
-OTHER_SCALE = re.compile(
-    r"temp|time|zeit|trigg|date|datum|year|jahr|valid|due|number|^no$|^nr$|filt|freq|rate|crest|scheitel|power|form"
-    r"|safety|quality|window|load|damp|dampf|sampl|decim|dynamic|gps|utc|posit|byte|pixel|colou?r|plot|axis|display"
-    r"|image|zoom|print|volt|current|strom|speed|length|dist|wheel|full|range|cross|pad|sensitiv|version|limit|max|min"
-    r"|error|uncert|cover|peak|^q$|spectr|start|begin|file|data|block|buffer|header|index|mode|type|auto|cut|x$|model|map"
-)
 YEARS = (1990.0, 2060.0)  # a whole number between them behind a word of calibration is a year
-
-
-@lru_cache(maxsize=4096)
-def plain_word(name: str) -> str:
-    """A name in lower case without accents, separators and a unit in brackets.
-
-    Parameters
-    ----------
-    name : str
-        Name of an attribute, a property or a head line.
-
-    Returns
-    -------
-    str
-        Only its letters and digits.
-
-    Examples
-    --------
-    >>> plain_word("Scale_Factor [N/V]"), plain_word("Verstärkung")
-    ('scalefactor', 'verstarkung')
-    """
-    letters = unicodedata.normalize("NFKD", re.sub(r"[\[(].*?[\])]", "", name).lower())
-    return re.sub(r"[^a-z0-9]", "", letters.replace("æ", "ae").replace("ø", "o"))
-
-
-def is_scale_name(name: str) -> bool:
-    """Whether a name speaks of a factor or an offset of the ordinate.
-
-    Parameters
-    ----------
-    name : str
-        Name of an attribute, a property or a head line.
-
-    Returns
-    -------
-    bool
-        True for "gain", "Scale factor", "Skalierung" and the like.
-    """
-    return _neutral_value(name) is not None
-
-
-@lru_cache(maxsize=4096)
-def _neutral_value(name: str) -> float | None:
-    """1 for the name of a factor, 0 for that of an offset, None for any other name."""
-    word = plain_word(name)
-    if word in SCALE_WORDS:
-        return 1.0 if word in FACTOR_WORDS else 0.0
-    words = words_of(re.sub(r"[\[(].*?[\])]", "", name))
-    if (bracket := re.search(r"[\[(](.*?)[\])]", name)) and rate_unit(bracket[1]):
-        return None
-    if "per" in words[1:-1]:
-        at = words.index("per", 1)
-        return 1.0 if any(STEPS_OF_CONVERTER.fullmatch(w) for w in (words[at - 1], words[at + 1])) else None
-    if any(OTHER_SCALE.search(word) for word in words):
-        return None
-    if word in CALIBRATION_WORDS or any(POSSIBLE_FACTOR.search(word) for word in words):
-        return 1.0
-    return 0.0 if any(POSSIBLE_OFFSET.search(word) for word in words) else None
 
 
 def scale_statements(facts: Mapping[str, Any], n_channel: int = 1) -> tuple[str, ...]:
@@ -133,26 +56,80 @@ def scale_statements(facts: Mapping[str, Any], n_channel: int = 1) -> tuple[str,
     ("Slope = '1:10'",)
     """
     texts: list[list[str]] = [[] for _ in range(n_channel)]
+    names = {str(name).casefold() for name in facts}
     for name, value in facts.items():
-        for text, stated in zip(texts, _stated_by_channel(str(name), str(name), value, n_channel)):
+        meaning = _meaning_among(str(name), names)
+        if not meaning and isinstance(value, str):
+            for inner, number in scales_in_text(value):
+                for text, stated in zip(texts, _stated_by_channel(inner, scale_meaning(inner), number, n_channel)):
+                    text.extend(stated)
+            continue
+        for text, stated in zip(texts, _stated_by_channel(str(name), meaning, value, n_channel)):
             text.extend(stated)
     return tuple(", ".join(text) for text in texts)
 
 
-def _stated_by_channel(label: str, name: str, value: Any, n_channel: int) -> list[list[str]]:
+@lru_cache(maxsize=4096)
+def scales_in_text(text: str) -> tuple[tuple[str, str], ...]:
+    """Names and values of the scales in a free text, as in "gain 10, tip: steel"."""
+    if len(text) > MAX_SCALE_TEXT or not re.search(r"[^\W\d]{3}.*\d", text):
+        return ()
+    return tuple((e.name, e.value) for e in entries_of_text(text, "") if scale_meaning(e.name))
+
+
+MAX_SCALE_TEXT = 400  # characters: a longer text is no note about an amplifier
+
+
+def _meaning_among(name: str, names: Set[str]) -> str:
+    """Kind of scale of a name beside others in lower case: "a0" beside "a1" are the coefficients of a polynomial."""
+    if meaning := scale_meaning(name):
+        return meaning
+    plain = name.strip().casefold()
+    if not POLYNOMIAL.fullmatch(plain) or not {f"{plain[0]}0", f"{plain[0]}1"} <= names:
+        return ""
+    return POSSIBLY_FACTOR if plain[1] == "1" else POSSIBLY_OFFSET
+
+
+def _stated_by_channel(label: str, meaning: str, value: Any, n_channel: int) -> list[list[str]]:
     """Texts of the scales that one entry states for each channel, without neutral ones."""
-    neutral = _neutral_value(name)
-    if neutral is None:
+    if not meaning:
         return [[] for _ in range(n_channel)]
-    values = _scale_values(value)
-    if plain_word(name) not in SCALE_WORDS:
-        values = [
-            x if isinstance(x, float) and not (x.is_integer() and YEARS[0] < x < YEARS[1]) else neutral for x in values
-        ]
-    stated = [_scale_text(label, x, neutral) for x in values]
+    neutral = NEUTRAL[meaning]
+    if (words := _words(value, meaning)) is not None:
+        stated = [f"{label} = {_value_text(v)}" if number != neutral else "" for v, number in words]
+    else:
+        values = _scale_values(value)
+        if meaning not in (FACTOR, OFFSET):
+            values = [x if isinstance(x, float) and not _is_year(x) else _ratio(x, neutral) for x in values]
+        stated = [_scale_text(label, x, neutral) for x in values]
     if len(stated) == n_channel:
         return [[text] if text else [] for text in stated]
     return [list(filter(None, dict.fromkeys(stated))) for _ in range(n_channel)]
+
+
+def _words(value: Any, meaning: str) -> list[tuple[Any, float]] | None:
+    """(value, factor) of each value under a name of an inversion, a prefix or an exponent; else None."""
+    values = value.ravel().tolist() if isinstance(value, np.ndarray) else value
+    values = values if isinstance(values, (list, tuple)) else [values]
+    pairs = [(v, value_of_word(meaning, v)) for v in values[:MAX_CHANNELS]]
+    return [(v, number) for v, number in pairs if number is not None] if pairs and pairs[0][1] is not None else None
+
+
+def _value_text(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, (int, float)) and not isinstance(value, bool) else repr(str(value)[:40])
+
+
+def _is_year(number: float) -> bool:
+    return number.is_integer() and YEARS[0] < number < YEARS[1]
+
+
+def _ratio(value: float | str, neutral: float) -> float:
+    """The number of a text such as "x10", "1:10" and "10 mV/pC"; ``neutral`` for any other text."""
+    match = re.fullmatch(
+        r"(?:[x×]|1 ?[:/] ?)?(\d+(?:[.,]\d+)?)(?: ?[:/] ?1| ?[^\s\d/]{1,5}/[^\s\d]{1,8})?",
+        str(value).strip().casefold(),
+    )
+    return float(match[1].replace(",", ".")) if match and isinstance(value, str) else neutral
 
 
 def _scale_text(label: str, value: float | str, neutral: float) -> str:
@@ -239,15 +216,24 @@ def entry_statements(entries: Iterable[Entry], names: Sequence[str]) -> dict[int
         Index of the channel -> problem; without channels of which nothing or a neutral scale is stated.
     """
     entries = list(entries)
+    texts_beside = [
+        Entry(entry.place, name, value)
+        for entry in entries
+        if isinstance(entry.value, str) and not is_scale_name(entry.name)
+        for name, value in scales_in_text(entry.value)
+    ]
+    entries = [*entries, *texts_beside]
     scales = [(entry, _scale_name(entry, names)) for entry in entries]
     scales = [(entry, name) for entry, name in scales if name]
     if not scales:
         return {}
+    plain_names = {name.strip().casefold() for _, name in scales}
     texts: list[list[str]] = [[] for _ in names]
     named = [(entry, name, container_of(entry), owners_of(entry, entries, names)) for entry, name in scales]
     for entry, name, container, owners in named:
         label = entry.name if entry.name == name else f"{name} of {entry.name}"
-        stated = _stated_by_channel(label, name, entry.value, 1 if owners else len(names))
+        meaning = _meaning_among(name, plain_names)
+        stated = _stated_by_channel(label, meaning, entry.value, 1 if owners else len(names))
         for i, text in enumerate(texts):
             if owners and i not in owners:
                 continue
@@ -265,7 +251,7 @@ def _scale_name(entry: Entry, names: Sequence[str]) -> str:
 
     "" if it states no scale.
     """
-    if is_scale_name(entry.name):
+    if is_scale_name(entry.name) or POLYNOMIAL.fullmatch(entry.name.strip().casefold()):
         return entry.name
     group = container_of(entry).rpartition("/")[2]
     is_channel = entry.name.strip().casefold() in {name.strip().casefold() for name in names}
@@ -388,10 +374,6 @@ def _numbers(value: Any) -> np.ndarray | None:
 MAX_CHANNELS = 64  # a longer array is no list of scales but one of samples
 
 
-FILL_WORDS = frozenset(
-    "fillvalue missingvalue nodata nodatavalue invalidvalue novalue nanvalue fehlwert ersatzwert "
-    "valeurmanquante manglendevaerdi valoremancante valorfaltante".split()
-)
 SENSITIVITY = re.compile(r"sensitiv|empfindlich|sensibi|folsom|gevoelig")
 # What is beside a sensitivity: the frequency and the day at which it was measured, its tolerance, that of the trigger.
 BESIDE_SENSITIVITY = re.compile(r"trigger|seuil|freq|toler|temp|date|datum|uncertain|unsicher|deviation|abweich")
@@ -444,22 +426,6 @@ def fill_values(entries: Iterable[Entry], names: Sequence[str]) -> tuple[tuple[f
             elif not owners or i in owners:
                 fill.extend(map(float, numbers))
     return tuple(map(tuple, fills))
-
-
-def is_fill_name(name: str) -> bool:
-    """Whether a name speaks of the number that stands for a missing sample.
-
-    Parameters
-    ----------
-    name : str
-        Name of an attribute, a property or a head line.
-
-    Returns
-    -------
-    bool
-        True for "_FillValue", "NoData" and the like.
-    """
-    return plain_word(name) in FILL_WORDS
 
 
 def sensitivity_entries(entries: Iterable[Entry]) -> tuple[Entry, ...]:

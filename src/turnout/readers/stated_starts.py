@@ -2,11 +2,12 @@
 
 import re
 from dataclasses import replace
+from datetime import datetime, timedelta
 from functools import lru_cache
 
 from turnout.readers.rate_words import words_of
 from turnout.readers.source import RawRecord
-from turnout.readers.timing import parse_time
+from turnout.readers.timing import looks_dated, parse_time
 
 START = re.compile(
     r"start|begin|debut|inici|inizi|zacat|trigg|record|aufnahm|aufzeich|mess|mesur|medic|misur|enregistr|registr|grab"
@@ -17,7 +18,7 @@ OTHER = re.compile(
     r"end|stop|fin$|slut|calib|kalib|etalonn|tarat|export|creat|erstell|modif|chang|saved|print|servic|install|version"
     r"|due|valid|last|letzt|next|file|datei|software|firmware|config|import|convert|upload"
 )
-HAS_DATE_AND_TIME = re.compile(r"\d{1,4}[-.]\d{1,2}[-.]\d{1,4}\D+\d{1,2}:\d{2}")
+MAX_ZONE_DIFFERENCE = timedelta(hours=26)  # two zones on both sides of the date line
 
 
 @lru_cache(maxsize=4096)
@@ -54,13 +55,26 @@ def with_stated_start(record: RawRecord) -> RawRecord:
     Returns
     -------
     RawRecord
-        With a start time if all entries under such a name agree; a text that is no time is its unread start.
+        With a start time if all entries under such a name agree; a text that is no time is its unread start, and one
+        that contradicts the start time of the format.
     """
-    if record.started_at is not None or record.unread_start:
-        return record
     texts = [e.value.strip() for e in record.entries if isinstance(e.value, str) and is_start_name(e.name)]
-    texts = list(dict.fromkeys(text for text in texts if HAS_DATE_AND_TIME.match(text)))
-    if len(texts) != 1:
-        return replace(record, unread_start=" or ".join(texts)[:60]) if texts else record
-    started_at = parse_time(texts[0])
-    return replace(record, started_at=started_at, unread_start="" if started_at else texts[0][:60])
+    texts = list(dict.fromkeys(text for text in texts if looks_dated(text)))
+    if not texts or record.unread_start:
+        return record
+    if record.started_at is not None:
+        other_texts = [text for text in texts if _is_other(parse_time(text), record.started_at)]
+        return replace(record, unread_start=other_texts[0][:60]) if other_texts else record
+    times = {_naive(stamp) for text in texts if (stamp := parse_time(text))}
+    if len(times) != 1:
+        return replace(record, unread_start=" or ".join(texts)[:60])
+    return replace(record, started_at=next(stamp for text in texts if (stamp := parse_time(text))))
+
+
+def _naive(stamp: datetime) -> datetime:
+    return stamp.replace(tzinfo=None)
+
+
+def _is_other(stamp: datetime | None, started_at: datetime) -> bool:
+    """Whether a stamp is of another day than the start, in any time zones."""
+    return stamp is not None and abs(_naive(stamp) - _naive(started_at)) > MAX_ZONE_DIFFERENCE

@@ -20,6 +20,7 @@ import numpy as np
 from turnout.errors import ReadError
 from turnout.readers.precision import EXACT_PRECISION, NUMBER, Interval, around, readings
 from turnout.readers.rate_words import CERTAIN, NOT, POSSIBLY, RateUnit, name_meaning, rate_unit, reduction_of_name
+from turnout.readers.scale_words import scale_meaning, value_of_word
 from turnout.readers.source import Source
 
 MAX_CLOCK_DRIFT = 1e-4  # relative: two clocks of one logger with separate crystals may differ by this much
@@ -194,6 +195,13 @@ def _decode_json(text: str) -> Any:
         return text
 
 
+# "name: value" with a word, numbers without unit, or a ratio as its value.
+NAMED_PIECE = re.compile(
+    r"(?:[^\d:=]*:)?\s*([^\W\d][^:=]{1,40}?)\s*[:=]\s*"
+    r"([+-]?[.,]?\d[^:=]{0,30}?|[^\W\d]{1,20}\.?|[-+]|[x×]\s?\d+|\d+\s?:\s?\d+)\s*"
+)
+
+
 def entries_of_text(text: str, place: str) -> Iterator[Entry]:
     """Entries of a free text such as a comment: its pieces with a number, "sampled at 25.6 kHz; tip: steel".
 
@@ -215,6 +223,10 @@ def entries_of_text(text: str, place: str) -> Iterator[Entry]:
     [('hammer', '3'), ('sampled at', '25.6 kHz')]
     """
     for piece in re.split(r"[;\n\r|]|,\s", text[:MAX_TEXT]):
+        named = NAMED_PIECE.fullmatch(piece)
+        if named and (re.search(r"\d", named[2]) or value_of_word(scale_meaning(named[1]), named[2]) is not None):
+            yield Entry(place, named[1].strip(), named[2].strip())
+            continue
         match = re.fullmatch(rf"\s*([^\d]*?)[\s:=,@~≈#]*({NUMBER.pattern})\s*([^\d]*?)[\s.]*", piece)
         if not match or not (match[1] or match[3]):
             continue
@@ -335,6 +347,8 @@ def _statements(entry: Entry, value: Any) -> Iterator[Statement]:
         certainty = other.certainty
     if certainty == NOT:
         return
+    if unit is not None and unit.is_sampling and certainty == POSSIBLY:
+        certainty = CERTAIN  # nothing else is counted in samples per second
     is_unknown = bool(unit_text or meaning.unknown_unit) and unit is None
     intervals = () if is_unknown else _intervals(number, unit, meaning.is_step, certainty)
     if not intervals and meaning.is_step and any(r.value >= MIN_EPOCH for r in readings(number)):
@@ -386,7 +400,7 @@ def _intervals(number: Any, unit: RateUnit | None, is_step: bool | None, certain
         intervals = [i for i in intervals if USUAL_RATES[0] <= i.rate <= USUAL_RATES[1]] or intervals
     if unit is None and len(units) > 1:
         intervals = [i for i in intervals if PLAUSIBLE_RATES[0] <= i.rate <= PLAUSIBLE_RATES[1]]
-    if unit is not None and unit.is_step and certainty == POSSIBLY:
+    if unit is not None and certainty == POSSIBLY:
         intervals = [i for i in intervals if USUAL_RATES[0] <= i.rate <= USUAL_RATES[1]]
     return tuple(intervals)
 
@@ -485,6 +499,23 @@ def resolve(statements: Sequence[Statement], promised: float | None, where: str,
     return float(whole) if is_unique and is_within else interval.rate
 
 
+MIN_OTHER_RATE = 1000.0  # Hz: lower frequencies beside a certain rate mean something else
+
+
+def _other_rate(statements: Sequence[Statement], rate: float) -> Statement | None:
+    """A statement that may be about the sampling rate and is not about the one in use."""
+    used = around(rate, EXACT_PRECISION)
+    return next(
+        (
+            s
+            for s in statements
+            if s.certainty == POSSIBLY and not s.is_clock and s.intervals
+            if MIN_OTHER_RATE <= s.usual.rate <= USUAL_RATES[1] and not any(i.loose.overlaps(used) for i in s.intervals)
+        ),
+        None,
+    )
+
+
 def _common_meanings(certain: Sequence[Statement]) -> list[Interval]:
     """The meanings of the first statement with which all others agree."""
     return [i for i in certain[0].intervals if all(s.agrees_with(i) for s in certain[1:])]
@@ -498,8 +529,10 @@ def _reduction_problem(statement: Statement) -> str:
     )
 
 
-def reduction_remark(statements: Sequence[Statement], rate: float, where: str, source: Source) -> ReadError | None:
-    """Remark on a record whose rate in the layout is the one before a reduction, if nothing else confirms it.
+def rate_remark(statements: Sequence[Statement], rate: float, where: str, source: Source) -> ReadError | None:
+    """Remark on a record of which the file may state another rate than the one in use.
+
+    That is one before a reduction which nothing else confirms, or an entry that may be a rate.
 
     Parameters
     ----------
@@ -515,9 +548,12 @@ def reduction_remark(statements: Sequence[Statement], rate: float, where: str, s
     Returns
     -------
     ReadError or None
-        None without a reduction, or if a time axis or the format itself states this rate.
+        None if nothing is in doubt.
     """
     certain = [s for s in statements if s.certainty == CERTAIN and s.intervals]
+    if certain and (other := _other_rate(statements, rate)):
+        problem = f"{other} may be a sampling rate as well; {rate:.9g} Hz is used, by {certain[0]}"
+        return source.error(where, problem, "Find out which rate is right", reason="wrong_rate")
     if not any(s.factor > 1 for s in certain) or len(meanings := _common_meanings(certain)) < 2:
         return None
     if meanings[-1].loose.overlaps(around(rate, EXACT_PRECISION)):

@@ -154,7 +154,9 @@ def test_a_frequency_that_nobody_understood_is_no_licence_for_another_rate(line,
     (error,) = read("a.csv", tmp_path, replace(NAMED, rate=20000.0)).errors
     assert error.reason == "wrong_rate" and "10" in error.problem and "20000 Hz" in error.problem
     assert line.split()[-2].strip("#")[:8].rstrip(":") in error.problem and "in line 1" in error.problem
-    sound(tmp_path, "b.csv", f"rate: 20000\n{text}", replace(NAMED, rate=20000.0))
+    (tmp_path / "b.csv").write_text(f"rate: 20000\n{text}", encoding="utf-8")
+    result = read("b.csv", tmp_path, replace(NAMED, rate=20000.0))
+    assert result.recordings[0].rate == 20000.0 and "as well; 20000 Hz is used" in result.errors[0].problem
 
 
 @pytest.mark.parametrize("line", ["Tiefpass: 8000 Hz", "Filter 10 kHz", "sensor: 0.5-10000 Hz", "Bandbreite: 8 kHz"])

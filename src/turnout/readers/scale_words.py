@@ -1,0 +1,231 @@
+"""Words for the scale of samples in the metadata of any format: factors, offsets, inversions, prefixes, fill values.
+
+A name is compared without case, accents and separators. Certain words are scales whatever follows them; of longer names
+only a number counts. Names of other things than the numbers of a channel are neither.
+"""
+
+import re
+import unicodedata
+from functools import lru_cache
+from itertools import pairwise
+
+from turnout.readers.rate_words import rate_unit, words_of
+
+FACTOR_WORDS = frozenset(
+    (
+        "scale scaling scalefactor scalingfactor factor calibrationfactor calfactor conversionfactor multiplier gain "
+        "slope ymult ygain yscale ordinatescale skalierung skalierungsfaktor faktor kalibrierfaktor verstarkung "
+        "facteur facteurdechelle echelle pente skala skalafaktor forstaerkning forstarkning factordeescala escala "
+        "ganancia pendiente fattore fattorediscala scala guadagno pendenza"
+    ).split()
+)
+OFFSET_WORDS = frozenset(
+    "offset addoffset yoffset intercept yintercept nullpunkt nullpunktverschiebung decalage forskydning "
+    "desplazamiento scostamento ordenada versatz baseline ordonneealorigine".split()
+)
+# Words of longer names that may be a factor or an offset ("InputGain", "Kalibrierfaktor_1"): only a number counts.
+POSSIBLE_FACTOR = re.compile(
+    r"(?:^|[a-z]{2}|^b)(?<!\ba)gains?$|(?:scale?|skala|escala|scala|echelle)s?$|scaling|skali?er|fak?tore?n?$|factors?$|facteurs?$"
+    r"|fattor[ei]$|multipl|^mult$|verstark|vorverst|forstaerk|forstark|amplific|^preamp|guadagn|gananc|attenuat"
+    r"|abschwach|divis(?:or|eur)$|^divid|^teiler$|prescal|vorteiler|^lsb$|^pga$|^coeff?|^koeff|quantis|umrechn|conversion"
+    r"|^polynom|normali[sz]|normier|^quantum$|^verst$|^amp$|^masss?tab$|^multiply$"
+)
+CALIBRATION_WORDS = frozenset("calibration cal calib kalibrierung kalibrering etalonnage taratura calibracion".split())
+CALIBRATION = re.compile(r"^(?:cal|kal)(?:ib\w*)?$|^etalonn\w*|^taratura$|^eich\w*|^(?:calib|kalib)\w*(?:wert|value)$")
+VALUE = re.compile(r"values?|wert|valeur|valore?|const\w*|konst\w*|weight|gewicht|size|v\w?rdi")
+POSSIBLE_OFFSET = re.compile(
+    r"offset(?:wert)?$|decalage|desplazam|scostam|forskyd|^off?s$|^dc$|^removed$|^subtracted$|abgezogen|^bias$"
+    r"|intercept$|^tar[ae]$|^zero$|nullabgleich|nullpunkt|nullwert"
+)
+STEPS_OF_CONVERTER = re.compile(r"bits?|counts?|lsb|digits?|codes?|quant\w*|eu|unit|div")
+LEVEL = re.compile(r"dampfung|correct|korrekt|correz")  # a scale if its value is a level in dB
+CORRECTION = re.compile(r"correct|korrekt|correz")
+INVERSION = re.compile(
+    r"polari[td]\w*|invert\w*|invers\w*|neg(?:ative?)?|vorzeichen|sign|signe|segno|signo|fortegn|flipped|reversed|negated|negiert"
+)
+PREFIX = re.compile(r"(?:unit|einheit\w*|si)?(?:prefix|vorsatz|prefixe|prefisso|prefijo|praefiks)")
+EXPONENT = re.compile(r"(?:scale|unit|decimal)?exponent\d*|zehnerpotenz|poweroften")
+# What a number is converted to: "adc_to_volt", "ToSI".
+TARGETS = frozenset("si eu volt volts v mv unit units newton newtons n kn g ms physical engineering".split())
+CONVERTED = re.compile(r"[a-z]+2([a-z]+)2?")  # "lbf2N"
+# Factors and offsets of other things than the numbers of a channel.
+OTHER_SCALE = re.compile(
+    r"temp|time|zeit|trigg|date|datum|year|jahr|valid|due|number|^no$|^nr$|filt|freq|rate|crest|scheitel|power|form"
+    r"|safety|quality|window|load|damp(?!fung)|sampl|decim|dynamic|gps|utc|posit|byte|pixel|colou?r|plot|axis|display"
+    r"|image|zoom|print|volt(?!s?$|age$)|current|strom|speed|length|dist|wheel|full|range|cross|pad|sensitiv|(?<!con)(?<!in)version|limit|max|min"
+    r"|error|uncert|cover|peak|^q$|spectr|start|begin|mode|type|auto|cut|^x$|model|map"
+    r"|excit|anreg|supply|speis"
+)
+OTHER_OFFSET = re.compile(r"voltage|file|data|block|buffer|header|index")  # a bias, or a position in the file
+PREFIX_VALUES = {
+    "k": 1e3, "kilo": 1e3, "m": 1e-3, "milli": 1e-3, "µ": 1e-6, "u": 1e-6, "micro": 1e-6, "mikro": 1e-6, "mega": 1e6,
+    "n": 1e-9, "nano": 1e-9, "giga": 1e9, "c": 1e-2, "centi": 1e-2, "d": 1e-1, "deci": 1e-1, "da": 10.0, "h": 100.0,
+}  # fmt: skip
+INVERTED = frozenset("- -1 -1.0 true yes ja oui si on 1 1.0 flipped".split())
+FILL_WORDS = frozenset(
+    "fillvalue missingvalue nodata nodatavalue invalidvalue novalue nanvalue fehlwert ersatzwert "
+    "valeurmanquante manglendevaerdi valoremancante valorfaltante".split()
+)
+FACTOR, OFFSET, POSSIBLY_FACTOR, POSSIBLY_OFFSET = "factor", "offset", "possibly factor", "possibly offset"
+INVERSIONS, PREFIXES, EXPONENTS, LEVELS = "inversion", "prefix", "exponent", "level"
+NEUTRAL = {
+    FACTOR: 1.0, OFFSET: 0.0, POSSIBLY_FACTOR: 1.0, POSSIBLY_OFFSET: 0.0, INVERSIONS: 1.0, PREFIXES: 1.0,
+    EXPONENTS: 1.0, LEVELS: 1.0,
+}  # fmt: skip
+POLYNOMIAL = re.compile(r"[abcpk][01]")
+
+
+@lru_cache(maxsize=4096)
+def plain_word(name: str) -> str:
+    """A name in lower case without accents, separators and a unit in brackets.
+
+    Parameters
+    ----------
+    name : str
+        Name of an attribute, a property or a head line.
+
+    Returns
+    -------
+    str
+        Only its letters and digits.
+
+    Examples
+    --------
+    >>> plain_word("Scale_Factor [N/V]"), plain_word("Verstärkung")
+    ('scalefactor', 'verstarkung')
+    """
+    letters = unicodedata.normalize("NFKD", re.sub(r"[\[(].*?[\])]", "", name).lower())
+    return re.sub(r"[^a-z0-9]", "", letters.replace("æ", "ae").replace("ø", "o"))
+
+
+def is_scale_name(name: str) -> bool:
+    """Whether a name speaks of a factor, an offset or an inversion of the ordinate.
+
+    Parameters
+    ----------
+    name : str
+        Name of an attribute, a property or a head line.
+
+    Returns
+    -------
+    bool
+        True for "gain", "Scale factor", "Skalierung", "Polarity" and the like.
+    """
+    return bool(scale_meaning(name))
+
+
+@lru_cache(maxsize=4096)
+def scale_meaning(name: str) -> str:
+    """Kind of scale of which a name speaks.
+
+    Parameters
+    ----------
+    name : str
+        Name of an attribute, a property or a head line.
+
+    Returns
+    -------
+    str
+        A key of ``NEUTRAL``; "" for any other name.
+
+    Examples
+    --------
+    >>> [scale_meaning(n) for n in ("gain", "DC offset", "Polarity", "adc_to_volt", "Trigger polarity", "Crest factor")]
+    ['factor', 'possibly offset', 'inversion', 'possibly factor', '', '']
+    """
+    word = plain_word(name)
+    stem = word.rstrip("0123456789")
+    if stem in FACTOR_WORDS or stem in OFFSET_WORDS:
+        return FACTOR if stem in FACTOR_WORDS else OFFSET
+    if (converted := CONVERTED.fullmatch(word)) and converted[1] in TARGETS:
+        return POSSIBLY_FACTOR
+    if EXPONENT.fullmatch(word):
+        return EXPONENTS
+    words = words_of(re.sub(r"[\[(].*?[\])]", "", name))
+    if (bracket := re.search(r"[\[(](.*?)[\])]", name)) and rate_unit(bracket[1]):
+        return ""
+    if "per" in words[1:-1]:
+        at = words.index("per", 1)
+        is_step = any(STEPS_OF_CONVERTER.fullmatch(w) for w in (words[at - 1], words[at + 1]))
+        return POSSIBLY_FACTOR if is_step else ""
+    is_correction = any(CORRECTION.match(word) for word in words)
+    if any(OTHER_SCALE.search(word) for word in words):
+        return ""
+    if any(word in ("file", "name") for word in words):
+        return ""
+    for pattern, meaning in ((INVERSION, INVERSIONS), (PREFIX, PREFIXES), (EXPONENT, EXPONENTS)):
+        if any(pattern.fullmatch(w) for w in (*words, "".join(words))):
+            return meaning
+    is_factor = word in CALIBRATION_WORDS or any(POSSIBLE_FACTOR.search(word) for word in words)
+    if is_factor or _is_conversion(words) or _is_value_of_step(words):
+        return POSSIBLY_FACTOR
+    if any(OTHER_OFFSET.search(word) and not (is_correction and word == "voltage") for word in words):
+        return ""
+    is_offset = any(POSSIBLE_OFFSET.search(w) for w in words) or (is_correction and "offset" in words)
+    if is_offset:
+        return POSSIBLY_OFFSET
+    return LEVELS if any(LEVEL.search(word) for word in words) else ""
+
+
+def _is_conversion(words: tuple[str, ...]) -> bool:
+    """Whether words speak of a conversion to a unit: "adc_to_volt", "ToSI"."""
+    return any((a == "to" or STEPS_OF_CONVERTER.fullmatch(a)) and b in TARGETS for a, b in pairwise(words))
+
+
+def _is_value_of_step(words: tuple[str, ...]) -> bool:
+    """Whether words speak of a step of the converter or the value of a calibration: "bit_weight", "Kalibrierwert"."""
+    if any(CALIBRATION.match(w) for w in words) and (len(words) == 1 or any(VALUE.fullmatch(w) for w in words)):
+        return True
+    is_step = any(STEPS_OF_CONVERTER.fullmatch(w) for w in words)
+    return is_step and len(words) > 1 and any(VALUE.fullmatch(w) for w in words)
+
+
+def is_fill_name(name: str) -> bool:
+    """Whether a name speaks of the number that stands for a missing sample.
+
+    Parameters
+    ----------
+    name : str
+        Name of an attribute, a property or a head line.
+
+    Returns
+    -------
+    bool
+        True for "_FillValue", "NoData" and the like.
+    """
+    return plain_word(name) in FILL_WORDS
+
+
+def value_of_word(meaning: str, value: object) -> float | None:
+    """The factor that a text stands for under a name of an inversion, a prefix or an exponent.
+
+    Parameters
+    ----------
+    meaning : str
+        As ``scale_meaning`` returns it.
+    value : object
+        Value of the entry.
+
+    Returns
+    -------
+    float or None
+        1 for a value that changes nothing or is not understood; None for any other meaning of scale.
+
+    Examples
+    --------
+    >>> value_of_word("inversion", "Invertiert"), value_of_word("prefix", "k"), value_of_word("exponent", -3)
+    (-1.0, 1000.0, 0.001)
+    """
+    text = str(value.decode("utf-8", "replace") if isinstance(value, bytes) else value).strip()
+    if meaning == INVERSIONS:
+        word = text.casefold().rstrip(".")
+        return -1.0 if word in INVERTED or word.startswith(("inv", "neg", "rev", "umgek")) else 1.0
+    if meaning == PREFIXES:
+        return 1e6 if text == "M" else PREFIX_VALUES.get(text.casefold().replace("\u03bc", "µ"), 1.0)
+    if meaning == LEVELS:
+        match = re.fullmatch(r"([+-]?\d+(?:[.,]\d+)?)\s*dB", text, re.IGNORECASE)
+        return 10.0 ** (float(match[1].replace(",", ".")) / 20.0) if match else 1.0
+    if meaning == EXPONENTS:
+        match = re.fullmatch(r"[+-]?\d{1,2}(?:\.0*)?", text)
+        return 10.0 ** float(text) if match else 1.0
+    return None
