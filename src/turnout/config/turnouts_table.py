@@ -21,7 +21,7 @@ ROW = {
     "turnout": Key("text", "id: letters, digits, _ and -", required=True, pattern=ID),
     "layout": Key("text", "file in config/layouts/ without .yaml", required=True),
     "raw": Key("text", "folder of its raw files below the raw root; empty: its id"),
-    "name": Key("text", "name for people"),
+    "name": Key("text", "name for display"),
     "line": Key("text", "railway line"),
     "km": Key("number", "position along the line", unit="km", minimum=0, maximum=100000),
     "lat_deg": Key("number", "latitude, WGS 84", unit="°", minimum=-90, maximum=90),

@@ -33,7 +33,7 @@ class AttachedResonator(PhysicsTerm):
 
     name = "attached_resonator"
     left_out = "{mass:.1f} kg resonate at {frequency:.0f} Hz on the rail over sleeper {support}"
-    message = "A mass of {mass} swings at {frequency} on the track at {place}"
+    message = "A mass of {mass} on the track at {place} resonates at {frequency}"
     site_check = "Look for parts attached to the rail there: a box, a rod, a heater"
     separating_test = "a hammer test above and beside this place"
     effect_type = "matrix"

@@ -24,7 +24,7 @@ class ContactStiffness(PhysicsTerm):
 
     name = "contact_stiffness"
     left_out = "the wheel-rail contact has {factor:.2f} times its stiffness"
-    message = "The contact of wheel and rail is {factor} times as stiff"
+    message = "The contact of wheel and rail is {factor} times as stiff as that of the nominal profiles"
     site_check = "Measure the profiles of rail and wheels"
     effect_type = "vehicle"
     frame = "train"

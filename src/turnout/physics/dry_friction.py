@@ -28,7 +28,7 @@ class DryFriction(PhysicsTerm):
 
     name = "dry_friction"
     left_out = "dry friction of {limit:.0f} N between rail and sleeper {support}"
-    message = "Something rubs with up to {limit} at {place}"
+    message = "A joint at {place} has dry friction of up to {limit}"
     site_check = "Look for a loose clip or a worn baseplate on this sleeper"
     effect_type = "port"
     frame = "amplitude"

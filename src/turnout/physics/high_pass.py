@@ -27,7 +27,7 @@ class HighPass(TransferTerm):
 
     name = "high_pass"
     left_out = "channel {channel_name} loses what lies below {corner:.1f} Hz"
-    message = "Channel {channel} loses what is slower than {corner}"
+    message = "Channel {channel} loses frequencies below {corner}"
     site_check = "Check the coupling of this channel's amplifier"
     site_types = (ChannelSite,)
     column_type = "channel"

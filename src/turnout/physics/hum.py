@@ -32,7 +32,7 @@ class Hum(PhysicsTerm):
 
     name = "hum"
     left_out = "channel {channel_name} hums at {frequency:.1f} Hz with an amplitude of {amplitude:.3g} m/s²"
-    message = "Channel {channel} hums"
+    message = "Channel {channel} contains hum of mains or traction current"
     site_check = "Check shielding and grounding of this channel"
     effect_type = "channel"
     frame = "clock"

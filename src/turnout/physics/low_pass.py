@@ -27,7 +27,7 @@ class LowPass(TransferTerm):
 
     name = "low_pass"
     left_out = "channel {channel_name} loses what lies above {corner:.0f} Hz"
-    message = "Channel {channel} loses what is fast"
+    message = "Channel {channel} loses high frequencies"
     site_check = "Check filter and cable of this channel"
     site_types = (ChannelSite,)
     column_type = "channel"

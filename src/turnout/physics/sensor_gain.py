@@ -31,8 +31,8 @@ class SensorGain(TransferTerm):
 
     name = "sensor_gain"
     left_out = "channel {channel_name} shows {gain:.3f} times the true signal"
-    message = "Sensor {channel} reads {gain} times what it should"
-    message_negative = "Sensor {channel} has the wrong polarity: it reads {gain} times what it should"
+    message = "Sensor {channel} reads {gain} times the true value"
+    message_negative = "Sensor {channel} has the wrong polarity: it reads {gain} times the true value"
     site_check = "Calibrate this sensor, check its polarity, exchange it with its neighbour"
     site_types = (ChannelSite,)
     column_type = "channel"

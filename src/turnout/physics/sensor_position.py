@@ -25,7 +25,7 @@ class SensorPosition(PhysicsTerm):
 
     name = "sensor_position"
     left_out = "channel {channel_name} sits {shift:+.2f} m from where its description says"
-    message = "Sensor {channel} sits {shift} from where the layout has it"
+    message = "Sensor {channel} is {shift} from its position in the layout"
     site_check = "Measure the position of this sensor"
     separating_test = "passages at another speed"
     effect_type = "channel"

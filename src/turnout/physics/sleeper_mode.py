@@ -32,7 +32,7 @@ class SleeperMode(PhysicsTerm):
 
     name = "sleeper_mode"
     left_out = "sleepers bend at {frequency:.0f} Hz with a share of {share:.2f} of their mass"
-    message = "The sleepers bend at {frequency}"
+    message = "The sleepers have a bending resonance at {frequency}"
     site_check = "Check the sleeper type in the track file"
     effect_type = "matrix"
     frame = "frequency"

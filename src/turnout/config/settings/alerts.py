@@ -9,7 +9,7 @@ from turnout.config.settings.setting import setting
 class AlertsSettings:
     """Mail server and webhook that get new entries of the worklist; nothing is sent without them."""
 
-    recipients: str = setting("", why="addresses for the mail, by commas; empty: no mail")
+    recipients: str = setting("", why="addresses for the mail, separated by commas; empty: no mail")
     sender: str = setting("", why="address that the mail comes from; empty: the first recipient")
     smtp_host: str = setting("localhost", why="mail server; the password of smtp_user is in TURNOUT_SMTP_PASSWORD")
     smtp_port: int = setting(25, why="25 without encryption, 587 for starttls, 465 for tls", minimum=1, maximum=65535)

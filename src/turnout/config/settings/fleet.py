@@ -13,16 +13,14 @@ class FleetSettings:
         1, why="one job per stage up to some fifty turnouts; a network of thousands wants 64", minimum=1, maximum=4096
     )
     checkpoint_units: int = setting(
-        200, why="results kept after so many units, so that a kill loses minutes, not hours", minimum=1
+        200, why="results are stored after this many units, so that an interruption loses only minutes", minimum=1
     )
-    checkpoint_time: float = setting(120.0, unit="s", why="results kept at least so often", minimum=0.0)
+    checkpoint_time: float = setting(120.0, unit="s", why="longest time between two stores of results", minimum=0.0)
     vanished_share: float = setting(
-        0.2, why="more known files gone than this is a lost disk, not tidying up: stop", minimum=0.0, maximum=1.0
+        0.2, why="the run stops if a larger share of the known files is missing", minimum=0.0, maximum=1.0
     )
-    vanished_files: int = setting(
-        10, why="so few files may vanish whatever their share: a small fleet is tidied up too", minimum=0
-    )
+    vanished_files: int = setting(10, why="this number of files may vanish whatever their share", minimum=0)
     quarantine_share: float = setting(
-        0.2, why="more new recordings in quarantine than this is a fault of the installation", minimum=0.0, maximum=1.0
+        0.2, why="the run fails if a larger share of new recordings is in quarantine", minimum=0.0, maximum=1.0
     )
-    quarantine_units: int = setting(20, why="below so many new units a share says nothing and is not judged", minimum=1)
+    quarantine_units: int = setting(20, why="with fewer new units the share is not judged", minimum=1)

@@ -67,7 +67,7 @@ class IdentifySettings:
     spread_maximum: float = setting(
         0.15,
         "",
-        "relative spread of a frequency between impacts above which it is no property of the place",
+        "relative spread of a frequency between impacts above which it is no property of the track",
         minimum=0.0,
     )
     gate_share: float = setting(
@@ -75,7 +75,7 @@ class IdentifySettings:
     )
     confidence: float = setting(0.95, "", "level of the intervals", minimum=0.5, maximum=0.999)
     null_draws: int = setting(60, "", "random pole sets behind the null of the fit", minimum=10, maximum=10000)
-    split_frequency: float = setting(200.0, "Hz", "where method paper parts its bands", minimum=1.0)
+    split_frequency: float = setting(200.0, "Hz", "frequency at which method paper splits its bands", minimum=1.0)
     paper_band_high: float = setting(800.0, "Hz", "upper end of the paper's high band", minimum=1.0)
     paper_filter_order: int = setting(
         4, "", "Butterworth; the paper gives neither filter nor order", minimum=1, maximum=12

@@ -9,13 +9,11 @@ from turnout.config.settings.setting import setting
 class MismatchSettings:
     """Settings of ``turnout.mismatch``: when a difference counts, and when it may carry a name."""
 
-    enabled: bool = setting(False, why="a diagnosis takes minutes per turnout: opt in, the nightly run stays quick")
+    enabled: bool = setting(False, why="diagnose in the nightly run; it takes minutes per turnout")
     materiality: float = setting(
-        0.06, "-", "share of the local amplitude below which a difference is nobody's business", 0.0, 0.5
+        0.06, "-", "share of the local amplitude below which a difference causes no action", 0.0, 0.5
     )
-    pair_tolerance: float = setting(
-        0.03, "-", "share of a receptance that gain and slope of a hammer test may be off", 0.0, 0.5
-    )
+    pair_tolerance: float = setting(0.03, "-", "tolerated relative error of gain and slope of a receptance", 0.0, 0.5)
     control_level: float = setting(
         1.6, "-", "weighted mean square above which a fit has not reached the control level", 1.0, 100.0
     )
@@ -45,15 +43,15 @@ class MismatchSettings:
     fall: float = setting(
         1.0,
         "%",
-        "points of fit that a name may cost on reserved recordings; more withdraw it, if beyond two standard errors",
+        "loss of fit on reserved recordings that withdraws a name, if beyond two standard errors",
         0.0,
         100.0,
     )
     structure_left: float = setting(
-        0.4, "-", "share of the residual that a free law of the state still explains: shape unresolved", 0.0, 1.0
+        0.4, "-", "share of the residual that a free law still explains: the shape is not resolved", 0.0, 1.0
     )
-    temperature: float = setting(4.0, "-", "softens scores into probabilities; chosen by hand", 0.1)
-    softmax_share: float = setting(0.2, "-", "how much the softmax says beyond the kind of answer", 0.0, 1.0)
+    temperature: float = setting(4.0, "-", "divisor of scores before they become probabilities; chosen by hand", 0.1)
+    softmax_share: float = setting(0.2, "-", "weight of the scores in the probability of an answer", 0.0, 1.0)
     certainty_none: float = setting(
         0.75, "-", "share of 'none' that is right, judged from few opened cases", 0.01, 0.99
     )
@@ -64,20 +62,20 @@ class MismatchSettings:
         0.55, "-", "share of 'unknown' where the catalogue has no name, judged from few opened cases", 0.01, 0.99
     )
     certainty_clock: float = setting(
-        0.83, "-", "the same where sensors shook while no wheel was near, two of two by Jeffreys' prior", 0.01, 0.99
+        0.83, "-", "the same for vibration without a wheel near: two of two, with Jeffreys' prior", 0.01, 0.99
     )
     unknown_offset: float = setting(
-        -12.0, "nats", "score of 'unknown' relative to the best's shortfall; chosen by hand"
+        -12.0, "nats", "score of 'unknown' relative to what the best candidate leaves; chosen by hand"
     )
     base_iterations: int = setting(15, why="Gauss-Newton steps of the base fit", minimum=1, maximum=100)
-    scouted_places: int = setting(2, why="places of a family fitted to the hammer tests alone", minimum=1, maximum=50)
+    scouted_places: int = setting(2, why="positions of an effect fitted to hammer tests alone", minimum=1, maximum=50)
     promise: float = setting(2.0, "nats", "estimated gain below which a candidate is not refitted", 0.0)
-    joint_starts: int = setting(1, why="places of the first families that are refitted", minimum=1, maximum=20)
-    refits: int = setting(5, why="families refitted jointly where a prediction is dear", minimum=2, maximum=50)
+    joint_starts: int = setting(1, why="positions of the first effects that are refitted", minimum=1, maximum=20)
+    refits: int = setting(5, why="effects refitted jointly where a prediction is expensive", minimum=2, maximum=50)
     iterations: int = setting(6, why="Gauss-Newton steps of a joint refit", minimum=1, maximum=50)
     effects: int = setting(2, why="effects sought one after the other", minimum=1, maximum=3)
     numerics_share: float = setting(
-        0.333, "-", "own numerical error over mismatch above which no cause is named", 0.01, 1.0
+        0.333, "-", "numerical error over mismatch above which no cause is named", 0.01, 1.0
     )
 
     def certainty(self, answer: str, disturbed: bool = False) -> float:

@@ -12,7 +12,7 @@ class PassageSettings:
     """How a train passage is cut, counted, timed, fitted and scored."""
 
     # joint fit
-    band_low: float = setting(80.0, "Hz", "below it the hammer says nothing (paper, section on tests)", 1.0)
+    band_low: float = setting(80.0, "Hz", "below it hammer tests carry no information (paper, section on tests)", 1.0)
     band_high: float = setting(800.0, "Hz", "above it the plastic tip excites nothing (paper)", 10.0)
     filter_order: int = setting(4, "", "Butterworth order of each edge; the model passes the same filter", 1, 8)
     score_window: float = setting(
@@ -53,7 +53,9 @@ class PassageSettings:
     axle_level: float = setting(
         3.0, "", "peaks below this many noise deviations are not considered as axles", 1.0, 50.0
     )
-    place_error: float = setting(0.05, "m", "standard error of where along the rail a sensor records a wheel", 0.0, 1.0)
+    place_error: float = setting(
+        0.05, "m", "standard error of the position at which a sensor records a wheel", 0.0, 1.0
+    )
     acceleration_limit: float = setting(1.2, "m/s²", "service braking and traction stay below it", 0.1, 5.0)
     # train type
     type_tolerance: float = setting(
@@ -65,7 +67,7 @@ class PassageSettings:
     load_relative_error_maximum: float = setting(
         0.025,
         "",
-        "a load with a larger relative standard error is said to be unavailable: 5 % is two of them",
+        "a load with a larger relative standard error is unavailable: 5 % is two of them",
         0.005,
         0.5,
     )

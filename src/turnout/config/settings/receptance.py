@@ -18,7 +18,7 @@ class ReceptanceSettings:
         minimum=4.0, maximum=1000.0,
     )  # fmt: skip
     weakest_blow: float = setting(
-        0.05, "1", "in a record with many impacts, less than this share of a usual peak is the hammer being handled",
+        0.05, "1", "in a record with many impacts, a peak below this share of the usual one is handling of the hammer",
         minimum=0.01, maximum=0.5,
     )  # fmt: skip
     softest_blow: float = setting(
@@ -36,10 +36,10 @@ class ReceptanceSettings:
         minimum=0.06, maximum=5.0,
     )  # fmt: skip
     pre_trigger: float = setting(
-        0.05, "s", "at most this much of the record before an impact is kept, for its noise", minimum=1e-3, maximum=1.0
+        0.05, "s", "longest part of the record before an impact that is used, for its noise", minimum=1e-3, maximum=1.0
     )
     window: float = setting(
-        1.0, "s", "at most this much of the record after an impact is kept", minimum=0.02, maximum=60.0
+        1.0, "s", "longest part of the record after an impact that is used", minimum=0.02, maximum=60.0
     )
     double_hit: str = setting(
         "move", "", "'move' starts the decay after the last contact if enough of it is left, 'reject' never uses it",
@@ -71,7 +71,7 @@ class ReceptanceSettings:
     noise: float = setting(
         0.15,
         "1",
-        "rms before the impact over the largest sample: 20 dB reads 0.09, from 15 dB on the decay is noise",
+        "rms before the impact over the largest sample: 0.09 at 20 dB; from 15 dB on the decay is noise",
         minimum=0.01,
         maximum=1.0,
     )
@@ -96,7 +96,7 @@ class ReceptanceSettings:
         8.0, "1", "and its incoherence is this many times theirs; half the force makes four", minimum=2.0, maximum=100.0
     )
     gain: float = setting(
-        0.02, "1", "a response this far off what the test's mean predicts is odd, if the test is steadier than that",
+        0.02, "1", "relative deviation from the mean that makes a response an outlier, if others scatter less",
         minimum=0.005, maximum=1.0,
     )  # fmt: skip
     best_impacts: int = setting(
@@ -104,7 +104,7 @@ class ReceptanceSettings:
         minimum=0, maximum=1000,
     )  # fmt: skip
     minimum_impacts: int = setting(
-        3, "", "with fewer accepted impacts the limits of the coherence say nothing", minimum=2, maximum=100
+        3, "", "with fewer accepted impacts the limits of the coherence carry no information", minimum=2, maximum=100
     )
     force_window: bool = setting(False, "", "set the force to zero after the contact: for noisy force channels")
     exponential_window: float = setting(

@@ -15,7 +15,7 @@ class TrendSettings:
         "values within this of a campaign's first belong to it: it may last into the night; work that resets ends it",
         minimum=0.0,
     )
-    earliest_year: int = setting(1990, "", "an older time stamp is a clock that was never set", minimum=1900)
+    earliest_year: int = setting(1990, "", "an older time stamp comes from a clock that was never set", minimum=1900)
     clock_gap_days: float = setting(
         400.0, "d", "a lone last campaign this long after every other is taken for a wrong clock", minimum=1.0
     )
@@ -101,5 +101,5 @@ class TrendSettings:
     )
     horizon_years: float = setting(20.0, "a", "a limit reached later than this counts as no limit", minimum=1.0)
     worklist_rows: int = setting(
-        20, "", "rows of the list, what a person can act on in a day; open alarms are listed beyond it", minimum=1
+        20, "", "rows of the worklist, what a person can act on in a day; open alarms are listed beyond it", minimum=1
     )

@@ -1,8 +1,8 @@
 -- The newest campaign that a chart rests on; newest_measurement() would follow a clock that runs ahead.
 create or replace macro newest_charted() as (select max(last_measured_at_utc) from chart_status);
 
--- One row per chart: chart_status on a day at or after the newest campaign. A chart that nobody has measured since for
--- long is not measured, also where the whole fleet is silent; a turnout's median is as old as the newest of its charts.
+-- One row per chart: chart_status on a day at or after the newest campaign. A chart without a
+-- campaign for long is 'not_measured', also if the whole fleet has none; the median of a turnout is as old as its newest chart.
 -- is_coupled: the alarm of one resonance follows from the component of the other, which is in alarm as well.
 create or replace macro chart_status_on("asof") as table
 select * exclude (is_silent) replace (
@@ -170,7 +170,7 @@ where coalesce("asof" >= newest_charted(), true);
 -- section_id | varchar | | section; * = median of the turnout's sections
 -- band | varchar | | which resonance
 -- source | varchar | | hammer or passage: never mixed in one chart
--- state | varchar | | what the chart says today
+-- state | varchar | | state of the chart on that day
 -- reason | varchar | | why: see docs/trends.md
 -- last_measured_at_utc | timestamp | UTC | newest campaign with a value
 -- n_campaigns | integer | | campaigns with a value

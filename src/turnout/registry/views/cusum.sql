@@ -86,4 +86,4 @@ window history as (
 -- cusum_up | double | | sum for a gain
 -- threshold_down | double | | limit of cusum_down
 -- threshold_up | double | | limit of cusum_up
--- state | varchar | | what the campaign says
+-- state | varchar | | state of the chart after this campaign

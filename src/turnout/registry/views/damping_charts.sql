@@ -41,4 +41,4 @@ from banded c
 -- expected_high_damping | double | | upper end
 -- residual_pct | double | % | measured minus expected, of the baseline's damping ratio
 -- z | double | | residual in its guarded standard deviations with memory
--- state | varchar | | what the campaign says
+-- state | varchar | | state of the chart after this campaign

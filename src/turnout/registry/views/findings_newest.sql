@@ -1,5 +1,5 @@
--- One row per finding that still stands: of one of its sections at least, its visit's is the newest diagnosis. A finding
--- ends when each of its sections was looked at again, in whatever groups: what is measured differs from visit to visit.
+-- One row per finding that is still valid: for at least one of its sections its visit is the newest diagnosis. A finding
+-- ends when each of its sections was diagnosed again, in any group, because the sections differ from visit to visit.
 -- needs: findings_current
 create or replace view findings_newest as
 select * from findings_current

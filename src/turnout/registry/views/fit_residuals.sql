@@ -1,6 +1,6 @@
--- One row per passage and score (fit, forecast), mean of its sensors: what its train type, speed and axle load each contribute.
+-- One row per passage and score (fit, forecast), mean of its sensors: the contributions of train type, speed and axle load.
 -- Least squares with a level per train type and slopes in speed and axle load, per section: the ground of fit_effects
--- and fit_adjusted. Where a fifth of the loads is missing they are left out, and the speed stands for them.
+-- and fit_adjusted. If a fifth of the loads is missing, they are left out, and the slope in speed contains their effect.
 -- Windows only, no part twice: a condition on turnout_id or section_id reaches the files.
 -- needs: section_scores
 create or replace view fit_residuals as

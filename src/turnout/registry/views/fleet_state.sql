@@ -26,7 +26,7 @@ from turnouts t left join measured using (turnout_id) left join passed using (tu
 
 -- columns of fleet_state
 -- turnout_id | varchar | | turnout, as in config/turnouts.tsv
--- name | varchar | | name for people
+-- name | varchar | | name for display
 -- line | varchar | | railway line
 -- km | double | km | position along the line
 -- layout | varchar | | layout it follows, config/layouts/<layout>.yaml

@@ -1,4 +1,4 @@
--- One row per place where an effect grows, named or accepted: when it reaches a size, as an interval of dates. The line
+-- One row per position where an effect grows, named or accepted: when it reaches a size, as an interval of dates. The line
 -- through all visits is known with an error; the dates are those at which its 95 % limits reach the size (Fieller 1954).
 -- needs: parameter_growth, in_service
 create or replace macro growth_to_limit(effect := 'hanging_sleeper', quantity := 'gap', size_limit := 0.002) as table

@@ -11,7 +11,7 @@ order by gap_m_per_year desc;
 
 -- columns of hanging_sleepers_that_grow(above := 0.0003)
 -- turnout_id | varchar | | turnout
--- position_m | double | m | place of the sleeper, to 0.1 m
+-- position_m | double | m | position of the sleeper, to 0.1 m
 -- gap_m | double | m | gap at the newest visit
 -- gap_se_m | double | m | its standard error
 -- gap_m_per_year | double | m/a | growth of the gap

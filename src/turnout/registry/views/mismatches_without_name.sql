@@ -1,4 +1,4 @@
--- One row per turnout and group of sections whose newest visit differs from the simulation, and nobody can say by what.
+-- One row per turnout and group of sections whose newest visit differs from the simulation by an effect without a name.
 -- needs: findings_newest, in_service
 create or replace view mismatches_without_name as
 select

@@ -1,7 +1,7 @@
 -- One row per chart and campaign since a date: the residual of the chart, recomputed from modes and baselines.
 -- corrected_pct: 100 (f / f0 - 1) - b (T - T0) - level of the epoch. residual_pct: the same minus the median of the
 -- other sections of the turnout, where the chart uses them and three are there, minus their usual difference.
--- Sections in alarm are nobody's sibling, nor are those that learn their level, except of others that learn too.
+-- Sections in alarm are not siblings, nor are those that learn their level, except for others that learn too.
 -- A campaign may last into the next day: a value belongs to the last campaign that began before it.
 -- needs: chart_values
 create or replace macro mode_residuals(since) as table
@@ -77,7 +77,7 @@ from siblings;
 -- source | varchar | | hammer or passage: never mixed in one chart
 -- measured_at_utc | timestamp | UTC | start of the campaign
 -- epoch | integer | | epoch of the chart, 0 from the first campaign
--- state | varchar | | what the campaign says
+-- state | varchar | | state of the chart after this campaign
 -- frequency_hz | double | Hz | undamped natural frequency, mean over impacts
 -- corrected_pct | double | % | deviation from the baseline at its temperature, minus the level of the epoch
 -- sibling_median_pct | double | % | median of the other sections' corrected_pct; empty where they do not serve

@@ -10,7 +10,7 @@ from models t anti join superseded s on t.model_id = s.old_id;
 -- section_id | varchar | | section
 -- campaign_id | varchar | | campaign
 -- measured_at_utc | timestamp | UTC | time of the campaign
--- method | varchar | | joint: both modes on the unfiltered decay; paper: 200 Hz split, 2 + 2; frf: averaged frequency responses, no impact could be judged
+-- method | varchar | | joint: both modes on the unfiltered decay; paper: 200 Hz split, 2 + 2; frf: averaged frequency responses, no impact could be checked
 -- status | varchar | | what the model is good for
 -- reason | varchar | | first reason of a rejection
 -- measured_value | double | | number behind the reason

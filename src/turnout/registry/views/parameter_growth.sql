@@ -1,7 +1,7 @@
--- One row per turnout, effect, place, sensor and parameter that was named or accepted: its latest value, and its growth.
+-- One row per turnout, effect, position, sensor and parameter that was named or accepted: its latest value, and its growth.
 -- A straight line through all visits, each weighted by its standard error; NULL with a single visit. Visits before
 -- ballast work on their sections, unless it is only planned, do not count for effects of the ballast. is_open: no newer
--- visit looked at its sections.
+-- visit diagnosed its sections.
 -- needs: findings_newest
 create or replace view parameter_growth as
 with undone as (

@@ -14,7 +14,7 @@ order by s.passed_at_utc, s.channel;
 -- passed_at_utc | timestamp | UTC | time of the passage
 -- passage_id | varchar | | passage
 -- model_id | varchar | | model that predicted
--- status | varchar | | what the fit says: accepted = beyond its null band, null_explains = inside it, not_an_impulse = beyond it, but the wheels do not act as impulses
+-- status | varchar | | result of the fit: accepted = beyond its null band, null_explains = inside it, not_an_impulse = beyond it, but the wheels do not act as impulses
 -- fit_pct | double | % | in-sample fit, the paper's equation 22 repaired
 -- fit_null_pct | double | % | 95 % quantile of the same fit with random pole pairs
 -- forecast_pct | double | % | forecast skill

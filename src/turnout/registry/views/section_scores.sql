@@ -1,5 +1,5 @@
--- One row per passage and section: the mean scores of its sensors. They hear the same wheels: three sensors are no three
--- trains, and a standard error of sensors taken as trains is too small.
+-- One row per passage and section: the mean scores of its sensors. They record the same wheels: three sensors are not
+-- three trains, and a standard error over sensors instead of trains is too small.
 -- needs: passage_scores
 create or replace view section_scores as
 select

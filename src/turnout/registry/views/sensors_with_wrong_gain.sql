@@ -1,4 +1,4 @@
--- One row per sensor whose newest visit says that it reads too much or too little: 1 is right.
+-- One row per sensor with a wrong gain at the newest visit; 1 is the right gain.
 -- needs: parameter_growth, in_service
 create or replace view sensors_with_wrong_gain as
 select

@@ -407,7 +407,7 @@ create or replace view worklist as select * from worklist(newest_measurement());
 -- last_maintenance | varchar | | newest work on the section
 -- look_at | varchar | | what to look at
 -- diagnosis | varchar | | of an alarm or a campaign to confirm: what has changed by the diagnosis, or why there is no decision; where alarm and diagnosis differ, in what; empty = no alarm
--- name | varchar | | name for people
+-- name | varchar | | name for display
 -- line | varchar | | railway line
 -- km | double | km | position along the line
 -- n_in_all | bigint | | rows that the list would have without an end
@@ -442,7 +442,7 @@ create or replace view worklist as select * from worklist(newest_measurement());
 -- last_maintenance | varchar | | newest work on the section
 -- look_at | varchar | | what to look at
 -- diagnosis | varchar | | of an alarm or a campaign to confirm: what has changed by the diagnosis, or why there is no decision; where alarm and diagnosis differ, in what; empty = no alarm
--- name | varchar | | name for people
+-- name | varchar | | name for display
 -- line | varchar | | railway line
 -- km | double | km | position along the line
 -- n_in_all | bigint | | rows that the list would have without an end
