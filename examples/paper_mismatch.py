@@ -156,9 +156,9 @@ This page repeats the mismatch that the publication reports, and its name.
 *Made by `python -m examples.paper_mismatch`; every number comes from that run. The recordings are simulated.*
 
 Barkhordari et al. simulate one car over the turnout, calibrated on receptances of the unloaded track. It agrees with
-the recording below 40 Hz and is too strong from 40 to 300 Hz at A4. They blame the number of rail cross sections and
-stop there. Their recording is not public, so which effect it was cannot be found out here. What can be shown is what
-this program says when the same thing happens for a reason that is known, and concealed from it.
+the recording below 40 Hz and is too strong from 40 to 300 Hz at A4. They suspect the number of rail cross sections.
+Their recording is not public, so the true effect cannot be determined. This page shows the answer of the program when
+a known effect, which is concealed from it, causes the same mismatch.
 
 ## The case
 The track of `config/tracks/tommerup.yaml`, sensors A1 and A4 (0.6 m and 9.0 m from
@@ -168,11 +168,11 @@ hammer meets the unloaded pad: however well the track is calibrated on impacts, 
 
 {excess}
 
-How much stronger the simulation is than the recording. The draw of scatter and roughness was chosen so that the
-pattern is the publication's: right below 40 Hz, too strong above. Of another draw the same effect makes another pattern
-(seed 11: A1 too strong, A4 too weak), which is one more reason not to guess a cause from a band. The diagnosis asks
+Level of the simulation over that of the recording. The seed of scatter and roughness was chosen so that the pattern is
+that of the publication: right below 40 Hz, too strong above. With another seed the same effect has another pattern
+(seed 11: A1 too strong, A4 too weak), so a cause should not be guessed from a band. The diagnosis uses
 passages up to 112 Hz; recording and simulation pass the same filter, which ends at 140 Hz, as the spectra show. Above,
-roughness that no simulation knows dominates, so the upper half of the publication's band is not looked at.
+unknown roughness dominates, so the upper half of the publication's band is not used.
 
 ![Power spectral density at A1 and A4](paper_mismatch.svg)
 
@@ -193,13 +193,12 @@ Leaders with five:
 {ranking_more}
 
 ## Why
-An effect that grows with load looks, under a single train, like anything that makes the loaded track differ from the
-struck one: free numbers that any intact turnout needs (pads, ballast, gains, speed, load, waves of the rail) take up
-most of it. One train is not enough to name anything. Other axle loads and speeds add evidence; how much, `turnout
-distinguish` says before anybody measures. Where the fit on a held-out train stays low beside the answer "none",
-thresholds hide what is there: a low fit is worth a look whatever the answer. A coarse description of the rail's
-shape, which the publication suspects, is a fault of the simulation and not of the track: that is what the answer
-"numerics" is for, and the tool looks for it first, by halving step and mesh.
+Under a single train, an effect that grows with load looks like any other difference between the loaded track and that
+of the hammer test. Nuisance parameters (pads, ballast, gains, speed, load, waves of the rail) absorb most of it. One
+train is not enough to name anything. Other axle loads and speeds add evidence; `turnout distinguish` computes how much
+before a measurement. Examine a low fit on a held-out train even if the answer is "none". A coarse description of the
+rail's shape, which the publication suspects, is a fault of the simulation and not of the track. The answer "numerics"
+is for this case: the tool checks it first, by halving step and mesh.
 
 What was concealed: {concealed}. {outcome}
 """

@@ -116,9 +116,9 @@ This page shows that the diagnosis finds the nonlinear spring of a measured osci
 *Made by `python -m examples.silverbox [FOLDER]`; every number comes from that run. Recording: Wigren and Schoukens
 2013, Three free data sets for development and benchmarking in nonlinear system identification; SNLS80mV.csv.*
 
-An electronic circuit that behaves as a mass on a spring that hardens. The diagnosis gets what a measuring campaign
-would give - input, output, a linear second-order model with wide priors - and a library of {n_laws} laws, one of which
-is right. It is fitted to five realisations of a multisine. Two recordings are reserved, read by nothing but the
+An electronic circuit that behaves as a mass on a hardening spring. The diagnosis gets the data of a measuring
+campaign (input, output, a linear second-order model with wide priors) and a library of {n_laws} laws, one of which
+is right. It is fitted to five realisations of a multisine. Two recordings are reserved for the
 verification: another multisine, and the *arrow*, a sweep that grows beyond whatever was fitted.
 
 ## Without prior knowledge
