@@ -57,8 +57,8 @@ WITHOUT_LIMIT: dict[str, Any] = {
     "forecast": None,
     "forecast_slope_pct_per_year": np.nan,
     "forecast_slope_se_pct_per_year": np.nan,
-    "not_before_utc": np.datetime64("NaT"),
-    "not_after_utc": np.datetime64("NaT"),
+    "not_before_utc": np.datetime64("NaT", "us"),
+    "not_after_utc": np.datetime64("NaT", "us"),
 }
 
 
@@ -185,7 +185,7 @@ def describe_flagged(status: pd.DataFrame, flags: Mapping[int, Flag], settings: 
     for name, dtype in COLUMNS.items():
         column = np.full(len(status), None if dtype is object else np.nan, dtype=object if dtype is object else float)
         if "datetime" in str(dtype):
-            column = np.full(len(status), np.datetime64("NaT"), dtype="datetime64[us]")
+            column = np.full(len(status), np.datetime64("NaT", "us"), dtype="datetime64[us]")
         for i, description in descriptions.items():
             column[i] = description[name]
         status[name] = column

@@ -266,7 +266,7 @@ def timestamps(day: ArrayLike) -> np.ndarray:
     """
     day = np.asarray(day, dtype=float)
     micro = np.round(np.nan_to_num(day) * SECONDS_PER_DAY).astype("int64") * 1_000_000
-    return np.where(np.isfinite(day), micro.view("datetime64[us]"), np.datetime64("NaT"))
+    return np.where(np.isfinite(day), micro.view("datetime64[us]"), np.datetime64("NaT", "us"))
 
 
 def believable_times(time: np.ndarray, settings: TrendSettings, until: float = np.inf) -> tuple[np.ndarray, float]:
