@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
+from turnout.registry.arrow_arrays import arrow_array, arrow_table, from_numpy
 from turnout.registry.ids import content_id
 from turnout.registry.schema import FILLED_BY_REGISTER, Column, names, tables
 
@@ -124,9 +125,9 @@ def gather(table: str, arrivals: Iterable[Arrival]) -> tuple[pa.Table, list[Refu
         for i in wrong:
             value = repr(values[i])[:200]
             bad.setdefault(i, Refusal(units[i], table, row_numbers[i], column.name, value, f"of type {column.type}"))
-    marks = {"_unit": pa.array(units, pa.int32()), "_row": pa.array(row_numbers, pa.int32())}
-    marks |= {"_year": pa.array(years, pa.int32()), "_result_id": pa.array(result_ids, pa.string())}
-    gathered = pa.table(arrays | marks)
+    numbers = {"_unit": units, "_row": row_numbers, "_year": years}
+    marks = {name: arrow_array(values, pa.int32()) for name, values in numbers.items()}
+    gathered = arrow_table(arrays | marks | {"_result_id": arrow_array(result_ids, pa.string())})
     if bad:
         gathered = gathered.filter(pa.array([i not in bad for i in range(len(rows))]))
     return gathered, refusals + [bad[i] for i in sorted(bad)]
@@ -192,15 +193,17 @@ def _convert(column: Column, values: Sequence) -> pa.Array:
     if column.is_list:
         return _lists(column, values)
     if column.type == "timestamp":
-        parsed = {v: _time(v) for v in set(values)}
-        return pa.array([parsed[v] for v in values], pa.timestamp("us"))
+        distinct = list(set(values))
+        parsed = arrow_array([_time(v) for v in distinct], pa.timestamp("us"))
+        positions = {v: k for k, v in enumerate(distinct)}
+        return parsed.take(from_numpy(np.array([positions[v] for v in values], np.int64)))
     if pa.types.is_floating(column.arrow) or pa.types.is_integer(column.arrow):
         kinds = set(map(type, values))
         if not kinds.isdisjoint((bool, str, np.bool_)):
             raise TypeError("text or truth value where a number belongs")
         if pa.types.is_integer(column.arrow) and float in kinds:  # pa.array would silently truncate
             return pa.array(values, pa.float64()).cast(column.arrow)
-    return pa.array(values, column.arrow)
+    return arrow_array(values, column.arrow)
 
 
 def _time(value: Any) -> datetime | None:
@@ -232,9 +235,10 @@ def _lists(column: Column, values: Sequence) -> pa.Array:
     flat = np.concatenate(arrays) if arrays else np.zeros(0)
     lengths = np.array([0 if v is None else np.size(v) for v in values], dtype=np.int64)
     offsets = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int32)
-    missing = pa.array(np.array([v is None for v in values], dtype=bool), pa.bool_())
-    return pa.ListArray.from_arrays(
-        pa.array(offsets),
-        pa.array(flat.astype(element_type.to_pandas_dtype()), element_type),
-        mask=missing if len(values) else None,
-    )
+    if pa.types.is_string(element_type):
+        elements = arrow_array(flat.tolist(), element_type)
+    else:
+        elements = from_numpy(flat.astype(element_type.to_pandas_dtype()))
+    is_valid = np.packbits(np.array([v is not None for v in values], dtype=bool), bitorder="little")
+    buffers = [pa.py_buffer(is_valid.tobytes()), pa.py_buffer(offsets)]
+    return pa.Array.from_buffers(column.arrow, len(values), buffers, children=[elements])

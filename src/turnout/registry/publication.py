@@ -53,7 +53,7 @@ def publish(registry_dir: Path, generation: Generation) -> None:
     expired = _expired_generations(root, generation.number, now)
     due = _due_for_deletion(generation, expired)
     entry = root / HISTORY_FOLDER / f"{generation.number:06d}-{now.strftime(TIME_FORMAT)}.json"
-    former = [path for number, (path, _) in history(root).items() if number >= generation.number]
+    former = [path for number, (path, _) in _entries(root).items() if number >= generation.number]
     entry.parent.mkdir(parents=True, exist_ok=True)
     write_durably(entry, generation.to_json().encode())
     for path in former:  # of a run that was killed before its generation was published
@@ -61,13 +61,13 @@ def publish(registry_dir: Path, generation: Generation) -> None:
     commit(root, generation)
     build_database(root, generation)
     delete_files(root, due)
-    for number, (path, _) in history(root).items():
+    for number, (path, _) in _entries(root).items():
         if number < max(expired, default=0):
             path.unlink(missing_ok=True)
 
 
 def history(registry_dir: Path) -> dict[int, tuple[Path, datetime]]:
-    """Kept generations.
+    """Kept generations, without one that is being published now or that a killed run left unpublished.
 
     Parameters
     ----------
@@ -79,6 +79,13 @@ def history(registry_dir: Path) -> dict[int, tuple[Path, datetime]]:
     dict of int to (Path, datetime)
         Number -> file, time of publication in UTC; in the order of the numbers.
     """
+    entries = _entries(registry_dir)  # first: what is published meanwhile is left out as a whole
+    newest = load(Path(registry_dir)).number
+    return {number: entry for number, entry in entries.items() if number <= newest}
+
+
+def _entries(registry_dir: Path) -> dict[int, tuple[Path, datetime]]:
+    """The same with generations that are not published."""
     entries: dict[int, tuple[Path, datetime]] = {}
     for path in sorted((Path(registry_dir) / HISTORY_FOLDER).glob("*.json")):
         if match := _ENTRY.fullmatch(path.name):
@@ -107,10 +114,8 @@ def find_generation(registry_dir: PathLike | str, as_of: int | str | datetime) -
         If it is not kept, or ``as_of`` is neither a number nor a time.
     """
     root = Path(registry_dir)
-    now, generations = load(root), {}
-    for number, (path, time) in history(root).items():
-        if number <= now.number:
-            generations[number] = path, time
+    generations = history(root)
+    now = load(root)
     if isinstance(as_of, int) or str(as_of).strip().isdigit():
         wanted = int(as_of) if isinstance(as_of, int) else int(str(as_of))
     else:
@@ -143,7 +148,7 @@ def _expired_generations(root: Path, number: int, now: datetime) -> set[int]:
     A generation expires a day after its publication and two generations later. One with an unknown time (of an earlier
     version of the program), or a time that is still to come (the clock was wrong), expires two generations later.
     """
-    times = {n: time for n, (_, time) in history(root).items()}
+    times = {n: time for n, (_, time) in _entries(root).items()}
     oldest = min((n for n, time in times.items() if now - KEPT_TIME < time <= now), default=number)
     return {n for n in range(number - N_KEPT_GENERATIONS + 1) if n < oldest or times.get(n, now) > now}
 

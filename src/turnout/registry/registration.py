@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
+from turnout.registry.arrow_arrays import arrow_array, arrow_table
 from turnout.registry.database import build_database, is_behind
 from turnout.registry.generation import GENERATION_FILE, Generation, commit, schema_of
 from turnout.registry.ids import content_id
@@ -189,7 +190,7 @@ class Registration:
         # a result that is live may have lost rows
         if self.before.incomplete or not arrivals or not self.before.of("results"):
             return arrivals
-        offered_ids = pa.table({"result_id": pa.array([a.result_id for a in arrivals], pa.string())})
+        offered_ids = arrow_table({"result_id": arrow_array([a.result_id for a in arrivals], pa.string())})
         self.con.register("_asked", offered_ids)
         live = self.con.execute(
             "select result_id from old_results semi join _asked using (result_id) anti join dead on result_id = old_id"

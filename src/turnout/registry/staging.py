@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import duckdb
 import pyarrow as pa
 
+from turnout.registry.arrow_arrays import arrow_array, arrow_table
 from turnout.registry.ids import content_id
 from turnout.registry.intake import Arrival, Refusal
 from turnout.registry.schema import create_table, key, names, tables
@@ -72,9 +73,9 @@ def note_arrivals(con: duckdb.DuckDBPyConnection, arrivals: list[Arrival]) -> No
     arrivals : list of Arrival
         Units of a chunk.
     """
-    columns = {"_unit": "index", "unit_id": "unit", "result_id": "result_id", "algo": "algo"}
-    unit_rows = pa.table({name: pa.array([getattr(a, of) for a in arrivals]) for name, of in columns.items()})
-    con.register("_arrivals", unit_rows)
+    columns = {"unit_id": "unit", "result_id": "result_id", "algo": "algo"}
+    texts = {name: arrow_array([getattr(a, of) for a in arrivals], pa.string()) for name, of in columns.items()}
+    con.register("_arrivals", arrow_table({"_unit": arrow_array([a.index for a in arrivals], pa.int32())} | texts))
     con.execute("insert into came select * from _arrivals")
     con.unregister("_arrivals")
 

@@ -127,3 +127,12 @@ def test_an_entry_of_a_run_that_was_killed_before_its_generation_counted_is_not_
     assert count_as_of(merged.registry, "2999-01-01") == 3
     merged.register(hammer("t2"))
     assert not lost.exists() and count_as_of(merged.registry, 5) == 4
+
+
+def test_a_generation_that_is_not_published_yet_is_not_listed(merged):
+    """Its file is written first; a run that is killed then leaves it behind."""
+    path = merged.registry / HISTORY_FOLDER / "000005-20260101T000000000000Z.json"
+    path.write_bytes((merged.registry / "_generation.json").read_bytes())
+    assert max(history(merged.registry)) == 4 == load(merged.registry).number
+    with pytest.raises(RegistryError, match="no generation of 5 is kept"):
+        open_registry(merged.registry, as_of=5)
