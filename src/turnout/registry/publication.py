@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from turnout.errors import RegistryError
 from turnout.registry.database import build_database
 from turnout.registry.generation import (
+    GENERATION_FILE,
     N_KEPT_GENERATIONS,
     Generation,
     commit,
@@ -45,20 +46,25 @@ def publish(registry_dir: Path, generation: Generation) -> None:
     Raises
     ------
     RegistryError
-        If ``registry.duckdb`` cannot be written; the generation is published by then.
-    OSError
-        If the disk fails or is full; then the former generation stays.
+        If the disk fails or is full, or without write permission; then the former generation stays. Or if
+        ``registry.duckdb`` cannot be written; the generation is published by then.
     """
     root, now = Path(registry_dir), datetime.now(UTC)
     expired = _expired_generations(root, generation.number, now)
     due = _due_for_deletion(generation, expired)
     entry = root / HISTORY_FOLDER / f"{generation.number:06d}-{now.strftime(TIME_FORMAT)}.json"
     former = [path for number, (path, _) in _entries(root).items() if number >= generation.number]
-    entry.parent.mkdir(parents=True, exist_ok=True)
-    write_durably(entry, generation.to_json().encode())
-    for path in former:  # of a run that was killed before its generation was published
-        path.unlink(missing_ok=True)
-    commit(root, generation)
+    try:
+        entry.parent.mkdir(parents=True, exist_ok=True)
+        write_durably(entry, generation.to_json().encode())
+        for path in former:  # of a run that was killed before its generation was published
+            path.unlink(missing_ok=True)
+        commit(root, generation)
+    except OSError as error:
+        raise RegistryError(
+            f"cannot write {GENERATION_FILE} in {root}: {error}. The new rows do not count yet: make room or give "
+            "write permission, then run again."
+        ) from error
     build_database(root, generation)
     delete_files(root, due)
     for number, (path, _) in _entries(root).items():

@@ -1,5 +1,6 @@
 """Killed at any moment, out of space, locked out: nothing lost, nothing half, and the same bytes afterwards."""
 
+import errno
 import os
 import random
 import shutil
@@ -136,6 +137,26 @@ def test_a_locked_registry_is_said_and_left_alone(bench, hammer):
     assert bench.ask("select count(*) from modes") == [(1,)], "reading needs no lock"
     bench.register()
     assert bench.ask("select count(*) from modes") == [(2,)]
+
+
+@pytest.mark.parametrize("code", [errno.EACCES, errno.ENOSPC, errno.EIO])
+@pytest.mark.parametrize("part", ["generations", "_generation.json"])
+def test_a_list_that_cannot_be_written_is_said_and_the_former_one_counts(part, code, bench, hammer, monkeypatch):
+    bench.register(hammer())
+    replace = os.replace
+
+    def fails(source, target):
+        if part in str(target):
+            raise OSError(code, os.strerror(code), str(target))
+        replace(source, target)
+
+    monkeypatch.setattr(os, "replace", fails)
+    with pytest.raises(RegistryError, match=f"cannot write _generation.json in .*{os.strerror(code)}"):
+        bench.register(hammer(section="A2"))
+    monkeypatch.undo()
+    assert bench.ask("select count(*) from models") == [(1,)]
+    bench.register(hammer(section="A2"))
+    assert bench.ask("select count(*) from models") == [(2,)]
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
