@@ -8,10 +8,14 @@ is fitted to all campaigns by least absolute deviations. Errors that are the sam
 """
 
 import os
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from datetime import date
+from importlib.resources import files
 from zlib import crc32
 
+import duckdb
 import numpy as np
+import pandas as pd
 from scipy.stats import binom
 
 from benchmarks.bar import Bar, stopwatch
@@ -23,11 +27,24 @@ from turnout.stages.hammer import identify_accepted
 
 SEEDS = tuple(int(s) for s in os.environ.get("TURNOUT_BENCH_FLEETS", "1,2").split(","))
 BANDS, QUANTITIES = ("ballast", "railpad"), ("frequency", "damping")
-N_CAMPAIGN, EVERY = 24, 2
+N_CAMPAIGN = 24
+EVERY = int(os.environ.get("TURNOUT_BENCH_EVERY", "2"))  # 1 uses all campaigns and takes twice as long
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """One section in one campaign: number of the turnout, factors of ballast and railpad, modes by band."""
+
+    turnout: int
+    section: str
+    factors: tuple[float, float]
+    modes: dict
+    day: date
+    temperature: float
 
 
 def fleet_modes(seed):
-    """A row per section and every second campaign: turnout, section, factors, modes by band. No hanging sleepers."""
+    """The sections of every second campaign, without hanging sleepers."""
     settings = load_configuration("config").turnout(FLEET[0].turnout).settings
     days, rows = campaign_days(N_CAMPAIGN), []
     for number, scenario in enumerate(FLEET):
@@ -47,7 +64,8 @@ def fleet_modes(seed):
                     recordings += [replace(r, source=f"{section}_{test}") for r in records]
                 impacts = find_track_impacts(recordings, "force", "rail", settings["receptance"])
                 model = identify_accepted(impacts, settings["receptance"], settings["identify"])[2]
-                rows.append((number, section, factors, {band: model.mode(band) for band in BANDS}))
+                modes = {band: model.mode(band) for band in BANDS}
+                rows.append(Campaign(number, section, factors, modes, day, round(temperature, 1)))
     return rows
 
 
@@ -62,19 +80,49 @@ def law_residual(x, y):
     return residual
 
 
-def interval_groups(rows):
+def own_intervals(rows):
+    """{(row, band, quantity): (low, high)} of the campaigns themselves."""
+    return {
+        (k, band, quantity): (getattr(mode, quantity + "_low"), getattr(mode, quantity + "_high"))
+        for k, row in enumerate(rows)
+        for band, mode in row.modes.items()
+        if mode is not None
+        for quantity in QUANTITIES
+    }
+
+
+def history_intervals(rows):
+    """The same from the view ``mode_intervals``, which has the history of each section."""
+    modes = pd.DataFrame([
+        {
+            "model_id": k, "band": band, "turnout_id": row.turnout, "section_id": f"{row.turnout}/{row.section}",
+            "measured_at_utc": pd.Timestamp(row.day), "epoch": 0, "rail_temperature_c": row.temperature,
+            "source": "hammer", "frequency_hz": mode.frequency, "damping_ratio": mode.damping,
+            "frequency_repeatability_hz": mode.frequency_repeatability,
+            "damping_repeatability": mode.damping_repeatability,
+        }
+        for k, row in enumerate(rows) for band, mode in row.modes.items() if mode is not None
+    ])  # fmt: skip
+    with duckdb.connect() as connection:
+        connection.register("epochs", modes)
+        for view in ("students_t", "mode_intervals"):
+            connection.execute(files("turnout.registry").joinpath(f"views/{view}.sql").read_text(encoding="utf-8"))
+        found = connection.execute("select model_id, band, quantity, value_low, value_high from mode_intervals")
+        return {(k, band, quantity): (low, high) for k, band, quantity, low, high in found.fetchall()}
+
+
+def interval_groups(rows, intervals):
     """Of each group its name, the campaigns, the coverage, and the median half width over the exact one."""
     for section in SECTIONS:
         for band in BANDS:
-            chosen = [(n, factors, modes[band]) for n, s, factors, modes in rows if s == section and modes[band]]
-            x = np.array([[*(n == k for k in range(len(FLEET))), *np.log(factors)] for n, factors, _ in chosen], float)
             for quantity in QUANTITIES:
-                value, low, high = (
-                    np.array([getattr(mode, quantity + end) for _, _, mode in chosen]) for end in ("", "_low", "_high")
-                )
+                index = [k for k, row in enumerate(rows) if row.section == section and (k, band, quantity) in intervals]
+                x = [[*(rows[k].turnout == n for n in range(len(FLEET))), *np.log(rows[k].factors)] for k in index]
+                value = np.array([getattr(rows[k].modes[band], quantity) for k in index])
+                low, high = np.array([intervals[k, band, quantity] for k in index]).T
                 if quantity == "frequency":
                     value, low, high = np.log(value), np.log(low), np.log(high)
-                error = law_residual(x, value)
+                error = law_residual(np.array(x, float), value)
                 inside = (error <= value - low) & (-error <= high - value)
                 exact = np.quantile(np.abs(error), 0.95)
                 yield (section, band, quantity), len(value), inside.mean(), np.median(0.5 * (high - low)) / exact
@@ -84,18 +132,23 @@ def demonstration_coverage():
     """Coverage and width of nominal 95 % intervals on the fleet of the demonstration, for each seed."""
     for seed in SEEDS:
         with stopwatch() as watch:
-            groups = list(interval_groups(fleet_modes(seed)))
-        coverage, width = (np.array([g[column] for g in groups]) for column in (2, 3))
-        inside = int(np.sum((coverage >= 0.93) & (coverage <= 0.97)))
-        chance = sum(_chance_inside(n) for _, n, _, _ in groups)
-        worst = min(groups, key=lambda g: g[2])
-        name, n = f"fleet of seed {seed}: ", f"n={len(groups)} groups of {groups[0][1]}"
-        note = f"intervals of exactly 95 % would give {chance:.0f}; mean coverage {coverage.mean():.3f}"
-        yield Bar(name + "groups with a coverage of 93 to 97 %", inside, 30, sense=">=", n=n, note=note)
-        below = f"{int(np.sum(coverage < 0.9))} groups below 0.90"
-        yield Bar(name + "lowest coverage", worst[2], 0.90, sense=">=", n=n, note=f"{' '.join(worst[0])}; {below}")
-        note = f"largest {width.max():.1f}, {watch.cpu:.0f} CPU s"
-        yield Bar(name + "median width over the exact one", float(np.median(width)), 1.3, n=n, note=note)
+            rows = fleet_modes(seed)
+        for name, intervals in (("own intervals", own_intervals), ("with history", history_intervals)):
+            yield from _bars(f"fleet of seed {seed}, {name}: ", list(interval_groups(rows, intervals(rows))), watch.cpu)
+
+
+def _bars(name, groups, seconds):
+    coverage, width = (np.array([g[column] for g in groups]) for column in (2, 3))
+    inside = int(np.sum((coverage >= 0.93) & (coverage <= 0.97)))
+    chance = sum(_chance_inside(n) for _, n, _, _ in groups)
+    worst = min(groups, key=lambda g: g[2])
+    n = f"n={len(groups)} groups of {groups[0][1]}"
+    note = f"intervals of exactly 95 % would give {chance:.0f}; mean coverage {coverage.mean():.3f}"
+    yield Bar(name + "groups with a coverage of 93 to 97 %", inside, 30, sense=">=", n=n, note=note)
+    below = f"{int(np.sum(coverage < 0.9))} groups below 0.90"
+    yield Bar(name + "lowest coverage", worst[2], 0.90, sense=">=", n=n, note=f"{' '.join(worst[0])}; {below}")
+    note = f"largest {width.max():.1f}, {seconds:.0f} CPU s"
+    yield Bar(name + "median width over the exact one", float(np.median(width)), 1.3, n=n, note=note)
 
 
 def _chance_inside(n):

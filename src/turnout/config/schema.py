@@ -372,7 +372,7 @@ HAMMER = {
     **FILES,
     "force": Key("text", "channel of the hammer", required=True),
     "response": Key("text", "channel that the models are identified from", required=True),
-    "validation": Key("text", "second channel, only compared with; null: none", nullable=True),
+    "validation": Key("text", "second response; identify.second_response says what for; null: none", nullable=True),
     "channels": NamedEntries(CHANNEL, NAME, "one entry per channel", required=True),
 }
 PASSAGES = {

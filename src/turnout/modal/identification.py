@@ -51,7 +51,8 @@ def identify(
     method : "joint" or "paper", optional
         ``settings.method`` by default.
     options
-        Options of the method: ``leads`` (the samples before each decay) for "paper".
+        Options of the method: ``leads`` (the samples before each decay) for "paper", ``second`` (the decays of a second
+        response to the same impacts, which has the same modes) for "joint".
 
     Returns
     -------

@@ -13,6 +13,7 @@ import numpy as np
 from turnout.modal.bands import choose_bands, fit_receptance
 from turnout.modal.mixed_effects import MIN_DAMPING
 from turnout.modal.noise import whiten
+from turnout.modal.second_response import second_records, with_second_response
 from turnout.modal.selection import Selection, select_modes
 from turnout.modal.state_space import assemble, no_decays, no_model
 from turnout.modal.summary import ImpactEstimates, cramer_rao_bound
@@ -181,6 +182,7 @@ def identify_joint(
     settings: IdentifySettings,
     receptance: Receptance | None = None,
     leads: Sequence[np.ndarray] | None = None,
+    second: Sequence[np.ndarray] | None = None,
 ) -> ModalModel:
     """Modal model of one section by joint identification; see :func:`turnout.modal.identify`.
 
@@ -198,6 +200,8 @@ def identify_joint(
         Receptance whose gate rejects modes and whose H1 gives the residues; None: no gate.
     leads : sequence of array or None
         Not used.
+    second : sequence of (n,) arrays of float, optional
+        Decays of a second response to the same impacts, which has the same modes. [m/s²]
 
     Returns
     -------
@@ -208,9 +212,12 @@ def identify_joint(
     if not len(records):
         return no_decays(rate, "joint", dropped)
     selection, records, index, dropped = _select_without_outliers(records, index, dropped, rate, settings)
+    pair = None if second is None or selection.fit is None else second_records(second, index, records.shape[1])
+    if pair is not None:
+        selection = with_second_response(selection, records, pair, rate, settings)
     choice = choose_bands(selection, settings, receptance)
     estimates, modes = _band_modes(selection, choice, records, index, rate, settings)
-    diagnostics = fit_diagnostics(selection, index, dropped)
+    diagnostics = fit_diagnostics(selection, index, dropped) | {"responses": 1 + (pair is not None)}
     model_fields: dict[str, Any] = {
         "rejections": tuple(choice.rejections),
         "rejected_modes": tuple(choice.rejected_modes),
@@ -300,7 +307,9 @@ def _estimates(
     fit = selection.mode_fit
     white = whiten(records, selection.whitening)
     columns = selection.background.columns(white.shape[1], rate)
-    bound = cramer_rao_bound(fit.theta, white, rate, fit.sigma2, columns)
+    bound = selection.bound
+    if bound is None:
+        bound = cramer_rao_bound(fit.theta, white, rate, fit.sigma2, columns)
     error = np.sqrt(np.einsum("ijj->ij", fit.covariance)).reshape(fit.unshrunken.shape)
     strength = np.linalg.norm(records, axis=1)
     systematic = systematic_error(own_estimates(fit, rate), selection.rival_modes, settings.spread_maximum)

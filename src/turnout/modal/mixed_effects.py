@@ -199,7 +199,8 @@ def fit_mixed(
     drift : (n_drift, n) array of float
         Further columns of the model.
     theta : (n_decay, n_mode, 2) array of float, optional
-        Modes of each decay from an earlier fit; ``start`` is then not used.
+        Modes of each decay from an earlier fit; ``start`` is then not used. With fewer rows than ``decays``, the decays
+        of an impact (its responses) follow each other and share their modes; "decay" below then means impact.
     iterations : int
         Largest number of iterations.
     tolerance : float
@@ -231,7 +232,10 @@ def fit_mixed(
         sigma2 = max(linearisation.rss.sum() / dof, 1e-300)
         rss.append(float(linearisation.rss.sum()))
         free, covariance, variance, spread, centre, shrunken = shrink(
-            theta.reshape(n_decay, -1), linearisation.information, linearisation.score, sigma2
+            theta.reshape(n_decay, -1),
+            linearisation.information.reshape(n_decay, -1, 2 * n_mode, 2 * n_mode).sum(axis=1),
+            linearisation.score.reshape(n_decay, -1, 2 * n_mode).sum(axis=1),
+            sigma2,
         )
         shrunken = _limit_step(shrunken.reshape(theta.shape), theta)
         change = np.max(np.abs((shrunken - theta).reshape(n_decay, -1)) / np.sqrt(variance + spread))

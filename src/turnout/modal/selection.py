@@ -296,6 +296,7 @@ class Selection:
     ``chi_squared`` and ``amplitude`` (n_decay, n_mode). ``residual_power`` (n_decay,) is the power of the residual.
     ``failed_tests`` maps modes that stay in the fit but belong to no band to (reason, value, limit).
     ``rival_modes`` are the modes of the explanations that were not chosen, with their own errors.
+    ``bound`` (n_mode, 2) is the Cramér-Rao bound where more than these decays were used, None otherwise.
     ``rejected`` lists mappings of frequency, damping, reason, value and limit. ``whitening`` and ``background``
     describe the rest of the model.
     """
@@ -312,6 +313,7 @@ class Selection:
     background: Background = field(default_factory=Background)
     failed_tests: dict = field(default_factory=dict)
     rival_modes: list[OwnEstimates] = field(default_factory=list)
+    bound: np.ndarray | None = None
 
     @property
     def mode_fit(self) -> MixedFit:

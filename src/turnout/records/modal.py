@@ -49,10 +49,10 @@ class Mode:
     """One resonance: ``frequency`` [Hz] undamped, ``damping`` ratio, with standard errors and interval.
 
     ``*_se`` is the standard error of the campaign value. It adds two parts in squares: ``*_repeatability`` from the
-    spread of its ``n`` impacts, and ``*_systematic`` from the choice among models that explain the impacts. ``*_sd`` is
-    the spread between impacts after subtraction of the estimation error of each impact. ``*_low`` and ``*_high`` are
-    the two-sided 95 % interval, for damping within 0 and 1. ``*_crb`` is the Cramér-Rao bound of the same decays, as a
-    standard error.
+    spread of its ``n`` impacts, and ``*_systematic`` from what the modes leave of all impacts alike, and from the
+    choice among explanations. ``*_sd`` is the spread between impacts after subtraction of the estimation error of each
+    impact. ``*_low`` and ``*_high`` are the two-sided 95 % interval, for damping within 0 and 1. ``*_crb`` is the
+    Cramér-Rao bound of the same decays, as a standard error.
     ``band`` is "ballast", "railpad" or "other". ``energy`` is the mode's share of the energy of the decay.
     """
 

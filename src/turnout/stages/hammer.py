@@ -98,7 +98,11 @@ def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root: str | Path, algo: 
     # all impacts of the campaign at once: a fault of a whole file shows in comparison with the others
     found = find_track_impacts(recordings, force, response, turnout.settings["receptance"])
     settings = turnout.settings
-    impacts, receptance, model = identify_accepted(found, settings["receptance"], settings["identify"])
+    second = _second_response(recordings, turnout.hammer, unit.section, settings["receptance"])
+    is_joint = settings["identify"].second_response == settings["identify"].method == "joint"
+    impacts, receptance, model = identify_accepted(
+        found, settings["receptance"], settings["identify"], second if is_joint else {}
+    )
     tests = {path: _test_number(turnout, unit, path) for path in ids}
     rows["impacts"] = [impact_row(i, base, tests[i.source], ids[i.source]) for i in impacts]
     temperature = campaign.rail_temperature
@@ -111,11 +115,12 @@ def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root: str | Path, algo: 
     required = turnout.settings["receptance"].gate_level
     if receptance is None:
         return rows | {"models": [model_row(model, base, identity, counts, None)], "modes": []}
-    second = _second_response(recordings, turnout.hammer, unit.section, used, settings["receptance"])
+    # a response that took part in the identification validates nothing
+    validation = [] if is_joint else [second[key] for i in used if (key := (i.source, i.record)) in second]
     model_columns = model_row(model, base, identity, counts, _lowest_gate_level(receptance, model))
     receptance_columns = receptance_row(receptance, required, model, used[0].decay, base, identity)
     return rows | {
-        "models": [model_columns | validation_columns(model, _cut(second, settings["identify"]))],
+        "models": [model_columns | validation_columns(model, _cut(validation, settings["identify"]))],
         "modes": mode_rows(model, receptance, base, identity, temperature),
         "impact_modes": [impact_mode_row(e, base, identity, names[e["impact"]]) for e in model.per_impact],
         "receptances": [receptance_columns | density_columns(used, receptance_columns["frequency_hz"])],
@@ -123,19 +128,14 @@ def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root: str | Path, algo: 
 
 
 def _second_response(
-    recordings: Sequence[Recording],
-    hammer: HammerConfig,
-    section: str,
-    used: Sequence[Impact],
-    settings: ReceptanceSettings,
-) -> list[Impact]:
-    """The accepted impacts of the identification with the second response, where the layout has one."""
+    recordings: Sequence[Recording], hammer: HammerConfig, section: str, settings: ReceptanceSettings
+) -> dict[tuple[str, int], Impact]:
+    """The accepted impacts on the second response by source and record; empty where the layout or a file has none."""
     channel = hammer.validation.get(section)
     if channel is None or any(channel not in [c.name for c in r.channels] for r in recordings):
-        return []
-    names = {(i.source, i.record) for i in used}
+        return {}
     impacts = find_impacts(recordings, hammer.force[section], channel, settings)
-    return [i for i in impacts if i.accepted and (i.source, i.record) in names]
+    return {(i.source, i.record): i for i in impacts if i.accepted}
 
 
 def _cut(impacts: Sequence[Impact], settings: IdentifySettings) -> list[Impact]:
@@ -229,7 +229,10 @@ def _round_rate(rate: float) -> float:
 
 
 def identify_accepted(
-    impacts: Sequence[Impact], receptance_settings: ReceptanceSettings, identify_settings: IdentifySettings
+    impacts: Sequence[Impact],
+    receptance_settings: ReceptanceSettings,
+    identify_settings: IdentifySettings,
+    second: Mapping[tuple[str, int], Impact] | None = None,
 ) -> tuple[Sequence[Impact], Receptance | None, ModalModel]:
     """Receptance and modes of one section from its accepted impacts.
 
@@ -241,6 +244,8 @@ def identify_accepted(
         All impacts of the section, rejected ones included.
     receptance_settings : ReceptanceSettings
     identify_settings : IdentifySettings
+    second : mapping of (str, int) to Impact, optional
+        A second response to the impacts by source and record. It is used where all used impacts have it.
 
     Returns
     -------
@@ -257,10 +262,12 @@ def identify_accepted(
         if len(used) < n_required:
             return impacts, None, _rejected_model(len(used), n_required, impacts)
         receptance = receptance_of(used, receptance_settings)
-        lead_arguments: dict[str, Any] = {}
+        options: dict[str, Any] = {}
         if identify_settings.method == "paper":
-            lead_arguments = {"leads": [i.acceleration[: i.decay_start] for i in used]}
-        model = identify([i.decay for i in used], used[0].rate, identify_settings, receptance, **lead_arguments)
+            options = {"leads": [i.acceleration[: i.decay_start] for i in used]}
+        elif second and all((i.source, i.record) in second for i in used):
+            options = {"second": [second[i.source, i.record].decay for i in used]}
+        model = identify([i.decay for i in used], used[0].rate, identify_settings, receptance, **options)
         rejected = {id(used[k]): rejection for k, rejection in model.diagnostics.get("dropped_impacts", ())}
         if not rejected:
             return impacts, receptance, model

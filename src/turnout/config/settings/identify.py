@@ -14,6 +14,11 @@ class IdentifySettings:
         why="joint: all modes on the unfiltered decay; paper: 200 Hz split, 2 + 2, -11 to +8 % off in simulation",
         choices=("joint", "paper"),
     )
+    second_response: str = setting(
+        "validate",
+        why="what a second response is for; validate: the model is compared with it; joint: its poles count, too",
+        choices=("validate", "joint"),
+    )
     duration: float = setting(
         0.03, "s", "4 to 6 decay times of the paper's ballast modes; more adds noise", minimum=0.004, maximum=1.0
     )

@@ -1,0 +1,80 @@
+"""Intervals of modes from the history of their section equal an independent computation, and cover as they promise."""
+
+from datetime import date, timedelta
+
+import numpy as np
+import pytest
+from registry_rows import hammer_result
+from scipy.stats import t
+
+from turnout.registry.database import open_registry
+
+N, REPEATABILITY, BETWEEN, SLOPE = 25, 0.002, 0.006, -0.0015  # relative, and per °C
+
+
+def campaigns(section, rng, between=BETWEEN, step=None):
+    """Results of N campaigns, and (frequency, temperature) of each; ``step`` (campaign, factor) changes the section."""
+    temperature = np.round(10.0 + 10.0 * np.sin(np.arange(N) * 0.8) + rng.normal(0.0, 3.0, N), 1)  # as stored
+    log_f = np.log(150.0) + SLOPE * temperature + rng.normal(0.0, np.hypot(REPEATABILITY, between), N)
+    if step is not None:
+        log_f[step[0] :] += np.log(step[1])
+    results = []
+    for k in range(N):
+        day = (date(2024, 1, 10) + timedelta(days=40 * k)).isoformat()
+        f = float(np.exp(log_f[k]))
+        values = {"rail_temperature_c": float(temperature[k]), "frequency_repeatability_hz": REPEATABILITY * f}
+        results.append(hammer_result(day=day, file=day, key=f"{section}{k}", section=section, frequency=f, **values))
+    return results, log_f, temperature
+
+
+def between_variance(log_f, temperature):
+    """Scatter between campaigns beyond their repeatability, from steps."""
+    step, warmer = np.diff(log_f), np.diff(temperature)
+    residual = step - (step @ warmer) / (warmer @ warmer) * warmer
+    residual = residual[np.abs(residual) <= 6 * 1.4826 * np.median(np.abs(residual))]
+    return max(0.0, residual @ residual / (len(residual) - 1) / 2 - REPEATABILITY**2), len(residual)
+
+
+def test_the_interval_is_that_of_the_steps_of_its_section_and_the_mean_of_the_fleet(bench):
+    rng = np.random.default_rng(5)
+    histories = {
+        "A1": campaigns("A1", rng), "A2": campaigns("A2", rng, 0.02), "A3": campaigns("A3", rng, step=(12, 0.7)),
+    }  # fmt: skip
+    bench.register(*(result for history in histories.values() for result in history[0]))
+    estimates = {name: between_variance(*history[1:]) for name, history in histories.items()}
+    fleet = np.mean([variance for variance, _ in estimates.values()])
+    for name, (variance, n) in estimates.items():
+        freedom = 1 + 2 * (n - 1) / 3
+        expected = np.sqrt((fleet + (freedom - 1) * variance) / freedom)
+        rows = bench.ask(
+            "select value, value_low, value_high, between_campaigns_pct, n_steps from mode_intervals"
+            f" where section_id = 't1/{name}' and quantity = 'frequency' order by measured_at_utc"
+        )
+        value, low, high, between, n_steps = np.array(rows, float).T
+        np.testing.assert_allclose(np.log(value), histories[name][1], atol=1e-5)  # stored with three decimals
+        assert set(n_steps) == {n} and n == (N - 2 if name == "A3" else N - 1)  # the change of A3 is no scatter
+        np.testing.assert_allclose(between, 100 * expected, rtol=1e-3)
+        half = t.ppf(0.975, freedom) * np.hypot(REPEATABILITY, expected)
+        np.testing.assert_allclose(np.log(high / low) / 2, half, rtol=0.01)
+
+
+def test_intervals_cover_the_law_of_temperature_in_19_of_20_campaigns(bench):
+    """Twelve sections of 25 campaigns: .95 ± .025 (two standard errors)."""
+    rng = np.random.default_rng(6)
+    histories = [campaigns(f"S{k}", rng) for k in range(12)]
+    bench.register(*(result for history in histories for result in history[0]))
+    with open_registry(bench.registry) as connection:
+        rows = connection.execute(
+            "select i.value_low, i.value_high, m.rail_temperature_c from mode_intervals i"
+            " join modes_current m using (model_id, band) where quantity = 'frequency'"
+        ).fetchall()
+    low, high, temperature = np.array(rows).T
+    law = 150.0 * np.exp(SLOPE * temperature)
+    assert len(rows) == 12 * N
+    assert np.mean((low <= law) & (law <= high)) == pytest.approx(0.955, abs=0.025)
+
+
+def test_seven_campaigns_are_no_history(bench):
+    results, _, _ = campaigns("A1", np.random.default_rng(7))
+    bench.register(*results[:7])
+    assert bench.ask("select * from mode_intervals") == []
