@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from turnout.passage.wheel_basis import WheelBasis
 
 ACCEPTED, NULL, NOT_AN_IMPULSE, REJECTED = "accepted", "null_explains", "not_an_impulse", "rejected"
-PEAK_ONLY = "peak_only"  # by configuration: not scored
+PEAK_ONLY = "peak_only"  # not scored: by configuration, or without a model of the section
 LEAD_TIME = 0.25  # s before the first wheel, in which the band-pass settles
 
 
@@ -70,7 +70,7 @@ def fit_channel(
     rate: float,
     axle_times: np.ndarray,
     speed: float,
-    model: ModalModel,
+    model: ModalModel | None,
     settings: PassageSettings,
     other_models: Mapping[str, ModalModel] | None = None,
     with_null: bool = True,
@@ -88,8 +88,8 @@ def fit_channel(
         When the axles pass this sensor; those without a whole window in the recording are left out. [s]
     speed : float
         Speed of the train. [m/s]
-    model : ModalModel
-        Of the sensor's section.
+    model : ModalModel or None
+        Of the sensor's section. None: the section has none, and only the peak is found ("peak_only").
     settings : PassageSettings
         Settings of the passage analysis.
     other_models : mapping or None
@@ -114,11 +114,15 @@ def fit_channel(
     min_noise = converter_step(samples) / np.sqrt(12.0)  # a record constant within one step has at least this noise
     if not min_noise > 0.0:
         return ChannelFit(REJECTED, "it never changes")
+    start = _excerpt_start(samples, rate, axle_times)
+    if model is None:
+        earlier = settings.delay_search  # the delay of the impacts is unknown: all delays are allowed for
+        window = _windows(data, rate, expected - earlier * rate, settings.score_window + 2.0 * earlier)
+        return ChannelFit(PEAK_ONLY, times=expected / rate + start, peak=float(np.max(np.abs(window))))
     basis = _filtered_basis(model, rate, settings)
     delay = common_delay(delay_power(data, expected, basis, settings))
-    window = np.concatenate([data[int(t) : int(t + settings.score_window * rate)] for t in expected + delay])
+    window = _windows(data, rate, expected + delay, settings.score_window)
     peak = float(np.max(np.abs(window)))
-    start = _excerpt_start(samples, rate, axle_times)
     if not with_scores:
         return ChannelFit(PEAK_ONLY, times=(expected + delay) / rate + start, peak=peak)
     quiet = _quiet_samples(samples, rate, axle_times, speed)
@@ -161,6 +165,11 @@ def fit_channel(
         joint.prediction,
         start,
     )
+
+
+def _windows(data: np.ndarray, rate: float, begins: np.ndarray, length: float) -> np.ndarray:
+    """Data of ``length`` [s] from each of the samples ``begins``, one behind the other."""
+    return np.concatenate([data[int(begin) : int(begin + length * rate)] for begin in begins])
 
 
 def _excerpt_start(samples: np.ndarray, rate: float, axle_times: np.ndarray) -> float:

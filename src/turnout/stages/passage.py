@@ -27,6 +27,7 @@ from turnout.stages.common import quarantine_row, read_or_quarantine, recording_
 from turnout.stages.passage_rows import finding_rows, fit_row, passage_row
 from turnout.units import IGNORED
 
+NO_MODEL = "none"  # in the place of a model's id: the section has no model
 # Largest time between the file's name and its content; names in local time differ by less.
 MAX_NAME_OFFSET = timedelta(days=1)
 TIME_REMEDY = "Nobody can tell which is right. Rename it, or export it again with the right time"
@@ -295,14 +296,14 @@ def _fit_rows(
     identity: Mapping[str, Any],
     settings: PassageSettings,
 ) -> list[dict[str, Any]]:
-    """One row per sensor that recorded the train and whose section has a model."""
+    """One row per sensor that recorded the train; where its section has no model, with the peak alone."""
     clipped = {f.channel for f in passage.findings if f.reason == "clipped"}
     lost_from = {f.channel: f.time for f in passage.findings if f.reason == "sensor_lost"}
     rows = []
     latest = {label: model_at(models, identity["passed_at_utc"]) for label, models in context.models.items()}
     for sensor in sensors:
         section_model = latest.get(sensor.section)
-        if sensor.name not in passage.at_sensor or section_model is None:
+        if sensor.name not in passage.at_sensor:
             continue
         times = passage.at_sensor[sensor.name]
         lost_at = lost_from.get(sensor.name)
@@ -314,10 +315,11 @@ def _fit_rows(
             samples = recording.signal(sensor.name)
             other_models = {label: m.model for label, m in latest.items() if m is not None and label != sensor.section}
             fit = fit_channel(
-                samples, recording.rate, times, passage.train_motion.speed, section_model.model, settings, other_models,
-                with_scores=is_scored(identity["passed_at_utc"], settings.scored_share),
+                samples, recording.rate, times, passage.train_motion.speed, section_model and section_model.model,
+                settings, other_models, with_scores=is_scored(identity["passed_at_utc"], settings.scored_share),
             )  # fmt: skip
-        rows.append(fit_row(fit, sensor, section_model.model_id, turnout, identity))
+        model_id = section_model.model_id if section_model else NO_MODEL
+        rows.append(fit_row(fit, sensor, model_id, turnout, identity))
     return rows
 
 

@@ -25,15 +25,22 @@ RATE = 5000.0
 AXLES = np.array([0.8, 0.86, 1.2, 1.26])
 
 
-@pytest.fixture(scope="module")
-def fits():
-    """(scored, not scored) of the same record: noise, and an impact at each axle."""
-    rng, settings = np.random.default_rng(5), replace(PassageSettings(), null_models=5)
-    samples = 0.2 * rng.standard_normal(10000)
+def record():
+    """Noise, and an impact at each axle."""
+    samples = 0.2 * np.random.default_rng(5).standard_normal(10000)
     decay = np.exp(-200.0 * np.arange(250) / RATE) * np.sin(2 * np.pi * 600.0 * np.arange(250) / RATE)
     for k, axle in enumerate(AXLES):
         samples[int(axle * RATE) : int(axle * RATE) + 250] += (10.0 + k) * decay
-    arguments = (samples, RATE, AXLES, 40.0, paper_model("CP A7"), settings)
+    return samples, RATE, AXLES
+
+
+RECORD = record()
+
+
+@pytest.fixture(scope="module")
+def fits():
+    """(scored, not scored) of the same record."""
+    arguments = (*RECORD, 40.0, paper_model("CP A7"), replace(PassageSettings(), null_models=5))
     return fit_channel(*arguments), fit_channel(*arguments, with_scores=False)
 
 
@@ -43,6 +50,15 @@ def test_the_peak_is_that_of_the_scored_passage(fits):
     assert peak_only.peak == scored.peak and 6.0 < scored.peak < 15.0
     assert len(scored.times) == len(scored.amplitudes) == len(AXLES) and len(peak_only.times) == len(AXLES)
     assert np.allclose(scored.times, AXLES, atol=0.005)
+
+
+def test_without_a_model_the_peak_is_sought_where_any_delay_may_put_it(fits):
+    """The highest sample of the filtered record; a model finds the same one, since its windows hold all impacts."""
+    without = fit_channel(*RECORD, 40.0, None, PassageSettings())
+    assert without.status == "peak_only" and without.scores is None
+    assert without.peak == fits[0].peak and np.allclose(without.times, AXLES)
+    late = fit_channel(RECORD[0], RATE, AXLES - 0.012, 40.0, None, PassageSettings())  # all impacts 12 ms late
+    assert late.peak == without.peak
 
 
 def test_views_count_a_peak_without_scores_and_give_the_state_of_each_wheel(tmp_path):

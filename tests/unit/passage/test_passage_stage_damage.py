@@ -38,6 +38,11 @@ def on_main(snr_db=40.0):
     return replace(recording, samples=samples, channels=channels, started_at=STARTED)
 
 
+def with_model(rows):
+    """Rows of passage_fits at sections that have a model."""
+    return [fit for fit in rows["passage_fits"] if fit["model_id"] != "none"]
+
+
 def rows_of(raw, *recordings, sections=("A7", "SP")):
     """Rows of a file with these records, fitted with the models of two sections."""
     folder = raw / "tommerup_s1" / "passages"
@@ -79,7 +84,7 @@ def test_a_zero_offset_changes_nothing(channels, tmp_path):
     expected = rows_of(tmp_path / "sound", sound)
     found = rows_of(tmp_path / "offset", replace(sound, samples=sound.samples + offset))
     assert [p["status"] for p in expected["passages"]] == ["accepted"]
-    assert {f["status"] for f in expected["passage_fits"]} == {"accepted"}
+    assert {f["status"] for f in with_model(expected)} == {"accepted"}
     for table in ("passages", "passage_fits"):
         same(found[table], expected[table])
     assert found["quarantine"] == []
@@ -107,7 +112,7 @@ def test_a_converter_that_rounds_the_quiet_to_zero_has_lost_no_sensor(codes, tmp
     (passage,) = rows["passages"]
     assert (passage["status"], passage["n_axles"], passage["train_type"]) == ("accepted", 8, "IC3")
     assert passage["speed_kmh"] == pytest.approx(3.6 * 44.4, rel=3e-3)
-    assert [f["status"] for f in rows["passage_fits"]] == ["accepted", "accepted"] and rows["quarantine"] == []
+    assert [f["status"] for f in with_model(rows)] == ["accepted", "accepted"] and rows["quarantine"] == []
 
 
 @pytest.mark.parametrize("noisy_end", [False, True])
@@ -116,7 +121,7 @@ def test_a_channel_without_noise_is_fitted_with_that_of_its_converter(noisy_end,
     samples = sound.samples.copy()
     samples[3] = coarse(on_main(90.0).samples[3], 40, noisy_end)
     rows = rows_of(tmp_path, replace(sound, samples=samples))
-    assert {f["channel"]: f["status"] for f in rows["passage_fits"]} == {"A7": "accepted", "SP": "accepted"}
+    assert {f["channel"]: f["status"] for f in with_model(rows)} == {"A7": "accepted", "SP": "accepted"}
     assert rows["passages"][0]["status"] == "accepted"
 
 
