@@ -39,6 +39,7 @@ from turnout.readers.csv_header import (
     time_column,
 )
 from turnout.readers.lazy import Column, LazyColumn
+from turnout.readers.lost_entries import control_character_errors
 from turnout.readers.named_arrays import RECORD_COUNT_NAMES, SAMPLE_COUNT_NAMES, START_DATE_NAMES, START_NAMES, Metadata
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.stated_scales import entry_statements, scale_problem, scale_statements
@@ -76,6 +77,7 @@ def read_raw(source: Source) -> RawFile:
     )
     time = time_column(names, units)
     columns = read_columns(source, data, offset, separator, names, time)
+    remarks += control_character_errors(data[:offset], source)
     facts = Metadata(head, source)
     records = tuple(_records(columns, names, units, time, facts, source, entries))
     return RawFile(records, facts.count(RECORD_COUNT_NAMES), remarks)
@@ -128,10 +130,18 @@ def _columns_in_memory(
     source: Source, data: bytes | mmap, offset: int, separator: str, names: Sequence[str], time: int | None
 ) -> list[Column]:
     """All columns as arrays."""
+    context = source, data, offset, separator, names
     options = _options(data, offset, separator, len(names))
     line = _line_number(data, offset)
     end = len(data)
+    strict = options | {"parse_options": csv.ParseOptions(delimiter=separator, ignore_empty_lines=False)}
     with source.parsed_by("pyarrow", f"the numbers after line {line}"), cell_errors(source, line, names):
+        try:
+            table = csv.read_csv(io.BytesIO(memoryview(data)[offset:]), **strict)
+            if not table.column(0).null_count:  # an empty line is a row without values
+                return _checked(table, *context)
+        except pa.ArrowInvalid:
+            pass
         try:
             table = csv.read_csv(io.BytesIO(memoryview(data)[offset:]), **options)
         except pa.ArrowInvalid:
@@ -140,6 +150,13 @@ def _columns_in_memory(
                 raise
             table = csv.read_csv(io.BytesIO(memoryview(data)[offset:end]), **options)
     _check_one_block(data, offset, end, source)
+    return _checked(table, *context)
+
+
+def _checked(
+    table: pa.Table, source: Source, data: bytes | mmap, offset: int, separator: str, names: Sequence[str]
+) -> list[Column]:
+    """The columns of a table as arrays, whose marks are no marks for thousands."""
     columns = [column.to_numpy(zero_copy_only=False) for column in table.columns]
     for i, column in enumerate(columns):
         check_thousands(column, i, names[i], data, offset, separator, source)

@@ -440,6 +440,7 @@ class Assignments:
         self.channels, self.source = channels, source
         self._has_sensitivity = any(c.sensitivity is not None for c in channels)
         self._keyed: tuple[RawRecord, tuple] | None = None
+        self._stated: tuple[Any, tuple] = (None, ())  # entries, which records may share, and what they state of units
         self._rows: dict[tuple, set[int]] = {}
         self._mappings: dict[tuple, tuple[ChannelMapping, ...]] = {}
 
@@ -475,13 +476,18 @@ class Assignments:
 
     def _key_of(self, record: RawRecord) -> tuple:
         is_named = all(isinstance(c.source, int) or c.source in record.names for c in self.channels)
+        aliases = () if is_named else record.aliases
+        if self._stated[0] is not record.entries:
+            self._stated = record.entries, self._stated_of(record)
+        return record.names, record.units, aliases, tuple(record.undecided.items()), self._stated[1]
+
+    def _stated_of(self, record: RawRecord) -> tuple:
+        """What the entries of a record state about units, quantities and sensitivities."""
         sensitivities: tuple[str, ...] = ()
         if self._has_sensitivity and stated_scales.sensitivity_entries(record.entries):
             sensitivities = tuple(f"{entry.place}: {entry.name}: {entry.value}" for entry in record.entries)
-        aliases = () if is_named else record.aliases
         quantities = tuple((e.place, e.name, str(e.value)) for e in quantity_entries(record.entries))
-        stated = sensitivities, key_of_units(record.entries), quantities
-        return record.names, record.units, aliases, tuple(record.undecided.items()), stated
+        return sensitivities, key_of_units(record.entries), quantities
 
     def mappings(self, record: RawRecord, where: str) -> tuple[ChannelMapping, ...]:
         """As ``channel_mappings``.

@@ -10,7 +10,7 @@ from functools import lru_cache
 
 from turnout.errors import ReadError
 from turnout.readers.named_arrays import START_NAMES
-from turnout.readers.source import CONDITIONS, RawRecord, Source
+from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawRecord, Source
 
 MIN_NAME_SIZE = 5  # characters: shorter names resemble many
 START = "start time"
@@ -52,6 +52,30 @@ def lost_entry_errors(records: Sequence[RawRecord | ReadError], source: Source) 
                 f"{entry.name[:60]!r} in {entry.place[:80]} is nearly the name of the {condition}, which is missing"
             )
             yield _error("the file", condition, problem, source)
+
+
+CONTROL_CHARACTER = re.compile(rb"[\x00-\x08\x0e-\x19\x1b-\x1f]")
+
+
+def control_character_errors(head: bytes, source: Source) -> tuple[ReadError, ...]:
+    """Remark on the head of a text file that holds bytes which are no text: entries may be lost.
+
+    Parameters
+    ----------
+    head : bytes
+        Bytes above the samples.
+    source : Source
+        The raw file.
+
+    Returns
+    -------
+    tuple of ReadError
+        At most one, with the reason ``condition_lost``.
+    """
+    if (match := CONTROL_CHARACTER.search(head)) is None:
+        return ()
+    problem = f"byte {match[0][0]:#04x} in its head is no text: entries of the head may be lost"
+    return (source.error(f"byte {match.start()}", problem, COPY_AGAIN, reason="condition_lost"),)
 
 
 def _names(record: RawRecord) -> set[str]:

@@ -13,6 +13,7 @@ import pyarrow as pa
 from pyarrow import csv
 
 from turnout.errors import ReadError
+from turnout.readers.lost_entries import control_character_errors
 from turnout.readers.named_arrays import Metadata
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, Source, number_or_text
 from turnout.readers.stated_scales import scale_problem, scale_statements
@@ -65,7 +66,8 @@ def read_raw(source: Source) -> RawFile:
             records.extend(_records(source, start, edges[k + 1], head, separator, k, len(starts)))
         except ReadError as error:
             records.append(error)
-    return RawFile(tuple(records), Metadata(head, source).count(("records",)))
+    remarks = control_character_errors(source.data[: starts[0]], source)
+    return RawFile(tuple(records), Metadata(head, source).count(("records",)), remarks)
 
 
 FIRST_WORDS = b"LabVIEW Measurement"

@@ -445,7 +445,9 @@ def raw_file(variables: Mapping, source: Source, parent: Metadata | None = None)
     records = [
         _numbered_record(value, k, len(entries), where, facts, source) for k, (value, where) in enumerate(entries)
     ]
-    return RawFile(tuple(records), expected)
+    of_records = {name for _, name in numbered}
+    lost = tuple(v for name, v in variables.items() if isinstance(v, ReadError) and name not in of_records)
+    return RawFile(tuple(records), expected, lost)
 
 
 SAMPLES_REMEDY = (

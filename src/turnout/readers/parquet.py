@@ -5,6 +5,7 @@ metadata of its field. A truncated file lacks its footer and cannot be opened; p
 """
 
 import json
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -46,6 +47,7 @@ def read_raw(source: Source) -> RawFile:
         file = pq.ParquetFile(source.path, page_checksum_verification=True)
         check_parquet(file.metadata, source)
         schema, n_row = file.schema_arrow, file.metadata.num_rows
+        remarks = tuple(_differing_copies(schema.metadata, file.metadata.metadata, source))
         rows = RowGroupReader(file) if source.lazy and "record" not in schema.names else None
         columns = _columns(file, rows)
     notes = _notes_of(schema.metadata)
@@ -89,7 +91,19 @@ def read_raw(source: Source) -> RawFile:
                 clocks=tuple((f"column {name!r}", _seconds(columns[name][span])) for name in clocks),
             )
         )
-    return RawFile(tuple(records) if n_row else (), facts.count(RECORD_COUNT_NAMES))
+    return RawFile(tuple(records) if n_row else (), facts.count(RECORD_COUNT_NAMES), remarks)
+
+
+def _differing_copies(
+    of_schema: dict[bytes, bytes] | None, of_file: dict[bytes, bytes] | None, source: Source
+) -> Iterator[ReadError]:
+    """Remark on the first entry of the metadata whose two copies differ: Arrow stores the schema once more."""
+    copies = of_file or {}
+    for name, value in (of_schema or {}).items():
+        if copies.get(name, value) != value:
+            problem = f"its two copies of the entry {name.decode('utf-8', 'replace')!r} differ"
+            yield source.error("the metadata", problem, COPY_AGAIN, reason="condition_lost")
+            return
 
 
 def _columns(file: pq.ParquetFile, rows: "RowGroupReader | None") -> dict[str, Column]:

@@ -259,29 +259,32 @@ def statements_of(entries: Iterable[Entry], k: int = 0, n: int = 1) -> list[Stat
     >>> statement.usual.rate
     25600.0
     """
-    found: dict[tuple[str, str], Statement] = {}
+    found: dict[tuple[str, str], tuple[Statement, str, bool]] = {}
     factors: dict[str, int] = {}  # by name: each channel may state the same one
     for entry in entries:
         reduction = reduction_of_name(entry.name)
-        for value in _values(entry.value, k, n):
+        values = (entry.value,) if isinstance(entry.value, PLAIN_TYPES) else _values(entry.value, k, n)
+        for value in values:
             if isinstance(value, (bool, np.bool_)) or not isinstance(value, (str, int, float, np.number)):
                 continue
             if reduction == "factor":
                 factors[entry.name.strip().casefold()] = reduction_factor(value)
             for statement in _statements_of_value(entry.name, value, type(value).__name__):
                 is_final = bool(reduction) or entry.is_defined
-                statement = replace(statement, place=entry.place, factor=0 if is_final else 1)
-                found.setdefault((entry.place, statement.text), statement)
+                found.setdefault((entry.place, statement.text), (statement, entry.place, is_final))
     factor = math.prod(factors.values())
-    return [_with_factor(statement, factor) for statement in found.values()]
+    return [_placed(statement, place, 1 if is_final else factor) for statement, place, is_final in found.values()]
 
 
-def _with_factor(statement: Statement, factor: int) -> Statement:
-    """The statement with the rate behind a reduction as a further meaning, unless it is about the samples."""
-    if not statement.factor or factor == 1 or statement.certainty != CERTAIN:
-        return replace(statement, factor=1)
+PLAIN_TYPES = (str, float, int)
+
+
+def _placed(statement: Statement, place: str, factor: int) -> Statement:
+    """The statement at its place, with the rate behind a reduction as a further meaning."""
+    if factor == 1 or statement.certainty != CERTAIN:
+        return replace(statement, place=place)
     reduced = tuple(i.divide(factor) for i in statement.intervals)
-    return replace(statement, intervals=statement.intervals + reduced, factor=factor)
+    return replace(statement, place=place, intervals=statement.intervals + reduced, factor=factor)
 
 
 @lru_cache(maxsize=4096)

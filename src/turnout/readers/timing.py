@@ -385,6 +385,7 @@ MATLAB_EPOCH = 719529  # datenum of 1970-01-01
 DATED = re.compile(
     r"\d{1,4}[-./]\s?\d{1,2}[-./]\s?\d{1,4}\D+\d{1,2}[:.h-]\d{2}|\d{8}[T _-]?\d{4,6}|\d{4}-?(?:W\d\d|\d{3}T)|\d{4}年"
 )
+ISO_CHARACTERS = re.compile(r"[\dTtWZz:+.,_ -]+")
 WORDED_DATE = re.compile(r"[^\W\d]{3,}\.?.*\d{1,2}:\d{2}")
 CLOCK = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}(?:[.,]\d{1,9})?))?")
 DOTTED_DATE = re.compile(r"(\d{1,2})\.\s?(\d{1,2})\.\s?(\d{4})[\sT,;]+(\d{1,2}):(\d{2}(?::\d{2}(?:[.,]\d{1,9})?)?)")
@@ -486,11 +487,15 @@ def parse_time(value: Any) -> datetime | None:
     if isinstance(value, str):
         if match := DOTTED_DATE.fullmatch(value.strip()):
             value = f"{match[3]}-{match[2]:0>2}-{match[1]:0>2}T{match[4]:0>2}:{match[5]}"
+        if (zone := re.search(r"[+-]\d{2}:?(\d{2})$", value.strip())) and int(zone[1]) % 15 and ":" in value:
+            return None  # no time zone has such an offset: the text is damaged
         text = re.sub(r"^(\d{4})/(\d{1,2})/(\d{1,2})(?=\D)", _with_dashes, value.strip())
+        if not ISO_CHARACTERS.fullmatch(text):  # Python skips other characters behind the microseconds
+            return _parse_worded(text)
         try:
             return datetime.fromisoformat(text)
         except ValueError:
-            return _parse_worded(text)
+            return None
     if isinstance(value, (int, float)) and math.isfinite(value):
         if 6e5 < value < 8e5:
             return datetime(1970, 1, 1) + timedelta(seconds=round((value - MATLAB_EPOCH) * 86400, 6))

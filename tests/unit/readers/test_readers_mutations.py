@@ -1,17 +1,20 @@
 """Mutated files of every format: no crash, no other samples, and no lost metadata without a message."""
 
+import base64
 import io
 import struct
 import zlib
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 import scipy.io
-from benchmarks.mutations import cases
+from benchmarks.mutations import CHANNELS, cases, intact_recordings
 
 from turnout.errors import ReadError
 from turnout.readers import read
 from turnout.readers.lost_entries import KNOWN, similar_name
+from turnout.readers.timing import parse_time
 from turnout.readers.writing import write
 from turnout.records import RawChannel, RawDescription
 
@@ -102,3 +105,30 @@ def test_only_a_comment_that_cannot_be_decoded_is_reported(comment, is_lost, tmp
     channel = RawChannel("rail", 0, "acceleration", unit="g")
     result = read("a.wav", tmp_path, RawDescription((channel,), rate=1000.0))
     assert len(result.recordings) == 1 and [e.reason for e in result.errors] == ["condition_lost"] * is_lost
+
+
+def test_copies_of_parquet_metadata_that_differ_are_reported(tmp_path):
+    """Arrow stores the schema once more, in base64: damage there changes what is read."""
+    path = write(intact_recordings("parquet"), tmp_path / "a.parquet", "parquet")
+    data = path.read_bytes()
+    copy = pq.ParquetFile(path).metadata.metadata[b"ARROW:schema"]
+    at = data.index(copy) + base64.b64decode(copy).index(b"train_type") * 4 // 3 + 4
+    path.write_bytes(data[:at] + (b"Z" if data[at : at + 1] != b"Z" else b"Y") + data[at + 1 :])
+    result = read("a.parquet", tmp_path, RawDescription(CHANNELS))
+    assert any("two copies" in error.problem for error in result.errors)
+
+
+@pytest.mark.parametrize("format", ["csv", "lvm"])
+def test_bytes_in_a_head_that_are_no_text_are_reported(format, tmp_path):
+    path = write(intact_recordings(format), tmp_path / f"a.{format}", format)
+    path.write_bytes(path.read_bytes().replace(b"train_type", b"tr\x14\xd5\x19_type"))
+    result = read(path.name, tmp_path, RawDescription(CHANNELS))
+    assert len(result.recordings) == 4
+    assert "condition_lost" in {error.reason for error in result.errors}
+
+
+def test_a_start_time_with_other_characters_or_a_zone_that_does_not_exist_is_no_time():
+    assert parse_time("2024-05-13T10:01:17.250000+00:00") is not None
+    assert parse_time("2024-05-13T10:01:17.250000l_temp+00:00") is None
+    assert parse_time("2024-05-13T10:01:17.250000+00:01") is None
+    assert parse_time("2024-05-13T10:01:17+05:45") is not None
