@@ -195,7 +195,17 @@ def element_stiffness(rail: Rail, length: float) -> np.ndarray:
 
 
 def element_mass(rail: Rail, length: float) -> np.ndarray:
-    """Consistent mass of a rail element: translation with weight m, rotation with weight ρI.
+    r"""Mass of a rail element: consistent, and for Timoshenko's beam corrected for what lies between its nodes.
+
+    Between the nodes inertia shears the element by what static shape functions lack, an error of order :math:`h^2`:
+
+    .. math:: \omega^4 m^2 h^2 w^2 / 12 \kappa G A \;=\; \omega^2 m h^2\, w' \gamma / 12
+
+    per length, by :math:`\omega^2 m w = -Q'` of the free rail and one integration by parts, with the shear
+    :math:`\gamma = P/(1+P)\,[(w_2 - w_1)/h - (\theta_1 + \theta_2)/2]` of the element. The right side is a mass.
+    With it waves have an error of order :math:`h^4`, as those of Euler-Bernoulli elements have without it. It adds
+    nothing to a rigid motion. For a rod in shear it is the mean of consistent and lumped mass (Goudreau and Taylor
+    1972, Computer Methods in Applied Mechanics and Engineering 2).
 
     Parameters
     ----------
@@ -214,7 +224,11 @@ def element_mass(rail: Rail, length: float) -> np.ndarray:
     r = rotation_functions(GAUSS_POINT, length, p)
     inertia = 0.0 if rail.beam == "euler" else rail.rotary_inertia
     weight = length * GAUSS_WEIGHT[:, None, None]
-    return (weight * (rail.mass * n[:, :, None] * n[:, None, :] + inertia * r[:, :, None] * r[:, None, :])).sum(0)
+    consistent = (weight * (rail.mass * n[:, :, None] * n[:, None, :] + inertia * r[:, :, None] * r[:, None, :])).sum(0)
+    slope = np.array([-1.0, 0.0, 1.0, 0.0])
+    shear = p / (1.0 + p) * np.array([-1.0, -0.5 * length, 1.0, -0.5 * length])
+    correction = np.outer(slope, shear)
+    return consistent + rail.mass * length / 24.0 * (correction + correction.T)
 
 
 def local_compliance(s1: float | np.ndarray, s2: float | np.ndarray, length: float, rail: Rail) -> np.ndarray:

@@ -9,6 +9,7 @@ import pytest
 from turnout.physics import TERMS, LocalBallast
 from turnout.simulate import Sensor, car, prepare_passage, uniform_track
 from turnout.simulate import discretization_error as module
+from turnout.simulate.blade import Blade
 from turnout.simulate.discretization_error import PassageCase, end_error, numerical_error
 from turnout.simulate.links import SUPPORT_FIELDS, shift_supports
 
@@ -62,8 +63,9 @@ COUNTING = [term for term in TERMS if {f.name for f in fields(term)} & set(SUPPO
 
 @pytest.mark.parametrize("term", COUNTING, ids=lambda t: t.name)
 def test_terms_stay_where_they_are_on_a_longer_track(term):
-    example, longer = term.example(), module._lengthen(TRACK, 6.0)
-    assert placed(longer, shift_supports(example, 10)) == placed(TRACK, example) != []
+    switch = TRACK.with_(blade=Blade(9.0, 12.3, 18.0, TRACK.rail, 3e8, 3e4))  # effects of a blade need one
+    example, longer = term.example(), module._lengthen(switch, 6.0)
+    assert placed(longer, shift_supports(example, 10)) == placed(switch, example) != []
 
 
 def test_no_field_that_counts_supports_is_forgotten():
