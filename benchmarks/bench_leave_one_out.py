@@ -2,9 +2,11 @@
 
 Sites are those of the generator of the blind proof, with two visits. The answer must be "unknown" at its position,
 or a declared relative; another name is wrong. TURNOUT_LEFT_OUT_SITES sets the sites of each effect (2).
+TURNOUT_LEFT_OUT_PAGE is a page whose block "leave_one_out" is replaced by the result, such as docs/mismatch.md.
 """
 
 import os
+import re
 import tempfile
 from pathlib import Path
 
@@ -18,6 +20,10 @@ from turnout_blind.score.matching import MAX_POSITION_ERROR, MIN_CLEAR_GAIN, gai
 from turnout_blind.score.names import right_names
 
 SEED, N_VISITS = 20261125, 2
+OUTCOMES = {
+    "unknown": "at its position", "right": "a relative, at its position", "elsewhere": "at another position",
+    "none": "not seen", "other": "another name",
+}  # fmt: skip
 # Name of the tool -> (kinds of the generator, relatives: effects that soften or stiffen the same support)
 LIBRARY = {
     "local_ballast": (("ballast",), ("hanging_sleeper",)),
@@ -52,6 +58,32 @@ def bars():
         "effect in the library: its name at its position", [m for m in present if m[2][0] == "right"], n, None, ""
     )
     yield Bar("CPU time of all sites", watch.cpu, None, "s")
+    if page := os.environ.get("TURNOUT_LEFT_OUT_PAGE"):
+        replace_block(Path(page), _table(present, missing, watch.cpu))
+
+
+def replace_block(page, text):
+    """Replace what stands in ``page`` between the two comments of this benchmark."""
+    begin, end = "<!-- begin leave_one_out -->", "<!-- end leave_one_out -->"
+    old = page.read_text()
+    if begin not in old or end not in old:
+        raise ValueError(f"{page}: no block between {begin} and {end}")
+    page.write_text(re.sub(f"{begin}.*{end}", lambda _: f"{begin}\n{text}\n{end}", old, flags=re.DOTALL))
+
+
+def _table(present, missing, cpu):
+    """Sites by effect: what the answer is with the effect in the library, and without it."""
+    lines = ["| concealed | left out | answer with it | answer without it |", "|---|---|---|---|"]
+    for (name, kind, (_, words)), (_, _, (outcome, other_words)) in zip(present, missing):
+        lines.append(f"| {kind} | `{name}` | {words} | {other_words} ({OUTCOMES[outcome]}) |")
+    counts = {o: sum(m[2][0] == o for m in missing) for o in OUTCOMES}
+    n = len(missing)
+    low, high = clopper_pearson(counts["other"], n)
+    lines += ["", f"Another name: {counts['other']} of {n} (95 %: {100 * low:.0f} to {100 * high:.0f} %; bar 3 %)."]
+    low, high = clopper_pearson(counts["unknown"] + counts["right"], n)
+    located = f"{counts['unknown'] + counts['right']} of {n} (95 %: {100 * low:.0f} to {100 * high:.0f} %; bar 80 %)"
+    lines += [f"At its position: {located}. {cpu:.0f} CPU s for all sites."]
+    return "\n".join(lines)
 
 
 def _bar(title, chosen, n, bar, sense):
