@@ -18,7 +18,7 @@ GAUSS_POINT = GAUSS_POINT + 0.5
 
 @dataclass(frozen=True)
 class Rail:
-    """One rail profile; ``beam`` is "timoshenko" or "euler".
+    """One rail profile; ``beam`` is "timoshenko" or "euler", ``mass_matrix`` "consistent" or "corrected".
 
     ``bending_stiffness`` EI [N m²], ``mass`` per length [kg/m], ``shear_stiffness`` κGA [N],
     ``rotary_inertia`` ρI [kg m], ``damping`` to ground per length [N s/m²].
@@ -33,10 +33,13 @@ class Rail:
     rotary_inertia: float = 0.0
     damping: float = 0.0
     beam: str = "timoshenko"
+    mass_matrix: str = "consistent"
 
     def __post_init__(self) -> None:
         if self.beam not in ("timoshenko", "euler"):
             raise SimulationError(f"rail: beam {self.beam!r} is neither 'timoshenko' nor 'euler'.")
+        if self.mass_matrix not in ("consistent", "corrected"):
+            raise SimulationError(f"rail: mass_matrix {self.mass_matrix!r} is neither 'consistent' nor 'corrected'.")
         for name in ("bending_stiffness", "mass", "shear_stiffness"):
             if not getattr(self, name) > 0.0:
                 raise SimulationError(f"rail: {name} must be above 0, got {getattr(self, name)!r}.")
@@ -99,6 +102,7 @@ def in_series(rails: Sequence[Rail], shares: Sequence[float] | np.ndarray) -> Ra
         rotary_inertia=mean("rotary_inertia"),
         damping=mean("damping"),
         beam="timoshenko" if shear_compliance else "euler",
+        mass_matrix=rails[0].mass_matrix,
     )
 
 
@@ -195,7 +199,7 @@ def element_stiffness(rail: Rail, length: float) -> np.ndarray:
 
 
 def element_mass(rail: Rail, length: float) -> np.ndarray:
-    r"""Mass of a rail element: consistent, and for Timoshenko's beam corrected for what lies between its nodes.
+    r"""Mass of a rail element: consistent, or corrected for what lies between the nodes of a Timoshenko beam.
 
     Between the nodes inertia shears the element by what static shape functions lack, an error of order :math:`h^2`:
 
@@ -225,6 +229,8 @@ def element_mass(rail: Rail, length: float) -> np.ndarray:
     inertia = 0.0 if rail.beam == "euler" else rail.rotary_inertia
     weight = length * GAUSS_WEIGHT[:, None, None]
     consistent = (weight * (rail.mass * n[:, :, None] * n[:, None, :] + inertia * r[:, :, None] * r[:, None, :])).sum(0)
+    if rail.mass_matrix == "consistent":
+        return consistent
     slope = np.array([-1.0, 0.0, 1.0, 0.0])
     shear = p / (1.0 + p) * np.array([-1.0, -0.5 * length, 1.0, -0.5 * length])
     correction = np.outer(slope, shear)

@@ -251,13 +251,14 @@ def _stretches(
 
 
 def _rail(p: ParameterSet) -> Rail:
-    p.allow_only(*RAIL_UNITS, "damping", "beam", "name")
+    p.allow_only(*RAIL_UNITS, "damping", "beam", "mass_matrix", "name")
     values = {name: p.number(name, unit) for name, unit in RAIL_UNITS.items()}
     bending = values["youngs_modulus"] * values["second_moment"]
     shear = values["shear_coefficient"] * values["shear_modulus"] * values["area"]
     rotary = values["density"] * values["second_moment"]
     damping = p.number("damping", "N s/m²", default=0.0)
-    return p.build(Rail, bending, values["mass"], shear, rotary, damping, p.get("beam", "timoshenko"))
+    kinds = p.get("beam", "timoshenko"), p.get("mass_matrix", "consistent")
+    return p.build(Rail, bending, values["mass"], shear, rotary, damping, *kinds)
 
 
 def _support_values(

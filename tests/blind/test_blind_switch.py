@@ -1,0 +1,109 @@
+"""Switch panels of the blind generator: its second rail against the library's, its files, its effects."""
+
+import numpy as np
+import pytest
+
+import turnout_blind.switch as module
+from turnout.config.parameters import read_parameters
+from turnout.simulate.blade import Blade, transfer_position
+from turnout.simulate.preparation import prepare
+from turnout.simulate.rail import Rail
+from turnout.simulate.run import Drive, run
+from turnout.simulate.track import Track
+from turnout.simulate.track_file import turnout_track
+from turnout.simulate.vehicle import car
+from turnout_blind import vehicle
+from turnout_blind.effect import load_effects
+from turnout_blind.grid import Rail as GridRail
+from turnout_blind.nominal_files import track
+from turnout_blind.run import simulate_passage
+from turnout_blind.site import SWITCH, draw_site
+from turnout_blind.strata import plan_cases
+from turnout_blind.switch import Switch, TrueBlade
+from turnout_blind.true_site import uniform_world
+
+GEOMETRY = Switch(2.2, 8.1, 0.015, 2.5, 2.7, 0.012, 4.6, 3e8, 2e4)
+SUPPORTS = {"pad": 2.5e8, "pad_damping": 2e4, "mass": 190.0, "ballast": 9e7, "ballast_damping": 6e4}
+SPEED, SENSORS, LEAD = 30.0, (2.4, 4.5, 6.6, 8.7), 0.3
+
+
+class Top:
+    """A top of the generator as a surface of the library."""
+
+    def __init__(self, top, on_blade):
+        self.top, self.on_blade = top, on_blade
+
+    def __call__(self, x, wheel=0):
+        return self.top(np.asarray(x, float))
+
+
+@pytest.fixture(scope="module")
+def wheel_forces():
+    """Force of the first wheel along the switch by both codes: (position [m], generator [N], library [N])."""
+    rail, c = Rail(6.378e6, 60.2, 2.435e8, 0.2384, 4000.0), vehicle.RAILCAR
+    world = uniform_world(length=96.0, rail=GridRail(damping=4000.0), **SUPPORTS)
+    under = np.flatnonzero(world.position > GEOMETRY.toe + 0.2)
+    gap = np.where(world.position[under] < GEOMETRY.heel, 0.0, -1.0)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "PLANED_SHARE", 1.0)  # one section, as in the library
+        chairs = np.full(under.size, GEOMETRY.chair), np.full(under.size, GEOMETRY.chair_damping)
+        world.blade = TrueBlade(GEOMETRY, under, *chairs, gap)
+        train = vehicle.Train("railcar", (c,), 0.43, 9.3e10)
+        _, force, _ = simulate_passage(world, train, SPEED, SENSORS, 0.8, LEAD)
+    values = [SUPPORTS[name] for name in ("pad", "pad_damping", "mass", "ballast", "ballast_damping")]
+    blade = Blade(GEOMETRY.toe, GEOMETRY.heel, 36.0, rail, GEOMETRY.chair, GEOMETRY.chair_damping)
+    library = Track(rail, world.position, *values, end_length=9.0, end_damping=400.0, blade=blade)
+    half = car(
+        body_mass=0.5 * c.body, body_inertia=0.5 * c.body_inertia, bogie_mass=0.5 * c.bogie,
+        bogie_inertia=0.5 * c.bogie_inertia, wheel_mass=0.5 * c.wheelset,
+        primary=(0.5 * c.primary, 0.5 * c.primary_damping), half_base=0.5 * c.base, half_pivot=0.5 * c.pivots,
+        secondary=(0.5 * c.secondary, 0.5 * c.secondary_damping),
+    )  # fmt: skip
+    surfaces = ((Top(GEOMETRY.stock_top, False),), (Top(GEOMETRY.blade_top, True),))
+    outcome = run(prepare(library, 5e-5), 0.8, (), half, Drive(SENSORS[0] - SPEED * LEAD, SPEED, surfaces=surfaces))
+    time = np.arange(force.shape[1]) * 1e-3
+    mean = np.convolve(outcome.force[0], np.ones(20) / 20.0, "same")
+    return SENSORS[0] + SPEED * (time - LEAD), force[0], np.interp(time, outcome.time, mean)
+
+
+def test_both_codes_change_the_wheel_alike(wheel_forces):
+    """Finite differences and elements, explicit and implicit: the force over 15 cm within 4 % of the load."""
+    x, generator, library = wheel_forces
+    smooth = [np.convolve(f, np.ones(5) / 5.0, "same") for f in (generator, library)]
+    inside = (x > 1.5) & (x < 11.0)
+    difference = np.abs(smooth[0] - smooth[1])[inside]
+    assert np.ptp(smooth[1][inside]) > 8e3, "the change must show"
+    assert difference.max() < 0.04 * 57e3
+    assert abs(np.mean(generator[inside]) / np.mean(library[inside]) - 1.0) < 0.005
+
+
+def test_the_file_of_the_owner_has_the_blade_and_both_tops(tmp_path):
+    site = draw_site(np.random.default_rng(3), panel=SWITCH)
+    path = tmp_path / "site.yaml"
+    path.write_text(track(site))
+    turnout = turnout_track(read_parameters(path))
+    blade = turnout.track.blade
+    assert (blade.toe, blade.heel) == pytest.approx((site.switch.toe, site.switch.heel), abs=1e-4)
+    transfer = transfer_position(turnout.surfaces("main"), blade)
+    assert site.switch.toe < transfer < site.switch.toe + site.switch.length
+    chairs = turnout.track.support[blade.slide_chairs(turnout.track)]
+    assert np.all((chairs > site.switch.toe) & (chairs < site.switch.heel)) and chairs.size >= 8
+
+
+@pytest.mark.parametrize("kind", ["chair_gap", "heel", "toe"])
+def test_an_effect_of_the_blade_grows_with_its_rung_and_is_planned_in_switch_panels_alone(kind):
+    effects = load_effects()
+    assert not any(kind in dict(p.effects) for p in plan_cases(1, effects))
+    assert any(kind in dict(p.effects) for p in plan_cases(1, effects, panel=SWITCH))
+    changes = []
+    for rung in (0, len(effects[kind].ladder) - 1):
+        rng = np.random.default_rng(8)
+        site = draw_site(rng, panel=SWITCH)
+        world = site.world.copy()
+        concealed = effects[kind].draw_concealed(rng, site, rung)
+        effects[kind].act(world, site, concealed.where, concealed.parameters)
+        train = site.true_trains["railcar"]
+        a, b = (simulate_passage(w, train, SPEED, SENSORS, 0.8, LEAD)[0] for w in (site.world, world))
+        changes.append(np.linalg.norm(a - b) / np.linalg.norm(a))
+    assert 0.0 < changes[0] < changes[1]
+    assert changes[1] > 0.05
