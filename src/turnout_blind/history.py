@@ -24,7 +24,7 @@ from turnout_blind.campaign import (
     write_passage,
 )
 from turnout_blind.nominal_files import write_configuration
-from turnout_blind.site import CROSSING, PLAIN, PlannedPassage, draw_site
+from turnout_blind.site import CROSSING, PLAIN, SWITCH, PlannedPassage, draw_site
 from turnout_blind.visibility import effect_visibility
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 NONE, START, STEP, GROWTH = PATTERNS = ("none", "start", "step", "growth")
 PATTERN_WEIGHTS = (0.25, 0.125, 0.3125, 0.3125)  # 20, 10, 25 and 25 of 80 sites
 HISTORY_EFFECTS = ("ballast", "pad", "gain", "position", "void", "dip", "nose")
+SWITCH_EFFECTS = ("chair_gap", "ballast", "heel", "void", "toe", "pad")  # in histories of switch panels
 FIRST_DAY, N_DAYS = datetime(2022, 2, 1), 730
 VISIT_JITTER = 20.0  # half the range of the uniform error of the day of a visit [d]
 GROWTH_DAYS = 365.0  # time from the first to the full size of an effect that grows [d]
@@ -56,6 +57,9 @@ GROWING = {
     "void": {"gap": lambda v, s: v * s, "seated": lambda v, s: 1.0 - (1.0 - v) * s, "growth": lambda v, s: 0.0},
     "dip": {"depth": lambda v, s: v * s},
     "nose": {"depth": lambda v, s: v * s},
+    "chair_gap": {"gap": lambda v, s: v * s},
+    "heel": {"factor": lambda v, s: v**s},
+    "toe": {"depth": lambda v, s: v * s},
 }
 
 
@@ -72,9 +76,16 @@ class HistoryPlan:
 
 
 def plan_histories(
-    seed: int, n_sites: int, effects: Mapping[str, Effect], n_passages: int = 1, n_visits: int = 4
+    seed: int,
+    n_sites: int,
+    effects: Mapping[str, Effect],
+    n_passages: int = 1,
+    n_visits: int = 4,
+    panel: str = PLAIN,
 ) -> list[HistoryPlan]:
-    """Plans of a set of histories in shuffled order, half of them in crossing panels, as all with a worn nose.
+    """Plans of a set of histories in shuffled order.
+
+    Half of them are in crossing panels, as all with a worn nose; or all in switch panels.
 
     Parameters
     ----------
@@ -88,6 +99,8 @@ def plan_histories(
         Passages at each visit.
     n_visits : int
         Visits in two years.
+    panel : str
+        ``SWITCH``: all sites are in switch panels; others have no meaning.
 
     Returns
     -------
@@ -104,7 +117,7 @@ def plan_histories(
     rng = np.random.default_rng([seed, 31])
     ends = np.rint(np.cumsum(PATTERN_WEIGHTS) * n_sites).astype(int)
     patterns = [PATTERNS[int(np.searchsorted(ends, k, side="right"))] for k in range(n_sites)]
-    kinds = [k for k in HISTORY_EFFECTS if k in effects]
+    kinds = [k for k in (SWITCH_EFFECTS if panel == SWITCH else HISTORY_EFFECTS) if k in effects]
     order = rng.permutation(n_sites)
     first, plans = int(rng.integers(len(kinds))), []
     for number, k in enumerate(order.tolist()):
@@ -113,6 +126,8 @@ def plan_histories(
         rung = int(rng.integers(n_rungs // 2, n_rungs))
         effect = None if patterns[k] == NONE else (kind, rung)
         plans.append(HistoryPlan(patterns[k], effect, (seed, 37, number), PLAIN, n_visits, n_passages))
+    if panel == SWITCH:
+        return [replace(p, panel=SWITCH) for p in plans]
     has_nose = [p.effect is not None and effects[p.effect[0]].site.get("panel") == CROSSING for p in plans]
     without_nose = rng.permutation([k for k, nose in enumerate(has_nose) if not nose]).tolist()
     crossings = {k for k, nose in enumerate(has_nose) if nose}
@@ -185,7 +200,7 @@ def parameters_at(kind: str, parameters: Mapping[str, Any], share: float) -> dic
     Parameters
     ----------
     kind : str
-        Kind of the effect, one of ``HISTORY_EFFECTS``.
+        Kind of the effect, one of ``HISTORY_EFFECTS`` or ``SWITCH_EFFECTS``.
     parameters : mapping
         Those of the full size.
     share : float

@@ -63,8 +63,8 @@ def make_set(
     progress : callable or None
         (iterable of finished cases, their number) -> iterable.
     histories : (int, int) or None
-        Number of sites with a history of two years, and of passages at each visit; None: single campaigns. ``full``,
-        ``only`` and ``panel`` have no meaning for them.
+        Number of sites with a history of two years, and of passages at each visit; None: single campaigns. ``full``
+        and ``only`` have no meaning for them, and of panels ``SWITCH`` alone has.
 
     Returns
     -------
@@ -92,7 +92,7 @@ def make_set(
     if histories is None:
         plans += plan_cases(set_seed, library, full, only, panel)[:limit]
     else:
-        plans += plan_histories(set_seed, histories[0], library, histories[1])[:limit]
+        plans += plan_histories(set_seed, histories[0], library, histories[1], panel=panel)[:limit]
     effect_folders = tuple(map(str, folders))
     jobs: list[Job] = [
         (out / "cases", truth, case_id(set_seed, k), plan, effect_folders, set_seed) for k, plan in enumerate(plans)

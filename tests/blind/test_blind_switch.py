@@ -15,6 +15,7 @@ from turnout.simulate.vehicle import car
 from turnout_blind import vehicle
 from turnout_blind.effect import load_effects
 from turnout_blind.grid import Rail as GridRail
+from turnout_blind.history import SWITCH_EFFECTS, HistoryPlan, make_history, plan_histories
 from turnout_blind.nominal_files import track
 from turnout_blind.run import simulate_passage
 from turnout_blind.site import SWITCH, draw_site
@@ -107,3 +108,15 @@ def test_an_effect_of_the_blade_grows_with_its_rung_and_is_planned_in_switch_pan
         changes.append(np.linalg.norm(a - b) / np.linalg.norm(a))
     assert 0.0 < changes[0] < changes[1]
     assert changes[1] > 0.05
+
+
+def test_histories_of_switch_panels_have_its_effects_and_grow(tmp_path):
+    effects = load_effects()
+    plans = plan_histories(5, 40, effects, panel=SWITCH)
+    assert {p.panel for p in plans} == {SWITCH}
+    assert {p.effect[0] for p in plans if p.effect} == set(SWITCH_EFFECTS)
+    plan = HistoryPlan("start", ("chair_gap", 5), (1, 2), SWITCH, n_visits=2)
+    truth = make_history(tmp_path, "site", plan, effects)
+    assert truth["severities"] == [1.0, 1.0] and truth["visible"][0]["passage_pct"] > 1.0
+    assert "slide" not in (tmp_path / "site" / "config" / "tracks" / "site.yaml").read_text()
+    assert len([*(tmp_path / "site" / "raw").rglob("passages/*.npz")]) == 2
