@@ -139,7 +139,7 @@ def _columns_in_memory(
         try:
             table = csv.read_csv(io.BytesIO(memoryview(data)[offset:]), **strict)
             if not table.column(0).null_count:  # an empty line is a row without values
-                return _checked(table, *context)
+                return _columns_of(table, *context)
         except pa.ArrowInvalid:
             pass
         try:
@@ -150,10 +150,10 @@ def _columns_in_memory(
                 raise
             table = csv.read_csv(io.BytesIO(memoryview(data)[offset:end]), **options)
     _check_one_block(data, offset, end, source)
-    return _checked(table, *context)
+    return _columns_of(table, *context)
 
 
-def _checked(
+def _columns_of(
     table: pa.Table, source: Source, data: bytes | mmap, offset: int, separator: str, names: Sequence[str]
 ) -> list[Column]:
     """The columns of a table as arrays, whose marks are no marks for thousands."""

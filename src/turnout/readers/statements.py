@@ -273,13 +273,13 @@ def statements_of(entries: Iterable[Entry], k: int = 0, n: int = 1) -> list[Stat
                 is_final = bool(reduction) or entry.is_defined
                 found.setdefault((entry.place, statement.text), (statement, entry.place, is_final))
     factor = math.prod(factors.values())
-    return [_placed(statement, place, 1 if is_final else factor) for statement, place, is_final in found.values()]
+    return [_at_place(statement, place, 1 if is_final else factor) for statement, place, is_final in found.values()]
 
 
 PLAIN_TYPES = (str, float, int)
 
 
-def _placed(statement: Statement, place: str, factor: int) -> Statement:
+def _at_place(statement: Statement, place: str, factor: int) -> Statement:
     """The statement at its place, with the rate behind a reduction as a further meaning."""
     if factor == 1 or statement.certainty != CERTAIN:
         return replace(statement, place=place)
