@@ -281,8 +281,19 @@ def visits_of(stored: Iterable[StoredVisit]) -> list[VisitInformation]:
     return visits_used
 
 
-def _with_library(answer: ModelAnswer, without: Collection[str]) -> ModelAnswer:
-    """The answer in a library ``without`` some effects: one that could only name these is "unknown"."""
+def within_library(answer: ModelAnswer, without: Collection[str]) -> ModelAnswer:
+    """The answer in a library ``without`` some effects: one that could only name these is "unknown".
+
+    Parameters
+    ----------
+    answer : ModelAnswer
+    without : collection of str
+        Names of effects that are left out.
+
+    Returns
+    -------
+    ModelAnswer
+    """
     names = tuple(name for name in answer.names if name not in without)
     if names == answer.names:
         return answer
@@ -475,7 +486,7 @@ def calibrate_turnout(
         {f"{s.visit} {s.sections}": s.answer for s in stored if s.answer not in USED_ANSWERS},
         tuple(missing),
         tuple(notes),
-        tuple(_with_library(answer, without) for answer in answers),
+        tuple(within_library(answer, without) for answer in answers),
     )
 
 

@@ -18,6 +18,7 @@ from turnout.mismatch.calibrated import (
     estimate_history,
 )
 from turnout.mismatch.calibrated.answers import (
+    ModelAnswer,
     answers_after_visits,
     change_answer,
     change_candidates,
@@ -25,7 +26,7 @@ from turnout.mismatch.calibrated.answers import (
 )
 from turnout.mismatch.turnout.calibration import dip_directions, nose_errors
 from turnout.mismatch.turnout.rail_roughness import Waves
-from turnout.stages.calibrated_model import events_of
+from turnout.stages.calibrated_model import events_of, within_library
 
 N_SUPPORT, SD, STEP = 5, 0.05, 0.5
 SUPPORTS = [StateParameter(f"ballast@{0.6 * k:.2f}", 0.0, 0.1, 0.03, "ballast", k, 0.6 * k) for k in range(N_SUPPORT)]
@@ -34,6 +35,7 @@ PARAMETERS = [*SUPPORTS, *GAINS]
 NAMES = tuple(p.name for p in PARAMETERS)
 MEAN = np.array([p.mean for p in PARAMETERS])
 CANDIDATES = change_candidates(PARAMETERS)
+SOFT_OR_GAP = ("local_ballast", "hanging_sleeper")
 
 
 def histories(rng, n_visit, change, trains_feel=1.0):
@@ -458,3 +460,23 @@ def test_a_gap_of_several_sleepers_is_told_from_soft_ballast_by_trains():
         visits = histories(np.random.default_rng(7), 6, lambda v: -1.0 * (v >= 3) * change, trains_feel)
         answer = change_answer(PARAMETERS, visits, [], all_candidates(), 12.0, 6.0, True)
         assert answer.names == names and len(answer.changed) == 3
+
+
+@pytest.mark.parametrize(
+    ("verdict", "names", "without", "expected"),
+    [
+        ("a_or_b", ("local_ballast", "hanging_sleeper"), ("hanging_sleeper",), ("named", ("local_ballast",))),
+        ("named", ("hanging_sleeper",), ("hanging_sleeper",), ("unknown", ())),
+        (
+            "a_or_b",
+            ("local_ballast", "hanging_sleeper"),
+            ("local_pad",),
+            ("a_or_b", ("local_ballast", "hanging_sleeper")),
+        ),
+        ("none", (), ("local_pad",), ("none", ())),
+    ],
+)
+def test_an_effect_that_is_left_out_is_no_name(verdict, names, without, expected):
+    """Also not as another form of an effect in the library: a gap as soft ballast that no train closes."""
+    answer = within_library(ModelAnswer("2024-02-01", "change", verdict, names), without)
+    assert (answer.verdict, answer.names) == expected
