@@ -60,7 +60,7 @@ def test_a_new_panel_is_a_function_and_one_line(monkeypatch):
 def test_a_section_that_the_configuration_does_not_know_spoils_no_page():
     """It was measured, and left the layout before it was registered."""
     text = page(sections=[SECTION | dict.fromkeys(("panel", "track", "position_m"))])
-    assert "A7: panel not configured, track not configured" in text and "None" not in text
+    assert "A7 (panel not configured, track not configured" in text and "None" not in text
 
 
 def test_a_dead_sensor_of_years_does_not_bury_what_else_is_in_quarantine():

@@ -166,17 +166,19 @@ def _section(
         for quantity, table in tables.items()
         for band in BANDS
     )
+    unused = _unused_tests(_rows_of(rows, "unused", section))
     return {
         "label": section["label"],
+        "measured": bool(model or history or unused),
         "panel": PANELS.get(section["panel"], "panel not configured"),
         "track": TRACKS.get(section["track"], "track not configured"),
         "position": f"{section['position_m']:.1f}" if section["position_m"] is not None else "–",
         "open": states.get(key) in ("confirm now", "inspect this week", "plan"),
         "when": day(model["measured_at_utc"]) if model else "none",
-        "history": history or f"<p>{'No model yet' if model else 'Not measured yet, or nothing could be read'}.</p>",
+        "history": history or "<p>No model yet.</p>",
         "panels": _panels(rows, section, model, receptance, modes) if model and receptance else "",
         "detail": model["detail"] if model else "",
-        "unused": _unused_tests(_rows_of(rows, "unused", section)),
+        "unused": unused,
     }
 
 
