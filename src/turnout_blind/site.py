@@ -176,7 +176,7 @@ def with_crossing(rng: np.random.Generator, site: Site) -> Site:
 
 
 def with_switch(rng: np.random.Generator, site: Site) -> Site:
-    """The site with long bearers from the zone boundary on, and a blade whose toe lies before it.
+    """The site with long bearers from the zone boundary on, and a blade near the sensors.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def with_switch(rng: np.random.Generator, site: Site) -> Site:
     nominal_factor, true_factor = draw_bearer_mass_ratio(rng)
     site.nominal = west, {**east, "mass": round(nominal_factor * east["mass"])}
     site.world.mass[site.world.position > boundary - 0.3] *= true_factor
-    true_switch, site.switch = draw_switch(rng, boundary)
+    true_switch, site.switch = draw_switch(rng)
     add_switch(rng, site.world, true_switch, site.trains)
     site.chains = tuple(replace(c, full_scale=5.0 * c.full_scale) for c in site.chains)  # impacts at the change
     return site

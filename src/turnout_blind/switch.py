@@ -160,23 +160,21 @@ class TrueBlade:
         return np.array([f * self.switch.stock_top(x - shift) for f, shift in wheels]), np.tile(top, (n, 1))
 
 
-def draw_switch(rng: np.random.Generator, boundary: float) -> tuple[Switch, Switch]:
-    """Switch with its toe 1 to 2.5 m before the boundary.
+def draw_switch(rng: np.random.Generator) -> tuple[Switch, Switch]:
+    """Switch with its heel and the change of the wheels near the sensors, which lie from 2 to 9 m.
 
     Parameters
     ----------
     rng : Generator
         Source of the random numbers.
-    boundary : float
-        Position where the long bearers begin. [m]
 
     Returns
     -------
     (Switch, Switch)
         True and nominal switch.
     """
-    toe, length = boundary - float(rng.uniform(1.0, 2.5)), float(rng.uniform(2.2, 3.0))
-    heel = toe + float(rng.uniform(5.5, 7.5))
+    heel, length = float(rng.uniform(7.2, 8.0)), float(rng.uniform(2.2, 3.0))
+    toe = heel - float(rng.uniform(4.6, 5.8))
     chair, damping = float(rng.uniform(2e8, 4e8)), float(rng.uniform(1.5e4, 3.5e4))
     true = Switch(
         toe, heel, float(rng.uniform(12e-3, 18e-3)), length, toe + float(rng.uniform(0.3, 0.8)),

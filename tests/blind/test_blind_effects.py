@@ -48,7 +48,7 @@ def contents(world):
 @pytest.mark.parametrize("kind", sorted(EFFECTS))
 def test_an_effect_changes_its_copy_of_the_world_and_nothing_else(kind):
     effect = EFFECTS[kind]
-    assert len(effect.ladder) == (7 if effect.stratum in ("single", "history") else 4)
+    assert len(effect.ladder) == (7 if effect.stratum in ("single", "history", "switch") else 4)
     for rung in range(len(effect.ladder)):
         site = draw_site(np.random.default_rng(rung), **effect.site)
         before, world = contents(site.world), site.world.copy()

@@ -59,5 +59,5 @@ def act(world: World, site: Site, where: Mapping[str, Any], p: Mapping[str, Any]
     world.blade.gap[world.blade.supports == where["sleeper"]] = p["gap"]
 
 
-LADDER = tuple(np.geomspace(1.5e-4, 4e-3, 6))
+LADDER = tuple(np.geomspace(1.5e-4, 4e-3, 7))
 EFFECT = Effect("chair_gap", "place", LADDER, draw, act, "switch", {"panel": "switch"})

@@ -62,5 +62,5 @@ def act(world: World, site: Site, where: Mapping[str, Any], p: Mapping[str, Any]
         world.blade.damping[first + k] *= p["factor"] ** (0.5 * exponent)
 
 
-LADDER = (0.7, 0.45, 0.25, 0.12, 0.05, 0.02)
+LADDER = (0.75, 0.5, 0.3, 0.16, 0.08, 0.04, 0.02)
 EFFECT = Effect("heel", "place", LADDER, draw, act, "switch", {"panel": "switch"})

@@ -86,5 +86,5 @@ def act(world: World, site: Site, where: Mapping[str, Any], p: Mapping[str, Any]
     world.blade.surface.append(lambda x: lost_height(x, where["position"], p["depth"], p["length"]))
 
 
-LADDER = tuple(np.geomspace(1e-4, 4e-3, 6))
+LADDER = tuple(np.geomspace(1e-4, 4e-3, 7))
 EFFECT = Effect("toe", "place", LADDER, draw, act, "switch", {"panel": "switch"})
