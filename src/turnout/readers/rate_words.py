@@ -41,6 +41,7 @@ STEP_TOKENS = {
     "steg",
     "timestep",
     "tick",
+    "dt",
 }
 TIME = re.compile(
     r"^(?:x|h|horz?|t|horizontal\w*|wf|zeit\w*|time\w*|tid|tids\w*|temps|tiempo|tempo|temporal\w*|temporel\w*|tijd\w*)$"
@@ -84,7 +85,7 @@ OTHER = re.compile(
     r"filt|pass(?!o)|cut|grenz|band|coup|cort|tagli|gra?en?s|eigen|reson|natur|modal|netz|mains|calib|kalib|tarat|etalonn|sensitiv"
     r"|servic|wart|inspec|trigg|bit|baud|start|begin|debut|inicio|inizio|stop|date(?!n)|datum|number|anzahl|count|nombre"
     r"|antal|numero|aantal|cantidad|max|range|bereich|nyquist|carrier|refresh|update|oversampl|decim|ratio|heart|rot"
-    r"|anreg|excit|sinus|sweep|\bspan\b|\bcpu\b|crystal|qu?artz|quarz|mode$|unit|einheit|label|dimension|counter|zahler|filename|offset"
+    r"|anreg|excit|sinus|sweep|\bspan\b|\bcent(?:er|re)\b|mitten|corner|octav|\bcpu\b|crystal|qu?artz|quarz|mode$|unit|einheit|label|dimension|counter|zahler|filename|offset"
 )
 # What a word of sampling with a word of rate or step leaves possible: "Signal sample rate".
 BESIDE_RATE = re.compile(r"signal|source|quelle|block|buffer|spectr|fft")

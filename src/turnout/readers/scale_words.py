@@ -30,6 +30,11 @@ POSSIBLE_FACTOR = re.compile(
     r"|abschwach|divis(?:or|eur)$|^divid|^teiler$|prescal|vorteiler|^lsb$|^pga$|^coeff?|^koeff|quantis|umrechn|conversion"
     r"|^polynom|normali[sz]|normier|^quantum$|^verst$|^amp$|^masss?tab$|^multiply$"
 )
+# Words of an amplifier, and what makes them a setting or a limit.
+STRONG_FACTOR = re.compile(r"^gains?$|verstark|forstaerk|forstark|amplific|attenuat|guadagn|gananc")
+OTHER_GAIN = re.compile(
+    r"trigg|control|mode|type|auto|date|datum|number|^n[or]$|max|min|limit|version|error|file|serial"
+)
 CALIBRATION_WORDS = frozenset("calibration cal calib kalibrierung kalibrering etalonnage taratura calibracion".split())
 CALIBRATION = re.compile(r"^(?:cal|kal)(?:ib\w*)?$|^etalonn\w*|^taratura$|^eich\w*|^(?:calib|kalib)\w*(?:wert|value)$")
 VALUE = re.compile(r"values?|wert|valeur|valore?|const\w*|konst\w*|weight|gewicht|size|v\w?rdi")
@@ -149,6 +154,8 @@ def scale_meaning(name: str) -> str:
         is_step = any(STEPS_OF_CONVERTER.fullmatch(w) for w in (words[at - 1], words[at + 1]))
         return POSSIBLY_FACTOR if is_step else ""
     is_correction = any(CORRECTION.match(word) for word in words)
+    if any(STRONG_FACTOR.search(word) for word in words):
+        return "" if any(OTHER_GAIN.search(word) for word in words) else POSSIBLY_FACTOR
     if any(OTHER_SCALE.search(word) for word in words):
         return ""
     if any(word in ("file", "name") for word in words):
