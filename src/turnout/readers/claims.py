@@ -196,10 +196,23 @@ class Hdf5Claims:
 
         if problem := _elsewhere(dataset):
             raise self.source.error(f"dataset {path!r}", problem, ELSEWHERE_REMEDY, reason="outside_root")
+        number_type = dataset.get_type()
+        if number_type.get_class() == h5py.h5t.FLOAT and not _is_ieee(number_type):
+            problem = "the description of its floating-point numbers is that of no IEEE 754 format"
+            raise self.source.error(f"dataset {path!r}", problem)
         space = dataset.get_space()
         if space.get_simple_extent_type() != h5py.h5s.NULL:
-            self.total += space.get_simple_extent_npoints() * dataset.get_type().get_size()
+            self.total += space.get_simple_extent_npoints() * number_type.get_size()
         check_size(self.total, self.source, f"dataset {path!r}")
+
+
+def _is_ieee(number_type: Any) -> bool:
+    """Whether a floating-point type is one of IEEE 754 in either byte order; damage of its header makes another one."""
+    import h5py
+
+    bits = 8 * number_type.get_size()
+    names = (f"IEEE_F{bits}{order}" for order in ("LE", "BE"))
+    return any(number_type.equal(getattr(h5py.h5t, name)) for name in names if hasattr(h5py.h5t, name))
 
 
 def check_hdf5(file: Any, source: Source) -> None:

@@ -18,7 +18,7 @@ SAMPLING = re.compile(
 WEAK_SAMPLING = re.compile(
     r"mess|mesur|medi[dc]|misur|male|maling|meas|meting|meet|record|aufzeich|enregistr|registr|logg|data|daq|adc|digit|conver|output"
 )
-RATE = re.compile(r"freq|frekv|frequ|frec|kmitoc")
+RATE = re.compile(r"freq|frq|frekv|frequ|frec|kmitoc")
 RATE_TOKENS = {
     "rate", "rates", "taux", "tasa", "cadence", "cadenza", "cadencia", "velocidad", "velocita", "vitesse", "hastighed",
     "takt", "clock", "snelheid", "tasso", "hz",
@@ -85,7 +85,7 @@ OTHER = re.compile(
     r"filt|pass(?!o)|cut|grenz|band|coup|cort|tagli|gra?en?s|eigen|reson|natur|modal|netz|mains|calib|kalib|tarat|etalonn|sensitiv"
     r"|servic|wart|inspec|trigg|bit|baud|start|begin|debut|inicio|inizio|stop|date(?!n)|datum|number|anzahl|count|nombre"
     r"|antal|numero|aantal|cantidad|max|range|bereich|nyquist|carrier|refresh|update|oversampl|decim|ratio|heart|rot"
-    r"|anreg|excit|sinus|sweep|\bspan\b|\bcent(?:er|re)\b|mitten|corner|octav|\bcpu\b|crystal|qu?artz|quarz|mode$|unit|einheit|label|dimension|counter|zahler|filename|offset"
+    r"|anreg|excit|sinus|sweep|\bspan\b|\bcent(?:er|re)\b|mitten|corner|octav|\bupper\b|\blower\b|\bring\b|\bcpu\b|crystal|qu?artz|quarz|mode$|unit|einheit|label|dimension|counter|zahler|filename|offset"
 )
 # What a word of sampling with a word of rate or step leaves possible: "Signal sample rate".
 BESIDE_RATE = re.compile(r"signal|source|quelle|block|buffer|spectr|fft")

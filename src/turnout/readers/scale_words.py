@@ -25,7 +25,7 @@ OFFSET_WORDS = frozenset(
 )
 # Words of longer names that may be a factor or an offset ("InputGain", "Kalibrierfaktor_1"): only a number counts.
 POSSIBLE_FACTOR = re.compile(
-    r"(?:^|[a-z]{2}|^b)(?<!\ba)gains?$|(?:scale?|skala|escala|scala|echelle)s?$|scaling|skali?er|fak?tore?n?$|factors?$|facteurs?$"
+    r"(?:^|[a-z]{2}|^b)(?<!\ba)gains?$|(?:scale?|skala|escala|scala|echelle)s?$|^escalad|scaling|skali?er|fak?tore?n?$|factors?$|facteurs?$"
     r"|fattor[ei]$|multipl|^mult$|verstark|vorverst|forstaerk|forstark|amplific|^preamp|guadagn|gananc|attenuat"
     r"|abschwach|divis(?:or|eur)$|^divid|^teiler$|prescal|vorteiler|^lsb$|^pga$|^coeff?|^koeff|quantis|umrechn|conversion"
     r"|^polynom|normali[sz]|normier|^quantum$|^verst$|^amp$|^masss?tab$|^multiply$"
@@ -39,7 +39,7 @@ CALIBRATION_WORDS = frozenset("calibration cal calib kalibrierung kalibrering et
 CALIBRATION = re.compile(r"^(?:cal|kal)(?:ib\w*)?$|^etalonn\w*|^taratura$|^eich\w*|^(?:calib|kalib)\w*(?:wert|value)$")
 VALUE = re.compile(r"values?|wert|valeur|valore?|const\w*|konst\w*|weight|gewicht|size|v\w?rdi")
 POSSIBLE_OFFSET = re.compile(
-    r"offset(?:wert)?$|decalage|desplazam|scostam|forskyd|^off?s$|^dc$|^removed$|^subtracted$|abgezogen|^bias$"
+    r"offset(?:wert|korrektur)?$|decalage|desplazam|scostam|forskyd|^off?s$|^dc$|^removed$|^subtracted$|abgezogen|^bias$"
     r"|intercept$|^tar[ae]$|^zero$|nullabgleich|nullpunkt|nullwert"
 )
 STEPS_OF_CONVERTER = re.compile(r"bits?|counts?|lsb|digits?|codes?|quant\w*|eu|unit|div")

@@ -132,3 +132,19 @@ def test_a_start_time_with_other_characters_or_a_zone_that_does_not_exist_is_no_
     assert parse_time("2024-05-13T10:01:17.250000l_temp+00:00") is None
     assert parse_time("2024-05-13T10:01:17.250000+00:01") is None
     assert parse_time("2024-05-13T10:01:17+05:45") is not None
+
+
+@pytest.mark.parametrize("format", ["rcmdx", "mat73"])
+def test_numbers_that_are_described_as_no_ieee_format_are_rejected(format, tmp_path):
+    """A flipped bit of the description changes every sample, and the checksum of the samples does not cover it."""
+    path = write(intact_recordings(format), tmp_path / f"a.{format}", format)
+    description = bytes([0x11, 0x20, 0x3F, 0, 8, 0, 0, 0])  # of 64 bit numbers, little endian
+    data = path.read_bytes()
+    assert description in data
+    path.write_bytes(data.replace(description, bytes([0x11, 0x00, *description[2:]])))
+    try:
+        result = read(path.name, tmp_path, RawDescription(CHANNELS, format=format))
+    except ReadError as error:
+        assert "IEEE 754" in str(error)
+        return
+    assert result.recordings == () and "IEEE 754" in str(result.errors[0])
