@@ -315,7 +315,7 @@ def _fit_rows(
             samples = recording.signal(sensor.name)
             other_models = {label: m.model for label, m in latest.items() if m is not None and label != sensor.section}
             fit = fit_channel(
-                samples, recording.rate, times, passage.train_motion.speed, section_model and section_model.model,
+                samples, recording.rate, times, passage.train_motion.speed, section_model.model if section_model else None,
                 settings, other_models, with_scores=is_scored(identity["passed_at_utc"], settings.scored_share),
             )  # fmt: skip
         model_id = section_model.model_id if section_model else NO_MODEL

@@ -141,7 +141,7 @@ def test_what_is_not_named_is_refused_unless_asked_for(config, more):
 
 
 def test_nothing_to_accept_and_what_belongs_to_a_wheelset_are_refused(config):
-    with pytest.raises(SimulationError, match="no term"):
+    with pytest.raises(SimulationError, match="no effect that could be accepted"):
         accept(finding(term_json=None, verdict="none"), config, "t1", anyway=True)
     flat = {"term": "wheel_flat", "fixed": {"wheel": 1}, "parameters": {"length": GAP}}
     with pytest.raises(SimulationError, match="belongs to a wheelset"):
