@@ -312,10 +312,10 @@ def _fit_rows(
         is_clipped = sensor.name in clipped and lost_at is None
         fit = None
         if not is_clipped and len(times) >= 2:
-            samples = recording.signal(sensor.name)
+            samples, model = recording.signal(sensor.name), section_model.model if section_model else None
             other_models = {label: m.model for label, m in latest.items() if m is not None and label != sensor.section}
             fit = fit_channel(
-                samples, recording.rate, times, passage.train_motion.speed, section_model.model if section_model else None,
+                samples, recording.rate, times, passage.train_motion.speed, model,
                 settings, other_models, with_scores=is_scored(identity["passed_at_utc"], settings.scored_share),
             )  # fmt: skip
         model_id = section_model.model_id if section_model else NO_MODEL
