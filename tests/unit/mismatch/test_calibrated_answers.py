@@ -324,6 +324,18 @@ def test_the_surface_at_a_nose_is_that_of_the_nose_and_no_dip_of_the_rail():
         assert (answer.question, answer.verdict) == ("file", verdict)
 
 
+@pytest.mark.parametrize(
+    ("size", "expected"),
+    [(-0.3, ("a_or_b", ("local_ballast", "hanging_sleeper"))), (0.3, ("named", ("local_ballast",)))],
+)
+def test_a_stretch_softer_than_in_the_file_may_as_well_have_gaps(size, expected):
+    """None of three supports has the evidence of a name; together they differ from the file."""
+    change = sum(step(f"ballast@{x:.2f}", size, 0)(0) for x in (0.6, 1.2, 1.8))
+    answer = last_answers(histories(np.random.default_rng(23), 4, lambda v: change))["file"]
+    assert (answer.verdict, answer.names) == expected and answer.gain is None
+    assert answer.position == pytest.approx(1.2, abs=0.31)
+
+
 def test_a_nose_that_wears_unevenly_is_named_at_the_nose():
     """The surface falls by two dips of different depth, of which one alone explains less than half."""
     rng, names, sd = np.random.default_rng(19), tuple(p.name for p in SURFACE), WAVES.sd

@@ -584,8 +584,11 @@ def _deviation_answer(
     first: Deviation = deviations[0]
     middle = None if first.positions is None else 0.5 * sum(first.positions)
     position = middle if middle is not None else position_of(first.names[0], by_name[first.names[0]])
+    names: tuple[str, ...] = (NAMES[first.group],)
+    if names == ("local_ballast",) and first.size < 0.0:  # as in ``_supported_names``
+        names = ("local_ballast", "hanging_sleeper")
     return ModelAnswer(
-        visit, FILE, "named", (NAMES[first.group],), ", ".join(first.names), first.group,
+        visit, FILE, "named" if len(names) == 1 else "a_or_b", names, ", ".join(first.names), first.group,
         position, first.size, first.sd, first.unit,
     )  # fmt: skip
 
