@@ -337,11 +337,12 @@ def test_a_stretch_softer_than_in_the_file_may_as_well_have_gaps(size, expected)
 
 
 def test_a_nose_that_wears_unevenly_is_named_at_the_nose():
-    """The surface falls by two dips of different depth, of which one alone explains less than half."""
+    """The surface changes by four dips and humps, of which one alone explains less than half."""
     rng, names, sd = np.random.default_rng(19), tuple(p.name for p in SURFACE), WAVES.sd
     nose = StateParameter("ln depth of the kink at 5.30 m", 0.0, 0.4, 0.0, "depth")
     directions = dip_directions(SURFACE)
-    shape = [1e-3 * (directions["dip of 0.4 m@5.00"][n] - 0.9 * directions["dip of 0.4 m@5.50"][n]) for n in names]
+    dips = {"4.90": 1.0, "5.20": -1.0, "5.50": 1.0, "5.80": -1.0}
+    shape = [1e-3 * sum(size * directions[f"dip of 0.4 m@{x}"][n] for x, size in dips.items()) for n in names]
     parameters, visits = [*SURFACE, nose], []
     truth = sd * rng.normal(size=len(sd))
     for v in range(4):
