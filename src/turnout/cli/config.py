@@ -2,7 +2,7 @@
 
 turnout config show tommerup_s1
 turnout config show tommerup_s1 --only receptance
-turnout config generate            config.yaml, JSON schemas for editors, the tables of docs/configuration.md
+turnout config generate            config.yaml, JSON schemas for editors, docs/settings.md
 turnout config generate --check    show what is out of date, change nothing
 """
 

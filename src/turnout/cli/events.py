@@ -5,7 +5,7 @@
   turnout events tommerup_s1/A7 tamping 2026-04-02 --note "machine 09-3X"
 
 An event that resets a resonance starts a new epoch of its charts: they learn the new level before they raise an alarm
-again. Each kind of work resets certain resonances (docs/configuration.md); --resets states others.
+again. Each kind of work resets certain resonances (docs/settings.md); --resets states others.
 """
 
 import argparse

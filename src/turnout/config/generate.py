@@ -1,18 +1,15 @@
-"""Files generated from the keys of settings and layouts: config.yaml, JSON schemas, docs/configuration.md."""
+"""Files generated from the keys of settings and layouts: config.yaml, JSON schemas, docs/settings.md."""
 
 import json
 import textwrap
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
 
 from turnout.config.document import load, plain_values
-from turnout.config.events import COLUMNS as EVENT_COLUMNS
-from turnout.config.events import RESETS
-from turnout.config.filename_pattern import FIELDS
+from turnout.config.key_text import describe_key, yaml_text
 from turnout.config.schema import FleetWideKey, Group, Key, NamedEntries, default_of, layout_keys, settings_keys
 from turnout.config.settings import parts
-from turnout.config.turnouts_table import ROW
+from turnout.config.settings_page import settings_page
 
 WIDTH = 112
 HEAD = """\
@@ -49,7 +46,7 @@ def generate_files(folder: Path, docs: Path, defaults: bool = False) -> dict[Pat
         Path(folder) / "schema" / "config.json": schema(settings_keys(), "config/config.yaml", whole=False),
         Path(folder) / "schema" / "layout.json": schema(layout, "config/layouts/<name>.yaml", whole=True),
         Path(folder) / "schema" / "override.json": schema(override, "config/overrides/<id>.yaml", whole=False),
-        Path(docs) / "configuration.md": _docs(Path(docs) / "configuration.md"),
+        Path(docs) / "settings.md": settings_page(),
     }
 
 
@@ -78,44 +75,10 @@ def config_yaml(present: dict) -> str:
         for field in fields(cls):
             key, default = keys[field.name], default_of(field)
             value = present.get(name, {}).get(field.name, default)
-            changed = "" if value == default else f"default {_yaml(default)}; "
+            changed = "" if value == default else f"default {yaml_text(default)}; "
             lines += textwrap.wrap(changed + describe_key(key), WIDTH, initial_indent="  # ", subsequent_indent="  # ")
-            lines.append(f"  {field.name}: {_yaml(value)}")
+            lines.append(f"  {field.name}: {yaml_text(value)}")
     return "\n".join(lines).replace("\n\n\n", "\n\n") + "\n"
-
-
-def describe_key(key: Key) -> str:
-    """Unit, limits and reason of a key as text.
-
-    Parameters
-    ----------
-    key : Key
-        Key of the schema.
-
-    Returns
-    -------
-    str
-        One line, without a full stop.
-
-    Examples
-    --------
-    >>> describe_key(Key("number", "the paper's gate", minimum=0.0, maximum=1.0))
-    "0 to 1: the paper's gate"
-    """
-    unit = "" if key.unit in ("", "-", "1") else f"[{key.unit}]"
-    limits = ""
-    if key.choices:
-        limits = " or ".join(map(str, key.choices))
-    elif key.above is not None:
-        limits = f"above {key.above:g}"
-    elif key.minimum is not None and key.maximum is not None:
-        limits = f"{key.minimum:g} to {key.maximum:g}"
-    elif key.minimum is not None:
-        limits = f"at least {key.minimum:g}"
-    elif key.maximum is not None:
-        limits = f"at most {key.maximum:g}"
-    head = " ".join(text for text in (limits, unit) if text)
-    return f"{head}: {key.meaning}" if head else key.meaning
 
 
 def schema(keys: dict, title: str, whole: bool) -> str:
@@ -171,63 +134,3 @@ def _property_schema(rule: Key | Group | NamedEntries, whole: bool) -> dict:
         result["pattern"] = f"^{rule.pattern}$"
     limits = {"minimum": rule.minimum, "maximum": rule.maximum, "exclusiveMinimum": rule.above}
     return result | {k: v for k, v in limits.items() if v is not None}
-
-
-GENERATED_MARK = "<!-- below: made by `turnout config generate` -->"
-
-
-def _docs(path: Path) -> str:
-    """docs/configuration.md: the text above the mark stays, the tables below it are generated."""
-    above = path.read_text(encoding="utf-8").partition(GENERATED_MARK)[0] if path.exists() else "# Configuration\n\n"
-    return f"{above}{GENERATED_MARK}\n\n{tables()}"
-
-
-RESETS_NOTE = """An empty `section` is the whole turnout. `resets` overrules the kind: `ballast`, `railpad`,
-`ballast railpad` or `none`. Crossing or blade renewed: `rail_change`; bearers: `sleeper_change`; deposit welding:
-`grinding`; clips tightened: `other` with `railpad`.
-"""
-
-
-def tables() -> str:
-    """Tables of all columns and keys in Markdown."""
-    blocks = ["## Columns of config/turnouts.tsv\n", _table(_flatten_keys(ROW))]
-    blocks += ["## Columns of config/events.csv\n", f"`{','.join(EVENT_COLUMNS)}`. `kind` and what it resets:\n"]
-    blocks.append("\n".join(f"- `{key}`: {' and '.join(bands) or 'nothing'}" for key, bands in RESETS.items()) + "\n")
-    blocks += [RESETS_NOTE, "## Fields of a file pattern\n"]
-    blocks += [f"- `{key}`: " + ", ".join(f"`{{{name}}}`" for name in names) for key, names in FIELDS.items()]
-    blocks += ["\n`{section}` in `hammer` is a label of the layout; `*` is anything but a slash.\n"]
-    layout = {name: rule for name, rule in layout_keys().items() if name != "settings"}
-    blocks += ["## Keys of config/layouts/*.yaml and config/overrides/*.yaml\n", _table(_flatten_keys(layout))]
-    for name, group in settings_keys().items():
-        blocks += [f"## Settings: {name}\n", group.meaning + "\n", _table(_flatten_keys(group.spec, f"{name}."), True)]
-    return "\n".join(blocks)
-
-
-def _flatten_keys(keys: dict, prefix: str = "") -> list[tuple[str, Key]]:
-    entries = []
-    for name, rule in keys.items():
-        if isinstance(rule, Key):
-            entries.append((prefix + name, rule))
-        else:
-            inner = f"{prefix}{name}." + ("<name>." if isinstance(rule, NamedEntries) else "")
-            entries += _flatten_keys(rule.spec, inner)
-    return entries
-
-
-def _table(keys: list[tuple[str, Key]], with_default: bool = False) -> str:
-    lines = [f"| key | {'default' if with_default else 'needed'} | meaning |", "|---|---|---|"]
-    for name, key in keys:
-        second_cell = f"`{_yaml(key.default)}`" if with_default else ("yes" if key.required else "")
-        text = describe_key(key).replace("|", "\\|").replace("<", "&lt;")
-        lines.append(f"| `{name}` | {second_cell} | {text} |")
-    return "\n".join(lines) + "\n"
-
-
-def _yaml(value: Any) -> str:
-    """A value in YAML notation."""
-    if isinstance(value, tuple):
-        return "[" + ", ".join(_yaml(v) for v in value) + "]"
-    if isinstance(value, str):
-        plain_word = value.replace("_", "").replace("-", "").isalpha() and value not in ("true", "false", "null")
-        return value if plain_word else json.dumps(value, ensure_ascii=False)
-    return json.dumps(value)

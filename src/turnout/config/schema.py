@@ -107,7 +107,7 @@ def suggestion(name: str, allowed: Iterable[Any], none: str = "There is none to 
     if not allowed:
         return none
     close = get_close_matches(name, allowed, n=1, cutoff=0.6)
-    listed = ", ".join(allowed) if len(allowed) <= 24 else f"{len(allowed)} names, as in docs/configuration.md"
+    listed = ", ".join(allowed) if len(allowed) <= 24 else f"{len(allowed)} names, as in docs/settings.md"
     return (f"Did you mean {close[0]!r}? " if close else "") + f"Allowed: {listed}"
 
 

@@ -1,6 +1,7 @@
 """The generated files of the repository are those that the settings give, and the program reads them."""
 
 import json
+import re
 
 import jsonschema
 import pytest
@@ -17,6 +18,29 @@ from turnout.units import to_si
 def test_generated_files_are_up_to_date(repository):
     for path, text in generate_files(repository / "config", repository / "docs", defaults=True).items():
         assert path.read_text(encoding="utf-8") == text, f"{path}: run `turnout config generate --defaults`"
+
+
+def test_the_page_of_settings_lists_every_key_once(repository):
+    """As many rows as there are keys in the schema for editors, which has the keys of a channel three times."""
+    page = (repository / "docs" / "settings.md").read_text(encoding="utf-8")
+    layout = page.partition("## Keys of config/layouts")[2].partition("## Settings:")[0]
+    rows = re.findall(r"^\| `(\w+)` \| (?:yes)? \| (.+) \|$", layout, re.M)
+    assert len(rows) == len(set(rows)) and {name for name, _ in rows} == names_of(
+        json.loads((repository / "config/schema/layout.json").read_text(encoding="utf-8"))
+    )
+    settings = re.findall(r"^\| `(\w+\.\w+)` \|", page, re.M)
+    assert settings == [f"{part}.{name}" for part, cls in sorted(parts().items()) for name in vars(cls())]
+
+
+def names_of(schema):
+    """Names of the leaves of a JSON schema, without the settings."""
+    names = set()
+    for name, rule in schema.get("properties", {}).items():
+        if name != "settings":
+            names |= names_of(rule) if rule["type"] == "object" else {name}
+    for rule in schema.get("patternProperties", {}).values():
+        names |= names_of(rule)
+    return names
 
 
 def test_the_repository_is_sound(repository):
