@@ -13,13 +13,13 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
     from typing import Any
 
-__all__ = ["accepted_parameters", "answer", "check", "facts", "parameters", "rivals", "title"]
-ANSWERS = {
-    "none": "nothing is missing",
-    "named": "named",
-    "a_or_b": "one of two",
-    "unknown": "something is missing, no name fits",
-    "numerics": "cannot tell: own numerical error",
+__all__ = ["ANSWERS", "accepted_parameters", "answer", "check", "facts", "parameters", "rivals", "title"]
+ANSWERS = {  # verdict: its word, as in docs/mismatch.md, and what it means
+    "named": ("named", "the effect that the simulation lacks"),
+    "a_or_b": ("a or b", "two effects explain the recordings equally well"),
+    "unknown": ("unknown", "no effect in the catalogue explains the difference"),
+    "numerics": ("numerics", "the numerical error of the simulation is too large"),
+    "none": ("none", "no more difference than at intact turnouts"),
 }
 
 
@@ -205,7 +205,7 @@ def answer(finding: Mapping[str, Any]) -> str:
     str
         Verdict and grade.
     """
-    words = ANSWERS[finding["verdict"]]
+    words, _ = ANSWERS[finding["verdict"]]
     return f"{words}, grade {finding['grade']}" if finding["grade"] else words
 
 
@@ -226,7 +226,7 @@ def check(finding: Mapping[str, Any]) -> str:
         return "Nothing to check."
     if finding["verdict"] == "numerics":
         return "Nothing on site: refine mesh and step of the simulation."
-    action = finding["next_measurement"] or "Look at the place; repeat the measurement"
+    action = finding["next_measurement"] or "Inspect the track at this position; repeat the measurement"
     return action.rstrip(".") + "."
 
 

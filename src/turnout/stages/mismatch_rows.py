@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 MAX_CELL_DISTANCE = 0.3  # m: a cell of the residual closer than this is at the finding
 FALSE_DISCOVERY_RATE = 0.05  # expected share of false ones among the frames reported
 SUPPORT_SPACING = 0.6  # m between supports
-GENERAL_CHECK = "Look at the place; repeat the measurement after the work"
+GENERAL_CHECK = "Inspect the track at this position; repeat the measurement after the work"
 GENERAL_TEST = "hammer tests at the points between, and a train of another load and speed"
 
 

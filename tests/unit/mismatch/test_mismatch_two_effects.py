@@ -14,6 +14,7 @@ from turnout.mismatch.engine.case import Case, Nuisance, Observation
 from turnout.mismatch.engine.decision import grade_name, judge
 from turnout.mismatch.engine.diagnose import grade_names
 from turnout.mismatch.engine.hammer_prescreen import informed_values
+from turnout.mismatch.engine.localization import ResidualSpace
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.search import Findings, Search
@@ -69,8 +70,23 @@ def test_what_shows_beside_a_name_and_gets_none_is_told():
     """A ripple that no candidate has takes nothing from the ramp, but with the ramp not all is said."""
     found = diagnose(Shapes(("wave", "ramp"), ramp=2.5, ripple=0.12))
     assert found.names == ("ramp",) and found.verdict.grade == "B"
-    assert found.verdict.reason.startswith("something else shows beside it")
+    assert found.verdict.reason.startswith("a second effect without a name remains: ")
     assert diagnose(Shapes(("wave", "ramp"), ramp=2.5)).verdict.reason == ""
+
+
+class LocatedShapes(Shapes):
+    """A ripple of any amplitude is a fault of channel A8, a bowl one of channel A9; neither is a candidate."""
+
+    def residual_spaces(self, fit):
+        columns = np.stack([SHAPES["ripple"], SHAPES["bowl"]], axis=1)
+        levels = {("sensor", name): np.eye(2)[:, [k]] for k, name in enumerate(("A8", "A9"))}
+        return [ResidualSpace((o.name,), columns, levels) for o in self.observations]
+
+
+def test_the_sentence_on_a_second_effect_without_a_name_tells_the_inspector_where_it_is():
+    found = diagnose(LocatedShapes(("wave", "ramp"), ramp=2.5, ripple=0.12))
+    assert found.names == ("ramp",)
+    assert found.verdict.reason.startswith("a second effect without a name remains in channel A8: ")
 
 
 def test_a_name_is_graded_by_what_the_last_fit_leaves():

@@ -102,7 +102,7 @@ def test_the_rule_of_a_second_name_without_improvement_keeps_the_first():
     facts = dict.fromkeys(
         ("is_choice", "both_stand", "first_is_unknown", "first_is_redundant", "second_predicts_worse"), False
     )
-    facts |= {"is_pair": True, "second_improves_nothing": True, "second": SimpleNamespace(names=("hardening",))}
+    facts |= {"is_pair": True, "second_improves_nothing": True, "second_text": "hardening"}
     rule = first_applicable(PAIR_RULES, SimpleNamespace(**facts))
     assert (rule.name, rule.answer) == ("second_does_not_improve_reserved", "first")
     assert "hardening" in rule.reason_for(SimpleNamespace(**facts))

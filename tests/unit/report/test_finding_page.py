@@ -11,7 +11,7 @@ import pytest
 from jinja2 import Environment, PackageLoader
 
 from turnout.errors import SimulationError
-from turnout.report.finding_text import accepted_parameters, answer, check, facts, parameters
+from turnout.report.finding_text import ANSWERS, accepted_parameters, answer, check, facts, parameters
 from turnout.report.pages.finding import finding_page
 from turnout.report.panels.finding import TurnoutDrawing, marked_position, residual_panel
 from turnout.stages.accept_finding import _check_acceptable
@@ -136,10 +136,22 @@ def test_a_named_finding_says_what_where_how_much_and_what_to_check():
     assert "--accept" in text and "held out" in text and "evidence [nats]" in text
 
 
+def test_the_words_of_the_answers_are_those_of_the_documentation(repository):
+    table = (
+        (repository / "docs" / "mismatch.md")
+        .read_text(encoding="utf-8")
+        .partition("| answer |")[2]
+        .partition("\n\n")[0]
+    )
+    documented = {cell.split(", grade")[0] for cell in re.findall(r"^\| ([^|]+?) \|", table, re.M)}
+    assert {word for word, _ in ANSWERS.values()} == documented and len(documented) == 5
+    assert all(f"<b>{word}</b>: {meaning}" in page(named()) for word, meaning in ANSWERS.values())
+
+
 def test_what_shows_beside_a_name_stands_in_its_sentence():
-    reason = "something else shows beside it: above the control level, and no candidate helps"
+    reason = "a second effect without a name remains in channel A8: the residual is above the control level"
     row = named() | {"evidence_json": json.dumps(EVIDENCE | {"reason": reason})}
-    said = "hangs 1.1 mm above its ballast. Something else shows beside it: above the control level"
+    said = "hangs 1.1 mm above its ballast. A second effect without a name remains in channel A8: the residual"
     assert said in headline(row) and "above its ballast." in headline(named())
     heading = page(row).split("<h1>")[1].split("</h1>")[0]
     assert heading.endswith("above its ballast.")  # the rest stands under "How sure"
@@ -193,14 +205,12 @@ def test_unknown_is_located_and_offers_nothing_to_accept():
 
 def test_none_and_numerics_send_nobody_out():
     assert check(ROWS["none"]) == "Nothing to check."
-    assert "refine" in check(ROWS["numerics"]) and answer(ROWS["numerics"]).startswith("cannot tell")
+    assert "refine" in check(ROWS["numerics"]) and answer(ROWS["numerics"]) == "numerics"
 
 
 def test_the_worst_comes_first_and_the_rest_is_folded():
     text = page(finding("none", sections="OT"), named(), finding("unknown", sections="SP"))
-    order = [
-        text.index(words) for words in ("named, grade A", "no name fits</span> SP", "simulation and recordings agree")
-    ]
+    order = [text.index(words) for words in ("named, grade A", "unknown</span> SP", "simulation and recordings agree")]
     assert order[0] < order[1] and '<details><summary><span class="badge ok">OT' in text
 
 

@@ -257,6 +257,27 @@ class Candidate:
         return f"{self.family}[{position}]" if position else self.family
 
     @property
+    def in_words(self) -> str:
+        """Family and site as text.
+
+        >>> from turnout.physics import Parameter
+        >>> amount = Parameter("amount", "-", 0.0, (0.0, 1.0), "share", "chosen")
+        >>> sites = ({"place": 8.41}, {"sensor": "A8"}, {"train": "ic3", "axle": 3}, {})
+        >>> [Candidate.of("soft_pad", (amount,), dict, (), site).in_words for site in sites]
+        ['soft pad at 8.4 m', 'soft pad at sensor A8', 'soft pad at wheelset 3 of ic3', 'soft pad']
+        """
+        words, where = [self.family.replace("_", " ")], self.where
+        if isinstance(where.get("place"), (int, float)):  # words have no coordinate
+            words.append(f"at {where['place']:.1f} m")
+        if "sensor" in where:
+            words.append(f"at sensor {where['sensor']}")
+        if "axle" in where:
+            words.append(f"at wheelset {where['axle']}")
+        if "train" in where:
+            words.append(f"of {where['train']}")
+        return " ".join(words)
+
+    @property
     def part(self) -> tuple[str, Any]:
         """(component, position or sensor) that the effect changes."""
         return self.effect.component, self.where.get("place", self.where.get("sensor"))

@@ -107,7 +107,7 @@ EFFECT_RULES: tuple[Rule[EffectEvidence], ...] = (
     Rule("leaves_too_much", lambda e: e.has_leader and e.residual_excess > e.settings.leftover, "unknown",
          "{e.leader.family} leaves {e.residual_excess:.0f} times the control level", HOW),
     Rule("excess_without_candidate", lambda e: e.shows_nothing and e.excess > 1.0, "unknown",
-         "above the control level, and no candidate helps", HOW),
+         "the residual is above the control level, and no candidate explains it", HOW),
     Rule("sensors_shake_without_wheel", lambda e: e.shows_nothing and e.disturbed, "unknown",
          "all sensors vibrate while no wheel is near", LOCATED, cause="clock"),
     Rule("train_unlike_its_file", lambda e: e.shows_nothing and e.mismatched_trains, "unknown",
@@ -134,7 +134,7 @@ EFFECT_RULES: tuple[Rule[EffectEvidence], ...] = (
 
 SECOND_RULES: tuple[Rule[SecondEvidence], ...] = (
     Rule("unnamed_beside_name", lambda e: e.first.answer == "named" and e.second.answer == "unknown", "first",
-         "something else shows beside it: {e.second.reason}", PAIRS),
+         "a second effect without a name remains{e.location}: {e.second.reason}", PAIRS),
     Rule("second_is_no_single_effect", lambda e: not e.second.is_single_effect, "first", "", PAIRS),
     Rule("second_may_be_shape_of_first", lambda e: e.gain < e.shape_error_evidence, "first", "", PAIRS),
     Rule("rivals_stay_a_choice", lambda e: e.is_choice and not e.split_first.is_single_effect, "first", "", PAIRS),
@@ -152,10 +152,9 @@ PAIR_RULES: tuple[Rule[PairEvidence], ...] = (
          "unknown second", "the best candidate explains {e.second_score.explained:.0%} of the excess", PAIRS),
     Rule("first_adds_too_little", lambda e: e.first_is_redundant, "second", "", PAIRS),
     Rule("second_predicts_reserved_worse", lambda e: e.second_predicts_worse, "first",
-         "something else shows beside it: {e.second.names[0]}, which predicts held-out recordings worse", PAIRS),
+         "a second effect is possible: {e.second_text}. With it, held-out recordings are predicted worse", PAIRS),
     Rule("second_does_not_improve_reserved", lambda e: e.second_improves_nothing, "first",
-         "something else shows beside it: {e.second.names[0]}, with which held-out recordings are predicted no better",
-         PAIRS),
+         "a second effect is possible: {e.second_text}. With it, held-out recordings are predicted no better", PAIRS),
     Rule("both_stand", _always, "all", "", PAIRS),
 )
 

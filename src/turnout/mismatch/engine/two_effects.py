@@ -24,6 +24,7 @@ from turnout.mismatch.engine.evidence import (
     residual_structure,
     worst_excess,
 )
+from turnout.mismatch.engine.localization import locate
 from turnout.mismatch.engine.reserved_data import gain_error, reserved_fit
 from turnout.mismatch.engine.search import Findings, Search
 from turnout.mismatch.engine.thresholds import THRESHOLDS
@@ -67,6 +68,13 @@ class SecondEvidence:
     def gain(self) -> float:
         """Gain of the second effect. [nats]"""
         return self.named.gain
+
+    @cached_property
+    def location(self) -> str:
+        """Where the first effect leaves a residual, in words after a space, "" if nothing locates it."""
+        leader = next((s for s in self.second.scores[:1] if s.gain > self.search.settings.threshold), None)
+        location = locate(self.search.case, self.findings.fit, leader, self.second.cause)
+        return "" if location is None else f" {location}"
 
     @property
     def is_choice(self) -> bool:
@@ -159,6 +167,11 @@ class PairEvidence:
     def second(self) -> Verdict:
         """Verdict on the second effect."""
         return self.findings.verdicts[1]
+
+    @property
+    def second_text(self) -> str:
+        """Name of the second effect with its position, sensor or wheelset, in words."""
+        return self.second.scores[0].candidate.in_words
 
     @property
     def is_choice(self) -> bool:

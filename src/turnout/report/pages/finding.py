@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from turnout.report.finding_text import accepted_parameters, answer, check, facts, parameters, rivals, title
+from turnout.report.finding_text import ANSWERS, accepted_parameters, answer, check, facts, parameters, rivals, title
 from turnout.report.formatting import day
 from turnout.report.panels.finding import (
+    STYLES,
     curve_panel,
     fit_panel,
     history_of_parameter,
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
     from jinja2 import Template
 
-SEVERITY_ORDER = ("named", "a_or_b", "unknown", "numerics", "none")
+SEVERITY_ORDER = tuple(ANSWERS)
 BADGES = {"named": "inspect", "a_or_b": "plan", "unknown": "plan", "numerics": "learning", "none": "ok"}
 
 
@@ -56,6 +57,7 @@ def finding_page(
         visit=first["visit"] if first else "",
         newest=day(max((f["found_at_utc"] for f in findings), default=None)),
         drawing=position_panel(rows["sections"], findings, first) if findings else "",
+        legend=[(STYLES[verdict], word, meaning) for verdict, (word, meaning) in ANSWERS.items()],
         findings=[_finding(f, rows, k) for k, f in enumerate(findings)],
         silent=[q for q in rows["quarantine"] if q["stage"] == "mismatch"],
         notes=list(dict.fromkeys(n for f in findings for n in (f["notes"] or "").splitlines())),
