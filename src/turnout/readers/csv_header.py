@@ -22,7 +22,7 @@ from turnout.readers.named_arrays import (
     TIME_NAMES,
 )
 from turnout.readers.rate_words import is_rate_name, rate_unit
-from turnout.readers.scale_words import is_scale_name, scale_meaning, value_of_word
+from turnout.readers.scale_words import is_of_drawing, is_scale_name, scale_meaning, value_of_word
 from turnout.readers.source import COPY_AGAIN, MEANINGLESS_UNITS, Source
 from turnout.readers.stated_quantities import is_quantity_name
 from turnout.readers.stated_units import is_unit_name
@@ -416,14 +416,15 @@ def _entries(lines: Sequence[str], separator: str, names: Sequence[str]) -> Iter
                 pairs = [(name, f"{third} {second}"), *(pair for pair in pairs if pair != (name, second))]
         if len([cell for cell in cells if cell]) > 2 and i + 1 < len(table) and len(table[i + 1]) == len(cells):
             pairs += [(a, b) for a, b in zip(cells, table[i + 1]) if a and _is_number(b)]
-        if (match := HEAD_LINE.match(text)) and len(cells) < 3:
+        is_drawn = len(cells) == 2 and is_of_drawing(cells[0])  # "Plan;scale 1:500" is about the plan as a whole
+        if (match := HEAD_LINE.match(text)) and len(cells) < 3 and not is_drawn:
             name = f"{match[1]} {match[2]}" if match[2] else match[1]
             pairs.append((name, match[3].strip(separator + ' "')))
         entries = [Entry(place, name.strip('"# '), value.strip('"')) for name, value in pairs]
         if len(cells) > 2 and (is_unit_name(cells[0]) or is_quantity_name(cells[0])):
             entries = [Entry(place, cells[0], cells[1:])]  # one for each column
         yield from entries or entries_of_text(text, place)
-        if pairs and not any(is_rate_name(entry.name) for entry in entries):
+        if pairs and not is_drawn and not any(is_rate_name(entry.name) for entry in entries):
             yield from entries_of_text(text, place)
 
 

@@ -404,6 +404,31 @@ def list_of_texts(value: Any) -> list[str]:
     ]
 
 
+def channel_names(facts: Metadata) -> list[str]:
+    """Names of the channels in the metadata; a number there counts the channels, as in "Channels: 2".
+
+    Parameters
+    ----------
+    facts : Metadata
+        Metadata of the record.
+
+    Returns
+    -------
+    list of str
+        Empty without names.
+
+    Raises
+    ------
+    ReadError
+        If the variable is damaged.
+    """
+    value = facts.get(CHANNEL_NAMES)
+    value = value[()] if isinstance(value, np.ndarray) and value.ndim == 0 else value
+    is_number = isinstance(value, (int, float, np.number))
+    is_count = is_number or (isinstance(value, str) and value.strip().isdecimal() and int(value) > 1)
+    return [] if is_count else list_of_texts(value)
+
+
 def raw_file(variables: Mapping, source: Source, parent: Metadata | None = None) -> RawFile:
     """Interpret named variables as records.
 
@@ -548,7 +573,7 @@ def _group_records(
         )
     for name, array in blocks_by_name.items():
         blocks = array if array.ndim == 3 else [array]
-        if array.ndim == 3 and len(names := list_of_texts(facts.get(CHANNEL_NAMES))) and array.shape[1] != len(names):
+        if array.ndim == 3 and len(names := channel_names(facts)) and array.shape[1] != len(names):
             raise source.error(f"variable {name!r}", f"{array.shape} samples do not match {len(names)} channels")
         if array.ndim == 3 and array.shape[0] > array.shape[2]:  # MATLAB: (sample, channel, record)
             blocks = array.transpose(2, 1, 0)
@@ -566,7 +591,7 @@ def _units_of(channels: Mapping[str, Array], facts: Metadata, ordered: bool, whe
     entry = facts.get(UNIT_NAMES)
     if isinstance(entry, Mapping):
         return [entry.get(name, "") for name in channels]
-    units = match_units(list(channels), list_of_texts(entry), list_of_texts(facts.get(CHANNEL_NAMES)), ordered)
+    units = match_units(list(channels), list_of_texts(entry), channel_names(facts), ordered)
     if units is None:
         problem = f"nothing says which of the units {', '.join(map(repr, list_of_texts(entry)))} are whose"
         remedy = "Write each dataset's unit beside it, or a list 'channels' of their names beside that of the units"
@@ -625,7 +650,7 @@ def vectors(variables: Mapping[str, Any]) -> dict[str, Any]:
 def _record(block: Any, facts: Metadata, k: int, n: int, where: str, source: Source) -> RawRecord:
     """The record of a matrix (channel, sample) or (sample, channel)."""
     block = np.atleast_2d(block) if isinstance(block, np.ndarray) else block
-    names, units = list_of_texts(facts.get(CHANNEL_NAMES)), list_of_texts(facts.get(UNIT_NAMES))
+    names, units = channel_names(facts), list_of_texts(facts.get(UNIT_NAMES))
     if block.ndim != 2 or block.dtype.kind not in "fiu":
         raise source.error(where, f"{block.dtype} of shape {block.shape} is no matrix of samples")
     rows = len(names) or min(block.shape)

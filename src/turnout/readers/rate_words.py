@@ -8,6 +8,7 @@ Italian and Spanish forms are recognised, and some Dutch, Swedish and Czech ones
 
 import re
 import unicodedata
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
@@ -85,8 +86,24 @@ OTHER = re.compile(
     r"filt|pass(?!o)|cut|grenz|band|coup|cort|tagli|gra?en?s|eigen|reson|natur|modal|netz|mains|calib|kalib|tarat|etalonn|sensitiv"
     r"|servic|wart|inspec|trigg|bit|baud|start|begin|debut|inicio|inizio|stop|date(?!n)|datum|number|anzahl|count|nombre"
     r"|antal|numero|aantal|cantidad|max|range|bereich|nyquist|carrier|refresh|update|oversampl|decim|ratio|heart|rot"
-    r"|anreg|excit|sinus|sweep|\bspan\b|\bcent(?:er|re)\b|mitten|corner|octav|\bupper\b|\blower\b|\bring\b|\bcpu\b|crystal|qu?artz|quarz|mode$|unit|einheit|label|dimension|counter|zahler|filename|offset"
+    r"|anreg|excit|sinus|sweep|\balias|antialias|\btone?\b|\bspan\b|\bcent(?:er|re)\b|mitten|corner|octav|\bupper\b|\blower\b|\bring\b|\bcpu\b|crystal|qu?artz|quarz|mode$|unit|einheit|label|dimension|counter|zahler|filename|offset"
 )
+# Words for frequency as a whole, and what may stand beside one that is the sampling rate: the device, the record, its
+# channels and quantities, and words without a meaning of their own. "Bolt frequency" is one of the bolt.
+FREQUENCY = re.compile(
+    r"frequen(?:z(?:en|a|e)?|c(?:y|ies|es?|ias?)|ties?)|frekven(?:s(?:er|en)?|ce|ca|cia)|frec(?:uencias?|venta)|kmitocet"
+    r"|freqs?(?!u)|frq"
+)
+OF_RECORD = re.compile(
+    r"clock|takt|horlog|reloj|orolog|adc|dac|daq|board|card|carte|karte|kort$|scheda|tarjeta|logg|grab|device|gerat"
+    r"|appar|dispos|modul(?!at)|digit|wandl|conver|hardware|system|sistema|instrument|scan|record|aufzeich|enregistr|registr"
+    r"|channel|kanal|kanaele|voie|canal|data|daten|donnees|dati$|datos|file|datei|fichier|output|ausgang|sortie|salida"
+    r"|input|eingang|entree|entrada|base|basis|master|main|haupt|princip|time|zeit|tid|temps|tiempo|tempo|sett?ing"
+    r"|einst|regl|config|konfig|mess|mesur|medi[dc]|misur|male|maling|meas|frame|tick|point|punkt|nominal|nenn|actual"
+    r"|real|reel|effe[ck]t|true|used|current|default|select|stor|speich|save|final|value|wert|valeur|valor"
+    r"|forc|kraft|acc|beschl|vibrat|schwing|vzork|amostr|probk|mintav|nayt|ornek|esant|uzork|sampl"  # sampling
+)
+NO_MEANING = {"and", "the", "for", "von", "der", "die", "das", "des", "fur", "del", "della", "dei", "les", "los", "per"}
 # What a word of sampling with a word of rate or step leaves possible: "Signal sample rate".
 BESIDE_RATE = re.compile(r"signal|source|quelle|block|buffer|spectr|fft")
 # Names of other durations: a short one under any other name may be a time step.
@@ -262,7 +279,7 @@ def name_meaning(name: str) -> NameMeaning:
         words = words[:-1] if unit else words
     certainty, is_step = _meaning([w for w in words if not (REDUCTION.search(w) if unit else REDUCED.search(w))])
     spaced = " ".join(words)
-    if unit is not None and certainty == NOT and words and not OTHER.search(spaced):
+    if unit is not None and certainty == NOT and words and not OTHER.search(spaced) and not is_other_frequency(words):
         if not unit.is_step or unit.is_sampling:
             is_sampled = unit.is_sampling or bool(SAMPLING.search(spaced))
             certainty, is_step = (CERTAIN if is_sampled else POSSIBLY), unit.is_step
@@ -318,9 +335,36 @@ def _meaning(words: list[str]) -> tuple[int, bool | None]:
         return POSSIBLY, True
     if not (is_step or is_rate) and {"fs", "sr"} & set(words):
         return POSSIBLY, False
+    if is_rate and not is_step and is_other_frequency(words):
+        return NOT, None
     if is_step or is_rate:
         return POSSIBLY, (is_step if is_step != is_rate else None)
     return (POSSIBLY if joined in POSSIBLE else NOT), (False if joined in POSSIBLE_RATES else None)
+
+
+def is_other_frequency(words: Sequence[str]) -> bool:
+    """Whether words speak of the frequency of something else than the recording.
+
+    Parameters
+    ----------
+    words : sequence of str
+        Words of a name, as ``words_of`` returns them.
+
+    Returns
+    -------
+    bool
+        True for a word of frequency with words of which none concerns the recording.
+
+    Examples
+    --------
+    >>> [is_other_frequency(words_of(n)) for n in ("Bolt frequency", "Trägerfrequenz", "Board frequency", "Frequency")]
+    [True, True, False, False]
+    """
+    if not any(FREQUENCY.search(word) for word in words):
+        return False
+    stems = [stem for word in words for stem in FREQUENCY.split(word)]
+    subjects = [stem for stem in stems if len(stem) > 2 and stem not in NO_MEANING]
+    return bool(subjects) and not any(OF_RECORD.search(subject) for subject in subjects)
 
 
 # A reduction of the sampling rate behind the converter, and words for what is reduced.

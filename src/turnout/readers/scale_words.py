@@ -62,6 +62,17 @@ OTHER_SCALE = re.compile(
     r"|excit|anreg|supply|speis"
 )
 OTHER_OFFSET = re.compile(r"voltage|file|data|block|buffer|header|index")  # a bias, or a position in the file
+# What is drawn or shown at a scale: a map, a plot. Words for something that is switched off.
+DRAWN = re.compile(
+    r"(?:site|track|lage|gleis|street)?(?:maps?|plans?|karten?|carte|kort|mappa|mapa|plano)|drawings?|zeichnung|dessin"
+    r"|tegning|disegno|dibujo|sketch|images?|bild|photo|foto|display|anzeige|plots?|charts?|diagramm?"
+    r"|screen|print\w*|zoom"
+)
+SWITCHED_OFF = re.compile(
+    r"off|none|disabled|deactivated|inactive|aus|ausgeschaltet|abgeschaltet|deaktiviert|keine[rs]?|slukket|ingen|arret"
+    r"|desactivee?|aucune?|spento|disattivat[oa]|nessuna?|apagad[oa]|desactivad[oa]|ningun[oa]?"
+)
+MAX_WORDS_OFF = 4  # of a text that says that something is switched off
 PREFIX_VALUES = {
     "k": 1e3, "kilo": 1e3, "m": 1e-3, "milli": 1e-3, "µ": 1e-6, "u": 1e-6, "micro": 1e-6, "mikro": 1e-6, "mega": 1e6,
     "n": 1e-9, "nano": 1e-9, "giga": 1e9, "c": 1e-2, "centi": 1e-2, "d": 1e-1, "deci": 1e-1, "da": 10.0, "h": 100.0,
@@ -156,7 +167,7 @@ def scale_meaning(name: str) -> str:
     is_correction = any(CORRECTION.match(word) for word in words)
     if any(STRONG_FACTOR.search(word) for word in words):
         return "" if any(OTHER_GAIN.search(word) for word in words) else POSSIBLY_FACTOR
-    if any(OTHER_SCALE.search(word) for word in words):
+    if any(OTHER_SCALE.search(word) for word in words) or is_of_drawing(name):
         return ""
     if any(word in ("file", "name") for word in words):
         return ""
@@ -185,6 +196,48 @@ def _is_value_of_step(words: tuple[str, ...]) -> bool:
         return True
     is_step = any(STEPS_OF_CONVERTER.fullmatch(w) for w in words)
     return is_step and len(words) > 1 and any(VALUE.fullmatch(w) for w in words)
+
+
+def is_of_drawing(text: str) -> bool:
+    """Whether a name or a value speaks of something that is drawn or shown at a scale.
+
+    Parameters
+    ----------
+    text : str
+        Name or value of an entry.
+
+    Returns
+    -------
+    bool
+        True for "1:500 map" and the like.
+    """
+    return any(DRAWN.fullmatch(word) for word in words_of(text))
+
+
+def says_no_scale(text: str) -> bool:
+    """Whether the value under a name of a scale states none of the samples: that of a drawing, or one switched off.
+
+    Parameters
+    ----------
+    text : str
+        Value of an entry.
+
+    Returns
+    -------
+    bool
+        False for a number other than a ratio, whatever its words.
+
+    Examples
+    --------
+    >>> [says_no_scale(text) for text in ("1:500 map", "auto-range off", "1:500", "10 (auto off)", "off by 10")]
+    [True, True, False, False, False]
+    """
+    without_ratio = re.sub(r"\b1 ?[:/] ?\d+\b", "", text)
+    if re.search(r"\d", without_ratio):
+        return False
+    words = words_of(text)
+    is_off = without_ratio == text and len(words) <= MAX_WORDS_OFF and any(SWITCHED_OFF.fullmatch(w) for w in words)
+    return is_off or is_of_drawing(text)
 
 
 def is_fill_name(name: str) -> bool:

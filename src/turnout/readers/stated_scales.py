@@ -20,8 +20,10 @@ from turnout.readers.scale_words import (
     POSSIBLY_FACTOR,
     POSSIBLY_OFFSET,
     is_fill_name,
+    is_of_drawing,
     is_scale_name,
     plain_word,
+    says_no_scale,
     scale_meaning,
     value_of_word,
 )
@@ -60,6 +62,8 @@ def scale_statements(facts: Mapping[str, Any], n_channel: int = 1) -> tuple[str,
     for name, value in facts.items():
         meaning = _meaning_among(str(name), names)
         if not meaning and isinstance(value, str):
+            if is_of_drawing(str(name)):
+                continue
             for inner, number in scales_in_text(value):
                 for text, stated in zip(texts, _stated_by_channel(inner, scale_meaning(inner), number, n_channel)):
                     text.extend(stated)
@@ -177,7 +181,7 @@ def _scales_of_text(text: str) -> list[float | str]:
 
 def _scale_of_piece(text: str) -> float | str:
     """The number of a scale; the text itself if it is not understood, nan if it says that there is none."""
-    if text.casefold() in NO_SCALE:
+    if text.casefold() in NO_SCALE or says_no_scale(text):
         return math.nan
     parts = _number_and_unit(text)
     if parts is None:
@@ -219,7 +223,7 @@ def entry_statements(entries: Iterable[Entry], names: Sequence[str]) -> dict[int
     texts_beside = [
         Entry(entry.place, name, value)
         for entry in entries
-        if isinstance(entry.value, str) and not is_scale_name(entry.name)
+        if isinstance(entry.value, str) and not is_scale_name(entry.name) and not is_of_drawing(entry.name)
         for name, value in scales_in_text(entry.value)
     ]
     entries = [*entries, *texts_beside]

@@ -20,7 +20,7 @@ import numpy as np
 from turnout.errors import ReadError
 from turnout.readers.precision import EXACT_PRECISION, NUMBER, Interval, around, readings
 from turnout.readers.rate_words import CERTAIN, NOT, POSSIBLY, RateUnit, name_meaning, rate_unit, reduction_of_name
-from turnout.readers.scale_words import scale_meaning, value_of_word
+from turnout.readers.scale_words import is_of_drawing, scale_meaning, value_of_word
 from turnout.readers.source import Source
 
 MAX_CLOCK_DRIFT = 1e-4  # relative: two clocks of one logger with separate crystals may differ by this much
@@ -201,6 +201,10 @@ NAMED_PIECE = re.compile(
     r"([+-]?[.,]?\d[^:=]{0,30}?|[^\W\d]{1,20}\.?|[-+]|[x×]\s?\d+|\d+\s?:\s?\d+)\s*"
 )
 
+RATIO_PIECE = re.compile(
+    r"(?:\s*([^\d:=]*):)?\s*([^\d:=]*[^\W\d])[\s:=]+(1\s?[:/]\s?\d+[^\d:=]{0,30})"
+)  # "scale 1:500 map"
+
 
 def entries_of_text(text: str, place: str) -> Iterator[Entry]:
     """Entries of a free text such as a comment: its pieces with a number, "sampled at 25.6 kHz; tip: steel".
@@ -223,6 +227,10 @@ def entries_of_text(text: str, place: str) -> Iterator[Entry]:
     [('hammer', '3'), ('sampled at', '25.6 kHz')]
     """
     for piece in re.split(r"[;\n\r|]|,\s", text[:MAX_TEXT]):
+        if (ratio := RATIO_PIECE.fullmatch(piece)) and scale_meaning(ratio[2]):
+            subject = f"{ratio[1]} " if is_of_drawing(ratio[1] or "") else ""
+            yield Entry(place, subject + ratio[2].strip(), ratio[3].strip())
+            continue
         named = NAMED_PIECE.fullmatch(piece)
         if named and (re.search(r"\d", named[2]) or value_of_word(scale_meaning(named[1]), named[2]) is not None):
             yield Entry(place, named[1].strip(), named[2].strip())

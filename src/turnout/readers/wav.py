@@ -18,7 +18,7 @@ import numpy as np
 import soundfile
 
 from turnout.readers.lazy import LazyMatrix
-from turnout.readers.named_arrays import CHANNEL_NAMES, START_NAMES, UNIT_NAMES, Metadata, list_of_texts
+from turnout.readers.named_arrays import START_NAMES, UNIT_NAMES, Metadata, channel_names, list_of_texts
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.stated_scales import entry_statements
 from turnout.readers.statements import Entry, entries_of, entries_of_text, rate_entry
@@ -67,7 +67,7 @@ def read_raw(source: Source) -> RawFile:
     byte_rate = _byte_rate_entries(source.head)
     facts = Metadata(_notes(comment), source)
     n = len(samples)
-    names, units = list_of_texts(facts.get(CHANNEL_NAMES)), list_of_texts(facts.get(UNIT_NAMES))
+    names, units = channel_names(facts), list_of_texts(facts.get(UNIT_NAMES))
     entries = (*_entries(texts, comment), *_further_entries(further))
     record = RawRecord(
         names=tuple(names) if len(names) == n else tuple(str(i) for i in range(n)),
