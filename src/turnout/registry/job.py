@@ -67,17 +67,33 @@ def register(
         faults: dict[str, str] = {}
         existing, tokens = existing_batches(batches, faults)
         folders = [fspath(Path(path).parent) for path in existing]
-        unread, count = [existing[i] for i in unread_positions(tokens, before.consumed, folders)], 0
-        registration = Registration(root, before)
-        with _without_collection():
-            for chunk in chunks(merge_units(unread, read, faults)):
-                count = chunk[-1].index + 1
-                registration.take(chunk)
-        registration.replace_whole(tables or {})
-        registration.take(table_arrivals(tables or {}, count))
+        unread = [existing[i] for i in unread_positions(tokens, before.consumed, folders)]
+        registration = Registration(root, before, is_indexed=False)
+        _take_all(registration, unread, read, faults, tables or {})
+        if registration.has_duplicates():  # rare: a stage made a wrong id, or two units have the same
+            registration.con.close()
+            registration = Registration(root, before)
+            _take_all(registration, unread, read, faults, tables or {})
         consumed = [t for t, p in zip(tokens, existing) if fspath(p) not in faults]
         run_info = {"code_version": code_version, "config_hash": config_hash, "started_at_utc": started}
         return registration.finish(consumed, faults, run_info)
+
+
+def _take_all(
+    registration: Registration,
+    unread: Sequence[PathLike],
+    read: Callable,
+    faults: dict[str, str],
+    tables: Mapping[str, list[dict]],
+) -> None:
+    """Take the units of the batches, then the rows that come from no recording."""
+    count = 0
+    with _without_collection():
+        for chunk in chunks(merge_units(unread, read, faults)):
+            count = chunk[-1].index + 1
+            registration.take(chunk)
+    registration.replace_whole(tables)
+    registration.take(table_arrivals(tables, count))
 
 
 @contextmanager

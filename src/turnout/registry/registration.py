@@ -21,9 +21,11 @@ from turnout.registry.parquet import read_live, write_sorted
 from turnout.registry.publication import publish
 from turnout.registry.schema import WHOLE_TABLES, key, literal, tables
 from turnout.registry.staging import (
+    CHILDREN,
     admit,
     connect,
     create_staging,
+    has_duplicate_keys,
     note_arrivals,
     quarantine_of,
     reject_orphans,
@@ -80,10 +82,14 @@ class RegistrationResult:
 
 
 class Registration:
-    """Takes units in chunks, rejects rows that break a rule, and publishes all at once."""
+    """Takes units in chunks, rejects rows that break a rule, and publishes all at once.
 
-    def __init__(self, root: Path, before: Generation) -> None:
-        self.root, self.before = root, before
+    Without an index, rows with the same key are not rejected; ``has_duplicates`` tells whether there are any.
+    """
+
+    def __init__(self, root: Path, before: Generation, is_indexed: bool = True) -> None:
+        self.root, self.before, self.is_indexed = root, before, is_indexed
+        self.lost_duplicates = False
         self.result_ids: list[str] = []
         self.n_refused = self.n_bad = 0
         self.whole: set[str] = set()
@@ -93,7 +99,7 @@ class Registration:
     def con(self) -> duckdb.DuckDBPyConnection:
         """Connection with the staging tables and the views of the live rows; a night without news needs none."""
         con = connect(temp_directory=str(self.root / ".spill"))
-        create_staging(con)
+        create_staging(con, self.is_indexed)
         for table in tables():
             con.execute(f"create view old_{table} as {read_live(con, self.root, table, self.before.of(table))}")
         note_superseded(con)
@@ -122,6 +128,7 @@ class Registration:
             if table not in INTERNAL_TABLES and any(table in a.tables for a in arrivals):
                 gathered, untyped = gather(table, arrivals)
                 refusals += untyped + admit(self.con, table, gathered, PENDING)
+        self._note_duplicates({r.table for r in refusals})
         reject_orphans(self.con, refusals, by_index)
         for refusal in refusals:
             quarantine[refusal.unit].append(quarantine_of(refusal, by_index[refusal.unit]))
@@ -185,6 +192,18 @@ class Registration:
         now.consumed = consumed
         publish(self.root, now)
         return RegistrationResult(run_id, number, len(self.result_ids), rows, self.n_refused, n_superseded, faults)
+
+    def has_duplicates(self) -> bool:
+        """Whether rows that were taken have the same key, so that they must be taken again with an index."""
+        if self.is_indexed or not self.result_ids:
+            return False
+        return self.lost_duplicates or has_duplicate_keys(self.con, tables())
+
+    def _note_duplicates(self, rejected: set[str]) -> None:
+        """Search the tables whose rows are about to be removed with their parent, and with them a duplicate."""
+        children = {child for parent in rejected & CHILDREN.keys() for child in CHILDREN[parent][1]}
+        if children and not self.is_indexed and not self.lost_duplicates:
+            self.lost_duplicates = has_duplicate_keys(self.con, sorted(children))
 
     def _select_changed(self, arrivals: list[Arrival]) -> list[Arrival]:
         # a result that is live may have lost rows

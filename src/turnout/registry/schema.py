@@ -301,7 +301,7 @@ def arrow_schema(table: str) -> pa.Schema:
     )
 
 
-def create_table(table: str, name: str, extra: str = "") -> str:
+def create_table(table: str, name: str, extra: str = "", is_indexed: bool = True) -> str:
     """CREATE TABLE with NOT NULL, CHECK and PRIMARY KEY.
 
     Parameters
@@ -312,6 +312,9 @@ def create_table(table: str, name: str, extra: str = "") -> str:
         Name under which it is created.
     extra : str
         Further columns, as in ", x integer".
+    is_indexed : bool
+        Whether there is a PRIMARY KEY, whose index takes a quarter of the time of a registration. Without it
+        two rows may have the same key.
 
     Returns
     -------
@@ -320,4 +323,5 @@ def create_table(table: str, name: str, extra: str = "") -> str:
     """
     body = ", ".join(c.ddl for c in tables()[table])
     keys = ", ".join(f'"{k}"' for k in key(table))
-    return f"create table {name} ({body}{extra}, primary key ({keys}))"
+    rule = f", primary key ({keys})" if is_indexed else ""
+    return f"create table {name} ({body}{extra}{rule})"

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 import duckdb
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 UNIQUE = "unique, and another row has it already"
+FILLED_AT_THE_END = ("runs", "supersedes")  # by the registration itself, not from the rows of units
 MARK_COLUMNS = ", _unit integer, _row integer, _year integer"
 # Parent table: its id, and the tables whose rows have no meaning without their parent row.
 CHILDREN = {
@@ -50,17 +51,41 @@ def connect(**config: Any) -> duckdb.DuckDBPyConnection:
     return con
 
 
-def create_staging(con: duckdb.DuckDBPyConnection) -> None:
+def create_staging(con: duckdb.DuckDBPyConnection, is_indexed: bool = True) -> None:
     """Create the table ``came`` of incoming units, and an empty staging table for each table of the registry.
 
     Parameters
     ----------
     con : DuckDB connection
         Connection in memory.
+    is_indexed : bool
+        Whether a row with the key of another is rejected at once; otherwise ``has_duplicate_keys`` finds it later.
     """
     con.execute("create table came (_unit integer, unit_id varchar, result_id varchar, algo varchar)")
     for table in tables():
-        con.execute(create_table(table, f"new_{table}", MARK_COLUMNS))
+        con.execute(create_table(table, f"new_{table}", MARK_COLUMNS, is_indexed or table in FILLED_AT_THE_END))
+
+
+def has_duplicate_keys(con: duckdb.DuckDBPyConnection, among: Iterable[str]) -> bool:
+    """Whether two rows of a staging table have the same key.
+
+    Parameters
+    ----------
+    con : DuckDB connection
+        Connection with the staging tables.
+    among : iterable of str
+        Names of the tables to be searched.
+
+    Returns
+    -------
+    bool
+        True if a table has such rows.
+    """
+    for table in among:
+        keys = ", ".join(f'"{k}"' for k in key(table))
+        if con.execute(f"select 1 from new_{table} group by {keys} having count(*) > 1 limit 1").fetchall():
+            return True
+    return False
 
 
 def note_arrivals(con: duckdb.DuckDBPyConnection, arrivals: list[Arrival]) -> None:

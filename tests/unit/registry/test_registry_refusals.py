@@ -6,13 +6,14 @@ from functools import partial
 
 import pyarrow as pa
 import pytest
-from registry_rows import hammer_result
+from registry_rows import hammer_result, parquet_hashes
 
 from turnout.errors import RegistryError
 from turnout.registry.batch_stream import chunks
 from turnout.registry.database import open_registry
 from turnout.registry.derived_tables import publish
 from turnout.registry.job import register
+from turnout.registry.registration import Registration
 from turnout.registry.schema import arrow_schema, create_table, tables
 from turnout.registry.staging import connect
 from turnout.workflow.batches import UnitResult
@@ -130,6 +131,40 @@ def test_the_second_row_of_a_key_is_refused(bench, register_raw, hammer):
     assert [p for _, p in places] == [
         "models, row 1, column model_id", "modes, row 2, column model_id+band",
     ]  # fmt: skip
+
+
+def _same_model_twice(hammer):
+    first, second = hammer(section="A1"), hammer(section="A2")
+    second.tables["models"][0]["model_id"] = second.tables["modes"][0]["model_id"] = first.tables["models"][0][
+        "model_id"
+    ]
+    return first, second
+
+
+def _row_twice(hammer):
+    first, second = hammer(section="A1"), hammer(section="A2")
+    first.tables["modes"].append(dict(first.tables["modes"][0]))
+    return first, second
+
+
+def _mode_twice_of_a_bad_model(hammer):
+    first, second = _same_model_twice(hammer)
+    first.tables["models"][0]["a_matrix"] = [NAN]
+    return first, second
+
+
+@pytest.mark.parametrize("size", [1, 1024])
+@pytest.mark.parametrize("make", [_same_model_twice, _row_twice, _mode_twice_of_a_bad_model])
+def test_keys_checked_at_the_end_give_the_bytes_of_an_index(tmp_path, monkeypatch, hammer, make, size):
+    monkeypatch.setattr("turnout.registry.job.chunks", partial(chunks, size=size))
+    (tmp_path / "raw").write_text("")
+    HELD["raw"] = list(make(hammer))
+    late = register([tmp_path / "raw"], tmp_path / "late", read=results_as_given)
+    monkeypatch.setattr("turnout.registry.job.Registration", lambda *a, **_: Registration(*a, is_indexed=True))
+    HELD["raw"] = list(make(hammer))
+    at_once = register([tmp_path / "raw"], tmp_path / "at_once", read=results_as_given)
+    assert late.n_refused == at_once.n_refused > 0
+    assert parquet_hashes(tmp_path / "late") == parquet_hashes(tmp_path / "at_once")
 
 
 def test_a_table_or_a_row_of_no_kind_is_refused(bench, register_raw, hammer):
