@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from turnout.registry.arrow_arrays import arrow_array, arrow_table, from_numpy
+from turnout.registry.arrow_arrays import NONE, arrow_array, arrow_table, from_numpy
 from turnout.registry.ids import content_id
 from turnout.registry.schema import FILLED_BY_REGISTER, Column, names, tables
 
@@ -226,10 +226,11 @@ def _as_datetime(value: Any) -> datetime:
 
 def _lists(column: Column, values: Sequence) -> pa.Array:
     """List array from lists or numpy arrays, through one flat array."""
-    if any(isinstance(v, (str, bytes, Mapping)) for v in values):
+    kinds = set(map(type, values))
+    if any(issubclass(kind, (str, bytes, Mapping)) for kind in kinds):
         raise TypeError("not a list")
     element_type = column.arrow.value_type
-    if any(v is not None and not isinstance(v, np.ndarray) for v in values):
+    if not all(issubclass(kind, (np.ndarray, NONE)) for kind in kinds):
         return pa.array([v.tolist() if isinstance(v, np.ndarray) else v for v in values], column.arrow)
     arrays = [np.ravel(v) for v in values if v is not None]
     flat = np.concatenate(arrays) if arrays else np.zeros(0)

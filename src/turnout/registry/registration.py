@@ -98,7 +98,7 @@ class Registration:
     @cached_property
     def con(self) -> duckdb.DuckDBPyConnection:
         """Connection with the staging tables and the views of the live rows; a night without news needs none."""
-        con = connect(temp_directory=str(self.root / ".spill"))
+        con = connect(temp_directory=str(self.root / ".spill"), threads=1)  # two take more CPU time and memory
         create_staging(con, self.is_indexed)
         for table in tables():
             con.execute(f"create view old_{table} as {read_live(con, self.root, table, self.before.of(table))}")
