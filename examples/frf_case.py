@@ -35,7 +35,7 @@ class Effect:
 EFFECT_TEXTS = {
     "mode": "a resonance that the model lacks, near",
     "sensor_gain": "another sensitivity of sensor",
-    "blow_gain": "another sensitivity of the hammer in",
+    "impact_gain": "another sensitivity of the hammer in",
     "sensor_delay": "a delay of sensor",
     "mount_resonance": "a resonance of the mounting of sensor",
     "structural_damping": "damping by a loss factor instead of a dashpot",
@@ -175,7 +175,7 @@ class FrfCase(Case):
         for o in self.observations:
             gain = _parameter("gain", "-", -0.95, 3.0, (0.0, 0.5))
             where, n = {"blow": o.name}, len(self.observations)
-            yield Candidate.of("blow_gain", (gain,), lambda p, w=o.name: Effect("blow_gain", w, dict(p)),
+            yield Candidate.of("impact_gain", (gain,), lambda p, w=o.name: Effect("impact_gain", w, dict(p)),
                                ((-0.5,), (0.5,)), where, "condition", n)  # fmt: skip
         yield _single_candidate(
             "structural_damping", "", [_parameter("share", "-", 0.0, 1.0, (0.5, 0.5))], ((0.5,),), self
@@ -254,7 +254,7 @@ class FrfCase(Case):
                 line = -(x**2) / (1.0 - x**2 + 2j * zeta * ((1.0 - loss) * x + loss))
                 rows += np.outer(np.asarray(shape[: self.n_sensor]) * shape[self.impact_places[k]], line)
             gain = 1.0 + values[f"hammer@{o.name}"]
-            gain += sum(t.values["gain"] for t in terms if t.effect_type == "blow_gain" and t.where == o.name)
+            gain += sum(t.values["gain"] for t in terms if t.effect_type == "impact_gain" and t.where == o.name)
             predictions.append(split_complex(gain * self._through_sensors(rows, terms)))
         return predictions
 

@@ -15,7 +15,7 @@ def what_in_words(names):
     if set(names) <= DAMPING_EFFECTS:
         alternatives = " or ".join(texts.values())
         also = "" if len(names) == 1 else "; not distinguished"
-        return f"**added: something that damps the rail** ({alternatives}{also})"
+        return f"**added: damping of the rail** ({alternatives}{also})"
     return "open: " + " or ".join(texts.values())
 
 
@@ -132,13 +132,13 @@ This page shows which change the diagnosis finds on a measured track.
 
 *Made by `python -m examples.niederwangen [FOLDER]`; every number comes from that run. Measurements: repository
 mic-haf/SDWirkungNi (SBB; Scossa-Romano and Oertli), CC0 1.0. What was done at the track is not in the folder and was
-not looked up. `docs/niederwangen_decay_rate.md` asks the same of the same numbers without a model.*
+not looked up. `docs/niederwangen_decay_rate.md` evaluates the same measurements without a model.*
 
 Track decay rates, vertical and lateral, in 18 third octaves, at five sections in four campaigns at 1 to 38 °C. The
-track model is calibrated, section by section, on the first campaign alone. Then the diagnosis is asked what it lacks
-in the others, with {n_changes} changes as rivals, each possible from any later campaign on, and with the softening and
-calming of pads by warmth as free numbers. It runs twice: once 2015-09 (cool) and once 2013-07 (hot) is read by nothing
-but the verification.
+track model is calibrated, section by section, on the first campaign alone. The diagnosis then seeks what it lacks
+in the others, with {n_changes} changes as rivals, each possible from any later campaign on, and with the
+dependence of pad stiffness and pad damping on temperature as free parameters. It runs twice: once
+with 2015-09 (cool) and once with 2013-07 (hot) held out for the verification.
 
 ## Answer
 
@@ -147,8 +147,8 @@ but the verification.
 Fit: share of the variation over bands that is predicted of the campaign left out [%], in units of its errors, before →
 after (best rival).
 Bands: recorded over the calibrated model, mean of the later campaigns, beyond three standard deviations. A section
-counts as changed only if both runs name something and both predict the unseen campaign better for it, as not changed
-if both say none.
+counts as changed only if both runs name something and both predict the held-out campaign better with it. It
+counts as not changed if both answer "none".
 
 ![Recorded over calibrated, and the leading change](niederwangen_mismatch.svg)
 
@@ -156,37 +156,37 @@ if both say none.
 
 {terms}
 
-Gain: evidence over the calibrated model less the logarithm of the number of dates [nats]; 12 are asked for.
+Gain: evidence over the calibrated model less the logarithm of the number of dates [nats]; a name needs 12.
 
 {dates}
 
-The same change at other dates: gain of the density with which campaigns are predicted from the others [nats], which
-says more of the date than the evidence above and is larger; both runs.
+The same change at other dates: gain of the density with which campaigns are predicted from the others [nats], for
+both runs. It depends on the date more than the evidence above, and is larger.
 
 ## How to read it
 
-- **Named as far as the numbers go.** What came raises the lateral decay rate many times over from 500 Hz up, where
-  the fastening no longer holds the rail, and hardly moves it below: it takes energy out of the rail itself. Other
-  pads, damping of pads, ballast, sleepers or another way of measuring do not do that. Whether tuned masses or a
-  damping layer, third octaves of the decay rate do not settle: where the margin is open, both names are given. A
+- **Named as far as the data allow.** The change raises the lateral decay rate many times over from 500 Hz up, where
+  the fastening no longer holds the rail, and hardly changes it below: it dissipates energy of the rail itself. Other
+  pads, damping of pads, ballast, sleepers or another way of measuring do not have this effect. Third octaves of
+  the decay rate do not distinguish tuned masses from a damping layer: within the margin, both names are given. A
   loss factor of the rail of 0.1 would be a very thick layer and the masses found would be ordinary ones; that is
-  knowledge of the trade, not of these numbers. A hammer test at one seat with 1 Hz resolution would tell: a tuned
-  mass splits the response near its frequency.
+  engineering knowledge and does not follow from these data. A hammer test at one rail seat with 1 Hz resolution would
+  distinguish them: a tuned mass splits the response near its frequency.
 - **Temperature.** {warmth} A change is named on top of it, and holds at 24 to 38 °C when fitted at 1 to 15 °C.
 - **What the model is.** A Timoshenko rail on discrete supports of the library's closed form; the meshed track of
   `turnout simulate` gives the same vertical decay rates within 4 %, but for the depth of the pinned-pinned line
   (`tests/blind/test_real_niederwangen.py`). Lateral: the same beam with the rail's lateral bending; it has no
   torsion and no bending of the web. Each band therefore has an error of the model of its own, the same in all
-  campaigns (sd 0.5 of the logarithm to 1600 Hz, 1.0 above), learnt from the first campaign.
+  campaigns (sd 0.5 of the logarithm to 1600 Hz, 1.0 above), estimated from the first campaign.
 - **Noise.** From rail to rail {spread_v:.2f} vertical, {spread_l:.2f} lateral (median of the logarithm's sd); from
-  section to section in the first campaign {repeat_v:.2f} and {repeat_l:.2f}, taken as how well one campaign repeats,
-  smooth over half an octave.
+  section to section in the first campaign {repeat_v:.2f} and {repeat_l:.2f}, taken as the repeatability of one
+  campaign, smooth over half an octave.
 - **What stays open.** S3 rose in the cold campaign and fell back. With 2015-09 left out rail damping is named,
   by little (table); with 2013-07 left out nothing reaches 12 nats; and the campaign left out is predicted worse with
-  it: nothing is said. Another campaign in the cold would settle it.
-- **What was changed after a look.** Two things. The errors that bands share were first a share of independent bands
-  (0.23) and became what the first campaign's sections show, after S5 had been run: with the former 12 nats cannot be
-  reached. The masses tuned an octave apart joined the library after all five had been run. The verdicts by section
+  it: no name is given. Another campaign in cold weather would decide.
+- **What was changed after a first result.** Two things. The errors that bands share were first a share of independent
+  bands (0.23) and became what the first campaign's sections show, after S5 had been run: with the former
+  12 nats cannot be reached. The masses tuned an octave apart joined the library after all five had been run. The verdicts by section
   were the same before and after the latter; the rule for "changed" was written after the first had been run.
 """
 

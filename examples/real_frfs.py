@@ -62,11 +62,11 @@ def cases(folder):
         "A3": (FrfCase(peaks=MODES, rigid=1, **one), "one of the two motions of the rigid body (its mass)"),
         "A4": (FrfCase(peaks=MODES, rigid=2, beam=True, **{**one, "band": (100.0, 1900.0), "step": 6}),
                "resonances tied to those of a free Euler-Bernoulli beam"),
-        "A5": (FrfCase(peaks=MODES, rigid=2, **one), "nothing that we know of"),
+        "A5": (FrfCase(peaks=MODES, rigid=2, **one), "nothing known"),
         "B1": (FrfCase(peaks=PEAKS, reserved=(4,), impact_places=[1] * 5, **two),
                "nothing on purpose; the makers overloaded impact 1"),
         "B2": (FrfCase(peaks=without(more, 447.0), reserved=(3,), impact_places=[1] * 4, **{**two, "h": h2[1:]}),
-               "a resonance; impact 1 left away, what B1 found besides put in"),
+               "a resonance; without impact 1; the resonance that B1 found is in the model"),
     }  # fmt: skip
 
 
@@ -167,34 +167,35 @@ PAGE = """# Real hammer tests against models that are too simple
 
 This page shows what the diagnosis names on beams that others measured.
 
-*Made by `python -m examples.real_frfs [FOLDER]`; every number comes from that run. A: a beam, 6 places struck, 7
-accelerometers, published with sdypy-EMA (MIT). B: a beam, one place struck five times, published with pyFRF (MIT).*
+*Made by `python -m examples.real_frfs [FOLDER]`; every number comes from that run. A: a beam, impacts at 6 positions,
+7 accelerometers, published with sdypy-EMA (MIT). B: a beam, five impacts at one position, published with pyFRF (MIT).*
 
 The diagnosis is given measured frequency responses and a sum of resonances from which something is missing. The
 library: further resonances anywhere from a quarter of the band's lowest to four times its highest frequency, gain,
 delay and mounting of each sensor, gain of each impact, damping of another kind; in A4 also shear, a mass, an axial
-force and springs. One impact is read by the verification alone.
+force and springs. One impact is held out for the verification.
 
 {cases}
 
-Fit: of the held-out impact [%], before → after, and with the best rival. "Near" is where the search started: a
-resonance found outside the band of the fit stands for all that lies beyond, and is none of the beam's own.{starred}
+Fit: of the held-out impact [%], before → after, and with the best rival. "Near" is the frequency at which the search
+started. A resonance outside the band of the fit represents all resonances beyond it; it is
+not one of the beam itself.{starred}
 
 ![Responses of the held-out impacts](real_frfs.svg)
 
 - **A1: found.** The resonance left out is named at {f:.1f} Hz with {zeta:.2f} % damping. The makers print
   {published:.1f} Hz and {printed:.2f} %.
-- **A2: said to be unknown.** The residual is largest at {a2}; 477 Hz lies between
+- **A2: answer "unknown".** The residual is largest at {a2}; 477 Hz lies between
   449 and 566 Hz, the centres of neighbouring thirds of an octave.
-- **A3: found**, as a resonance below the band ({low:.0f} Hz, on the beam's suspension): what a missing mass of the
-  body looks like from above.
+- **A3: found**, as a resonance below the band ({low:.0f} Hz, on the beam's suspension): within the band, a missing mass
+  of the body has this effect.
 - **A4: {a4}
 - **A5: {a5}
-- **B1: found.** Impact 1 is named as struck with a hammer of {gain:.0%} sensitivity (its gain and the tolerance of that
-  impact together): its response is that share of what its force calls for, so that the force reads too large for it or
-  the responses are cut. The makers say that it was overloaded on purpose; which channel suffered they do not. The
-  double impact (impact 3) is not seen: a ratio of spectra holds for two hits as well. `make real` rejects both, hits 0
-  and 2 as it counts, from the force itself.
+- **B1: found.** Impact 1 is named as one by a hammer of {gain:.0%} sensitivity (its gain and the tolerance of that
+  impact together): the response is that share of the one that the recorded force would cause.
+  Either the force is too large or the responses are clipped. The makers state that the impact
+  was overloaded on purpose, but not in which channel. The double impact (impact 3) is not detected: a ratio of
+  spectra holds for two impacts as well. `make real` rejects both from the force itself (impacts 0 and 2, as it counts).
 - **B2:** {b2}
 """
 
@@ -207,14 +208,14 @@ def control_text(d):
     """The answer where no omission is known, and whether the reserved impact confirms it."""
     check, reason = d.verification, d.verdict.reason.replace("_", " ")
     if d.verdict.answer == "none":
-        return "none**: nothing is missing, it says."
+        return 'answer "none"**.'
     if d.verdict.answer != "named":
         return (
-            f"said to be unknown**: {reason}. The fit of the held-out impact is {check.before:.1f} %, best of series A."
+            f'answer "unknown"**: {reason}. The fit of the held-out impact is {check.before:.1f} %, best of series A.'
         )
-    text = "a false name, not withdrawn" if check.is_worse else "named, and we cannot check it"
+    text = "a false name, not withdrawn" if check.is_worse else "named; this cannot be checked"
     return (
-        f"{text}.** Nothing was left out that we know of; the fit of the held-out impact goes from {check.before:.1f}\n"
+        f"{text}.** No omission is known; the fit of the held-out impact goes from {check.before:.1f}\n"
         f"  to {check.after:.1f} % (standard error of the difference {check.error:.1f}). Resonances above the band\n"
         f"  there are: the makers print some up to {PRINTED_FREQUENCIES[-1]:.0f} Hz."
     )
@@ -223,7 +224,7 @@ def control_text(d):
 def beam_text(d):
     """The answer for a beam without shear and rotatory inertia, compared with its printed frequencies."""
     if d.verdict.names[:1] != ("shear_and_rotation",):
-        return f"said to be unknown**: {d.verdict.reason.replace('_', ' ')}."
+        return f'answer "unknown"**: {d.verdict.reason.replace("_", " ")}.'
     (size, *_), (error, *_) = d.verdict.scores[0].estimates
     printed, half, above = beam_printed()
     fitted_text, printed_text = f"{1e4 * size:.3f} ± {1.96e4 * error:.3f}", f"{1e4 * printed:.2f} ± {1e4 * half:.2f}"
@@ -232,9 +233,9 @@ def beam_text(d):
         "from\n"
         f"  100 to 1900 Hz. The second to the seventh frequency that the makers print, "
         f"up to {PRINTED_FREQUENCIES[-1]:.0f} Hz,\n"
-        f"  ask for ({printed_text}) 1e-4. The first lies {above:.1%} above that law, which is the structure "
-        "that stays:\n"
-        "  what holds the beam and what its seven accelerometers weigh is not told."
+        f"  require ({printed_text}) 1e-4. The first lies {above:.1%} above that law, which is the structure "
+        "that remains:\n"
+        "  the supports of the beam and the mass of its seven accelerometers are not published."
     )
 
 
@@ -242,15 +243,15 @@ def page(results):
     """The page as text."""
     f, zeta = identified_mode(results["A1"][2])
     b2 = results["B2"][2]
-    gain_effect = next(t for t in results["B1"][2].fit.terms if t.effect_type == "blow_gain")
+    gain_effect = next(t for t in results["B1"][2].fit.terms if t.effect_type == "impact_gain")
     impact_gain = 1.0 + gain_effect.values["gain"] + results["B1"][2].fit.values["hammer@impact 1"]
     head = ["", "left out", "answer", "in words", "residual is largest at", "fit", "rival"]
-    b2_text = "found." if "mode" in b2.verdict.names else "said to be unknown, and placed; "
+    b2_text = "found." if "mode" in b2.verdict.names else 'answer "unknown", located; '
     if "mode" in b2.verdict.names:
         b2_text += f" At {identified_mode(b2)[0]:.1f} Hz; left out was the one at 447 Hz."
     else:
         b2_text += (
-            f"the resonance near {b2.verdict.scores[0].candidate.where.get('near', '?')} leads and leaves too much."
+            f"the resonance near {b2.verdict.scores[0].candidate.where.get('near', '?')} leads, but leaves too much."
         )
     cells = table(head, rows(results))
     return PAGE.format(

@@ -1,4 +1,4 @@
-"""Real hammer tests against too simple models: what was left out is found or said to be unknown."""
+"""Real hammer tests against too simple models: what was left out is found, or the answer is "unknown"."""
 
 import numpy as np
 import pytest
@@ -49,6 +49,6 @@ def test_what_was_left_out_is_found_or_said_to_be_unknown(shared_data):
     assert beam.verdict.scores[0].estimates[0][0] == pytest.approx(size, abs=half)
     assert above > 0.01  # what no law of the library holds: so B, not A
     assert beam.verification.after > beam.verification.before + 10.0
-    assert said["B1"] == ("named", ("blow_gain",))
+    assert said["B1"] == ("named", ("impact_gain",))
     assert found["B1"][2].fit.terms[0].where == "impact 1"
     assert said["B2"][0] in ("unknown", "named") and set(said["B2"][1]) <= {"mode"}

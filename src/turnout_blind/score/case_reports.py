@@ -284,7 +284,7 @@ def _plot_track(axis: Axes, truth: Mapping[str, Any], rows: Sequence[Mapping[str
     for k, a in enumerate(answers_of(rows) or ()):
         x = truth["sensors"].get(a.sensor) if a.position is None else a.position
         _plot_mark(axis, x, 2.0 + 0.45 * k, " or ".join(a.names) or a.verdict, a.train, a.axle, color="C3", mfc="none")
-    axis.set_yticks([0, 1, 2], ["track", "concealed", "said"])
+    axis.set_yticks([0, 1, 2], ["track", "concealed", "answer"])
     axis.set_ylim(-1.1, 3.3)
     axis.set_xlabel("place [m]")
     axis.legend(loc="lower right", ncols=2, fontsize=7)
@@ -313,7 +313,7 @@ def _annotate(axis: Axes, x: float, y: float, text: str) -> None:
 def _plot_fits(axis: Axes, rows: Sequence[Mapping[str, Any]] | None, oracle: float | None) -> None:
     """Plot the fits of the held-out recordings."""
     row = (rows or [{}])[0]
-    fits = {label: row.get(f"fit_{name}_pct") for name, label in FIT_LABELS.items()} | {"told the truth": oracle}
+    fits = {label: row.get(f"fit_{name}_pct") for name, label in FIT_LABELS.items()} | {"with the true effect": oracle}
     stated: dict[str, Any] = {name: value for name, value in fits.items() if value is not None}
     axis.barh(list(stated), list(stated.values()), color="C0")
     axis.set_xlabel("fit on held-out recordings [%]")

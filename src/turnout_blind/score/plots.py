@@ -106,7 +106,7 @@ def draw_severity(results: Sequence[CaseResult], path: Path) -> Path:
     axis.set_ylim(-0.6, len(effect_types) - 0.4)
     handles = [plt.Rectangle((0, 0), 1, 1, facecolor=c) for c in COLOURS.values()]
     figure.legend(handles, list(COLOURS), ncols=5, loc="outside lower center", frameon=False)
-    axis.set_title("what was said, from hidden to obvious; framed: visibility above 3 points", fontsize=9)
+    axis.set_title("answers, from hidden to obvious; framed: visibility above 3 points", fontsize=9)
     return save(figure, path)
 
 

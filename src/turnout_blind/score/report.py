@@ -162,13 +162,13 @@ def report_text(out: str | Path, extra_names: Mapping[str, Sequence[str]] | None
         cost_text(results, diagnosis, len(read_commit(out)["cases"])),
         *oracle_text(out),
         figure_table(figures(results, read_oracle(out))),
-        "What was said first, by what was concealed:",
+        "First answer (columns) by concealed effect (rows):",
         confusion_table(confusion(results)),
-        "Along the ladder (visibility in points: what was said; * = the right name among it):",
+        "Answers by size of the effect, the smallest first (visibility in points: answer; * = with the right name):",
         severity_table(severity(results)),
         "Stated probability and share right, in up to five groups of the cases, equal ones together:",
         "\n".join(f"- {p:.2f}: {share:.2f} of {n}" for p, share, n in reliability(results)) or "- none stated",
-        "Alarms, wrong names, clear effects without their name or without a word, no answer:",
+        "False alarms, wrong names, clear effects that were not named or not reported, cases without an answer:",
         failure_table(results),
     ]
     if ablation_labels(out):
@@ -218,7 +218,7 @@ def failure_table(results: Sequence[CaseResult]) -> str:
         Markdown, "None." without a failure.
     """
     lines = [
-        "| case | concealed | visibility [points] | said first | wrong names | probability |",
+        "| case | concealed | visibility [points] | first answer | wrong names | probability |",
         "|---|---|---|---|---|---|",
     ]
     for j in sorted(results, key=lambda j: (j.stratum, j.kinds, j.rungs)):
