@@ -186,8 +186,9 @@ both runs. It depends on the date more than the evidence above, and is larger.
   it: no name is given. Another campaign in cold weather would decide.
 - **What was changed after a first result.** Two things. The errors that bands share were first a share of independent
   bands (0.23) and became what the first campaign's sections show, after S5 had been run: with the former
-  12 nats cannot be reached. The masses tuned an octave apart joined the library after all five had been run. The verdicts by section
-  were the same before and after the latter; the rule for "changed" was written after the first had been run.
+  12 nats cannot be reached. The masses tuned an octave apart joined the library after all five had been run. The
+  verdicts by section were the same before and after the latter; the rule for "changed" was written after
+  the first had been run.
 """
 
 
