@@ -37,7 +37,7 @@ def test_the_site_has_a_search_that_needs_no_server(site):
     # a page opened from a folder can load a script only, and this one stands in for the worker of the search
     assert (site / "search" / "search_index.js").read_text("utf-8").startswith("var __index")
     assert "javascripts/iframe-worker.js" in (site / "index.html").read_text("utf-8")
-    assert "identify_modes" in (site / "api.html").read_text(encoding="utf-8")
+    assert "identify_modes" in (site / "modules.html").read_text(encoding="utf-8")
 
 
 def test_notebooks_are_pages_of_the_site(site):
