@@ -201,9 +201,10 @@ NAMED_PIECE = re.compile(
     r"([+-]?[.,]?\d[^:=]{0,30}?|[^\W\d]{1,20}\.?|[-+]|[x×]\s?\d+|\d+\s?:\s?\d+)\s*"
 )
 
-RATIO_PIECE = re.compile(
-    r"(?:\s*([^\d:=]*):)?\s*([^\d:=]*[^\W\d])[\s:=]+(1\s?[:/]\s?\d+[^\d:=]{0,30})"
-)  # "scale 1:500 map"
+RATIO_PIECE = re.compile(  # "scale 1:500 map"
+    r"(?:([^\d:=]*):)?([^\d:=]*[^\W\d])[\s:=]+(1\s?[:/]\s?\d+[^\d:=]{0,30})"
+)
+MAX_RATIO_PIECE = 100  # characters: a longer piece is a description
 
 
 def entries_of_text(text: str, place: str) -> Iterator[Entry]:
@@ -227,7 +228,8 @@ def entries_of_text(text: str, place: str) -> Iterator[Entry]:
     [('hammer', '3'), ('sampled at', '25.6 kHz')]
     """
     for piece in re.split(r"[;\n\r|]|,\s", text[:MAX_TEXT]):
-        if (ratio := RATIO_PIECE.fullmatch(piece)) and scale_meaning(ratio[2]):
+        ratio = RATIO_PIECE.fullmatch(piece.strip()) if len(piece) <= MAX_RATIO_PIECE else None
+        if ratio and scale_meaning(ratio[2]):
             subject = f"{ratio[1]} " if is_of_drawing(ratio[1] or "") else ""
             yield Entry(place, subject + ratio[2].strip(), ratio[3].strip())
             continue

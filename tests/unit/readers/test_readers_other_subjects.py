@@ -5,6 +5,7 @@ The samples were taken at 25.6 kHz.
 """
 
 import json
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +17,7 @@ from turnout.errors import ReadError
 from turnout.readers import read
 from turnout.readers.rate_words import NOT, name_meaning
 from turnout.readers.scale_words import says_no_scale
+from turnout.readers.statements import entries_of_text
 from turnout.records import RawDescription
 
 FREQUENCIES = (
@@ -109,6 +111,13 @@ def test_a_name_without_a_word_of_frequency_keeps_its_meaning():
     """An unknown word with a frequency may be in another language."""
     assert name_meaning("Tastung [kHz]").certainty != NOT and name_meaning("Bolt frequency [kHz]").certainty == NOT
     assert not says_no_scale("0.4") and not says_no_scale("1:10") and not says_no_scale("inverted")
+
+
+@pytest.mark.parametrize("text", [" " * 1000, " " * 500 + ":" + " " * 499, "a" + " " * 995 + "1:1x9", "a: " * 330])
+def test_a_comment_of_many_blanks_is_searched_quickly(text):
+    started = time.process_time()
+    assert len(list(entries_of_text(text, "comment"))) <= 1
+    assert time.process_time() - started < 0.5  # s; a search that tries every division of the blanks takes 5 s
 
 
 COMMENTS = (
