@@ -227,8 +227,8 @@ def entries_of_text(text: str, place: str) -> Iterator[Entry]:
     >>> [(e.name, e.value) for e in entries_of_text("hammer 3; sampled at 25.6 kHz, tip=steel", "comment")]
     [('hammer', '3'), ('sampled at', '25.6 kHz')]
     """
-    for piece in re.split(r"[;\n\r|]|,\s", text[:MAX_TEXT]):
-        ratio = RATIO_PIECE.fullmatch(piece.strip()) if len(piece) <= MAX_RATIO_PIECE else None
+    for piece in map(str.strip, re.split(r"[;\n\r|]|,\s", text[:MAX_TEXT])):
+        ratio = RATIO_PIECE.fullmatch(piece) if len(piece) <= MAX_RATIO_PIECE else None
         if ratio and scale_meaning(ratio[2]):
             subject = f"{ratio[1]} " if is_of_drawing(ratio[1] or "") else ""
             yield Entry(place, subject + ratio[2].strip(), ratio[3].strip())
