@@ -25,9 +25,6 @@ if TYPE_CHECKING:
     from turnout.mismatch.turnout.case import TrackCase
 
 
-COMMON_PADS = ("pad_stiffness", "pad_damping")  # of the whole track
-
-
 def calibrated_parameters(case: TrackCase, route: str = "main") -> dict[str, StateParameter]:
     """Parameters of a case that all visits share, with names that do not depend on the case.
 
@@ -85,7 +82,7 @@ def calibrated_parameters(case: TrackCase, route: str = "main") -> dict[str, Sta
 
 def _visit_sd(nuisance: Nuisance, is_outer: bool) -> float:
     """What each visit adds of its own: another train of the type, the temperature of pads, what lies farther out."""
-    if nuisance.name in COMMON_PADS:
+    if nuisance.name in ("pad_stiffness", "pad_damping"):  # of all pads
         return CALIBRATION.pad_visit_sd
     if is_outer:
         return CALIBRATION.change_sds * nuisance.sd
