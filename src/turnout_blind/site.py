@@ -150,6 +150,15 @@ def draw_site(
     return {CROSSING: with_crossing, SWITCH: with_switch}[panel](rng, site) if panel != PLAIN else site
 
 
+def _lay_bearers(rng: np.random.Generator, site: Site) -> float:
+    """Long bearers instead of sleepers from the zone boundary on; returns this boundary. [m]"""
+    (west, east), boundary = site.nominal, site.zones[1][0]
+    nominal_factor, true_factor = draw_bearer_mass_ratio(rng)
+    site.nominal = west, {**east, "mass": round(nominal_factor * east["mass"])}
+    site.world.mass[site.world.position > boundary - 0.3] *= true_factor
+    return boundary
+
+
 def with_crossing(rng: np.random.Generator, site: Site) -> Site:
     """The site with bearers from the zone boundary on, and a crossing behind it.
 
@@ -165,10 +174,7 @@ def with_crossing(rng: np.random.Generator, site: Site) -> Site:
     Site
         The same site, changed.
     """
-    (west, east), boundary = site.nominal, site.zones[1][0]
-    nominal_factor, true_factor = draw_bearer_mass_ratio(rng)
-    site.nominal = west, {**east, "mass": round(nominal_factor * east["mass"])}
-    site.world.mass[site.world.position > boundary - 0.3] *= true_factor
+    boundary = _lay_bearers(rng, site)
     true_crossing, site.crossing = draw_crossing(rng, boundary)
     add_crossing(rng, site.world, true_crossing, site.trains)
     site.chains = tuple(replace(c, full_scale=5.0 * c.full_scale) for c in site.chains)  # impacts at the nose are hard
@@ -190,10 +196,7 @@ def with_switch(rng: np.random.Generator, site: Site) -> Site:
     Site
         The same site, changed.
     """
-    (west, east), boundary = site.nominal, site.zones[1][0]
-    nominal_factor, true_factor = draw_bearer_mass_ratio(rng)
-    site.nominal = west, {**east, "mass": round(nominal_factor * east["mass"])}
-    site.world.mass[site.world.position > boundary - 0.3] *= true_factor
+    _lay_bearers(rng, site)
     true_switch, site.switch = draw_switch(rng)
     add_switch(rng, site.world, true_switch, site.trains)
     site.chains = tuple(replace(c, full_scale=5.0 * c.full_scale) for c in site.chains)  # impacts at the change
