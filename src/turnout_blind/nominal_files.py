@@ -113,7 +113,7 @@ def track(site: Site) -> str:
     lines += ["support:", *_support(site.nominal[0]), "sections:"]
     for label, zone, values in zip(("west", "east"), site.zones, site.nominal):
         lines += [f"  - label: {label}", "    panel: CLP"]
-        lines += [f"    from: {_value(zone[0] - 0.3, 'm')}", f"    to: {_value(zone[1] - 0.3, 'm')}"]
+        lines += [f"    from: {_value(zone[0], 'm')}", f"    to: {_value(zone[1], 'm')}"]
         lines += ["  " + line for line in _support(values)]
     lines += ["locations:"]
     lines += [f"  S{i}: {{place: {_value(x, 'm', 0.02)}}}" for i, x in enumerate(site.sensors, 1)]

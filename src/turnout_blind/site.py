@@ -155,7 +155,7 @@ def _lay_bearers(rng: np.random.Generator, site: Site) -> float:
     (west, east), boundary = site.nominal, site.zones[1][0]
     nominal_factor, true_factor = draw_bearer_mass_ratio(rng)
     site.nominal = west, {**east, "mass": round(nominal_factor * east["mass"])}
-    site.world.mass[site.world.position > boundary - 0.3] *= true_factor
+    site.world.mass[site.world.position > boundary] *= true_factor
     return boundary
 
 

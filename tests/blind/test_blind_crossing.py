@@ -113,3 +113,21 @@ def test_a_nose_wears_at_its_tip_by_as_much_as_it_says_and_nowhere_else(site):
     plain = draw_site(np.random.default_rng(1))
     with pytest.raises(ValueError, match="only a crossing"):
         effect.draw(np.random.default_rng(2), plain, 1e-3)
+
+
+@pytest.mark.parametrize("panel", ["plain", "crossing"])
+@pytest.mark.parametrize("seed", [0, 1, 2, 8])  # each boundary of sections
+def test_each_support_is_in_the_file_with_the_values_of_its_own_section(panel, seed, tmp_path):
+    """A boundary on a support would give it the pad, the bed and the mass of the other section."""
+    site = draw_site(np.random.default_rng([5, 29, seed]), panel=panel)
+    write_configuration(tmp_path / "config", "T1", site)
+    track = track_of(load_configuration(tmp_path / "config").turnout("T1"))[0].track
+    world, (west, east) = site.world, site.nominal
+    boundary = site.zones[1][0]
+    assert np.abs(track.support - boundary).min() == pytest.approx(0.3)
+    for position, stiffness, mass in zip(track.support, track.ballast_stiffness, track.sleeper_mass):
+        if not world.position[0] < position < world.position[-1]:
+            continue
+        nominal = west if position < boundary else east
+        assert (stiffness, mass) == pytest.approx((nominal["ballast"], nominal["mass"]))
+        assert world.mass[world.nearest(position)] == pytest.approx(mass, rel=0.14)
