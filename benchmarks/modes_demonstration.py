@@ -105,7 +105,7 @@ def history_intervals(rows):
     ])  # fmt: skip
     with duckdb.connect() as connection:
         connection.register("epochs", modes)
-        for view in ("students_t", "mode_intervals"):
+        for view in ("students_t", "mode_scatter", "mode_intervals"):
             connection.execute(files("turnout.registry").joinpath(f"views/{view}.sql").read_text(encoding="utf-8"))
         found = connection.execute("select model_id, band, quantity, value_low, value_high from mode_intervals")
         return {(k, band, quantity): (low, high) for k, band, quantity, low, high in found.fetchall()}

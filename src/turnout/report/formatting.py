@@ -107,11 +107,36 @@ def with_interval(value: float | None, standard_error: float | None, n: int, dig
     >>> with_interval(None, None, 0)
     'none'
     """
+    # an error of zero is below the resolution of the registry
+    return with_half_width(value, student_quantile(n) * standard_error if standard_error and n > 1 else None, digits)
+
+
+def with_half_width(value: float | None, half: float | None, digits: int = 1) -> str:
+    """A value with half of its interval, which gets at least one significant digit.
+
+    Parameters
+    ----------
+    value : float or None
+        The value.
+    half : float or None
+        Half width of the interval, above 0.
+    digits : int
+        Least number of decimals.
+
+    Returns
+    -------
+    str
+        Text; "none" without a value, "?" for an unknown interval.
+
+    Examples
+    --------
+    >>> with_half_width(154.55, 0.004), with_half_width(154.55, None)
+    ('154.550 ± 0.008', '154.5 ± ?')
+    """
     if value is None:
         return "none"
-    if not standard_error or n < 2:  # an error of zero is below the resolution of the registry
+    if half is None:
         return f"{value:.{digits}f} ± ?"
-    half = student_quantile(n) * standard_error
     if 2.0 * half < 10.0**-digits:
         digits = -math.floor(math.log10(half))
     return f"{value:.{digits}f} ± {half:.{digits}f}"

@@ -19,16 +19,29 @@ BASELINE = TrendSettings()  # of which the page states what a baseline needs
 # One row per section: that of the newest model, accepted or not.
 NEWEST_MODEL = "qualify row_number() over (partition by section_id order by measured_at_utc desc, model_id) = 1"
 ID_GIVEN = "turnout_id in (select unnest($turnouts))"
+# Scatter between the campaigns of each section, which needs all campaigns of the fleet: read once, for all turnouts.
+HISTORY = "mode_scatter_read"
 MAX_QUARANTINE_ROWS = 20  # quarantine rows of one reason that a page shows
 ROWS = {
     "turnouts": f"select * from turnouts where {ID_GIVEN}",
     "sections": f"select * from sections where {ID_GIVEN} order by position_m, label",
     "events": f"select * from events where {ID_GIVEN} order by event_at_utc, event_id",
     "modes": f"""
+        with intervals as (
+            select m.*,
+                history_half_width(frequency_repeatability_hz / frequency_hz, f.between_sd, f.freedom) as f_half,
+                history_half_width(damping_repeatability / damping_ratio, d.between_sd, d.freedom) as d_half,
+                f.n_steps as frequency_steps, d.n_steps as damping_steps
+            from modes_current m
+            left join {HISTORY} f on f.section_id = m.section_id and f.band = m.band and f.quantity = 'frequency'
+            left join {HISTORY} d on d.section_id = m.section_id and d.band = m.band and d.quantity = 'damping'
+            where m.band in ('ballast', 'railpad') and m.source = 'hammer' and {ID_GIVEN}
+        )
         select turnout_id, section_id, model_id, band, measured_at_utc, frequency_hz, frequency_se_hz,
-            damping_ratio, damping_se, n_impacts, rail_temperature_c
-        from modes_current where band in ('ballast', 'railpad') and source = 'hammer' and {ID_GIVEN}
-        order by section_id, band, measured_at_utc""",
+            damping_ratio, damping_se, n_impacts, rail_temperature_c, frequency_steps, damping_steps,
+            frequency_hz * exp(-f_half) as frequency_low_hz, frequency_hz * exp(f_half) as frequency_high_hz,
+            damping_ratio * exp(-d_half) as damping_low, damping_ratio * exp(d_half) as damping_high
+        from intervals order by section_id, band, measured_at_utc""",
     "models": f"select * from models_current where {ID_GIVEN} {NEWEST_MODEL}",
     "unused": f"""
         select turnout_id, section_id, measured_at_utc, reason, detail
@@ -116,6 +129,7 @@ class FleetSource:
         self.connection, self.day = connection, list_day(connection, day)
         rows = connection.execute("select view_name from duckdb_views() where database_name = current_database()")
         self.views = {row[0] for row in rows.fetchall()}
+        self._has_history = False
 
     def turnouts(self) -> list[dict[str, Any]]:
         """One row per turnout with its counts."""
@@ -211,10 +225,18 @@ class FleetSource:
             Rows by kind and turnout id: {table: {turnout_id: [row, ...]}}.
         """
         chosen = {"turnouts": list(turnout_ids)}
+        self._read_history()
         tables = [table for table in ROWS if self.has(table)]
         rows = {table: _by_turnout(self._fetch(ROWS[table], chosen)) for table in tables if table != "receptances"}
         rows |= train_rows(self._fetch, turnout_ids, self.has("charts"))
         return rows | {"receptances": _by_turnout(self._arrays(ROWS["receptances"], chosen))}
+
+    def _read_history(self) -> None:
+        """Read the scatter between campaigns into a temporary table, once."""
+        if not self._has_history:
+            sql = f"create or replace temp table {HISTORY} as select * from mode_scatter"
+            self.connection.execute(sql)
+            self._has_history = True
 
     def _arrays(self, sql: str, parameters: Mapping[str, Any]) -> list[dict[str, Any]]:
         """Rows with lists as numpy arrays, which is many times faster than Python lists."""

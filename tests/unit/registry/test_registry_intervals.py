@@ -8,11 +8,12 @@ from registry_rows import hammer_result
 from scipy.stats import t
 
 from turnout.registry.database import open_registry
+from turnout.report.site import write_pages
 
 N, REPEATABILITY, BETWEEN, SLOPE = 25, 0.002, 0.006, -0.0015  # relative, and per °C
 
 
-def campaigns(section, rng, between=BETWEEN, step=None):
+def campaigns(section, rng, between=BETWEEN, step=None, **mode):
     """Results of N campaigns, and (frequency, temperature) of each; ``step`` (campaign, factor) changes the section."""
     temperature = np.round(10.0 + 10.0 * np.sin(np.arange(N) * 0.8) + rng.normal(0.0, 3.0, N), 1)  # as stored
     log_f = np.log(150.0) + SLOPE * temperature + rng.normal(0.0, np.hypot(REPEATABILITY, between), N)
@@ -22,7 +23,7 @@ def campaigns(section, rng, between=BETWEEN, step=None):
     for k in range(N):
         day = (date(2024, 1, 10) + timedelta(days=40 * k)).isoformat()
         f = float(np.exp(log_f[k]))
-        values = {"rail_temperature_c": float(temperature[k]), "frequency_repeatability_hz": REPEATABILITY * f}
+        values = {"rail_temperature_c": float(temperature[k]), "frequency_repeatability_hz": REPEATABILITY * f} | mode
         results.append(hammer_result(day=day, file=day, key=f"{section}{k}", section=section, frequency=f, **values))
     return results, log_f, temperature
 
@@ -78,3 +79,39 @@ def test_seven_campaigns_are_no_history(bench):
     results, _, _ = campaigns("A1", np.random.default_rng(7))
     bench.register(*results[:7])
     assert bench.ask("select * from mode_intervals") == []
+
+
+SECTION = {
+    "turnouts": [{"turnout_id": "t1", "name": "t1", "line": "L", "km": 1.5, "layout": "l", "config_hash": "h"}],
+    "sections": [
+        {"turnout_id": "t1", "section_id": "t1/A1", "label": "A1", "panel": "CP", "track": "main", "position_m": 1.0}
+    ],
+}
+
+
+def page_of(bench, tmp_path):
+    """Text of the page of the turnout."""
+    with open_registry(bench.registry) as connection:
+        write_pages(connection, tmp_path / "pages", progress=False)
+    return (tmp_path / "pages" / "turnouts" / "t1.html").read_text(encoding="utf-8")
+
+
+def test_the_page_shows_the_interval_of_the_history_with_its_number_of_steps(bench, tmp_path):
+    results, log_f, _ = campaigns("A1", np.random.default_rng(8))
+    bench.register(*results, tables=SECTION)
+    rows = bench.ask("select value_low, value_high from mode_intervals where quantity = 'frequency' order by model_id")
+    order = [model for (model,) in bench.ask("select model_id from modes_current order by measured_at_utc")]
+    limits = [rows[sorted(order).index(model)] for model in order]
+    text = page_of(bench, tmp_path)
+    for k in (0, N - 1):
+        half = 0.5 * (limits[k][1] - limits[k][0])
+        assert f"{np.exp(log_f[k]):.2f} Hz ± {half:.2g} (95 %, {N - 1} steps)" in text
+    assert f">{np.exp(log_f[-1]):.1f} ± {half:.1f}</td>" in text  # the table of the present resonances
+
+
+def test_the_page_of_a_section_without_history_shows_the_interval_of_the_campaign(bench, tmp_path):
+    results, log_f, _ = campaigns("A1", np.random.default_rng(9), frequency_se_hz=0.7)
+    bench.register(*results[:7], tables=SECTION)
+    text = page_of(bench, tmp_path)
+    assert f"{np.exp(log_f[0]):.2f} Hz ± {t.ppf(0.975, 29) * 0.7:.2g} (95 %)" in text
+    assert " steps)" not in text

@@ -6,11 +6,11 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from turnout.report import panels
-from turnout.report.formatting import badge, count_of, day, diagnoses_once, number_ranges, with_interval
+from turnout.report.formatting import badge, count_of, day, diagnoses_once, number_ranges, with_half_width
 from turnout.report.panels.calibrated_model import calibrated_panels, visits_in_words
 from turnout.report.panels.diagram import diagram
 from turnout.report.panels.hammer import HammerTest
-from turnout.report.panels.history import DAMPING, FREQUENCY, history_panel
+from turnout.report.panels.history import DAMPING, FREQUENCY, history_panel, interval
 from turnout.report.trains import trains_part
 
 if TYPE_CHECKING:
@@ -135,9 +135,9 @@ def _summary(
         row["status"] = model["status"].replace("_", " ") + (f": {model['reason']}" if model["reason"] else "")
     for band in BANDS:
         mode = _latest(modes, band, model) or {}
-        n = mode.get("n_impacts", 0)
-        row[band] = with_interval(mode.get("frequency_hz"), mode.get("frequency_se_hz"), n)
-        row[f"{band}_damping"] = with_interval(mode.get("damping_ratio"), mode.get("damping_se"), n, 4)
+        for quantity, key, digits in ((FREQUENCY, band, 1), (DAMPING, f"{band}_damping", 4)):
+            value = mode.get(quantity.value)
+            row[key] = with_half_width(value, None if value is None else interval(mode, quantity).half_width, digits)
     return row
 
 

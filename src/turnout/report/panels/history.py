@@ -20,8 +20,9 @@ class Quantity:
     """Columns of one quantity of a mode, and how it is written.
 
     ``value`` and ``error`` are columns of ``modes_current``; ``low``, ``high`` those of its chart; ``recursive``
-    that of ``recursive_modes``. ``name`` stands behind the band, ``unit`` behind a value; ``decimals``
-    are those of a title.
+    that of ``recursive_modes``; ``history`` the limits from the history of the section, and the number of steps from
+    campaign to campaign behind them. ``name`` stands behind the band, ``unit`` behind a value; ``decimals`` are those
+    of a title.
     """
 
     value: str
@@ -29,17 +30,19 @@ class Quantity:
     low: str
     high: str
     recursive: str
+    history: tuple[str, str, str]
     name: str = ""
     unit: str = ""
     decimals: int = 1
 
 
 FREQUENCY = Quantity(
-    "frequency_hz", "frequency_se_hz", "expected_low_hz", "expected_high_hz", "frequency_recursive_hz", unit=" Hz"
-)
+    "frequency_hz", "frequency_se_hz", "expected_low_hz", "expected_high_hz", "frequency_recursive_hz",
+    ("frequency_low_hz", "frequency_high_hz", "frequency_steps"), unit=" Hz",
+)  # fmt: skip
 DAMPING = Quantity(
-    "damping_ratio", "damping_se", "expected_low_damping", "expected_high_damping", "damping_recursive", " damping",
-    decimals=4,
+    "damping_ratio", "damping_se", "expected_low_damping", "expected_high_damping", "damping_recursive",
+    ("damping_low", "damping_high", "damping_steps"), " damping", decimals=4,
 )  # fmt: skip
 SERIES = {"point": "campaign", "confirm": "campaign to be confirmed", "alarm": "campaign in an open alarm"}
 
@@ -81,9 +84,9 @@ def history_panel(
         return ""
     time = np.array([seconds(m["measured_at_utc"]) for m in modes])
     value = np.array([m[quantity.value] for m in modes])
-    error = np.array([_half_width(m, quantity) for m in modes])
-    half = np.where(np.isnan(error), 0.0, error)
-    low, high = value - half, value + half
+    intervals = [interval(m, quantity) for m in modes]
+    low, high = np.array([[i.low, i.high] for i in intervals], dtype=float).T
+    low, high = np.where(np.isnan(low), value, low), np.where(np.isnan(high), value, high)
     expected = [c for c in charts if c[quantity.low] is not None and c[quantity.high] is not None]
     lowest = min([low.min(), *(c[quantity.low] for c in expected)])
     highest = max([high.max(), *(c[quantity.high] for c in expected)])
@@ -93,7 +96,7 @@ def history_panel(
     chart = Chart(
         Axis(time.min() - margin, time.max() + margin, "", "time"),
         Axis(lowest - pad, highest + pad, f"{band}{quantity.name} [{quantity.unit.strip() or '-'}]"),
-        f"{band}{quantity.name}: {value[-1]:.{quantity.decimals}f}{quantity.unit} {_interval(error[-1])}, "
+        f"{band}{quantity.name}: {value[-1]:.{quantity.decimals}f}{quantity.unit} {_words(intervals[-1])}, "
         f"n = {modes[-1]['n_impacts']}; " + count_of(len(modes), "campaign"),
         width=width,
     )
@@ -108,10 +111,10 @@ def history_panel(
         style = "event" if event[f"resets_{band}"] else "event mild"
         chart.vertical(seconds(event["event_at_utc"]), style, event["kind"].replace("_", " "), row % 3)
     labels = [
-        f"{m['measured_at_utc']:%Y-%m-%d}: {m['frequency_hz']:.2f} Hz{_of(e, quantity is FREQUENCY)}, damping "
-        f"{m['damping_ratio']:.4f}{_of(e, quantity is DAMPING)}, n = {m['n_impacts']}, "
+        f"{m['measured_at_utc']:%Y-%m-%d}: {m['frequency_hz']:.2f} Hz{_of(i, quantity is FREQUENCY)}, damping "
+        f"{m['damping_ratio']:.4f}{_of(i, quantity is DAMPING)}, n = {m['n_impacts']}, "
         f"{_temperature(m['rail_temperature_c'])}"
-        for m, e in zip(modes, error)
+        for m, i in zip(modes, intervals)
     ]
     styles = _point_styles(modes, charts)
     for style in (style for style in SERIES if style in styles):
@@ -139,20 +142,57 @@ def _style(row: Mapping[str, Any]) -> str:
     return "point" if row.get("deviation_pct") is None else "confirm"
 
 
-def _half_width(mode: Mapping[str, Any], quantity: Quantity) -> float:
-    """Half of the 95 % t interval, nan where the campaign has no standard error."""
-    if mode[quantity.error] is None or mode["n_impacts"] < 2:
-        return np.nan
-    return student_quantile(mode["n_impacts"]) * mode[quantity.error]
+@dataclass(frozen=True)
+class Interval:
+    """95 % interval of one campaign value; ``steps`` from campaign to campaign behind it, 0 where it is the campaign's.
+
+    Without a standard error its limits are nan.
+    """
+
+    low: float
+    high: float
+    steps: int = 0
+
+    @property
+    def half_width(self) -> float | None:
+        """Half of its width, None without limits."""
+        return 0.5 * (self.high - self.low) if np.isfinite(self.high) else None
 
 
-def _of(half: float, is_shown: bool) -> str:
+def interval(mode: Mapping[str, Any], quantity: Quantity) -> Interval:
+    """The interval by which campaigns of a section are compared, where it has no history that of the campaign.
+
+    Parameters
+    ----------
+    mode : mapping
+        Row of ``modes`` of the page.
+    quantity : Quantity
+        ``FREQUENCY`` or ``DAMPING``.
+
+    Returns
+    -------
+    Interval
+        From the view ``mode_intervals``, else Student's t times the standard error of the campaign.
+    """
+    low, high, steps = (mode.get(column) for column in quantity.history)
+    if low is not None and high is not None and steps is not None:
+        return Interval(low, high, steps)
+    value, error, n = mode[quantity.value], mode[quantity.error], mode["n_impacts"]
+    half = np.nan if not error or n < 2 else student_quantile(n) * error
+    return Interval(value - half, value + half)
+
+
+def _of(of_campaign: Interval, is_shown: bool) -> str:
     """The interval of the quantity that is shown, with a space before it."""
-    return f" {_interval(half)}" if is_shown else ""
+    return f" {_words(of_campaign)}" if is_shown else ""
 
 
-def _interval(half: float) -> str:
-    return f"± {half:.2g} (95 %)" if np.isfinite(half) else "± unknown"
+def _words(of_campaign: Interval) -> str:
+    """Half width of an interval, and where it comes from."""
+    half = of_campaign.half_width
+    if half is None:
+        return "± unknown"
+    return f"± {half:.2g} (95 %{f', {of_campaign.steps} steps' if of_campaign.steps else ''})"
 
 
 def _temperature(value: float | None) -> str:
