@@ -113,15 +113,12 @@ def _description_of_layout(
         raise ValueError("give either a layout or channels: both say what the channels are")
     turnout = layout if isinstance(layout, TurnoutConfig) else load_layout(Path(layout))
     if section is None:
-        if turnout.passages is None:
-            remedy = "Give a section, for a file of a hammer test"
-            raise ConfigError(turnout.layout, "passages", "the layout describes no passages", remedy)
-        return turnout.passages.description
+        return turnout.require_passages().description
     if turnout.hammer is None:
-        raise ConfigError(turnout.layout, "hammer", "the layout describes no hammer tests", "Add the part hammer")
+        raise ConfigError(turnout.layout_file, "hammer", "the layout describes no hammer tests", "Add the part hammer")
     if section not in turnout.hammer.descriptions:
         remedy = f"Write one of {', '.join(turnout.hammer.descriptions)}"
-        raise ConfigError(turnout.layout, "section", f"there is no section {section!r}", remedy)
+        raise ConfigError(turnout.layout_file, "section", f"there is no section {section!r}", remedy)
     return turnout.hammer.descriptions[section]
 
 

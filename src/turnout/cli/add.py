@@ -45,11 +45,16 @@ def run(args: argparse.Namespace) -> int:
     from pathlib import Path
 
     from turnout.config import load_configuration
-    from turnout.config.turnouts_table import ROW, append_tsv, restore_on_error
+    from turnout.config.turnouts_table import ROW, append_tsv, read_table, restore_on_error
+    from turnout.errors import ConfigError
     from turnout.readers.formats import FORMATS
     from turnout.units import to_si
 
     path = Path(args.configuration) / "turnouts.tsv"
+    rows = read_table(path, str(path))[0]
+    if row := next((row for row in rows if row.id == args.turnout), None):
+        problem = f"there is a turnout {row.id!r} already"
+        raise ConfigError(path, f"line {row.line}", problem, "Write another id; to change the turnout, edit this line")
     with restore_on_error(path):
         append_tsv(path, {column: getattr(args, column) for column in ROW}, tuple(ROW))
         turnout = load_configuration(args.configuration, FORMATS, to_si).turnout(args.turnout)

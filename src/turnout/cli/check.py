@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from turnout.cli.options import RAW_HELP, add_configuration, add_raw, add_result
+from turnout.counts import count_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Iterator
+    from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 
     from turnout.config import Configuration, Event
     from turnout.units import Conversion
@@ -34,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_configuration(parser)
     add_raw(parser, help=f"{RAW_HELP} (raw, where it is there)", default=None)
     parser.add_argument("--read", action="store_true", help="read one file per section and compare it with the layout")
-    parser.add_argument("--turnout", help="with --read: only this one")
+    parser.add_argument("--turnout", help="only this one")
     parser.add_argument("--formats", action="store_true", help="list the raw formats")
 
 
@@ -60,28 +61,33 @@ def run(args: argparse.Namespace) -> int:
         print("\n".join(f"{name:<10} {' '.join(f.extensions):<24} {f.meaning}" for name, f in FORMATS.items()))
         return 0
     configuration = load_configuration(args.configuration, FORMATS, to_si)
+    ids = [configuration.turnout(args.turnout).id] if args.turnout else list(configuration.ids)
     faults = [*_faults(configuration, FORMATS, to_si)]
     add_result(args, {"turnouts": list(configuration.ids), "faults": faults})
     layouts = {row.values["layout"] for row in configuration.rows.values()}
     n_events = len(configuration.events)
     n_acks = len(configuration.acknowledgements)
-    counts = f"{len(configuration.ids)} turnouts, {len(layouts)} layouts, {n_events} events, {n_acks} acknowledgements"
+    counts = (
+        f"{count_of(len(configuration.ids), 'turnout')} with {count_of(len(layouts), 'layout')}, "
+        f"{count_of(n_events, 'event')}, {count_of(n_acks, 'acknowledgement')}"
+    )
     print(f"{args.configuration}: {counts}, {'with faults' if faults else 'sound'}.")
     for fault in faults:
         print(f"  {fault}")
     for event in _planned_events(configuration.events):
         print(f"  {event}")
+    for decision in _open_decisions(configuration, layouts):
+        print(f"  {decision}")
     raw = Path(args.raw or "raw")
     if not raw.is_dir() and args.raw:
-        raise ConfigError(
-            args.raw, "--raw", "no such folder", "Write the folder that holds the folders of the turnouts"
-        )
+        problem = "it is a file" if raw.exists() else "no such folder"
+        raise ConfigError(args.raw, "--raw", problem, "Write the folder that holds the folders of the turnouts")
     if not raw.is_dir():
         print(f"{raw}: no such folder, file names not checked.")
         return 1 if faults or args.read else 0
-    n_fault = _report_left_out(configuration, raw) + len(faults)
+    n_fault = _report_left_out(configuration, raw, ids) + len(faults)
     if args.read:
-        n_fault += _report_readings(configuration, raw, args.turnout)
+        n_fault += _report_readings(configuration, raw, ids)
     return 1 if n_fault else 0
 
 
@@ -97,6 +103,16 @@ def _faults(configuration: Configuration, formats: Collection[str], to_si: Calla
     yield from faults_of_tracks(configuration)
 
 
+def _open_decisions(configuration: Configuration, layouts: Iterable[str]) -> Iterator[str]:
+    """Each line of a used layout that a person has yet to decide, as `turnout layout new` marks it."""
+    from turnout.stages.layout_draft import decisions
+
+    for name in sorted(layouts):
+        path = configuration.folder / "layouts" / f"{name}.yaml"
+        for decision in decisions(path.read_text(encoding="utf-8")):
+            yield f"{path}, {decision}: still marked with DECIDE. Write the value, and remove the mark"
+
+
 def _planned_events(events: Iterable[Event]) -> Iterator[str]:
     """Each event of the next year, which may be a typing error; later ones are warnings already."""
     from datetime import timedelta
@@ -109,7 +125,7 @@ def _planned_events(events: Iterable[Event]) -> Iterator[str]:
             yield f"planned, counts from its day: {e.kind} at {where}, {e.at:%Y-%m-%d} (events.csv)"
 
 
-def _report_left_out(configuration: Configuration, raw: Path) -> int:
+def _report_left_out(configuration: Configuration, raw: Path, ids: Sequence[str]) -> int:
     """Print the number of raw files and each problem with them; returns the number of problems."""
     from turnout.config.load import read_notes
     from turnout.workflow.notes_check import note_contradictions
@@ -117,13 +133,14 @@ def _report_left_out(configuration: Configuration, raw: Path) -> int:
 
     n_units = n_files = 0
     problems = []
-    for turnout in map(configuration.turnout, configuration.ids):
+    for turnout in map(configuration.turnout, ids):
         scanned = scan(turnout, raw)
         n_units += len(scanned.units)
         n_files += sum(len(u.files) for u in scanned.units)
         noted_turnout, note_errors = read_notes(turnout, raw)
         problems += [*scanned.problems, *note_errors, *note_contradictions(noted_turnout, raw, scanned.units)]
-    print(f"{raw}: {n_files} files in {n_units} units, {len(problems)} left out or unsound.")
+    problem_count = count_of(len(problems), "problem") if problems else "no problem"
+    print(f"{raw}: {count_of(n_files, 'file')} in {count_of(n_units, 'unit')}, {problem_count}.")
     for problem in problems:
         print(f"  {problem}")
     for folder in _folders_without_turnout(configuration, raw):
@@ -139,18 +156,18 @@ def _folders_without_turnout(configuration: Configuration, raw: Path) -> list[Pa
     return sorted(p for p in raw.iterdir() if p.is_dir() and not p.name.startswith(".") and (p.name,) not in first)
 
 
-def _report_readings(configuration: Configuration, raw: Path, only: str | None) -> int:
+def _report_readings(configuration: Configuration, raw: Path, ids: Sequence[str]) -> int:
     """Print what the reading of one file per section gave; returns the number of faults."""
     from turnout.config.load import with_raw
     from turnout.stages.layout_reading import file_readings, sections_without_files
     from turnout.workflow.scan import scan
 
     n_fault = 0
-    for name in [only] if only else configuration.ids:
+    for name in ids:
         turnout = with_raw(configuration.turnout(name), raw)
         units = scan(turnout, raw).units
         for reading in file_readings(turnout, raw, units):
-            verdict = "agrees" if not reading.faults else f"{len(reading.faults)} faults"
+            verdict = "agrees" if not reading.faults else count_of(len(reading.faults), "fault")
             print(
                 f"{reading.turnout}, {reading.section}: {reading.path}: {verdict}{reading.text and ': '}{reading.text}"
             )

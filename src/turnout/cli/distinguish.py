@@ -10,7 +10,7 @@ distinguished. A name needs 12 in the column "none" and 6 against each rival.
 
 import argparse
 
-from turnout.cli.options import add_configuration, add_former, add_track
+from turnout.cli.options import above_zero, add_configuration, add_former, add_track
 
 GROUP = "Simulate and diagnose"
 HELP = "show which effects a planned campaign can distinguish"
@@ -31,8 +31,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_former(parser, "--blows", "--impacts", nargs="*", type=float)
     parser.add_argument("--temperatures", nargs="+", type=float, default=(15.0,), metavar="C", help="of the rail [°C]")
     parser.add_argument("--trains", nargs="*", default=(), help="files in config/vehicles")
-    parser.add_argument("--speeds", nargs="+", type=float, default=(160.0,), metavar="KMH", help="[km/h]")
-    parser.add_argument("--families", nargs="+", help="only these effects")
+    parser.add_argument("--speeds", nargs="+", type=above_zero, default=(160.0,), metavar="KMH", help="[km/h]")
+    parser.add_argument("--effects", nargs="+", metavar="EFFECT", help="only these effects")
+    add_former(parser, "--families", "--effects", nargs="+")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -57,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
         args.temperatures,
         args.trains,
         args.speeds,
-        args.families,
+        args.effects,
         args.configuration,
     )
     print(matrix)

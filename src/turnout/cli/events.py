@@ -57,13 +57,17 @@ def run(args: argparse.Namespace) -> int:
     if not args.place:
         events = load_configuration(args.configuration).events
         add_result(args, [asdict(e) for e in events])
+        if not events:
+            print(f"{args.configuration}/events.csv: no event yet. Enter one: turnout events PLACE KIND DATE")
         for e in events:
             where = f"{e.turnout}/{e.section}" if e.section else e.turnout
             resets = " and ".join(e.resets) or "nothing"
             print(f"{e.at:%Y-%m-%d}  {where:<28} {e.kind:<16} resets {resets}  {e.note}")
         return 0
     if not (args.kind and args.date):
-        raise ConfigError("events", "arguments", "a place without kind and date", "Write: PLACE KIND DATE")
+        raise ConfigError(
+            "events", "the command line", "a place without kind and date", "Write: turnout events PLACE KIND DATE"
+        )
     return _enter(args)
 
 
@@ -83,7 +87,7 @@ def _enter(args: argparse.Namespace) -> int:
         append_csv(path, cells, COLUMNS)
         after = load_configuration(args.configuration)
         if problems := list(turnout_problems(cells, after.ids, after.variants)):
-            raise ConfigErrors([ConfigError("events", column, *content) for column, *content in problems])
+            raise ConfigErrors([ConfigError(path, column, *content) for column, *content in problems])
     print(f"{path}: {args.kind} at {args.place}, {args.date}. It counts from the next run.")
     return 0
 

@@ -56,6 +56,7 @@ def run(args: argparse.Namespace) -> int:
     from turnout.errors import ConfigError
     from turnout.files import write_atomic
     from turnout.readers.formats import FORMATS
+    from turnout.stages.common import require_file
     from turnout.stages.file_contents import file_contents
     from turnout.stages.layout_draft import decisions, layout_draft
     from turnout.units import to_si
@@ -64,8 +65,8 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError("turnout layout", "--name", repr(args.name), "Write letters, digits, _ and -")
     path = Path(args.configuration) / "layouts" / f"{args.name}.yaml"
     if os.path.lexists(path):
-        raise ConfigError(path, "--name", "there is such a layout already", "Write another name, or remove it")
-    contents = [file_contents(file) for file in args.files]
+        raise ConfigError(path, "--name", "there is such a layout already", "Write another name, or remove the file")
+    contents = [file_contents(require_file(file)) for file in args.files]
     draft = layout_draft(contents)
     path.parent.mkdir(parents=True, exist_ok=True)
     with restore_on_error(path):

@@ -6,10 +6,12 @@ import argparse
 import json
 import logging
 import os
+import re
 import sys
 import time
 import traceback
 from contextlib import contextmanager, redirect_stdout
+from difflib import get_close_matches
 from importlib import import_module
 from io import StringIO
 from typing import TYPE_CHECKING
@@ -67,6 +69,7 @@ def build_parser() -> argparse.ArgumentParser:
         module.add_arguments(sub)
         for leaf in leaf_parsers(sub):
             add_common(leaf)
+            leaf.set_defaults(parser=leaf)
         sub.set_defaults(run=module.run)
     parser.set_defaults(**COMMON_DEFAULTS)
     return parser
@@ -95,7 +98,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         Exit code, see ``EXIT_CODES``.
     """
     use_one_thread()
-    args = build_parser().parse_args(argv)
+    args = _parse(sys.argv[1:] if argv is None else argv)
     started = time.monotonic()
     if args.quiet:
         os.environ["TQDM_DISABLE"] = "1"
@@ -110,6 +113,22 @@ def main(argv: Sequence[str] | None = None) -> int:
     if args.verbose:
         print(f"turnout {args.command}: exit code {code} after {time.monotonic() - started:.1f} s", file=sys.stderr)
     return code
+
+
+def _parse(words: Sequence[str]) -> argparse.Namespace:
+    """Options of a command line. Without a command the help is printed; a wrong one ends with exit code 2."""
+    parser = build_parser()
+    if not words:
+        parser.print_help(sys.stderr)
+        parser.exit(NOT_FOLLOWED)
+    first = words[0]
+    if not first.startswith("-") and first not in (commands := [name.replace("_", "-") for name in COMMANDS]):
+        close = "".join(f" Did you mean {name!r}?" for name in get_close_matches(first, commands, n=1))
+        parser.exit(NOT_FOLLOWED, f"turnout: no command {first!r}.{close} 'turnout --help' lists the commands.\n")
+    args, unknown = parser.parse_known_args(words)
+    if unknown:
+        args.parser.error(f"unknown: {' '.join(unknown)}. '{args.parser.prog} --help' lists the options")
+    return args
 
 
 def _run(args: argparse.Namespace) -> tuple[int, str]:
@@ -133,7 +152,8 @@ def _run(args: argparse.Namespace) -> tuple[int, str]:
 def _message(error: TurnoutError | OSError, command: str) -> str:
     """What went wrong. The name of the command stands before it already, and is left out where an error begins so."""
     if isinstance(error, TurnoutError):
-        return "\n".join(line.removeprefix(f"{command}, ") for line in str(error).splitlines())
+        pattern = rf"^(turnout )?{re.escape(command)}, "
+        return re.sub(pattern, "", str(error), flags=re.MULTILINE)
     where = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error)
     return f"{where}. Correct this, or name another file or folder, then run again."
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import add_result
+from turnout.cli.options import above_zero, add_result
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         Parser of the command.
     """
     parser.add_argument("--profile", default="profiles/default", help="folder of the profile (%(default)s)")
-    parser.add_argument("--limit-hours", type=float, default=None, help="end a run that takes longer")
+    parser.add_argument("--limit-hours", type=above_zero, default=None, help="end a run that takes longer")
     parser.add_argument("options", nargs="*", help="options of Snakemake, after --")
 
 

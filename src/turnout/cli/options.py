@@ -41,6 +41,33 @@ def at_least_one(text: str) -> int:
     return number
 
 
+def above_zero(text: str) -> float:
+    """The number of ``text``, above 0; argparse.ArgumentTypeError otherwise.
+
+    Parameters
+    ----------
+    text : str
+        Value of an option.
+
+    Returns
+    -------
+    float
+        The number.
+
+    Examples
+    --------
+    >>> above_zero("160")
+    160.0
+    """
+    try:
+        number = float(text)
+    except ValueError:
+        number = 0.0
+    if not 0.0 < number < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number above 0")
+    return number
+
+
 def add_configuration(
     parser: argparse.ArgumentParser,
     help: str = "folder of the configuration (%(default)s)",

@@ -59,22 +59,21 @@ def run(args: argparse.Namespace) -> int:
     int
         Exit code.
     """
-    from pathlib import Path
 
     from turnout.config import load_configuration
-    from turnout.errors import ConfigError
     from turnout.readers import read
+    from turnout.stages.common import require_file
+    from turnout.stages.layout_reading import grouped_errors
     from turnout.stages.passage import trains_in
     from turnout.stages.passage_context import passage_context
 
     turnout = load_configuration(args.configuration).turnout(args.turnout)
-    if turnout.passages is None:
-        raise ConfigError(turnout.layout, "passages", "the layout describes no passages", "Add the part passages")
-    path = Path(args.file).resolve()  # a link may lead anywhere
+    description = turnout.require_passages().description
+    path = require_file(args.file).resolve()  # a link may lead anywhere
     settings = turnout.settings["passage"]
-    result = read(path.name, path.parent, turnout.passages.description, settings.longest)
-    for error in result.errors:
-        print(f"Not used: {error}")
+    result = read(path.name, path.parent, description, settings.longest)
+    for problem in grouped_errors(result.errors):
+        print(f"Not used: {problem}")
     _, context = passage_context(turnout.id, turnout.settings, args.work)
     has_train = False
     records: list[Recording | LongRecording] = [*result.recordings, *result.long_recordings]

@@ -12,6 +12,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from turnout.cli.options import RAW_HELP, add_configuration, add_raw, add_result, add_work, at_least_one
+from turnout.counts import count_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -78,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
     for turnout in map(configuration.turnout, args.turnout or configuration.ids):
         _print_changes(turnout, Path(args.raw or "raw"), earlier, counts)
     add_result(args, counts)
-    print(f"{counts['all']} units, {counts['new']} never computed, {counts['changed']} changed since.")
+    print(f"{count_of(counts['all'], 'unit')}, {counts['new']} never computed, {counts['changed']} changed since.")
     _print_gone(configuration, Path(args.raw or "raw"), Path(args.work) / "plan", shards, args.turnout)
     return 0
 
@@ -112,7 +113,7 @@ def _print_changes(turnout: TurnoutConfig, raw: Path, earlier: _EarlierResults, 
         counts["all"] += 1
         if change:
             counts[change] += 1
-            print(f"{change:<8} {unit_id(unit)}: {len(unit.files)} files")
+            print(f"{change:<8} {unit_id(unit)}: {count_of(len(unit.files), 'file')}")
     for problem in (*scanned.problems, *note_errors):
         print(f"left out {problem}")
 

@@ -127,5 +127,5 @@ def _registry_folder(args: argparse.Namespace) -> Path:
 
     folder = Path(args.registry)
     if not (folder / GENERATION_FILE).exists():
-        raise RegistryError(f"{folder}: there is no registry here. Run the pipeline, or give --registry")
+        raise RegistryError(f"{folder}: there is no registry here. 'turnout nightly' makes one; or give --registry")
     return folder

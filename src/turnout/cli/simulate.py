@@ -11,7 +11,7 @@ and force of each impact, or the forces of the wheels.
 
 import argparse
 
-from turnout.cli.options import add_configuration, add_former, add_raw, add_track, add_turnout
+from turnout.cli.options import above_zero, add_configuration, add_former, add_raw, add_track, add_turnout
 
 GROUP = "Simulate and diagnose"
 HELP = "simulate a hammer test or a train passage"
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_former(hammer, "--blows", "--impacts", type=int)
     passage = subcommands.add_parser("passage", help="one train over the turnout")
     passage.add_argument("--vehicle", default="ic3", help="file in config/vehicles, or its path (default ic3)")
-    passage.add_argument("--speed", type=float, default=160.0, help="speed [km/h] (default 160)")
+    passage.add_argument("--speed", type=above_zero, default=160.0, help="speed [km/h] (default 160)")
     passage.add_argument(
         "--load",
         type=float,

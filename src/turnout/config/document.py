@@ -60,7 +60,12 @@ def as_config_errors(path: Path | str, where: str, syntax_remedy: str = "") -> I
             raise
         mark = error.problem_mark or error.context_mark
         place = str(Place(str(path), mark.line + 1, mark.column + 1)) if mark else where
-        raise ConfigError(path, place, str(error.problem), syntax_remedy) from None
+        problem = str(error.problem)
+        if "'\\t'" in problem:
+            raise ConfigError(path, place, "a tab", "Write blanks: YAML does not allow tabs before a value") from None
+        raise ConfigError(
+            path, place, problem.replace("'<stream end>'", "the end of the file"), syntax_remedy
+        ) from None
     except RecursionError:
         problem = "content without an end, as of an anchor that holds itself"
         raise ConfigError(path, where, problem, "Write the values out there") from None

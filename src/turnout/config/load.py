@@ -159,6 +159,9 @@ def load_configuration(
     ConfigErrors
         With all errors: file, line, column, problem, remedy.
     """
+    if Path(folder).is_file():
+        remedy = "Name the folder of the configuration, 'config' in a project"
+        raise ConfigErrors([ConfigError(folder, "the folder", "it is a file", remedy)])
     reading = _ConfigurationReader(Path(folder), formats, to_si)
     reading.check_extensions()
     settings = reading.document(reading.folder / "config.yaml", settings_keys())

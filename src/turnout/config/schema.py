@@ -20,6 +20,14 @@ from turnout.errors import ConfigError
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
+ID = r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}"
+LABEL = r"[A-Za-z][A-Za-z0-9-]*"
+NAME = r"[A-Za-z][A-Za-z0-9_-]*"
+PATTERN_TEXTS = {
+    ID: "1 to 64 letters, digits, _ and -, the first a letter or digit",
+    LABEL: "letters, digits and -, the first a letter",
+    NAME: "letters, digits, _ and -, the first a letter",
+}
 NO_TURNOUT = "There are no turnouts yet: add one with 'turnout add ID LAYOUT'"
 VALUE_TYPES = {
     "text": (str,),
@@ -202,7 +210,8 @@ def check(spec: dict, tree: Branch, whole: bool = True) -> Iterator[ConfigError]
 def _check_each(rule: NamedEntries, name: str, tree: Branch, whole: bool) -> Iterator[ConfigError]:
     for label, value in tree.items():
         if not re.fullmatch(rule.pattern, label):
-            yield tree.key_places[label].error(f"{label!r} under {name!r}", f"Write a name like {rule.pattern}")
+            remedy = f"Write a name of {PATTERN_TEXTS[rule.pattern]}"
+            yield tree.key_places[label].error(f"{label!r} under {name!r}", remedy)
         elif isinstance(value, Leaf):
             yield value.place.error(f"{label} is {value.value!r}", "Write 'name: value' lines below it")
         else:
@@ -214,6 +223,8 @@ def _check_each(rule: NamedEntries, name: str, tree: Branch, whole: bool) -> Ite
 def _expected_text(key: Key) -> str:
     if key.choices:
         return "one of " + ", ".join(map(str, key.choices))
+    if key.pattern:
+        return PATTERN_TEXTS[key.pattern]
     text = TYPE_TEXTS.get(key.value_type, "a name, or a number counted from 0")
     unit = f" {key.unit}" if key.unit not in ("", None, "-", "1") else ""
     if key.above is not None:
@@ -226,7 +237,7 @@ def _expected_text(key: Key) -> str:
         text += f" of at most {key.maximum:g}{unit}"
     elif unit:
         text += f" in{unit}"
-    return text + (f" like {key.pattern}" if key.pattern else "")
+    return text
 
 
 TYPE_NAMES = {int: "integer", float: "number", str: "text", bool: "flag"}
@@ -334,8 +345,6 @@ def _first_line(cls: type) -> str:
     return (cls.__doc__ or cls.__name__).strip().splitlines()[0]
 
 
-LABEL = r"[A-Za-z][A-Za-z0-9-]*"
-NAME = r"[A-Za-z][A-Za-z0-9_-]*"
 QUANTITIES = ("force", "acceleration", "velocity", "displacement", "strain", "temperature", "ignored")
 
 CHANNEL = {

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from turnout.config.document import Frozen
+from turnout.errors import ConfigError
 from turnout.records import RawDescription
 
 
@@ -96,6 +97,29 @@ class TurnoutConfig:
         ]
         sections = f"{len(self.sections)} sections"
         return f"TurnoutConfig({self.id}, layout {self.layout}: {', '.join([sections, *kinds])})"
+
+    @property
+    def layout_file(self) -> Path:
+        """File of the layout."""
+        return self.folder / "layouts" / f"{self.layout}.yaml"
+
+    def require_passages(self) -> PassageConfig:
+        """Files and channels of the passages.
+
+        Returns
+        -------
+        PassageConfig
+            That of the layout.
+
+        Raises
+        ------
+        ConfigError
+            If the layout describes no passages.
+        """
+        if self.passages is None:
+            remedy = "Add the part 'passages:', as in the layout tommerup"
+            raise ConfigError(self.layout_file, "passages", "the layout describes no passages", remedy)
+        return self.passages
 
     def section(self, label: str) -> Section:
         """The section with a label.

@@ -12,11 +12,12 @@ from typing import Any
 
 from turnout.config.csv_table import TableError, header_of
 from turnout.config.document import Place, as_config_errors
-from turnout.config.schema import HAMMER_RATE, PASSAGE_RATE, Key, suggestion, value_problem
+from turnout.config.schema import HAMMER_RATE, ID, PASSAGE_RATE, Key, suggestion, value_problem
 from turnout.errors import ConfigError
 from turnout.files import write_atomic
 
-ID = r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}"
+NO_TABLE = "Run 'turnout add ID LAYOUT' to begin one"
+NO_PROJECT = "Run the command in the folder of a project; 'turnout init FOLDER' makes one"
 ROW = {
     "turnout": Key("text", "id: letters, digits, _ and -", required=True, pattern=ID),
     "layout": Key("text", "file in config/layouts/ without .yaml", required=True),
@@ -92,7 +93,8 @@ def read_table(path: Path, name: str) -> tuple[list[Row], list[ConfigError]]:
         The rows in their order, and the errors.
     """
     if not os.path.lexists(path):
-        return [], [ConfigError(name, "line 1", "no such file", "Run 'turnout add ID LAYOUT' to begin one")]
+        remedy = NO_TABLE if Path(path).parent.is_dir() else NO_PROJECT
+        return [], [ConfigError(name, "line 1", "no such file", remedy)]
     try:
         with as_config_errors(name, "line 1"):
             lines = Path(path).read_text(encoding="utf-8-sig").splitlines()

@@ -89,4 +89,4 @@ def past_day_hint(newest: datetime, option: str, what: str) -> str:
     """
     then = (newest + timedelta(days=1)).date()  # the day after, because a day begins at midnight
     today = f"As of {datetime.now(UTC):%Y-%m-%d}; the last data are of {newest:%Y-%m-%d}"
-    return f"{today}: {option} {then} shows the {what} of then."
+    return f"{today}: {option} {then} shows the {what} of that day."

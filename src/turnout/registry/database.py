@@ -66,7 +66,7 @@ def open_registry(
         return _open_generation(file.parent, as_of)
     if not file.exists():
         raise RegistryError(
-            f"{file}: there is no registry here. Run the pipeline, or give the folder that holds {DATABASE}."
+            f"{file}: there is no registry here. 'turnout nightly' makes one; or name the folder that holds {DATABASE}."
         )
     try:
         connection = duckdb.connect(str(file), read_only=read_only, config=OFFLINE_CONFIG)

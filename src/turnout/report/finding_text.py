@@ -6,7 +6,7 @@ import json
 from typing import TYPE_CHECKING
 
 from turnout.constants import Z95_EXACT
-from turnout.report.formatting import count_of
+from turnout.counts import count_of
 from turnout.stages.mismatch_text import interval, number_in_words, parameter_in_words, title
 
 if TYPE_CHECKING:

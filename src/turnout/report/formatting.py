@@ -174,29 +174,6 @@ def badge(state: str) -> str:
     return BADGES.get(state, "unknown")
 
 
-def count_of(n: int, noun: str) -> str:
-    """A number with its noun, in the plural where it is not one.
-
-    Parameters
-    ----------
-    n : int
-        Number.
-    noun : str
-        Noun whose plural ends in "s".
-
-    Returns
-    -------
-    str
-        For example "1 turnout" or "2 turnouts".
-
-    Examples
-    --------
-    >>> count_of(1, "turnout"), count_of(0, "turnout")
-    ('1 turnout', '0 turnouts')
-    """
-    return f"{n} {noun}{'' if n == 1 else 's'}"
-
-
 def number_ranges(numbers: Iterable[int]) -> str:
     """Whole numbers in words, those in a row as a range.
 

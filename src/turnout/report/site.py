@@ -10,8 +10,8 @@ from jinja2 import Environment, PackageLoader
 from tqdm import tqdm
 
 from turnout import __version__
+from turnout.counts import count_of
 from turnout.files import write_text
-from turnout.report.formatting import count_of
 from turnout.report.pages.fleet import fleet_page
 from turnout.report.pages.glossary import glossary_page
 from turnout.report.pages.turnout import turnout_page

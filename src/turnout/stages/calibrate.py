@@ -21,6 +21,7 @@ from turnout.simulate.calibration import Calibration, MeasuredReceptance, calibr
 from turnout.simulate.hammer import resolve_location
 from turnout.simulate.modal_calibration import ModeFit, fit_modes
 from turnout.simulate.parameters import track_path
+from turnout.stages.common import require_file
 from turnout.stages.mismatch_inputs import track_file
 
 LOG = logging.getLogger("turnout.simulate")
@@ -98,6 +99,8 @@ def calibrate_to_files(
     ------
     SimulationError
         None of the files can be used, or a channel has too few accepted impacts.
+    ReadError
+        There is no such file, or it is a folder.
     ConfigError
         The turnout has no hammer tests in its layout.
     """
@@ -126,7 +129,7 @@ def _recordings(files: Iterable[str | Path], description: RawDescription) -> tup
     """(recordings of all files, errors of those that cannot be read)."""
     recordings: list[Recording] = []
     rejected: list[str] = []
-    for file in (Path(f).resolve() for f in files):  # a link may lead anywhere
+    for file in (require_file(f).resolve() for f in files):  # a link may lead anywhere
         try:
             result = read(file.name, file.parent, description)
         except ReadError as error:

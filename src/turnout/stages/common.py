@@ -18,6 +18,35 @@ from turnout.records import LongRecording, RawDescription, ReadResult, Recording
 from turnout.registry.ids import content_id
 
 
+def require_file(path: str | Path) -> Path:
+    """The path of a recording that a person names, checked before anything is read.
+
+    Parameters
+    ----------
+    path : str or Path
+        Path as it was written.
+
+    Returns
+    -------
+    Path
+        The same path.
+
+    Raises
+    ------
+    ReadError
+        There is no such file, or it is a folder.
+    """
+    path = Path(path)
+    if path.is_dir():
+        inside = sorted(p for p in path.rglob("*") if p.is_file() and not p.name.startswith("."))
+        remedy = f"Name the files in it, such as {inside[0]}" if inside else "It holds no file: name another one"
+        raise ReadError(path, "the path", "it is a folder", remedy)
+    if not path.exists():
+        problem = "there is no such file, or no permission to read it"
+        raise ReadError(path, "the path", problem, "Correct the path or the permission", "vanished")
+    return path
+
+
 def read_or_quarantine(
     path: str,
     raw_root: str | Path,

@@ -22,7 +22,8 @@ from turnout.simulate.parameters import load_track, load_vehicle
 from turnout.simulate.passage import simulate_passage
 from turnout.simulate.sensor import Sensor
 from turnout.stages.calibrate import calibrate_to_files, resolve_track
-from turnout.stages.passage import passage_config, sensors_of
+from turnout.stages.common import require_file
+from turnout.stages.passage import sensors_of
 from turnout.stages.passage_context import known_patterns
 from turnout.workflow.scan import scan
 
@@ -126,7 +127,7 @@ def compare_passage(
         No train, an unknown type without ``vehicle``, or an unknown sensor.
     """
     turnout = with_raw(load_configuration(configuration).turnout(turnout_id), Path(raw))
-    recording, passage = _recorded_train(Path(file), turnout)
+    recording, passage = _recorded_train(require_file(file), turnout)
     chosen = _chosen_sensors(sensors, passage, sensors_of(turnout), file)
     train = _vehicle(vehicle, load, passage, file)
     path = resolve_track(track, turnout_id, configuration)
@@ -143,7 +144,7 @@ def compare_passage(
 
 def _recorded_train(path: Path, turnout: TurnoutConfig) -> tuple[Recording, Passage]:
     settings = turnout.settings["passage"]
-    result = read(path.name, path.resolve().parent, passage_config(turnout).description, settings.longest)
+    result = read(path.name, path.resolve().parent, turnout.require_passages().description, settings.longest)
     for error in result.errors:
         raise error
     if not result.recordings:

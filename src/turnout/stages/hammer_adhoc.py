@@ -19,6 +19,7 @@ from turnout.errors import ConfigError, ReadError
 from turnout.readers import read
 from turnout.readers.frequency_responses import find_responses
 from turnout.records import EMPTY_MAPPING, RawDescription, Unit
+from turnout.stages.common import require_file
 from turnout.stages.hammer import hammer_config, hammer_unit
 from turnout.workflow.guard import compute_guarded
 from turnout.workflow.scan import scan
@@ -269,8 +270,8 @@ def requested_units(
     )
     in_raw_folder: dict[str, tuple[Unit, set]] = {}
     elsewhere: dict[str, list[Path]] = {}
-    for path in dict.fromkeys(Path(os.path.abspath(file)) for file in files):
-        real_path = _real_path(path)
+    for path in dict.fromkeys(Path(os.path.abspath(require_file(file))) for file in files):
+        real_path = os.path.realpath(path)
         if real_path in scan_result.units:
             unit, name = scan_result.units[real_path]
             check_agreement(path, unit.section, unit.campaign, section, campaign)
@@ -393,18 +394,6 @@ def _fill_pattern(pattern: str, paths: Iterable[Path], label: str, day: str) -> 
 
 def _within(path: str | Path, folder: str | Path) -> bool:
     return os.path.realpath(path).startswith(os.path.realpath(folder) + os.sep)
-
-
-def _real_path(path: Path) -> str:
-    """Real path of a file, links resolved; ReadError if it is none."""
-    if os.path.isdir(path):
-        remedy = f"Name the files in it, such as {path.name}/*"
-        raise ReadError(path, "the path", "it is a folder", remedy)
-    if not os.path.exists(path):
-        raise ReadError(
-            path, "the path", "there is no such file, or no permission to read it", "Correct it", "vanished"
-        )
-    return os.path.realpath(path)
 
 
 def _unit_elsewhere(

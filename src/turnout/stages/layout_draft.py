@@ -12,7 +12,7 @@ from turnout.errors import ConfigError
 from turnout.stages.file_contents import ChannelContents, FileContents
 from turnout.units import SI, conversion
 
-DECIDE = "# DECIDE:"  # marks what the files do not tell
+DECIDE = "# DECIDE:"  # marks what the files do not state
 TEST_NAME = re.compile(rf"({LABEL})_([A-Za-z0-9]+)")
 PANELS = ("OT", "SP", "CLP", "CP", "AS")
 QUANTITY_OF_ROLE = {"force": "force", "response": "acceleration"}
@@ -20,7 +20,7 @@ MOUNTING = {"hammer": ("hammer", "rail head at sleeper"), "passages": ("rail web
 
 
 def layout_draft(contents: Sequence[FileContents]) -> str:
-    """Text of a layout that fits the given files as far as these tell.
+    """Text of a layout that fits the given files as far as these state it.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def layout_draft(contents: Sequence[FileContents]) -> str:
     labels = _labels(hammer) or ["S1"]
     lines = [
         f"# Draft from {', '.join(Path(c.path).name for c in contents[:3])}{' ...' if len(contents) > 3 else ''}.",
-        f"# Lines with {DECIDE[2:]} hold what the files do not tell. `turnout check --read` compares it with them.",
+        f"# Lines with {DECIDE[2:]} hold what the files do not state. `turnout check` lists those that are left.",
         "description: Draft  # what this layout is, for people",
         "",
         "sections:  # in the order of the track",
@@ -135,7 +135,7 @@ def _branch_lines(branch: str, group: Sequence[FileContents], labels: Sequence[s
             raise ConfigError(first.path, "--from", "it has a force and no vibration", "Name files with a response")
         for role, found in (("force", forces), ("response", responses)):
             others = [names[id(c)] for c in found[1:]]
-            comment = found[0].role.why + (f"; {DECIDE} or {', '.join(others)}" if others else "")
+            comment = found[0].role.why + (f"  {DECIDE} this one or {', '.join(others)}" if others else "")
             yield f"  {role}: {names[id(found[0])]}  # {comment}"
         yield "  validation: null  # a second response, only compared with"
     yield "  channels:"
@@ -164,7 +164,7 @@ def _channel_lines(
     yield f"    {name}:"
     yield f"      source: {source}  # {channel.minimum:.5g} to {channel.maximum:.5g} {channel.unit}".rstrip()
     if quantity == "ignored":
-        why = channel.role.why or "the file does not tell what it measures"
+        why = channel.role.why or "the file does not state what it measures"
         yield f"      quantity: ignored  {'#' if channel.role.name == 'time' else DECIDE} {why}"
     else:
         yield f"      quantity: {quantity}  # {channel.role.why}" + (

@@ -86,7 +86,7 @@ def _read(turnout: TurnoutConfig, section: str, path: str, raw_root: Path, descr
         result = read(path, raw_root, description, turnout.settings["passage"].longest)
     except ReadError as error:
         return FileReading(turnout.id, section, path, "", (str(error),))
-    faults = _grouped_errors(result.errors)
+    faults = grouped_errors(result.errors)
     text = _contents_text(result)
     if description.kind == "hammer":
         more, found = _hammer_faults(turnout, section, path, result.recordings)
@@ -95,8 +95,19 @@ def _read(turnout: TurnoutConfig, section: str, path: str, raw_root: Path, descr
     return FileReading(turnout.id, section, path, f"{text}{found}", (*faults, *more))
 
 
-def _grouped_errors(errors: Sequence[Exception]) -> list[str]:
-    """Errors of a file as text; records with the same problem share one."""
+def grouped_errors(errors: Sequence[Exception]) -> list[str]:
+    """Errors of a file as text; records with the same problem share one.
+
+    Parameters
+    ----------
+    errors : sequence of Exception
+        Errors of the reading of one file.
+
+    Returns
+    -------
+    list of str
+        One text for each problem, with its first place and the number of further ones.
+    """
     groups: dict[tuple[str, str], list[ReadError]] = {}
     texts = [str(error) for error in errors if not isinstance(error, ReadError)]
     for error in errors:

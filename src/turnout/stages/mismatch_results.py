@@ -106,7 +106,8 @@ def diagnose_turnout(
     """
     turnout = with_raw(load_configuration(config).turnout(turnout_id), Path(raw_root))
     if unknown := sorted(set(sections) - {s.label for s in turnout.sections}):
-        raise SimulationError(f"{turnout_id} has no section {', '.join(unknown)}.")
+        labels = ", ".join(s.label for s in turnout.sections)
+        raise SimulationError(f"{turnout_id} has no section {', '.join(unknown)}. Write some of {labels}.")
     label, units = _visit(turnout_id, visits(scan(turnout, Path(raw_root)).units), visit, raw_root)
     unit = unit_of(turnout_id, label, units, turnout.hashes["mismatch"])
     _, passage_tables = mismatch_context(turnout_id, work=work)

@@ -10,7 +10,7 @@ from typing import Any, cast
 from zlib import crc32
 
 from turnout.config.settings.passage import PassageSettings
-from turnout.config.turnout import PassageConfig, TurnoutConfig
+from turnout.config.turnout import TurnoutConfig
 from turnout.errors import PartlyComputed, ReadError
 from turnout.passage.analysis import analyse
 from turnout.passage.axle_load import LoadCalibration, axle_load
@@ -86,7 +86,7 @@ def passage_unit(
     faults: list[tuple] = []
     base = {"turnout_id": unit.turnout}
     rows: dict[str, list[dict]] = {"recordings": [], "passages": [], "passage_fits": [], "quarantine": []}
-    description = passage_config(turnout).description
+    description = turnout.require_passages().description
     for path, size, _ in unit.files:
         longest = turnout.settings["passage"].longest
         result = read_or_quarantine(path, raw_root, description, base, rows["quarantine"], "passage", longest=longest)
@@ -135,7 +135,7 @@ def _without_sensor(
     path: str, record: int, base: Mapping[str, Any], turnout: TurnoutConfig, recording_id: str
 ) -> dict[str, Any]:
     """Quarantine row of a record of a turnout whose passages have no accelerometer."""
-    quantities = sorted({c.quantity for c in passage_config(turnout).description.channels} - {IGNORED})
+    quantities = sorted({c.quantity for c in turnout.require_passages().description.channels} - {IGNORED})
     problem = f"its channels measure {' and '.join(quantities)}, and trains are found by accelerometers alone"
     remedy = "Name an acceleration channel in the layout; until then the recording is filed without a passage"
     error = ReadError(path, f"record {record + 1}", problem, remedy, "no_accelerometer")
@@ -157,10 +157,10 @@ def sensors_of(turnout: TurnoutConfig) -> tuple[PassageSensor, ...]:
 
     Raises
     ------
-    ValueError
-        The turnout has no passages in its configuration.
+    ConfigError
+        If the layout describes no passages.
     """
-    sensors, passages = [], passage_config(turnout)
+    sensors, passages = [], turnout.require_passages()
     for channel in passages.description.channels:
         if channel.quantity == "acceleration":
             section = turnout.section(passages.sections[channel.name])
@@ -186,29 +186,6 @@ def model_at(models: Sequence[SectionModel], moment: datetime) -> SectionModel |
     """
     before = [m for m in models if m.measured_at <= moment]
     return before[-1] if before else models[0] if models else None
-
-
-def passage_config(turnout: TurnoutConfig) -> PassageConfig:
-    """The passage configuration of a turnout.
-
-    Parameters
-    ----------
-    turnout : TurnoutConfig
-        Configuration of the turnout.
-
-    Returns
-    -------
-    PassageConfig
-        Files and channels of its passages.
-
-    Raises
-    ------
-    ValueError
-        It has no passages.
-    """
-    if turnout.passages is None:
-        raise ValueError(f"{turnout.id} has no passages in its configuration")
-    return turnout.passages
 
 
 def trains_in(

@@ -21,7 +21,7 @@ from turnout.passage.result import Passage, PassageSensor
 from turnout.passage.timetable import ListedTrain, listed_for, listed_trains
 from turnout.readers import read
 from turnout.records import LongRecording, Recording, Unit
-from turnout.stages.passage import _time_of_label, passage_config, sensors_of, trains_in
+from turnout.stages.passage import _time_of_label, sensors_of, trains_in
 from turnout.stages.passage_context import read_clusters, read_loads
 from turnout.workflow.scan import scan
 
@@ -108,7 +108,7 @@ def _weighed_in_unit(
     trains = []
     for path, *_ in unit.files:
         try:
-            result = read(path, raw_root, passage_config(turnout).description, settings.longest)
+            result = read(path, raw_root, turnout.require_passages().description, settings.longest)
             records: list[Recording | LongRecording] = [*result.recordings, *result.long_recordings]
             for recording in records:
                 started = recording.started_at or _time_of_label(unit.label)

@@ -15,6 +15,7 @@ from turnout.config.events import COLUMNS as EVENT_COLUMNS
 from turnout.config.generate import config_yaml
 from turnout.config.turnouts_table import ROW
 from turnout.errors import ConfigError
+from turnout.files import write_text
 from turnout.installation import shipped_path
 
 if TYPE_CHECKING:
@@ -36,7 +37,8 @@ workflow.default_target = "all"  # an included file does not set it
 README = """\
 # Turnouts
 
-1. Put the recordings of a turnout below `raw/ID/`, as `hammer/2026-05-13/A7_1.uff`, and `campaigns.csv` beside them.
+1. Put the recordings of a turnout below `raw/ID/`, such as `raw/ID/hammer/2026-05-13/A7_1.uff`, and note the rail
+   temperature of each campaign in `raw/ID/campaigns.csv` (columns campaign, started_at_utc, rail_temperature_c).
 2. `turnout inspect FILE` shows what a file contains. `turnout layout new --from FILE...` drafts its description.
 3. Enter the turnout: `turnout add ID LAYOUT`. The layout `tommerup` is an example with comments.
 4. `turnout check --read` says what does not fit together, with file, line and remedy.
@@ -68,7 +70,7 @@ def snakemake_environment() -> dict[str, str]:
 def create_project(folder: Path) -> list[Path]:
     """Make a project: commented configuration, one layout, raw/, profiles, Snakefile and README.
 
-    Files that are there stay as they are.
+    Files that are there stay as they are. A project that was interrupted is completed by the next call.
 
     Parameters
     ----------
@@ -94,24 +96,23 @@ def create_project(folder: Path) -> list[Path]:
     for path, text in _project_files():
         target = folder / path
         if not target.exists():
-            target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_text(text, encoding="utf-8")
+            write_text(target, text)
             written.append(target)
     return written
 
 
 def _project_files() -> Iterator[tuple[Path, str]]:
-    """Path in the project and text of each file."""
+    """Path in the project and text of each file; turnouts.tsv is the last, because it marks a complete project."""
     yield Path("README.md"), README
     yield Path("Snakefile"), SNAKEFILE
     yield Path("config/config.yaml"), config_yaml({})
-    yield Path("config/turnouts.tsv"), "\t".join(ROW) + "\n"
     yield Path("config/events.csv"), ",".join(EVENT_COLUMNS) + "\n"
     for name in COPIED:
         source = shipped_path(name)
         for path in sorted(source.rglob("*")) if source.is_dir() else [source]:
             if path.is_file():
                 yield Path(name) / path.relative_to(source), path.read_text(encoding="utf-8")
+    yield Path("config/turnouts.tsv"), "\t".join(ROW) + "\n"
 
 
 def use_demonstration(folder: Path) -> None:

@@ -116,7 +116,7 @@ def test_check_names_files_that_no_pattern_knows(copy, capsys):
     (copy / "raw/tommerup_s2").mkdir()
     assert main(["check"]) == 1
     said = capsys.readouterr().out
-    assert "1 files in 1 units, 3 left out or unsound" in said
+    assert "1 file in 1 unit, 3 problems" in said
     assert "tommerup_s1/hammer/2024-05-13/A77_1.uff, file name: its name follows no pattern of the layout" in said
     assert "tommerup_s2, folder: no file matches a pattern of the layout" in said
 

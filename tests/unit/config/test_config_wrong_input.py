@@ -60,7 +60,10 @@ def layout(old, new):
 
 
 WRONG = {
-    "id with a space": (row("t 3\tmain"), "config/turnouts.tsv, line 4, column 1: turnout is 't 3'. Write text like"),
+    "id with a space": (
+        row("t 3\tmain"),
+        "config/turnouts.tsv, line 4, column 1: turnout is 't 3'. Write 1 to 64",
+    ),
     "duplicate id": (row("t1\tmain"), "line 4, column 1: turnout 't1' for the second time. Give it another id"),
     "no id": (row("\tmain"), "line 4, column 1: turnout is empty. Write id"),
     "unknown layout": (row("t3\tmian"), "line 4, column 4: no layout 'mian'. Did you mean 'main'?"),

@@ -54,7 +54,7 @@ def test_passages_below_160_hz_are_blind_to_frequency_dependent_pads_and_blows_a
     [
         ([], "nothing is planned: give --impacts, --trains or both."),
         (
-            ["--impacts", "24.6", "--families", "hanging_slepper"],
+            ["--impacts", "24.6", "--effects", "hanging_slepper"],
             "no effect 'hanging_slepper' in such a campaign",
         ),
     ],

@@ -209,7 +209,7 @@ def test_a_spoilt_generation_file_is_said(bench, hammer, content):
 
 
 def test_no_registry_is_said(tmp_path):
-    with pytest.raises(RegistryError, match=r"there is no registry here. Run the pipeline"):
+    with pytest.raises(RegistryError, match=r"there is no registry here. 'turnout nightly' makes one"):
         open_registry(tmp_path)
 
 

@@ -113,7 +113,7 @@ def test_a_rate_that_the_layout_contradicts_is_named(configuration, tmp_path, ca
     assert check(configuration, tmp_path, "--read") == 1
     text = capsys.readouterr().out
     assert "t1, A7: t1/hammer/2026-05-13/A7_1.h5: agrees" in text
-    assert "t1, A8: t1/hammer/2026-05-13/A8_1.h5: 1 faults" in text and "25600 Hz instead of 20000 Hz" in text
+    assert "t1, A8: t1/hammer/2026-05-13/A8_1.h5: 1 fault:" in text and "25600 Hz instead of 20000 Hz" in text
 
 
 def test_what_the_files_do_not_state_is_to_be_decided_and_is_not_guessed(tmp_path, configuration):

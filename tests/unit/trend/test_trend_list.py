@@ -264,12 +264,12 @@ def test_the_list_in_words_says_what_it_rests_on_and_what_it_leaves_out(tmp_path
     assert [(e["state"], bool(e["look_at"])) for e in worklist_entries(tmp_path)] == [("inspect this week", True)]
     then = f"{newest + pd.Timedelta(days=1):%Y-%m-%d}"
     assert f"As of {datetime.now(UTC):%Y-%m-%d}; the last data are of {newest:%Y-%m-%d}: " in told
-    assert told.endswith(f"turnout worklist --asof {then} shows the list of then.\n")
+    assert told.endswith(f"turnout worklist --asof {then} shows the list of that day.\n")
     assert main(["worklist", "--registry", str(tmp_path), "--asof", then]) == 0
     assert "26 not measured" not in capsys.readouterr().out
     pages = ["report", "--registry", str(tmp_path), "--pages", str(tmp_path / "pages")]
     assert main(pages) == 0
-    assert f"turnout report --day {then} shows the pages of then." in capsys.readouterr().out
+    assert f"turnout report --day {then} shows the pages of that day." in capsys.readouterr().out
     assert ", 26 not measured" in (tmp_path / "pages/index.html").read_text()
     assert main([*pages, "--day", then]) == 0
     assert f"As of {then}." in capsys.readouterr().out

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING
 
+from turnout.counts import count_of
 from turnout.report import panels
-from turnout.report.formatting import badge, count_of, day, diagnoses_once, number_ranges, with_half_width
+from turnout.report.formatting import badge, day, diagnoses_once, number_ranges, with_half_width
 from turnout.report.panels.calibrated_model import calibrated_panels, visits_in_words
 from turnout.report.panels.diagram import diagram
 from turnout.report.panels.hammer import HammerTest

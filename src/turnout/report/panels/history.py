@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.report.formatting import count_of, seconds, student_quantile
+from turnout.counts import count_of
+from turnout.report.formatting import seconds, student_quantile
 from turnout.report.svg import Axis, Chart
 
 if TYPE_CHECKING:

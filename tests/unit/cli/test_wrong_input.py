@@ -1,0 +1,124 @@
+"""What a user sees who types something wrong: one message that says where, what was found, and what to do."""
+
+import shutil
+
+import pytest
+
+from turnout.cli.main import main
+from turnout.workflow import project as project_module
+from turnout.workflow.project import create_project
+
+
+@pytest.fixture
+def project(tmp_path, monkeypatch):
+    """A new project with turnout W1 of the example layout, whose file of passages is a folder."""
+    create_project(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    assert main(["add", "W1", "tommerup"]) == 0
+    (tmp_path / "raw/W1/hammer").mkdir(parents=True)
+    (tmp_path / "raw/W1/hammer/A7_1.csv").write_text("no numbers\n")
+    return tmp_path
+
+
+def without_passages(project):
+    """Remove the part ``passages`` of the layout."""
+    layout = project / "config/layouts/tommerup.yaml"
+    layout.write_text(layout.read_text().partition("\npassages:")[0] + "\n")
+
+
+WRONG = {
+    "passage nothing.csv --turnout W1": "nothing.csv, the path: there is no such file",
+    "passage raw --turnout W1": "raw, the path: it is a folder. Name the files in it, such as raw/W1/hammer/A7_1.csv.",
+    "compare raw --turnout W1": "raw, the path: it is a folder. Name the files in it",
+    "hammer raw/W1 --turnout W1": "raw/W1, the path: it is a folder. Name the files in it, such as raw/W1/hammer/A7",
+    "calibrate raw --section A7 --track tommerup": "raw, the path: it is a folder. Name the files in it",
+    "layout new --from raw": "raw, the path: it is a folder. Name the files in it",
+    "hammer raw/W1/hammer/A7_1.csv --turnout W1 --section X": "turnout hammer: --section: 'X' is no section of W1",
+    "check --turnout W9": "config/turnouts.tsv, line 1, column 1: no turnout 'W9'. Allowed: W1.",
+    "check --raw README.md": "README.md, --raw: it is a file.",
+    "check --config config/config.yaml": "config/config.yaml, the folder: it is a file. Name the folder",
+    "check --config nowhere": "no such file. Run the command in the folder of a project; 'turnout init FOLDER' makes",
+    "add W1 tommerup": "config/turnouts.tsv, line 2: there is a turnout 'W1' already. Write another id",
+    "add W:1 tommerup": "turnout is 'W:1'. Write 1 to 64 letters, digits, _ and -, the first a letter or digit.",
+    "worklist": "results/registry: there is no registry here. 'turnout nightly' makes one",
+    "events W9 tamping 2026-04-02": "config/events.csv, turnout: turnout 'W9' has no row in turnouts.tsv. Allowed: W1.",
+    "simulate hammer --section X": "no section 'X' in the track file. Write one of OT, SP",
+    "diagnose --turnout W1 --sections X": "W1 has no section X. Write some of OT, SP",
+}
+
+
+@pytest.mark.parametrize("line", WRONG)
+def test_the_message_says_what_to_do(project, capsys, line):
+    assert main(line.split()) == 2
+    message = capsys.readouterr().err
+    assert WRONG[line] in message and "Traceback" not in message
+
+
+@pytest.mark.parametrize("command", ["passage", "compare"])
+def test_a_layout_without_passages_is_named(project, capsys, command):
+    without_passages(project)
+    assert main([command, "raw/W1/hammer/A7_1.csv", "--turnout", "W1"]) == 2
+    message = capsys.readouterr().err
+    assert "config/layouts/tommerup.yaml, passages: the layout describes no passages. Add the part" in message
+
+
+@pytest.mark.parametrize(
+    "line, message",
+    [
+        ("", "usage: turnout"),
+        ("hamer", "no command 'hamer'. Did you mean 'hammer'?"),
+        ("worklist --turnout W1", "turnout worklist: error: unknown: --turnout W1. 'turnout worklist --help'"),
+        (
+            "simulate passage --speed -3",
+            "turnout simulate passage: error: argument --speed: '-3' is not a number above",
+        ),
+    ],
+)
+def test_a_wrong_command_line_ends_with_2(capsys, line, message):
+    with pytest.raises(SystemExit) as end:
+        main(line.split())
+    assert end.value.code == 2 and message in capsys.readouterr().err
+
+
+def test_a_tab_in_yaml_is_named(project, capsys):
+    (project / "config/config.yaml").write_text("fleet:\n\tshards: 2\n")
+    assert main(["check"]) == 2
+    assert "config/config.yaml, line 2, column 1: a tab. Write blanks" in capsys.readouterr().err
+
+
+def test_counts_of_one_have_no_plural(project, capsys):
+    shutil.rmtree(project / "raw/W1")
+    main(["check"])
+    assert "config: 1 turnout with 1 layout, 0 events, 0 acknowledgements, sound." in capsys.readouterr().out
+
+
+def test_a_draft_that_is_not_finished_is_listed(project, capsys):
+    layout = project / "config/layouts/tommerup.yaml"
+    layout.write_text(layout.read_text().replace("position: 24.6}  ", "position: 24.6}  # DECIDE: position [m]"))
+    assert main(["check"]) in (0, 1)
+    line = 1 + layout.read_text().splitlines().index(next(x for x in layout.read_text().splitlines() if "DECIDE" in x))
+    assert f"config/layouts/tommerup.yaml, line {line}: position [m]" in capsys.readouterr().out
+
+
+def test_an_interrupted_init_is_completed_by_the_next(tmp_path, monkeypatch):
+    write, n_written = project_module.write_text, []
+
+    def interrupted(path, text):
+        if len(n_written) == 5:
+            raise KeyboardInterrupt
+        n_written.append(path)
+        write(path, text)
+
+    monkeypatch.setattr(project_module, "write_text", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        create_project(tmp_path)
+    monkeypatch.undo()
+    assert create_project(tmp_path)
+    names = {str(p.relative_to(tmp_path)) for p in tmp_path.rglob("*") if p.is_file()}
+    create_project(tmp_path / "whole")
+    assert names == {str(p.relative_to(tmp_path / "whole")) for p in (tmp_path / "whole").rglob("*") if p.is_file()}
+
+
+def test_no_events_are_said_to_be_none(project, capsys):
+    assert main(["events"]) == 0
+    assert "config/events.csv: no event yet" in capsys.readouterr().out
