@@ -53,7 +53,7 @@ def bars():
     at_place = [m for m in missing if m[2][0] in ("unknown", "right")]
     yield _bar("effect left out: another name", other, n, 3.0, "<=")
     yield _bar("effect left out: unknown at its position, or a relative", at_place, n, 80.0, ">=")
-    yield _bar("effect left out: said to be intact", [m for m in missing if m[2][0] == "none"], n, None, "<=")
+    yield _bar("effect left out: called intact", [m for m in missing if m[2][0] == "none"], n, None, "<=")
     yield _bar(
         "effect in the library: its name at its position", [m for m in present if m[2][0] == "right"], n, None, ""
     )

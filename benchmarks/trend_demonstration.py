@@ -84,10 +84,10 @@ def _sentences(section, band, change, since, rows) -> str:
     spacing = float(np.median(np.diff(times)) / timedelta(days=1))
     sentences = [
         f"On the demonstration fleet ({len(times)} campaigns of this chart, {spacing:.0f} days apart; raw files "
-        f"through the whole pipeline) the stiffness of the {band} at `{section}` falls by "
-        f"{-100 * change.per_year:.0f} % a year from {change.since}; its frequency has lost {-truth[-1]:.1f} % by the "
+        f"through the whole workflow) the stiffness of the {band} at `{section}` falls by "
+        f"{-100 * change.per_year:.0f} % a year from {change.since}. Its frequency has lost {-truth[-1]:.1f} % by the "
         f"newest campaign, {times[-1]:%Y-%m-%d}.",
-        f"It is number {rank} of the list, and {n_inspect} place{' is' if n_inspect == 1 else 's are'} to inspect."
+        f"It is number {rank} of the list, which asks for {n_inspect} inspection{'s' * (n_inspect != 1)}."
         if rank
         else f"It is not on the list (state {state}).",
     ]
@@ -97,8 +97,8 @@ def _sentences(section, band, change, since, rows) -> str:
     soon = f"half of such charts are in alarm by campaign {half}" if half else "fewer than half are in alarm today"
     sure = f"95 % by campaign {most}" if most else "95 % not yet"
     sentences.append(
-        f"With this chart's spread of {spread:.2f} % a campaign ({phi:.2f} memory) {soon} after the onset and {sure}; "
-        f"one campaign alone may never raise one: nobody could have known before the second."
+        f"With this chart's spread of {spread:.2f} % a campaign ({phi:.2f} memory) {soon} after the onset and {sure}. "
+        f"A single campaign raises no alarm."
     )
     if first:
         date_ok = early <= since <= late

@@ -334,7 +334,7 @@ def test_a_page_shows_figures_pictures_stories_failures_and_ablations(scored, tm
     assert "| controls: false alarms | 100.0 % (1)" in text  # the failure is there
     assert "the tool (n = 2) | mute (n = 2)" in text
     assert "| controls: false alarms | 1 of 1 | 0 of 1 |" in text
-    assert f"### {single}: pad" in text and "Said: *named (probability 0.80)" in text
+    assert f"### {single}: pad" in text and "Answer: *named (probability 0.80)" in text
     for name in ("page_severity.svg", "page_reliability.svg", f"page_story_{single}.svg"):
         assert (tmp_path / name).read_text().startswith("<?xml")
     page.write_text("no marks")

@@ -27,6 +27,7 @@ from turnout.cli.options import (
     add_turnout,
     add_work,
 )
+from turnout.counts import count_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -145,10 +146,11 @@ def _details(row: Mapping[str, Any]) -> Iterator[str]:
     if row["n_held_out"]:
         names = ("before", "after", "rival", "decoy")
         fits_text = ", ".join(f"{n} {row[f'fit_{n}_pct']:.1f} %" for n in names if row[f"fit_{n}_pct"] is not None)
-        yield f"fit on {row['n_held_out']} held-out recordings: {fits_text}"
+        yield f"fit on {count_of(row['n_held_out'], 'held-out recording')}: {fits_text}"
     if row["next_measurement"]:
         yield row["next_measurement"] + "."
-    yield f"from {row['n_hammer_tests']} hammer tests, {row['n_passages']} passages, {row['n_sensors']} sensors"
+    counts = ("hammer_tests", "hammer test"), ("passages", "passage"), ("sensors", "sensor")
+    yield "from " + ", ".join(count_of(row[f"n_{column}"], noun) for column, noun in counts)
 
 
 LOG_INTERVAL = 20.0  # s between two lines in a log

@@ -27,6 +27,12 @@ if TYPE_CHECKING:
 
 GROUP = "Look at recordings"
 HELP = "analyse one passage file, without storing results"
+SPEED_SOURCES = {
+    "sensors": "the delays between sensors",
+    "axle spacing": "the axle spacing",
+    "both": "sensors and axle spacing",
+    "bogie": "the axle spacing of a usual bogie",
+}
 FIT_HEAD = "  sensor      fit / null   forecast / null  left out / null   along b  peak m/s²  status"
 
 
@@ -116,8 +122,10 @@ def _train_lines(recording: Recording, passage: Passage) -> list[str]:
     if passage.speed is None or passage.type is None:
         return lines
     speed, type_ = passage.speed, passage.type
-    lines.append(f"  axles      {passage.n_axle}, the clearest cut between them and the rest is {passage.contrast:.1f}")
-    lines.append(f"  speed      {KMH * speed.speed:.1f} ± {KMH * speed.se:.1f} km/h halfway, from {speed.source}")
+    lines.append(f"  axles      {passage.n_axle}; the weakest peak is {passage.contrast:.1f} times the next one")
+    lines.append(
+        f"  speed      {KMH * speed.speed:.1f} ± {KMH * speed.se:.1f} km/h in the middle, from {SPEED_SOURCES[speed.source]}"
+    )
     lines.append(f"  change     {speed.acceleration:+z.2f} ± {speed.acceleration_se:.2f} m/s²")
     if speed.disagreement is not None and abs(speed.disagreement) > 3:
         lines.append(f"  sensors and axle spacing differ by {abs(speed.disagreement):.1f} standard errors")

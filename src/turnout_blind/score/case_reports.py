@@ -137,7 +137,8 @@ def case_text(truth: Mapping[str, Any], rows: Sequence[Mapping[str, Any]] | None
     answers = " ".join(f"*{_row_text(row)}*" for row in rows) if rows else "*no answer*"
     return (
         f"Concealed: {concealed or 'nothing'}. It makes up {visibility['hammer_pct']:.0f} % of the impacts' and "
-        f"{visibility['passage_pct']:.0f} % of the passages' response at the sensor that shows it most. Said: {answers}"
+        f"{visibility['passage_pct']:.0f} % of the passages' response at the sensor that shows it most. "
+        f"Answer: {answers}"
     )
 
 
