@@ -40,8 +40,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--band", default="", help=f"{', '.join(BANDS)} (under trains); all if not given")
     parser.add_argument("--by", required=True, help="name of the person")
     parser.add_argument("--reason", required=True, help="reason, stored with it")
-    parser.add_argument("--suppress-until", metavar="DATE", default="", help="silence it until then, YYYY-MM-DD")
-    parser.add_argument("--at", default="", help="when it was said, UTC; now if not given")
+    parser.add_argument("--suppress-until", metavar="DATE", default="", help="suppress the chart until this day")
+    parser.add_argument("--at", default="", help="time of the acknowledgement, UTC; now if not given")
     add_registry(parser, help="where open alarms are looked up (%(default)s)")
     add_configuration(parser)
 

@@ -2,7 +2,7 @@
 
 turnout config show tommerup_s1
 turnout config show tommerup_s1 --only receptance
-turnout config generate            config.yaml, JSON schemas for editors, docs/settings.md
+turnout config generate            renew config.yaml and the JSON schemas for editors, and docs/settings.md if docs/ exists
 turnout config generate --check    show what is out of date, change nothing
 """
 
@@ -27,10 +27,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     show = actions.add_parser("show", help="every value of a turnout and the file it comes from")
     show.add_argument("turnout")
     show.add_argument("--only", metavar="WORD", default="", help="only keys that contain this word")
-    generate = actions.add_parser("generate", help="make config.yaml, the JSON schemas and the docs table")
+    generate = actions.add_parser("generate", help="renew config.yaml and the JSON schemas")
     generate.add_argument("--check", action="store_true", help="change nothing; exit code 1 where one is out of date")
     generate.add_argument("--defaults", action="store_true", help="do not keep values changed in config.yaml")
-    generate.add_argument("--docs", default="docs", help="folder of the documentation (%(default)s)")
+    generate.add_argument("--docs", default="docs", help="folder of the documentation, if it is there (%(default)s)")
     for sub in (show, generate):
         add_configuration(sub)
 
@@ -72,8 +72,10 @@ def _generate(args: argparse.Namespace) -> int:
     from turnout.config.generate import generate_files
     from turnout.files import write_if_changed
 
-    stale = 0
-    for path, text in generate_files(Path(args.configuration), Path(args.docs), args.defaults).items():
+    stale, docs = 0, Path(args.docs)
+    for path, text in generate_files(Path(args.configuration), docs, args.defaults).items():
+        if path.parent == docs and not docs.is_dir():
+            continue  # a project of a user has no documentation
         if args.check:
             differs = not path.exists() or path.read_text(encoding="utf-8") != text
             print(f"{path}: out of date" if differs else f"{path}: up to date")

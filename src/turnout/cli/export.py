@@ -4,7 +4,7 @@ turnout export out                            every table as one Parquet file
 turnout export out --format csv --only worklist chart_states
 turnout export lake --format delta --only modes_current charts
 
-Delta Lake needs the extra: pip install -e '.[lakehouse]'
+Delta Lake needs the extra: pip install '.[lakehouse]'
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def _delta(con: duckdb.DuckDBPyConnection, quoted: str, path: Path) -> int:
     try:
         from deltalake import write_deltalake
     except ImportError:
-        raise RegistryError("Delta Lake needs a package: pip install -e '.[lakehouse]'.") from None
+        raise RegistryError("Delta Lake needs a package: pip install '.[lakehouse]'.") from None
     rows = con.sql(f"select * from {quoted}").to_arrow_table()
     write_deltalake(str(path), rows, mode="overwrite")
     return rows.num_rows

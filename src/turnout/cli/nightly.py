@@ -7,7 +7,7 @@
 
 The exit code is 0 only if every job ran and the results may be trusted. The registry is published in any case, with
 what was computed until a job failed or was ended. The last sixth of --limit-hours is reserved for publishing. The next
-run continues where this one ended.
+run continues where this one ended. docs/operation.md lists the options after --config.
 """
 
 from __future__ import annotations

@@ -123,9 +123,8 @@ def _train_lines(recording: Recording, passage: Passage) -> list[str]:
         return lines
     speed, type_ = passage.speed, passage.type
     lines.append(f"  axles      {passage.n_axle}; the weakest peak is {passage.contrast:.1f} times the next one")
-    lines.append(
-        f"  speed      {KMH * speed.speed:.1f} ± {KMH * speed.se:.1f} km/h in the middle, from {SPEED_SOURCES[speed.source]}"
-    )
+    speed_text = f"{KMH * speed.speed:.1f} ± {KMH * speed.se:.1f} km/h in the middle"
+    lines.append(f"  speed      {speed_text}, from {SPEED_SOURCES[speed.source]}")
     lines.append(f"  change     {speed.acceleration:+z.2f} ± {speed.acceleration_se:.2f} m/s²")
     if speed.disagreement is not None and abs(speed.disagreement) > 3:
         lines.append(f"  sensors and axle spacing differ by {abs(speed.disagreement):.1f} standard errors")

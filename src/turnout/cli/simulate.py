@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     subcommands = parser.add_subparsers(dest="kind", metavar="kind", required=True)
     hammer = subcommands.add_parser("hammer", help="impacts of a hammer at one section")
     hammer.add_argument(
-        "--section", required=True, help="location of the track file, or, without --turnout, a position [m]"
+        "--section", required=True, help="section of the track file, or, without --turnout, a position [m]"
     )
     hammer.add_argument("--tests", type=int, default=1, help="tests, one file each; --out takes one (default 1)")
     hammer.add_argument("--impacts", type=int, default=10, help="impacts per test (default 10)")

@@ -4,7 +4,7 @@
   turnout twin --turnout tommerup_s1 --each-visit
 
 The fit of each visit is stored in the work folder. It is computed again if the code, the track file or the recordings
-have changed. Visits with an open finding of ``turnout diagnose`` are not used.
+have changed. Visits with an open finding of turnout diagnose are not used.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_track(parser, help="file in config/tracks; default: the turnout's own, else its layout's")
     add_configuration(parser)
     add_raw(parser)
-    add_work(parser, "where the information of each visit is kept (%(default)s)")
+    add_work(parser, "folder of the fits of each visit (%(default)s)")
     parser.add_argument("--each-visit", action="store_true", help="show the result after each visit, too")
     parser.add_argument("--all", action="store_true", help="list parameters that recordings hardly determine, too")
 

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from turnout.report.axis import Axis
 from turnout.report.site import page_environment, replace_page, shared_by_pages
-from turnout.report.svg import Axis, Chart
+from turnout.report.svg import Chart
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from turnout.report.axis import Axis
 from turnout.report.site import page_environment, shared_by_pages
-from turnout.report.svg import Axis, Chart
+from turnout.report.svg import Chart
 
 if TYPE_CHECKING:
     from turnout.stages.compare import BandComparison, PassageComparison

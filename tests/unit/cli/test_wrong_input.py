@@ -122,3 +122,8 @@ def test_an_interrupted_init_is_completed_by_the_next(tmp_path, monkeypatch):
 def test_no_events_are_said_to_be_none(project, capsys):
     assert main(["events"]) == 0
     assert "config/events.csv: no event yet" in capsys.readouterr().out
+
+
+def test_a_project_gets_no_page_of_the_documentation(project, capsys):
+    assert main(["config", "generate"]) == 0
+    assert not (project / "docs").exists() and "settings.md" not in capsys.readouterr().out

@@ -7,10 +7,12 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from turnout.report.axis import Axis, linear_ticks, log_ticks, time_ticks
 from turnout.report.panels.hammer import HammerTest, coherence_panel, receptance_panel
 from turnout.report.panels.history import history_panel
 from turnout.report.panels.phase import phase_panel
-from turnout.report.svg import BOTTOM, LEFT, RIGHT, TOP, Axis, Chart, linear_ticks, log_ticks, reduce_points, time_ticks
+from turnout.report.path_data import reduce_points
+from turnout.report.svg import BOTTOM, LEFT, RIGHT, TOP, Chart
 
 
 def chart(scale="linear"):

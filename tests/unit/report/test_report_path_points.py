@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from turnout.report.svg import MAX_PIXEL, MIN_TOGETHER, _format_together, _path_points
+from turnout.report.path_data import MAX_PIXEL, MIN_TOGETHER, _format_together, path_points
 
 ONE_BY_ONE = "%.2f %.2f"
 
@@ -26,7 +26,7 @@ def expected(points):
 )
 def test_numbers_are_rounded_as_one_by_one(numbers):
     for some in (numbers, numbers[: MIN_TOGETHER - 1], numbers[:1]):
-        assert _path_points(some[:, 0], some[:, 1]) == expected(some)
+        assert path_points(some[:, 0], some[:, 1]) == expected(some)
 
 
 def test_usual_numbers_are_format_together_and_others_are_not():

@@ -8,7 +8,8 @@ import numpy as np
 
 from turnout.constants import Z95
 from turnout.counts import count_of
-from turnout.report.svg import Axis, Chart
+from turnout.report.axis import Axis
+from turnout.report.svg import Chart
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

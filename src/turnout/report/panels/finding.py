@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.report.svg import Axis, Chart
+from turnout.report.axis import Axis
+from turnout.report.svg import Chart
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.counts import count_of
+from turnout.report.axis import Axis
 from turnout.report.formatting import seconds, student_quantile
-from turnout.report.svg import Axis, Chart
+from turnout.report.svg import Chart
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -5,8 +5,9 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING
 
+from turnout.report.axis import format_number, linear_ticks
 from turnout.report.panels.diagram import STYLE
-from turnout.report.svg import LETTER, format_number, linear_ticks
+from turnout.report.svg import LETTER
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from turnout.report.axis import Axis
 from turnout.report.panels.hammer import FREQUENCY_RANGE, HammerTest
-from turnout.report.svg import Axis, Chart
+from turnout.report.svg import Chart
 
 
 def phase_panel(test: HammerTest) -> str:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.constants import Z95
-from turnout.report.svg import LEFT, LINE, Axis, Chart
+from turnout.report.axis import Axis
+from turnout.report.svg import LEFT, LINE, Chart
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
