@@ -46,10 +46,11 @@ from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.calibration import (
     calibrated_parameters,
     dip_directions,
-    nose_errors,
+    file_errors,
     visit_groups,
 )
 from turnout.mismatch.turnout.further_passages import names_beyond, with_reserved_passages
+from turnout.mismatch.turnout.nose_starts import fit_from_nose_positions
 from turnout.stages.checkpoint import SUFFIX, read_value, write_value
 from turnout.stages.mismatch_groups import groups, unit_of, visits
 from turnout.stages.mismatch_inputs import digest_of_model, gather_inputs, mismatch_context, track_of
@@ -83,6 +84,7 @@ OPENED_COMMON = {
 }
 MAX_FITTED_AXLES = 8  # of all fitted passages of a visit: the others are linear about the fit, and cost little
 MAX_PASSAGES_AND_AXLES = (60, 1000)  # of a group of sections at one visit
+NOSE_POSITION = "place of the kink"  # begin of the name of a parameter
 EVENT_REACH = 6.0  # m from a section that work there may touch
 
 
@@ -189,6 +191,8 @@ def store_visit(
     search, fit = fit_base(Search.of(case, about["turnout"].settings["mismatch"], None, store))
     assert isinstance(search.case, TrackCase)
     parameters = calibrated_parameters(search.case, group.route)
+    positions = [nuisance for nuisance, p in parameters.items() if p.name.startswith(NOSE_POSITION)]
+    fit = fit_from_nose_positions(search, fit, positions)
     may_be_large = [
         nuisance
         for nuisance, p in parameters.items()
@@ -380,7 +384,7 @@ def state_rows(
     stored = read_visits(folder, turnout.id, earlier | {about["visit"]: about["version"]})
     parameters = parameters_of(stored)
     visits_used = visits_of(_without_findings(stored))
-    events = [*events_of(turnout, parameters), *nose_errors(parameters, dip_directions(parameters))]
+    events = [*events_of(turnout, parameters), *file_errors(parameters, dip_directions(parameters))]
     history = estimate_history(parameters, visits_used, events)
     belief, n = history.belief, sum(s.n_recordings for s in history.used_steps)
     number = {p.name: k for k, p in enumerate(parameters)}
@@ -459,7 +463,7 @@ def calibrate_turnout(
         )
     parameters = parameters_of(stored)
     directions = dip_directions(parameters)
-    events = [*events_of(turnout, parameters), *nose_errors(parameters, directions)]
+    events = [*events_of(turnout, parameters), *file_errors(parameters, directions)]
     history = estimate_history(parameters, visits_of(_without_findings(stored)), events)
     informed = visits_of(stored)
     changes = estimate_history(parameters, informed, events, repeats_between_visits=False, accepted=None)

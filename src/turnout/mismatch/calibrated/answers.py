@@ -18,6 +18,7 @@ from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.file_comparison import Deviation, deviations_from_file
 from turnout.mismatch.calibrated.history import Event, History, estimate_history
 from turnout.mismatch.calibrated.information import GroupInformation, VisitInformation
+from turnout.mismatch.calibrated.levels import IMPACTS, kind_of, own_levels
 
 CHANGE, FILE = QUESTIONS = ("change", "file")
 # Group of a parameter -> the effect of the library that changes it
@@ -32,7 +33,6 @@ NAMES = {
 INTOLERABLE = {"depth": CALIBRATION.worn_depth}
 STRETCH_GROUPS = ("ballast", "pad")  # of which adjacent supports change together
 DAMPER_SHARES = (0.5, 1.0)  # change of the logarithm of the damping over that of the stiffness
-IMPACTS = "impacts at"  # part of the name of a group of hammer tests
 
 
 @dataclass(frozen=True)
@@ -225,8 +225,7 @@ def change_answer(
         "unknown" if a visit differs from all before, and no name explains it.
     """
     visit = visits[-1].visit
-    history = estimate_history(parameters, visits, events, repeats_between_visits=False, accepted=None)
-    evidence = compare_onsets(history, candidates)
+    levels, history, evidence = _evidence_of_changes(parameters, visits, events, candidates, is_alarmed)
     price = float(np.log(max(len(candidates), 1)))
     by_name = {p.name: p for p in parameters}
     least = threshold + price
@@ -234,7 +233,8 @@ def change_answer(
     material = [e for e in material if e.gain >= e.from_first]
     gain = _evidence_of_name(material, by_name) if is_alarmed else max((e.gain for e in material), default=-np.inf)
     if gain < least:
-        return _answer_without_name(history, visit, by_name)
+        by_stated_errors = estimate_history(parameters, visits, events, repeats_between_visits=False, accepted=None)
+        return _answer_without_name(by_stated_errors, visit, by_name)
     leader = material[0]
     other_form = next((e for e in evidence if e.effect.name == leader.effect.name and e is not leader), None)
     stated = _LeadingEffect.of(
@@ -247,16 +247,41 @@ def change_answer(
         [*events, *_events_of_change(leader, parameters, candidates)],
         repeats_between_visits=False,
         accepted=None,
+        levels=levels,
     )
     explained = next(s.innovation for s in with_change.steps if s.visit == leader.onset)
     if not _is_explained(jump, explained):
         return stated.unknown(visit, CHANGE, by_name[jump.parameter])
     names = [stated.name]
     if stated.name == "local_ballast" and leader.size[0] < 0.0:
-        names = _supported_names(parameters, visits, events, leader, _present_size(leader), margin)
+        names = _supported_names(parameters, visits, events, leader, _present_size(leader), margin, levels)
     rivals = [_name(e.effect, by_name) for e in material if e.gain > leader.gain - margin]
     answer = stated.answer(visit, CHANGE, _with_rivals(names, stated, rivals))
     return replace(answer, changed=tuple(leader.effect.direction), total=_present_size(leader)[0])
+
+
+def _evidence_of_changes(
+    parameters: Sequence[StateParameter],
+    visits: Sequence[VisitInformation],
+    events: Sequence[Event],
+    candidates: Sequence[ChangeEffect],
+    is_alarmed: bool,
+) -> tuple[dict[str, float], History, list[OnsetEvidence]]:
+    """Levels of the errors, history and evidence. The levels are those that the most evident change leaves.
+
+    Where an alarm asks, a change of any size is told: there the errors are the stated ones.
+    """
+    levels = {} if is_alarmed else own_levels(parameters, visits, events)
+    for is_last in (is_alarmed, True):
+        history = estimate_history(
+            parameters, visits, events, repeats_between_visits=False, accepted=None, levels=levels
+        )
+        evidence = compare_onsets(history, candidates)
+        if is_last or not evidence:
+            break
+        change = _events_of_change(evidence[0], parameters, candidates)
+        levels = own_levels(parameters, visits, [*events, *change])
+    return levels, history, evidence
 
 
 def _evidence_of_name(material: Sequence[OnsetEvidence], by_name: Mapping[str, StateParameter]) -> float:
@@ -424,9 +449,10 @@ def _supported_names(
     parameters: Sequence[StateParameter],
     visits: Sequence[VisitInformation],
     events: Sequence[Event],
-    best: OnsetEvidence | ChangeEffect,
+    leader: OnsetEvidence | ChangeEffect,
     size: tuple[float, float],
     margin: float,
+    levels: Mapping[str, float] | None = None,
 ) -> list[str]:
     """Names of softer ballast: a gap is felt by impacts on the unloaded track, and less by trains that close it.
 
@@ -438,7 +464,7 @@ def _supported_names(
     """
     if size[0] + CALIBRATION.finding_sds * size[1] < np.log(CALIBRATION.least_support):
         return ["hanging_sleeper"]
-    effect = best.effect if isinstance(best, OnsetEvidence) else best
+    effect = leader.effect if isinstance(leader, OnsetEvidence) else leader
     felt = [p for p in parameters if p.name in effect.direction]  # the damper of a support with its spring
     offsets = {p.name: replace(p, name=f"{p.name} as trains feel it", mean=0.0) for p in felt}
     all_parameters = [*parameters, *offsets.values()]
@@ -458,8 +484,15 @@ def _supported_names(
         )
         for share in (1.0, *CALIBRATION.gap_shares)
     ]
-    history = estimate_history(all_parameters, split, opened, repeats_between_visits=False, accepted=None)
-    if isinstance(best, OnsetEvidence):
+    history = estimate_history(
+        all_parameters,
+        split,
+        opened,
+        repeats_between_visits=False,
+        accepted=None,
+        levels=levels,
+    )
+    if isinstance(leader, OnsetEvidence):
         gains = {e.effect.name: e.gain for e in compare_onsets(history, effects)}
     else:
         gains = dict(zip((e.name for e in effects), evidence_from_first(all_parameters, history, effects)[0]))
@@ -470,7 +503,7 @@ def _supported_names(
 
 def _with_offset(group: GroupInformation, name: str, offset: str) -> GroupInformation:
     """Information of trains on the sum of a parameter and its ``offset``; that of impacts as it is."""
-    if IMPACTS in group.group or name not in group.names:
+    if kind_of(group.group) == IMPACTS or name not in group.names:
         return group
     k, n = group.names.index(name), len(group.names)
     terms = np.vstack([np.eye(n), np.eye(n)[k]])  # (n + 1, n)

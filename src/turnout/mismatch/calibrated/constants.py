@@ -15,6 +15,9 @@ class CalibrationConstants:
     repeated_error_share: float = threshold(
         0.9, "share of the tolerated variance", "that repeats in all recordings of a group; not yet measured", PAGE
     )
+    level_visits: float = threshold(
+        1.0, "visits", "that the stated variance of errors counts as, beside what a turnout has shown of its own", PAGE
+    )
     max_chance: float = threshold(1e-4, "probability", "that an innovation of an intact visit is larger", PAGE)
     speed_step: float = threshold(10.0, "km/h", "trains of one type within it share the error of the model", PAGE)
     walk_sds: tuple[tuple[str, float], ...] = threshold(
@@ -27,8 +30,12 @@ class CalibrationConstants:
         "unit of the group", "deviations from the file below which nobody would act", PAGE,
     )  # fmt: skip
     model_errors: tuple[tuple[str, float], ...] = threshold(
-        (("depth", 0.1),), "unit of the group", "of a value, the same in all recordings: the wheels of all trains meet "
-        "a nose of one shape", "decisions/running-surface-priors.md",
+        (
+            ("depth", 0.1), ("ballast", 0.04), ("ballast_damper", 0.05), ("pad", 0.02), ("pad_damper", 0.06),
+            ("sleeper", 0.03),
+        ),
+        "unit of the group", "of a value, the same in all recordings: the wheels of all trains meet a nose of one "
+        "shape; supports of 10 intact crossing sites have errors beyond their standard deviations", PAGE,
     )  # fmt: skip
     pad_visit_sd: float = threshold(
         0.1, "ln", "change of all pads between visits by their temperature: 30 K at 0.3 % per kelvin", PAGE
@@ -55,6 +62,9 @@ class CalibrationConstants:
     )
     nose_error: float = threshold(
         1.5e-4, "m", "of the file's surface of a nose over the shortest dip: a fifth of a depth of 0.4 to 1.6 mm", PAGE
+    )
+    nose_start_sds: float = threshold(
+        2.0, "prior sd", "of the position of a nose, from which fits begin to either side of that of the file", PAGE
     )
     finding_sds: float = threshold(3.0, "standard deviations", "beyond which a value differs from the file", PAGE)
     least_support: float = threshold(

@@ -10,6 +10,7 @@ from scipy import stats
 
 from turnout.mismatch.calibrated.belief import Belief, StateParameter
 from turnout.mismatch.calibrated.constants import CALIBRATION
+from turnout.mismatch.calibrated.history import BEFORE_ALL, Event
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,37 @@ class Deviation:
         return self.size / self.ordinary_sd
 
 
+def model_error_sds(parameters: Sequence[StateParameter]) -> np.ndarray:
+    """Standard deviations of the error of the model in each value, ``CALIBRATION.model_errors``: independent ones.
+
+    Parameters
+    ----------
+    parameters : sequence of StateParameter
+
+    Returns
+    -------
+    (n_parameter,) array of float
+        In the units of the parameters, 0 where no error is known.
+    """
+    errors = dict(CALIBRATION.model_errors)
+    return np.array([errors.get(p.group, 0.0) for p in parameters])
+
+
+def model_error(parameters: Sequence[StateParameter]) -> Event:
+    """The error of the model before all visits: the values that fit best differ from those of the track.
+
+    Parameters
+    ----------
+    parameters : sequence of StateParameter
+
+    Returns
+    -------
+    Event
+    """
+    sds = model_error_sds(parameters)
+    return Event(BEFORE_ALL, {p.name: float(sd) for p, sd in zip(parameters, sds) if sd > 0.0})
+
+
 def deviations_from_file(
     belief: Belief,
     parameters: Sequence[StateParameter],
@@ -44,11 +76,12 @@ def deviations_from_file(
 ) -> list[Deviation]:
     r"""Deviations from the file, the clearest first. Adjacent components of a group are one deviation.
 
-    The posterior standard deviation of a value includes the error of the model, ``CALIBRATION.model_errors``.
-    With the difference :math:`d = m - m_0` of the belief from the file, the mean over a run of components is tested
-    three times. It must be as large as the least size of the group. It must be ``sds`` times its posterior standard
-    deviation. And it must be larger than intact components leave: there :math:`d` has the covariance
-    :math:`P_0 - P`, with the two-sided chance of ``sds`` standard deviations over all runs of the group.
+    The belief is in values as the model needs them: those of the track and an error of the model with the covariance E,
+    see ``model_error``. With the difference :math:`d = m - m_0` of the belief from the file, the mean over a run of
+    components is tested three times. It must be as large as the least size of the group. It must be ``sds`` times its
+    standard deviation, with the covariance :math:`P + E`. And it must be larger than intact components leave: there
+    :math:`d` has the covariance :math:`P_0 + E - P`, with the two-sided chance of ``sds`` standard deviations over all
+    runs of the group.
 
     Parameters
     ----------
@@ -69,8 +102,8 @@ def deviations_from_file(
     list of Deviation
         No component is in two of them.
     """
-    prior = Belief.of_file(parameters)
-    ordinary = prior.covariance - belief.covariance
+    prior, error = Belief.of_file(parameters), np.diag(model_error_sds(parameters) ** 2)
+    ordinary = prior.covariance + error - belief.covariance
     difference = belief.mean - prior.mean
     deviations: list[Deviation] = []
     for group, least_size in least_sizes.items():
@@ -80,15 +113,15 @@ def deviations_from_file(
             row[run] = 1.0 / len(run)
         limit = float(stats.norm.isf(stats.norm.sf(sds) / max(len(runs), 1)))
         size = means @ difference
-        sd = np.hypot(_sds(means, belief.covariance), dict(CALIBRATION.model_errors).get(group, 0.0))
+        sd = _sds(means, belief.covariance + error)
         floor = np.sqrt(CALIBRATION.min_prior_share) * _sds(means, prior.covariance)
         ordinary_sd = np.maximum(_sds(means, ordinary), floor)
         beyond = (abs(size) > limit * ordinary_sd) | (abs(size) - sds * sd >= (intolerable or {}).get(group, np.inf))
         is_clear = (abs(size) >= least_size) & (abs(size) >= sds * sd) & beyond
-        taken: set[int] = set()
+        in_a_deviation: set[int] = set()
         for r in sorted(np.flatnonzero(is_clear), key=lambda r: -abs(size[r]) / ordinary_sd[r]):
-            if taken.isdisjoint(runs[r]):
-                taken.update(runs[r])
+            if in_a_deviation.isdisjoint(runs[r]):
+                in_a_deviation.update(runs[r])
                 members = [parameters[k] for k in runs[r]]
                 deviations.append(_deviation(members, float(size[r]), float(sd[r]), float(ordinary_sd[r])))
     return sorted(deviations, key=lambda d: -abs(d.deviates))

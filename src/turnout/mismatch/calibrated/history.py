@@ -77,6 +77,7 @@ def estimate_history(
     repeated_share: float = CALIBRATION.repeated_error_share,
     repeats_between_visits: bool = True,
     accepted: Collection[str] | None = (),
+    levels: Mapping[str, float] | None = None,
 ) -> History:
     """Belief after each visit, from the belief of the file.
 
@@ -96,6 +97,9 @@ def estimate_history(
         for changes, in which a constant error cancels.
     accepted : collection of str or None
         Visits that are used whatever their innovation. None: all.
+    levels : mapping or None
+        Group -> variance of what its errors do not repeat from visit to visit, over the variance of its errors, as
+        ``own_levels``. None: 1. For changes alone.
 
     Returns
     -------
@@ -120,7 +124,8 @@ def estimate_history(
     for visit in ordered:
         predicted = belief.with_noise(noise.covariance(time, visit.time)) if steps else belief
         own_weights = repeated_error_weights([visit], repeated_share)
-        total = visit.total(names, {**own_weights, **(weights or {})})
+        repeated = {g.group: own_weights[g.group] / (levels or {}).get(g.group, 1.0) for g in visit.groups}
+        total = visit.total(names, {**repeated, **(weights or {})})
         matrix, vector = with_own_values(*total, own_sds)
         test = tested.get(visit.visit)
         innovation = test.innovation if test else predicted.innovation(matrix, vector)

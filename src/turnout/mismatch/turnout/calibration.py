@@ -12,6 +12,7 @@ from turnout.constants import KMH
 from turnout.mismatch.calibrated.answers import position_of
 from turnout.mismatch.calibrated.belief import StateParameter
 from turnout.mismatch.calibrated.constants import CALIBRATION
+from turnout.mismatch.calibrated.file_comparison import model_error
 from turnout.mismatch.calibrated.history import BEFORE_ALL, Event
 from turnout.mismatch.calibrated.information import GroupInformation, marginalize
 from turnout.mismatch.turnout.priors import ROUGHNESS
@@ -169,6 +170,23 @@ def _recording_information(case: TrackCase, fit: Fit, members: Sequence[int]) ->
         vector += weight * rows.T @ (fit.white[k] + rows @ point)
     owned = nuisances[n_shared:]
     return marginalize(matrix, vector, range(n_shared, len(order)), np.array([n.sd**-2 for n in owned]))
+
+
+def file_errors(parameters: Sequence[StateParameter], directions: Mapping[str, Mapping[str, float]]) -> list[Event]:
+    """What values that fit best have beside the tolerances of the file: errors of the model, and of surfaces at noses.
+
+    Parameters
+    ----------
+    parameters : sequence of StateParameter
+    directions : mapping
+        As ``dip_directions``.
+
+    Returns
+    -------
+    list of Event
+        Before all visits.
+    """
+    return [model_error(parameters), *nose_errors(parameters, directions)]
 
 
 def nose_errors(parameters: Sequence[StateParameter], directions: Mapping[str, Mapping[str, float]]) -> list[Event]:
