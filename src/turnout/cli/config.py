@@ -2,7 +2,7 @@
 
 turnout config show tommerup_s1
 turnout config show tommerup_s1 --only receptance
-turnout config generate            renew config.yaml and the JSON schemas for editors, and docs/settings.md if docs/ exists
+turnout config generate            renew config.yaml and the JSON schemas for editors (and docs/settings.md, if present)
 turnout config generate --check    show what is out of date, change nothing
 """
 
