@@ -117,7 +117,7 @@ class TurnoutConfig:
             If the layout describes no passages.
         """
         if self.passages is None:
-            remedy = "Add the part 'passages:', as in the layout tommerup"
+            remedy = "Add the part 'passages:' as in the layout tommerup. A hammer test is read with its section"
             raise ConfigError(self.layout_file, "passages", "the layout describes no passages", remedy)
         return self.passages
 

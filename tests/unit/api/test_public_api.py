@@ -291,7 +291,7 @@ def test_a_layout_describes_the_files_of_its_sections(tmp_path, repository):
     assert turnout.read(path, layout=turnout_s1, section="A7")[9].channels == result[9].channels
     with pytest.raises(ReadError, match="there is no channel"):
         turnout.read(path, layout=layout)  # a file of passages has other channels
-    with pytest.raises(ConfigError, match=r"tommerup, section: there is no section 'X9'\. Write one of OT, SP"):
+    with pytest.raises(ConfigError, match=r"tommerup\.yaml, section: there is no section 'X9'\. Write one of OT, SP"):
         turnout.read(path, layout=layout, section="X9")
     with pytest.raises(ConfigError, match=r"none\.yaml, the path: there is no such file"):
         turnout.read(path, layout=tmp_path / "none.yaml", section="A7")
@@ -355,7 +355,7 @@ def test_settings_rule_a_simulated_hammer_test():
     settings = SimulateSettings(rate=10e3, hammer_duration=0.05, hammer_half_length=6.0)
     (recording,) = turnout.simulate_hammer(uniform_track(30.0), 15.0, impacts=1, settings=settings)
     assert recording.rate == 10e3 and recording.n_sample == 500
-    with pytest.raises(SimulationError, match="no location 'X9'"):
+    with pytest.raises(SimulationError, match="no section 'X9' in the track file"):
         turnout.simulate_hammer("tommerup", "X9")
 
 

@@ -123,10 +123,10 @@ def test_a_body_on_nothing_is_refused():
             lambda: simulate_passage(TRACK, car(), 30.0, SENSOR, prepared=prepare_passage(TRACK, rate=10e3)),
             r"for steps of 0\.0001 s, but 20000\.0 Hz with 1 per sample ask for 5e-05 s",
         ),
-        (lambda: simulate_hammer(TRACK, "A7"), "no location 'A7'"),
-        (lambda: load_vehicle("tgv"), "no file config/vehicles/tgv.yaml; there are .*coach"),
+        (lambda: simulate_hammer(TRACK, "A7"), "no section 'A7'"),
+        (lambda: load_vehicle("tgv"), r"no file config/vehicles/tgv.yaml\. Write one of .*coach"),
         (lambda: load_vehicle("ic3", load=7.0), "load 7.0"),
-        (lambda: load_track("nowhere"), "there are tommerup"),
+        (lambda: load_track("nowhere"), "Write one of tommerup"),
     ],
 )
 def test_other_bad_input_says_what_was_found(build, said):
