@@ -5,13 +5,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from turnout.report.formatting import with_interval
-
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from datetime import datetime
 
-    from turnout.modal.frf import FrfModes
     from turnout.stages.file_contents import ChannelContents, FileContents
 
 MAX_EVENTS = 12  # impacts or trains that are listed by their times
@@ -128,32 +125,6 @@ def contents_values(contents: FileContents) -> dict[str, Any]:
             for e in contents.events
         ],
     }
-
-
-def mode_lines(modes: FrfModes) -> list[str]:
-    """Modes of frequency responses, and the peaks that are none.
-
-    Parameters
-    ----------
-    modes : FrfModes
-        From ``modes_of_frf``.
-
-    Returns
-    -------
-    list of str
-        One line each.
-    """
-    lines = []
-    for mode in modes.modes:
-        n = mode.frequency.n
-        frequency = with_interval(mode.frequency.mean, mode.frequency.se, n)
-        damping = with_interval(mode.damping.mean, mode.damping.se, n, 4)
-        lines.append(_line("mode", f"{frequency} Hz, damping {damping}, n = {n}"))
-    if not modes.modes:
-        lines.append(_line("mode", "none"))
-    for peak in modes.rejected:
-        lines.append(_line("not used", f"peak at {peak['frequency']:.4g} Hz: {peak['reason']}"))
-    return lines
 
 
 def _line(what: str, words: str) -> str:

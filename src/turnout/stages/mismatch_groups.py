@@ -314,6 +314,8 @@ def _visit_of(label: str, days: Sequence[date]) -> str:
 def enabled_visit(plan: Path, configuration: Configuration) -> Iterator[PlannedUnit]:
     """Newest visits, as units, of the turnouts with the setting ``mismatch: enabled: true``.
 
+    rules/mismatch.smk composes the name of this function.
+
     Parameters
     ----------
     plan : Path
@@ -332,6 +334,8 @@ def enabled_visit(plan: Path, configuration: Configuration) -> Iterator[PlannedU
 
 def every_visit(plan: Path, configuration: Configuration) -> Iterator[PlannedUnit]:
     """Newest visits of all turnouts of a plan; their note changes with notes, track and vehicle files.
+
+    rules/mismatch.smk composes the name of this function.
 
     Parameters
     ----------

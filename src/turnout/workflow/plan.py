@@ -4,7 +4,6 @@ The shard of a turnout follows from a checksum of its id.
 """
 
 import json
-import re
 import zlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -18,8 +17,6 @@ from turnout.files import is_truncated, write_if_changed
 from turnout.records import Unit
 from turnout.workflow.notes import notes_of
 from turnout.workflow.scan import scan
-
-SHARD_NAME = r"\d{2,4}of\d{2,4}"
 
 
 def shard_of(turnout: str, shards: int) -> str:
@@ -83,30 +80,6 @@ def shard_names(shards: int, turnouts: Iterable[str] | None = None) -> list[str]
     if turnouts is None:
         return [shard_name(i, shards) for i in range(shards)]
     return sorted({shard_of(t, shards) for t in turnouts})
-
-
-def parse_shard_name(name: str) -> tuple[int, int]:
-    """Number of a shard and number of shards from its name.
-
-    Parameters
-    ----------
-    name : str
-        Name such as "38of64".
-
-    Returns
-    -------
-    tuple of (int, int)
-        The two numbers, 38 and 64.
-
-    Raises
-    ------
-    ConfigError
-        If it is no such name.
-    """
-    if not re.fullmatch(SHARD_NAME, name):
-        raise ConfigError("shard", "name", repr(name), "Write a name like 00of64")
-    number, count = name.split("of")
-    return int(number), int(count)
 
 
 PLAN_END = "\n]}\n"

@@ -1,7 +1,6 @@
 """Numeric constants of the calibrated model in one place, each with its unit, its reason and its source."""
 
-from dataclasses import dataclass, fields
-from typing import Any
+from dataclasses import dataclass
 
 from turnout.mismatch.engine.thresholds import threshold
 
@@ -83,11 +82,3 @@ class CalibrationConstants:
 
 
 CALIBRATION = CalibrationConstants()
-
-
-def calibration_rows() -> list[tuple[str, Any, str, str, str]]:
-    """(name, value, unit, reason, source) of every constant, in the order of the code."""
-    return [
-        (f.name, f.default, f.metadata["unit"], f.metadata["reason"], f.metadata["source"])
-        for f in fields(CalibrationConstants)
-    ]
