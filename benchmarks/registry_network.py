@@ -5,11 +5,11 @@ Nine complete years are compacted and the tenth has one batch a week, as in dail
 
 from pathlib import Path
 
+from turnout.registry.connection import connect
 from turnout.registry.database import build_database
 from turnout.registry.generation import Generation, commit, schema_of
 from turnout.registry.parquet import read_live, write_sorted
 from turnout.registry.schema import names, tables
-from turnout.registry.staging import connect
 from turnout.registry.supersede import count_superseded, latest_supersession
 
 WEEKS, WEEKS_A_YEAR, FIRST = 520, 52, "2016-01-04 10:00:00"

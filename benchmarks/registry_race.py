@@ -11,13 +11,13 @@ from pathlib import Path
 import duckdb
 
 from turnout.registry.compaction import compact
+from turnout.registry.connection import connect
 from turnout.registry.database import open_registry
 from turnout.registry.generation import load, schema_of
 from turnout.registry.lock import registry_lock
 from turnout.registry.parquet import write_sorted
 from turnout.registry.publication import history, publish
 from turnout.registry.schema import tables
-from turnout.registry.staging import connect
 
 ROWS = 20_000
 VALUES = {

@@ -52,13 +52,18 @@ assert register([folder / sys.argv[2]], folder / 'registry', read=read_results, 
 
 TREND = """
 from pathlib import Path
-from turnout.stages.trend import trend_job, worklist_job
+from turnout.stages.trend import trend_job
 folder = Path(sys.argv[1])
 (folder / 'config').mkdir()
 (folder / 'config/turnouts.tsv').write_text('turnout\\tlayout\\n')
 paths = [str(folder / name) for name in ('registry/_generation.json', 'trend.json', 'config')]
 trend_job(*paths, '2024-06-01')
-worklist_job(paths[0], folder / 'worklist.csv', folder / 'work', '2024-06-01')
+"""
+WORKLIST = """
+from pathlib import Path
+from turnout.stages.worklist import worklist_job
+folder = Path(sys.argv[1])
+worklist_job(folder / 'registry/_generation.json', folder / 'worklist.csv', folder / 'work', '2024-06-01')
 """
 REPORT = """
 from pathlib import Path
@@ -113,6 +118,7 @@ def measure(n_byte: int = 24_000_000, formats: tuple[str, ...] = tuple(WRITERS))
         yield StageMemory("registration of 5,000 units", batch.stat().st_size, peak_of(REGISTER, folder, batch.name))
         n_byte = sum(path.stat().st_size for path in (folder / "registry").rglob("*.parquet"))
         yield StageMemory("trends of its registry", n_byte, peak_of(TREND, folder))
+        yield StageMemory("worklist of its registry", n_byte, peak_of(WORKLIST, folder))
         yield StageMemory("pages of 20 of its turnouts", n_byte, peak_of(REPORT, folder))
 
 

@@ -5,11 +5,11 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.trend_fleet import Fleet, drift, modes
+from turnout.registry.connection import connect
 from turnout.registry.database import build_database
 from turnout.registry.generation import Generation, commit, load
 from turnout.registry.parquet import write_sorted
 from turnout.registry.schema import tables
-from turnout.registry.staging import connect
 
 EXTRA = (
     "'joint' as method, null::double as frequency_sd_hz, 0.05 as damping_ratio, null::double as damping_se, "

@@ -45,7 +45,7 @@ rule worklist:
         mem_mb=2000,
         runtime=20,
     params:
-        code=fingerprint("turnout.stages.trend"),
+        code=fingerprint("turnout.stages.worklist"),
         again=attempts("worklist"),
         day=RUN.day,
     script:

@@ -2,7 +2,7 @@
 
 import logging
 
-from turnout.stages.trend import worklist_job
+from turnout.stages.worklist import worklist_job
 from turnout.workflow.jobs import touch_after_publication
 from turnout.workflow.retries import attempt
 

@@ -6,11 +6,11 @@ import pytest
 
 from turnout.errors import REASONS
 from turnout.registry import documentation
+from turnout.registry.arrow_types import ARROW_TYPES
 from turnout.registry.database import open_registry
 from turnout.registry.documentation import views
 from turnout.registry.job import register
-from turnout.registry.schema import ARROW_TYPES, FILLED_BY_REGISTER, key, sort_order, tables, time_column
-from turnout.registry.staging import CHILDREN
+from turnout.registry.schema import CHILDREN, FILLED_BY_REGISTER, key, sort_order, tables, time_column
 from turnout.registry.supersede import KINDS, LARGE_TABLES
 from turnout.registry.view_texts import view_files
 

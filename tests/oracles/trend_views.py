@@ -3,7 +3,8 @@
 import duckdb
 import pyarrow as pa
 
-from turnout.registry.schema import arrow_schema, tables
+from turnout.registry.arrow_types import arrow_schema
+from turnout.registry.schema import tables
 from turnout.registry.view_texts import view_files
 from turnout.trend.panel import days, timestamps
 from turnout.trend.tables import arrow_rows

@@ -19,10 +19,10 @@ import duckdb
 from turnout.files import changed_at, write_atomic
 from turnout.registry import view_texts
 from turnout.registry.catalogue import comment_catalogue, create_catalogue
+from turnout.registry.connection import connect
 from turnout.registry.generation import Generation
 from turnout.registry.ids import content_id
 from turnout.registry.schema import literal, tables
-from turnout.registry.staging import connect
 
 # Every DuckDB since 1.2 opens it; tools with an older DuckDB could not read the newest format.
 STORAGE_VERSION = "v1.2.0"

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from turnout.errors import RegistryError
+from turnout.registry.connection import connect
 from turnout.registry.damage import take_off_damage
 from turnout.registry.database import build_database
 from turnout.registry.generation import (
@@ -20,7 +21,6 @@ from turnout.registry.lock import registry_lock
 from turnout.registry.parquet import folder_of, read_list, read_live, write_sorted
 from turnout.registry.publication import publish
 from turnout.registry.schema import WHOLE_TABLES, file_literal, tables
-from turnout.registry.staging import connect
 from turnout.registry.supersede import LARGE_TABLES, count_superseded, latest_supersession, split_superseded
 
 if TYPE_CHECKING:

@@ -17,18 +17,14 @@ from turnout.files import publish_file, temporary_path
 from turnout.registry import view_texts
 from turnout.registry.catalogue import create_catalogue, use_generation
 from turnout.registry.catalogue_template import catalogue_template
+from turnout.registry.connection import OFFLINE_CONFIG, connect
 from turnout.registry.generation import Generation, load
 from turnout.registry.schema import literal
-from turnout.registry.staging import connect
 
 if TYPE_CHECKING:
     from os import PathLike
 
 DATABASE = "registry.duckdb"
-OFFLINE_CONFIG: dict[str, str | bool | int | float | list[str]] = {
-    "autoinstall_known_extensions": False,
-    "autoload_known_extensions": False,
-}
 
 
 def open_registry(

@@ -1,14 +1,17 @@
 """Check and publish tables that are computed from the registry itself and replaced as a whole."""
 
-from collections.abc import Collection, Mapping
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import duckdb
-import pandas as pd
-import pyarrow as pa
 
 from turnout.errors import RegistryError
+from turnout.registry.connection import connect
 from turnout.registry.database import build_database, is_behind
 from turnout.registry.generation import (
     DataFile,
@@ -20,14 +23,19 @@ from turnout.registry.lock import registry_lock
 from turnout.registry.parquet import write_sorted
 from turnout.registry.publication import publish as publish_generation
 from turnout.registry.schema import WHOLE_TABLES, key, tables, time_column
-from turnout.registry.staging import connect
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    import pandas as pd
+    import pyarrow as pa
 
 TABLES_BY_YEAR = ("charts",)
 
 
 def publish(
     registry_dir: PathLike,
-    frames: Mapping[str, pd.DataFrame | pa.Table],
+    frames: Mapping[str, pd.DataFrame | pa.Table | Sequence[Mapping[str, Any]]],
     patience: float = 600.0,
     keep: Mapping[str, Collection[int]] | None = None,
 ) -> Generation:
@@ -40,8 +48,8 @@ def publish(
     ----------
     registry_dir : path
         An existing registry, or a folder to make one in.
-    frames : mapping of table to DataFrame or Arrow table
-        All rows of each table, except the years in ``keep``.
+    frames : mapping of table to DataFrame, Arrow table or sequence of mappings
+        All rows of each table, except the years in ``keep``. Few rows may be mappings, which take no further package.
     patience : float
         How long to wait for another run that holds the lock. [s]
     keep : mapping of table to years, optional
@@ -75,14 +83,22 @@ def publish(
         return now
 
 
-def _create_view(con: duckdb.DuckDBPyConnection, table: str, frame: pd.DataFrame | pa.Table) -> None:
+def _create_view(
+    con: duckdb.DuckDBPyConnection, table: str, frame: pd.DataFrame | pa.Table | Sequence[Mapping[str, Any]]
+) -> None:
     """Create view ``new_<table>`` of the rows, typed and rounded; RegistryError at the first bad row."""
     if table not in WHOLE_TABLES:
         raise RegistryError(f"{table} is not a table that is replaced whole; those are {', '.join(WHOLE_TABLES)}.")
-    present = list(frame.columns if isinstance(frame, pd.DataFrame) else frame.column_names)
+    if isinstance(frame, Sequence):
+        present = sorted({name for row in frame for name in row})
+    else:
+        present = list(getattr(frame, "column_names", None) or frame.columns)
     if unknown := sorted(set(present) - {c.name for c in tables()[table]}):
         raise RegistryError(f"{table}, column {unknown[0]}: columns.csv does not know it.")
-    con.register(f"came_{table}", frame)
+    if isinstance(frame, Sequence):
+        _insert_rows(con, table, frame, present)
+    else:
+        con.register(f"came_{table}", frame)
     expressions = []
     for c in tables()[table]:
         value = f'"{c.name}"::{c.type}' if c.name in present else f"null::{c.type}"
@@ -92,6 +108,19 @@ def _create_view(con: duckdb.DuckDBPyConnection, table: str, frame: pd.DataFrame
         expressions.append(f'{value} as "{c.name}"')
     con.execute(f"create view new_{table} as select {', '.join(expressions)} from came_{table}")
     _reject_bad_rows(con, table)
+
+
+def _insert_rows(
+    con: duckdb.DuckDBPyConnection, table: str, rows: Sequence[Mapping[str, Any]], present: Sequence[str]
+) -> None:
+    """Table ``came_<table>`` of a few rows; a number that is not finite is NULL."""
+    columns = [f'"{c.name}" {c.type}' for c in tables()[table]]
+    con.execute(f"create temp table came_{table} ({', '.join(columns)})")
+    names = ", ".join(f'"{name}"' for name in present)
+    insert = f"insert into came_{table} ({names}) values ({', '.join('?' * len(present))})"
+    for row in rows:
+        values = [row.get(name) for name in present]
+        con.execute(insert, [None if isinstance(v, float) and not math.isfinite(v) else v for v in values])
 
 
 def _reject_bad_rows(con: duckdb.DuckDBPyConnection, table: str) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 import pyarrow as pa
 
 from turnout.registry.arrow_arrays import NONE, arrow_array, arrow_table, from_numpy
+from turnout.registry.arrow_types import arrow_type
 from turnout.registry.ids import content_id
 from turnout.registry.schema import FILLED_BY_REGISTER, Column, names, tables
 
@@ -197,13 +198,13 @@ def _convert(column: Column, values: Sequence) -> pa.Array:
         parsed = arrow_array([_time(v) for v in distinct], pa.timestamp("us"))
         positions = {v: k for k, v in enumerate(distinct)}
         return parsed.take(from_numpy(np.array([positions[v] for v in values], np.int64)))
-    if pa.types.is_floating(column.arrow) or pa.types.is_integer(column.arrow):
+    if pa.types.is_floating(arrow_type(column)) or pa.types.is_integer(arrow_type(column)):
         kinds = set(map(type, values))
         if not kinds.isdisjoint((bool, str, np.bool_)):
             raise TypeError("text or truth value where a number belongs")
-        if pa.types.is_integer(column.arrow) and float in kinds:  # pa.array would silently truncate
-            return pa.array(values, pa.float64()).cast(column.arrow)
-    return arrow_array(values, column.arrow)
+        if pa.types.is_integer(arrow_type(column)) and float in kinds:  # pa.array would silently truncate
+            return pa.array(values, pa.float64()).cast(arrow_type(column))
+    return arrow_array(values, arrow_type(column))
 
 
 def _time(value: Any) -> datetime | None:
@@ -229,9 +230,9 @@ def _lists(column: Column, values: Sequence) -> pa.Array:
     kinds = set(map(type, values))
     if any(issubclass(kind, (str, bytes, Mapping)) for kind in kinds):
         raise TypeError("not a list")
-    element_type = column.arrow.value_type
+    element_type = arrow_type(column).value_type
     if not all(issubclass(kind, (np.ndarray, NONE)) for kind in kinds):
-        return pa.array([v.tolist() if isinstance(v, np.ndarray) else v for v in values], column.arrow)
+        return pa.array([v.tolist() if isinstance(v, np.ndarray) else v for v in values], arrow_type(column))
     arrays = [np.ravel(v) for v in values if v is not None]
     flat = np.concatenate(arrays) if arrays else np.zeros(0)
     lengths = np.array([0 if v is None else np.size(v) for v in values], dtype=np.int64)
@@ -242,4 +243,4 @@ def _lists(column: Column, values: Sequence) -> pa.Array:
         elements = from_numpy(flat.astype(element_type.to_pandas_dtype()))
     is_valid = np.packbits(np.array([v is not None for v in values], dtype=bool), bitorder="little")
     buffers = [pa.py_buffer(is_valid.tobytes()), pa.py_buffer(offsets)]
-    return pa.Array.from_buffers(column.arrow, len(values), buffers, children=[elements])
+    return pa.Array.from_buffers(arrow_type(column), len(values), buffers, children=[elements])

@@ -8,6 +8,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from turnout.content import sha256_of
+from turnout.registry.arrow_types import arrow_type
 from turnout.registry.database import DATABASE, is_behind
 from turnout.registry.generation import DataFile, Generation, load
 from turnout.registry.lock import registry_lock
@@ -120,7 +121,7 @@ def _check_file(root: Path, file: DataFile, hashes: bool) -> list[str]:
         problems.append(f"{file.path}: {parquet.metadata.num_rows} rows, the list says {file.rows}.")
     file_types = {f.name: f.type for f in parquet.schema_arrow}
     for column in tables().get(file.table, ()):
-        if column.name in file_types and not _is_same_type(file_types[column.name], column.arrow):
+        if column.name in file_types and not _is_same_type(file_types[column.name], arrow_type(column)):
             problems.append(
                 f"{file.path}, column {column.name}: {file_types[column.name]}, columns.csv says {column.type}."
             )

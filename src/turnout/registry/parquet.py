@@ -3,8 +3,6 @@
 from pathlib import Path
 
 import duckdb
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from turnout.content import sha256_of
 from turnout.errors import RegistryError
@@ -191,6 +189,9 @@ def has_present_columns(path: Path, table: str) -> bool:
     bool
         True if it has the present columns and no rows.
     """
+    import pyarrow as pa  # readers of the registry do without it
+    import pyarrow.parquet as pq
+
     try:
         with pq.ParquetFile(path) as parquet:
             return tuple(parquet.schema_arrow.names) == names(table) and parquet.metadata.num_rows == 0

@@ -13,17 +13,16 @@ from typing import TYPE_CHECKING
 import pyarrow as pa
 
 from turnout.registry.arrow_arrays import arrow_array, arrow_table
+from turnout.registry.connection import connect, limit_memory
 from turnout.registry.database import build_database, is_behind
 from turnout.registry.generation import GENERATION_FILE, Generation, commit, schema_of
 from turnout.registry.ids import content_id
 from turnout.registry.intake import Arrival, Refusal, gather
 from turnout.registry.parquet import read_live, write_sorted
 from turnout.registry.publication import publish
-from turnout.registry.schema import WHOLE_TABLES, key, literal, tables
+from turnout.registry.schema import CHILDREN, WHOLE_TABLES, key, literal, tables
 from turnout.registry.staging import (
-    CHILDREN,
     admit,
-    connect,
     create_staging,
     has_duplicate_keys,
     note_arrivals,
@@ -98,7 +97,8 @@ class Registration:
     @cached_property
     def con(self) -> duckdb.DuckDBPyConnection:
         """Connection with the staging tables and the views of the live rows; a night without news needs none."""
-        con = connect(temp_directory=str(self.root / ".spill"), threads=1)  # two take more CPU time and memory
+        con = connect(temp_directory=str(self.root / ".spill"))
+        limit_memory(con)  # a second thread would take more CPU time, too
         create_staging(con, self.is_indexed)
         for table in tables():
             con.execute(f"create view old_{table} as {read_live(con, self.root, table, self.before.of(table))}")
@@ -190,6 +190,7 @@ class Registration:
         if n_superseded:
             now.files = self._count_superseded(now.files)
         now.consumed = consumed
+        self.con.close()  # the rows are written: their memory is free for the catalogue
         publish(self.root, now)
         return RegistrationResult(run_id, number, len(self.result_ids), rows, self.n_refused, n_superseded, faults)
 

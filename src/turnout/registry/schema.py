@@ -1,4 +1,4 @@
-"""Tables and columns of the registry from ``columns.csv``, with their DDL, checks and Arrow types."""
+"""Tables and columns of the registry from ``columns.csv``, with their DDL and checks."""
 
 from __future__ import annotations
 
@@ -10,26 +10,21 @@ from importlib.resources import files
 from os import PathLike, fspath
 from typing import TYPE_CHECKING
 
-import pyarrow as pa
-
 if TYPE_CHECKING:
     from typing import NoReturn
 
-ARROW_TYPES = {
-    "varchar": pa.string(),
-    "double": pa.float64(),
-    "float": pa.float32(),
-    "integer": pa.int32(),
-    "bigint": pa.int64(),
-    "boolean": pa.bool_(),
-    "timestamp": pa.timestamp("us"),
-}
 # Computed after every run: for all charts at once, and what open alarms rest on.
 DERIVED_TABLES = ("charts", "baselines", "chart_status", "alarms", "change_findings")
 # Replaced as a whole, from configuration, by hand or by computation; the others get one file per run and year.
 WHOLE_TABLES = ("turnouts", "sections", "events", "campaigns", "acknowledgements", *DERIVED_TABLES)
 # Columns of every result row that the registration fills in.
 FILLED_BY_REGISTER = ("run_id", "result_id")
+# Parent table: its id, and the tables whose rows have no meaning without their parent row.
+CHILDREN = {
+    "models": ("model_id", ("modes", "impact_modes", "receptances")),
+    "passages": ("passage_id", ("passage_fits",)),
+    "mismatch_findings": ("finding_id", ("mismatch_parameters", "mismatch_curves", "twin_states")),
+}
 # Rows are sorted by section, then by type of resonance, then by time, so that one chart is contiguous in the file.
 SORT_FIRST = ("turnout_id", "section_id", "channel", "band", "method")
 
@@ -54,12 +49,6 @@ class Column:
     def is_list(self) -> bool:
         """Whether a value is a list of numbers or texts."""
         return self.type.endswith("[]")
-
-    @property
-    def arrow(self) -> pa.DataType:
-        """The same type in Arrow."""
-        arrow_type = ARROW_TYPES[self.type.removesuffix("[]")]
-        return pa.list_(arrow_type) if self.is_list else arrow_type
 
     @property
     def check(self) -> str | None:
@@ -280,25 +269,6 @@ def sort_order(table: str) -> tuple[str, ...]:
         return ('"turnout_id"', f'"{time}"', *(f'"{k}"' for k in key(table)))
     order = [f'"{c}"' for c in SORT_FIRST if c in names(table)] + ([f'"{time}"'] if time else [])
     return tuple(order + [f'"{k}"' for k in key(table) if f'"{k}"' not in order])
-
-
-@cache
-def arrow_schema(table: str) -> pa.Schema:
-    """Arrow types of the table, with unit and meaning as field metadata.
-
-    Parameters
-    ----------
-    table : str
-        Name of the table.
-
-    Returns
-    -------
-    Schema
-        The schema.
-    """
-    return pa.schema(
-        [pa.field(c.name, c.arrow, metadata={"unit": c.unit, "meaning": c.meaning}) for c in tables()[table]]
-    )
 
 
 def create_table(table: str, name: str, extra: str = "", is_indexed: bool = True) -> str:

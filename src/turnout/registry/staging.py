@@ -16,7 +16,7 @@ import pyarrow as pa
 from turnout.registry.arrow_arrays import arrow_array, arrow_table
 from turnout.registry.ids import content_id
 from turnout.registry.intake import Arrival, Refusal
-from turnout.registry.schema import create_table, key, names, tables
+from turnout.registry.schema import CHILDREN, create_table, key, names, tables
 
 if TYPE_CHECKING:
     from typing import Any
@@ -24,31 +24,6 @@ if TYPE_CHECKING:
 UNIQUE = "unique, and another row has it already"
 FILLED_AT_THE_END = ("runs", "supersedes")  # by the registration itself, not from the rows of units
 MARK_COLUMNS = ", _unit integer, _row integer, _year integer"
-# Parent table: its id, and the tables whose rows have no meaning without their parent row.
-CHILDREN = {
-    "models": ("model_id", ("modes", "impact_modes", "receptances")),
-    "passages": ("passage_id", ("passage_fits",)),
-    "mismatch_findings": ("finding_id", ("mismatch_parameters", "mismatch_curves", "twin_states")),
-}
-
-
-def connect(**config: Any) -> duckdb.DuckDBPyConnection:
-    """DuckDB connection in memory that downloads no extension.
-
-    Parameters
-    ----------
-    **config : str
-        Further settings of DuckDB.
-
-    Returns
-    -------
-    DuckDB connection
-        The connection.
-    """
-    settings = {"autoinstall_known_extensions": False, "autoload_known_extensions": False}
-    con = duckdb.connect(":memory:", config=settings | {"memory_limit": "2GB"} | config)
-    con.execute("set enable_progress_bar = false")  # it would mix with the output of a command
-    return con
 
 
 def create_staging(con: duckdb.DuckDBPyConnection, is_indexed: bool = True) -> None:

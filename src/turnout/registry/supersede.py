@@ -10,8 +10,7 @@ from pathlib import Path
 import duckdb
 
 from turnout.registry.generation import DataFile
-from turnout.registry.schema import WHOLE_TABLES, file_literal, key, names, tables
-from turnout.registry.staging import CHILDREN
+from turnout.registry.schema import CHILDREN, WHOLE_TABLES, file_literal, key, names, tables
 
 # type of row: its table, its id, and the SQL of the text that is equal in its counterpart of the new result
 KINDS = {

@@ -7,6 +7,7 @@ from concurrent.futures import ProcessPoolExecutor
 from typing import TYPE_CHECKING
 
 from turnout.errors import RegistryError
+from turnout.registry.connection import limit_memory
 from turnout.registry.database import open_registry
 from turnout.report.finding_pages import write_finding_pages
 from turnout.report.site import AT_ONCE, write_pages, write_turnouts
@@ -54,6 +55,7 @@ def report_job(
         For a turnout that the registry does not have.
     """
     with open_registry(registry) as connection:
+        limit_memory(connection)
         _check_turnouts(connection, turnouts)
         generation, n_turnouts = connection.execute(
             "select (select generation from registry_info), (select count(*) from turnouts)"
@@ -89,7 +91,7 @@ def _write_share(
     registry: str | Path, pages: str | Path, content: Mapping[str, str], generation: int, day: str | None
 ) -> None:
     with open_registry(registry) as connection:
-        connection.execute("set threads = 1")
+        limit_memory(connection)
         write_turnouts(connection, pages, content, generation, day=day)
 
 

@@ -1,21 +1,13 @@
-"""Stage trend: charts, alarms and states from the registry; then the worklist with the diagnoses of open alarms."""
+"""Stage trend: charts, alarms and states from the registry."""
 
 import json
 import logging
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
 from turnout.config import load_configuration
 from turnout.files import read_json, write_text
-from turnout.registry.as_of import list_day
-from turnout.registry.database import open_registry
-from turnout.registry.derived_tables import publish
-from turnout.registry.spreadsheet import without_formula
-from turnout.trend.tables import arrow_rows
 from turnout.trend.update import update
-from turnout.workflow.current_results import current_results
 
 
 def trend_job(
@@ -55,41 +47,3 @@ def trend_job(
     new_state |= {"warnings": warnings} if warnings else {}
     write_text(state, json.dumps(new_state, indent=1, sort_keys=True) + "\n")
     return new_state
-
-
-def worklist_job(
-    generation: str | Path, worklist: str | Path, work: str | Path = "work", day: str | None = None
-) -> int:
-    """Publish the diagnoses of open alarms and write the worklist.
-
-    Parameters
-    ----------
-    generation : path
-        ``_generation.json`` of the registry.
-    worklist : path
-        The list as CSV; ``asof_utc`` shows whether it is of today.
-    work : path
-        Folder of intermediate results, with those of the stage change.
-    day : str, optional
-        Day of the list, YYYY-MM-DD; by default today.
-
-    Returns
-    -------
-    int
-        Number of diagnoses.
-    """
-    registry = Path(generation).parent
-    with open_registry(registry) as con:
-        turnouts = [turnout for (turnout,) in con.execute("select turnout_id from turnouts order by all").fetchall()]
-    found = [
-        row
-        for turnout in turnouts
-        for result in current_results(work, "change", turnout)
-        for row in result.tables.get("change_findings", ())
-    ]
-    publish(registry, {"change_findings": arrow_rows("change_findings", pd.DataFrame(found))})
-    with open_registry(registry) as con:
-        asof = list_day(con, day)
-        rows = con.execute(f"select *, {asof} as asof_utc from worklist({asof}) order by rank").df()
-    write_text(worklist, rows.map(without_formula).to_csv(index=False, lineterminator="\n"))
-    return len(found)

@@ -12,7 +12,8 @@ import pandas as pd
 import pyarrow as pa
 from scipy.special import ndtri
 
-from turnout.registry.schema import arrow_schema, tables
+from turnout.registry.arrow_types import arrow_schema
+from turnout.registry.schema import tables
 from turnout.trend.epochs import by_epoch
 from turnout.trend.panel import timestamps
 from turnout.trend.quantities import DAMPING_SCALE, is_damping

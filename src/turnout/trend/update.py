@@ -18,6 +18,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from turnout.registry.connection import limit_memory
 from turnout.registry.database import open_registry
 from turnout.registry.derived_tables import publish
 from turnout.registry.generation import load
@@ -175,6 +176,7 @@ def update(
     """
     day_end = np.floor(days([datetime.now(UTC).replace(tzinfo=None) if day is None else day])[0]) + 1.0
     with open_registry(registry_dir) as con:
+        limit_memory(con)
         events = con.execute("select * from events order by event_at_utc, event_id").df()
         groups, newest = _chart_groups(con, settings, as_of, day_end)
         at = days(events["event_at_utc"])

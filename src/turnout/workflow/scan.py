@@ -9,17 +9,19 @@ from functools import lru_cache
 from operator import attrgetter
 from pathlib import Path
 from re import Match, Pattern
+from stat import S_ISREG
 
 from turnout.config import TurnoutConfig
 from turnout.config.filename_pattern import compile_pattern
 from turnout.errors import ReadError
-from turnout.files import sparse_size, special_kind
+from turnout.files import MIN_SPARSE_SIZE, sparse_size, special_kind
 from turnout.records import Unit
 
 NOTE_FILES = ("campaigns.csv", "trains.csv")
 # Suffixes that upload programs give to unfinished files, and names of files for people; both are ignored.
 UNFINISHED_SUFFIXES = (".tmp", ".part", ".partial", ".crdownload", ".filepart")
 IGNORED_NAMES = ("README", "README.txt", "README.md", "Thumbs.db", "desktop.ini")
+READABLE = 0o444  # mode of a file that everybody may read
 
 _name = attrgetter("name")
 
@@ -36,7 +38,7 @@ class RawFolder:
     """
 
     def __init__(self, raw_root: Path, raw: str) -> None:
-        self.root, self.raw = os.path.realpath(raw_root), raw
+        self.root, self.raw, self._below = os.path.realpath(raw_root), raw, f"{raw}/"
         self.files: list[tuple[str, os.DirEntry]] = []
         self.problems: list[ReadError] = []
         top = os.path.join(raw_root, raw)
@@ -66,18 +68,21 @@ class RawFolder:
         except OSError as error:
             self._note_unreadable(inside, "file", error)
             return None
-        if kind := special_kind(status.st_mode):
+        mode, size = status.st_mode, status.st_size
+        if S_ISREG(mode) and mode & READABLE == READABLE and size <= MIN_SPARSE_SIZE:  # nearly every file
+            return self._below + inside, size, status.st_mtime_ns
+        if kind := special_kind(mode):
             self._leave_out(inside, "file", f"is a {kind}", "Put a file there, or remove it", "no_file")
             return None
         if (on_disk := sparse_size(entry.path, status)) >= 0:
-            finding = f"has a size of {status.st_size} bytes, of which {on_disk} are on the disk"
+            finding = f"has a size of {size} bytes, of which {on_disk} are on the disk"
             self._leave_out(inside, "file", finding, "Copy it again from the logger", "claims_too_much")
             return None
         # allowing to read it changes neither size nor time, so until then the file is not part of a unit
-        if status.st_mode & 0o444 != 0o444 and not os.access(entry.path, os.R_OK):
+        if mode & READABLE != READABLE and not os.access(entry.path, os.R_OK):
             self._leave_out(inside, "file", "may not be read", "Allow reading it")
             return None
-        return f"{self.raw}/{inside}", status.st_size, status.st_mtime_ns
+        return self._below + inside, size, status.st_mtime_ns
 
     def _collect(self, folder: str, inside: str, ancestors: tuple[str, ...]) -> None:
         """Collect the files of a folder and below; ``ancestors`` are the real paths of the folders that lead here."""
@@ -98,7 +103,10 @@ class RawFolder:
             ):
                 continue
             try:
-                self._take(entry, inside + name, ancestors)
+                if name.isascii() and entry.is_file(follow_symlinks=False):
+                    self.files.append((inside + name, entry))
+                else:
+                    self._take(entry, inside + name, ancestors)
             except OSError as error:
                 self._note_unreadable(inside + name, "entry", error)
 
@@ -169,7 +177,8 @@ def scan(turnout: TurnoutConfig, raw_root: Path) -> Scan:
     folder = RawFolder(raw_root, turnout.raw)
     for inside, entry in folder.files:
         for kind, expression in names:
-            if match := expression.fullmatch(unicodedata.normalize("NFC", inside)):  # a Mac decomposes umlauts
+            composed = inside if inside.isascii() else unicodedata.normalize("NFC", inside)  # a Mac decomposes umlauts
+            if match := expression.fullmatch(composed):
                 matched.add(kind)
                 if wrong := _time_problem(match):
                     result.problems.append(ReadError(f"{turnout.raw}/{inside}", "file name", *wrong, "name_unknown"))
@@ -234,14 +243,21 @@ def _time_problem(match: Match) -> tuple[str, str] | None:
     >>> _time_problem(re.fullmatch("(?P<campaign>.*)", "2024-13-45"))[0]
     "'2024-13-45' is no day of the calendar"
     """
-    for group, form, quantity in (("campaign", "%Y-%m-%d", "day"), ("time", "%Y%m%dT%H%M%SZ", "time")):
-        text = match[group] if group in match.re.groupindex else None
+    for group, form, quantity in _times_in(match.re):
+        text = match[group]
         if text is not None and not _is_calendar_time(text, form):
             return (
                 f"{text!r} is no {quantity} of the calendar",
                 "Rename it after the day on which it was measured, in UTC",
             )
     return None
+
+
+@lru_cache
+def _times_in(expression: Pattern) -> tuple[tuple[str, str, str], ...]:
+    """Group, form and quantity of each day or time in the names that an expression matches."""
+    times = (("campaign", "%Y-%m-%d", "day"), ("time", "%Y%m%dT%H%M%SZ", "time"))
+    return tuple(time for time in times if time[0] in expression.groupindex)
 
 
 @lru_cache(maxsize=10_000)

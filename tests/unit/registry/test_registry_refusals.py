@@ -9,13 +9,14 @@ import pytest
 from registry_rows import hammer_result, parquet_hashes
 
 from turnout.errors import RegistryError
+from turnout.registry.arrow_types import arrow_schema
 from turnout.registry.batch_stream import chunks
+from turnout.registry.connection import connect
 from turnout.registry.database import open_registry
 from turnout.registry.derived_tables import publish
 from turnout.registry.job import register
 from turnout.registry.registration import Registration
-from turnout.registry.schema import arrow_schema, create_table, tables
-from turnout.registry.staging import connect
+from turnout.registry.schema import create_table, tables
 from turnout.workflow.batches import UnitResult
 
 NAN, INF = math.nan, math.inf

@@ -70,8 +70,8 @@ def test_files_do_not_depend_on_the_number_of_threads(tmp_path, hammer, hashes):
     batch = write_batch(tmp_path / "work", results)
     for threads in (1, 2):
         code = (
-            "from functools import partial; import turnout.registry.staging as s; real = s.connect;"
-            f"import turnout.registry.registration as r; r.connect = partial(real, threads={threads});"
+            "from functools import partial; import turnout.registry.registration as r;"
+            f"r.connect = partial(r.connect, threads={threads}); r.limit_memory = lambda con: None;"
             "from turnout.registry.job import register; from turnout.workflow.batches import read_results;"
             f"register([{str(batch)!r}], {str(tmp_path / str(threads))!r}, read=read_results)"
         )

@@ -18,7 +18,7 @@ from turnout.mismatch.calibrated import ModelAnswer
 from turnout.records import Unit
 from turnout.stages import change_diagnosis, change_units
 from turnout.stages.change_diagnosis import TrainTest, change_unit, finding_of_change
-from turnout.stages.trend import worklist_job
+from turnout.stages.worklist import worklist_job
 from turnout.workflow.batches import read_results
 from turnout.workflow.plan import write_plans
 from turnout.workflow.scan import scan
@@ -235,7 +235,7 @@ def test_the_list_gets_the_newest_diagnoses(tmp_path, monkeypatch):
     row = {"turnout_id": "t1", "sections": "A, B", "found_at_utc": pd.Timestamp("2026-05-01T23:59")}
     row |= {"verdict": "no_decision", "sentence": "no diagnosis: no track file"}
     result = UnitResult("t1/change/A+B", "t1", "change", "k", "v", "ok", {"change_findings": [row]})
-    monkeypatch.setattr("turnout.stages.trend.current_results", lambda work, stage, turnout: [result])
+    monkeypatch.setattr("turnout.stages.worklist.current_results", lambda work, stage, turnout: [result])
     for _ in range(2):
         assert worklist_job(root / "_generation.json", tmp_path / "list.csv", tmp_path) == 1
         with open_registry(root) as connection:

@@ -170,7 +170,8 @@ def test_a_bad_line_hides_no_alarm(configuration, tmp_path, capsys, caplog):
     from benchmarks.trend_fleet import Fleet, modes
     from benchmarks.trend_registry import small_registry
 
-    from turnout.stages.trend import trend_job, worklist_job
+    from turnout.stages.trend import trend_job
+    from turnout.stages.worklist import worklist_job
 
     turnout, _ = place_of(configuration)
     lines = "{0},,,silence,me,2026-01-01,,x\nnowhere,,,acknowledge,me,2026-01-01,,x\n"
@@ -195,7 +196,8 @@ def test_a_silence_ends_on_its_day_though_no_file_has_come(configuration, tmp_pa
     from benchmarks.trend_registry import small_registry
 
     from turnout.registry.database import open_registry
-    from turnout.stages.trend import trend_job, worklist_job
+    from turnout.stages.trend import trend_job
+    from turnout.stages.worklist import worklist_job
 
     turnout, _ = place_of(configuration)
     fleet, which = Fleet(turnouts=1, weeks=120, phi=0.1), np.zeros((1, 8), bool)
