@@ -36,6 +36,7 @@ from turnout.mismatch.calibrated import (
     compare_onsets,
     deviations_from_file,
     estimate_history,
+    track_sds,
 )
 from turnout.mismatch.calibrated.answers import INTOLERABLE, NAMES
 from turnout.mismatch.calibrated.constants import CALIBRATION
@@ -387,12 +388,13 @@ def state_rows(
     events = [*events_of(turnout, parameters), *file_errors(parameters, dip_directions(parameters))]
     history = estimate_history(parameters, visits_used, events)
     belief, n = history.belief, sum(s.n_recordings for s in history.used_steps)
+    sds = track_sds(belief, parameters)
     number = {p.name: k for k, p in enumerate(parameters)}
     key = {k: finding[k] for k in ("finding_id", "turnout_id", "found_at_utc")}
     return [
         {
             **key, "parameter_no": k, "visit": about["visit"], "parameter": p.name, "position_m": p.position,
-            "value": float(belief.mean[number[p.name]]), "sd": float(belief.sd[number[p.name]]),
+            "value": float(belief.mean[number[p.name]]), "sd": float(sds[number[p.name]]),
             "prior_sd": p.sd, "unit": p.unit, "n_visits": len(history.used_steps), "n_recordings": n,
             "code_version": version["code"],
         }

@@ -9,7 +9,7 @@ from turnout.mismatch.calibrated.answers import (
 )
 from turnout.mismatch.calibrated.belief import Belief, Innovation, StateParameter
 from turnout.mismatch.calibrated.change import ChangeEffect, OnsetEvidence, compare_onsets, drift_since
-from turnout.mismatch.calibrated.file_comparison import Deviation, deviations_from_file
+from turnout.mismatch.calibrated.file_comparison import Deviation, deviations_from_file, track_sds
 from turnout.mismatch.calibrated.history import Event, History, estimate_history
 from turnout.mismatch.calibrated.information import GroupInformation, VisitInformation
 
@@ -33,4 +33,5 @@ __all__ = [
     "drift_since",
     "estimate_history",
     "stretch_candidates",
+    "track_sds",
 ]

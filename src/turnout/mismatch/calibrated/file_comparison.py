@@ -67,6 +67,26 @@ def model_error(parameters: Sequence[StateParameter]) -> Event:
     return Event(BEFORE_ALL, {p.name: float(sd) for p, sd in zip(parameters, sds) if sd > 0.0})
 
 
+def track_sds(belief: Belief, parameters: Sequence[StateParameter]) -> np.ndarray:
+    """Standard deviations of the values of the track, of which the belief has those that the model needs.
+
+    Parameters
+    ----------
+    belief : Belief
+        From a history with ``model_error``.
+    parameters : sequence of StateParameter
+        Those of the belief, in its order.
+
+    Returns
+    -------
+    (n_parameter,) array of float
+        With the error of the model, and at most those of the file where there was no event.
+    """
+    file_sds, errors = np.array([p.sd for p in parameters]), model_error_sds(parameters)
+    largest = np.maximum(file_sds, np.sqrt(np.maximum(belief.sd**2 - errors**2, 0.0)))  # events open more than the file
+    return np.minimum(np.hypot(belief.sd, errors), largest)
+
+
 def deviations_from_file(
     belief: Belief,
     parameters: Sequence[StateParameter],
