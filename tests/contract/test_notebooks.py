@@ -41,6 +41,8 @@ def test_passages_lead_to_the_gap_of_the_sleeper(after):
 
 def test_notebooks_hold_no_outputs():
     """They are shown as they are typed; the site and the tests run the same text."""
-    for path in FOLDER.glob("*.ipynb"):
+    notebooks = sorted(FOLDER.glob("*.ipynb"))
+    assert notebooks
+    for path in notebooks:
         for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
             assert not cell.get("outputs") and cell.get("execution_count") is None

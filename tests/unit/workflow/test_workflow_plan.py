@@ -256,8 +256,11 @@ def test_plan_announces_that_the_next_run_will_stop_and_what_to_do(fleet, capsys
 
 def test_a_few_files_may_go(fleet):
     plans(fleet)
+    (plan,) = (fleet / "work/plan").glob("*.json")
+    n_before = plan.read_text().count("hammer/2024-05-13/A_1.uff")
     (fleet / "raw/t1/hammer/2024-05-13/A_1.uff").unlink()
     plans(fleet)
+    assert plan.read_text().count("hammer/2024-05-13/A_1.uff") == n_before - 1
 
 
 def test_a_file_of_a_logger_that_never_stops_holds_the_trains_of_its_day(fleet):

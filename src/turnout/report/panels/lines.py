@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,7 @@ from turnout.report.panels.diagram import STYLE
 from turnout.report.svg import LETTER
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
     from typing import Any
 
 WIDTH, LEFT, RIGHT = 960, 20, 40  # px
@@ -49,6 +50,7 @@ def line_diagrams(turnouts: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]
 
 
 def _drawing(line: str, turnouts: Sequence[Mapping[str, Any]]) -> str:
+    """SVG of one line: its turnouts above the kilometres, those close to each other in lanes."""
     ordered = sorted(turnouts, key=lambda t: (t["km"], t["turnout_id"]))
     low, high = ordered[0]["km"], ordered[-1]["km"]
     margin = 0.03 * (high - low) or 0.5
@@ -64,32 +66,43 @@ def _drawing(line: str, turnouts: Sequence[Mapping[str, Any]]) -> str:
         f'aria-label="Turnouts of {escape(line, quote=True)} by kilometre">'
         f'<path class="rail" d="M{LEFT} {rail}H{WIDTH - RIGHT}"/>'
     ]
+    elements += _kilometres(low, high, px, rail)
+    elements += _names(ordered, px)
+    elements += [_circle(turnout, px(turnout["km"]), rail - LANE * lane) for turnout, lane in zip(ordered, lanes)]
+    return "".join(elements) + "</svg>"
+
+
+def _kilometres(low: float, high: float, px: Callable[[float], float], rail: float) -> Iterator[str]:
+    """Ticks of the line with their kilometres."""
     ticks = linear_ticks(low, high, 8)
     step = ticks[1] - ticks[0] if len(ticks) > 1 else None
     for tick in ticks:
-        x = px(tick)
-        elements.append(
-            f'<path class="frame" d="M{x:.0f} {rail + 3}v5"/>'
-            f'<text class="tick" x="{x:.0f}" y="{rail + 20}" text-anchor="middle">{format_number(tick, step)}</text>'
+        yield (
+            f'<path class="frame" d="M{px(tick):.0f} {rail + 3}v5"/><text class="tick" x="{px(tick):.0f}" '
+            f'y="{rail + 20}" text-anchor="middle">{format_number(tick, step)}</text>'
         )
-    elements.append(f'<text class="label" x="{WIDTH}" y="{rail + 20}" text-anchor="end">km</text>')
-    label_end = -1e9
-    for turnout, lane in zip(ordered, lanes):
+    yield f'<text class="label" x="{WIDTH}" y="{rail + 20}" text-anchor="end">km</text>'
+
+
+def _names(turnouts: Sequence[Mapping[str, Any]], px: Callable[[float], float]) -> Iterator[str]:
+    """Ids above the line, those left out that would lie on the one before."""
+    last_end = -math.inf
+    for turnout in turnouts:
         half = 0.5 * LETTER * len(turnout["turnout_id"])
         x = min(max(px(turnout["km"]), half), WIDTH - half)
-        if x - half > label_end:
-            words = (
-                f'<text class="place" x="{x:.1f}" y="11" text-anchor="middle">{escape(turnout["turnout_id"])}</text>'
-            )
-            elements.append(words)
-            label_end = x + half + 4.0
-        words = escape(f"{turnout['turnout_id']}, km {turnout['km']:.3f}: {turnout['worst']}")
-        elements.append(
-            f'<a href="turnouts/{escape(turnout["turnout_id"], quote=True)}.html">'
-            f'<circle class="{STYLE.get(turnout["worst"], "state-unknown")}" cx="{px(turnout["km"]):.1f}" '
-            f'cy="{rail - LANE * lane}" r="{RADIUS}"><title>{words}</title></circle></a>'
-        )
-    return "".join(elements) + "</svg>"
+        if x - half > last_end:
+            yield f'<text class="place" x="{x:.1f}" y="11" text-anchor="middle">{escape(turnout["turnout_id"])}</text>'
+            last_end = x + half + 4.0
+
+
+def _circle(turnout: Mapping[str, Any], x: float, y: float) -> str:
+    """A turnout as a circle with its state, a link to its page."""
+    words = escape(f"{turnout['turnout_id']}, km {turnout['km']:.3f}: {turnout['worst']}")
+    return (
+        f'<a href="turnouts/{escape(turnout["turnout_id"], quote=True)}.html">'
+        f'<circle class="{STYLE.get(turnout["worst"], "state-unknown")}" cx="{x:.1f}" '
+        f'cy="{y}" r="{RADIUS}"><title>{words}</title></circle></a>'
+    )
 
 
 def _lanes(positions: Sequence[float]) -> list[int]:

@@ -10,15 +10,15 @@ import numpy as np
 
 from turnout.constants import Z95
 from turnout.report.axis import Axis
-from turnout.report.svg import LEFT, LINE, Chart
+from turnout.report.svg import LEFT, LETTER, LINE, Chart
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from typing import Any
 
 WIDTH = 952
-# Light to dark, distinct in print and for colour-blind readers.
 LEGEND = "○ others held fixed, 95 %, magenta: random models"
+# Light to dark, distinct in print and for colour-blind readers.
 COLOURS = ("#c6dbef", "#6baed6", "#2171b5", "#08306b", "#fdd0a2", "#fd8d3c", "#d94801", "#7f2704")
 
 
@@ -62,7 +62,7 @@ def train_bars(factor: str, rows: Sequence[Mapping[str, Any]], sections: Sequenc
             len(sections_shown) + 0.5,
             f"section ({n} passages at {sections_shown[0]['label']})",
             "names",
-            _labels(sections_shown),
+            tuple(s["label"] for s in sections_shown),
         ),
         Axis(min(0.0, max(min(ends), -60.0)) - 2.0, max(ends) * 1.08 + 2.0, f"{rows[0]['score']} [%]"),
         title,
@@ -81,10 +81,6 @@ def train_bars(factor: str, rows: Sequence[Mapping[str, Any]], sections: Sequenc
 def _undrawn(n: int) -> str:
     """Number of classes that are not drawn, in words."""
     return f"; {n} class{'es' * (n > 1)} with fewer passages {'are' if n > 1 else 'is'} not drawn" if n else ""
-
-
-def _labels(sections: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
-    return tuple(s["label"] for s in sections)
 
 
 def _low(row: Mapping[str, Any]) -> float:
@@ -125,4 +121,4 @@ def _key(chart: Chart, names: Sequence[str]) -> None:
     for colour, name in zip(COLOURS, names):
         chart.outside.append(f'<rect x="{x:.0f}" y="{y}" width="10" height="10" fill="{colour}" stroke="#65727f"/>')
         chart.outside.append(f'<text x="{x + 14:.0f}" y="{y + 9}">{escape(name)}</text>')
-        x += 30 + 6.2 * len(name)
+        x += 30 + LETTER * len(name)
