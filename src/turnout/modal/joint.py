@@ -18,6 +18,7 @@ from turnout.modal.selection import Selection, select_modes
 from turnout.modal.state_space import assemble, no_decays, no_model
 from turnout.modal.summary import ImpactEstimates, cramer_rao_bound
 from turnout.modal.systematic_error import own_estimates, systematic_error
+from turnout.modal.unresolved_pole import unresolved_pole_error
 from turnout.records import ModalModel, Rejection
 
 if TYPE_CHECKING:
@@ -312,7 +313,10 @@ def _estimates(
         bound = cramer_rao_bound(fit.theta, white, rate, fit.sigma2, columns)
     error = np.sqrt(np.einsum("ijj->ij", fit.covariance)).reshape(fit.unshrunken.shape)
     strength = np.linalg.norm(records, axis=1)
-    systematic = systematic_error(own_estimates(fit, rate), selection.rival_modes, settings.spread_maximum)
+    systematic = np.hypot(
+        systematic_error(own_estimates(fit, rate), selection.rival_modes, settings.spread_maximum),
+        unresolved_pole_error(fit, columns, rate),
+    )
     return [
         ImpactEstimates(
             band,

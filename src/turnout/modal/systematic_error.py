@@ -65,17 +65,49 @@ def common_error(fit: MixedFit, rate: float) -> np.ndarray:
     White 1982, Maximum likelihood estimation of misspecified models: covariance from the residuals, not the model.
     """
     residual = fit.linearisation.residual
-    n = residual.shape[1]
-    line = np.fft.rfftfreq(n, 1.0 / rate)
-    single = np.mean(np.abs(np.fft.rfft(residual, axis=1)) ** 2, axis=0)
-    excess = np.abs(np.fft.rfft(common_residual(fit))) ** 2 - single
-    frequency = np.exp(fit.mean[:, 0])
-    # at least one line on each side
-    half = HALF_WIDTHS * np.maximum(fit.mean[:, 1], MIN_DAMPING) * frequency + rate / n
-    near = np.abs(line - frequency[:, None]) <= half[:, None]
-    # a pole above the Nyquist frequency has no line
-    ratio = near @ excess / np.maximum(near.sum(axis=1), 1) / (n * fit.sigma2)
+    excess = np.abs(np.fft.rfft(common_residual(fit))) ** 2 - _single_power(residual)
+    ratio = _mean_near(excess, fit, rate) / (residual.shape[1] * fit.sigma2)
     return shared_bound(fit.linearisation, fit.sigma2) * np.sqrt(np.maximum(ratio, 0.0))[:, None]
+
+
+def noise_near(fit: MixedFit, rate: float) -> np.ndarray:
+    """Variance of white noise as strong as the noise of single impacts near each mode.
+
+    The residuals without their combination that all impacts share; of one impact they are all there is.
+
+    Parameters
+    ----------
+    fit : MixedFit
+        Fit of whitened decays.
+    rate : float
+        Sampling rate. [Hz]
+
+    Returns
+    -------
+    (n_mode,) array of float
+        Mean power density within two half-widths of the mode, over that of white noise of unit variance.
+    """
+    residual = fit.linearisation.residual
+    n_decay, n = residual.shape
+    power = _single_power(residual)
+    if n_decay > 1:
+        power = (n_decay * power - np.abs(np.fft.rfft(common_residual(fit))) ** 2) / (n_decay - 1)
+    return _mean_near(power, fit, rate) / n
+
+
+def _single_power(residual: np.ndarray) -> np.ndarray:
+    """Power of each line, mean over the impacts."""
+    return np.mean(np.abs(np.fft.rfft(residual, axis=1)) ** 2, axis=0)
+
+
+def _mean_near(power: np.ndarray, fit: MixedFit, rate: float) -> np.ndarray:
+    """(n_mode,) mean of the lines within ``HALF_WIDTHS`` of each mode, at least one line on each side."""
+    n = fit.linearisation.residual.shape[1]
+    frequency = np.exp(fit.mean[:, 0])
+    half = HALF_WIDTHS * np.maximum(fit.mean[:, 1], MIN_DAMPING) * frequency + rate / n
+    near = np.abs(np.fft.rfftfreq(n, 1.0 / rate) - frequency[:, None]) <= half[:, None]
+    # a pole above the Nyquist frequency has no line
+    return near @ power / np.maximum(near.sum(axis=1), 1)
 
 
 @dataclass(frozen=True)

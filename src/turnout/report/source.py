@@ -51,6 +51,10 @@ ROWS = {
         )
         where status = 'rejected' and coalesce(method, 'joint') = 'joint' and measured_at_utc < newest_utc
         order by section_id, measured_at_utc desc, model_id""",
+    "off_track": f"""
+        select turnout_id, section_id, band, measured_at_utc, frequency_hz, frequency_track_hz, damping_ratio,
+            damping_track, residue_ratio, n_history
+        from modes_off_track where {ID_GIVEN} order by section_id, measured_at_utc desc, band""",
     "receptances": f"select * from receptances_current where {ID_GIVEN} {NEWEST_MODEL}",
     "impacts": f"""
         select i.turnout_id, i.section_id, i.test, i.record, i.status, i.reason, i.detail, i.peak_n

@@ -115,3 +115,17 @@ def test_the_page_of_a_section_without_history_shows_the_interval_of_the_campaig
     text = page_of(bench, tmp_path)
     assert f"{np.exp(log_f[0]):.2f} Hz ± {t.ppf(0.975, 29) * 0.7:.2g} (95 %)" in text
     assert " steps)" not in text
+
+
+def test_the_page_names_a_mode_that_leaves_the_track_of_its_section(bench, tmp_path):
+    """A pole of a third of the damping, 15 % higher; the campaigns before and after it are not named."""
+    results, log_f, _ = campaigns("A1", np.random.default_rng(10), frequency_se_hz=0.3, damping_se=0.002)
+    odd = results[9].tables["modes"][0]
+    odd |= {"frequency_hz": 1.15 * odd["frequency_hz"], "damping_ratio": 0.03}
+    bench.register(*results[:12], tables=SECTION)
+    text = page_of(bench, tmp_path)
+    day = (date(2024, 1, 10) + timedelta(days=40 * 9)).isoformat()
+    words = (
+        f"another mode or a sudden change: {day} ballast {1.15 * np.exp(log_f[9]):.1f} Hz, damping 0.0300 (median of"
+    )
+    assert words in text and "9 campaigns before" in text

@@ -51,9 +51,9 @@ where coalesce(m.method, 'joint') = 'joint';
 -- source | varchar | | what it was identified from
 -- run_id | varchar | | content id of the batch
 -- frequency_repeatability_hz | double | Hz | part of frequency_se_hz from the scatter of the impacts of the campaign
--- frequency_systematic_hz | double | Hz | part of frequency_se_hz from what the modes leave of all impacts alike, and from the choice among explanations
+-- frequency_systematic_hz | double | Hz | part of frequency_se_hz from what the modes leave of all impacts alike, the choice among explanations, and a second pole that is not resolved
 -- damping_repeatability | double | | part of damping_se from the scatter of the impacts of the campaign
--- damping_systematic | double | | part of damping_se from what the modes leave of all impacts alike, and from the choice among explanations
+-- damping_systematic | double | | part of damping_se from what the modes leave of all impacts alike, the choice among explanations, and a second pole that is not resolved
 -- stiffness_mn_m | double | MN/m | dynamic stiffness at the resonance; empty where the line fails the gate, and behind an exponential window
 -- stiffness_low_mn_m | double | MN/m | lower 95 % limit of stiffness_mn_m
 -- stiffness_high_mn_m | double | MN/m | upper 95 % limit of stiffness_mn_m; empty where there is none

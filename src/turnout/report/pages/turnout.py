@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from jinja2 import Template
 
 BANDS = ("ballast", "railpad")
-MAX_UNUSED_SHOWN = 5  # earlier unused tests that are listed per section
+MAX_UNUSED_SHOWN = 5  # earlier unused tests, and modes off their track, that are listed per section
 TRACKS = {"main": "main track", "diverging": "diverging track", "both": "both tracks"}
 PANELS = {
     "OT": "open track",
@@ -180,6 +180,7 @@ def _section(
         "panels": _panels(rows, section, model, receptance, modes) if model and receptance else "",
         "detail": model["detail"] if model else "",
         "unused": unused,
+        "off_track": _off_track(_rows_of(rows, "off_track", section)),
     }
 
 
@@ -217,6 +218,22 @@ def _unused_tests(tests: Sequence[Mapping[str, Any]]) -> str:
     entries = [f"{day(t['measured_at_utc'])} ({_reason(t)})" for t in tests[:MAX_UNUSED_SHOWN]]
     more = len(tests) - MAX_UNUSED_SHOWN
     return ", ".join(entries) + (f" and {more} before" if more > 0 else "")
+
+
+def _off_track(modes: Sequence[Mapping[str, Any]]) -> str:
+    """Modes that do not continue the track of their section, the newest first: another mode, or a sudden change."""
+    entries = [
+        f"{day(m['measured_at_utc'])} {m['band']} {m['frequency_hz']:.1f} Hz, damping {m['damping_ratio']:.4f} "
+        f"(median of {count_of(m['n_history'], 'campaign')} before: {m['frequency_track_hz']:.1f} Hz, "
+        f"{m['damping_track']:.4f}{_residue_words(m['residue_ratio'])})"
+        for m in modes[:MAX_UNUSED_SHOWN]
+    ]
+    more = len(modes) - MAX_UNUSED_SHOWN
+    return "; ".join(entries) + (f" and {more} before" if more > 0 else "")
+
+
+def _residue_words(ratio: float | None) -> str:
+    return "" if ratio is None else f"; {ratio:.2g} times their c1² + c2²"
 
 
 def _reason(test: Mapping[str, Any]) -> str:
