@@ -51,8 +51,8 @@ def second_order_term(fit: MixedFit, columns: np.ndarray, rate: float) -> tuple[
     n = residual.shape[1]
     wave = powers(np.exp(pole / rate), n)
     scaled_time = -pole.real[:, None] * np.arange(n) / rate
-    known = np.vstack([wave, scaled_time * wave])
-    basis = np.linalg.qr(np.vstack([known.real, known.imag, columns]).T)[0]
+    linear_terms = np.vstack([wave, scaled_time * wave])
+    basis = np.linalg.qr(np.vstack([linear_terms.real, linear_terms.imag, columns]).T)[0]
     second = scaled_time**2 * wave
     second = np.stack([second.real, second.imag], axis=1)  # (n_mode, 2, n)
     second = second - (second @ basis) @ basis.T
