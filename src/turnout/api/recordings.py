@@ -157,7 +157,7 @@ def _channel_by_unit(name: str, index: int, unit: str, file: Path) -> RawChannel
         quantity = ""
     if quantity in SI:
         return RawChannel(name, index, quantity)
-    statement = f"its unit {unit!r} does not tell its quantity" if unit else "the file states no unit"
+    statement = f"its unit {unit!r} does not state its quantity" if unit else "the file states no unit"
     raise ReadError(
         file, f"channel {name!r}", statement, f"Describe it: channels={{{name!r}: {EXAMPLE}}}", "unit_unknown"
     )

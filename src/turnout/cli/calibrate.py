@@ -97,7 +97,7 @@ def _track_entry(section: str, values: Mapping[str, float], sd: Mapping[str, flo
     elif values:
         head = f"# section {section}: paste into its entry in the track file"
     else:
-        head = f"# section {section}: nothing to paste, the tests tell none of its values"
+        head = f"# section {section}: nothing to paste, the tests determine none of its values"
     mark, source = ("# ", "guess: fit that misses its test") if missed else ("", "estimate: fitted")
     lines = ["", f"  {head}"]
     for name, value in values.items():

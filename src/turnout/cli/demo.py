@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     cores = args.cores or os.cpu_count() or 1
     print("1. Raw files of the demonstration fleet", flush=True)
     n = make_fleet("raw", "truth", seed=args.seed, n_campaign=args.campaigns, n_passage=args.passages, workers=cores)
-    print(f"   {n} files below raw/. What is true of them lies below truth/, which the pipeline does not read.")
+    print(f"   {n} files below raw/. What is true of them lies below truth/, which the workflow does not read.")
     if args.passages:
         write_clusters("raw")
     if args.only_raw:

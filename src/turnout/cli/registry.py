@@ -63,7 +63,7 @@ def _check(args: argparse.Namespace) -> int:
     from turnout.registry.integrity import check
 
     problems = check(_registry_folder(args), hashes=not args.quick)
-    print("\n".join(problems) or "The registry holds what its list says.")
+    print("\n".join(problems) or "The files of the registry agree with its list.")
     return 1 if problems else 0
 
 

@@ -1,4 +1,4 @@
 """The demonstration fleet: three turnouts over three years, with seasons, maintenance, faults and one true drift.
 
-Raw files go to ``raw/``, the truth to ``truth/``, which the pipeline does not read.
+Raw files go to ``raw/``, the truth to ``truth/``, which the workflow does not read.
 """

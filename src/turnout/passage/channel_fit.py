@@ -27,6 +27,10 @@ PEAK_ONLY = "peak_only"  # not scored: by configuration, or without a model of t
 LEAD_TIME = 0.25  # s before the first wheel, in which the band-pass settles
 
 
+MIN_QUIET_TIME = 0.1  # s without a train, from which the noise is estimated
+FILTER_SETTLING_TIME = 0.02  # s, over which the band filter starts from zero
+
+
 @dataclass(frozen=True)
 class ChannelFit:
     """Fit of one model at one sensor.
@@ -138,13 +142,8 @@ def fit_channel(
         for name, m in (other_models or {}).items()
     }
     joint = joint_fit(data, times.times, basis)
-    noise = (
-        float(np.std(apply_filter(quiet, band_filter)[int(0.02 * rate) :])) if quiet.size > 0.1 * rate else float("nan")
-    )
-    band_ratio = np.sqrt(
-        2.0 * (min(settings.band_high, rate / 2) - settings.band_low) / rate
-    )  # of white noise in the band
-    noise = max(noise, min_noise * band_ratio)
+    band_ratio = np.sqrt(2.0 * (min(settings.band_high, rate / 2) - settings.band_low) / rate)  # of white noise
+    noise = _band_noise(quiet, rate, band_filter, min_noise * band_ratio)
     status, detail = _judge(scores, null, test, settings)
     return ChannelFit(
         status,
@@ -165,6 +164,13 @@ def fit_channel(
         joint.prediction,
         start,
     )
+
+
+def _band_noise(quiet: np.ndarray, rate: float, band_filter: np.ndarray, least: float) -> float:
+    """Standard deviation of the samples without a train in the band, ``least`` or more; nan if they are too few."""
+    if quiet.size <= MIN_QUIET_TIME * rate:
+        return float("nan")
+    return max(float(np.std(apply_filter(quiet, band_filter)[int(FILTER_SETTLING_TIME * rate) :])), least)
 
 
 def _windows(data: np.ndarray, rate: float, begins: np.ndarray, length: float) -> np.ndarray:

@@ -233,7 +233,7 @@ def _gate_lines(rows: Mapping[str, Sequence[Mapping[str, Any]]], settings: Mappi
     )
     compared = "that limit" if row["gate"] == "limit" else "the coherence itself"
     lines = [
-        _line("coherence", f"{limit_words}the gate wants {compared} at {receptance_settings.gate_level:g} or more")
+        _line("coherence", f"{limit_words}the gate needs {compared} at {receptance_settings.gate_level:g} or more")
     ]
     frequency, passed = np.asarray(row["frequency_hz"]), np.asarray(row["passed"], dtype=bool)
     shares = []

@@ -71,7 +71,7 @@ def planned_matrix(
     extended = {name: (EFFORT_HOURS[name], _matrix(p, effects)) for name, p in _additions(plan, sensors, temperatures)}
     name, resolved, _ = cheapest_addition(matrix, extended)
     if not resolved:
-        return matrix, "No single addition tells more pairs apart."
+        return matrix, "No single addition distinguishes more pairs."
     return matrix, f"Most would be added by {name}: {resolved} more pairs distinguished."
 
 

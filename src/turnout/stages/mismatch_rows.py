@@ -62,7 +62,7 @@ def sentence(diagnosis: Diagnosis) -> str:
     for term, term_verdict in zip(diagnosis.fit.terms, diagnosis.verdicts):
         sentences.append(f"What the model left out: {term.sentence()}.")
         if term_verdict.answer == "a_or_b":
-            sentences.append(f"Or {term_verdict.names[1].replace('_', ' ')}: these recordings cannot tell them apart.")
+            sentences.append(f"Or {term_verdict.names[1].replace('_', ' ')}: these recordings cannot distinguish them.")
     return " ".join(
         [*sentences, f"But {verdict.reason}."] if verdict.answer == "named" and verdict.reason else sentences
     )

@@ -30,7 +30,7 @@ from turnout.units import IGNORED
 NO_MODEL = "none"  # in the place of a model's id: the section has no model
 # Largest time between the file's name and its content; names in local time differ by less.
 MAX_NAME_OFFSET = timedelta(days=1)
-TIME_REMEDY = "Nobody can tell which is right. Rename it, or export it again with the right time"
+TIME_REMEDY = "Which is right is not known. Rename it, or export it again with the right time"
 
 
 @dataclass(frozen=True)

@@ -201,8 +201,8 @@ def test_passages_with_different_sensors_are_compared_by_those_they_share():
     ("place", "said"),
     [
         (3.6, "at 3.6 m, between 3.0 and 4.2 m"),
-        (0.6, "before 2.4 m, how far cannot be told"),
-        (9.0, "beyond 8.1 m, how far cannot be told"),
+        (0.6, "before 2.4 m, the distance is not known"),
+        (9.0, "beyond 8.1 m, the distance is not known"),
     ],
 )
 def test_a_place_beyond_what_was_measured_is_not_said_to_a_metre(place, said):

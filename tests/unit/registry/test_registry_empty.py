@@ -120,7 +120,7 @@ def test_a_wrong_query_is_one_message_and_exit_code_2(empty, capsys):
 
 def test_the_registry_command_looks_after_it(empty, capsys):
     for action, said in [
-        ("check", "The registry holds what its list says."),
+        ("check", "The files of the registry agree with its list."),
         ("compact", "Nothing to do."),
         ("vacuum", "Nothing to delete."),
         ("relocate", "views over"),

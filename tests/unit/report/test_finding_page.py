@@ -170,7 +170,7 @@ def test_of_two_effects_each_says_how_sure_it_is_and_what_else_it_may_be():
     }  # fmt: skip
     said = headline(row)
     assert "at 8.4 m is 0.3 times as stiff" in said
-    torn = "above its ballast, or what was left out is “local ballast”: these recordings cannot tell the two apart."
+    torn = "above its ballast, or what was left out is “local ballast”: these recordings cannot distinguish the two."
     assert said.endswith(torn)
     sure = dict(facts(row))["How sure"]
     assert sure.startswith("probability 0.80") and "local pad 0.97, hanging sleeper 0.80" in sure
@@ -193,7 +193,7 @@ def test_axes_carry_their_units():
 
 def test_one_of_two_says_which_measurement_would_tell():
     row = ROWS["a_or_b"] | {"next_measurement": "Measure passages of a lighter and a heavier train"}
-    assert "or what was left out is “local ballast”: these recordings cannot tell the two apart" in headline(row)
+    assert "or what was left out is “local ballast”: these recordings cannot distinguish the two" in headline(row)
     assert check(row) == "Measure passages of a lighter and a heavier train."
 
 

@@ -10,7 +10,7 @@ class FleetSettings:
     """Shards, checkpoints and the limits beyond which a run is called a failure."""
 
     shards: int = setting(
-        1, why="one job per stage up to some fifty turnouts; a network of thousands wants 64", minimum=1, maximum=4096
+        1, why="one job per stage up to some fifty turnouts; a network of thousands needs 64", minimum=1, maximum=4096
     )
     checkpoint_units: int = setting(
         200, why="results are stored after this many units, so that an interruption loses only minutes", minimum=1
@@ -19,7 +19,7 @@ class FleetSettings:
     vanished_share: float = setting(
         0.2, why="the run stops if a larger share of the known files is missing", minimum=0.0, maximum=1.0
     )
-    vanished_files: int = setting(10, why="this number of files may vanish whatever their share", minimum=0)
+    vanished_files: int = setting(10, why="this number of files may vanish at any share", minimum=0)
     quarantine_share: float = setting(
         0.2, why="the run fails if a larger share of new recordings is in quarantine", minimum=0.0, maximum=1.0
     )

@@ -32,7 +32,7 @@ class ReceptanceSettings:
         2e-4, "s", "the decay starts this long after the last contact: 4 samples at 20 kHz", minimum=0.0, maximum=0.01
     )
     separation: float = setting(
-        0.3, "s", "contacts closer than this belong to one impact; nobody can repeat an impact faster",
+        0.3, "s", "contacts closer than this belong to one impact; a person cannot repeat an impact faster",
         minimum=0.06, maximum=5.0,
     )  # fmt: skip
     pre_trigger: float = setting(

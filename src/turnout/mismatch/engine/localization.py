@@ -188,7 +188,7 @@ class Location:
         if self.place is not None and not self.measured_range[0] <= self.place <= self.measured_range[1]:
             before = self.place < self.measured_range[0]
             end = self.measured_range[0] if before else self.measured_range[1]
-            return f"{'before' if before else 'beyond'} {end:.1f} m, how far cannot be told"
+            return f"{'before' if before else 'beyond'} {end:.1f} m, the distance is not known"
         if self.place is not None:
             return f"at {self.place:.1f} m, between {self.low:.1f} and {self.high:.1f} m"
         if self.axle is not None:
@@ -198,7 +198,7 @@ class Location:
         if self.frame == "sensor":
             return f"in channel {self.sensor}"
         if self.frame == "clock":
-            return f"in recording {self.level}, whatever the wheels do"
+            return f"in recording {self.level}, in any state of the wheels"
         return {"frequency": "along the whole track", "condition": f"in the tests of {self.level}"}.get(
             self.frame, f"locked to {self.frame} {self.level}"
         )

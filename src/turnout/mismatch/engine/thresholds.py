@@ -111,7 +111,10 @@ class Thresholds:
         PAIRS,
     )  # fmt: skip
     loss_errors: float = threshold(
-        2.0, "standard errors", "a loss of fit within these says nothing; one in six wrong names reaches one", GUIDE
+        2.0,
+        "standard errors",
+        "a loss of fit within these carries no information; one in six wrong names reaches one",
+        GUIDE,
     )
     max_reserved_steps: int = threshold(8, "steps", "of the nuisances that a reserved recording owns", "numerical")
     min_cost_decrease: float = threshold(
@@ -149,7 +152,7 @@ class Thresholds:
         "from the third candidate on, those that promise less are not fitted",
         PARTS,
     )
-    n_always_refitted: int = threshold(2, "candidates", "are refitted whatever the others promise", PARTS)
+    n_always_refitted: int = threshold(2, "candidates", "are refitted in any case", PARTS)
     n_families_with_sites: int = threshold(3, "families", "of which the second best sites are refitted", PRESCREEN)
     uninformed_sd_share: float = threshold(
         0.999, "share of the prior standard deviation", "if more remains, the data say nothing", ALWAYS
@@ -191,7 +194,7 @@ class Thresholds:
     )
 
     # Joint fit
-    n_steps: int = threshold(6, "steps", "of a joint fit, unless its caller says more", "numerical")
+    n_steps: int = threshold(6, "steps", "of a joint fit, unless its caller sets more", "numerical")
     max_cheap_steps: int = threshold(60, "steps", "of a fit to cheap observations alone: some valleys are long", FITS)
     min_gain: float = threshold(0.05, "nats", "a smaller gain ends the iteration", "numerical")
     least_gain: float = threshold(
@@ -257,7 +260,7 @@ class Thresholds:
     max_noise_factor: float = threshold(100.0, "-", "noise over that of intact recordings, largest", LOCATED)
     n_noise_factors: int = threshold(25, "-", "values up to it", "numerical")
     min_hammer_evidence: float = threshold(
-        6.0, "nats", "that impacts must add before a channel is blamed: its fault shows in impacts, too", LOCATED
+        6.0, "nats", "that impacts must add before a fault of a channel is named: it shows in impacts, too", LOCATED
     )
     position_margin: float = threshold(
         6.0,
