@@ -103,9 +103,11 @@ class RegistryError(TurnoutError):
     """The registry rejects rows or cannot be used; the message names table, row, column and value."""
 
 
-# errno codes that damaged data may cause (a seek to an impossible byte, a name that is no file), whatever the machine.
+# errno codes that damaged data or a name may cause (a seek to an impossible byte, a name that is no file, a link that
+# leads back to itself), whatever the machine.
 # Every other one is a fault of the machine. It concerns the file at which it occurred: the next run tries it again.
-DATA_ERRNOS = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EINVAL, errno.EOVERFLOW}
+NAME_ERRNOS = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG}
+DATA_ERRNOS = NAME_ERRNOS | {errno.EINVAL, errno.EOVERFLOW}
 
 
 def is_infrastructure(error: BaseException) -> bool:
@@ -126,8 +128,8 @@ def is_infrastructure(error: BaseException) -> bool:
 
     Examples
     --------
-    >>> [is_infrastructure(OSError(code, "")) for code in (errno.EIO, errno.EUCLEAN, errno.ENXIO, errno.EINVAL)]
-    [True, True, True, False]
+    >>> [is_infrastructure(OSError(code, "")) for code in (errno.EIO, errno.EUCLEAN, errno.EINVAL, errno.ELOOP)]
+    [True, True, False, False]
     """
     if isinstance(error, OSError):
         return error.errno is not None and error.errno not in DATA_ERRNOS
