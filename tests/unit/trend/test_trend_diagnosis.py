@@ -118,3 +118,30 @@ def test_another_component_direction_or_position_is_no_decision(settings, rows, 
     assert diagnosis.endswith("soft ballast at 21.6 m")
     assert diagnosis == "soft ballast at 21.6 m" if expected is None else expected in diagnosis
     assert diagnosis.startswith("no decision: ") == (expected is not None)
+
+
+def amplitude_row(rows, settings, **tables):
+    """Diagnosis and advice of an alarm of trains at S4, whose peak accelerations rise as its resonances fell."""
+    peaks = rows.assign(
+        band="amplitude", source="passage", frequency_hz=rows["frequency_hz"].max() ** 2 / rows["frequency_hz"]
+    )
+    with viewed(peaks, settings, **tables) as con:
+        query = """
+            select state, direction, diagnosis, look_at from worklist
+            where section_id = ? and raised_at_utc is not null"""
+        ((state, direction, diagnosis, look_at),) = con.execute(query, [SECTION]).fetchall()
+    assert (state, direction) == ("inspect this week", "up")
+    return diagnosis, look_at
+
+
+@pytest.mark.parametrize(
+    ("weeks_ago", "verdict", "is_surface"), [(0, "none", True), (0, "named", False), (110, "none", False)],
+    ids=["support unchanged", "support changed", "before the change"],
+)  # fmt: skip
+def test_an_alarm_of_trains_alone_has_a_reason_and_a_next_step(settings, rows, weeks_ago, verdict, is_surface):
+    sections = pd.DataFrame([{"section_id": SECTION, "turnout_id": "T00001", "label": "S4", "position_m": 36.3}])
+    found_at = rows["measured_at_utc"].max() - pd.Timedelta(weeks=weeks_ago)
+    findings = change(found_at, verdict, sentence="3 tests name no change")
+    diagnosis, look_at = amplitude_row(rows, settings, change_findings=findings, sections=sections)
+    assert ("only trains show it" in diagnosis and "no decision" not in diagnosis) == is_surface
+    assert ("straightedge at 36.3 m: a dipped weld" in look_at) == is_surface

@@ -34,3 +34,16 @@ create or replace macro pad_advice(pct) as (
     case when pct < 0 then 'worn, cracked or displaced pads, loose fastenings'
         else 'pads exchanged or hardened; an exchange that is not in the events' end
 );
+
+-- What to look at where the peak acceleration under trains has changed: hammer tests that find the support unchanged
+-- leave the running surface and the sensor; a fall is more often of the sensor.
+create or replace macro peak_advice(direction, is_support_unchanged, position_m) as (
+    case
+        when not coalesce(is_support_unchanged, false) then
+            'running surface, fastenings and voids; the mounting of the sensor'
+        when direction = 'down' then
+            'the mounting and the calibration of the sensor; grinding or welding that is not in the events'
+        else 'the running surface with a straightedge' || coalesce(printf(' at %.1f m', position_m), '')
+            || ': a dipped weld or joint, a worn nose, corrugation; if it is smooth, the mounting of the sensor'
+    end
+);

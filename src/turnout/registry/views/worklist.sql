@@ -291,7 +291,9 @@ select
             pad_advice(coalesce(h.pad_stiffness_pct, case h.direction when 'down' then -1 else 1 end))
         when h.band = 'ballast_damping' then 'wet, fouled or loose ballast; frost; the position of hammer and sensor'
         when h.band = 'railpad_damping' then 'aged or hardened pads, loose fastenings; the position of hammer and sensor'
-        when h.band = 'amplitude' then 'running surface, fastenings and voids; the mounting of the sensor'
+        when h.band = 'amplitude' then
+            peak_advice(h.direction,
+                c.verdict = 'none' and c.found_at_utc >= coalesce(h.since_at_utc, h.raised_at_utc), p.position_m)
         else 'the section'
     end as look_at,
     case
@@ -331,11 +333,10 @@ select
         when c.sentence is not null and c.found_at_utc < coalesce(h.since_at_utc, h.raised_at_utc) then
             'no decision: the diagnosis of ' || coalesce(c.visit, strftime(c.found_at_utc, '%Y-%m-%d'))
             || ' is older than the change'
-        when c.sentence is not null then
-            'no decision: ' || c.sentence || case
-                when h.source = 'passage' then '; the alarm is of trains: what only they show, hammer tests cannot'
-                else ''
-            end
+        when h.band = 'amplitude' and c.verdict = 'none' then
+            'only trains show it, so the running surface or the sensor is the likely cause, not ballast or railpads: '
+            || c.sentence
+        when c.sentence is not null then 'no decision: ' || c.sentence
         when g.finding_id is null then 'no decision: no diagnosis of this section yet (turnout diagnose)'
         when g.found_at_utc < coalesce(h.since_at_utc, h.raised_at_utc) then
             'no decision: the diagnosis of ' || coalesce(g.visit, strftime(g.found_at_utc, '%Y-%m-%d'))
