@@ -155,6 +155,7 @@ REASONS = {
     "channel_unknown": "the file has a channel that the configuration does not name",
     "unit_unknown": "a unit that cannot be converted to the configured one",
     "scale_unknown": "the file states a scale, but not whether its numbers contain it",
+    "entry_unknown": "an entry of the file may state a rate, scale or unit, unexplained; its recordings are used",
     "library_warning": "the library that reads the format warns about the file; its recordings are used",
     "condition_lost": "names, or a condition such as a temperature, are damaged in the file; its recordings are used",
     "not_finite": "NaN or infinity in the samples",

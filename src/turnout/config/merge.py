@@ -179,6 +179,7 @@ def description(values: dict, kind: str, positions: dict[str, float]) -> RawDesc
         n_records=values.get("records"),
         n_samples=values.get("samples"),
         time_zone=values.get("time_zone", "UTC"),
+        checked_entries=tuple(filter(None, map(str.strip, values.get("checked_entries", "").split(";")))),
     )
 
 

@@ -376,6 +376,7 @@ FILES = {
     "records": Key("integer", "records in one file; null: not promised", minimum=1, nullable=True),
     "samples": Key("integer", "samples per record; null: not promised", minimum=1, nullable=True),
     "time_zone": Key("text", "time zone of the file's time stamps, an IANA name"),
+    "checked_entries": Key("text", "entries of the files that state neither rate, scale nor unit; separated by ;"),
 }
 HAMMER = {
     **FILES,

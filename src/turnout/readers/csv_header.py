@@ -21,12 +21,13 @@ from turnout.readers.named_arrays import (
     START_NAMES,
     TIME_NAMES,
 )
+from turnout.readers.other_subjects import STRONG, subject_of
 from turnout.readers.rate_words import is_rate_name, rate_unit
 from turnout.readers.scale_words import is_of_drawing, is_scale_name, scale_meaning, value_of_word
 from turnout.readers.source import COPY_AGAIN, MEANINGLESS_UNITS, Source
 from turnout.readers.stated_quantities import is_quantity_name
 from turnout.readers.stated_units import is_unit_name
-from turnout.readers.statements import Entry, entries_of_text
+from turnout.readers.statements import FREE_TEXT, Entry, entries_of_text
 from turnout.units import conversion
 
 TIME_WORDS = (*TIME_NAMES, "zeit", "tid", "temps", "tempo", "tiempo", "tijd")
@@ -413,7 +414,7 @@ def _entries(lines: Sequence[str], separator: str, names: Sequence[str]) -> Iter
             if name and _is_number(second) and rate_unit(third):
                 pairs = [(name, f"{second} {third}"), *(pair for pair in pairs if pair != (name, second))]
             elif name and rate_unit(second) and _is_number(third):
-                pairs = [(name, f"{third} {second}"), *(pair for pair in pairs if pair != (name, second))]
+                pairs = [(name, f"{third} {second}"), *(p for p in pairs if p not in ((name, second), (second, third)))]
         if len([cell for cell in cells if cell]) > 2 and i + 1 < len(table) and len(table[i + 1]) == len(cells):
             pairs += [(a, b) for a, b in zip(cells, table[i + 1]) if a and _is_number(b)]
         is_drawn = len(cells) == 2 and is_of_drawing(cells[0])  # "Plan;scale 1:500" is about the plan as a whole
@@ -423,8 +424,9 @@ def _entries(lines: Sequence[str], separator: str, names: Sequence[str]) -> Iter
         entries = [Entry(place, name.strip('"# '), value.strip('"')) for name, value in pairs]
         if len(cells) > 2 and (is_unit_name(cells[0]) or is_quantity_name(cells[0])):
             entries = [Entry(place, cells[0], cells[1:])]  # one for each column
-        yield from entries or entries_of_text(text, place)
-        if pairs and not is_drawn and not any(is_rate_name(entry.name) for entry in entries):
+        yield from entries or (*entries_of_text(text, place), Entry(place, FREE_TEXT, text))
+        is_settled = any(is_rate_name(entry.name) or subject_of(entry.name) == STRONG for entry in entries)
+        if pairs and not is_drawn and not is_settled:
             yield from entries_of_text(text, place)
 
 

@@ -17,13 +17,14 @@ from turnout.errors import ReadError
 from turnout.readers import stated_scales
 from turnout.readers.lazy import BlockReader, ChannelStatistics, Column, channel_error
 from turnout.readers.lost_entries import lost_entry_errors
-from turnout.readers.rate_words import is_rate_name, rate_unit
+from turnout.readers.rate_words import CERTAIN, is_rate_name, rate_unit
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
 from turnout.readers.stated_quantities import contradicting_quantity, quantity_entries
 from turnout.readers.stated_units import contradicting_unit, is_meaningless, key_of_units
 from turnout.readers.statements import rate_remark, resolve
 from turnout.readers.time_axes import all_statements, is_axis_name
 from turnout.readers.timing import check_order, is_plausible, start_errors, start_times
+from turnout.readers.unexplained_entries import EntryCheck
 from turnout.records import Channel, LongRecording, RawChannel, RawDescription, Recording
 from turnout.units import IGNORED, conversion, to_si
 
@@ -335,20 +336,24 @@ def convert_records(
     order_errors = check_order(starts, source)
     start_of = dict(starts)
     assignments = Assignments(description.channels, source)
+    entry_check = EntryCheck(description, source)
     for k, record in enumerate(raw.records):
         try:
             if isinstance(record, ReadError):
                 raise record
             if k in order_errors:
                 raise order_errors[k]
+            record = entry_check.without_checked(record)
             limit = max_duration if source.lazy and description.kind == "passage" else None
             start = start_of[k]
             started_at = start if start and is_plausible(start) else None
             recording, channel_errors = _recording(
-                record, k, len(raw.records), started_at, assignments, description, source, limit
+                record, k, len(raw.records), started_at, assignments, entry_check, description, source, limit
             )
             recordings.append(recording)
-            remarked = {error.problem for error in errors if error.reason == "wrong_rate"}  # once for all records
+            remarked = {
+                e.problem for e in errors if e.reason in ("wrong_rate", "entry_unknown")
+            }  # once for all records
             errors.extend(error for error in channel_errors if error.problem not in remarked)
         except ReadError as error:
             errors.append(error)
@@ -521,6 +526,7 @@ def _recording(
     n_record: int,
     started_at: datetime | None,
     assignments: Assignments,
+    entry_check: EntryCheck,
     description: RawDescription,
     source: Source,
     max_duration: float | None,
@@ -558,8 +564,10 @@ def _recording(
         "started_at": started_at,
         "conditions": MappingProxyType(dict(record.conditions)),
     }
-    remark = rate_remark(statements, rate, where, source)
-    channel_errors = [*faults.values(), *([remark] if remark else [])]
+    of_rate = rate_remark(statements, rate, where, source)
+    is_rate_stated = any(s.certainty == CERTAIN and s.intervals for s in statements)
+    of_entries = entry_check.remark(record, rate, n_record, where, is_rate_stated, of_rate.problem if of_rate else "")
+    channel_errors = [*faults.values(), *(remark for remark in (of_rate, of_entries) if remark)]
     if is_long:
         return LongRecording(block_reader.subset(usable), n_sample, **fields), channel_errors
     return Recording(samples=samples if not faults else samples[usable], **fields), channel_errors

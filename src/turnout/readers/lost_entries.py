@@ -108,7 +108,12 @@ def similar_name(name: str) -> str:
     ('rail_temperature', 'start time', '')
     """
     plain = name.strip().lower()
-    if re.sub(r"[ -]", "_", plain) in KNOWN or len(plain) < MIN_NAME_SIZE or len(plain) > MAX_NAME_SIZE:
+    if (
+        re.sub(r"[ -]", "_", plain) in KNOWN
+        or plain in OTHER_LANGUAGES
+        or len(plain) < MIN_NAME_SIZE
+        or len(plain) > MAX_NAME_SIZE
+    ):
         return ""
     return next((KNOWN[known] for known in KNOWN if _is_damaged(plain, known)), "")
 
@@ -129,9 +134,12 @@ def _is_damaged(name: str, known: str) -> bool:
         return False
     is_swap = a[:2] == b[1::-1] and len(b) > 1 and a[2:] == b[2:]
     is_word = (start == 0 or known[start - 1] in WORD_ENDS) and b[1:2] in ("", *WORD_ENDS)
-    return is_swap or (a[1:] == b[1:] and not is_word)
+    is_one_bit = (ord(a[0]) ^ ord(b[0])).bit_count() == 1 if a and b else True
+    return is_swap or (a[1:] == b[1:] and not is_word and (is_one_bit or len(known) > MAX_SHORT))
 
 
+OTHER_LANGUAGES = frozenset(("operatør", "operator", "operatör", "operador", "operatore", "opérator", "operateur"))
+MAX_SHORT = 6  # characters: of names as short as "track" only one changed bit counts
 WORD_ENDS = ("_", " ", "-", ".")
 
 

@@ -54,12 +54,12 @@ class Interval:
         """The interval if the number was rounded."""
         return Interval(self.rate, self.loose_low, self.loose_high, self.loose_low, self.loose_high)
 
-    def divide(self, factor: int) -> "Interval":
+    def divide(self, factor: float) -> "Interval":
         """The interval of a rate divided by a factor.
 
         Parameters
         ----------
-        factor : int
+        factor : float
             Above 0.
 
         Returns

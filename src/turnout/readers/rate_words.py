@@ -73,6 +73,7 @@ CERTAIN_STEPS = {
 }  # fmt: skip
 POSSIBLE_RATES = {"fe", "fc"}  # of French and Italian: also other things
 RATE_WORD = re.compile(r"(?:[a-z]{1,2}|adc|dac|daq|data|daten|frame|tick|line|log)rates?")
+PER_SAMPLE = ("sample", "samples", "point")
 # What is counted per second beside samples: not a rate of sampling.
 NOT_COUNTED = re.compile(
     r"met|mile|foot|feet|inch|zoll|rev|umdreh|tour|gir|vuelt|rad|grad|deg|byt|okt|octet|pack|newt|volt"
@@ -311,7 +312,7 @@ def _meaning(words: list[str]) -> tuple[int, bool | None]:
         return CERTAIN, False
     if joined in CERTAIN_STEPS:
         return CERTAIN, True
-    if "per" in words[1:-1] and words[-1] in ("sample", "samples", "point") and AXIS_UNIT.fullmatch(words[-3]):
+    if "per" in words[1:-1] and words[-1] in PER_SAMPLE and AXIS_UNIT.fullmatch(words[-3]):
         return CERTAIN, True
     if OTHER.search(spaced) or not words:
         return NOT, None
@@ -322,7 +323,8 @@ def _meaning(words: list[str]) -> tuple[int, bool | None]:
     is_rate |= any(word.endswith(("rate", "takt")) and WEAK_SAMPLING.search(word) for word in words)
     is_rate |= is_counted or (len(counted) > 2 and not NOT_COUNTED.search(counted))
     is_step = bool(STEP.search(joined)) or any(word in STEP_TOKENS for word in words)
-    is_step |= "per" in words and len(words) > 2 and words[-1] in ("sample", "samples", "point") and not is_rate
+    is_counted = "per" in words[1:-1] and NOT_COUNTED.search(words[-3]) is not None  # "bytes per sample"
+    is_step |= "per" in words and len(words) > 2 and words[-1] in PER_SAMPLE and not is_rate and not is_counted
     is_sampling = bool(SAMPLING.search(spaced)) or any(SAMPLES.fullmatch(w) and len(w) > 2 for w in words)
     is_timed = any(TIME.match(word) for word in words)
     is_measuring = bool(WEAK_SAMPLING.search(spaced)) and not re.search(r"data|daten", spaced)

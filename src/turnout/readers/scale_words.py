@@ -9,6 +9,7 @@ import unicodedata
 from functools import lru_cache
 from itertools import pairwise
 
+from turnout.readers.other_subjects import STRONG, subject_of
 from turnout.readers.rate_words import rate_unit, words_of
 
 FACTOR_WORDS = frozenset(
@@ -158,16 +159,20 @@ def scale_meaning(name: str) -> str:
     if EXPONENT.fullmatch(word):
         return EXPONENTS
     words = words_of(re.sub(r"[\[(].*?[\])]", "", name))
+    if len(words) > 1 and len(words[-1]) > 1 and (unit := rate_unit(words[-1])) and not unit.is_sampling:
+        return ""  # "ntp_offset_ms"
     if (bracket := re.search(r"[\[(](.*?)[\])]", name)) and rate_unit(bracket[1]):
         return ""
     if "per" in words[1:-1]:
         at = words.index("per", 1)
+        if {words[at - 1], words[at + 1]} & {"sample", "samples", "value", "channel"}:
+            return ""  # "bits per sample"
         is_step = any(STEPS_OF_CONVERTER.fullmatch(w) for w in (words[at - 1], words[at + 1]))
         return POSSIBLY_FACTOR if is_step else ""
     is_correction = any(CORRECTION.match(word) for word in words)
     if any(STRONG_FACTOR.search(word) for word in words):
         return "" if any(OTHER_GAIN.search(word) for word in words) else POSSIBLY_FACTOR
-    if any(OTHER_SCALE.search(word) for word in words) or is_of_drawing(name):
+    if any(OTHER_SCALE.search(word) for word in words) or is_of_drawing(name) or subject_of(name) == STRONG:
         return ""
     if any(word in ("file", "name") for word in words):
         return ""

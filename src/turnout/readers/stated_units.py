@@ -23,7 +23,7 @@ UNIT_WORD = re.compile(
 )
 # Units of other things than the samples of a channel.
 OTHER_UNITS = re.compile(
-    r"time|zeit|temps|tempo|tid|x$|rate|freq|sensitiv|empfind|sensib|speed|length|range|limit|gain"
+    r"time|zeit|temps|tempo|tid|x$|rate|freq|sensitiv|empfind|sensib|speed|length|range|limit|gain|type$|damp"
 )
 # Units of the same channel at another place of its measuring chain.
 CHAIN_WORDS = frozenset("raw sensor input electrical signal native adc hardware transducer description roh".split())
@@ -58,6 +58,23 @@ def is_unit_name(name: str) -> bool:
     words = words_of(name)
     is_named = any(UNIT_WORD.fullmatch(word) for word in words) or "".join(words) == "dimension"
     return is_named and not any(OTHER_UNITS.search(word) for word in words)
+
+
+@lru_cache(maxsize=4096)
+def is_unit_of_other(name: str) -> bool:
+    """Whether a name means the unit of something else than samples: "time unit".
+
+    Parameters
+    ----------
+    name : str
+        Name of an entry of the metadata.
+
+    Returns
+    -------
+    bool
+        False for a name without a word for a unit.
+    """
+    return any(UNIT_WORD.fullmatch(word) for word in words_of(name)) and not is_unit_name(name)
 
 
 @lru_cache(maxsize=4096)

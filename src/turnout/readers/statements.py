@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from turnout.errors import ReadError
+from turnout.readers.other_subjects import STRONG, subject_of
 from turnout.readers.precision import EXACT_PRECISION, NUMBER, Interval, around, readings
 from turnout.readers.rate_words import CERTAIN, NOT, POSSIBLY, RateUnit, name_meaning, rate_unit, reduction_of_name
 from turnout.readers.scale_words import is_of_drawing, scale_meaning, value_of_word
@@ -46,13 +47,18 @@ TIME_SCALES = (1.0, 1e-3, 1e-6, 1e-9, 60.0, 3600.0, 86400.0)
 class Entry:
     """An entry of the metadata: ``value`` (text, number, list, mapping) under ``name``; ``place`` is where it is.
 
-    ``is_defined`` is True if the format defines it: then it is about the samples as they are in the file.
+    ``is_defined`` is True if the format defines it: then it is about the samples as they are in the file. ``is_piece``
+    is True for a part of a free text that is an entry as well.
     """
 
     place: str
     name: str
     value: Any
     is_defined: bool = False
+    is_piece: bool = False
+
+
+FREE_TEXT = "text"  # name of an entry that holds a whole text, beside the entries of its pieces
 
 
 @dataclass(frozen=True)
@@ -231,11 +237,11 @@ def entries_of_text(text: str, place: str) -> Iterator[Entry]:
         ratio = RATIO_PIECE.fullmatch(piece) if len(piece) <= MAX_RATIO_PIECE else None
         if ratio and scale_meaning(ratio[2]):
             subject = f"{ratio[1]} " if is_of_drawing(ratio[1] or "") else ""
-            yield Entry(place, subject + ratio[2].strip(), ratio[3].strip())
+            yield Entry(place, subject + ratio[2].strip(), ratio[3].strip(), is_piece=True)
             continue
         named = NAMED_PIECE.fullmatch(piece)
         if named and (re.search(r"\d", named[2]) or value_of_word(scale_meaning(named[1]), named[2]) is not None):
-            yield Entry(place, named[1].strip(), named[2].strip())
+            yield Entry(place, named[1].strip(), named[2].strip(), is_piece=True)
             continue
         match = re.fullmatch(rf"\s*([^\d]*?)[\s:=,@~≈#]*({NUMBER.pattern})\s*([^\d]*?)[\s.]*", piece)
         if not match or not (match[1] or match[3]):
@@ -243,7 +249,7 @@ def entries_of_text(text: str, place: str) -> Iterator[Entry]:
         words = match[3].split()
         n_unit = next((n for n in (3, 2, 1) if rate_unit(" ".join(words[:n])) and len(words) >= n), 1)
         name = match[1].strip() or " ".join(words[n_unit:]) or "number"
-        yield Entry(place, name, f"{match[2]} {' '.join(words[:n_unit])}".strip())
+        yield Entry(place, name, f"{match[2]} {' '.join(words[:n_unit])}".strip(), is_piece=True)
 
 
 def statements_of(entries: Iterable[Entry], k: int = 0, n: int = 1) -> list[Statement]:
@@ -342,6 +348,8 @@ def reduction_factor(value: Any) -> int:
 def _statements(entry: Entry, value: Any) -> Iterator[Statement]:
     """The statements of one value of an entry."""
     meaning = name_meaning(entry.name)
+    if meaning.certainty != CERTAIN and subject_of(entry.name) == STRONG:
+        return
     text = str(value).strip()
     shown = f"{entry.name}: {text[:40]}"
     number, unit_text = _split(text) if isinstance(value, str) else (value, "")

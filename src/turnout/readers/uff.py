@@ -17,7 +17,7 @@ from turnout.readers.rate_words import rate_unit
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, Source, load, number_or_text
 from turnout.readers.stated_quantities import DEFINED_NAME
 from turnout.readers.stated_scales import entry_statements
-from turnout.readers.statements import Entry, entries_of_text, step_entry
+from turnout.readers.statements import FREE_TEXT, Entry, entries_of_text, step_entry
 from turnout.readers.timing import check_simultaneous, is_unread_uff_time, parse_uff_time
 from turnout.readers.uff_datasets import FileUnits, UffDataset, file_units, read_datasets
 from turnout.units import UNITS, conversion
@@ -296,6 +296,7 @@ def _entries(sets: Sequence[UffDataset]) -> Iterator[Entry]:
         for i, text in enumerate(dataset.ids, 1):
             if i != 3 and text not in ("", "NONE"):
                 yield from entries_of_text(text, f"ID line {i}")
+                yield Entry(f"ID line {i}", FREE_TEXT, text)
 
 
 def _quantities(sets: Sequence[UffDataset], names: Sequence[str]) -> Iterator[Entry]:

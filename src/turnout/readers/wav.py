@@ -21,7 +21,7 @@ from turnout.readers.lazy import LazyMatrix
 from turnout.readers.named_arrays import START_NAMES, UNIT_NAMES, Metadata, channel_names, list_of_texts
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.stated_scales import entry_statements
-from turnout.readers.statements import Entry, entries_of, entries_of_text, rate_entry
+from turnout.readers.statements import FREE_TEXT, Entry, entries_of, entries_of_text, rate_entry
 from turnout.readers.timing import start_fields
 
 UNKNOWN_LENGTH = 0xFFFFFFFF
@@ -197,7 +197,9 @@ def _further_entries(chunks: dict[bytes, bytes]) -> Iterator[Entry]:
     for name, value in re.findall(r"<(\w+)>\s*([^<>]{1,200}?)\s*</\1>", xml):
         yield Entry(f"chunk iXML: {name}", name, value)
     chunk = chunks.get(b"bext", b"")
-    yield from entries_of_text(_field_text(chunk, DESCRIPTION), "chunk bext: description")
+    description = _field_text(chunk, DESCRIPTION)
+    yield from entries_of_text(description, "chunk bext: description")
+    yield Entry("chunk bext: description", FREE_TEXT, description)
     for rate in re.findall(r"\bF=(\d{3,9})\b", chunk[CODING_HISTORY:].decode("ascii", "replace")):
         yield rate_entry("chunk bext: coding history", int(rate))
 
@@ -228,6 +230,7 @@ def _entries(texts: dict[str, str], comment: str) -> Iterator[Entry]:
     for name, text in texts.items():
         if name != "comment" or not notes:
             yield from entries_of_text(text, name)
+            yield Entry(name, FREE_TEXT, text)
 
 
 def _is_json(text: str) -> bool:

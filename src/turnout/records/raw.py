@@ -38,6 +38,7 @@ class RawDescription:
     ``format`` is a key of ``turnout.readers.FORMATS`` or "auto". ``rate`` [Hz], ``n_records`` and
     ``n_samples`` (per record) are None if not stated. ``channels`` become the rows of the recordings, in
     this order. ``time_zone`` is the zone of the file's time stamps (IANA name).
+    ``checked_entries`` are names of entries of the metadata that state neither rate nor scale nor unit of the samples.
     """
 
     channels: tuple[RawChannel, ...]
@@ -47,3 +48,4 @@ class RawDescription:
     n_records: int | None = None
     n_samples: int | None = None
     time_zone: str = "UTC"
+    checked_entries: tuple[str, ...] = ()

@@ -448,8 +448,8 @@ def test_what_may_be_a_rate_or_a_step_is_compared_with_the_layout(format, tmp_pa
 
 
 DURATIONS = (
-    "Contact time [ms]", "Pulse width [ms]", "Rise time [ms]", "Delay [ms]", "Time constant [ms]", "Duration [ms]",
-    "Filter time [ms]", "Jitter [ms]", "Peak time [ms]", "Overlap [ms]", "ts",
+    "Contact time [ms]", "Pulse width [ms]", "Rise time [ms]", "Delay [ms]", "Time constant [ms]",
+    "Duration of the contact [ms]", "Filter time [ms]", "Jitter [ms]", "Peak time [ms]", "Overlap [ms]", "ts",
 )  # fmt: skip
 
 

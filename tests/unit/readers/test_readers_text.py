@@ -188,7 +188,7 @@ HEADS = {
     "an empty row between": "Messung;Gleis 3;Weiche 12\n;;\nZeit;force;acc\n;;\ns;N;m/s²\n",
     "empty units and a comment": "Zeit;force;acc\n;;\nUhr;Hammer;Schwelle 3\n",
     "the time of day above": "Datum;13.05.2024;\nZeit;08:30:12;\nt_rel [s];force;acc\n",
-    "a unit above": "Einheit;g;N\nMessung;Gleis 3;Weiche 12\nZeit;force;acc\ns;N;m/s²\n",
+    "a unit above": "Einheit;N;m/s²\nMessung;Gleis 3;Weiche 12\nZeit;force;acc\ns;N;m/s²\n",
     "a length above": "Messung;Gleis 3;\nLage;12 m;\nZeit;force;acc\n",
     "a unit that says nothing": "Messung;Gleis 3;Weiche 12\nZeit;force;acc\ns;EU;EU\n",
 }

@@ -1,0 +1,302 @@
+"""What a value of the metadata may state about the samples, by its form and the words beside it.
+
+A value is a candidate for a rate, a scale or a unit if its unit is one of frequency, time or amplitude, if it says how
+numbers become others ("x100", "1 V = 10 g", "inverted"), or if it is a bare number that a device may have as a setting.
+Values under a name that speaks of something else (``other_subjects``) and values that other modules compare with the
+layout are none.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import lru_cache
+
+from turnout.readers.other_subjects import NONE, STRONG, SUSPECT, WEAK, subject_of
+from turnout.readers.precision import Interval, readings
+from turnout.readers.rate_words import CERTAIN, NAME_WITH_UNIT, SHORT_UNIT, RateUnit, name_meaning, rate_unit, words_of
+from turnout.readers.scale_words import LEVELS, is_fill_name, is_scale_name, plain_word, scale_meaning
+from turnout.readers.stated_units import is_unit_of_other, known_unit
+from turnout.readers.statements import USUAL_RATES
+from turnout.readers.timing import looks_dated
+from turnout.units import Conversion
+
+RATE, SCALE, UNIT, DURATION = "sampling rate", "scale", "unit", "duration"
+RATE_OR_SCALE, SCALE_OR_OFFSET = "rate, scale or offset", "scale or offset"
+AMPLITUDES = frozenset(("force", "acceleration", "voltage", "count"))
+ORDINATES = AMPLITUDES | {"velocity", "displacement", "strain"}
+MAX_TEXT = 1000  # characters of a text that are searched
+MAX_CODE = 10  # a smaller whole number is a count or a code
+MIN_PER_SECOND = 1000.0  # a name that ends with seconds may mean a number per second from here on: "ndata_sec"
+MIN_LIMIT = 0.01  # a smaller number is no count, limit or size
+EPOCHS = (6.3e8, 2.9e9)  # s since 1970: years 1990 to 2061
+RATES_IN_TEXT = (2000.0, 1e6)  # Hz: round numbers in a text that may be a rate
+MAX_WORDS = 12  # of a text that says what was done to the samples
+MAX_SIZE = 40  # characters of a candidate that are shown
+
+LETTER = r"(?:[^\W\d_]|[°%‰])"
+QUANTITY = re.compile(
+    r"(?<![\d.,^])([+-]?(?:\d+(?:[.,'’\u00a0\u202f]\d+)*|[.,]\d+)(?:[eE][+-]?\d+)?)"
+    rf"(?:[ \u00a0-]?((?!x\d){LETTER}+[²³]?(?:\^?-?\d(?![\d.,]))?(?:/\(?{LETTER}+[²³]?(?:\^?\d)?\)?){{0,3}}))?"
+)
+BARE_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+GROUPED_DIGITS = re.compile(r"\d{1,3} \d{3}\b")
+PIECES = re.compile(r"[;|\n]|,(?!\d)")
+NAMED = re.compile(r"(?:.*[:=]\s*)?([^\W\d][^:=]{0,40}?)\s*[:=]\s*([^:=]+|\d+\s?:\s?\d+)")
+PART_OF_SECOND = re.compile(r"\b1\s?/\s?(\d[\d.,' ]*)\s?(s|sec|ms)\b")  # "1/20000 s"
+RATIO = re.compile(r"(\d+)\s?:\s?(\d+)")
+# How numbers become others: "x100", "10fach", "2.5*x", "1 V = 10 g", "0.3 mV/bit", "Q1.15".
+CONVERSION = re.compile(
+    r"(?:^|(?<=[\s=,;(]))[x×*]\s?(?!1(?![\d.,]))\d|(?<![\d.,])(?!1\s?[x×])\d[\d.,]*\s?(?:[x×](?=$|[\s,;)])|-?fach|-?fold)"
+    r"|\b(?:times|fois|mal|gange)\b|\d\s?\*|\*\s?\d|\b(?:raw|value|counts?|x|lsb|adc)\s?[/*]\s?\d|\by\s?="
+    rf"|\d\s?{LETTER}+\s?=\s?[+-]?[\d.,]+\s?{LETTER}+"
+    r"|(?:/\s?|\bper\s)(?:bit|lsb|count|digit|code|step|adu|div)s?\b|\b(?-i:Q)\d{1,2}(?:\.\d{1,2})?\b",
+    re.IGNORECASE,
+)
+UNIT_IN_TEXT = re.compile(
+    rf"(?:\b(?:in|en|as|i|im)\s+(?:units of\s+)?|[\[(]\s*|[,/|:]\s+)"
+    rf"({LETTER}+[²³]?(?:\^?\d)?(?:/{LETTER}+[²³]?(?:\^?\d)?)?)(?=$|[\s\]),;.|'’])"
+)
+LEVEL_UNIT = re.compile(r"dB", re.IGNORECASE)
+# Units of force and acceleration that a layout cannot state.
+FOREIGN_UNIT = re.compile(
+    r"[kM]?(?:lbf?s?|pounds?|kips?|dyn(?:es?)?|[tT]onf|ozf|pdl)|Gal|gal|gees?|[mµ]Gal|µN|µg|k?gf|ksi|psi|Vrms|Vpk"
+)
+# Units of other things than samples, rates and times.
+HARMLESS_UNIT = re.compile(
+    r"°?[CF]|K|%|‰|ppm|[kmcµu]?m[²³]?|in|ft|kg|t|lb|oz|[mk]?A|Ah|[mk]?W|[kM]?(?:Ohm|Ω)|[pnµu]?F|[mh]?Pa|m?bar|km/[ht]|mph"
+    r"|m/s|rpm|deg|°|rad|[kMG]i?B|bytes?|bits?|Bit|[kMG]?N/mm?|ch|div|dBm|year|y|a|d|h|min|MGT(?:/y)?"
+)
+# Words for what was done to the samples, for what was not, and for what should have been.
+CHANGED = re.compile(
+    r"raw|roh\w{0,6}|brut|unscaled|unskaliert|uncalibrated|unkalibriert|counts?|imperial|customary|invert\w*|invers\w*"
+    r"|revers(?:ed|al)|negat(?:e|ed|ive)|flip(?:ped)?|normali[sz]\w*|normier\w*|amplified|verstarkt|amplifie|attenuated"
+    r"|multipl(?:y|ied|ier)|divided|resampled|decimated|downsampled|integrated|differentiated|binary|voltage|volts|percent"
+)
+INVERTED = re.compile(r"invert\w*|flip\w*|negat\w*|revers\w*|raw")
+DENIED = re.compile(r"no|not|none|nein|non|nej|ingen|off|false|0|normal|without|ohne|sans|uden|never|kein\w*")
+CONVERTED = re.compile(
+    r"scaled|skaliert|calibrated|kalibriert|converted|umgerechnet|physical|physikalisch|si|etalonne|compensated|applied"
+    r"|angewend\w*|applique\w*"
+)
+AFFIRMED = frozenset("yes true ja oui si on 1".split())
+# Letters of units in Russian.
+CYRILLIC = str.maketrans(dict(zip("кНмсгВГцдБ", "kNmsgVHzdB")))
+CYRILLIC_LETTER = re.compile(r"[\u0400-\u04ff]")
+# Names that a format defines and its reader uses: start of the abscissa, state of the scaling.
+STANDARD_NAMES = frozenset(("x0", "wfstartoffset", "niscalingstatus", "startoffset"))
+NO_STATEMENT = frozenset(("", "-", "n/a", "na", "?", "unknown", "nan", "null", "undefined", "not set", "off"))
+DATED = re.compile(r"\d{1,4}[-./]\s?\d{1,2}[-./]\s?\d{1,4}|\d{2}:\d{2}(?::\d{2})?|\d{1,2}[-. ][A-Za-z]{3}[-. ]\d{2,4}")
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """What a value may state: ``statement`` says of what, ``text`` are its words.
+
+    ``is_weak`` is True if only little speaks for it. ``rates`` are the sampling rates that it may mean. ``number`` is
+    the bare number, NaN if it has a unit; ``unit`` the unit if the text is one; ``seconds`` a time. [s]
+    """
+
+    statement: str
+    text: str
+    is_weak: bool = False
+    rates: tuple[Interval, ...] = ()
+    number: float = float("nan")
+    unit: str = ""
+    seconds: float = float("nan")
+
+
+@lru_cache(maxsize=16384)
+def candidates(name: str, group: str, text: str) -> tuple[Candidate, ...]:
+    """What a value may state about the samples, without what its name explains.
+
+    Parameters
+    ----------
+    name, group : str
+        Name of the entry, and that of its group.
+    text : str
+        Its value.
+
+    Returns
+    -------
+    tuple of Candidate
+        Empty for a value that states nothing.
+
+    Examples
+    --------
+    >>> [c.statement for c in candidates("Mode", "", "20 kS/s @ 24 bit")], candidates("Filter", "", "BE 5 kHz")
+    (['sampling rate'], ())
+    """
+    text = " ".join(text[:MAX_TEXT].split())
+    text = text.translate(CYRILLIC) if CYRILLIC_LETTER.search(text) else text
+    subject = STRONG if subject_of(group) == STRONG else subject_of(name)
+    is_standard = plain_word(name) in STANDARD_NAMES or is_scale_name(group)
+    if is_standard or subject == STRONG or text.casefold() in NO_STATEMENT or DATED.match(text) or looks_dated(text):
+        return ()
+    return tuple(_of_value(name, text, subject))
+
+
+def _of_value(name: str, text: str, subject: int) -> Iterator[Candidate]:
+    cells = re.split(r"[;\s]+|,\s?", text)
+    if len(cells) > 1 and all(map(BARE_NUMBER.fullmatch, cells)) and not GROUPED_DIGITS.match(text):
+        for cell in cells:
+            yield from _of_number(name, cell, _unit_of_name(name), subject)
+    elif whole := QUANTITY.fullmatch(text):
+        is_bare = not whole[2]
+        stated = (
+            _of_number(name, whole[1], _unit_of_name(name), subject) if is_bare else _of_quantity(name, whole, subject)
+        )
+        yield from _full_rates(name, stated)
+    else:
+        for piece in map(str.strip, PIECES.split(text)):
+            named = NAMED.fullmatch(piece)
+            if named and STRONG not in (subject_of(named[1]), subject_of(piece[: named.start(2)])):
+                yield from _of_value(named[1], named[2].strip(), subject_of(named[1]))
+            elif piece and not named:
+                yield from _of_text(name, piece, subject)
+
+
+def _full_rates(text: str, stated: Iterator[Candidate]) -> Iterator[Candidate]:
+    """Candidates of a text; a Nyquist frequency is half the sampling rate."""
+    for candidate in stated:
+        is_half = "nyquist" in text.casefold()
+        yield replace(candidate, rates=tuple(i.divide(0.5) for i in candidate.rates)) if is_half else candidate
+
+
+def _of_text(name: str, text: str, subject: int) -> Iterator[Candidate]:
+    """Candidates of a piece of free text under a name."""
+    if units := tuple(_of_unit(text)):
+        if not is_unit_of_other(name) and (subject == NONE or len(text) > 1):
+            yield from units
+        return
+    yield from _of_state(name, text)
+    if subject_of(text) == STRONG:
+        return
+    ratio = RATIO.fullmatch(text)
+    if CONVERSION.search(text) or (ratio and ratio[1] != ratio[2]):
+        yield Candidate(SCALE, text[:MAX_SIZE])
+    for match in PART_OF_SECOND.finditer(text):
+        scale = Fraction(1000 if match[2] == "ms" else 1)
+        yield from _of_rate(match[0], match[1], RateUnit(False, scale), is_weak=False)
+    quantities = (c for match in QUANTITY.finditer(text) for c in _of_quantity(name, match, subject, is_part=True))
+    yield from _full_rates(f"{name} {text}", quantities)
+    for match in UNIT_IN_TEXT.finditer(text):
+        unit = known_unit(match[1])
+        if unit and unit.dimension in AMPLITUDES | {"velocity"}:
+            yield _unit_candidate(match[1], unit)
+
+
+def _of_unit(text: str) -> Iterator[Candidate]:
+    """A candidate of a text that is a unit."""
+    unit = None if re.match(r"[+-]?[.,]?\d", text) else known_unit(text)
+    if unit and unit.dimension in ORDINATES:
+        yield _unit_candidate(text, unit)
+    elif unit is None and FOREIGN_UNIT.fullmatch(text):
+        yield Candidate(UNIT, text, unit=text)
+
+
+def _unit_candidate(text: str, unit: Conversion) -> Candidate:
+    """A unit; one of volts or counts may be that of the sensor's signal."""
+    return Candidate(UNIT, text, unit.dimension in ("voltage", "count"), unit=text)
+
+
+def _unit_of_name(name: str) -> str:
+    """The unit in brackets behind a name, or its last word if that is one."""
+    if match := NAME_WITH_UNIT.match(name.strip()):
+        return match[2]
+    word = re.split(r"[\s_]", name.strip())[-1]
+    return word if word != name.strip() and len(word) > 1 and (rate_unit(word) or known_unit(word)) else ""
+
+
+def _of_number(name: str, number: str, unit: str, subject: int) -> Iterator[Candidate]:
+    """Candidates of a bare number under a name."""
+    if name_meaning(name).certainty == CERTAIN or scale_meaning(name) not in ("", LEVELS) or is_fill_name(name):
+        return  # compared by other modules
+    value = _value(number)
+    quantity = QUANTITY.fullmatch(f"{number} {unit}") if rate_unit(unit) or HARMLESS_UNIT.fullmatch(unit) else None
+    is_counted = unit.casefold() in ("s", "sec") and value >= MIN_PER_SECOND
+    if quantity and not is_counted:
+        yield from _of_quantity(name, quantity, subject)
+        return
+    if value == 1.0 and any(map(INVERTED.fullmatch, words_of(name))):
+        yield Candidate(SCALE, number)
+    if value in (0.0, 1.0) or (subject == WEAK and abs(value) >= MIN_LIMIT):
+        return
+    if re.fullmatch(r"\+?\d+", number) and _is_count(value, name):
+        return
+    yield Candidate(RATE_OR_SCALE, number, True, _rates_of_number(number), value)
+
+
+def _is_count(value: float, name: str) -> bool:
+    """Whether a whole number is a count, a code or a time stamp rather than a setting."""
+    is_epoch = any(EPOCHS[0] <= value / scale <= EPOCHS[1] for scale in (1.0, 1e3, 1e6, 1e9))
+    is_small = value < MAX_CODE
+    return is_epoch or (not SUSPECT.search(" ".join(words_of(name))) if is_small else not _is_round(int(value)))
+
+
+def _is_round(value: int) -> bool:
+    """Whether a whole number is one that people choose as a factor or a rate."""
+    return value % 50 == 0 or value % 64 == 0 or value in (10, 16, 20, 25, 32)
+
+
+def _rates_of_number(number: str) -> tuple[Interval, ...]:
+    """Rates that a number without unit may mean: in Hz and kHz, or a step in s, ms and µs."""
+    units = ((False, 1), (True, 1), (False, 1000), (True, Fraction(1, 1000)), (True, Fraction(1, 10**6)))
+    return tuple(
+        interval
+        for is_step, scale in units
+        for reading in readings(number)
+        if (interval := reading.interval(Fraction(scale), is_step))
+    )
+
+
+def _value(number: str) -> float:
+    printed = readings(number)
+    return float(printed[0].value) if printed else 0.0
+
+
+def _of_state(name: str, text: str) -> Iterator[Candidate]:
+    """What a word says was done to the samples: "raw", "inverted"; or a flag under such a name."""
+    words, names = words_of(text) or (text.casefold(),), words_of(name)
+    is_denied = any(map(DENIED.fullmatch, words))
+    if len(words) == 1 and (is_denied or words[0] in AFFIRMED):
+        pattern = CONVERTED if is_denied else CHANGED
+        is_changed = any(map(pattern.fullmatch, names))
+    else:
+        is_changed = any(map(CHANGED.fullmatch, words)) and not is_denied and len(words) <= MAX_WORDS
+    if is_changed:
+        yield Candidate(SCALE, text[:MAX_SIZE])
+
+
+def _of_quantity(name: str, match: re.Match[str], subject: int, is_part: bool = False) -> Iterator[Candidate]:
+    """Candidates of a number with its unit, in a text or alone."""
+    number, unit, value = match[1], match[2] or "", _value(match[1])
+    if value == 0.0:
+        return
+    stated = RateUnit(False, Fraction(1000)) if unit in ("k", "ks", "kS") else rate_unit(unit) if unit else None
+    if stated is not None:
+        if name_meaning(name).certainty != CERTAIN:  # else it is compared by other modules
+            yield from _of_rate(match[0], number, stated, is_weak=subject == WEAK or len(unit) == 1)
+    elif not unit:
+        is_round = value.is_integer() and (value % 100 == 0 or value % 1024 == 0)
+        if is_round and RATES_IN_TEXT[0] <= value <= RATES_IN_TEXT[1]:
+            yield Candidate(RATE, number, True, _rates_of_number(number), value)
+    elif subject == NONE:
+        amplitude = known_unit(unit)
+        if LEVEL_UNIT.fullmatch(unit):
+            yield Candidate(SCALE, match[0])
+        elif amplitude and amplitude.dimension in AMPLITUDES:
+            yield Candidate(SCALE_OR_OFFSET, match[0], True)
+        elif not is_part and amplitude is None and not HARMLESS_UNIT.fullmatch(unit):
+            yield from _of_number(name, number, "", subject)  # a unit that is not known
+
+
+def _of_rate(text: str, number: str, unit: RateUnit, is_weak: bool) -> Iterator[Candidate]:
+    """A candidate of a rate, a step or a duration."""
+    intervals = tuple(i for reading in readings(number) if (i := reading.interval(unit.scale, unit.is_step)))
+    usual = tuple(i for i in intervals if USUAL_RATES[0] <= i.rate <= USUAL_RATES[1])
+    if unit.is_step and not unit.is_sampling and intervals:
+        is_long = unit.scale > SHORT_UNIT
+        yield Candidate(RATE if usual else DURATION, text, is_weak or is_long, usual, seconds=1.0 / intervals[0].rate)
+    elif usual:
+        yield Candidate(RATE, text, is_weak, usual)

@@ -1,0 +1,242 @@
+"""Entries of the metadata that may state a rate, a scale or a unit and that nothing explains.
+
+Other modules look for statements whose words they know. This one is the reverse: a value that could change the samples
+or their rate must be explained, else it is reported by name, with the key of the layout that declares it checked
+(``checked_entries``). It is explained if
+
+- another module has compared it with the layout,
+- its name, its group or the words beside it speak of something else (``other_subjects``),
+- it agrees with the record: rate, step, number of samples, duration, units, a neutral scale, or
+- it can be none of these: a length, a temperature, a small whole number (``entry_candidates``).
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from turnout.errors import ReadError
+from turnout.readers.entry_candidates import DURATION, RATE, SCALE, UNIT, Candidate, candidates
+from turnout.readers.precision import EXACT_PRECISION, around
+from turnout.readers.source import RawRecord, Source
+from turnout.readers.stated_scales import container_of
+from turnout.readers.stated_units import same_unit, with_stated_units
+from turnout.readers.statements import MAX_ENTRIES, Entry
+from turnout.records import RawDescription
+from turnout.units import IGNORED
+
+MAX_RATE_RATIO = 64.0  # a frequency or a time that differs more from the rate in use is one of something else
+MAX_DURATION_RATIO = 8.0  # a time that differs more from the record's duration is one of something else
+DURATION_TOLERANCE = 0.02  # relative
+MAX_LISTED = 5  # entries in one message
+MAX_SHOWN = 40  # characters of a value in a message
+MAX_PROBLEM = 200  # characters of all of them
+REASONS_OF = {RATE: "wrong_rate", DURATION: "wrong_rate", SCALE: "scale_unknown", UNIT: "unit_unknown"}
+
+
+@dataclass(frozen=True)
+class RecordFacts:
+    """Facts of a record: rate [Hz], numbers of samples, channels and records, and the units in use."""
+
+    rate: float
+    n_sample: int
+    n_channel: int
+    n_record: int
+    units: tuple[str, ...]
+
+    def explains(self, candidate: Candidate) -> bool:
+        """Whether a candidate agrees with the record, or is too far from it to be about it.
+
+        Parameters
+        ----------
+        candidate : Candidate
+            A value of the metadata.
+
+        Returns
+        -------
+        bool
+            False for a statement that contradicts the facts.
+        """
+        n = self.n_sample
+        if candidate.unit:
+            return any(same_unit(candidate.unit, unit) for unit in self.units)
+        if not np.isnan(candidate.seconds):
+            ratio = candidate.seconds * self.rate / n
+            if 1 / MAX_DURATION_RATIO <= ratio <= MAX_DURATION_RATIO:
+                return abs(ratio - 1.0) <= max(DURATION_TOLERANCE, 2.0 / n)
+            if not candidate.rates:
+                return True
+        rate = around(self.rate, EXACT_PRECISION)
+        if any(interval.loose.overlaps(rate) for interval in candidate.rates):
+            return True
+        if np.isnan(candidate.number):  # its unit is known
+            ratios = [interval.rate / self.rate for interval in candidate.rates]
+            return bool(ratios) and not any(1 / MAX_RATE_RATIO <= ratio <= MAX_RATE_RATIO for ratio in ratios)
+        counts = (n, n - 1, n * self.n_record, n * self.n_channel, self.n_channel, self.n_record)
+        return candidate.text.isdigit() and candidate.number in counts
+
+
+def unexplained_entries(
+    entries: Iterable[Entry], facts: RecordFacts, are_units_certain: bool = False
+) -> Iterator[tuple[Entry, Candidate]]:
+    """Entries of a record that may state its rate, scale or unit and that nothing explains.
+
+    Parameters
+    ----------
+    entries : iterable of Entry
+        Metadata of the record.
+    facts : RecordFacts
+        Facts of the record.
+    are_units_certain : bool
+        Whether units of the layout overrule the file, so that scales and units are explained.
+
+    Yields
+    ------
+    tuple of (Entry, Candidate)
+        Each such entry with the first of its candidates.
+
+    Examples
+    --------
+    >>> facts = RecordFacts(25600.0, 64, 2, 1, ("N", "m/s²"))
+    >>> entries = [Entry("head", "Mode", "20 kS/s"), Entry("head", "Mode 2", "25.6 kS/s"), Entry("head", "Gleis", "2")]
+    >>> [entry.name for entry, _ in unexplained_entries(entries, facts)]
+    ['Mode']
+    """
+    for entry in entries:
+        if entry.is_defined or entry.is_piece:
+            continue
+        group = container_of(entry).rpartition("/")[2] if "/" in entry.place else ""
+        texts = _texts(entry.value, facts.n_sample)
+        is_unit_list = len(texts) > 1 and any(same_unit(text, unit) for text in texts for unit in facts.units)
+        for candidate in (c for text in texts for c in candidates(entry.name, group, text)):
+            is_overruled = are_units_certain and candidate.statement in (SCALE, UNIT)
+            is_overruled |= is_unit_list and candidate.statement == UNIT  # of all channels, assigned by the reader
+            if not is_overruled and not facts.explains(candidate):
+                yield entry, candidate
+                break
+
+
+def _texts(value: Any, n_sample: int) -> Sequence[str]:
+    """The texts of a value; none of one number per sample."""
+    if isinstance(value, str):
+        return (value,)
+    values = value.ravel() if isinstance(value, np.ndarray) else value
+    if not isinstance(values, (list, tuple, np.ndarray)):
+        return (_text(value),) if np.isscalar(value) else ()
+    return (
+        [_text(v) for v in values if np.isscalar(v)] if len(values) <= MAX_ENTRIES and len(values) != n_sample else ()
+    )
+
+
+def _text(value: Any) -> str:
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+
+
+class EntryCheck:
+    """Check of the entries of all records of a file; records that share their entries are checked once.
+
+    Parameters
+    ----------
+    description : RawDescription
+        What the layout states: units of the channels, names of entries that somebody has checked.
+    source : Source
+        The raw file.
+    """
+
+    def __init__(self, description: RawDescription, source: Source):
+        self.source = source
+        self._checked = frozenset(name.strip().casefold() for name in description.checked_entries)
+        units = [c.unit for c in description.channels if c.quantity != IGNORED and c.unit]
+        self._units = tuple(unit.rstrip("!") for unit in units)
+        self._are_certain = any(unit.endswith("!") for unit in units)
+        self._last: tuple[Sequence[Entry], tuple] | None = (
+            None  # entries of the last record, and what they were compared with
+        )
+        self._reported: set[tuple[str, str]] = set()
+
+    def without_checked(self, record: RawRecord) -> RawRecord:
+        """The record without the entries that the layout declares checked: they state nothing about it.
+
+        Parameters
+        ----------
+        record : RawRecord
+            The record as it is in the file.
+
+        Returns
+        -------
+        RawRecord
+            The same record if there are none.
+        """
+        if not self._checked:
+            return record
+        entries = tuple(e for e in record.entries if e.name.strip().casefold() not in self._checked)
+        return record if len(entries) == len(record.entries) else replace(record, entries=entries)
+
+    def remark(
+        self, record: RawRecord, rate: float, n_record: int, where: str, is_rate_stated: bool, rate_remark: str
+    ) -> ReadError | None:
+        """Check the entries of one record.
+
+        Parameters
+        ----------
+        record : RawRecord
+            The record as it is in the file.
+        rate : float
+            Its sampling rate. [Hz]
+        n_record : int
+            Number of records of the file.
+        where : str
+            The record, for the message.
+        is_rate_stated : bool
+            Whether the file states the rate in known words: another rate is then a remark.
+        rate_remark : str
+            What is reported about the rate already.
+
+        Returns
+        -------
+        ReadError or None
+            A remark on entries that may state a rate, scale or unit, with the reason ``entry_unknown``.
+
+        Raises
+        ------
+        ReadError
+            If an entry with the unit of a rate, or words of a scale or a unit, is not explained.
+        """
+        n_sample = len(record.samples[0])
+        key = (record.units, rate, n_sample)
+        if self._last is not None and self._last[0] is record.entries and self._last[1] == key:
+            return None
+        facts = RecordFacts(rate, n_sample, len(record.names), n_record, self._units + with_stated_units(record).units)
+        unexplained = [
+            (entry, candidate)
+            for entry, candidate in unexplained_entries(record.entries, facts, self._are_certain)
+            if not rate_remark or (entry.name not in rate_remark and candidate.text not in rate_remark)
+        ]
+        for entry, candidate in unexplained:
+            if not candidate.is_weak and not (is_rate_stated and candidate.statement == RATE):
+                raise self._error(where, [(entry, candidate)], REASONS_OF[candidate.statement])
+        self._last = record.entries, key
+        new = [(e, c) for e, c in unexplained if (e.name, c.text) not in self._reported]
+        self._reported.update((e.name, c.text) for e, c in new)
+        return self._error(where, new, "entry_unknown") if new else None
+
+    def _error(self, where: str, unexplained: Sequence[tuple[Entry, Candidate]], reason: str) -> ReadError:
+        listed = [f"{entry.name}: {_short_text(entry, candidate)}" for entry, candidate in unexplained[:MAX_LISTED]]
+        more = f" and {len(unexplained) - MAX_LISTED} more" if len(unexplained) > MAX_LISTED else ""
+        statements = " or ".join(dict.fromkeys(candidate.statement for _, candidate in unexplained))
+        names = "; ".join(dict.fromkeys(entry.name for entry, _ in unexplained[:MAX_LISTED]))
+        problem = (
+            f"{', '.join(dict.fromkeys(listed))[:MAX_PROBLEM]!r}{more} in {unexplained[0][0].place} may state a "
+            f"{statements}, and nothing explains it"
+        )
+        remedy = (
+            "Correct rate and units of the layout; if such an entry means something else, name it there, "
+            f"'checked_entries: {names}'"
+        )
+        return self.source.error(where, problem, remedy, reason=reason)
+
+
+def _short_text(entry: Entry, candidate: Candidate) -> str:
+    text = _text(entry.value)
+    return text if len(text) <= MAX_SHOWN else f"... {candidate.text} ..."

@@ -1,0 +1,72 @@
+"""Entries that no other rule understands: what could change samples or rate is reported by name, the others are not.
+
+The layout states 25.6 kHz, newtons and m/s²; the file holds no statement in known words.
+"""
+
+import pytest
+from tests.unit.readers.test_readers_other_subjects import can_hold, outcome
+from tests.unit.readers.test_readers_rate_matrix import FORMATS, SENSORS, TRUE, described, write_csv
+
+from turnout.errors import ReadError
+from turnout.readers import read
+from turnout.records import RawDescription
+
+# Name, value: a rate of 20 kHz, a scale, or another unit, under names that are on no list.
+CONTRADICTIONS = [
+    ("Mode", "20 kS/s @ 24 bit"), ("Profile", "mono/20kHz/16bit"), ("Setup", "2 ch x 20000 Hz, 24 bit"), ("Acq", "20k"),
+    ("Qtz", 5e-05), ("Punktabstand", 5e-05), ("Hub", "20000"), ("Nyquist", "10 kHz"), ("Uhr", "1/20000 s"),
+    ("Sweep", "3.2 ms"), ("Amplifier", "x100"), ("Reading", "raw*0.01"), ("Conversion", "1 count = 0.3 mV"),
+    ("Q-format", "Q1.15"), ("Inverted", "true"), ("Scaled", "no"), ("Hub", 2.5), ("Range factor", 0.5),
+    ("Values in", "kN"), ("Comment", "acceleration in g"), ("Data", "rail [g]"), ("System", "US customary"),
+]  # fmt: skip
+# The same statements in agreement with the record, and values that are about something else.
+HARMLESS = [
+    ("Mode", "25.6 kS/s @ 24 bit"), ("Acq", "25.6k"), ("Qtz", 3.90625e-05), ("Nyquist", "12.8 kHz"),
+    ("Sweep", "2.5 ms"), ("Hub", 3), ("Hub", 1.0), ("Values in", "N"), ("Amplifier", "x1"), ("Scaled", "yes"),
+    ("Filter", "BE 5000 Hz"),
+    ("Trigger level", "50 N"), ("Rail temperature", 12.5), ("Kilometer", "41,235"), ("Serial", 20000), ("Lot", 41233),
+    ("Pre-trigger", "10 ms"), ("Recorded", "13.05.2024"), ("Bits per sample", 24), ("Wheel load", "80 kN"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("format", FORMATS)
+def test_a_value_that_contradicts_the_record_is_reported_under_any_name(format, tmp_path):
+    for name, value in CONTRADICTIONS:
+        if can_hold(format, name, str(value)):
+            _, errors = outcome(format, tmp_path, (name, value))
+            assert errors, (name, value)
+            assert str(value)[:6] in errors[0].problem.replace("T", "t"), (name, value)
+
+
+@pytest.mark.parametrize("format", FORMATS)
+def test_a_value_that_agrees_or_is_about_something_else_is_not_reported(format, tmp_path):
+    for name, value in HARMLESS:
+        if can_hold(format, name, str(value)):
+            recording, errors = outcome(format, tmp_path, (name, value))
+            assert recording is not None and errors == (), (name, value)
+
+
+def test_a_checked_entry_is_accepted_and_no_other(tmp_path):
+    write_csv(tmp_path / "a.csv", [("Profile", "20 kS/s"), ("Hub", "2.5")])
+    for checked, n_record, reasons in (
+        ((), 0, ["wrong_rate"]), (("profile",), 1, ["entry_unknown"]), (("Profile", "Hub"), 1, []),
+    ):  # fmt: skip
+        description = RawDescription(SENSORS, rate=TRUE, checked_entries=checked)
+        try:
+            result = read("a.csv", tmp_path, description)
+        except ReadError as error:
+            assert n_record == 0 and [error.reason] == reasons
+            continue
+        assert len(result.recordings) == n_record and [e.reason for e in result.errors] == reasons
+        assert all("checked_entries: Hub" in str(e) for e in result.errors if e.reason == "entry_unknown")
+
+
+def test_units_that_overrule_the_file_explain_scales_but_no_rates(tmp_path):
+    sensors = tuple(RawDescription(SENSORS).channels)
+    overruled = tuple(type(s)(s.name, s.source, s.quantity, unit=f"{s.unit}!") for s in sensors)
+    write_csv(tmp_path / "a.csv", [("Reading", "raw*0.01"), ("Values in", "kN")])
+    assert read("a.csv", tmp_path, RawDescription(overruled, rate=TRUE)).errors == ()
+    write_csv(tmp_path / "a.csv", [("Profile", "20 kS/s")])
+    (error,) = read("a.csv", tmp_path, RawDescription(overruled, rate=TRUE)).errors
+    assert error.reason == "wrong_rate"
+    assert read("a.csv", tmp_path, described(20000.0)).errors == ()
