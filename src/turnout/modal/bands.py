@@ -165,7 +165,7 @@ def _choose_strongest(choice: BandChoice, selection: Selection, settings: Identi
         bands = [band for band, low, high in settings.bands() if low <= frequency[m] < high]
         reason = f"weaker than the {bands[0]} mode of its band" if bands else "outside all bands"
         reason, *limits = selection.failed_tests.get(m, (reason,))
-        choice.rejected_modes.append(_rejected_mode(selection, m, reason + "; kept in the fit", *limits))
+        choice.rejected_modes.append(_rejected_mode(selection, m, reason + ", but it stays in the fit", *limits))
 
 
 def _assign_across_edge(

@@ -280,10 +280,12 @@ def _stiffness_lines(mode: Mapping[str, Any], rows: Mapping[str, Sequence[Mappin
 
 
 def _reason_lines(model: Mapping[str, Any]) -> list[str]:
-    """Why the model was rejected or has one resonance only, or else its detail."""
-    if not model["reason"]:
-        return [_line("detail", model["detail"])] if model["detail"] else []
-    return [_line("why", f"{REASONS[model['reason']]}: {model['detail']}")]
+    """Why the model was rejected or has one resonance only, or else its detail; a line for each statement."""
+    statements = (model["detail"] or "").split("; ")
+    if model["reason"]:
+        return [_line("why", REASONS[model["reason"]]), *(_line("", statement) for statement in statements)]
+    lines = [_line("" if k else "detail", statement) for k, statement in enumerate(statements)]
+    return lines if model["detail"] else []
 
 
 def _temperature(rows: Mapping[str, Sequence[Mapping[str, Any]]], unit: Unit, turnout: TurnoutConfig) -> str:
