@@ -17,6 +17,7 @@ from filelock import FileLock, Timeout
 
 from turnout.errors import TurnoutError
 from turnout.files import changed_at
+from turnout.installation import shipped_path
 from turnout.workflow.plan import is_cut_plan, read_plan
 from turnout.workflow.project import profile_folder, snakefile_options, snakemake_environment
 from turnout.workflow.run_report import failure_reason, rejected_units, unused_turnouts
@@ -124,9 +125,10 @@ def nightly(options: Sequence[str], profile: str, limit: float | None = None, wo
 def _require_profile(profile: Path) -> None:
     """TurnoutError without the profile; Snakemake's own message would only be about cores."""
     if not any(profile.glob("config*.yaml")):
-        profiles = sorted(str(p.parent) for p in profile.parent.glob("*/config*.yaml"))
+        folders = Path("profiles"), shipped_path("profiles")
+        profiles = sorted({f"profiles/{p.parent.name}" for folder in folders for p in folder.glob("*/config*.yaml")})
         problem = "holds no config.yaml" if profile.is_dir() else "there is no such folder"
-        remedy = f"Give one of {', '.join(profiles)}" if profiles else "Run it in the folder of the Snakefile"
+        remedy = f"Write one of {', '.join(profiles)}, or the folder of your own"
         raise TurnoutError(f"{profile}, the profile: {problem}. {remedy}.")
 
 

@@ -112,12 +112,15 @@ def test_remains_of_a_killed_run_are_cleared(tmp_path, monkeypatch):
     assert list((tmp_path / ".snakemake").iterdir()) == []
 
 
-@pytest.mark.parametrize(
-    ("profile", "there"), [("nosuch", "p"), ("profiles/nosuch", "profiles/default, profiles/slurm")]
-)
-def test_a_profile_that_is_not_there_is_said_before_anything_begins(tmp_path, monkeypatch, profile, there):
+@pytest.mark.parametrize("profile", ["nosuch", "profiles/nosuch"])
+def test_a_profile_that_is_not_there_is_said_before_anything_begins(tmp_path, monkeypatch, profile):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(TurnoutError, match=f"{profile}, the profile: there is no such folder. Give one of {there}"):
+    (tmp_path / "profiles/own").mkdir(parents=True)
+    (tmp_path / "profiles/own/config.yaml").touch()
+    (tmp_path / "config").mkdir()
+    (tmp_path / "config/config.yaml").touch()  # the configuration is no profile
+    present = "profiles/default, profiles/own, profiles/slurm"
+    with pytest.raises(TurnoutError, match=f"{profile}, the profile: there is no such folder. Write one of {present}"):
         nightly([], profile)
     assert not (tmp_path / "work").exists()
 

@@ -278,7 +278,7 @@ select
             end
         when h.follows_other then 'nothing for this resonance: see the other one of this section'
         when h.is_small then 'nothing on site: the next campaigns, and the other resonance of this section'
-        when h.state = 'learning' then 'nothing: measure again as planned'
+        when h.state = 'learning' then 'nothing; measure again as planned'
         when h.why like 'the alarm of %' then 'what was corrected or entered since, and the chart of this section'
         when h.band = 'all' then 'what was rejected: turnout query "from rejected where turnout_id = ''' || h.turnout_id || '''"'
         when h.state = 'cannot tell' then 'the measurement: more impacts per campaign, rail temperature, sensor'
