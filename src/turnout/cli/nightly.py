@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 GROUP = "Run"
 HELP = "run the whole workflow unattended"
 INTERRUPTED = 130
+# Options of Snakemake with which the configuration may be elsewhere.
+MOVING_OPTIONS = ("--configfile", "--directory", "-d", "--snakefile", "-s")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -52,9 +54,13 @@ def run(args: argparse.Namespace) -> int:
         Exit code.
     """
     from dataclasses import asdict
+    from pathlib import Path
 
     from turnout.workflow.nightly import nightly
+    from turnout.workflow.project import snakefile_options
 
+    if snakefile_options(Path()) and not any(word.startswith(MOVING_OPTIONS) for word in args.options):
+        _require_project(_configuration_folder(args.options))
     limit = None if args.limit_hours is None else 3600.0 * args.limit_hours
     try:
         options = [*args.options, *(["--quiet", "all"] if args.quiet else [])]
@@ -66,6 +72,22 @@ def run(args: argparse.Namespace) -> int:
     return night.code or (_alert(args.options) if night.published else 0)
 
 
+def _configuration_folder(options: Sequence[str]) -> str:
+    folders = [word.partition("=")[2] for word in options if word.startswith("configuration=")]
+    return folders[0] if folders else "config"
+
+
+def _require_project(folder: str) -> None:
+    """ConfigError without a table of turnouts, before anything is written into a folder that is no project."""
+    from pathlib import Path
+
+    from turnout.config.turnouts_table import read_table
+
+    table = Path(folder) / "turnouts.tsv"
+    if not table.exists():
+        raise read_table(table, str(table))[1][0]
+
+
 def _alert(options: Sequence[str]) -> int:
     """Send new entries of the worklist if the configuration asks for it; 1 if a server does not take them."""
     import sys
@@ -75,8 +97,7 @@ def _alert(options: Sequence[str]) -> int:
     from turnout.workflow.alerts import has_channel, send_alerts, worklist_entries
     from turnout.workflow.nightly import GENERATION
 
-    folders = [word.partition("=")[2] for word in options if word.startswith("configuration=")]
-    settings = load_configuration(folders[0] if folders else "config").settings["alerts"]
+    settings = load_configuration(_configuration_folder(options)).settings["alerts"]
     if not has_channel(settings):
         return 0
     try:

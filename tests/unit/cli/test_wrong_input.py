@@ -127,3 +127,10 @@ def test_no_events_are_said_to_be_none(project, capsys):
 def test_a_project_gets_no_page_of_the_documentation(project, capsys):
     assert main(["config", "generate"]) == 0
     assert not (project / "docs").exists() and "settings.md" not in capsys.readouterr().out
+
+
+def test_a_night_without_a_project_writes_nothing(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["nightly"]) == 2
+    assert "Run the command in the folder of a project" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())

@@ -62,6 +62,8 @@ def test_a_signal_ends_the_run_and_its_jobs(tmp_path, number):
         "with open('pids', 'a') as stream:\n    stream.write(f'{os.getpid()}\\n')\n"
         "time.sleep(600)\n"
     )
+    (tmp_path / "config").mkdir()
+    (tmp_path / "config/turnouts.tsv").touch()
     night = [sys.executable, "-m", "turnout.cli.main", "nightly"]
     path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
     run = subprocess.Popen(
