@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from turnout.simulate.track import Track
     from turnout.simulate.wheel_path import PathPart, Surfaces
 
+AT_SUPPORT = 0.1  # bays; a toe that is closer to a support is on it
+
 
 @dataclass(frozen=True)
 class Blade:
@@ -41,7 +43,7 @@ class Blade:
 
     ``rail`` is its section, of which the planed part is lighter: an average. ``chair_stiffness`` [N/m] and
     ``chair_damping`` [N s/m] act between blade and bearer at every support. Before the heel the blade rests on them by
-    its own weight, from the heel on it is fastened. The toe is at the nearest node, the end at the nearest support.
+    its own weight, from the heel on it is fastened. The end is at the nearest support.
     """
 
     toe: float
@@ -105,13 +107,33 @@ class Blade:
             if not track.start <= getattr(self, name) <= track.end:
                 problem = f"from {track.start:.3f} to {track.end:.3f} m"
                 raise SimulationError(f"{track.name}: the {name} at {getattr(self, name):.3f} m is not {problem}.")
-        per_bay = track.elements_per_bay
-        end = track.nearest_support(self.end) * per_bay
-        bay = np.interp(self.toe, track.support, np.arange(track.support.size))
-        toe = round(float(bay) * per_bay)
+        end, toe = track.nearest_support(self.end) * track.elements_per_bay, self.toe_node(track)
         if toe == end:
             raise SimulationError(f"{track.name}: the blade is shorter than an element.")
         return min(toe, end), max(toe, end)
+
+    def toe_node(self, track: Track) -> int:
+        """Node of the toe: that of a support close to it, otherwise the nearest one in the bay, which is moved to it.
+
+        So the blade has the same length on every mesh, but for a bay of one element.
+
+        Parameters
+        ----------
+        track : Track
+            The track with the stock rail.
+
+        Returns
+        -------
+        int
+            Number of the node.
+        """
+        per_bay = track.elements_per_bay
+        position = float(np.interp(self.toe, track.support, np.arange(track.support.size)))
+        bay = min(int(position), track.support.size - 2)
+        share = position - bay
+        if per_bay == 1 or not AT_SUPPORT < share < 1.0 - AT_SUPPORT:
+            return (bay + round(share)) * per_bay
+        return bay * per_bay + min(max(round(share * per_bay), 1), per_bay - 1)
 
     def chairs(self, track: Track) -> list[int]:
         """Supports under the blade from the toe to the one before the end.

@@ -329,6 +329,9 @@ def _number_rows(track: Track, links: Sequence[Link]) -> tuple[np.ndarray, np.nd
     per_bay = track.elements_per_bay
     bays = [np.linspace(a, b, per_bay + 1)[:-1] for a, b in zip(track.support[:-1], track.support[1:])]
     node = np.append(np.concatenate(bays), track.support[-1])
+    if track.blade is not None:
+        toe = track.blade.toe_node(track)
+        node[toe] = track.blade.toe if toe % per_bay else node[toe]
     extra: list[set[tuple]] = [set() for _ in track.support]
     for link in links:
         for name, _ in link.ends:

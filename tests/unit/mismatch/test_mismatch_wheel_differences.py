@@ -1,7 +1,6 @@
 """Each wheel meets a nose otherwise than the file has it: an error of the passage's own, as a simulation has it."""
 
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -58,8 +57,7 @@ def test_a_measured_surface_that_ends_lower_makes_no_step_and_a_corrugation_is_a
     assert deeper[np.argmin(np.abs(way - 25.2))] == pytest.approx(WHEELS.depth_sd * (2.0e-3 - 0.8e-3))
     assert max(np.abs(w).max() for w in (deeper, further, longer, sharper)) < 0.5e-3
     waves = Corrugation(20.0, 28.0, 5e-5, 0.35)
-    case = SimpleNamespace(surface=SimpleNamespace(surfaces=lambda route, values: ((waves, NOSE),)))
-    assert _components(case, {}, SimpleNamespace(passage=SimpleNamespace(route="main"))) == [NOSE]
+    assert _components((waves, NOSE)) == [NOSE]
 
 
 @dataclass(frozen=True)

@@ -159,3 +159,14 @@ def test_a_blade_that_cannot_be_is_rejected(blade, message):
     values = {"toe": 9.0, "heel": 15.0, "end": 24.0, "rail": TRACK.rail, "chair_stiffness": 3e8, "chair_damping": 3e4}
     with pytest.raises(SimulationError, match=message):
         TRACK.with_(blade=Blade(**{**values, **blade}))
+
+
+@pytest.mark.parametrize("toe", [9.2, 9.04, 20.8])
+def test_a_blade_is_as_long_on_every_mesh(toe):
+    """Without a node at its toe it would be up to 0.15 m too long or too short, and rest on another chair."""
+    heel, end = (15.0, 24.0) if toe < 15.0 else (14.0, 6.0)
+    switch, frequency = TRACK.with_(blade=Blade(toe, heel, end, TRACK.rail, 3e8, 3e4)), np.linspace(20.0, 112.0, 20)
+    position = toe + 0.1 * np.sign(heel - toe)
+    meshes = (prepare(switch.with_(elements_per_bay=n), 1e-4).matrices for n in (2, 4, 6, 8))
+    *coarse, fine = (receptance(matrices, frequency, position, position) for matrices in meshes)
+    assert max(np.max(np.abs(h / fine - 1.0)) for h in coarse) < 0.005

@@ -18,6 +18,7 @@ from turnout.mismatch.turnout.prediction import Predictor, Values
 from turnout.mismatch.turnout.priors import ALIGNMENT, SIMULATION
 from turnout.mismatch.turnout.running_surface import POSITION_FIELDS
 from turnout.records import Recording
+from turnout.simulate.blade import is_on_blade
 from turnout.simulate.sensor import Sensor
 
 
@@ -179,10 +180,13 @@ def fit_surface(aligner: PassageAligner, values: Values) -> dict[str, float]:
     recorded = [p for p in recorded if p.name not in campaign.reserved] or recorded
     passages = sorted(recorded, key=lambda p: len(p.vehicle.wheels))[: ALIGNMENT.max_trial_passages]
     priors = {n.name: n for n in surface.nuisances()}
+    in_switch = is_on_blade([u.component for u in surface.parameters])
     surface_values = dict.fromkeys(priors, 0.0)
     best_score = _log_posterior(aligner, {**values, **surface_values}, passages) if priors else 0.0
     for refine in (False, True):
         for u in sorted(surface.parameters, key=lambda u: u.field not in POSITION_FIELDS):
+            if in_switch and u.field not in POSITION_FIELDS:  # the fit finds depths and lengths of tops as well
+                continue
             centre, prior = surface_values[u.name], priors[u.name]
             for by in _trial_steps(u.field, prior.sd, refine):
                 trial = {**surface_values, u.name: float(np.clip(centre + by, *prior.bounds))}

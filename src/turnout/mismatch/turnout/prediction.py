@@ -141,6 +141,8 @@ class Predictor:
         self._simulators: OrderedDict[Hashable, PassageSimulator] = OrderedDict()
         self._sensitivities: OrderedDict[Hashable, ReceptanceSensitivity] = OrderedDict()
         self._zones_with_file_values: dict[tuple[str, ...], Any] = {}
+        # difference quotients of passages, each with the common values (in prior sd) at which it was computed
+        self.differences: dict[Hashable, tuple[dict[str, float], np.ndarray]] = {}
 
     def with_recordings(
         self, frf_pairs: Mapping[str, FrfPair], aligned_passages: Mapping[str, AlignedPassage]

@@ -216,7 +216,11 @@ class SimulationPriors:
     band_margin: float = prior(1.3, "-", "highest line of the transfer functions over the end of the band", "numerical")
     node_stride: int = prior(2, "nodes", "every second one is used; in between a force is shared linearly", "numerical")
     node_margin: float = prior(0.3, "m", "of nodes beyond the free waves", "numerical")
+    difference_reach: float = prior(
+        1.0, "prior sd", "of a common value, within which a difference quotient in a switch is used again", "numerical")
     path_step: float = prior(0.01, "m", "of a fine path", "numerical")
+    contact_approach: float = prior(
+        1e-4, "m", "of wheel and rail under 100 kN: over so much, two tops share the force", "convention")
     ring_time: float = prior(0.35, "s", "ringing of the track after the last wheel", LOCAL_RAIL)
     averaging_length: float = prior(
         2.4, "m", "of the rail about a wheel; 0.6 and 1.2 err near the wheel resonance, the whole rail above it",

@@ -16,6 +16,7 @@ from turnout.mismatch.turnout.priors import RECEPTANCE, SIMULATION
 from turnout.mismatch.turnout.receptance_model import linear_matrices
 from turnout.mismatch.turnout.track_parameters import track_with
 from turnout.mismatch.turnout.wave_response import WaveTransfer
+from turnout.mismatch.turnout.wheel_line import rows_under_wheels
 from turnout.simulate.frequency_response import responses
 from turnout.simulate.run import Probe
 
@@ -127,7 +128,10 @@ def _static_deflection(
     track = track_with(predictor.track(aligned.passage.route, under), predictor.zone, values)
     matrices = linear_matrices(track, under)
     names = [(layer, j) for j in predictor.zone.supports for layer in ("rail", "sleeper")]
-    h = responses(matrices, [0.0], names, matrices.node_index)[0].real
+    rows = matrices.node_index
+    if track.blade is not None:
+        rows = rows_under_wheels(matrices, track.blade, predictor.surface.surfaces(aligned.passage.route, values))
+    h = responses(matrices, [0.0], names, rows)[0].real
     inside = [np.interp(positions, matrices.node, row) for row in h]
     return np.array(inside).reshape(-1, 2, positions.size)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 from turnout.mismatch.engine.case import Nuisance
 from turnout.mismatch.turnout.campaign import CampaignInput, PassageInput
@@ -31,6 +32,12 @@ class Site:
     def shared_nuisances(self) -> tuple[Nuisance, ...]:
         """Nuisances of track, wheelsets and sensors: those that hammer tests depend on, and the wheelsets."""
         return (*track_nuisances(self.nominal, self.trains), *_sensor_nuisances(self.sensors))
+
+    @cached_property
+    def common_sds(self) -> dict[str, float]:
+        """Prior standard deviations of the values that all supports have in common, and of the running surface."""
+        nuisances = [n for n in track_nuisances(self.nominal, self.trains) if n.group == "track"]
+        return {n.name: n.sd for n in (*nuisances, *(self.surface.nuisances() if self.surface else ()))}
 
     def nuisances(self, passages: Iterable[PassageInput] = ()) -> tuple[Nuisance, ...]:
         """All nuisances: the shared ones, then rail roughness, running surface and each of the ``passages``.

@@ -21,6 +21,7 @@ from turnout.mismatch.turnout.priors import PASSAGE, SIMULATION
 from turnout.mismatch.turnout.receptance_model import linear_matrices
 from turnout.mismatch.turnout.receptance_observation import channel_factor
 from turnout.mismatch.turnout.track_parameters import track_with, vehicle_with
+from turnout.mismatch.turnout.wheel_line import points_of_rows, rows_under_wheels
 from turnout.simulate.frequency_response import responses
 
 if TYPE_CHECKING:
@@ -331,14 +332,22 @@ def _transfers(
     near = np.flatnonzero(
         (matrices.node >= predictor.waves.start - beyond) & (matrices.node <= predictor.waves.end + beyond)
     )
+    rows = matrices.node_index
+    if track.blade is not None:
+        rows = rows_under_wheels(matrices, track.blade, predictor.surface.surfaces(aligned.passage.route, values))
+        near = near[near[0] % SIMULATION.node_stride :]  # the node at the toe is not in line with the others
     near = near[:: SIMULATION.node_stride]
     positions = [predictor.seat(s, values, terms).probe(track).place for s in aligned.sensors]
-    h, mean_receptance = rail_receptances(matrices, frequency, near, positions)
+    h, mean_receptance = rail_receptances(matrices, frequency, near, positions, rows[near])
     return frequency, -((2.0 * np.pi * frequency) ** 2)[:, None, None] * h, mean_receptance, matrices.node[near]
 
 
 def rail_receptances(
-    matrices: TrackMatrices, frequency: np.ndarray, near: np.ndarray, positions: Sequence[float | tuple]
+    matrices: TrackMatrices,
+    frequency: np.ndarray,
+    near: np.ndarray,
+    positions: Sequence[float | tuple],
+    rows: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Receptances between positions and nodes, and of the rail about these nodes.
 
@@ -354,6 +363,8 @@ def rail_receptances(
         Nodes.
     positions : sequence
         Positions [m] or degrees of freedom.
+    rows : (n,) array of int or None
+        Row of the deflection under wheels at each node; None: that of the rail.
 
     Returns
     -------
@@ -363,7 +374,8 @@ def rail_receptances(
         [m/N]
     """
     node = matrices.node[near]
-    h = responses(matrices, frequency, [*positions, *node.tolist()], matrices.node_index[near])
+    rows = matrices.node_index[near] if rows is None else rows
+    h = responses(matrices, frequency, [*positions, *points_of_rows(matrices, rows)], rows)
     about = np.abs(node[:, None] - node) < 0.5 * SIMULATION.averaging_length
     mean_receptance = np.diagonal(h[:, len(positions) :], axis1=1, axis2=2) @ (about / about.sum(axis=0))
     return h[:, : len(positions)], mean_receptance

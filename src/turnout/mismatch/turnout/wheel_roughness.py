@@ -20,8 +20,10 @@ from turnout.mismatch.engine.candidate_search import masked_candidates
 from turnout.mismatch.turnout.priors import WHEELS
 from turnout.mismatch.turnout.rail_roughness import amplitude_sd
 from turnout.mismatch.turnout.wave_response import WaveTransfer
+from turnout.mismatch.turnout.wheel_line import carrying_weights
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from typing import Any
 
     from turnout.mismatch.engine.map_fit import Fit
@@ -52,7 +54,13 @@ def profile_modes(predictor: Predictor, values: Values, aligned: AlignedPassage,
         [m/s²]
     """
     grid = transfer.fine_grid
-    paths = [path for component in _components(predictor, values, aligned) for path in _deviations(component, grid)]
+    surfaces = predictor.surface.surfaces(aligned.passage.route, values)
+    paths = [
+        weight * path
+        for surface, weight in zip(surfaces, carrying_weights(surfaces, grid))
+        for component in _components(surface)
+        for path in _deviations(component, grid)
+    ]
     if not paths:
         return np.zeros((len(aligned.sensors) * aligned.time.size, 0))
     return np.concatenate(
@@ -60,14 +68,9 @@ def profile_modes(predictor: Predictor, values: Values, aligned: AlignedPassage,
     )
 
 
-def _components(predictor: Predictor, values: Values, aligned: AlignedPassage) -> list[PathPart]:
-    """Components of a passage's route except waves, which are the same for all wheels."""
-    components = [
-        component
-        for components in predictor.surface.surfaces(aligned.passage.route, values)
-        for component in components
-    ]
-    return [component for component in components if not hasattr(component, "wavelength")]
+def _components(surface: Sequence[PathPart]) -> list[PathPart]:
+    """Components of a surface except waves, which are the same for all wheels."""
+    return [component for component in surface if not hasattr(component, "wavelength")]
 
 
 def _deviations(component: PathPart, grid: np.ndarray) -> list[np.ndarray]:
