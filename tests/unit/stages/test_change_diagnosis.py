@@ -234,11 +234,13 @@ def test_the_list_gets_the_newest_diagnoses(tmp_path, monkeypatch):
     register([], root, read=iter, tables={"turnouts": [{"turnout_id": "t1", "layout": "small", "config_hash": "h"}]})
     row = {"turnout_id": "t1", "sections": "A, B", "found_at_utc": pd.Timestamp("2026-05-01T23:59")}
     row |= {"verdict": "no_decision", "sentence": "no diagnosis: no track file"}
+    row |= {"change": float("nan"), "change_se": float("inf")}
     result = UnitResult("t1/change/A+B", "t1", "change", "k", "v", "ok", {"change_findings": [row]})
     monkeypatch.setattr("turnout.stages.worklist.current_results", lambda work, stage, turnout: [result])
     for _ in range(2):
         assert worklist_job(root / "_generation.json", tmp_path / "list.csv", tmp_path) == 1
         with open_registry(root) as connection:
-            query = "select turnout_id, sections, sentence from change_findings"
-            assert connection.execute(query).fetchall() == [("t1", "A, B", "no diagnosis: no track file")]
+            query = "select turnout_id, sections, sentence, change, change_se from change_findings"
+            rows = connection.execute(query).fetchall()
+            assert rows == [("t1", "A, B", "no diagnosis: no track file", None, None)]
     assert (tmp_path / "list.csv").exists()
