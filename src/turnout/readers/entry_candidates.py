@@ -31,13 +31,16 @@ MIN_PER_SECOND = 1000.0  # a name that ends with seconds may mean a number per s
 MIN_LIMIT = 0.01  # a smaller number is no count, limit or size
 EPOCHS = (6.3e8, 2.9e9)  # s since 1970: years 1990 to 2061
 RATES_IN_TEXT = (2000.0, 1e6)  # Hz: round numbers in a text that may be a rate
+MIN_LARGEST = 127  # of a converter of 8 bits
 MAX_WORDS = 12  # of a text that says what was done to the samples
+MAX_LABEL = 3  # words of a quantity with its unit
 MAX_SIZE = 40  # characters of a candidate that are shown
 
 LETTER = r"(?:[^\W\d_]|[°%‰])"
 QUANTITY = re.compile(
-    r"(?<![\d.,^])([+-]?(?:\d+(?:[.,'’\u00a0\u202f]\d+)*|[.,]\d+)(?:[eE][+-]?\d+)?)"
-    rf"(?:[ \u00a0-]?((?!x\d){LETTER}+[²³]?(?:\^?-?\d(?![\d.,]))?(?:/\(?{LETTER}+[²³]?(?:\^?\d)?\)?){{0,3}}))?"
+    r"(?<![\d.,^])(?!\d\dE\d\b)([+-]?(?:\d+(?:[.,'’\u00a0\u202f]\d+)*|[.,]\d+)(?:[eE][+-]?\d+)?)"
+    rf"(?:[ \u00a0-]?((?!x\d){LETTER}+[²³]?(?:\^?-?\d(?![\d.,]))?(?:/\(?{LETTER}+[²³]?(?:\^?\d)?\)?){{0,3}}"
+    r"(?: per sec(?:ond)?\b)?))?"
 )
 BARE_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 GROUPED_DIGITS = re.compile(r"\d{1,3} \d{3}\b")
@@ -48,7 +51,7 @@ RATIO = re.compile(r"(\d+)\s?:\s?(\d+)")
 # How numbers become others: "x100", "10fach", "2.5*x", "1 V = 10 g", "0.3 mV/bit", "Q1.15".
 CONVERSION = re.compile(
     r"(?:^|(?<=[\s=,;(]))[x×*]\s?(?!1(?![\d.,]))\d|(?<![\d.,])(?!1\s?[x×])\d[\d.,]*\s?(?:[x×](?=$|[\s,;)])|-?fach|-?fold)"
-    r"|\b(?:times|fois|mal|gange)\b|\d\s?\*|\*\s?\d|\b(?:raw|value|counts?|x|lsb|adc)\s?[/*]\s?\d|\by\s?="
+    r"|\b(?:gain|factor|faktor|facteur|fattore|scale)s?\b[^\d;,]{0,8}(?!1(?![\d.,]))\d|\b(?:times|fois|mal|gange)\b|\b[abm]\s?=\s?[+-]?[\d.]+|\d\s?\*|\*\s?\d|\b(?:raw|value|counts?|x|lsb|adc)\s?[/*]\s?\d|\by\s?="
     rf"|\d\s?{LETTER}+\s?=\s?[+-]?[\d.,]+\s?{LETTER}+"
     r"|(?:/\s?|\bper\s)(?:bit|lsb|count|digit|code|step|adu|div)s?\b|\b(?-i:Q)\d{1,2}(?:\.\d{1,2})?\b",
     re.IGNORECASE,
@@ -60,7 +63,7 @@ UNIT_IN_TEXT = re.compile(
 LEVEL_UNIT = re.compile(r"dB", re.IGNORECASE)
 # Units of force and acceleration that a layout cannot state.
 FOREIGN_UNIT = re.compile(
-    r"[kM]?(?:lbf?s?|pounds?|kips?|dyn(?:es?)?|[tT]onf|ozf|pdl)|Gal|gal|gees?|[mµ]Gal|µN|µg|k?gf|ksi|psi|Vrms|Vpk"
+    r"[kM]?(?:lbf?s?|pounds?|kips?|dyn(?:es?)?|[tT]onf|ozf|pdl)|Gal|gal|gees?|milli-?g|g's|[mµ]Gal|µN|µg|k?gf|ksi|psi|Vrms|Vpk"
 )
 # Units of other things than samples, rates and times.
 HARMLESS_UNIT = re.compile(
@@ -69,14 +72,14 @@ HARMLESS_UNIT = re.compile(
 )
 # Words for what was done to the samples, for what was not, and for what should have been.
 CHANGED = re.compile(
-    r"raw|roh\w{0,6}|brut|unscaled|unskaliert|uncalibrated|unkalibriert|counts?|imperial|customary|invert\w*|invers\w*"
+    r"raw|roh\w{0,6}|brut|unscaled|unskaliert|uncalibrated|unkalibriert|counts?|imperial|customary|inv|invert\w*|invers\w*"
     r"|revers(?:ed|al)|negat(?:e|ed|ive)|flip(?:ped)?|normali[sz]\w*|normier\w*|amplified|verstarkt|amplifie|attenuated"
     r"|multipl(?:y|ied|ier)|divided|resampled|decimated|downsampled|integrated|differentiated|binary|voltage|volts|percent"
 )
-INVERTED = re.compile(r"invert\w*|flip\w*|negat\w*|revers\w*|raw")
+INVERTED = re.compile(r"inv|invert\w*|flip\w*|negat\w*|revers\w*|raw")
 DENIED = re.compile(r"no|not|none|nein|non|nej|ingen|off|false|0|normal|without|ohne|sans|uden|never|kein\w*")
 CONVERTED = re.compile(
-    r"scaled|skaliert|calibrated|kalibriert|converted|umgerechnet|physical|physikalisch|si|etalonne|compensated|applied"
+    r"scaled|skaliert|calibrated|kalibriert|converted|umgerechnet|physical|physikalisch|si|etalonne|compensated|applied|abgezogen|removed|subtracted"
     r"|angewend\w*|applique\w*"
 )
 AFFIRMED = frozenset("yes true ja oui si on 1".split())
@@ -85,7 +88,7 @@ CYRILLIC = str.maketrans(dict(zip("кНмсгВГцдБ", "kNmsgVHzdB")))
 CYRILLIC_LETTER = re.compile(r"[\u0400-\u04ff]")
 # Names that a format defines and its reader uses: start of the abscissa, state of the scaling.
 STANDARD_NAMES = frozenset(("x0", "wfstartoffset", "niscalingstatus", "startoffset"))
-NO_STATEMENT = frozenset(("", "-", "n/a", "na", "?", "unknown", "nan", "null", "undefined", "not set", "off"))
+NO_STATEMENT = frozenset(("", "-", "n/a", "na", "?", "unknown", "nan", "null", "undefined", "not set"))
 DATED = re.compile(r"\d{1,4}[-./]\s?\d{1,2}[-./]\s?\d{1,4}|\d{2}:\d{2}(?::\d{2})?|\d{1,2}[-. ][A-Za-z]{3}[-. ]\d{2,4}")
 
 
@@ -137,6 +140,8 @@ def candidates(name: str, group: str, text: str) -> tuple[Candidate, ...]:
 
 
 def _of_value(name: str, text: str, subject: int) -> Iterator[Candidate]:
+    if DATED.match(text):
+        return
     cells = re.split(r"[;\s]+|,\s?", text)
     if len(cells) > 1 and all(map(BARE_NUMBER.fullmatch, cells)) and not GROUPED_DIGITS.match(text):
         for cell in cells:
@@ -148,9 +153,12 @@ def _of_value(name: str, text: str, subject: int) -> Iterator[Candidate]:
         )
         yield from _full_rates(name, stated)
     else:
+        unread = {piece for part in re.split(r"[;|\n]|,\s", text) if "," in part for piece in part.split(",")}
         for piece in map(str.strip, PIECES.split(text)):
             named = NAMED.fullmatch(piece)
-            if named and STRONG not in (subject_of(named[1]), subject_of(piece[: named.start(2)])):
+            if named and piece in unread and name_meaning(named[1]).certainty == CERTAIN:
+                yield from _of_value("", named[2].strip(), NONE)  # other modules do not separate it
+            elif named and STRONG not in (subject_of(named[1]), subject_of(piece[: named.start(2)])):
                 yield from _of_value(named[1], named[2].strip(), subject_of(named[1]))
             elif piece and not named:
                 yield from _of_text(name, piece, subject)
@@ -180,6 +188,8 @@ def _of_text(name: str, text: str, subject: int) -> Iterator[Candidate]:
         yield from _of_rate(match[0], match[1], RateUnit(False, scale), is_weak=False)
     quantities = (c for match in QUANTITY.finditer(text) for c in _of_quantity(name, match, subject, is_part=True))
     yield from _full_rates(f"{name} {text}", quantities)
+    if (words := text.split())[1:] and len(words) <= MAX_LABEL and len(words[-1]) > 1 and not re.search(r"\d", text):
+        yield from _of_unit(words[-1])  # "siła kN"
     for match in UNIT_IN_TEXT.finditer(text):
         unit = known_unit(match[1])
         if unit and unit.dimension in AMPLITUDES | {"velocity"}:
@@ -205,7 +215,8 @@ def _unit_of_name(name: str) -> str:
     if match := NAME_WITH_UNIT.match(name.strip()):
         return match[2]
     word = re.split(r"[\s_]", name.strip())[-1]
-    return word if word != name.strip() and len(word) > 1 and (rate_unit(word) or known_unit(word)) else ""
+    is_unit = rate_unit(word) or known_unit(word) or HARMLESS_UNIT.fullmatch(word)
+    return word if word != name.strip() and len(word) > 1 and is_unit else ""
 
 
 def _of_number(name: str, number: str, unit: str, subject: int) -> Iterator[Candidate]:
@@ -235,8 +246,13 @@ def _is_count(value: float, name: str) -> bool:
 
 
 def _is_round(value: int) -> bool:
-    """Whether a whole number is one that people choose as a factor or a rate."""
-    return value % 50 == 0 or value % 64 == 0 or value in (10, 16, 20, 25, 32)
+    """Whether a whole number is one that people choose as a factor or a rate, or the largest one of a converter."""
+    return (
+        (value >= MIN_LARGEST and value & (value + 1) == 0)
+        or value % 50 == 0
+        or value % 64 == 0
+        or value in (10, 16, 20, 25, 32)
+    )
 
 
 def _rates_of_number(number: str) -> tuple[Interval, ...]:
@@ -284,7 +300,7 @@ def _of_quantity(name: str, match: re.Match[str], subject: int, is_part: bool = 
     elif subject == NONE:
         amplitude = known_unit(unit)
         if LEVEL_UNIT.fullmatch(unit):
-            yield Candidate(SCALE, match[0])
+            yield Candidate(SCALE_OR_OFFSET, match[0], True)
         elif amplitude and amplitude.dimension in AMPLITUDES:
             yield Candidate(SCALE_OR_OFFSET, match[0], True)
         elif not is_part and amplitude is None and not HARMLESS_UNIT.fullmatch(unit):

@@ -20,10 +20,10 @@ STRONG_STEMS = (
     r"|bedien|medewerker|obsluha|company|firma|project|projekt|customer|phone|address|adress|station"
     r"|bahnhof|strecke|rechner|uuid|guid|imei|checksum|crc32|signature|hash|language|(?<!de)script|program"
     r"|invoice|(?<!rec)order|standard|engineers?$|team|report|sheet|photo|picture|foto|colou?r|farbe"
-    r"|couleur|brightness|volume|fan$|usb|wlan|network|baud|(?<!ex)(?<!re)port$|payload|heap|boot|reset"
+    r"|couleur|brightness|volume|fan$|usb|wlan|network|baud|(?<!ex)(?<!re)port$|payload|heap|boot|(?<!p)reset"
     r"|cable|kabel|connector|pinout"
     # date, time of day, clock quality
-    r"|(?<!up)(?<!up )date(?!n)|datum|fecha|timezone|zeitzone|utc|timestamp|uptime|laufzeit|runtime|created"
+    r"|(?<!up)(?<!up )(?<!op)date(?!n)|datum|fecha|timezone|zeitzone|utc|timestamp|uptime|laufzeit|runtime|created"
     r"|modified|erstellt|due$|year|jahr|ntp|pps\b|drift|jitter|gps|gnss|satell|latit|longit|altit|hdop"
     # environment and supply
     r"|temp(?!s\b|o\b|or)|tepl|humid|feucht|luftf|pression|pressure|druck|wind|rain|regen|pluie|weather"
@@ -35,9 +35,10 @@ STRONG_STEMS = (
     r"|vyhybk|rozjazd|wissel|sporskift|herzst|radlenk|ballast|schotter|tamp|stopf|tracks?$|gleis|voies?$"
     r"|binario|spoor|spor$|nose$|rail ?pads?\b|zwischenl|rail profil|schienenprofil|flangew|bearer|height"
     r"|hohe|hauteur|altura|altezza|width|breite|largeur|diamet|durchmess|thickness|dicke|angle|winkel"
-    r"|neigung|slope of|uberhoh|position|longitude|bolt|screw|torque|cant$|curve|kurve|courbe"
+    r"|neigung|slope of|uberhoh|position|longitude|elevat|azimut|magnitud"
+    r"|depth|profondeur|exposure|aperture|balance|auftrag|percent|bolt|screw|torque|cant$|curve|kurve|courbe"
     # trains and impacts
-    r"|train|zug|treno|wheel|rader|axle|achs|essieu|wagen|carriage|traffic|gewicht des|mass(?!einh|s?tab)"
+    r"|train|zug|treno|wheel|rader|axle|achslast|achszahl|essieu|wagen|carriage|traffic|gewicht des|mass(?!einh|s?tab)"
     r"|masa|massa|hmotn|impact|schlag|schlage|coup$|coups$|golpe|colpo|uderz|uder|slag|tips?$|embout"
     r"|operator|speed of|line speed|velocidad de linea|vitesse des"
     # settings of other things: triggers, filters, windows, limits, analysis
@@ -46,7 +47,7 @@ STRONG_STEMS = (
     r"|umricht|propre|egen(?:sv|frek)|cutoff|cut off|coupure|corner|grenz|notch|alias|butter|bessel|window"
     r"|fenster|fenetre|ventana|finestra|overlap|averag|mittel|moyenn|median|detrend|taper|zero ?pad|fft"
     r"|spectr|spektr|octav|terz|lines?$|band|resonan|risonan|eigenfr|eigensv|natural|modal|mode "
-    r"|damp(?!fung)|stiff|steif|raideur|pinned|coheren|koharen|snr|noise|rausch|bruit|crest|scheitel|kurtos"
+    r"|damp(?!fung|fer)|stiff|steif|raideur|pinned|coheren|koharen|snr|noise|rausch|bruit|crest|scheitel|kurtos"
     r"|skewness|leq$|quality factor|guete|gute|safety|sicherheit|contact|kontakt|rise|anstieg|montee|subida"
     r"|salita|stigtid|hold|timeout|delay|verzog|retard|retraso|laten|pretrig|posttrig|vorlauf|nachlauf"
     r"|vorgesch|retr[yi]|max\w* (?:sampl|rate|freq)|peak (?:time|freq)|alarm|overload|uberst|clip|linearit"
@@ -54,24 +55,25 @@ STRONG_STEMS = (
     r"|sensibil|gevoelig|folsom|citliv|czul|carrier|trager|porteus|portador|modulat|mains|netz|powerline"
     r"|power line|response|excit|anreg|tone$|sweep range|decay|abkling"
     r"|(?:data|file|block|header|byte|index) ?offset|full ?scale(?! ?count)"
-    r"|calibration (?:period|interval|due)|time ?(?:const|offset|scale)|start ?offset|span\b|time ?zone"
+    r"|calibration (?:period|interval|due)|time ?(?:const|offset|scale)|start ?offset|span\b(?! of)|time ?zone"
     r"|zeitkonst|constante de temps|transient|referen|bezug|freq\w* (?:range|resp|limit)"
     r"|frequenz(?:bereich|gang)|gamme de freq|usable|nutzbar|tach|puls|rev$|rotat|drehz|heart|cpu|ram$"
     r"|display|anzeig|plot|screen|zoom|print|map$|karte$|drawing|zeichn"
 )
 STRONG_WORDS = frozenset(
     (
+        "dip iso mag mem pct "
         "id ids sn fw hw ip mac url lat lon alt km pk nr sw os vbat rssi dbm msg task run job hit hits shot "
         "node dof form page room zip age lift hum hz0 hp lp hpf lpf aaf tip hour minute second microsecond "
         "month day days weekday direction richtung sat fix track left right stage phase repetition marker "
-        "trace title location locations lid"
+        "title location locations lid"
     ).split()
 )
 # Words of counts, limits and states, which a word of rate, scale or unit overrules.
 WEAK_STEMS = (
     r"distan|entfern|abstand|afstand|length|lange|longueur|longitud|slot|steckpl|chassis|rack|buffer|puffer"
     r"|memory|speicher|disk|storage|card|hammer|marteau|martill|martell|klad|mlot|geschwind|hastighed"
-    r"|rychlost|predkosc|vitesse|velocid|snelheid|number|anzahl|nombre|numero|numer|antal|aantal|cantidad"
+    r"|rychlost|predkosc|vitesse|velocid|snelheid|number|nummer|anzahl|nombre|numero|numer|antal|aantal|cantidad"
     r"|\bpocet|liczba|count(?!s? per)|samples?$|abtastwert|echantillons|punkter|channels?$|kanale?r?$|canal"
     r"|voies|blocks?$|segment|records?$|averages|bytes?$|bits?$|total|header|index|range|bereich|gamme"
     r"|gama$|campo|rango|upper|lower|limit|level|pegel|niveau|nivel|start|stop|begin|first|last|previous"
@@ -81,13 +83,13 @@ WEAK_STEMS = (
 )
 WEAK_WORDS = frozenset(
     (
-        "peak max min rms mean std var tau label axis quality point points mode q sensor transducer name file "
+        "trace peak max min rms mean std var tau label axis quality point points mode q sensor transducer name file "
         "files path n no of num size pos ch ver ref reference calibration cal calib calibrated interval"
     ).split()
 )
 # What says that a name may speak of a rate, a scale or a unit in spite of a weak word.
 SUSPECT = re.compile(
-    r"factor|faktor|facteur|fattor|coef|koef|scal|skal|echelle|gain|ampli|verst|conv|umrech|corr|korr|calib|kalib|etalon"
+    r"physical|digital|factor|faktor|facteur|fattor|coef|koef|scal|skal|echelle|gain|ampli|verst|conv|umrech|corr|korr|calib|kalib|etalon"
     r"|multip|divi|ratio|slope|freq|frekv|frec|frq|rate|takt|clock|interv|period|step|schritt|shift|norm|polyn|offset|tare"
     r"|zero|remov|null|unit|einheit|format|weight|lsb|digit|quant|per$|speed|spacing|increment|value|time|durat|dauer|per(?:s|p)"
 )

@@ -119,7 +119,7 @@ AXIS_UNIT = re.compile(r"x|t|time|units?|s|secs?|seconds?|[mun]?s|sek(?:unden)?"
 PER = {"per", "pro", "par", "por", "al", "pr", "je"}
 UNIT_PER = re.compile(rf"\s*(?:/|\b(?:{'|'.join(sorted(PER))})\b\.?)\s*")
 SAMPLES = re.compile(
-    r"s|sa|samp|samples?|smpl|pts?|points?|scans?|messwerte?|abtastwerte?|werte?|punkte?|puntos?|punti|malinger"
+    r"s|sa|samp|samples?|smpl|pts?|points?|scans?|messwerte?|abtastwerte?|werte?|punkte?|puntos?|punti|malinger|ech"
     r"|echantillons?|campioni|muestras|count"
 )
 SECONDS = set(
@@ -168,7 +168,7 @@ def rate_unit(text: str) -> RateUnit | None:
     >>> rate_unit("kS/s").scale, rate_unit("µs/pt").is_step, rate_unit("Samples per second").scale, rate_unit("V")
     (Fraction(1000, 1), True, Fraction(1, 1), None)
     """
-    plain = text.strip("[](){} .").casefold().replace("\u03bc", "µ")
+    plain = text.strip("[](){} .").casefold().replace("é", "e").replace("\u03bc", "µ")
     plain = re.sub(r"\s*(?:/|per\s+)\s*(?:ch|chan|channel|kanal)$", "", plain)
     if match := RATE_UNIT.fullmatch(plain):
         return RateUnit(False, PREFIXES[match[1] or ""], plain.endswith("sps"))

@@ -634,9 +634,31 @@ def _check_axes(statements: Sequence[Statement], interval: Interval, where: str,
             raise source.error(where, problem, remedy, reason="wrong_rate")
 
 
+MAX_RATE_RATIO = 64.0  # a frequency or a time that differs more from the rate in use is one of something else
+
+
+def is_near_rate(rate: float, reference: float) -> bool:
+    """Whether a stated frequency may be meant as the sampling rate.
+
+    Parameters
+    ----------
+    rate : float
+        The frequency. [Hz]
+    reference : float
+        Rate in use. [Hz]
+
+    Returns
+    -------
+    bool
+        False if they differ by a factor above ``MAX_RATE_RATIO``.
+    """
+    return reference / MAX_RATE_RATIO <= rate <= reference * MAX_RATE_RATIO
+
+
 def _check_possible(statements: Sequence[Statement], layout: Interval, where: str, source: Source) -> None:
     """ReadError if statements that may be about the rate exist and none of them agrees with the layout."""
     possible = [s for s in statements if s.certainty == POSSIBLY and not s.is_clock]
+    possible = [s for s in possible if any(is_near_rate(i.rate, layout.rate) for i in s.intervals)]
     if possible and not any(s.meaning_near(layout) for s in possible):
         entry = f"{possible[0].text!r} in {possible[0].place}"
         problem = f"{entry} may be a sampling rate, and the layout's is {layout.rate:.9g} Hz"

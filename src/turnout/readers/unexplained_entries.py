@@ -17,18 +17,18 @@ from typing import Any
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.entry_candidates import DURATION, RATE, SCALE, UNIT, Candidate, candidates
+from turnout.readers.entry_candidates import DURATION, RATE, SCALE, SCALE_OR_OFFSET, UNIT, Candidate, candidates
 from turnout.readers.precision import EXACT_PRECISION, around
 from turnout.readers.source import RawRecord, Source
 from turnout.readers.stated_scales import container_of
 from turnout.readers.stated_units import same_unit, with_stated_units
-from turnout.readers.statements import MAX_ENTRIES, Entry
+from turnout.readers.statements import MAX_ENTRIES, PLAIN_TYPES, Entry, is_near_rate
 from turnout.records import RawDescription
 from turnout.units import IGNORED
 
-MAX_RATE_RATIO = 64.0  # a frequency or a time that differs more from the rate in use is one of something else
 MAX_DURATION_RATIO = 8.0  # a time that differs more from the record's duration is one of something else
 DURATION_TOLERANCE = 0.02  # relative
+OVERRULED = (SCALE, SCALE_OR_OFFSET, UNIT)  # by a unit of the layout that ends with "!"
 MAX_LISTED = 5  # entries in one message
 MAX_SHOWN = 40  # characters of a value in a message
 MAX_PROBLEM = 200  # characters of all of them
@@ -71,8 +71,9 @@ class RecordFacts:
         if any(interval.loose.overlaps(rate) for interval in candidate.rates):
             return True
         if np.isnan(candidate.number):  # its unit is known
-            ratios = [interval.rate / self.rate for interval in candidate.rates]
-            return bool(ratios) and not any(1 / MAX_RATE_RATIO <= ratio <= MAX_RATE_RATIO for ratio in ratios)
+            return bool(candidate.rates) and not any(is_near_rate(i.rate, self.rate) for i in candidate.rates)
+        if abs(candidate.number * self.rate / n - 1.0) <= DURATION_TOLERANCE:
+            return True
         counts = (n, n - 1, n * self.n_record, n * self.n_channel, self.n_channel, self.n_record)
         return candidate.text.isdigit() and candidate.number in counts
 
@@ -110,7 +111,7 @@ def unexplained_entries(
         texts = _texts(entry.value, facts.n_sample)
         is_unit_list = len(texts) > 1 and any(same_unit(text, unit) for text in texts for unit in facts.units)
         for candidate in (c for text in texts for c in candidates(entry.name, group, text)):
-            is_overruled = are_units_certain and candidate.statement in (SCALE, UNIT)
+            is_overruled = are_units_certain and candidate.statement in OVERRULED
             is_overruled |= is_unit_list and candidate.statement == UNIT  # of all channels, assigned by the reader
             if not is_overruled and not facts.explains(candidate):
                 yield entry, candidate
@@ -150,9 +151,9 @@ class EntryCheck:
         units = [c.unit for c in description.channels if c.quantity != IGNORED and c.unit]
         self._units = tuple(unit.rstrip("!") for unit in units)
         self._are_certain = any(unit.endswith("!") for unit in units)
-        self._last: tuple[Sequence[Entry], tuple] | None = (
-            None  # entries of the last record, and what they were compared with
-        )
+        self._last: tuple[Sequence[Entry], tuple] | None = None  # entries of the last record, and their key
+        self._key: tuple = ()  # what entries are compared with
+        self._seen: set[tuple] = set()  # entries that agree with it
         self._reported: set[tuple[str, str]] = set()
 
     def without_checked(self, record: RawRecord) -> RawRecord:
@@ -207,10 +208,16 @@ class EntryCheck:
         key = (record.units, rate, n_sample)
         if self._last is not None and self._last[0] is record.entries and self._last[1] == key:
             return None
+        if self._key != key:
+            self._key, self._seen = key, set()
+        new_entries = [entry for entry in record.entries if not entry.is_defined and self._is_new(entry)]
+        if not new_entries:
+            self._last = record.entries, key
+            return None
         facts = RecordFacts(rate, n_sample, len(record.names), n_record, self._units + with_stated_units(record).units)
         unexplained = [
             (entry, candidate)
-            for entry, candidate in unexplained_entries(record.entries, facts, self._are_certain)
+            for entry, candidate in unexplained_entries(new_entries, facts, self._are_certain)
             if not rate_remark or (entry.name not in rate_remark and candidate.text not in rate_remark)
         ]
         for entry, candidate in unexplained:
@@ -220,6 +227,15 @@ class EntryCheck:
         new = [(e, c) for e, c in unexplained if (e.name, c.text) not in self._reported]
         self._reported.update((e.name, c.text) for e, c in new)
         return self._error(where, new, "entry_unknown") if new else None
+
+    def _is_new(self, entry: Entry) -> bool:
+        """Whether an equal entry has not been checked; arrays are always new."""
+        if type(entry.value) not in PLAIN_TYPES:
+            return True
+        key = entry.place, entry.name, entry.value
+        is_new = key not in self._seen
+        self._seen.add(key)
+        return is_new
 
     def _error(self, where: str, unexplained: Sequence[tuple[Entry, Candidate]], reason: str) -> ReadError:
         listed = [f"{entry.name}: {_short_text(entry, candidate)}" for entry, candidate in unexplained[:MAX_LISTED]]
