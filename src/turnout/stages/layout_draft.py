@@ -111,7 +111,9 @@ def _branch_lines(branch: str, group: Sequence[FileContents], labels: Sequence[s
     pattern = '"hammer/{campaign}/{section}_{test}.{ext}"' if is_hammer else '"passages/{time}.{ext}"'
     if is_hammer:
         how = "below the turnout's raw folder; campaign is YYYY-MM-DD"
-        how += "" if named else f"  {DECIDE} file names, such as hammer/2026-05-13/{labels[0]}_1.uff"
+        how += (
+            "" if named else f"  {DECIDE} file names, such as hammer/2026-05-13/{labels[0]}_1{Path(first.path).suffix}"
+        )
     else:
         how = "below the turnout's raw folder; time is YYYYMMDDTHHMMSSZ"
     yield f"{branch}:"
@@ -123,11 +125,12 @@ def _branch_lines(branch: str, group: Sequence[FileContents], labels: Sequence[s
     else:
         yield f"  rate: null  {DECIDE} samples per second [Hz]: the files do not state one rate"
     counts, samples = {c.n_records for c in group}, {n for c in group for n in c.n_samples}
+    if any(len(c.events) > c.n_records for c in group):  # the logger runs on: a record is as long as the test
+        counts, samples = set(), set()
     if is_hammer:
         yield f"  records: {counts.pop() if len(counts) == 1 else 'null'}  # in one file; null: any number"
         yield f"  samples: {samples.pop() if len(samples) == 1 else 'null'}  # per record; null: any number"
-    zone = "the files state it" if first.has_zone else f"{DECIDE} zone of the times in the files, as Europe/Copenhagen"
-    yield f"  time_zone: UTC  {zone if zone.startswith('#') else '# ' + zone}"
+    yield f"  time_zone: UTC  {_zone_comment(first)}"
     names = _channel_names(first.channels)
     if is_hammer:
         forces, responses = first.with_role("force"), first.with_role("response")
@@ -141,6 +144,14 @@ def _branch_lines(branch: str, group: Sequence[FileContents], labels: Sequence[s
     yield "  channels:"
     for index, channel in enumerate(first.channels):
         yield from _channel_lines(branch, names[id(channel)], index, channel, first, labels)
+
+
+def _zone_comment(contents: FileContents) -> str:
+    if contents.starts is None:
+        return "# the files state no time"
+    if contents.has_zone:
+        return "# the files state it"
+    return f"{DECIDE} zone of the times in the files, as Europe/Copenhagen"
 
 
 def _channel_names(channels: Sequence[ChannelContents]) -> dict[int, str]:

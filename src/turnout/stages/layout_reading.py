@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from turnout.config import TurnoutConfig
+from turnout.counts import count_of
 from turnout.errors import ReadError
 from turnout.hammer_test import receptance_of
 from turnout.hammer_test.response_quality import find_track_impacts
@@ -124,7 +125,7 @@ def _contents_text(result: ReadResult) -> str:
     if not records:
         return "no record"
     channels = ", ".join(f"{c.name} [{SI.get(c.quantity, '-')}]" for c in records[0].channels)
-    return f"{len(records)} records of {records[0].n_sample} samples at {records[0].rate:g} Hz, {channels}"
+    return f"{count_of(len(records), 'record')} of {records[0].n_sample} samples at {records[0].rate:g} Hz, {channels}"
 
 
 def _hammer_faults(
@@ -151,7 +152,7 @@ def _hammer_faults(
     low, high = STIFFNESS_BAND
     band_text = f", dynamic stiffness (median of {low:g} to {high:g} Hz)"
     stiffness_text = "" if stiffness is None else f"{band_text} {stiffness / 1e6:.3g} MN/m"
-    return faults, f", {len(impacts)} impacts{stiffness_text}"
+    return faults, f", {count_of(len(impacts), 'impact')}{stiffness_text}"
 
 
 def _impact_numbers(numbers: Sequence[int]) -> str:

@@ -1,6 +1,8 @@
 """`turnout layout new` writes a draft that `turnout check` accepts; `check --read` compares it with the files."""
 
 import re
+from dataclasses import replace
+from datetime import datetime
 
 import numpy as np
 import pytest
@@ -124,7 +126,8 @@ def test_what_the_files_do_not_state_is_to_be_decided_and_is_not_guessed(tmp_pat
     write(hammer_test(), tmp_path / "log 17.npz", "npz", volts)
     draft = layout_draft([file_contents(tmp_path / "log 17.npz")])
     asked = " ".join(decisions(draft))
-    assert "file names" in asked and "sensitivity from the calibration sheet" in asked and "zone" in asked
+    assert "file names, such as hammer/2026-05-13/S1_1.npz" in asked and "from the calibration sheet" in asked
+    assert "zone" not in asked  # the file states no time
     path = configuration / "layouts" / "mine.yaml"
     path.write_text(draft, encoding="utf-8")
     channels = load_layout(path).hammer.descriptions["S1"].channels
@@ -132,6 +135,27 @@ def test_what_the_files_do_not_state_is_to_be_decided_and_is_not_guessed(tmp_pat
         ("AI0", "force", None),
         ("AI1", "acceleration", None),
     ]
+
+
+def test_a_logger_that_runs_on_has_records_of_any_length(tmp_path, configuration):
+    """Four impacts in one record: the next test may last longer. Four records of one impact are a count to check."""
+    tests = hammer_test()
+    samples = np.concatenate([np.pad(r.samples, ((0, 0), (0, 12_000))) for r in tests], axis=1)
+    one = Recording(samples, RATE, tests[0].channels)
+    one = replace(one, started_at=datetime(2026, 5, 13, 9))
+    write([one], tmp_path / "A7_1.h5", "hdf5")
+    draft = layout_draft([file_contents(tmp_path / "A7_1.h5")])
+    assert "records: null" in draft and "samples: null" in draft
+    triggered = layout_draft([file_contents(files(tmp_path)[0])])
+    assert "records: 4" in triggered and "samples: 4000" in triggered
+
+
+def test_a_zone_that_the_file_leaves_out_is_to_be_decided(tmp_path):
+    contents = file_contents(files(tmp_path)[0])
+    at = datetime(2026, 5, 13, 9)
+    without_zone = replace(contents, starts=(at, at), has_zone=False)
+    assert "zone" in " ".join(decisions(layout_draft([without_zone])))
+    assert "zone" not in " ".join(decisions(layout_draft([replace(without_zone, has_zone=True)])))
 
 
 def test_a_file_of_passages_gives_a_layout_of_passages(tmp_path, configuration):
