@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Make the fleet, run the pipeline, print the results.
+    """Make the fleet, run the workflow, print the results.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
         write_clusters("raw")
     if args.only_raw:
         return 0
-    print("2. The pipeline; all of its output is in logs/workflow.log", flush=True)
+    print("2. The workflow; all of its output is in logs/workflow.log", flush=True)
     last = max(campaign_days(args.campaigns))  # list and pages of that day, not of one years later
     code = run_pipeline(cores, "--config", f"day={last}")
     if code == 0:

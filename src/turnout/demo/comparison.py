@@ -1,6 +1,6 @@
-"""Compare what the pipeline found in the demonstration fleet with what is true of it, row by row.
+"""Compare what the workflow found in the demonstration fleet with what is true of it, row by row.
 
-The truth is read here for the first time: the pipeline has no access to it.
+The truth is read here for the first time: the workflow has no access to it.
 """
 
 from __future__ import annotations
