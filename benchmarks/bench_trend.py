@@ -25,11 +25,13 @@ from turnout.trend.forecast import crossing_interval, fit_line, forecast
 SETTINGS = TrendSettings()
 YEAR = 52
 FLEET = 56_000
+SEED_CURVED = 9511
 
 
 def bars():
     """All bars of the trend, in the order of their table."""
     yield from false_alarms()
+    yield from curved_laws()
     yield from rare_campaigns()
     yield from delays()
     yield from detectable()
@@ -67,6 +69,24 @@ def false_alarms(n_part=14, turnouts=500, years=3):
         words = ", ".join(f"{k} {v / weeks:.1f}" for k, v in counts.items())
         yield Bar(f"T1 false alarms a week in {FLEET} charts, phi {phi}", total, 10.0, "", "<=",
                   f"n = {n_part * turnouts * 8} charts x {years} a", words)  # fmt: skip
+
+
+def curved_laws(turnouts=500, years=3):
+    """False alarms over the expected number where the temperature law is curved: sections, and whole turnouts."""
+    promised = 1.0 / SETTINGS.run_length_loss + 1.0 / SETTINGS.run_length_gain
+    for n_section in (8, 2):
+        for curvature in (0.0, -0.002, -0.005):  # %/°C²
+            fleet = Fleet(turnouts=turnouts, sections=n_section, weeks=YEAR * (1 + years), phi=0.2, curvature=curvature)
+            charts = evaluate(modes(fleet, SEED_CURVED), None, SETTINGS)
+            openings = opens_alarm(charts.down_open) | opens_alarm(charts.up_open)
+            is_judged = np.isfinite(charts.z) & ~charts.learning & charts.prepared.baseline.complete[:, None]
+            for name, rows in (("sections", slice(fleet.charts)), ("turnouts", slice(fleet.charts, None))):
+                if not is_judged[rows].any():
+                    continue
+                alarms = (openings & is_judged)[rows].sum()
+                yield Bar(f"T1 false alarms of those promised, law curved by {curvature} %/°C², {name} of {n_section} "
+                          "sections", alarms / (is_judged[rows].sum() * promised), 1.2, "", "<=",
+                          f"n = {is_judged[rows].any(axis=1).sum()} charts, {alarms} alarms")  # fmt: skip
 
 
 def rare_campaigns(turnouts=750, years=5):

@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from turnout.trend.baseline import Baseline, fit_baseline, spread_and_autocorrelation, usual_interval
+from turnout.trend.curvature import curvature_term
 from turnout.trend.epochs import by_epoch, epochs_of, expand_epochs
 from turnout.trend.panel import WHOLE_TURNOUT, Panel
 from turnout.trend.siblings import median_of_group, median_of_siblings
@@ -300,7 +301,7 @@ def turnout_residuals(
     """Residuals of the medians of the turnouts, which show a change common to all sections.
 
     Sections in ``alarmed``, whose own alarm is open, do not count: a large change of one section would shift the median
-    of a few.
+    of a few. A curvature of the temperature law, which the sections share and their siblings remove, is fitted here.
 
     Parameters
     ----------
@@ -327,9 +328,12 @@ def turnout_residuals(
     median, count = median_of_group(sections.centred, settled[:n] & ~alarmed, group)
     young, young_count = median_of_group(sections.centred, np.isfinite(sections.centred), group)
     whole = np.where(count >= need, median, np.where((young_count >= need) & window[n:], young, np.nan))
+    temperature, _ = median_of_group(p.panel.temperature, np.isfinite(p.panel.temperature), group)
+    curve, ratio = curvature_term(whole, temperature, p.baseline.inside[n:], epoch, p.autocorrelation[n:])
+    whole = whole - curve
     level, residual = _centre(whole, window[n:] & np.isfinite(whole), epoch)
     common, _ = median_of_group(slope_variance(p, window[:n]), settled[:n] & ~alarmed, group)
-    sigma = np.sqrt(p.spread[n:, None] ** 2 + np.nan_to_num(common))
+    sigma = np.sqrt((ratio * p.spread[n:])[:, None] ** 2 + np.nan_to_num(common))
     return Residuals(whole, residual, np.where(sigma > 0.0, sigma, np.nan), level, np.zeros_like(level), residual)
 
 
