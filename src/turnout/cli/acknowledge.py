@@ -74,15 +74,15 @@ def run(args: argparse.Namespace) -> int:
     cells = dict(turnout=turnout, section=label, band=args.band, action=action, by=args.by, at=at)
     cells |= dict(until=args.suppress_until, reason=args.reason)
     cells = {column: one_line(content) for column, content in cells.items()}
-    if problems := list(row_problems(cells, configuration.ids, configuration.variants)):
-        raise ConfigErrors([ConfigError("acknowledge", column, *content) for column, *content in problems])
     path = Path(args.configuration) / "acknowledgements.csv"
+    if problems := list(row_problems(cells, configuration.ids, configuration.variants)):
+        raise ConfigErrors([ConfigError(path, column, *content) for column, *content in problems])
     with restore_on_error(path):
         append_csv(path, cells, COLUMNS)
         after = load_configuration(args.configuration)
         if acknowledgement_row(cells) not in after.acknowledgements:
             raise ConfigErrors(after.warnings)
-    print(f"{path}: {action} {args.place} {args.band or 'all its charts'}. It counts from the next run.")
+    print(f"{path}: {action} {args.place} {args.band or 'all bands'}. It counts from the next run.")
     if action == "acknowledge" and _has_no_alarm(args.registry, acknowledgement_row(cells)):
         print(f"Note: no alarm is open there in {args.registry} that was raised by then: nothing on the list changes.")
     return 0

@@ -69,7 +69,9 @@ def open_registry(
         connection.execute("set enable_progress_bar = false")
         ((folder,),) = connection.execute("select folder from registry_info").fetchall()
     except duckdb.Error as error:
-        raise RegistryError(f"{file}: cannot be opened: {str(error).splitlines()[0]}") from error
+        problem = str(error).splitlines()[0].rstrip(".!")
+        remedy = f"Name the folder that holds {DATABASE}. A damaged one is made again by: turnout registry relocate"
+        raise RegistryError(f"{file}: cannot be opened: {problem}. {remedy}.") from error
     if not Path(folder).is_dir():
         connection.close()
         remedy = f"Where it was moved, run once: turnout registry relocate --registry '{file.parent}'"

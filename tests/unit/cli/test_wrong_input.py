@@ -42,6 +42,8 @@ WRONG = {
     "add W:1 tommerup": "turnout is 'W:1'. Write 1 to 64 letters, digits, _ and -, the first a letter or digit.",
     "worklist": "results/registry: there is no registry here. 'turnout nightly' makes one",
     "events W9 tamping 2026-04-02": "config/events.csv, turnout: turnout 'W9' has no row in turnouts.tsv. Allowed: W1.",
+    "acknowledge W1/X --by me --reason x": "config/acknowledgements.csv, section: turnout 'W1' has no section 'X'",
+    "query from_worklist --registry README.md": "not a valid DuckDB database file. Name the folder that holds registry",
     "simulate hammer --section X": "no section 'X' in the track file. Write one of OT, SP",
     "diagnose --turnout W1 --sections X": "W1 has no section X. Write some of OT, SP",
 }
