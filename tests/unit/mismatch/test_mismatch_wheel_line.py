@@ -1,8 +1,11 @@
 """Linear responses in a switch: of the rail that wheels press, over the surface that carries them."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from turnout.mismatch.turnout.sensitivity import _difference
 from turnout.mismatch.turnout.wave_response import rail_receptances
 from turnout.mismatch.turnout.wheel_line import carrying_weights, rows_under_wheels
 from turnout.simulate.blade import Blade, transfer_position
@@ -46,3 +49,24 @@ def test_the_higher_top_carries():
     assert stock[0] > 0.999
     assert blade[2] > 0.999
     assert 0.3 < blade[1] < 0.7
+
+
+@pytest.mark.parametrize(("surfaces", "simulated"), [(SURFACES, [True, False, True]), (SURFACES[:1], [True] * 3)])
+def test_a_quotient_in_a_switch_is_used_again_until_a_common_value_has_moved(surfaces, simulated):
+    """By 0, 0.4 and 0.8 of its prior standard deviation. On plain track it is always computed."""
+    values_seen = []
+
+    def predict_passage(values, terms, aligned):
+        values_seen.append(values["load"])
+        return np.array([values["load"] ** 2])
+
+    predictor = SimpleNamespace(
+        predict_passage=predict_passage, differences={}, site=SimpleNamespace(common_sds={"ballast_stiffness": 0.25}),
+        surface=SimpleNamespace(turnout=SimpleNamespace(surfaces=lambda route: surfaces)),
+    )  # fmt: skip
+    aligned = SimpleNamespace(name="a passage", passage=SimpleNamespace(route="main"))
+    for moved, is_simulated in zip((0.0, 0.1, 0.2), simulated):
+        values, before = {"load": 1.0, "ballast_stiffness": moved}, len(values_seen)
+        column = _difference(predictor, values, (), aligned, np.array([1.0]), "load", 0.1)
+        assert column == pytest.approx(2.1)
+        assert (len(values_seen) > before) == is_simulated

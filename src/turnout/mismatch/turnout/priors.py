@@ -217,7 +217,8 @@ class SimulationPriors:
     node_stride: int = prior(2, "nodes", "every second one is used; in between a force is shared linearly", "numerical")
     node_margin: float = prior(0.3, "m", "of nodes beyond the free waves", "numerical")
     difference_reach: float = prior(
-        1.0, "prior sd", "of a common value, within which a difference quotient in a switch is used again", "numerical")
+        0.5, "prior sd", "of a common value, within which a quotient in a switch is used again; fits stall at 1",
+        "numerical")
     path_step: float = prior(0.01, "m", "of a fine path", "numerical")
     contact_approach: float = prior(
         1e-4, "m", "of wheel and rail under 100 kN: over so much, two tops share the force", "convention")

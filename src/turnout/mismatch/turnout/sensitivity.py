@@ -158,9 +158,7 @@ def _difference(
     if not has_blade(predictor.surface.turnout.surfaces(aligned.passage.route)):
         return _quotient(predictor, values, terms, aligned, predicted, name, step)
     key = (aligned.name, name, tuple(t.name for t in terms if t.effect_type == "path"))
-    of_surface = name in predictor.surface.names
-    sds = predictor.site.common_sds.items()
-    common = {n: values[n] / sd for n, sd in sds if of_surface or n not in predictor.surface.names}
+    common = {n: values[n] / sd for n, sd in predictor.site.common_sds.items()}
     at, column = predictor.differences.get(key, ({}, predicted))
     if any(abs(v - at.get(n, np.inf)) > SIMULATION.difference_reach for n, v in common.items()):
         column = _quotient(predictor, values, terms, aligned, predicted, name, step)
