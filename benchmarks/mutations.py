@@ -231,7 +231,7 @@ def _difference(result: ReadResult, expected: ReadResult, mutation: Mutation, da
         if n_other:
             found["damaged samples"] = f"record {k + 1}: {n_other} samples"
         for name, new, old in _metadata(a, b):
-            if new != old:
+            if not np.array_equal(np.asarray(new, dtype=object), np.asarray(old, dtype=object)):
                 is_inside = _is_damaged(old, new, mutation, data)
                 found["damaged value" if is_inside else "metadata"] = f"record {k + 1}: {name} {new!r}, was {old!r}"
     outcome = max(found, key=OUTCOMES.index)

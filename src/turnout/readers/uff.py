@@ -231,7 +231,7 @@ def _record(
     return RawRecord(
         names=names,
         samples=[s.data for s in sets],
-        entries=(*_entries(sets), *_quantities(sets, names)),
+        entries=(*_entries(sets), *_texts(sets), *_quantities(sets, names)),
         units=tuple(_unit(s.labels[1], stated_units) for s in sets),
         started_at=parse_uff_time(first.ids[2]),
         unread_start=first.ids[2] if is_unread_uff_time(first.ids[2]) else "",
@@ -296,7 +296,13 @@ def _entries(sets: Sequence[UffDataset]) -> Iterator[Entry]:
         for i, text in enumerate(dataset.ids, 1):
             if i != 3 and text not in ("", "NONE"):
                 yield from entries_of_text(text, f"ID line {i}")
-                yield Entry(f"ID line {i}", FREE_TEXT, text)
+
+
+def _texts(sets: Sequence[UffDataset]) -> Iterator[Entry]:
+    """The texts of the ID lines as a whole, each once."""
+    for i, text in dict.fromkeys((i, text) for dataset in sets for i, text in enumerate(dataset.ids, 1)):
+        if i != 3 and text not in ("", "NONE"):
+            yield Entry(f"ID line {i}", FREE_TEXT, text)
 
 
 def _quantities(sets: Sequence[UffDataset], names: Sequence[str]) -> Iterator[Entry]:
