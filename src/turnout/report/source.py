@@ -21,6 +21,7 @@ NEWEST_MODEL = "qualify row_number() over (partition by section_id order by meas
 ID_GIVEN = "turnout_id in (select unnest($turnouts))"
 # Scatter between the campaigns of each section, which needs all campaigns of the fleet: read once, for all turnouts.
 HISTORY = "mode_scatter_read"
+MIN_TRACK = 8  # earlier campaigns from which on a page names a mode off the track; quartiles of fewer are too uncertain
 MAX_QUARANTINE_ROWS = 20  # quarantine rows of one reason that a page shows
 ROWS = {
     "turnouts": f"select * from turnouts where {ID_GIVEN}",
@@ -54,7 +55,8 @@ ROWS = {
     "off_track": f"""
         select turnout_id, section_id, band, measured_at_utc, frequency_hz, frequency_track_hz, damping_ratio,
             damping_track, residue_ratio, n_history
-        from modes_off_track where {ID_GIVEN} order by section_id, measured_at_utc desc, band""",
+        from modes_off_track where {ID_GIVEN} and n_history >= {MIN_TRACK}
+        order by section_id, measured_at_utc desc, band""",
     "receptances": f"select * from receptances_current where {ID_GIVEN} {NEWEST_MODEL}",
     "impacts": f"""
         select i.turnout_id, i.section_id, i.test, i.record, i.status, i.reason, i.detail, i.peak_n
