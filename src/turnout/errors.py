@@ -192,6 +192,8 @@ REASONS = {
     "simulation_failed": "the simulation could not be completed",
     "internal_error": "a fault of this program, with its traceback",
 }
+# Remarks: the recordings are used all the same. No run fails and no turnout is overdue because of one.
+REMARK_REASONS = frozenset(("entry_unknown", "library_warning", "condition_lost"))
 # Reasons that concern a channel of a recording: ``turnout.records.Rejection.channel`` names it.
 CHANNEL_REASONS = frozenset(
     (

@@ -67,6 +67,7 @@ def run(args: argparse.Namespace) -> int:
     """
 
     from turnout.config import load_configuration
+    from turnout.errors import REMARK_REASONS, ReadError
     from turnout.readers import read
     from turnout.stages.common import require_file
     from turnout.stages.layout_reading import grouped_errors
@@ -78,8 +79,11 @@ def run(args: argparse.Namespace) -> int:
     path = require_file(args.file).resolve()  # a link may lead anywhere
     settings = turnout.settings["passage"]
     result = read(path.name, path.parent, description, settings.longest)
-    for problem in grouped_errors(result.errors):
+    remarks = [e for e in result.errors if isinstance(e, ReadError) and e.reason in REMARK_REASONS]
+    for problem in grouped_errors([error for error in result.errors if error not in remarks]):
         print(f"Not used: {problem}")
+    for problem in grouped_errors(remarks):
+        print(f"Note: {problem}")
     _, context = passage_context(turnout.id, turnout.settings, args.work)
     has_train = False
     records: list[Recording | LongRecording] = [*result.recordings, *result.long_recordings]

@@ -8,7 +8,7 @@ from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from importlib.resources import files
 
-from turnout.errors import REASONS, RegistryError
+from turnout.errors import REASONS, REMARK_REASONS, RegistryError
 from turnout.registry.ids import content_id
 from turnout.registry.schema import literal, tables
 
@@ -72,9 +72,11 @@ def sort_by_needs(texts: dict[str, str]) -> dict[str, str]:
 
 
 def reasons_sql() -> str:
-    """SQL of the view ``reasons``: every reason code with its meaning."""
-    values = ", ".join(f"({literal(code)}, {literal(meaning)})" for code, meaning in REASONS.items())
-    return f"create or replace view reasons as select * from (values {values}) as r(reason_code, meaning)"
+    """SQL of the view ``reasons``: every reason code with its meaning, and whether it is a remark."""
+    values = ", ".join(
+        f"({literal(code)}, {literal(meaning)}, {code in REMARK_REASONS})" for code, meaning in REASONS.items()
+    )
+    return f"create or replace view reasons as select * from (values {values}) as r(reason_code, meaning, is_remark)"
 
 
 @cache

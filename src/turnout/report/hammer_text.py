@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.errors import REASONS
+from turnout.errors import REASONS, REMARK_REASONS
 from turnout.hammer_test.dynamic_stiffness import dynamic_stiffness
 from turnout.report.formatting import with_interval
 from turnout.report.pages.turnout import BANDS, PANELS
@@ -180,7 +180,7 @@ def _channels(hammer: HammerConfig, section: str) -> str:
 def _quarantine_lines(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """A line for each file or record that is not used; records of a file with the same problem share one.
 
-    A file with another time in its name than inside is used, and has a line, too.
+    A file with another time in its name than inside is used and has a line, too, as any with a remark.
     """
     groups: dict[tuple, list] = {}
     for row in rows:
@@ -188,7 +188,7 @@ def _quarantine_lines(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     lines = []
     for (path, reason, finding, remedy), positions in groups.items():
         more = f" ({len(positions)} such places, the last: {positions[-1]})" if len(positions) > 1 else ""
-        what = "note" if reason == "wrong_time" else "not used"
+        what = "note" if reason == "wrong_time" or reason in REMARK_REASONS else "not used"
         lines.append(_line(what, f"{path}, {positions[0]}: {finding}{more}. {remedy}."))
     return lines
 

@@ -65,13 +65,15 @@ ROWS = {
             select section_id, max(campaign_id) as campaign_id from impacts_current where {ID_GIVEN} group by section_id
         ) newest using (section_id, campaign_id)
         order by i.section_id, i.test, i.record""",
-    # of each reason the newest by name, because a sensor may be dead for years
+    # of each reason the newest by name, because a sensor may be dead for years; of a remark on the layout one for all
     "quarantine": f"""
         select *, count(*) over (partition by turnout_id, kind, reason_code) as n_alike
         from quarantine_open where {ID_GIVEN}
         qualify row_number() over (
             partition by turnout_id, kind, reason_code order by path desc, record desc
-        ) <= {MAX_QUARANTINE_ROWS}
+        ) <= {MAX_QUARANTINE_ROWS} and (reason_code <> 'entry_unknown' or row_number() over (
+            partition by turnout_id, kind, reason_code, remedy order by path desc, record desc
+        ) = 1)
         order by path, record""",
     "charts": f"""
         select turnout_id, section_id, band, measured_at_utc, expected_low_hz, expected_high_hz, state, deviation_pct
@@ -99,7 +101,9 @@ TURNOUTS = f"""
     rejected as (
         select turnout_id, count(*) as n_rejected from impacts_current where status = 'rejected' group by turnout_id
     ),
-    quarantined as (select turnout_id, count(*) as n_quarantined from quarantine_open group by turnout_id)
+    quarantined as (
+        select turnout_id, count(*) as n_quarantined from quarantine_open where not is_remark group by turnout_id
+    )
     select t.*, m.latest, coalesce(m.n_models, 0) as n_models, coalesce(s.n_sections, 0) as n_sections,
         coalesce(r.n_rejected, 0) as n_rejected, coalesce(q.n_quarantined, 0) as n_quarantined
     from turnouts t left join models m using (turnout_id) left join sections s using (turnout_id)
@@ -110,7 +114,7 @@ REASONS = """
     select reason, sum(impacts) as impacts, sum(rows) as rows from (
         select reason, count(*) as impacts, 0 as rows from impacts_current where status = 'rejected' group by reason
         union all
-        select reason_code, 0, count(*) from quarantine_open group by reason_code
+        select reason_code, 0, count(*) from quarantine_open where not is_remark group by reason_code
     ) group by reason order by sum(impacts) + sum(rows) desc, reason
 """
 # How much the stiffness (the square of a frequency) changes in ten years at the present drift, at least, in per cent.

@@ -88,7 +88,11 @@ def read_or_quarantine(
     except ReadError as error:
         quarantine.append(quarantine_row(error, base, unit_kind, "read"))
         return None
+    # one remark on the layout is enough: equal entries are in all files of a unit
+    remarked = {row["remedy"] for row in quarantine if row["reason_code"] == "entry_unknown"}
     for damage in cast("tuple[ReadError, ...]", result.errors):
+        if damage.reason == "entry_unknown" and damage.remedy in remarked:
+            continue
         record = getattr(damage, "record", None)
         quarantine.append(quarantine_row(damage, base, unit_kind, "read", record, result.sha256[:32]))
     for earlier_path, recording_id in (ids_by_path or {}).items():

@@ -12,7 +12,7 @@ from scipy import signal
 
 from turnout.config import load_configuration, with_raw
 from turnout.constants import KMH
-from turnout.errors import ConfigError, SimulationError
+from turnout.errors import REMARK_REASONS, ConfigError, ReadError, SimulationError
 from turnout.passage.analysis import analyse
 from turnout.passage.scores import fit_percent
 from turnout.passage.train_type import UNKNOWN
@@ -146,7 +146,8 @@ def _recorded_train(path: Path, turnout: TurnoutConfig) -> tuple[Recording, Pass
     settings = turnout.settings["passage"]
     result = read(path.name, path.resolve().parent, turnout.require_passages().description, settings.longest)
     for error in result.errors:
-        raise error
+        if not (isinstance(error, ReadError) and error.reason in REMARK_REASONS):
+            raise error
     if not result.recordings:
         raise ConfigError(str(path), "recording", "no passage that fits into memory", "Cut the file at the train")
     recording = result.recordings[0]

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from turnout.config import TurnoutConfig
-from turnout.errors import PartlyComputed, ReadError, is_infrastructure
+from turnout.errors import REMARK_REASONS, PartlyComputed, ReadError, is_infrastructure
 from turnout.records import Unit
 from turnout.registry.ids import content_id
 from turnout.workflow.batches import UnitResult, encode
@@ -166,7 +166,7 @@ def _compute(
 
 
 def status_of(tables: dict[str, list[dict]]) -> str:
-    """Status of a unit from its rows: "ok", "partly", "quarantined" or "internal_error".
+    """Status of a unit from its rows: "ok", "partly", "quarantined" or "internal_error"; remarks do not count.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def status_of(tables: dict[str, list[dict]]) -> str:
     >>> status_of({"quarantine": [{"reason_code": "truncated"}], "recordings": [{}]})
     'partly'
     """
-    reasons = {row.get("reason_code") for row in tables.get("quarantine", ())}
+    reasons = {row.get("reason_code") for row in tables.get("quarantine", ())} - REMARK_REASONS
     if "internal_error" in reasons:
         return "internal_error"
     if not reasons:

@@ -55,6 +55,14 @@ def test_a_section_whose_newest_test_failed_says_since_when_and_a_good_one_later
     assert bench.ask(LIST) == []
 
 
+@pytest.mark.parametrize(("reason", "n"), [("truncated", 1), ("entry_unknown", 0), ("condition_lost", 0)])
+def test_a_remark_on_a_recording_that_is_used_is_no_failure(bench, reason, n):
+    bench.register(hammer_result(), quarantined_result(day="2026-03-09", reason=reason))
+    assert len(bench.ask(LIST)) == n
+    assert bench.ask("select count(*) from rejected where what = 'recording'") == [(n,)]
+    assert bench.ask("select reason_code, is_remark from quarantine_open") == [(reason, n == 0)]
+
+
 def test_sections_that_failed_alike_are_one_row_and_the_view_of_a_registry_without_a_model_has_it(bench):
     bench.register(quarantined_result(section="A1"), quarantined_result(section="A2"))
     assert [row[1] for row in bench.ask(LIST)] == ["A1, A2"]

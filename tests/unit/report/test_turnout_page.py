@@ -70,11 +70,16 @@ def test_a_dead_sensor_of_years_does_not_bury_what_else_is_in_quarantine():
             select 't' as turnout_id, 'passage' as kind, printf('t/passages/%05d.tdms', i) as path, 0 as record,
                 'dead_channel' as reason_code, 'A7' as place, 'all 0' as found, 'Look at it' as remedy
             from range(1000) r(i)
+            union all select 't', 'passage', printf('t/passages/%05d.tdms', i), 0, 'entry_unknown', 'record 1',
+                printf('Hub: %d', i), if(i % 2 = 0, 'name it: Hub', 'name it: Lot') from range(1000) r(i)
             union all select 't', 'hammer', 't/hammer/A7.uff', null, 'truncated', 'record 3', 'ends early', 'Copy it'
             union all select 'u', 'hammer', 'u/hammer/A7.uff', null, 'truncated', 'record 3', 'ends early', 'Copy it'
         """)
         found = con.execute(ROWS["quarantine"], {"turnouts": ["t"]})
         rows = [dict(zip([d[0] for d in found.description], row)) for row in found.fetchall()]
+    remarks = [row for row in rows if row["reason_code"] == "entry_unknown"]
+    assert [row["remedy"][-3:] for row in remarks] == ["Hub", "Lot"] and remarks[0]["n_alike"] == 1000
+    rows = [row for row in rows if row not in remarks]
     text = page(quarantine=rows)
     assert "t/passages/00999.tdms" in text and "t/hammer/A7.uff" in text and text.count("00999.tdms") == 1
     shown = text.count("<td>dead_channel</td>")

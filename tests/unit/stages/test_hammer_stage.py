@@ -5,6 +5,7 @@ from collections import Counter
 from dataclasses import replace
 from datetime import date, datetime
 
+import h5py
 import numpy as np
 import pytest
 from benchmarks.published.models import published_model
@@ -233,6 +234,17 @@ def test_a_file_that_no_reader_foresaw_costs_itself_alone(tmp_path):
     result = compute_guarded(hammer_unit, unit, turnout, tmp_path, "key", "1", False)
     assert result.status == "partly" and len(result.tables["impacts"]) == 20
     assert {q["path"][-8:] for q in result.tables["quarantine"]} == {"A7_3.csv"}
+
+
+def test_an_unexplained_entry_of_all_files_is_one_remark_and_the_unit_is_sound(tmp_path):
+    unit, turnout, _ = lay_out(tmp_path)
+    for path, *_ in unit.files:
+        with h5py.File(tmp_path / path, "a") as file:
+            file.attrs["Hub"] = 2.5
+    unit = scan(turnout, tmp_path).units[0]
+    result = compute_guarded(hammer_unit, unit, turnout, tmp_path, "key", "1", False)
+    assert [q["reason_code"] for q in result.tables["quarantine"]] == ["entry_unknown"]
+    assert result.status == "ok" and len(result.tables["impacts"]) == 30
 
 
 def test_the_decay_of_an_exponential_window_and_the_level_of_the_gate_stand_beside_a_receptance(tmp_path):

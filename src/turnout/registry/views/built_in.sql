@@ -3,6 +3,7 @@
 -- columns of reasons
 -- reason_code | varchar | | code of a rejection or a quarantine row
 -- meaning | varchar | | what it means
+-- is_remark | boolean | | whether recordings with it are used all the same
 
 -- columns of registry_info
 -- generation | bigint | | number of the last commit

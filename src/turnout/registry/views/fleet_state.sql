@@ -11,7 +11,7 @@ passed as (
     select turnout_id, count(*) as n_passages, max(passed_at_utc) as last_passage_utc
     from passages_current where status <> 'rejected' group by turnout_id
 ),
-waiting as (select turnout_id, count(*) as n_quarantine from quarantine_open group by turnout_id),
+waiting as (select turnout_id, count(*) as n_quarantine from quarantine_open where not is_remark group by turnout_id),
 work as (select turnout_id, max(event_at_utc) as last_event_utc, arg_max(kind, event_at_utc) as last_event
     from events where event_at_utc < published_at() + interval 1 day group by turnout_id)  -- not what is only planned
 select

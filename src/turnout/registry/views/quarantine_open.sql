@@ -2,7 +2,7 @@
 -- have no row in turnouts.tsv any more.
 -- needs: superseded, in_service
 create or replace view quarantine_open as
-select q.*, r.meaning as reason
+select q.*, r.meaning as reason, coalesce(r.is_remark, false) as is_remark
 from quarantine q anti join superseded s on q.quarantine_id = s.old_id
     left join reasons r using (reason_code)
 where coalesce(in_service(q.turnout_id), true);
@@ -26,3 +26,4 @@ where coalesce(in_service(q.turnout_id), true);
 -- result_id | varchar | | result (unit and key) that it came with
 -- run_id | varchar | | content id of the batch
 -- reason | varchar | | what the code means
+-- is_remark | boolean | | whether the recording is used all the same

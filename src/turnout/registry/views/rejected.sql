@@ -20,7 +20,7 @@ with everything as (
     select
         'recording', quarantine_id, turnout_id, section_id, null, reason_code, measured_value, threshold,
         path || coalesce(', ' || place, '') || ': ' || coalesce(found, '')
-    from quarantine_open
+    from quarantine_open where not is_remark
 )
 select e.*, r.meaning as reason
 from everything e left join reasons r using (reason_code);

@@ -14,7 +14,7 @@ with unread as (
     from quarantine_open q
     join results r using (result_id)  -- a row that is found again keeps the result that brought it first
     left join campaigns c on c.campaign_id = q.turnout_id || '/' || split_part(r.label, '/', -1)
-    where q.kind in ('hammer', 'passage')
+    where q.kind in ('hammer', 'passage') and not q.is_remark
 ),
 tried as not materialized (
     select
