@@ -16,7 +16,7 @@ import numpy as np
 from turnout.errors import ReadError
 from turnout.readers import stated_scales
 from turnout.readers.lazy import BlockReader, ChannelStatistics, Column, channel_error
-from turnout.readers.lost_entries import lost_entry_errors
+from turnout.readers.lost_entries import is_single, lost_entry_errors
 from turnout.readers.rate_words import CERTAIN, is_rate_name, rate_unit
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
 from turnout.readers.stated_quantities import contradicting_quantity, quantity_entries
@@ -562,7 +562,7 @@ def _recording(
         "source": source.name,
         "record": k,
         "started_at": started_at,
-        "conditions": MappingProxyType(dict(record.conditions)),
+        "conditions": MappingProxyType({n: v for n, v in record.conditions.items() if is_single(v)}),
     }
     of_rate = rate_remark(statements, rate, where, source)
     is_rate_stated = any(s.certainty == CERTAIN and s.intervals for s in statements)

@@ -7,6 +7,9 @@ entry that most records of a file have and some lack, and a name that nearly equ
 import re
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
+from typing import Any
+
+import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.named_arrays import START_NAMES
@@ -35,6 +38,12 @@ def lost_entry_errors(records: Sequence[RawRecord | ReadError], source: Source) 
     read = [(k, record, _names(record)) for k, record in enumerate(records) if isinstance(record, RawRecord)]
     if not read:
         return
+    arrays: dict[str, int] = {}  # first record with one
+    for k, record, _ in read:
+        for name, value in record.conditions.items():
+            if not is_single(value) and arrays.setdefault(name, k) == k:
+                problem = f"its {name} is {len(value)} different values, and not one for each record"
+                yield _error(f"record {k + 1}", name, problem, source)
     everywhere = set.intersection(*(names for _, _, names in read))
     reported = set()
     for name in sorted(set.union(*(names for _, _, names in read)) - everywhere):
@@ -52,6 +61,22 @@ def lost_entry_errors(records: Sequence[RawRecord | ReadError], source: Source) 
                 f"{entry.name[:60]!r} in {entry.place[:80]} is nearly the name of the {condition}, which is missing"
             )
             yield _error("the file", condition, problem, source)
+
+
+def is_single(value: Any) -> bool:
+    """Whether a condition is a number or a text, and no array or list.
+
+    Parameters
+    ----------
+    value : any
+        Value of a condition.
+
+    Returns
+    -------
+    bool
+        False for a condition that is reported and not used.
+    """
+    return not isinstance(value, (list, tuple, np.ndarray))
 
 
 CONTROL_CHARACTER = re.compile(rb"[\x00-\x08\x0e-\x19\x1b-\x1f]")

@@ -372,8 +372,43 @@ class Metadata:
         dict of str to any
             Name -> value of the conditions that are stored with the samples of record ``k``.
         """
-        values = {name: self.record_value((name, name.replace("_", " ")), k, n) for name in CONDITIONS}
+        values = {name: single_value(self.get((name, name.replace("_", " "))), k, n) for name in CONDITIONS}
         return {name: value for name, value in values.items() if value is not None}
+
+
+def single_value(value: Any, k: int, n: int) -> Any:
+    """The value of record ``k`` of an entry that a typed format may store as an array or a list.
+
+    Parameters
+    ----------
+    value : any
+        The entry as a library returns it.
+    k : int
+        Number of the record, from 0.
+    n : int
+        Number of records.
+
+    Returns
+    -------
+    any
+        A number, a text or None; of several different values that are not one per record the array or the list itself;
+        None for a group and an array that stays in the file.
+
+    Examples
+    --------
+    >>> [single_value(v, 1, 2) for v in (12.5, [12.5], [12.5, 13.0], [1, 2, 3], {"side": "left"})]
+    [12.5, 12.5, 13.0, [1, 2, 3], None]
+    """
+    if isinstance(value, np.generic):
+        return value.item() if value.dtype.kind != "M" else value
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        return single_value(value[()], k, n)
+    if isinstance(value, (list, tuple, np.ndarray)):
+        values = value.ravel() if isinstance(value, np.ndarray) else value
+        if len(values) == n or (len(values) and all(np.array_equal(v, values[0]) for v in values[1:])):
+            return single_value(values[k if len(values) == n else 0], k, 1)
+        return value if len(values) else None
+    return None if isinstance(value, (Mapping, *ARRAYS)) else value
 
 
 def _is_nested_text(value: Any) -> bool:

@@ -18,7 +18,7 @@ import numpy as np
 from turnout.errors import ReadError
 from turnout.readers.claims import check_hdf5
 from turnout.readers.lazy import is_large, lazy_array, open_hdf5
-from turnout.readers.named_arrays import Metadata
+from turnout.readers.named_arrays import Metadata, single_value
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
 from turnout.readers.stated_scales import scale_text
 from turnout.readers.statements import entries_of, rate_entry
@@ -163,7 +163,7 @@ def _record(data_source: DataSource, source: Source) -> RawRecord | None:
         entries=(*rates, *entries_of(_plain_attributes(places), "")),
         units=tuple(_text(attributes.get("Unit", "")) for attributes in of_data.values()),
         started_at=EPOCH + timedelta(microseconds=int(stamps[0]) // 1000),
-        conditions={name: _plain(notes[name]) for name in CONDITIONS if name in notes},
+        conditions={name: single_value(_plain(notes[name]), 0, 1) for name in CONDITIONS if name in notes},
         time=time,
         is_time_in_seconds=True,
         aliases=tuple((name,) for name in channels),
@@ -182,4 +182,4 @@ def _plain_attributes(places: dict[str, dict[str, Any]]) -> dict[str, dict[str, 
 
 def _plain(value: Any) -> Any:
     is_number = isinstance(value, np.generic) and not isinstance(value, np.bytes_)
-    return value.item() if is_number else _text(value)
+    return value.item() if is_number else value if isinstance(value, np.ndarray) else _text(value)
