@@ -64,7 +64,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--budget", type=float, metavar="MINUTES", help="stop after so many minutes; a next run continues"
     )
     parser.add_argument("--accept", action="store_true", help="write the named effect into the turnout's track file")
-    parser.add_argument("--finding", metavar="ID", help="finding to accept, if several are named")
+    parser.add_argument(
+        "--finding",
+        metavar="ID",
+        help="finding to accept, if several are named, or the sections of a change in the worklist",
+    )
     parser.add_argument("--anyway", action="store_true", help="accept a finding that is not named with grade A or B")
 
 
@@ -123,9 +127,13 @@ def _accept(args: argparse.Namespace, results: Results) -> int:
     """Write the finding into the track file and print the change."""
     from turnout.stages.accept_finding import accept
 
-    path, words = accept(results.finding(args.finding), args.configuration, args.turnout, args.track, args.anyway)
+    finding = results.finding(args.finding)
+    path, words = accept(finding, args.configuration, args.turnout, args.track, args.anyway)
     print(f"{path}: {words}")
-    print("From now on the simulation contains it; each visit estimates it again, see mismatch_parameters.")
+    if "onset_by_utc" in finding:
+        print("From now on the calibrated model contains it; what changes after it is told.")
+    else:
+        print("From now on the simulation contains it; each visit estimates it again, see mismatch_parameters.")
     return 0
 
 

@@ -17,7 +17,8 @@ from turnout.files import write_text
 from turnout.physics import TERMS, effects_by_name
 from turnout.simulate import load_track
 from turnout.simulate.turnout_track import TurnoutTrack
-from turnout.stages.accepted_effects import SUPPORT_KEYS, accepted_of
+from turnout.stages.accepted_changes import change_text, changes_of, check_change
+from turnout.stages.accepted_effects import SINCE, SUPPORT_KEYS, accepted_of
 from turnout.stages.mismatch_inputs import track_file
 
 # Units for values below 0.1 in SI units: SI unit -> (unit, its size in the SI unit)
@@ -42,7 +43,7 @@ def accept(
     Parameters
     ----------
     finding : mapping of str to any
-        Row of ``mismatch_findings``.
+        Row of ``mismatch_findings`` or ``change_findings``.
     config : str or Path
         Folder of the configuration.
     turnout_id : str
@@ -61,17 +62,24 @@ def accept(
     ------
     SimulationError
         The verdict is not "named" with grade A or B and ``anyway`` is not set, the finding has no term, or the term
-        belongs to a wheelset. The file is then unchanged.
+        belongs to a wheelset. Of a change: it is not named, or has no position. The file is then unchanged.
     """
     turnout = load_configuration(config).turnout(turnout_id)
-    _check_acceptable(finding, turnout_id, anyway)
-    terms = json.loads(finding["term_json"])
+    is_change = "onset_by_utc" in finding
+    if is_change:
+        check_change(finding, anyway)
+    else:
+        _check_acceptable(finding, turnout_id, anyway)
     path = track_file(turnout, track)
     if path.stem != turnout_id and track is None:
         text, path = FILE_HEADER.format(layout=path.stem), path.with_name(f"{turnout_id}.yaml")
     else:
         text = path.read_text(encoding="utf-8")
     current_track = load_track(str(track_file(turnout, track)), folder=path.parent)
+    if is_change:
+        _write(path, with_entry(text, change_text(finding)))
+        return path, f"{finding['sentence']}: accepted"
+    terms = json.loads(finding["term_json"])
     for term in terms:
         text = with_entry(text, entry_text(term, finding, current_track))
     _write(path, text)
@@ -109,6 +117,7 @@ def _write(path: Path, text: str) -> None:
     try:
         write_text(trial, text)
         track = load_track(str(trial), folder=path.parent)
+        changes_of(track.terms)
         for entry in accepted_of(track.terms):
             term = entry.term(track.track)
             if term is None:
@@ -223,7 +232,7 @@ def _is_same_effect(first: tuple[str, ...], second: tuple[str, ...]) -> bool:
 
 def _identity(entry: str) -> tuple[str, ...]:
     """Identity of an entry: route, effect, and position, sensor or train."""
-    names = ("route", "term", *SUPPORT_KEYS, *POSITION_FIELDS, "channel_name", "train")
+    names = ("route", "term", *SUPPORT_KEYS, *POSITION_FIELDS, "channel_name", "train", SINCE)
     values = []
     for name in names:
         match = re.search(rf"^[ -]*{name}: *(?:{{ *value: *([^,}}]+)|([^\n#]+))", entry, re.MULTILINE)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 SUPPORT_KEYS = SUPPORT_FIELDS  # a file gives the support's position [m] instead of its number
 ENTRY_METADATA = ("term", "accepted", "finding", "route")
+SINCE = "since"  # key of an entry that is a change of the calibrated model, see ``accepted_changes``
 ROUTES = ("main", "diverging")
 MAX_SUPPORT_DISTANCE = 0.35  # m: positions closer than this are the same support
 
@@ -140,7 +141,7 @@ class AcceptedEffect:
 
 
 def accepted_of(entries: Iterable[ParameterSet]) -> tuple[AcceptedEffect, ...]:
-    """Accepted effects of ``TurnoutTrack.terms``.
+    """Accepted effects of ``TurnoutTrack.terms``, without its accepted changes.
 
     Parameters
     ----------
@@ -156,7 +157,7 @@ def accepted_of(entries: Iterable[ParameterSet]) -> tuple[AcceptedEffect, ...]:
     SimulationError
         An entry has an unknown effect, field or route, or lacks a field.
     """
-    return tuple(_effect_of_entry(entry) for entry in entries)
+    return tuple(_effect_of_entry(entry) for entry in entries if SINCE not in entry)
 
 
 def _effect_of_entry(entry: ParameterSet) -> AcceptedEffect:

@@ -11,7 +11,6 @@ import json
 import sys
 from collections.abc import Collection, Iterable, Mapping, MutableMapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -52,18 +51,20 @@ from turnout.mismatch.turnout.calibration import (
 )
 from turnout.mismatch.turnout.further_passages import names_beyond, with_reserved_passages
 from turnout.mismatch.turnout.nose_starts import fit_from_nose_positions
+from turnout.stages.accepted_changes import change_events, changes_of, without_accepted
 from turnout.stages.checkpoint import SUFFIX, read_value, write_value
 from turnout.stages.mismatch_groups import groups, unit_of, visits
 from turnout.stages.mismatch_inputs import digest_of_model, gather_inputs, mismatch_context, track_of
+from turnout.stages.visit_time import DAYS_PER_YEAR, day_of, years_of
 from turnout.workflow.scan import scan
 
 if TYPE_CHECKING:
     from turnout.config.turnout import TurnoutConfig
     from turnout.records import Unit
+    from turnout.stages.accepted_changes import AcceptedChange
     from turnout.stages.mismatch_groups import Group
 
 FOLDER = "calibrated-model"
-DAYS_PER_YEAR = 365.25
 USED_ANSWERS = ("none", "")  # "": not diagnosed; a visit with an open finding changes nothing until it is accepted
 # Groups of parameters that a kind of work makes uncertain again
 OPENED = {
@@ -259,21 +260,6 @@ def read_visits(folder: Path, turnout_id: str, versions: Mapping[str, Mapping[st
     return sorted(stored, key=lambda s: (s.visit, s.sections))
 
 
-def years_of(visit: str) -> float:
-    """Time of a visit in years; of a month its middle.
-
-    Parameters
-    ----------
-    visit : str
-        YYYY-MM-DD or YYYY-MM.
-
-    Returns
-    -------
-    float
-    """
-    return date.fromisoformat(visit if len(visit) > 7 else f"{visit}-15").toordinal() / DAYS_PER_YEAR
-
-
 def visits_of(stored: Iterable[StoredVisit]) -> list[VisitInformation]:
     """One ``VisitInformation`` per visit, of all of its groups of sections."""
     members: dict[str, list[StoredVisit]] = {}
@@ -318,13 +304,22 @@ def parameters_of(stored: Iterable[StoredVisit]) -> tuple[StateParameter, ...]:
     return tuple(by_name.values())
 
 
-def events_of(turnout: TurnoutConfig, parameters: Sequence[StateParameter]) -> list[Event]:
-    """Recorded work on the turnout, as parameters that it makes as uncertain as the file.
+def events_of(
+    turnout: TurnoutConfig,
+    parameters: Sequence[StateParameter],
+    changes: Sequence[AcceptedChange] = (),
+    visits_used: Sequence[VisitInformation] = (),
+) -> list[Event]:
+    """Recorded work on the turnout, as parameters that it makes as uncertain as the file, and accepted changes.
 
     Parameters
     ----------
     turnout : TurnoutConfig
     parameters : sequence of StateParameter
+    changes : sequence of AcceptedChange
+        Of its track file.
+    visits_used : sequence of VisitInformation
+        Visits between which accepted changes lie.
 
     Returns
     -------
@@ -346,7 +341,8 @@ def events_of(turnout: TurnoutConfig, parameters: Sequence[StateParameter]) -> l
         common = OPENED_COMMON.get(event.kind, ()) if at is None else ()
         opened |= {p.name: p.sd for p in parameters if p.name.split(" ")[-1] in common}
         events.append(Event(event.at.date().toordinal() / DAYS_PER_YEAR, opened))
-    return events
+    candidates = change_candidates(parameters, dip_directions(parameters)) if changes else []
+    return events + change_events(changes, parameters, candidates, visits_used)
 
 
 def state_rows(
@@ -385,7 +381,9 @@ def state_rows(
     stored = read_visits(folder, turnout.id, earlier | {about["visit"]: about["version"]})
     parameters = parameters_of(stored)
     visits_used = visits_of(_without_findings(stored))
-    events = [*events_of(turnout, parameters), *file_errors(parameters, dip_directions(parameters))]
+    changes = changes_of(case.campaign.turnout.terms)
+    events = [*events_of(turnout, parameters, changes, visits_used)]
+    events += file_errors(parameters, dip_directions(parameters))
     history = estimate_history(parameters, visits_used, events)
     belief, n = history.belief, sum(s.n_recordings for s in history.used_steps)
     sds = track_sds(belief, parameters)
@@ -465,16 +463,16 @@ def calibrate_turnout(
         )
     parameters = parameters_of(stored)
     directions = dip_directions(parameters)
-    events = [*events_of(turnout, parameters), *file_errors(parameters, directions)]
-    history = estimate_history(parameters, visits_of(_without_findings(stored)), events)
     informed = visits_of(stored)
+    accepted = changes_of(track_of(turnout, track)[0].terms)
+    events = [*events_of(turnout, parameters, accepted, informed), *file_errors(parameters, directions)]
+    history = estimate_history(parameters, visits_of(_without_findings(stored)), events)
     changes = estimate_history(parameters, informed, events, repeats_between_visits=False, accepted=None)
+    settings = turnout.settings["mismatch"]
+    candidates = change_candidates(parameters, directions, without)
+    against_file = without_accepted(accepted, parameters, events, candidates)
     deviations = deviations_from_file(
-        history.belief, parameters, dict(CALIBRATION.least_sizes), intolerable=INTOLERABLE
-    )
-    candidates, settings = (
-        change_candidates(parameters, directions, without),
-        turnout.settings["mismatch"],
+        history.belief, against_file[0], dict(CALIBRATION.least_sizes), intolerable=INTOLERABLE
     )
     answers = answers_after_visits(
         parameters,
@@ -484,6 +482,7 @@ def calibrate_turnout(
         settings.threshold,
         settings.margin,
         1 if each_visit else len(informed),
+        against_file,
     )
     return CalibratedModel(
         history,
@@ -518,27 +517,6 @@ def _fit_visit(
         except (SimulationError, np.linalg.LinAlgError) as error:
             notes.append(f"visit {about['visit']}, sections {', '.join(group.labels)}: {error}")
     return notes
-
-
-def day_of(time: float) -> str:
-    """Day of a time of the calibrated model.
-
-    Parameters
-    ----------
-    time : float
-        [years]
-
-    Returns
-    -------
-    str
-        YYYY-MM-DD.
-
-    Examples
-    --------
-    >>> day_of(years_of("2024-02-29"))
-    '2024-02-29'
-    """
-    return date.fromordinal(round(time * DAYS_PER_YEAR)).isoformat()
 
 
 def answer_rows(model: CalibratedModel) -> list[dict[str, Any]]:

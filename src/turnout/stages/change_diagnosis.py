@@ -33,6 +33,7 @@ from turnout.mismatch.engine.search import Search
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.calibration import calibrated_parameters, dip_directions
 from turnout.stages import calibrated_model as calibrated
+from turnout.stages.accepted_changes import changes_of
 from turnout.stages.mismatch_groups import (
     Group,
     groups,
@@ -53,6 +54,7 @@ if TYPE_CHECKING:
     from turnout.mismatch.turnout import CampaignInput
     from turnout.records import Unit
     from turnout.simulate import TurnoutTrack
+    from turnout.stages.accepted_changes import AcceptedChange
     from turnout.stages.accepted_effects import AcceptedEffect
 
 FOLDER = Path("work/impact-models")
@@ -146,14 +148,17 @@ def _diagnose(
     if not stored:
         raise SimulationError("; ".join(notes) or NO_HAMMER_TESTS)
     threshold = turnout.settings["mismatch"].threshold
-    answer, informed = change_of(stored, turnout)
+    changes = changes_of(track.terms)
+    answer, informed = change_of(stored, turnout, changes=changes)
     if answer.verdict == "none":  # trains may have the evidence that impacts lack
-        answer, _ = change_of(stored, turnout, SUSPICION * threshold)
+        answer, _ = change_of(stored, turnout, SUSPICION * threshold, changes)
     test = None
     if answer.verdict in ("named", "a_or_b") and answer.group in SUPPORTS:
         test = _test_on_trains(answer, members, turnout, raw_root, track, accepted, passage_tables, labels)
     n_recordings = sum(v.n_recordings for v in informed)
     row = finding_of_change(answer, test, len(informed), n_recordings, threshold)
+    if changes:
+        row["sentence"] += f"; accepted before: {', '.join(c.words for c in changes)}"
     return row | {"notes": "\n".join(notes) or None}
 
 
@@ -198,7 +203,10 @@ def _case_of(
 
 
 def change_of(
-    stored: Sequence[calibrated.StoredVisit], turnout: TurnoutConfig, threshold: float | None = None
+    stored: Sequence[calibrated.StoredVisit],
+    turnout: TurnoutConfig,
+    threshold: float | None = None,
+    changes: Sequence[AcceptedChange] = (),
 ) -> tuple[ModelAnswer, list[VisitInformation]]:
     """What has changed up to the newest of the visits.
 
@@ -210,6 +218,8 @@ def change_of(
         Its settings and recorded work.
     threshold : float or None
         Evidence that a name needs, None: that of the settings. [nats]
+    changes : sequence of AcceptedChange
+        Those that are part of the model.
 
     Returns
     -------
@@ -221,7 +231,7 @@ def change_of(
     informed = sorted(calibrated.visits_of(stored), key=lambda v: (v.time, v.visit))
     settings = turnout.settings["mismatch"]
     candidates = [*change_candidates(parameters, dip_directions(parameters)), *stretch_candidates(parameters)]
-    events = calibrated.events_of(turnout, parameters)
+    events = calibrated.events_of(turnout, parameters, changes, informed)
     least = settings.threshold if threshold is None else threshold
     return change_answer(parameters, informed, events, candidates, least, settings.margin, True), informed
 

@@ -148,18 +148,26 @@ class Results:
         write_text(self.path, encode(tables))
 
     def finding(self, finding_id: str | None = None) -> dict[str, Any]:
-        """The finding with this id, or the only one with a term; SimulationError if that is ambiguous.
+        """The finding with this id, or the only one with a term.
 
         Parameters
         ----------
         finding_id : str or None
-            Id of a finding; by default the only one.
+            Id of a finding, or the sections of a change as in the worklist; by default the only one.
 
         Returns
         -------
         dict[str, Any]
-            The finding with this id, or the only one with a term; SimulationError if that is ambiguous.
+            Row of ``mismatch_findings`` or ``change_findings``.
+
+        Raises
+        ------
+        SimulationError
+            There is none, or several.
         """
+        for change in self._registry_rows("change_findings"):
+            if change["sections"] == finding_id:
+                return change
         rows = self._rows()
         if finding_id:
             chosen = [r for r in rows if r["finding_id"].startswith(finding_id)]
@@ -187,12 +195,12 @@ class Results:
         except FileNotFoundError:
             return []
 
-    def _registry_rows(self) -> list[dict[str, Any]]:
+    def _registry_rows(self, table: str = "findings_newest") -> list[dict[str, Any]]:
         """Newest findings of the turnout in the registry, [] without a registry."""
         if self.registry is None or not (Path(self.registry) / "registry.duckdb").exists():
             return []
         with open_registry(self.registry) as connection:
-            cursor = connection.execute("from findings_newest where turnout_id = ?", [self.turnout_id])
+            cursor = connection.execute(f"from {table} where turnout_id = ?", [self.turnout_id])
             names = [d[0] for d in cursor.description]
             return [dict(zip(names, row)) for row in cursor.fetchall()]
 

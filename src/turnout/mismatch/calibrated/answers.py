@@ -151,6 +151,7 @@ def answers_after_visits(
     threshold: float,
     margin: float,
     first: int = 1,
+    against_file: tuple[Sequence[StateParameter], Sequence[Event], Sequence[ChangeEffect]] | None = None,
 ) -> list[ModelAnswer]:
     """What the model says after each visit, of changes and against the file.
 
@@ -167,6 +168,8 @@ def answers_after_visits(
         A rival of another name within it makes the answer "a or b", also one below the threshold. [nats]
     first : int
         Number of the first visit after which an answer is given, from 1.
+    against_file : tuple or None
+        Parameters, events and candidates of the comparison with the file, None: the same.
 
     Returns
     -------
@@ -175,11 +178,15 @@ def answers_after_visits(
     """
     ordered = sorted(visits, key=lambda v: (v.time, v.visit))
     answers = []
+    file_parameters, file_events, file_candidates = against_file or (parameters, events, candidates)
     for n in range(first, len(ordered) + 1):
         change = change_answer(parameters, ordered[:n], events, candidates, threshold, margin)
         before = _visits_before(ordered[:n], change)
         label = ordered[n - 1].visit
-        answers += [change, file_answer(parameters, before, events, label, candidates, threshold, margin)]
+        answers += [
+            change,
+            file_answer(file_parameters, before, file_events, label, file_candidates, threshold, margin),
+        ]
     return answers
 
 
@@ -312,27 +319,38 @@ def _events_of_change(
 ) -> list[Event]:
     """Events that open the directions of an effect from its most probable onset on."""
     first = int(np.argmax(evidence.gains))
-    times, directions = evidence.times, _free_shape(evidence.effect, parameters, candidates)
+    times, directions = evidence.times, free_shape(evidence.effect, parameters, candidates)
     if not evidence.effect.grows:
         return [Event(float(times[first + 1]), {}, *d) for d in directions]
     steps = list(zip(times[first:-1], times[first + 1 :]))
     return [Event(float(now), {}, d, sd * float(now - before)) for before, now in steps for d, sd in directions]
 
 
-def _free_shape(
+def free_shape(
     effect: ChangeEffect, parameters: Sequence[StateParameter], candidates: Sequence[ChangeEffect]
 ) -> list[tuple[Mapping[str, float], float]]:
     """Directions of an effect with their standard deviations. A dip of the surface may have any shape.
 
     Wear lowers a nose unevenly: beside the dip, all dips and numbers of the file's surface within
     ``CALIBRATION.nose_reach`` may change.
+
+    Parameters
+    ----------
+    effect : ChangeEffect
+    parameters : sequence of StateParameter
+    candidates : sequence of ChangeEffect
+
+    Returns
+    -------
+    list of (mapping, float)
+        Parameter -> change per unit of size, and standard deviation of the size.
     """
     by_name = {p.name: p for p in parameters}
     at = position_of(effect.name, by_name.get(effect.name))
     directions: list[tuple[Mapping[str, float], float]] = [(effect.direction, effect.sd)]
-    if _group(effect, by_name) not in ("dip", "depth") or at is None:
+    if group_of(effect, by_name) not in ("dip", "depth") or at is None:
         return directions
-    dips = [c for c in candidates if _group(c, by_name) == "dip" and c.grows == effect.grows]
+    dips = [c for c in candidates if group_of(c, by_name) == "dip" and c.grows == effect.grows]
     numbers = [p for p in parameters if p.group in ("surface", "depth")]
     near = [(position_of(c.name, None), (c.direction, c.sd)) for c in dips]
     near += [(position_of(p.name, p), ({p.name: 1.0}, CALIBRATION.change_sds * p.sd)) for p in numbers]
@@ -364,7 +382,7 @@ class _LeadingEffect:
     ) -> _LeadingEffect:
         parameter = by_name.get(effect.name)
         first = parameter or by_name.get(next(iter(effect.direction)))
-        group = _group(effect, by_name)
+        group = group_of(effect, by_name)
         unit = first.unit if first and group != "dip" else "m"
         position = position_of(effect.name, parameter) if effect.position is None else effect.position
         position = _nose_near(position, by_name.values()) if group == "dip" else position
@@ -419,11 +437,21 @@ def position_of(name: str, parameter: StateParameter | None) -> float | None:
 
 
 def _name(effect: ChangeEffect, by_name: Mapping[str, StateParameter]) -> str:
-    return NAMES[_group(effect, by_name)]
+    return NAMES[group_of(effect, by_name)]
 
 
-def _group(effect: ChangeEffect, by_name: Mapping[str, StateParameter]) -> str:
-    """Group of the parameters that an effect changes, "dip" for the waves of a dip."""
+def group_of(effect: ChangeEffect, by_name: Mapping[str, StateParameter]) -> str:
+    """Group of the parameters that an effect changes, "dip" for the waves of a dip.
+
+    Parameters
+    ----------
+    effect : ChangeEffect
+    by_name : mapping of str to StateParameter
+
+    Returns
+    -------
+    str
+    """
     parameter = by_name.get(effect.name)
     return parameter.group if parameter else effect.group or "dip"
 
@@ -441,7 +469,7 @@ def _present_size(evidence: OnsetEvidence) -> tuple[float, float]:
 
 
 def _least_size(effect: ChangeEffect, by_name: Mapping[str, StateParameter]) -> float:
-    group = _group(effect, by_name)
+    group = group_of(effect, by_name)
     return CALIBRATION.least_dip if group == "dip" else dict(CALIBRATION.least_sizes)[group]
 
 
@@ -591,7 +619,7 @@ def _explains_first_visit(
     jump: Innovation,
 ) -> bool:
     """Whether an effect explains how far the first visit is from the file. A dip is taken at its evidence."""
-    if _group(effect, {p.name: p for p in parameters}) == "dip":
+    if group_of(effect, {p.name: p for p in parameters}) == "dip":
         return True
     wide = [replace(p, sd=float(np.hypot(p.sd, effect.sd * effect.direction.get(p.name, 0.0)))) for p in parameters]
     return _is_explained(jump, estimate_history(wide, visits, events, accepted=None).steps[0].innovation)

@@ -1,0 +1,193 @@
+"""An accepted change belongs to the calibrated model from its onset on; withdrawn, it leaves no trace."""
+
+import shutil
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import small_turnout as small
+
+from turnout import physics
+from turnout.cli.main import main
+from turnout.config import load_configuration, with_raw
+from turnout.errors import SimulationError
+from turnout.mismatch.calibrated import (
+    ChangeEffect,
+    GroupInformation,
+    StateParameter,
+    VisitInformation,
+    answers_after_visits,
+    change_answer,
+    change_candidates,
+    estimate_history,
+)
+from turnout.records import Unit
+from turnout.stages.accept_finding import accept, with_entry
+from turnout.stages.accepted_changes import AcceptedChange, change_events, change_text, changes_of, without_accepted
+from turnout.stages.change_diagnosis import change_unit
+from turnout.stages.mismatch_inputs import track_of
+from turnout.workflow.scan import scan
+
+N_SUPPORT, SD, STEP = 5, 0.05, 0.5
+PARAMETERS = [StateParameter(f"ballast@{0.6 * k:.2f}", 0.0, 0.1, 0.03, "ballast", k, 0.6 * k) for k in range(N_SUPPORT)]
+NAMES = tuple(p.name for p in PARAMETERS)
+CANDIDATES = change_candidates(PARAMETERS)
+
+
+def history_of(sizes, seed=1, at=2):
+    """One visit every half year; the ballast at support ``at`` has changed by ``sizes`` at each."""
+    rng = np.random.default_rng(seed)
+    rows = np.array([[0.6 ** abs(i - j) for j in range(N_SUPPORT)] for i in range(6)])
+    intact, visits = rng.normal(0.0, 0.1, N_SUPPORT), []
+    for v, size in enumerate(sizes):
+        y = rows @ (intact + size * np.eye(N_SUPPORT)[at]) + rng.normal(0.0, SD, len(rows))
+        group = GroupInformation("A: impacts at 1.20 m", 1, NAMES, rows.T @ rows / SD**2, rows.T @ y / SD**2)
+        visits.append(VisitInformation(f"v{v}", STEP * v, (group,)))
+    return visits
+
+
+def answer_of(visits, *accepted):
+    events = change_events(accepted, PARAMETERS, CANDIDATES, visits)
+    return change_answer(PARAMETERS, visits, events, CANDIDATES, 12.0, 6.0, True)
+
+
+def accepted_of(answer, visits):
+    until = visits[-1].time if answer.grows else answer.onset[1]
+    return AcceptedChange("local_ballast", answer.position, answer.position, answer.onset[0], until)
+
+
+@pytest.mark.parametrize("sizes", [(0, 0, -1, -1), (0, 0, -1, -1, -1, -1), (0, 0, -0.3, -0.6, -0.9, -1.2)])
+@pytest.mark.parametrize("seed", range(5))
+def test_an_accepted_step_or_growth_is_not_named_again(sizes, seed):
+    visits = history_of(sizes, seed)
+    before = answer_of(visits)
+    assert "local_ballast" in before.names and before.position == pytest.approx(1.2)
+    accepted = accepted_of(before, visits)
+    assert answer_of(visits, accepted).verdict == "none"
+    more = history_of((*sizes, sizes[-1], sizes[-1]), seed)
+    assert answer_of(more, accepted).verdict == "none"
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_grows_on_or_changes_elsewhere_is_named_since_the_acceptance(seed):
+    sizes = (0, 0, -1, -1)
+    accepted = accepted_of(answer_of(history_of(sizes, seed)), history_of(sizes, seed))
+    after = answer_of(history_of((*sizes, -1.8, -1.8), seed), accepted)
+    assert after.position == pytest.approx(1.2) and after.onset == (3 * STEP, 4 * STEP)
+    assert after.total == pytest.approx(-0.8, abs=4.0 * after.sd)
+    elsewhere = AcceptedChange("local_ballast", 0.0, 0.0, accepted.since, accepted.until)
+    assert answer_of(history_of(sizes, seed), elsewhere).position == pytest.approx(1.2)
+
+
+def test_the_belief_follows_the_accepted_change_at_once_and_only_there():
+    """Noise of variance q at one support is the Kalman recursion with it: the update of a Gaussian, in closed form."""
+    visits = history_of((0, 0, -1.5))
+    accepted = AcceptedChange("local_ballast", 1.2, 1.2, STEP, 2 * STEP)
+    (event,) = change_events([accepted], PARAMETERS, CANDIDATES, visits)
+    history = estimate_history(PARAMETERS, visits, [event], repeats_between_visits=False, accepted=None)
+    before, last = history.steps[1].belief, history.steps[2]
+    noise = np.diag([0.03**2 * STEP + (event.sd**2 if k == 2 else 0.0) for k in range(N_SUPPORT)])
+    predicted = before.covariance + noise
+    precision = np.linalg.inv(predicted) + last.matrix
+    score = np.linalg.solve(predicted, before.mean) + last.vector
+    np.testing.assert_allclose(last.belief.mean, np.linalg.solve(precision, score), rtol=1e-9)
+    assert last.belief.mean[2] - before.mean[2] == pytest.approx(-1.5, abs=0.25)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_an_accepted_change_is_no_deviation_from_the_file_and_others_are(seed):
+    visits = history_of((0, 0, -1, -1, -1), seed)
+    accepted = [AcceptedChange("local_ballast", 1.2, 1.2, STEP, 2 * STEP)]
+    events = change_events(accepted, PARAMETERS, CANDIDATES, visits)
+    against_file = without_accepted(accepted, PARAMETERS, events, CANDIDATES)
+    parameters, _, candidates = against_file
+    assert [p.name for p in parameters if not p.may_change] == ["ballast@1.20"]
+    assert {c.name for c in candidates} == set(NAMES) - {"ballast@1.20"}
+    answers = answers_after_visits(PARAMETERS, visits, events, CANDIDATES, 12.0, 6.0, 5, against_file)
+    assert [a.verdict for a in answers] == ["none", "none"]
+    answers = answers_after_visits(PARAMETERS, visits, events, CANDIDATES, 12.0, 6.0, 5)
+    assert answers[1].verdict != "none"
+
+
+def test_a_dip_opens_the_surface_within_reach_of_the_nose():
+    depth = StateParameter("ln depth of nose at 5.00 m", 0.0, 0.2, 0.0, "depth", None, 5.0)
+    number = StateParameter("length of nose at 5.00 m", 0.0, 0.2, 0.0, "surface", None, 5.0)
+    dip = ChangeEffect("dip of 0.4 m@5.30", {"wave": 1.0}, 1e-3, False)
+    far = ChangeEffect("dip of 0.4 m@7.30", {"wave": 2.0}, 1e-3, False)
+    wave = StateParameter("wave", 0.0, 1e-3, 0.0, "wave")
+    candidates = [*change_candidates([depth, number, wave]), dip, far]
+    change = AcceptedChange("surface_dip", 5.0, 5.0, 0.0, 1.0)
+    events = change_events([change], [depth, number, wave], candidates, [])
+    assert {tuple(e.direction.items()) for e in events} == {
+        (("wave", 1.0),), ((depth.name, 1.0),), ((number.name, 1.0),),
+    }  # fmt: skip
+    assert {e.time for e in events} == {1.0}
+
+
+def row(**more):
+    return {
+        "turnout_id": "t1", "sections": "A, B", "verdict": "named", "term": "local_ballast", "visit": "2026-05-01",
+        "position_m": 18.0, "first_m": 17.4, "last_m": 18.6, "grows": False, "sentence": 'soft "ballast"',
+        "onset_after_utc": datetime(2025, 11, 1), "onset_by_utc": datetime(2026, 2, 1), **more,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "more",
+    [{"verdict": "a_or_b"}, {"term": None}, {"term": "rail_shear"}, {"position_m": None}, {"onset_by_utc": None}],
+)
+def test_what_is_not_named_or_has_no_place_is_not_accepted(tmp_path, repository, more):
+    small.lay_out(tmp_path, repository)
+    with pytest.raises(SimulationError, match="t1, A, B"):
+        accept(row(**more), tmp_path / "config", "t1")
+    assert not (tmp_path / "config/tracks/t1.yaml").exists()
+
+
+def test_a_further_change_at_the_same_position_is_a_second_entry():
+    once = with_entry("name: a\n", change_text(row()))
+    assert with_entry(once, change_text(row())) == once
+    later = with_entry(once, change_text(row(onset_after_utc=datetime(2026, 5, 1))))
+    assert later.count("- term: local_ballast") == 2
+
+
+DAYS = ("2025-08-01", "2025-11-01", "2026-02-01", "2026-05-01")
+
+
+def row_of_night():
+    turnout = with_raw(load_configuration("config").turnout("t1"), Path("raw"))
+    files = tuple(sorted(f for u in scan(turnout, Path("raw")).units for f in u.files))
+    (change,) = change_unit(Unit("t1", "change", "A+B", files, ""), turnout, "raw", {}, "x")["change_findings"]
+    return change
+
+
+def test_a_night_after_the_acceptance_names_nothing_and_after_its_withdrawal_the_same(
+    tmp_path, repository, monkeypatch, capsys
+):
+    from turnout.registry.derived_tables import publish
+    from turnout.registry.job import register
+
+    small.lay_out(tmp_path, repository)
+    monkeypatch.chdir(tmp_path)
+    for k, day in enumerate(DAYS):
+        soft = (lambda track: (physics.LocalBallast(track.nearest_support(small.SLEEPER), 0.4),)) if k > 1 else None
+        small.strike(tmp_path, soft, day=datetime.fromisoformat(f"{day}T09:00"), seed=10 * k)
+    before = row_of_night()
+    assert before["verdict"] == "a_or_b" and before["position_m"] == 18.0
+    register([], tmp_path / "registry", read=iter, tables={"turnouts": [{"turnout_id": "t1", "layout": "small"}]})
+    publish(tmp_path / "registry", {"change_findings": [{**before, "found_at_utc": pd.Timestamp("2026-05-01T23:59")}]})
+    command = ["diagnose", "--turnout", "t1", "--registry", "registry", "--accept", "--finding", "A, B"]
+    assert main(command) != 0 and not (tmp_path / "config/tracks/t1.yaml").exists()
+    assert main([*command, "--anyway"]) == 0
+    assert "config/tracks/t1.yaml" in capsys.readouterr().out
+    turnout = load_configuration("config").turnout("t1")
+    track, effects = track_of(turnout)
+    (change,) = changes_of(track.terms)
+    assert effects == () and change.words in ("local ballast at 18.0 m", "hanging sleeper at 18.0 m")
+    after = row_of_night()
+    assert after["verdict"] == "none" and f"accepted before: {change.words}" in after["sentence"]
+    (tmp_path / "config/tracks/t1.yaml").unlink()
+    assert row_of_night() == before
+    shutil.rmtree("work")
+    assert row_of_night() == before
