@@ -16,6 +16,7 @@ from turnout.readers.other_subjects import NONE, STRONG, SUSPECT, WEAK, subject_
 from turnout.readers.precision import Interval, readings
 from turnout.readers.rate_words import CERTAIN, NAME_WITH_UNIT, SHORT_UNIT, RateUnit, name_meaning, rate_unit, words_of
 from turnout.readers.scale_words import LEVELS, is_fill_name, is_scale_name, plain_word, scale_meaning
+from turnout.readers.stated_quantities import quantity_of_text
 from turnout.readers.stated_units import is_unit_of_other, known_unit
 from turnout.readers.statements import USUAL_RATES
 from turnout.readers.timing import looks_dated
@@ -57,9 +58,10 @@ CONVERSION = re.compile(
     re.IGNORECASE,
 )
 UNIT_IN_TEXT = re.compile(
-    rf"(?:\b(?:in|en|as|i|im)\s+(?:units of\s+)?|[\[(]\s*|[,/|:]\s+)"
+    rf"(?:\b(?:in|en|as|i|im)\s*[:=]?\s+(?:units of\s+)?|[\[(]\s*|[,/|:]\s+)"
     rf"({LETTER}+[²³]?(?:\^?\d)?(?:/{LETTER}+[²³]?(?:\^?\d)?)?)(?=$|[\s\]),;.|'’])"
 )
+LABEL_WITH_UNIT = re.compile(rf"([^\W\d_]+)[_ ]({LETTER}+(?:/{LETTER}+[²³]?)?)")
 LEVEL_UNIT = re.compile(r"dB", re.IGNORECASE)
 # Units of force and acceleration that a layout cannot state.
 FOREIGN_UNIT = re.compile(
@@ -190,6 +192,8 @@ def _of_text(name: str, text: str, subject: int) -> Iterator[Candidate]:
     yield from _full_rates(f"{name} {text}", quantities)
     if (words := text.split())[1:] and len(words) <= MAX_LABEL and len(words[-1]) > 1 and not re.search(r"\d", text):
         yield from _of_unit(words[-1])  # "siła kN"
+    elif (label := LABEL_WITH_UNIT.fullmatch(text)) and quantity_of_text(label[1]):
+        yield from _of_unit(label[2])  # "accel_g"
     for match in UNIT_IN_TEXT.finditer(text):
         unit = known_unit(match[1])
         if unit and unit.dimension in AMPLITUDES | {"velocity"}:

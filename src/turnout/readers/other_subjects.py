@@ -2,7 +2,8 @@
 
 ``subject_of`` is the only question: does a name speak of such a thing. A strong word explains any value ("filter",
 "temperature", "trigger"). A weak word ("number", "range", "level") does not where another word of the name speaks of a
-rate, a scale or a unit: "Range factor". Words are compared without case and accents; stems are found inside compounds.
+rate, a scale or a unit: "Range factor". Words are compared without case and accents; stems count
+at the beginning of a word and of a part of a compound.
 """
 
 import re
@@ -12,18 +13,17 @@ from turnout.readers.rate_words import words_of
 
 STRONG, WEAK, NONE = 2, 1, 0
 
-# Stems of at least four letters, found anywhere in a word; (English, German, French, Danish, Swedish, Dutch, Spanish,
-# Italian, Czech, Polish).
+# Stems (English, German, French, Danish, Swedish, Dutch, Spanish, Italian, Czech, Polish); "$" is the end of a word.
 STRONG_STEMS = (
     # identity, people, places, software, devices
-    r"serial|seriennummer|serienr|firmware|softw|(?<!con)(?<!in)version|revision|schema|author|autor|operat"
+    r"serial|seriennummer|serienr|firmware|softw|version|revision|schema|author|autor|operat"
     r"|bedien|medewerker|obsluha|company|firma|project|projekt|customer|phone|address|adress|station"
-    r"|bahnhof|strecke|rechner|uuid|guid|imei|checksum|crc32|signature|hash|language|(?<!de)script|program"
-    r"|invoice|(?<!rec)order|standard|engineers?$|team|report|sheet|photo|picture|foto|colou?r|farbe"
-    r"|couleur|brightness|volume|fan$|usb|wlan|network|baud|(?<!ex)(?<!re)port$|payload|heap|boot|(?<!p)reset"
+    r"|bahnhof|strecke|rechner|uuid|guid|imei|checksum|crc32|signature|hash|language|script|program"
+    r"|invoice|order|standard|engineers?$|team|report|sheet|photo|picture|foto|colou?r|farbe"
+    r"|couleur|brightness|volume|fan$|usb|wlan|network|baud|port$|payload|heap|boot|reset"
     r"|cable|kabel|connector|pinout"
     # date, time of day, clock quality
-    r"|(?<!up)(?<!up )(?<!op)date(?!n)|datum|fecha|timezone|zeitzone|utc|timestamp|uptime|laufzeit|runtime|created"
+    r"|(?<!up )date(?!n)|datum|fecha|timezone|zeitzone|utc|timestamp|uptime|laufzeit|runtime|created"
     r"|modified|erstellt|due$|year|jahr|ntp|pps\b|drift|jitter|gps|gnss|satell|latit|longit|altit|hdop"
     # environment and supply
     r"|temp(?!s\b|o\b|or)|tepl|humid|feucht|luftf|pression|pressure|druck|wind|rain|regen|pluie|weather"
@@ -74,7 +74,7 @@ WEAK_STEMS = (
     r"distan|entfern|abstand|afstand|length|lange|longueur|longitud|slot|steckpl|chassis|rack|buffer|puffer"
     r"|memory|speicher|disk|storage|card|hammer|marteau|martill|martell|klad|mlot|geschwind|hastighed"
     r"|rychlost|predkosc|vitesse|velocid|snelheid|number|nummer|anzahl|nombre|numero|numer|antal|aantal|cantidad"
-    r"|\bpocet|liczba|count(?!s? per)|samples?$|abtastwert|echantillons|punkter|channels?$|kanale?r?$|canal"
+    r"|pocet|liczba|count(?!s? per)|samples?$|abtastwert|echantillons|punkter|channels?$|kanale?r?$|canal"
     r"|voies|blocks?$|segment|records?$|averages|bytes?$|bits?$|total|header|index|range|bereich|gamme"
     r"|gama$|campo|rango|upper|lower|limit|level|pegel|niveau|nivel|start|stop|begin|first|last|previous"
     r"|voltage|spannung|tension|size|status|state|type|class|kind|code|seq|config|auto|armed|event|test"
@@ -91,10 +91,19 @@ WEAK_WORDS = frozenset(
 SUSPECT = re.compile(
     r"physical|digital|factor|faktor|facteur|fattor|coef|koef|scal|skal|echelle|gain|ampli|verst|conv|umrech|corr|korr|calib|kalib|etalon"
     r"|multip|divi|ratio|slope|freq|frekv|frec|frq|rate|takt|clock|interv|period|step|schritt|shift|norm|polyn|offset|tare"
-    r"|zero|remov|null|unit|einheit|format|weight|lsb|digit|quant|per$|speed|spacing|increment|value|time|durat|dauer|per(?:s|p)"
+    r"|zero|remov|null|unit|einheit|format|weight|lsb|digit|quant|per\b|speed|spacing|increment|value|time|durat|dauer|per(?:s|p)"
 )
-_STRONG = re.compile(STRONG_STEMS)
-_WEAK = re.compile(WEAK_STEMS)
+# Where a stem counts: at the beginning of a word, or in a compound behind four letters or more, no preposition.
+# "Schienentemperatur" is a temperature; "Aufschlag" is no impact, "Rapport" no port and "Conversion" no version.
+BORDER = (
+    r"(?:\b|(?<=[a-z]{4})"
+    + "".join(rf"(?<!\b{word})" for word in "durch hinter inter nach super trans uber ueber unter wieder".split())
+    + ")"
+)
+_STRONG = re.compile(rf"{BORDER}(?:{STRONG_STEMS})".replace("$", r"\b"))
+_WEAK = re.compile(rf"{BORDER}(?:{WEAK_STEMS})".replace("$", r"\b"))
+# Words that make a statement about the samples of any subject: "Nyquist", "Empfindlichkeitskorrektur", "channel 2 in".
+_OF_SAMPLES = re.compile(r"\bnyquist|corre[ckz]t|korrekt|correz|\b(?:in|as)$|\w per \w")
 
 
 @lru_cache(maxsize=4096)
@@ -113,13 +122,14 @@ def subject_of(name: str) -> int:
 
     Examples
     --------
-    >>> [subject_of(n) for n in ("Filterfrequenz", "Number of blocks", "Range factor", "Hub", "Skinnetemperatur")]
-    [2, 1, 0, 0, 2]
+    >>> [subject_of(n) for n in ("Filterfrequenz", "Number of blocks", "Range factor", "Skinnetemperatur", "Aufschlag")]
+    [2, 1, 0, 2, 0]
     """
     words = words_of(re.sub(r"[\[({][^\[\](){}]*[\])}]", "", name))
-    if "per" in words[1:-1] or "nyquist" in words:
+    spaced = " ".join(words)
+    if _OF_SAMPLES.search(spaced):
         return NONE
-    if any(word in STRONG_WORDS or _STRONG.search(word) for word in words) or _STRONG.search(" ".join(words)):
+    if not STRONG_WORDS.isdisjoint(words) or _STRONG.search(spaced):
         return STRONG
-    is_weak = any(word in WEAK_WORDS or _WEAK.search(word) for word in words)
-    return WEAK if is_weak and not any(SUSPECT.search(word) for word in words) else NONE
+    is_weak = not WEAK_WORDS.isdisjoint(words) or _WEAK.search(spaced)
+    return WEAK if is_weak and not SUSPECT.search(spaced) else NONE

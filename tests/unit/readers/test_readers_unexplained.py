@@ -18,12 +18,15 @@ CONTRADICTIONS = [
     ("Sweep", "3.2 ms"), ("Amplifier", "x100"), ("Reading", "raw*0.01"), ("Conversion", "1 count = 0.3 mV"),
     ("Q-format", "Q1.15"), ("Inverted", "true"), ("Scaled", "no"), ("Hub", 2.5), ("Range factor", 0.5),
     ("Values in", "kN"), ("Comment", "acceleration in g"), ("Data", "rail [g]"), ("System", "US customary"),
+    ("Aufschlag", 1.25), ("Rapport", 2.5), ("Empfindlichkeitskorrektur", 1.08), ("Note", "accel_g"),
+    ("Note", "channel 2 in: g"), ("Channel 2 in", "g"), ("Zuschlag", "x1.1"), ("Conversion", 0.5),
 ]  # fmt: skip
 # The same statements in agreement with the record, and values that are about something else.
 HARMLESS = [
     ("Mode", "25.6 kS/s @ 24 bit"), ("Acq", "25.6k"), ("Qtz", 3.90625e-05), ("Nyquist", "12.8 kHz"),
     ("Sweep", "2.5 ms"), ("Hub", 3), ("Hub", 1.0), ("Values in", "N"), ("Amplifier", "x1"), ("Scaled", "yes"),
-    ("Filter", "BE 5000 Hz"),
+    ("Filter", "BE 5000 Hz"), ("Note", "accel_b"), ("Note", "channel 2 in: N"), ("Schienentemperatur", 12.5),
+    ("Hammerschlag", 12.5), ("Serialport", 2.5), ("Standardversion", 2.5),
     ("Trigger level", "50 N"), ("Rail temperature", 12.5), ("Kilometer", "41,235"), ("Serial", 20000), ("Lot", 41233),
     ("Pre-trigger", "10 ms"), ("Recorded", "13.05.2024"), ("Bits per sample", 24), ("Wheel load", "80 kN"),
 ]  # fmt: skip
