@@ -177,6 +177,7 @@ UNIT_NAMES = ("units", "unit", "channel_units")
 ATTRIBUTES_MARK = " (attributes)"  # behind the name of a variable: the name of its attributes
 STATED_SCALES = "(scales)"  # pairs (channel, statement about its scale) that a reader adds to the variables
 RECORD_COUNT_NAMES = ("n_records", "n_record")
+CONDITION_NAMES = {spelling: name for name in CONDITIONS for spelling in (name, name.replace("_", " "))}
 
 
 class Metadata:
@@ -372,7 +373,13 @@ class Metadata:
         dict of str to any
             Name -> value of the conditions that are stored with the samples of record ``k``.
         """
-        values = {name: single_value(self.get((name, name.replace("_", " "))), k, n) for name in CONDITIONS}
+        present: set[str] = set()
+        level: Metadata | None = self
+        while level:
+            present |= CONDITION_NAMES.keys() & level.lower.keys()
+            level = level.parent
+        names = sorted({CONDITION_NAMES[name] for name in present}, key=CONDITIONS.index)
+        values = {name: single_value(self.get((name, name.replace("_", " "))), k, n) for name in names}
         return {name: value for name, value in values.items() if value is not None}
 
 

@@ -203,6 +203,7 @@ def _is_value_of_step(words: tuple[str, ...]) -> bool:
     return is_step and len(words) > 1 and any(VALUE.fullmatch(w) for w in words)
 
 
+@lru_cache(maxsize=4096)
 def is_of_drawing(text: str) -> bool:
     """Whether a name or a value speaks of something that is drawn or shown at a scale.
 
@@ -245,6 +246,7 @@ def says_no_scale(text: str) -> bool:
     return is_off or is_of_drawing(text)
 
 
+@lru_cache(maxsize=4096)
 def is_fill_name(name: str) -> bool:
     """Whether a name speaks of the number that stands for a missing sample.
 

@@ -255,11 +255,12 @@ def _scale_name(entry: Entry, names: Sequence[str]) -> str:
 
     "" if it states no scale.
     """
-    if is_scale_name(entry.name) or POLYNOMIAL.fullmatch(entry.name.strip().casefold()):
+    if is_scale_name(entry.name) or POLYNOMIAL.fullmatch(plain := entry.name.strip().casefold()):
         return entry.name
+    if not any(plain == name.strip().casefold() for name in names):
+        return ""
     group = container_of(entry).rpartition("/")[2]
-    is_channel = entry.name.strip().casefold() in {name.strip().casefold() for name in names}
-    return group if is_channel and is_scale_name(group) else ""
+    return group if is_scale_name(group) else ""
 
 
 def container_of(entry: Entry) -> str:
@@ -307,6 +308,11 @@ def named_channels(text: str, names: Sequence[str]) -> frozenset[int]:
     >>> sorted(named_channels("sensors/rail 2/gain", ["rail", "rail 2", "force"]))
     [1]
     """
+    return _named_channels(text, tuple(names))
+
+
+@lru_cache(maxsize=4096)
+def _named_channels(text: str, names: tuple[str, ...]) -> frozenset[int]:
     words = f" {_words_of(text)} "
     spaced = {i: name for i, name in enumerate(map(_words_of, names)) if name and not name.isdigit()}
     found = {i: name for i, name in spaced.items() if f" {name} " in words}

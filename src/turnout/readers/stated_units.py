@@ -97,6 +97,7 @@ def known_unit(unit: str) -> Conversion | None:
         return None
 
 
+@lru_cache(maxsize=4096)
 def is_meaningless(unit: str) -> bool:
     """Whether a label is no unit: a placeholder, or a number that some loggers write there.
 
@@ -114,6 +115,7 @@ def is_meaningless(unit: str) -> bool:
     return plain.casefold() in MEANINGLESS_UNITS or plain.replace(".", "", 1).isdigit()
 
 
+@lru_cache(maxsize=4096)
 def same_unit(first: str, second: str) -> bool:
     """Whether two units are equal; the value of one count, as in "0.3 mV", counts as its unit.
 

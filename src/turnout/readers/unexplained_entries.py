@@ -12,12 +12,22 @@ or their rate must be explained, else it is reported by name, with the key of th
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.entry_candidates import DURATION, RATE, SCALE, SCALE_OR_OFFSET, UNIT, Candidate, candidates
+from turnout.readers.entry_candidates import (
+    DURATION,
+    MAX_TEXT,
+    RATE,
+    SCALE,
+    SCALE_OR_OFFSET,
+    UNIT,
+    Candidate,
+    candidates,
+)
 from turnout.readers.precision import EXACT_PRECISION, around
 from turnout.readers.source import RawRecord, Source
 from turnout.readers.stated_scales import container_of
@@ -108,26 +118,34 @@ def unexplained_entries(
         if entry.is_defined or entry.is_piece:
             continue
         group = container_of(entry).rpartition("/")[2] if "/" in entry.place else ""
-        texts = _texts(entry.value, facts.n_sample)
-        is_unit_list = len(texts) > 1 and any(same_unit(text, unit) for text in texts for unit in facts.units)
-        for candidate in (c for text in texts for c in candidates(entry.name, group, text)):
-            is_overruled = are_units_certain and candidate.statement in OVERRULED
-            is_overruled |= is_unit_list and candidate.statement == UNIT  # of all channels, assigned by the reader
-            if not is_overruled and not facts.explains(candidate):
-                yield entry, candidate
-                break
+        texts = tuple(text[:MAX_TEXT] for text in _texts(entry.value, facts.n_sample))
+        if candidate := _unexplained_candidate(entry.name, group, texts, facts, are_units_certain):
+            yield entry, candidate
 
 
-def _texts(value: Any, n_sample: int) -> Sequence[str]:
+@lru_cache(maxsize=4096)
+def _unexplained_candidate(
+    name: str, group: str, texts: tuple[str, ...], facts: RecordFacts, are_units_certain: bool
+) -> Candidate | None:
+    """The first candidate of an entry that nothing explains; files of one logger share most entries and facts."""
+    is_unit_list = len(texts) > 1 and any(same_unit(text, unit) for text in texts for unit in facts.units)
+    for candidate in (c for text in texts for c in candidates(name, group, text)):
+        is_overruled = are_units_certain and candidate.statement in OVERRULED
+        is_overruled |= is_unit_list and candidate.statement == UNIT  # of all channels, assigned by the reader
+        if not is_overruled and not facts.explains(candidate):
+            return candidate
+    return None
+
+
+def _texts(value: Any, n_sample: int) -> tuple[str, ...]:
     """The texts of a value; none of one number per sample."""
     if isinstance(value, str):
         return (value,)
     values = value.ravel() if isinstance(value, np.ndarray) else value
     if not isinstance(values, (list, tuple, np.ndarray)):
         return (_text(value),) if np.isscalar(value) else ()
-    return (
-        [_text(v) for v in values if np.isscalar(v)] if len(values) <= MAX_ENTRIES and len(values) != n_sample else ()
-    )
+    is_list = len(values) <= MAX_ENTRIES and len(values) != n_sample
+    return tuple(_text(v) for v in values if np.isscalar(v)) if is_list else ()
 
 
 def _text(value: Any) -> str:
