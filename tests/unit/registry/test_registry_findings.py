@@ -236,6 +236,34 @@ def test_a_gap_that_grows_has_a_date_for_its_limit(fleet):
     assert fleet.execute(asked).fetchall() == [("open", None)]
 
 
+def test_the_page_has_the_dates_of_significant_growth_alone(fleet):
+    """Of the fleet only t1 grows by more than 1.96 standard errors; t2 stays, t5 was seen once."""
+    from turnout.report.pages.turnout import mismatches_with_limits
+    from turnout.report.source import FleetSource
+
+    rows = FleetSource(fleet).rows_of([f"t{k}" for k in range(1, 14)])
+    assert list(rows["limits"]) == ["t1"]
+    (limit,) = rows["limits"]["t1"]
+    (words,) = fleet.execute("select words from growth_to_limit() where turnout_id = 't1'").fetchone()
+    (finding,) = rows["mismatches"]["t1"]
+    expected = f"hanging sleeper at 24.6 m: {words}"
+    assert mismatches_with_limits([finding], [limit]) == [(finding["sentence"], [expected])]
+    assert mismatches_with_limits([], [limit]) == [("", [expected])]  # accepted, and nothing beyond it
+    assert mismatches_with_limits([finding], []) == [(finding["sentence"], [])]
+
+
+def test_a_gap_that_shrinks_has_no_date_on_the_page(tmp_path):
+    from turnout.report.source import FleetSource
+
+    bench = Bench(tmp_path)
+    turnouts = [{"turnout_id": t, "layout": "l", "config_hash": "h"} for t in ("t1", "t2")]
+    grows = [gap("t1", d, v, s) for d, (v, s) in zip(DAYS, GROWING)]
+    shrinks = [gap("t2", d, v, s) for d, (v, s) in zip(DAYS, reversed(GROWING))]
+    bench.register(*grows, *shrinks, tables={"turnouts": turnouts})
+    with open_registry(bench.registry) as connection:
+        assert list(FleetSource(connection).rows_of(["t1", "t2"])["limits"]) == ["t1"]
+
+
 def test_dates_of_a_limit_cover_the_true_one():
     """Linear growth with known noise: of 2000 lines, the date at which the true line reaches the limit is inside."""
     import duckdb

@@ -64,7 +64,7 @@ def turnout_page(
         latest=day(max((m["measured_at_utc"] for m in models.values()), default=None)),
         diagram=diagram(rows["sections"], states) if rows["sections"] else "",
         findings=lines_of(rows["worklist"]),
-        mismatches=[m["sentence"] for m in rows["mismatches"]],
+        mismatches=mismatches_with_limits(rows["mismatches"], rows.get("limits", ())),
         summary=[_summary(s, models.get(s["section_id"]), _rows_of(rows, "modes", s)) for s in rows["sections"]],
         sections=[_section(rows, s, models, states) for s in rows["sections"]],
         calibrated=calibrated_panels(rows.get("calibrated", [])),
@@ -82,6 +82,32 @@ def _rows_of(
 ) -> list[Mapping[str, Any]]:
     """Rows of one table that belong to one section."""
     return [r for r in rows[table] if r["section_id"] == section["section_id"]]
+
+
+def mismatches_with_limits(
+    findings: Sequence[Mapping[str, Any]], limits: Sequence[Mapping[str, Any]]
+) -> list[tuple[str, list[str]]]:
+    """Findings as lines of the page, each with the dates at which what grows in it reaches its limit.
+
+    Parameters
+    ----------
+    findings : sequence of mapping
+        Rows of ``findings_newest`` of one turnout.
+    limits : sequence of mapping
+        Rows of ``growth_to_limit`` of one turnout with ``term``, only of significant growth.
+
+    Returns
+    -------
+    list of (str, list of str)
+        Sentence and dates in words. An accepted effect beyond which its visit shows nothing has the sentence "".
+    """
+    dates: dict[str, list[str]] = {}
+    for limit in limits:
+        position = "" if limit["position_m"] is None else f" at {limit['position_m']:.1f} m"
+        words = f"{limit['term'].replace('_', ' ')}{position}: {limit['words']}"
+        dates.setdefault(limit["finding_id"], []).append(words)
+    lines = [(f["sentence"], dates.pop(f["finding_id"], [])) for f in findings]
+    return lines + [("", words) for words in dates.values()]
 
 
 def lines_of(worklist: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
