@@ -42,7 +42,7 @@ from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.lost_entries import control_character_errors
 from turnout.readers.named_arrays import RECORD_COUNT_NAMES, SAMPLE_COUNT_NAMES, START_DATE_NAMES, START_NAMES, Metadata
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, RawFile, RawRecord, Source
-from turnout.readers.stated_scales import entry_statements, scale_problem, scale_statements
+from turnout.readers.stated_scales import entry_statements, scale_problem, scale_statements, without_drawings
 from turnout.readers.statements import Entry
 from turnout.readers.timing import start_fields
 
@@ -339,7 +339,7 @@ def _records(
     promised, rows = facts.count(("n_samples",)), facts.number(SAMPLE_COUNT_NAMES)
     if promised is None and rows is not None and rows > n_row:
         promised = int(rows)
-    of_notes = enumerate(map(scale_problem, scale_statements(facts.variables, len(selected))))
+    of_notes = enumerate(map(scale_problem, scale_statements(without_drawings(facts.variables), len(selected))))
     undecided = entry_statements(entries, [names[i] for i in selected]) | {i: text for i, text in of_notes if text}
     for k, (a, b) in enumerate(pairwise(edges)):
         if promised is not None and b - a != promised:

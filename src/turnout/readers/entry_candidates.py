@@ -15,7 +15,14 @@ from functools import lru_cache
 from turnout.readers.other_subjects import NONE, STRONG, SUSPECT, WEAK, subject_of
 from turnout.readers.precision import Interval, readings
 from turnout.readers.rate_words import CERTAIN, NAME_WITH_UNIT, SHORT_UNIT, RateUnit, name_meaning, rate_unit, words_of
-from turnout.readers.scale_words import LEVELS, is_fill_name, is_scale_name, plain_word, scale_meaning
+from turnout.readers.scale_words import (
+    LEVELS,
+    is_fill_name,
+    is_ratio_of_drawing,
+    is_scale_name,
+    plain_word,
+    scale_meaning,
+)
 from turnout.readers.stated_quantities import quantity_of_text
 from turnout.readers.stated_units import is_unit_of_other, known_unit
 from turnout.readers.statements import USUAL_RATES
@@ -183,7 +190,7 @@ def _of_text(name: str, text: str, subject: int) -> Iterator[Candidate]:
     if subject_of(text) == STRONG:
         return
     ratio = RATIO.fullmatch(text)
-    if CONVERSION.search(text) or (ratio and ratio[1] != ratio[2]):
+    if CONVERSION.search(text) or (ratio and ratio[1] != ratio[2] and not is_ratio_of_drawing(name, text)):
         yield Candidate(SCALE, text[:MAX_SIZE])
     for match in PART_OF_SECOND.finditer(text):
         scale = Fraction(1000 if match[2] == "ms" else 1)

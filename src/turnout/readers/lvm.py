@@ -16,7 +16,7 @@ from turnout.errors import ReadError
 from turnout.readers.lost_entries import control_character_errors
 from turnout.readers.named_arrays import Metadata
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, Source, number_or_text
-from turnout.readers.stated_scales import scale_problem, scale_statements
+from turnout.readers.stated_scales import scale_problem, scale_statements, without_drawings
 from turnout.readers.statements import Entry, entries_of, step_entry
 from turnout.readers.timing import check_simultaneous, parse_time, start_fields, start_offsets
 
@@ -168,7 +168,7 @@ def _records(
     has_x = x is not None and len(x) == n_row and bool(np.isfinite(x).all())
     n_sample = n_row // n_write
     listed = {name: _scales_of_channels(values, count) for name, values in fields.items() if any(values)}
-    problems = enumerate(map(scale_problem, scale_statements({**head, **listed}, count)))
+    problems = enumerate(map(scale_problem, scale_statements({**without_drawings(head), **listed}, count)))
     undecided = {i: problem for i, problem in problems if problem}
     return [
         RawRecord(

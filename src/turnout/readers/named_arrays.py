@@ -30,7 +30,7 @@ from turnout.readers.lazy import ARRAYS, Array, Column
 from turnout.readers.rate_words import is_rate_name
 from turnout.readers.scale_words import is_scale_name
 from turnout.readers.source import CONDITIONS, RawFile, RawRecord, Source
-from turnout.readers.stated_scales import entry_statements, scale_problem, scale_statements
+from turnout.readers.stated_scales import entry_statements, scale_problem, scale_statements, without_drawings
 from turnout.readers.statements import MAX_ENTRIES, Entry, entries_of
 from turnout.readers.timing import seconds_since_first, start_fields
 
@@ -729,7 +729,7 @@ def _raw_record(
 
 def _undecided_scales(names: Sequence[str], facts: Metadata) -> dict[int, str]:
     """Statements about the scale of channels, by index: of the group, its parents and the channels themselves."""
-    texts = scale_statements(facts.scale_facts, len(names))
+    texts = scale_statements(without_drawings(facts.scale_facts), len(names))
     problems = facts.nested_scales(names) | {i: scale_problem(text) for i, text in enumerate(texts) if text}
     by_name = dict(facts.get((STATED_SCALES,)) or ())
     return problems | {i: by_name[name] for i, name in enumerate(names) if name in by_name}

@@ -17,7 +17,7 @@ from turnout.readers.claims import check_parquet
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.named_arrays import RECORD_COUNT_NAMES, START_NAMES, TIME_NAMES, Metadata
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
-from turnout.readers.stated_scales import entry_statements, scale_text
+from turnout.readers.stated_scales import entry_statements, scale_text, without_drawings
 from turnout.readers.statements import entries_of
 from turnout.readers.timing import seconds_since_first, start_fields
 
@@ -53,7 +53,7 @@ def read_raw(source: Source) -> RawFile:
     notes = _notes_of(schema.metadata)
     facts = Metadata(notes, source)
     units = {field.name: _unit(field) for field in schema}
-    stated = {f.name: scale_text({**notes, **_notes_of(f.metadata)}) for f in schema}
+    stated = {f.name: scale_text({**without_drawings(notes), **_notes_of(f.metadata)}) for f in schema}
     numbers = columns.pop("record", None)
     edges = [0, n_row]
     if numbers is not None:

@@ -20,7 +20,7 @@ from turnout.readers.claims import check_hdf5
 from turnout.readers.lazy import is_large, lazy_array, open_hdf5
 from turnout.readers.named_arrays import Metadata, single_value
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
-from turnout.readers.stated_scales import scale_text
+from turnout.readers.stated_scales import scale_text, without_drawings
 from turnout.readers.statements import entries_of, rate_entry
 
 FREQUENCY_ATTRIBUTES = ("CommonTriggerFrequency", "CommonTriggerFreq", "CommonTriggerFrequence", "TriggerValue")
@@ -152,7 +152,7 @@ def _record(data_source: DataSource, source: Source) -> RawRecord | None:
         **{f"{path}/{name}/data": attributes for name, attributes in of_data.items()},
     }
     above = {k: v for attributes in reversed(data_source.attributes.values()) for k, v in attributes.items()}
-    scales = [scale_text({**above, **settings[name], **of_data[name]}) for name in channels]
+    scales = [scale_text({**without_drawings(above), **settings[name], **of_data[name]}) for name in channels]
     notes = _notes(data_source.attributes)
     time = (stamps - stamps[0]) * 1e-9
     names = tuple(name.rpartition(".")[2] for name in channels)

@@ -9,6 +9,8 @@ import unicodedata
 from functools import lru_cache
 from itertools import pairwise
 
+import numpy as np
+
 from turnout.readers.other_subjects import STRONG, subject_of
 from turnout.readers.rate_words import rate_unit, words_of
 
@@ -63,7 +65,7 @@ OTHER_SCALE = re.compile(
     r"|excit|anreg|supply|speis"
 )
 OTHER_OFFSET = re.compile(r"voltage|file|data|block|buffer|header|index")  # a bias, or a position in the file
-# What is drawn or shown at a scale: a map, a plot. Words for something that is switched off.
+# What is drawn or shown at a scale: a map, a plot. Words for something that is switched off or sets itself.
 DRAWN = re.compile(
     r"(?:site|track|lage|gleis|street)?(?:maps?|plans?|karten?|carte|kort|mappa|mapa|plano)|drawings?|zeichnung|dessin"
     r"|tegning|disegno|dibujo|sketch|images?|bild|photo|foto|display|anzeige|plots?|charts?|diagramm?"
@@ -71,7 +73,7 @@ DRAWN = re.compile(
 )
 SWITCHED_OFF = re.compile(
     r"off|none|disabled|deactivated|inactive|aus|ausgeschaltet|abgeschaltet|deaktiviert|keine[rs]?|slukket|ingen|arret"
-    r"|desactivee?|aucune?|spento|disattivat[oa]|nessuna?|apagad[oa]|desactivad[oa]|ningun[oa]?"
+    r"|auto|automati\w*|agc|desactivee?|aucune?|spento|disattivat[oa]|nessuna?|apagad[oa]|desactivad[oa]|ningun[oa]?"
 )
 MAX_WORDS_OFF = 4  # of a text that says that something is switched off
 PREFIX_VALUES = {
@@ -220,8 +222,37 @@ def is_of_drawing(text: str) -> bool:
     return any(DRAWN.fullmatch(word) for word in words_of(text))
 
 
+SCALE_OF_DRAWING = re.compile(r"(?:drawing|map|plan)?scale|massstab|echelle|escala|scala|skala")
+RATIO_OF_DRAWING = re.compile(r"1 ?[:/] ?\d{3,}")
+
+
+def is_ratio_of_drawing(name: str, value: object) -> bool:
+    """Whether an entry that stands at no channel is the scale of a drawing, which has 1:100 and smaller ones.
+
+    Parameters
+    ----------
+    name : str
+        Name of the entry.
+    value : object
+        Its value.
+
+    Returns
+    -------
+    bool
+        False for the gain of an amplifier, and for 1:10, which may be one.
+
+    Examples
+    --------
+    >>> [is_ratio_of_drawing(*e) for e in (("Maßstab", "1:1000"), ("Gain", "1:500"), ("Scale", "1:10"), ("Scale", 500))]
+    [True, False, False, False]
+    """
+    value = value.item() if isinstance(value, np.ndarray) and value.size == 1 else value
+    is_ratio = isinstance(value, str) and RATIO_OF_DRAWING.fullmatch(value.strip()) is not None
+    return is_ratio and SCALE_OF_DRAWING.fullmatch("".join(words_of(name))) is not None
+
+
 def says_no_scale(text: str) -> bool:
-    """Whether the value under a name of a scale states none of the samples: that of a drawing, or one switched off.
+    """Whether the value under a name of a scale states none of the samples: that of a drawing, or off, or automatic.
 
     Parameters
     ----------
@@ -235,7 +266,7 @@ def says_no_scale(text: str) -> bool:
 
     Examples
     --------
-    >>> [says_no_scale(text) for text in ("1:500 map", "auto-range off", "1:500", "10 (auto off)", "off by 10")]
+    >>> [says_no_scale(text) for text in ("1:500 map", "auto", "1:500", "10 (auto off)", "off by 10")]
     [True, True, False, False, False]
     """
     without_ratio = re.sub(r"\b1 ?[:/] ?\d+\b", "", text)

@@ -21,6 +21,7 @@ from turnout.readers.scale_words import (
     POSSIBLY_OFFSET,
     is_fill_name,
     is_of_drawing,
+    is_ratio_of_drawing,
     is_scale_name,
     plain_word,
     says_no_scale,
@@ -32,6 +33,22 @@ from turnout.readers.statements import PLACEHOLDERS, Entry, entries_of_text
 from turnout.units import conversion, to_si
 
 YEARS = (1990.0, 2060.0)  # a whole number between them behind a word of calibration is a year
+
+
+def without_drawings(facts: Mapping[str, Any]) -> dict[str, Any]:
+    """Metadata that stand at no channel, without the scale of a drawing.
+
+    Parameters
+    ----------
+    facts : mapping of str to any
+        Names and values.
+
+    Returns
+    -------
+    dict of str to any
+        The others.
+    """
+    return {name: value for name, value in facts.items() if not is_ratio_of_drawing(str(name), value)}
 
 
 def scale_statements(facts: Mapping[str, Any], n_channel: int = 1) -> tuple[str, ...]:
@@ -78,7 +95,8 @@ def scales_in_text(text: str) -> tuple[tuple[str, str], ...]:
     """Names and values of the scales in a free text, as in "gain 10, tip: steel"."""
     if len(text) > MAX_SCALE_TEXT or not re.search(r"[^\W\d]{3}.*\d", text):
         return ()
-    return tuple((e.name, e.value) for e in entries_of_text(text, "") if scale_meaning(e.name))
+    entries = [e for e in entries_of_text(text, "") if scale_meaning(e.name)]
+    return tuple((e.name, e.value) for e in entries if not is_ratio_of_drawing(e.name, e.value))
 
 
 MAX_SCALE_TEXT = 400  # characters: a longer text is no note about an amplifier
@@ -234,6 +252,7 @@ def entry_statements(entries: Iterable[Entry], names: Sequence[str]) -> dict[int
     plain_names = {name.strip().casefold() for _, name in scales}
     texts: list[list[str]] = [[] for _ in names]
     named = [(entry, name, container_of(entry), owners_of(entry, entries, names)) for entry, name in scales]
+    named = [n for n in named if n[3] or not is_ratio_of_drawing(n[1], n[0].value)]
     for entry, name, container, owners in named:
         label = entry.name if entry.name == name else f"{name} of {entry.name}"
         meaning = _meaning_among(name, plain_names)

@@ -15,7 +15,7 @@ from turnout.errors import ReadError
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.named_arrays import RECORD_COUNT_NAMES, START_NAMES, Metadata, natural_sort_key
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
-from turnout.readers.stated_scales import scale_text
+from turnout.readers.stated_scales import scale_text, without_drawings
 from turnout.readers.statements import Entry, entries_of
 from turnout.readers.timing import check_simultaneous, parse_time, start_fields, start_offsets
 
@@ -209,7 +209,8 @@ def _scale_text(*levels: Mapping[str, Any]) -> str:
         if unknown := sorted({str(kind) for kind in kinds if kind is not None} - KNOWN_SCALES):
             return f"the file states the scale {', '.join(map(repr, unknown))}, which npTDMS cannot apply"
         break
-    merged = {k: v for level in reversed(levels) for k, v in level.items() if not k.startswith(APPLIED_PREFIXES)}
+    shown = [without_drawings(level) for level in levels[:0:-1]] + [levels[0]]
+    merged = {k: v for level in shown for k, v in level.items() if not k.startswith(APPLIED_PREFIXES)}
     return scale_text(merged)
 
 

@@ -8,6 +8,7 @@ import json
 import time
 from dataclasses import replace
 
+import nptdms
 import numpy as np
 import pytest
 import soundfile
@@ -35,11 +36,13 @@ TRUE_FREQUENCIES = (
 )  # fmt: skip
 NO_SCALES = [
     ("Scale", "1:500 map"), ("Scale", "map 1:2000"), ("Scale", "1:500 (site plan)"), ("Maßstab", "1:1000 Lageplan"),
+    ("Scale", "1:500"), ("Maßstab", "1 : 1000"), ("Note", "Scale: 1:500"), ("Gain", "auto"),
+    ("Verstärkung", "automatisch"),
     ("Gain", "auto-range off"), ("Gain", "disabled"), ("Verstärkung", "aus"), ("Offset", "none applied"),
     ("Plan", "scale 1:500"), ("Map", "scale: 1:500"), ("Note", "Scale: 1:500 map"), ("Note", "Gain: auto-range off"),
 ]  # fmt: skip
 TRUE_SCALES = [
-    ("Scale", "1:500"), ("Scale", "0.4 map"), ("Gain", "10 (auto-range off)"), ("Gain", "auto"),
+    ("Scale", "1:10"), ("Gain", "1:500"), ("Scale", "0.4 map"), ("Gain", "10 (auto-range off)"), ("Gain", "ten"),
     ("Offset", "off by 10"), ("Gain", "x10, display off"), ("Note", "gain 1:10"), ("Note", "gain 10"),
     ("Note", "amplifier gain: 10"),
 ]  # fmt: skip
@@ -99,6 +102,16 @@ def test_a_scale_of_the_samples_beside_such_words_is_rejected_by_name(format, tm
     for name, value in TRUE_SCALES:
         recording, errors = outcome(format, tmp_path, (name, value))
         assert recording is None and errors[0].reason == "scale_unknown", (name, value)
+
+
+def test_a_ratio_that_stands_at_a_channel_is_no_scale_of_a_drawing(tmp_path):
+    recording, errors = outcome("hdf5", tmp_path, ("operator", "mj"), ("Scale", "1:500"))  # of the force's dataset
+    assert recording is None and errors[0].reason == "scale_unknown" and "1:500" in errors[0].problem
+    channels = [nptdms.ChannelObject("impact", n, x, {"Scale": "1:500"}) for n, x in zip(UNITS, SAMPLES)]
+    with nptdms.TdmsWriter(str(tmp_path / "a.tdms")) as writer:
+        writer.write_segment(channels)
+    result = read("a.tdms", tmp_path, described(TRUE))
+    assert result.recordings == () and "1:500" in result.errors[0].problem
 
 
 @pytest.mark.parametrize("format", FORMATS)
