@@ -18,9 +18,10 @@ import numpy as np
 
 from turnout.config import load_configuration, with_raw
 from turnout.mismatch.calibrated import change_candidates, compare_onsets, estimate_history
-from turnout.mismatch.calibrated.answers import NAMES, evidence_from_first
+from turnout.mismatch.calibrated.file_comparison import evidence_from_first
 from turnout.mismatch.calibrated.history import Event
 from turnout.mismatch.calibrated.levels import own_levels
+from turnout.mismatch.calibrated.model_answer import NAMES
 from turnout.mismatch.turnout.calibration import dip_directions, file_errors
 from turnout.stages import calibrated_model
 from turnout_blind.history import START, parameters_at

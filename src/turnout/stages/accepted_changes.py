@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 from turnout.errors import SimulationError
 from turnout.mismatch.calibrated import ChangeEffect, Event, StateParameter, VisitInformation
-from turnout.mismatch.calibrated.answers import NAMES, free_shape, group_of, position_of
+from turnout.mismatch.calibrated.answers_of_change import free_shape
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.history import BEFORE_ALL
+from turnout.mismatch.calibrated.model_answer import NAMES, group_of, position_of
 from turnout.stages.accepted_effects import SINCE
 from turnout.stages.visit_time import years_of
 

@@ -37,8 +37,9 @@ from turnout.mismatch.calibrated import (
     estimate_history,
     track_sds,
 )
-from turnout.mismatch.calibrated.answers import INTOLERABLE, NAMES
+from turnout.mismatch.calibrated.answers_against_file import INTOLERABLE
 from turnout.mismatch.calibrated.constants import CALIBRATION
+from turnout.mismatch.calibrated.model_answer import NAMES
 from turnout.mismatch.engine.diagnose import fit_base
 from turnout.mismatch.engine.large_values import fit_large_values
 from turnout.mismatch.engine.search import Search

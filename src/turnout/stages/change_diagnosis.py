@@ -25,8 +25,9 @@ from turnout.mismatch.calibrated import (
     change_candidates,
     stretch_candidates,
 )
-from turnout.mismatch.calibrated.answers import DAMPER_SHARES, position_of
+from turnout.mismatch.calibrated.answers_of_change import DAMPER_SHARES
 from turnout.mismatch.calibrated.constants import CALIBRATION
+from turnout.mismatch.calibrated.model_answer import position_of
 from turnout.mismatch.engine.diagnose import diagnose, fit_base
 from turnout.mismatch.engine.reserved_data import gain_error, reserved_fit
 from turnout.mismatch.engine.search import Search

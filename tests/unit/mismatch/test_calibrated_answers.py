@@ -10,20 +10,20 @@ from turnout.mismatch.calibrated import (
     Event,
     GroupInformation,
     Innovation,
+    ModelAnswer,
     OnsetEvidence,
     StateParameter,
     VisitInformation,
-    answers,
-    compare_onsets,
-    estimate_history,
-)
-from turnout.mismatch.calibrated.answers import (
-    ModelAnswer,
     answers_after_visits,
+    answers_of_change,
     change_answer,
     change_candidates,
+    compare_onsets,
+    estimate_history,
     stretch_candidates,
 )
+from turnout.mismatch.calibrated.file_comparison import evidence_from_first
+from turnout.mismatch.calibrated.model_answer import is_explained, position_of
 from turnout.mismatch.turnout.calibration import dip_directions, nose_errors
 from turnout.mismatch.turnout.rail_roughness import Waves
 from turnout.stages.calibrated_model import events_of, within_library
@@ -132,7 +132,9 @@ def test_a_rival_just_below_the_threshold_counts(monkeypatch):
     def answer(rival):
         pair = [evidence("gain_A1", 12.3, 0.3), evidence("ballast@1.20", rival, 0.5)]
         monkeypatch.setattr(
-            answers, "compare_onsets", lambda h, c: sorted(pair, key=lambda e: -e.gain) if c is CANDIDATES else []
+            answers_of_change,
+            "compare_onsets",
+            lambda h, c: sorted(pair, key=lambda e: -e.gain) if c is CANDIDATES else [],
         )
         found = change_answer(PARAMETERS, visits, [], CANDIDATES, 12.0, 6.0)
         return found.verdict, found.names
@@ -253,7 +255,7 @@ def test_evidence_from_the_first_visit_is_that_of_the_density_of_all_data():
     still = estimate_history(
         [replace(p, walk_sd=0.0) for p in PARAMETERS], visits, (), 0.0, repeats_between_visits=False, accepted=None
     )
-    gains, *_ = answers.evidence_from_first(single[0].parameters, still, candidates)
+    gains, *_ = evidence_from_first(single[0].parameters, still, candidates)
     of_still = {e.effect.name: e.from_first for e in compare_onsets(still, candidates)}
     assert [of_still[c.name] for c in candidates] == pytest.approx(gains.tolist(), abs=1e-6)
     assert found["ballast@1.20"] == max(found.values())
@@ -376,10 +378,10 @@ def test_a_support_that_carries_nothing_under_impacts_and_trains_hangs(size, nam
 def test_an_effect_that_explains_little_of_a_jump_is_no_name():
     """Half of the excess over the 100 directions of a visit, which leave 100 where nothing happened."""
     jump = Innovation(1100.0, 100, 0.0, "seat_A3", 50.0, 190)
-    assert answers._is_explained(jump, replace(jump, statistic=600.0))
-    assert not answers._is_explained(jump, replace(jump, statistic=601.0))
+    assert is_explained(jump, replace(jump, statistic=600.0))
+    assert not is_explained(jump, replace(jump, statistic=601.0))
     expected = replace(jump, statistic=90.0)
-    assert answers._is_explained(expected, expected)
+    assert is_explained(expected, expected)
 
 
 @pytest.mark.parametrize("first", [0, 2])
@@ -422,8 +424,8 @@ def test_without_its_effect_in_the_library_a_site_has_no_other_name(question, na
 
 
 def test_a_wave_has_a_stretch_and_no_position():
-    assert answers.position_of(SURFACE[0].name, SURFACE[0]) is None
-    assert answers.position_of("dip of 0.8 m@5.00", None) == 5.0
+    assert position_of(SURFACE[0].name, SURFACE[0]) is None
+    assert position_of("dip of 0.8 m@5.00", None) == 5.0
 
 
 def all_candidates():

@@ -9,8 +9,9 @@ import numpy as np
 from scipy import stats
 
 from turnout.mismatch.calibrated.belief import Belief, StateParameter
+from turnout.mismatch.calibrated.change import ChangeEffect
 from turnout.mismatch.calibrated.constants import CALIBRATION
-from turnout.mismatch.calibrated.history import BEFORE_ALL, Event
+from turnout.mismatch.calibrated.history import BEFORE_ALL, Event, History
 
 
 @dataclass(frozen=True)
@@ -171,3 +172,40 @@ def _deviation(run: Sequence[StateParameter], size: float, sd: float, ordinary_s
     positions = [p.position for p in run if p.position is not None]
     ends = (min(positions), max(positions)) if positions else None
     return Deviation(run[0].group, tuple(p.name for p in run), size, sd, ordinary_sd, ends, run[0].unit)
+
+
+def evidence_from_first(
+    parameters: Sequence[StateParameter], history: History, candidates: Sequence[ChangeEffect]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    r"""Evidence of effects that were there from the first visit, over the values of the file with their scatter.
+
+    With the information of all visits, :math:`\Lambda = P^{-1} - P_0^{-1}`, it is that of ``compare_onsets`` for one
+    visit.
+
+    Parameters
+    ----------
+    parameters : sequence of StateParameter
+    history : History
+    candidates : sequence of ChangeEffect
+        Whether they grow makes no difference.
+
+    Returns
+    -------
+    gains, sizes, sds : (n_candidate,) array of float
+    """
+    names = [p.name for p in parameters]
+    prior, belief = history.prior, history.belief
+    factor = np.linalg.cholesky(prior.covariance)
+    precision = np.linalg.inv(belief.covariance)
+    score = precision @ (belief.mean - prior.mean)  # information vector about the mean of the file
+    scaled = factor.T @ precision @ factor - np.eye(len(names))
+    eigenvalues, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
+    informed = eigenvalues > CALIBRATION.min_prior_share  # not what an event made less certain than the file
+    w, vectors = eigenvalues[informed], vectors[:, informed]
+    changes = np.array([[c.direction.get(name, 0.0) for name in names] for c in candidates])
+    directions = np.linalg.solve(factor, changes.T).T @ vectors
+    information = directions**2 @ (w / (1.0 + w))
+    b = directions @ (vectors.T @ (factor.T @ score) / (1.0 + w))
+    variance = np.array([c.sd**2 for c in candidates])
+    sizes, sds = b / (information + 1.0 / variance), 1.0 / np.sqrt(information + 1.0 / variance)
+    return 0.5 * b * sizes - 0.5 * np.log1p(variance * information), sizes, sds

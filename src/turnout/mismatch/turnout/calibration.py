@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.constants import KMH
-from turnout.mismatch.calibrated.answers import position_of
 from turnout.mismatch.calibrated.belief import StateParameter
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.file_comparison import model_error
 from turnout.mismatch.calibrated.history import BEFORE_ALL, Event
 from turnout.mismatch.calibrated.information import GroupInformation, marginalize
+from turnout.mismatch.calibrated.model_answer import position_of
 from turnout.mismatch.turnout.priors import ROUGHNESS
 from turnout.mismatch.turnout.rail_roughness import Waves
 

@@ -1,0 +1,130 @@
+"""What differs from the owner's file: the effect of the first visit, else the clearest deviation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from turnout.mismatch.calibrated.belief import Innovation, StateParameter
+from turnout.mismatch.calibrated.change import ChangeEffect
+from turnout.mismatch.calibrated.constants import CALIBRATION
+from turnout.mismatch.calibrated.file_comparison import Deviation, deviations_from_file, evidence_from_first
+from turnout.mismatch.calibrated.history import Event, History, estimate_history
+from turnout.mismatch.calibrated.information import VisitInformation
+from turnout.mismatch.calibrated.model_answer import (
+    FILE,
+    NAMES,
+    LeadingEffect,
+    ModelAnswer,
+    group_of,
+    is_explained,
+    least_size,
+    name_of,
+    position_of,
+    supported_names,
+    with_rivals,
+)
+
+INTOLERABLE = {"depth": CALIBRATION.worn_depth}
+
+
+def file_answer(
+    parameters: Sequence[StateParameter],
+    visits: Sequence[VisitInformation],
+    events: Sequence[Event],
+    visit: str,
+    candidates: Sequence[ChangeEffect],
+    threshold: float,
+    margin: float,
+) -> ModelAnswer:
+    """What differs from the file: the effect of the first visit with the most evidence, else the clearest deviation.
+
+    Parameters
+    ----------
+    parameters : sequence of StateParameter
+    visits : sequence of VisitInformation
+        Those that lie before any change.
+    events : sequence of Event
+    visit : str
+        Visit after which the answer is given.
+    candidates : sequence of ChangeEffect
+        As ``change_candidates``.
+    threshold : float
+        Evidence that an effect needs. [nats]
+    margin : float
+        A rival of another name within it makes the answer "a or b". [nats]
+
+    Returns
+    -------
+    ModelAnswer
+        "unknown" where what differs has no name, or no name explains it.
+    """
+    by_name = {p.name: p for p in parameters}
+    steps = [c for c in candidates if not c.grows]
+    history = estimate_history(parameters, visits, events, accepted=None)
+    price = float(np.log(max(len(steps), 1)))
+    least = threshold + price
+    gains, sizes, sds = evidence_from_first(parameters, history, steps)
+    order = [
+        k for k in np.argsort(-gains) if gains[k] > least - margin and abs(sizes[k]) >= least_size(steps[k], by_name)
+    ]
+    jump = history.steps[0].innovation if history.steps else None
+    if not order or gains[order[0]] < least:
+        return _deviation_answer(parameters, history, visit, steps, jump)
+    first = order[0]
+    stated = LeadingEffect.of(
+        steps[first], by_name, (float(sizes[first]), float(sds[first])), float(gains[first]) - price
+    )
+    assert jump is not None  # without a visit nothing has evidence
+    if not _explains_first_visit(parameters, visits, events, steps[first], jump):
+        return stated.unknown(visit, FILE, by_name[jump.parameter])
+    names = [stated.name]
+    if stated.name == "local_ballast" and sizes[first] < 0.0:
+        names = supported_names(parameters, visits, events, steps[first], stated.size, margin)
+    rivals = [name_of(steps[k], by_name) for k in order if gains[k] > gains[first] - margin]
+    return stated.answer(visit, FILE, with_rivals(names, stated, rivals))
+
+
+def _explains_first_visit(
+    parameters: Sequence[StateParameter],
+    visits: Sequence[VisitInformation],
+    events: Sequence[Event],
+    effect: ChangeEffect,
+    jump: Innovation,
+) -> bool:
+    """Whether an effect explains how far the first visit is from the file. A dip is taken at its evidence."""
+    if group_of(effect, {p.name: p for p in parameters}) == "dip":
+        return True
+    wide = [replace(p, sd=float(np.hypot(p.sd, effect.sd * effect.direction.get(p.name, 0.0)))) for p in parameters]
+    return is_explained(jump, estimate_history(wide, visits, events, accepted=None).steps[0].innovation)
+
+
+def _deviation_answer(
+    parameters: Sequence[StateParameter],
+    history: History,
+    visit: str,
+    candidates: Sequence[ChangeEffect],
+    jump: Innovation | None,
+) -> ModelAnswer:
+    """The clearest deviation from the file; without one "unknown" if the first visit is not what the file expects."""
+    by_name = {p.name: p for p in parameters}
+    groups = {by_name[c.name].group for c in candidates if c.name in by_name}
+    least = {g: size for g, size in CALIBRATION.least_sizes if g in groups}
+    deviations = deviations_from_file(history.belief, parameters, least, intolerable=INTOLERABLE)
+    if not deviations:
+        if jump is None or jump.is_expected:
+            return ModelAnswer(visit, FILE, "none")
+        at = by_name[jump.parameter]
+        return ModelAnswer(visit, FILE, "unknown", (), at.name, at.group, position_of(at.name, at))
+    first: Deviation = deviations[0]
+    middle = None if first.positions is None else 0.5 * sum(first.positions)
+    position = middle if middle is not None else position_of(first.names[0], by_name[first.names[0]])
+    names: tuple[str, ...] = (NAMES[first.group],)
+    if names == ("local_ballast",) and first.size < 0.0:  # as in ``supported_names``
+        names = ("local_ballast", "hanging_sleeper")
+    return ModelAnswer(
+        visit, FILE, "named" if len(names) == 1 else "a_or_b", names, ", ".join(first.names), first.group,
+        position, first.size, first.sd, first.unit,
+    )  # fmt: skip

@@ -1,0 +1,284 @@
+"""What has changed: candidates of changes, and the effect that has appeared since when."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from turnout.mismatch.calibrated.belief import StateParameter
+from turnout.mismatch.calibrated.change import ChangeEffect, OnsetEvidence, compare_onsets
+from turnout.mismatch.calibrated.constants import CALIBRATION
+from turnout.mismatch.calibrated.history import Event, History, estimate_history
+from turnout.mismatch.calibrated.information import VisitInformation
+from turnout.mismatch.calibrated.levels import own_levels
+from turnout.mismatch.calibrated.model_answer import (
+    CHANGE,
+    NAMES,
+    LeadingEffect,
+    ModelAnswer,
+    group_of,
+    is_explained,
+    least_size,
+    name_of,
+    position_of,
+    supported_names,
+    with_rivals,
+)
+
+STRETCH_GROUPS = ("ballast", "pad")  # of which adjacent supports change together
+DAMPER_SHARES = (0.5, 1.0)  # change of the logarithm of the damping over that of the stiffness
+
+
+def change_candidates(
+    parameters: Sequence[StateParameter],
+    shapes: Mapping[str, Mapping[str, float]] | None = None,
+    without: Collection[str] = (),
+) -> list[ChangeEffect]:
+    """Steps of each parameter of a single support, sensor or nose at an unknown visit, and their growth.
+
+    A spring changes alone, or with its damper, see ``stretch_candidates``.
+
+    Parameters
+    ----------
+    parameters : sequence of StateParameter
+    shapes : mapping or None
+        Further candidates: name -> direction (parameter -> change per unit of size), with a prior standard deviation
+        of the size of ``CALIBRATION.dip_sd``.
+    without : collection of str
+        Names of effects that are left out.
+
+    Returns
+    -------
+    list of ChangeEffect
+    """
+    local = [p for p in parameters if p.may_change and p.group in NAMES and NAMES[p.group] not in without]
+    shapes = {} if shapes is None or NAMES["dip"] in without else shapes
+    candidates = [(p.name, {p.name: 1.0}, CALIBRATION.change_sds * p.sd) for p in local]
+    candidates += [(name, dict(direction), CALIBRATION.dip_sd) for name, direction in shapes.items()]
+    steps = [ChangeEffect(name, d, sd, grows) for name, d, sd in candidates for grows in (False, True)]
+    springs = [p for p in local if p.group in STRETCH_GROUPS and p.position is not None]
+    with_dampers = [e for p in springs for share in DAMPER_SHARES for e in _stretch(p.group, [p], share, parameters)]
+    return steps + [e for e in with_dampers if len(e.direction) > 1]
+
+
+def stretch_candidates(parameters: Sequence[StateParameter]) -> list[ChangeEffect]:
+    """Changes of two to ``CALIBRATION.max_stretch`` adjacent supports alike, with their dampers.
+
+    Ballast and pads often change over a stretch: drainage and traffic do not end at a sleeper. Their dampers change by
+    half the logarithm of the stiffness, as the effects of the library assume. That of a single support may also change
+    by all of it, where a sleeper has lost its support.
+
+    Parameters
+    ----------
+    parameters : sequence of StateParameter
+
+    Returns
+    -------
+    list of ChangeEffect
+        Named by the group, the first and last position, and the share of the dampers.
+    """
+    candidates = []
+    for group in STRETCH_GROUPS:
+        along = [p for p in parameters if p.may_change and p.group == group and p.position is not None]
+        along.sort(key=_order)
+        for n in range(2, CALIBRATION.max_stretch + 1):
+            for k in range(len(along) - n + 1):
+                run = along[k : k + n]
+                if _order(run[-1]) - _order(run[0]) == n - 1:
+                    candidates += _stretch(group, run, DAMPER_SHARES[0], parameters)
+    return candidates
+
+
+def _order(parameter: StateParameter) -> int:
+    assert parameter.index is not None
+    return parameter.index
+
+
+def _stretch(
+    group: str, run: Sequence[StateParameter], share: float, parameters: Sequence[StateParameter]
+) -> list[ChangeEffect]:
+    dampers = {f"{group}_damper@" + p.name.partition("@")[2] for p in run}
+    direction = {p.name: 1.0 for p in run}
+    direction |= {
+        p.name: share for p in parameters if p.group == f"{group}_damper" and p.name.split(" ")[-1] in dampers
+    }
+    first, last = run[0].position, run[-1].position
+    assert first is not None and last is not None
+    where = run[0].name if len(run) == 1 else f"{group}@{first:.2f} to {last:.2f}"
+    name, sd = f"{where}, dampers {share:g}", CALIBRATION.change_sds * run[0].sd
+    return [ChangeEffect(name, direction, sd, grows, group, 0.5 * (first + last)) for grows in (False, True)]
+
+
+def change_answer(
+    parameters: Sequence[StateParameter],
+    visits: Sequence[VisitInformation],
+    events: Sequence[Event],
+    candidates: Sequence[ChangeEffect],
+    threshold: float,
+    margin: float,
+    is_alarmed: bool = False,
+) -> ModelAnswer:
+    """What has changed up to the last of these visits.
+
+    Every candidate is equally probable before, so that its evidence is less by the logarithm of their number. By
+    Markov's inequality an intact history then exceeds ``threshold`` with a probability of at most exp(-threshold).
+
+    Parameters
+    ----------
+    parameters : sequence of StateParameter
+    visits : sequence of VisitInformation
+        In the order of time.
+    events : sequence of Event
+    candidates : sequence of ChangeEffect
+    threshold : float
+        [nats]
+    margin : float
+        [nats]
+    is_alarmed : bool
+        Whether an open alarm asks: then a change of any size is told, and the evidence of a name is that of all of its
+        candidates together, the mean of their likelihood ratios. The inequality holds for it as well.
+
+    Returns
+    -------
+    ModelAnswer
+        "unknown" if a visit differs from all before, and no name explains it.
+    """
+    visit = visits[-1].visit
+    levels, history, evidence = _evidence_of_changes(parameters, visits, events, candidates, is_alarmed)
+    price = float(np.log(max(len(candidates), 1)))
+    by_name = {p.name: p for p in parameters}
+    least = threshold + price
+    material = [e for e in evidence if e.gain > least - margin and (is_alarmed or _is_material(e, by_name))]
+    material = [e for e in material if e.gain >= e.from_first]
+    gain = _evidence_of_name(material, by_name) if is_alarmed else max((e.gain for e in material), default=-np.inf)
+    if gain < least:
+        by_stated_errors = estimate_history(parameters, visits, events, repeats_between_visits=False, accepted=None)
+        return _answer_without_name(by_stated_errors, visit, by_name)
+    leader = material[0]
+    other_form = next((e for e in evidence if e.effect.name == leader.effect.name and e is not leader), None)
+    stated = LeadingEffect.of(leader.effect, by_name, leader.size, gain - price, leader.interval(other_form=other_form))
+    jump = history.steps[1 + int(np.argmax(leader.gains))].innovation
+    with_change = estimate_history(
+        parameters,
+        visits,
+        [*events, *_events_of_change(leader, parameters, candidates)],
+        repeats_between_visits=False,
+        accepted=None,
+        levels=levels,
+    )
+    explained = next(s.innovation for s in with_change.steps if s.visit == leader.onset)
+    if not is_explained(jump, explained):
+        return stated.unknown(visit, CHANGE, by_name[jump.parameter])
+    names = [stated.name]
+    if stated.name == "local_ballast" and leader.size[0] < 0.0:
+        names = supported_names(parameters, visits, events, leader, _present_size(leader), margin, levels)
+    rivals = [name_of(e.effect, by_name) for e in material if e.gain > leader.gain - margin]
+    answer = stated.answer(visit, CHANGE, with_rivals(names, stated, rivals))
+    return replace(answer, changed=tuple(leader.effect.direction), total=_present_size(leader)[0])
+
+
+def _evidence_of_changes(
+    parameters: Sequence[StateParameter],
+    visits: Sequence[VisitInformation],
+    events: Sequence[Event],
+    candidates: Sequence[ChangeEffect],
+    is_alarmed: bool,
+) -> tuple[dict[str, float], History, list[OnsetEvidence]]:
+    """Levels of the errors, history and evidence. The levels are those that the most evident change leaves.
+
+    Where an alarm asks, a change of any size is told: there the errors are the stated ones.
+    """
+    levels = {} if is_alarmed else own_levels(parameters, visits, events)
+    for is_last in (is_alarmed, True):
+        history = estimate_history(
+            parameters, visits, events, repeats_between_visits=False, accepted=None, levels=levels
+        )
+        evidence = compare_onsets(history, candidates)
+        if is_last or not evidence:
+            break
+        change = _events_of_change(evidence[0], parameters, candidates)
+        levels = own_levels(parameters, visits, [*events, *change])
+    return levels, history, evidence
+
+
+def _evidence_of_name(material: Sequence[OnsetEvidence], by_name: Mapping[str, StateParameter]) -> float:
+    """Sum of the likelihood ratios of all candidates with the name and the sign of the first one. [nats]"""
+    if not material:
+        return -np.inf
+    effect, size = material[0].effect, material[0].size[0]
+    alike = [
+        e.gain for e in material if name_of(e.effect, by_name) == name_of(effect, by_name) and e.size[0] * size > 0.0
+    ]
+    return float(np.logaddexp.reduce(alike))
+
+
+def _events_of_change(
+    evidence: OnsetEvidence, parameters: Sequence[StateParameter], candidates: Sequence[ChangeEffect]
+) -> list[Event]:
+    """Events that open the directions of an effect from its most probable onset on."""
+    first = int(np.argmax(evidence.gains))
+    times, directions = evidence.times, free_shape(evidence.effect, parameters, candidates)
+    if not evidence.effect.grows:
+        return [Event(float(times[first + 1]), {}, *d) for d in directions]
+    steps = list(zip(times[first:-1], times[first + 1 :]))
+    return [Event(float(now), {}, d, sd * float(now - before)) for before, now in steps for d, sd in directions]
+
+
+def free_shape(
+    effect: ChangeEffect, parameters: Sequence[StateParameter], candidates: Sequence[ChangeEffect]
+) -> list[tuple[Mapping[str, float], float]]:
+    """Directions of an effect with their standard deviations. A dip of the surface may have any shape.
+
+    Wear lowers a nose unevenly: beside the dip, all dips and numbers of the file's surface within
+    ``CALIBRATION.nose_reach`` may change.
+
+    Parameters
+    ----------
+    effect : ChangeEffect
+    parameters : sequence of StateParameter
+    candidates : sequence of ChangeEffect
+
+    Returns
+    -------
+    list of (mapping, float)
+        Parameter -> change per unit of size, and standard deviation of the size.
+    """
+    by_name = {p.name: p for p in parameters}
+    at = position_of(effect.name, by_name.get(effect.name))
+    directions: list[tuple[Mapping[str, float], float]] = [(effect.direction, effect.sd)]
+    if group_of(effect, by_name) not in ("dip", "depth") or at is None:
+        return directions
+    dips = [c for c in candidates if group_of(c, by_name) == "dip" and c.grows == effect.grows]
+    numbers = [p for p in parameters if p.group in ("surface", "depth")]
+    near = [(position_of(c.name, None), (c.direction, c.sd)) for c in dips]
+    near += [(position_of(p.name, p), ({p.name: 1.0}, CALIBRATION.change_sds * p.sd)) for p in numbers]
+    return directions + [d for x, d in near if x is not None and abs(x - at) <= CALIBRATION.nose_reach]
+
+
+def _is_material(evidence: OnsetEvidence, by_name: Mapping[str, StateParameter]) -> bool:
+    """Whether the present size causes any action."""
+    return abs(_present_size(evidence)[0]) >= least_size(evidence.effect, by_name)
+
+
+def _present_size(evidence: OnsetEvidence) -> tuple[float, float]:
+    """Size at the last visit and its standard deviation: of growth, that since its most probable onset."""
+    start = evidence.times[int(np.argmax(evidence.gains))]
+    elapsed = float(evidence.times[-1] - start) if evidence.effect.grows else 1.0
+    return elapsed * evidence.size[0], elapsed * evidence.size[1]
+
+
+def _answer_without_name(history: History, visit: str, by_name: Mapping[str, StateParameter]) -> ModelAnswer:
+    """ "none", or "unknown" since the first visit that differs from all before by more than those from the expected."""
+    level = 1.0
+    for before, step in pairwise(history.steps):
+        level = max(level, before.innovation.statistic / max(before.innovation.n_directions, 1))
+        if not step.innovation.is_expected_at(level):
+            at = by_name[step.innovation.parameter]
+            return ModelAnswer(
+                visit, CHANGE, "unknown", (), at.name, at.group, position_of(at.name, at),
+                onset=(before.time, step.time),
+            )  # fmt: skip
+    return ModelAnswer(visit, CHANGE, "none")

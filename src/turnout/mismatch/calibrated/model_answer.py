@@ -1,0 +1,336 @@
+"""An answer of the calibrated model, and the name of the effect with the most evidence."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from turnout.mismatch.calibrated.belief import Innovation, StateParameter
+from turnout.mismatch.calibrated.change import ChangeEffect, OnsetEvidence, compare_onsets
+from turnout.mismatch.calibrated.constants import CALIBRATION
+from turnout.mismatch.calibrated.file_comparison import evidence_from_first
+from turnout.mismatch.calibrated.history import Event, estimate_history
+from turnout.mismatch.calibrated.information import GroupInformation, VisitInformation
+from turnout.mismatch.calibrated.levels import IMPACTS, kind_of
+
+CHANGE, FILE = QUESTIONS = ("change", "file")
+# Group of a parameter -> the effect of the library that changes it
+NAMES = {
+    "ballast": "local_ballast",
+    "pad": "local_pad",
+    "gain": "sensor_gain",
+    "seat": "sensor_position",
+    "depth": "surface_dip",
+    "dip": "surface_dip",
+}
+
+
+@dataclass(frozen=True)
+class ModelAnswer:
+    """Answer of the calibrated model after one ``visit``.
+
+    ``question`` of ``QUESTIONS``; ``verdict`` "none", "named", "a_or_b" or "unknown" with its ``names``.
+    ``parameter`` has changed by ``size`` (standard error ``sd``, ``unit``), or by as much per year if it ``grows``.
+    ``onset``: last time without and first time with the change [years], None against the file. ``gain`` is the evidence
+    less the logarithm of the number of candidates [nats], None where the answer does not rest on one. ``changed`` are
+    all parameters that change alike, ``total`` is the change of each at the visit.
+    """
+
+    visit: str
+    question: str
+    verdict: str
+    names: tuple[str, ...] = ()
+    parameter: str = ""
+    group: str = ""
+    position: float | None = None
+    size: float | None = None
+    sd: float | None = None
+    unit: str = ""
+    onset: tuple[float, float] | None = None
+    gain: float | None = None
+    grows: bool = False
+    changed: tuple[str, ...] = ()
+    total: float | None = None
+
+
+@dataclass(frozen=True)
+class LeadingEffect:
+    """The effect with the most evidence."""
+
+    parameter: str
+    name: str
+    group: str
+    position: float | None
+    unit: str
+    size: tuple[float, float]
+    gain: float
+    onset: tuple[float, float] | None
+    grows: bool
+
+    @classmethod
+    def of(
+        cls,
+        effect: ChangeEffect,
+        by_name: Mapping[str, StateParameter],
+        size: tuple[float, float],
+        gain: float,
+        onset: tuple[float, float] | None = None,
+    ) -> LeadingEffect:
+        """The effect of a candidate.
+
+        Parameters
+        ----------
+        effect : ChangeEffect
+        by_name : mapping of str to StateParameter
+        size : (float, float)
+            Size and its standard deviation.
+        gain : float
+            [nats]
+        onset : (float, float) or None
+            [years]
+
+        Returns
+        -------
+        LeadingEffect
+        """
+        parameter = by_name.get(effect.name)
+        first = parameter or by_name.get(next(iter(effect.direction)))
+        group = group_of(effect, by_name)
+        unit = first.unit if first and group != "dip" else "m"
+        position = position_of(effect.name, parameter) if effect.position is None else effect.position
+        position = _nose_near(position, by_name.values()) if group == "dip" else position
+        return cls(
+            effect.name.partition(",")[0], name_of(effect, by_name), group, position, unit, size, gain, onset,
+            onset is not None and effect.grows,
+        )  # fmt: skip
+
+    def unknown(self, visit: str, question: str, jump: StateParameter) -> ModelAnswer:
+        """Answer "unknown", at the parameter whose jump explains most.
+
+        Parameters
+        ----------
+        visit, question : str
+        jump : StateParameter
+
+        Returns
+        -------
+        ModelAnswer
+        """
+        return ModelAnswer(
+            visit, question, "unknown", (), jump.name, jump.group, position_of(jump.name, jump), onset=self.onset,
+            gain=self.gain,
+        )  # fmt: skip
+
+    def answer(self, visit: str, question: str, names: Sequence[str]) -> ModelAnswer:
+        """Answer with these names.
+
+        Parameters
+        ----------
+        visit, question : str
+        names : sequence of str
+
+        Returns
+        -------
+        ModelAnswer
+        """
+        return ModelAnswer(
+            visit, question, "named" if len(names) == 1 else "a_or_b", tuple(names[:2]), self.parameter, self.group,
+            self.position, *self.size, self.unit, self.onset, self.gain, self.grows,
+        )  # fmt: skip
+
+
+def is_explained(before: Innovation, after: Innovation) -> bool:
+    """Whether an effect explains the innovation of its first visit: at least a share of the excess over the expected.
+
+    A substitute for an effect that has no name explains little of it, however much evidence it has.
+
+    Parameters
+    ----------
+    before, after : Innovation
+
+    Returns
+    -------
+    bool
+    """
+    excess = [i.statistic - i.n_directions for i in (before, after)]
+    return excess[1] <= max((1.0 - CALIBRATION.min_explained_share) * excess[0], 0.0)
+
+
+def with_rivals(names: Sequence[str], stated: LeadingEffect, rivals: Iterable[str]) -> list[str]:
+    """The names and those of rivals, each once.
+
+    Parameters
+    ----------
+    names : sequence of str
+    stated : LeadingEffect
+    rivals : iterable of str
+
+    Returns
+    -------
+    list of str
+    """
+    return [*names, *(n for n in dict.fromkeys(rivals) if n not in (*names, stated.name))]
+
+
+def supported_names(
+    parameters: Sequence[StateParameter],
+    visits: Sequence[VisitInformation],
+    events: Sequence[Event],
+    leader: OnsetEvidence | ChangeEffect,
+    size: tuple[float, float],
+    margin: float,
+    levels: Mapping[str, float] | None = None,
+) -> list[str]:
+    """Names of softer ballast: a gap is felt by impacts on the unloaded track, and less by trains that close it.
+
+    In one fit trains have a size of their own: that of impacts, or the shares of it that a gap leaves, which are
+    equally probable before. The prior of the size is so wide that it favours none: without trains, or without impacts,
+    the evidence decides nothing. A gap that no train closes feels alike under both, as a softer bed does. It is known
+    only where less of the stiffness is left than ballast has that carries anything.
+    An effect without onsets is one of the first visit.
+
+    Parameters
+    ----------
+    parameters : sequence of StateParameter
+    visits : sequence of VisitInformation
+    events : sequence of Event
+    leader : OnsetEvidence or ChangeEffect
+    size : (float, float)
+        Present size and its standard deviation.
+    margin : float
+        [nats]
+    levels : mapping of str to float or None
+        As in ``estimate_history``.
+
+    Returns
+    -------
+    list of str
+    """
+    if size[0] + CALIBRATION.finding_sds * size[1] < np.log(CALIBRATION.least_support):
+        return ["hanging_sleeper"]
+    effect = leader.effect if isinstance(leader, OnsetEvidence) else leader
+    felt = [p for p in parameters if p.name in effect.direction]  # the damper of a support with its spring
+    offsets = {p.name: replace(p, name=f"{p.name} as trains feel it", mean=0.0) for p in felt}
+    all_parameters = [*parameters, *offsets.values()]
+    opened, split = list(events), list(visits)
+    for name, offset in offsets.items():
+        opened = [
+            replace(e, opened={**e.opened, offset.name: e.opened[name]}) if name in e.opened else e for e in opened
+        ]
+        split = [replace(v, groups=tuple(_with_offset(g, name, offset.name) for g in v.groups)) for v in split]
+    sd = CALIBRATION.gap_size_sds * max(effect.sd, abs(size[0]))
+    effects = [
+        ChangeEffect(
+            f"{share:g}",
+            {**effect.direction, **{offsets[name].name: (share - 1.0) * d for name, d in effect.direction.items()}},
+            sd,
+            effect.grows,
+        )
+        for share in (1.0, *CALIBRATION.gap_shares)
+    ]
+    history = estimate_history(
+        all_parameters,
+        split,
+        opened,
+        repeats_between_visits=False,
+        accepted=None,
+        levels=levels,
+    )
+    if isinstance(leader, OnsetEvidence):
+        gains = {e.effect.name: e.gain for e in compare_onsets(history, effects)}
+    else:
+        gains = dict(zip((e.name for e in effects), evidence_from_first(all_parameters, history, effects)[0]))
+    equal, *of_gaps = (gains[e.name] for e in effects)
+    difference = float(np.logaddexp.reduce(of_gaps)) - float(np.log(len(of_gaps))) - equal
+    return ["hanging_sleeper"] if difference > margin else ["local_ballast", "hanging_sleeper"]
+
+
+def _with_offset(group: GroupInformation, name: str, offset: str) -> GroupInformation:
+    """Information of trains on the sum of a parameter and its ``offset``; that of impacts as it is."""
+    if kind_of(group.group) == IMPACTS or name not in group.names:
+        return group
+    k, n = group.names.index(name), len(group.names)
+    terms = np.vstack([np.eye(n), np.eye(n)[k]])  # (n + 1, n)
+    return replace(
+        group, names=(*group.names, offset), matrix=terms @ group.matrix @ terms.T, vector=terms @ group.vector
+    )  # fmt: skip
+
+
+def _nose_near(position: float | None, parameters: Iterable[StateParameter]) -> float | None:
+    """Position of the nose whose surface a dip changes, else that of the dip itself."""
+    if position is None:
+        return None
+    at = position
+    noses = [x for p in parameters if p.group == "depth" and (x := position_of(p.name, p)) is not None]
+    nose = min(noses, key=lambda x: abs(x - at), default=at)
+    return nose if abs(nose - at) <= CALIBRATION.nose_reach else at
+
+
+def position_of(name: str, parameter: StateParameter | None) -> float | None:
+    """Position of a candidate [m]: that of its parameter, or the number behind "@" or "at" in its name; none of a wave.
+
+    Parameters
+    ----------
+    name : str
+    parameter : StateParameter or None
+
+    Returns
+    -------
+    float or None
+    """
+    if parameter is not None and parameter.position is not None:
+        return parameter.position
+    if parameter is not None and parameter.group == "wave":  # it names its stretch
+        return None
+    number = re.search(r"(?:@| at )(-?\d+(?:\.\d+)?)", name)
+    return float(number.group(1)) if number else None
+
+
+def name_of(effect: ChangeEffect, by_name: Mapping[str, StateParameter]) -> str:
+    """Name of the effect of the library that a candidate is.
+
+    Parameters
+    ----------
+    effect : ChangeEffect
+    by_name : mapping of str to StateParameter
+
+    Returns
+    -------
+    str
+    """
+    return NAMES[group_of(effect, by_name)]
+
+
+def group_of(effect: ChangeEffect, by_name: Mapping[str, StateParameter]) -> str:
+    """Group of the parameters that an effect changes, "dip" for the waves of a dip.
+
+    Parameters
+    ----------
+    effect : ChangeEffect
+    by_name : mapping of str to StateParameter
+
+    Returns
+    -------
+    str
+    """
+    parameter = by_name.get(effect.name)
+    return parameter.group if parameter else effect.group or "dip"
+
+
+def least_size(effect: ChangeEffect, by_name: Mapping[str, StateParameter]) -> float:
+    """Least size of a candidate that causes any action.
+
+    Parameters
+    ----------
+    effect : ChangeEffect
+    by_name : mapping of str to StateParameter
+
+    Returns
+    -------
+    float
+    """
+    group = group_of(effect, by_name)
+    return CALIBRATION.least_dip if group == "dip" else dict(CALIBRATION.least_sizes)[group]
