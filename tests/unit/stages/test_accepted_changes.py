@@ -26,6 +26,7 @@ from turnout.mismatch.calibrated import (
 from turnout.records import Unit
 from turnout.stages.accept_finding import accept, with_entry
 from turnout.stages.accepted_changes import AcceptedChange, change_events, change_text, changes_of, without_accepted
+from turnout.stages.calibrated_model import calibrate_turnout
 from turnout.stages.change_diagnosis import change_unit
 from turnout.stages.mismatch_inputs import track_of
 from turnout.workflow.scan import scan
@@ -173,7 +174,7 @@ def test_a_night_after_the_acceptance_names_nothing_and_after_its_withdrawal_the
     for k, day in enumerate(DAYS):
         soft = (lambda track: (physics.LocalBallast(track.nearest_support(small.SLEEPER), 0.4),)) if k > 1 else None
         small.strike(tmp_path, soft, day=datetime.fromisoformat(f"{day}T09:00"), seed=10 * k)
-    before = row_of_night()
+    before, model = row_of_night(), calibrate_turnout("t1")
     assert before["verdict"] == "a_or_b" and before["position_m"] == 18.0
     register([], tmp_path / "registry", read=iter, tables={"turnouts": [{"turnout_id": "t1", "layout": "small"}]})
     publish(tmp_path / "registry", {"change_findings": [{**before, "found_at_utc": pd.Timestamp("2026-05-01T23:59")}]})
@@ -187,7 +188,18 @@ def test_a_night_after_the_acceptance_names_nothing_and_after_its_withdrawal_the
     assert effects == () and change.words in ("local ballast at 18.0 m", "hanging sleeper at 18.0 m")
     after = row_of_night()
     assert after["verdict"] == "none" and f"accepted before: {change.words}" in after["sentence"]
+    accepted = calibrate_turnout("t1")
+    assert [(a.question, a.verdict) for a in model.answers] == [("change", "a_or_b"), ("file", "none")]
+    assert [(a.question, a.verdict) for a in accepted.answers] == [("change", "none"), ("file", "none")]
+    assert len(accepted.history.used_steps) == len(DAYS) > len(model.history.used_steps)
+    number = [p.name for p in accepted.history.parameters].index("ballast@18.00")
+    contained = accepted.history.belief.mean[number]
+    assert contained == pytest.approx(before["change"], abs=0.15)
     (tmp_path / "config/tracks/t1.yaml").unlink()
     assert row_of_night() == before
+    withdrawn = calibrate_turnout("t1")
+    for name in ("mean", "covariance"):
+        assert getattr(withdrawn.history.belief, name).tobytes() == getattr(model.history.belief, name).tobytes()
+    assert withdrawn.answers == model.answers
     shutil.rmtree("work")
     assert row_of_night() == before
