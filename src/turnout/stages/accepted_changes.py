@@ -12,6 +12,8 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from turnout.errors import SimulationError
 from turnout.mismatch.calibrated import ChangeEffect, Event, StateParameter, VisitInformation
 from turnout.mismatch.calibrated.answers_of_change import free_shape
@@ -141,6 +143,27 @@ def change_events(
         within = {t for t in times if change.since < t <= change.until} | {change.until}
         events += [Event(t, {}, dict(d), sd) for t in sorted(within) for d, sd in distinct.items()]
     return events
+
+
+def further_candidates(
+    changes: Sequence[AcceptedChange], parameters: Sequence[StateParameter], candidates: Sequence[ChangeEffect]
+) -> list[ChangeEffect]:
+    """Candidates of further changes: those of an accepted change begin after it.
+
+    Parameters
+    ----------
+    changes : sequence of AcceptedChange
+    parameters : sequence of StateParameter
+    candidates : sequence of ChangeEffect
+
+    Returns
+    -------
+    list of ChangeEffect
+        In the same order.
+    """
+    by_name = {p.name: p for p in parameters}
+    ends = [max((change.until for change in changes if change.has(c, by_name)), default=-np.inf) for c in candidates]
+    return [replace(c, not_before=float(end)) for c, end in zip(candidates, ends)]
 
 
 def without_accepted(

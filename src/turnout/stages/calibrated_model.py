@@ -52,7 +52,7 @@ from turnout.mismatch.turnout.calibration import (
 )
 from turnout.mismatch.turnout.further_passages import names_beyond, with_reserved_passages
 from turnout.mismatch.turnout.nose_starts import fit_from_nose_positions
-from turnout.stages.accepted_changes import change_events, changes_of, without_accepted
+from turnout.stages.accepted_changes import change_events, changes_of, further_candidates, without_accepted
 from turnout.stages.checkpoint import SUFFIX, read_value, write_value
 from turnout.stages.mismatch_groups import groups, unit_of, visits
 from turnout.stages.mismatch_inputs import digest_of_model, gather_inputs, mismatch_context, track_of
@@ -470,7 +470,7 @@ def calibrate_turnout(
     history = estimate_history(parameters, visits_of(_without_findings(stored)), events)
     changes = estimate_history(parameters, informed, events, repeats_between_visits=False, accepted=None)
     settings = turnout.settings["mismatch"]
-    candidates = change_candidates(parameters, directions, without)
+    candidates = further_candidates(accepted, parameters, change_candidates(parameters, directions, without))
     against_file = without_accepted(accepted, parameters, events, candidates)
     deviations = deviations_from_file(
         history.belief, against_file[0], dict(CALIBRATION.least_sizes), intolerable=INTOLERABLE

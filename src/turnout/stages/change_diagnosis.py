@@ -34,7 +34,7 @@ from turnout.mismatch.engine.search import Search
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.calibration import calibrated_parameters, dip_directions
 from turnout.stages import calibrated_model as calibrated
-from turnout.stages.accepted_changes import changes_of
+from turnout.stages.accepted_changes import changes_of, further_candidates
 from turnout.stages.mismatch_groups import (
     Group,
     groups,
@@ -233,6 +233,7 @@ def change_of(
     settings = turnout.settings["mismatch"]
     candidates = [*change_candidates(parameters, dip_directions(parameters)), *stretch_candidates(parameters)]
     events = calibrated.events_of(turnout, parameters, changes, informed)
+    candidates = further_candidates(changes, parameters, candidates)
     least = settings.threshold if threshold is None else threshold
     return change_answer(parameters, informed, events, candidates, least, settings.margin, True), informed
 

@@ -17,7 +17,8 @@ class ChangeEffect:
 
     ``direction``: parameter -> change per unit of size. ``sd`` is the prior standard deviation of the size; of one that
     ``grows``, of its growth per year. ``group`` and ``position`` are those of an effect on several parameters of one
-    group; of an effect on one parameter they are known from it.
+    group; of an effect on one parameter they are known from it. ``not_before``: time before which it cannot begin,
+    since an accepted change explains what happened until then. [years]
     """
 
     name: str
@@ -26,6 +27,7 @@ class ChangeEffect:
     grows: bool = False
     group: str = ""
     position: float | None = None
+    not_before: float = -np.inf
 
 
 @dataclass(frozen=True)
@@ -167,9 +169,12 @@ def compare_onsets(history: History, effects: Sequence[ChangeEffect]) -> list[On
     gains = 0.5 * score * sizes - 0.5 * np.log1p(information / precision)
     sds = 1.0 / np.sqrt(information + precision)
     visits, times = tuple(s.visit for s in steps), np.array([s.time for s in steps])
+    is_too_early = times[:-1, None] < np.array([e.not_before for e in effects])  # (n_visit - 1, n_effect)
+    gains[1:][is_too_early] = -np.inf
     evidence = [
         OnsetEvidence(e, visits, times, gains[1:, k], sizes[1:, k], sds[1:, k], float(gains[0, k]))
         for k, e in enumerate(effects)
+        if not is_too_early[:, k].all()
     ]
     return sorted(evidence, key=lambda e: -e.gain)
 
