@@ -566,7 +566,7 @@ def _recording(
     }
     of_rate = rate_remark(statements, rate, where, source)
     is_rate_stated = any(s.certainty == CERTAIN and s.intervals for s in statements)
-    of_entries = entry_check.remark(record, rate, n_record, where, is_rate_stated, of_rate.problem if of_rate else "")
+    of_entries = entry_check.remark(record, rate, n_record, where, is_rate_stated)
     channel_errors = [*faults.values(), *(remark for remark in (of_rate, of_entries) if remark)]
     if is_long:
         return LongRecording(block_reader.subset(usable), n_sample, **fields), channel_errors

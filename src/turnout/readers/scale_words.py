@@ -56,13 +56,11 @@ EXPONENT = re.compile(r"(?:scale|unit|decimal)?exponent\d*|zehnerpotenz|poweroft
 # What a number is converted to: "adc_to_volt", "ToSI".
 TARGETS = frozenset("si eu volt volts v mv unit units newton newtons n kn g ms physical engineering".split())
 CONVERTED = re.compile(r"[a-z]+2([a-z]+)2?")  # "lbf2N"
-# Factors and offsets of other things than the numbers of a channel.
+# Factors and offsets of other things than the numbers of a channel, beside those of ``other_subjects``.
 OTHER_SCALE = re.compile(
-    r"temp|time|zeit|trigg|date|datum|year|jahr|valid|due|number|^no$|^nr$|filt|freq|rate|crest|scheitel|power|form"
-    r"|safety|quality|window|load|damp(?!fung)|sampl|decim|dynamic|gps|utc|posit|byte|pixel|colou?r|plot|axis|display"
-    r"|image|zoom|print|volt(?!s?$|age$)|current|strom|speed|length|dist|wheel|full|range|cross|pad|sensitiv|(?<!con)(?<!in)version|limit|max|min"
-    r"|error|uncert|cover|peak|^q$|spectr|start|begin|mode|type|auto|cut|^x$|model|map"
-    r"|excit|anreg|supply|speis"
+    r"time|zeit|valid|number|^no$|^nr$|freq|rate|power|form|quality|load|sampl|decim|dynamic|posit|byte|pixel|colou?r|axis"
+    r"|image|volt(?!s?$|age$)|speed|length|dist|full|range|cross|pad|limit|max|min|cover|peak|^q$|start|begin|mode|type"
+    r"|auto|cut|^x$|model"
 )
 OTHER_OFFSET = re.compile(r"voltage|file|data|block|buffer|header|index")  # a bias, or a position in the file
 # What is drawn or shown at a scale: a map, a plot. Words for something that is switched off or sets itself.

@@ -520,23 +520,6 @@ def resolve(statements: Sequence[Statement], promised: float | None, where: str,
     return float(whole) if is_unique and is_within else interval.rate
 
 
-MIN_OTHER_RATE = 1000.0  # Hz: lower frequencies beside a certain rate mean something else
-
-
-def _other_rate(statements: Sequence[Statement], rate: float) -> Statement | None:
-    """A statement that may be about the sampling rate and is not about the one in use."""
-    used = around(rate, EXACT_PRECISION)
-    return next(
-        (
-            s
-            for s in statements
-            if s.certainty == POSSIBLY and not s.is_clock and s.intervals
-            if MIN_OTHER_RATE <= s.usual.rate <= USUAL_RATES[1] and not any(i.loose.overlaps(used) for i in s.intervals)
-        ),
-        None,
-    )
-
-
 def _common_meanings(certain: Sequence[Statement]) -> list[Interval]:
     """The meanings of the first statement with which all others agree."""
     return [i for i in certain[0].intervals if all(s.agrees_with(i) for s in certain[1:])]
@@ -551,9 +534,7 @@ def _reduction_problem(statement: Statement) -> str:
 
 
 def rate_remark(statements: Sequence[Statement], rate: float, where: str, source: Source) -> ReadError | None:
-    """Remark on a record of which the file may state another rate than the one in use.
-
-    That is one before a reduction which nothing else confirms, or an entry that may be a rate.
+    """Remark on a record whose file states a rate before a reduction that nothing else confirms.
 
     Parameters
     ----------
@@ -572,9 +553,6 @@ def rate_remark(statements: Sequence[Statement], rate: float, where: str, source
         None if nothing is in doubt.
     """
     certain = [s for s in statements if s.certainty == CERTAIN and s.intervals]
-    if certain and (other := _other_rate(statements, rate)):
-        problem = f"{other} may be a sampling rate as well; {rate:.9g} Hz is used, by {certain[0]}"
-        return source.error(where, problem, "Find out which rate is right", reason="wrong_rate")
     if not any(s.factor > 1 for s in certain) or len(meanings := _common_meanings(certain)) < 2:
         return None
     if meanings[-1].loose.overlaps(around(rate, EXACT_PRECISION)):

@@ -193,7 +193,7 @@ class EntryCheck:
         return record if len(entries) == len(record.entries) else replace(record, entries=entries)
 
     def remark(
-        self, record: RawRecord, rate: float, n_record: int, where: str, is_rate_stated: bool, rate_remark: str
+        self, record: RawRecord, rate: float, n_record: int, where: str, is_rate_stated: bool
     ) -> ReadError | None:
         """Check the entries of one record.
 
@@ -209,8 +209,6 @@ class EntryCheck:
             The record, for the message.
         is_rate_stated : bool
             Whether the file states the rate in known words: another rate is then a remark.
-        rate_remark : str
-            What is reported about the rate already.
 
         Returns
         -------
@@ -233,11 +231,7 @@ class EntryCheck:
             self._last = record.entries, key
             return None
         facts = RecordFacts(rate, n_sample, len(record.names), n_record, self._units + with_stated_units(record).units)
-        unexplained = [
-            (entry, candidate)
-            for entry, candidate in unexplained_entries(new_entries, facts, self._are_certain)
-            if not rate_remark or (entry.name not in rate_remark and candidate.text not in rate_remark)
-        ]
+        unexplained = list(unexplained_entries(new_entries, facts, self._are_certain))
         for entry, candidate in unexplained:
             if not candidate.is_weak and not (is_rate_stated and candidate.statement == RATE):
                 raise self._error(where, [(entry, candidate)], REASONS_OF[candidate.statement])
