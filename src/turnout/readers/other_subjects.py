@@ -93,11 +93,11 @@ SUSPECT = re.compile(
     r"|multip|divi|ratio|slope|freq|frekv|frec|frq|rate|takt|clock|interv|period|step|schritt|shift|norm|polyn|offset|tare"
     r"|zero|remov|null|unit|einheit|format|weight|lsb|digit|quant|per\b|speed|spacing|increment|value|time|durat|dauer|per(?:s|p)"
 )
-# Where a stem counts: at the beginning of a word, or in a compound behind four letters or more, no preposition.
+# Where a stem counts: at the beginning of a word, or in a compound behind four letters or more that end in no prefix.
 # "Schienentemperatur" is a temperature; "Aufschlag" is no impact, "Rapport" no port and "Conversion" no version.
 BORDER = (
     r"(?:\b|(?<=[a-z]{4})"
-    + "".join(rf"(?<!\b{word})" for word in "durch hinter inter nach super trans uber ueber unter wieder".split())
+    + "".join(rf"(?<!{prefix})" for prefix in "auf con durch inter kon nach super sup trans uber ueber unter".split())
     + ")"
 )
 _STRONG = re.compile(rf"{BORDER}(?:{STRONG_STEMS})".replace("$", r"\b"))

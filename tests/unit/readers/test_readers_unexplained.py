@@ -20,6 +20,7 @@ CONTRADICTIONS = [
     ("Values in", "kN"), ("Comment", "acceleration in g"), ("Data", "rail [g]"), ("System", "US customary"),
     ("Aufschlag", 1.25), ("Rapport", 2.5), ("Empfindlichkeitskorrektur", 1.08), ("Note", "accel_g"),
     ("Note", "channel 2 in: g"), ("Channel 2 in", "g"), ("Zuschlag", "x1.1"), ("Conversion", 0.5),
+    ("Dataconversion", "a=2.5 b=0.1"), ("Signalkonversion", "x2.5"), ("Schienenaufschlag", "x1.1"),
 ]  # fmt: skip
 # The same statements in agreement with the record, and values that are about something else.
 HARMLESS = [
