@@ -35,7 +35,7 @@ def connect_views(frames, newest, rounded=True) -> duckdb.DuckDBPyConnection:
     con.execute("create macro published_at() as date_trunc('day', newest_measurement()) + interval 1 day")
     for table in ("models", "modes", "impacts", "passages", "passage_fits"):
         con.execute(f"create view {table}_current as select * from {table}")
-    con.execute("create view quarantine_open as select * from quarantine")
+    con.execute("create view quarantine_open as select *, false as is_remark from quarantine")
     con.execute("create view findings_current as select * from mismatch_findings")
     for name in view_files():
         if name in NAMES:
