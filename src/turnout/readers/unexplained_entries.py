@@ -29,7 +29,7 @@ from turnout.readers.entry_candidates import (
     candidates,
 )
 from turnout.readers.precision import EXACT_PRECISION, around
-from turnout.readers.source import RawRecord, Source
+from turnout.readers.source import CONDITIONS, RawRecord, Source
 from turnout.readers.stated_scales import container_of
 from turnout.readers.stated_units import same_unit, with_stated_units
 from turnout.readers.statements import MAX_ENTRIES, PLAIN_TYPES, Entry, is_near_rate
@@ -138,14 +138,18 @@ def _unexplained_candidate(
 
 
 def _texts(value: Any, n_sample: int) -> tuple[str, ...]:
-    """The texts of a value; none of one number per sample."""
+    """The texts of a value; none of one number per sample, or of samples of several channels."""
     if isinstance(value, str):
         return (value,)
     values = value.ravel() if isinstance(value, np.ndarray) else value
     if not isinstance(values, (list, tuple, np.ndarray)):
         return (_text(value),) if np.isscalar(value) else ()
-    is_list = len(values) <= MAX_ENTRIES and len(values) != n_sample
+    is_list = len(values) <= MAX_ENTRIES and n_sample not in getattr(value, "shape", (len(values),))
     return tuple(_text(v) for v in values if np.isscalar(v)) if is_list else ()
+
+
+def _plain_name(entry: Entry) -> str:
+    return entry.name.strip().casefold().replace(" ", "_")
 
 
 def _text(value: Any) -> str:
@@ -226,7 +230,11 @@ class EntryCheck:
             return None
         if self._key != key:
             self._key, self._seen = key, set()
-        new_entries = [entry for entry in record.entries if not entry.is_defined and self._is_new(entry)]
+        new_entries = [
+            entry
+            for entry in record.entries
+            if not entry.is_defined and _plain_name(entry) not in CONDITIONS and self._is_new(entry)
+        ]
         if not new_entries:
             self._last = record.entries, key
             return None

@@ -131,7 +131,7 @@ def with_half_width(value: float | None, half: float | None, digits: int = 1) ->
     Examples
     --------
     >>> with_half_width(154.55, 0.004), with_half_width(154.55, None)
-    ('154.550 ± 0.008', '154.5 ± ?')
+    ('154.550 ± 0.004', '154.6 ± ?')
     """
     if value is None:
         return "none"

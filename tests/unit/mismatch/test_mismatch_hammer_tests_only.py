@@ -176,7 +176,7 @@ def test_a_derivative_goes_to_the_side_where_the_simulation_can():
         return np.array([values["load"] ** 2])
 
     predictor = SimpleNamespace(predict_passage=simulated)
-    found = sensitivity._difference(predictor, {"load": 3.0}, (), None, np.array([9.0]), "load", 0.1)
+    found = sensitivity._quotient(predictor, {"load": 3.0}, (), None, np.array([9.0]), "load", 0.1)
     assert found == pytest.approx([5.9])
 
 

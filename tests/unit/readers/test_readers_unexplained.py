@@ -3,12 +3,15 @@
 The layout states 25.6 kHz, newtons and m/s²; the file holds no statement in known words.
 """
 
+import numpy as np
 import pytest
 from tests.unit.readers.test_readers_other_subjects import can_hold, outcome
 from tests.unit.readers.test_readers_rate_matrix import FORMATS, SENSORS, TRUE, described, write_csv
 
 from turnout.errors import ReadError
 from turnout.readers import read
+from turnout.readers.statements import Entry
+from turnout.readers.unexplained_entries import RecordFacts, unexplained_entries
 from turnout.records import RawDescription
 
 # Name, value: a rate of 20 kHz, a scale, or another unit, under names that are on no list.
@@ -74,3 +77,11 @@ def test_units_that_overrule_the_file_explain_scales_but_no_rates(tmp_path):
     (error,) = read("a.csv", tmp_path, RawDescription(overruled, rate=TRUE)).errors
     assert error.reason == "wrong_rate"
     assert read("a.csv", tmp_path, described(20000.0)).errors == ()
+
+
+def test_samples_of_another_record_are_no_statements():
+    """The matrix of a second record explains itself; a short list of the same numbers does not."""
+    facts = RecordFacts(5000.0, 32, 2, 2, ("N", "m/s²"))
+    matrix = np.random.default_rng(3).normal(size=(2, 32)) * 0.01
+    assert not list(unexplained_entries([Entry("record_001", "record_001", matrix)], facts))
+    assert list(unexplained_entries([Entry("head", "list", matrix[:1, :5])], facts))

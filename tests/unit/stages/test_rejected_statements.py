@@ -138,4 +138,4 @@ def test_a_file_that_agrees_with_its_layout_is_neither(extension, project, capsy
     WRITERS[extension](path, {"started_at": START, "Sample rate": RATE}, ("force", "acceleration"))
     rows, code, lines = rows_and_lines(project, capsys)
     assert rows == [] and code == 0
-    assert any(f"A7_1.{extension}: agrees: 1 records of 4000 samples at 20000 Hz" in line for line in lines)
+    assert any(f"A7_1.{extension}: agrees: 1 record of 4000 samples at 20000 Hz" in line for line in lines)
