@@ -165,7 +165,8 @@ class Results:
         SimulationError
             There is none, or several.
         """
-        for change in self._registry_rows("change_findings"):
+        changes = self._registry_rows("change_findings") if finding_id else []
+        for change in changes:
             if change["sections"] == finding_id:
                 return change
         rows = self._rows()
