@@ -46,7 +46,7 @@ from turnout.stages.mismatch_groups import (
     visits,
 )
 from turnout.stages.mismatch_inputs import gather_inputs, track_of
-from turnout.stages.mismatch_rows import finding_row
+from turnout.stages.mismatch_rows import UNPROVEN_SWITCH, finding_row
 from turnout.workflow.scan import scan
 
 if TYPE_CHECKING:
@@ -160,7 +160,25 @@ def _diagnose(
     row = finding_of_change(answer, test, len(informed), n_recordings, threshold)
     if changes:
         row["sentence"] += f"; accepted before: {', '.join(c.words for c in changes)}"
+    row["sentence"] += reservation(track)
     return row | {"notes": "\n".join(notes) or None}
+
+
+def reservation(track: TurnoutTrack) -> str:
+    """What is said behind a finding on a track whose diagnoses are not proven.
+
+    Parameters
+    ----------
+    track : TurnoutTrack
+        Track of the turnout.
+
+    Returns
+    -------
+    str
+        "" for a track without the blade of a switch.
+    """
+    has_switch = any(t.blade is not None for t in (track.track, *track.tracks.values()))
+    return f". {UNPROVEN_SWITCH}" if has_switch else ""
 
 
 def _fitted_visits(
