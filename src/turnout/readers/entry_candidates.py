@@ -23,6 +23,7 @@ from turnout.readers.scale_words import (
     plain_word,
     scale_meaning,
 )
+from turnout.readers.source import CONDITIONS
 from turnout.readers.stated_quantities import quantity_of_text
 from turnout.readers.stated_units import is_unit_of_other, known_unit
 from turnout.readers.statements import USUAL_RATES
@@ -234,6 +235,8 @@ def _of_number(name: str, number: str, unit: str, subject: int) -> Iterator[Cand
     """Candidates of a bare number under a name."""
     if name_meaning(name).certainty == CERTAIN or scale_meaning(name) not in ("", LEVELS) or is_fill_name(name):
         return  # compared by other modules
+    if "_".join(words_of(name)) in CONDITIONS:
+        return  # the condition itself: a speed, a temperature
     value = _value(number)
     quantity = QUANTITY.fullmatch(f"{number} {unit}") if rate_unit(unit) or HARMLESS_UNIT.fullmatch(unit) else None
     is_counted = unit.casefold() in ("s", "sec") and value >= MIN_PER_SECOND

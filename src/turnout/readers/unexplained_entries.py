@@ -29,7 +29,7 @@ from turnout.readers.entry_candidates import (
     candidates,
 )
 from turnout.readers.precision import EXACT_PRECISION, around
-from turnout.readers.source import CONDITIONS, RawRecord, Source
+from turnout.readers.source import RawRecord, Source
 from turnout.readers.stated_scales import container_of
 from turnout.readers.stated_units import same_unit, with_stated_units
 from turnout.readers.statements import MAX_ENTRIES, PLAIN_TYPES, Entry, is_near_rate
@@ -148,10 +148,6 @@ def _texts(value: Any, n_sample: int) -> tuple[str, ...]:
     return tuple(_text(v) for v in values if np.isscalar(v)) if is_list else ()
 
 
-def _plain_name(entry: Entry) -> str:
-    return entry.name.strip().casefold().replace(" ", "_")
-
-
 def _text(value: Any) -> str:
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
@@ -230,11 +226,7 @@ class EntryCheck:
             return None
         if self._key != key:
             self._key, self._seen = key, set()
-        new_entries = [
-            entry
-            for entry in record.entries
-            if not entry.is_defined and _plain_name(entry) not in CONDITIONS and self._is_new(entry)
-        ]
+        new_entries = [entry for entry in record.entries if not entry.is_defined and self._is_new(entry)]
         if not new_entries:
             self._last = record.entries, key
             return None

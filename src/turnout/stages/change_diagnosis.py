@@ -165,7 +165,7 @@ def _diagnose(
 
 
 def reservation(track: TurnoutTrack) -> str:
-    """What is said behind a finding on a track whose diagnoses are not proven.
+    """Sentence that a finding ends with on a track whose diagnoses are not proven.
 
     Parameters
     ----------

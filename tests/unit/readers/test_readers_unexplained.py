@@ -24,6 +24,7 @@ CONTRADICTIONS = [
     ("Aufschlag", 1.25), ("Rapport", 2.5), ("Empfindlichkeitskorrektur", 1.08), ("Note", "accel_g"),
     ("Note", "channel 2 in: g"), ("Channel 2 in", "g"), ("Zuschlag", "x1.1"), ("Conversion", 0.5),
     ("Dataconversion", "a=2.5 b=0.1"), ("Signalkonversion", "x2.5"), ("Schienenaufschlag", "x1.1"),
+    ("speed", "20 kS/s"),
 ]  # fmt: skip
 # The same statements in agreement with the record, and values that are about something else.
 HARMLESS = [
@@ -33,6 +34,7 @@ HARMLESS = [
     ("Hammerschlag", 12.5), ("Serialport", 2.5), ("Standardversion", 2.5),
     ("Trigger level", "50 N"), ("Rail temperature", 12.5), ("Kilometer", "41,235"), ("Serial", 20000), ("Lot", 41233),
     ("Pre-trigger", "10 ms"), ("Recorded", "13.05.2024"), ("Bits per sample", 24), ("Wheel load", "80 kN"),
+    ("speed", 37.871), ("Speed", "160.0"), ("train_id", 20000),
 ]  # fmt: skip
 
 
@@ -85,3 +87,13 @@ def test_samples_of_another_record_are_no_statements():
     matrix = np.random.default_rng(3).normal(size=(2, 32)) * 0.01
     assert not list(unexplained_entries([Entry("record_001", "record_001", matrix)], facts))
     assert list(unexplained_entries([Entry("head", "list", matrix[:1, :5])], facts))
+
+
+def test_a_condition_is_explained_for_one_record_or_each(tmp_path):
+    """A speed [m/s] that is stored with the samples of one record, as an array of one value."""
+    force, rail = np.random.default_rng(5).normal(size=(2, 64))
+    for speed in (37.871, np.array([37.871])):
+        np.savez(tmp_path / "a.npz", rate=TRUE, force=force, rail=rail, speed=speed)
+        result = read("a.npz", tmp_path, RawDescription(SENSORS, rate=TRUE))
+        assert result.recordings[0].conditions["speed"] == pytest.approx(37.871)
+        assert "entry_unknown" not in [e.reason for e in result.errors]
