@@ -99,6 +99,8 @@ def model_text(turnout_id: str, model: CalibratedModel, show_all: bool = False) 
     for change in (a for a in model.answers if a.question == "change"):
         yield f"changes up to {change.visit}: {_change(change)}"
     yield from _strongest(model)
+    if model.reservation:
+        yield model.reservation
 
 
 def _table(model: CalibratedModel, show_all: bool) -> Iterator[str]:

@@ -56,6 +56,7 @@ from turnout.stages.accepted_changes import change_events, changes_of, further_c
 from turnout.stages.checkpoint import SUFFIX, read_value, write_value
 from turnout.stages.mismatch_groups import groups, unit_of, visits
 from turnout.stages.mismatch_inputs import digest_of_model, gather_inputs, mismatch_context, track_of
+from turnout.stages.unproven import reservation
 from turnout.stages.visit_time import DAYS_PER_YEAR, day_of, years_of
 from turnout.workflow.scan import scan
 
@@ -108,7 +109,7 @@ class CalibratedModel:
 
     ``answers`` are those after the visits, the last two after the newest visit. ``held`` are visits with an open
     finding, which are not used, with their answers. ``computed`` are the visits that were fitted for this call,
-    ``notes`` what could not be.
+    ``notes`` what could not be. ``reservation`` says that answers on this track are not proven, "" where they are.
     """
 
     history: History
@@ -118,6 +119,7 @@ class CalibratedModel:
     computed: tuple[str, ...]
     notes: tuple[str, ...]
     answers: tuple[ModelAnswer, ...] = ()
+    reservation: str = ""
 
 
 def folder_of(fits: str | Path) -> Path:
@@ -465,7 +467,8 @@ def calibrate_turnout(
     parameters = parameters_of(stored)
     directions = dip_directions(parameters)
     informed = visits_of(stored)
-    accepted = changes_of(track_of(turnout, track)[0].terms)
+    turnout_track, _ = track_of(turnout, track)
+    accepted = changes_of(turnout_track.terms)
     events = [*events_of(turnout, parameters, accepted, informed), *file_errors(parameters, directions)]
     history = estimate_history(parameters, visits_of(_without_findings(stored)), events)
     changes = estimate_history(parameters, informed, events, repeats_between_visits=False, accepted=None)
@@ -493,6 +496,7 @@ def calibrate_turnout(
         tuple(missing),
         tuple(notes),
         tuple(within_library(answer, without) for answer in answers),
+        reservation(turnout_track),
     )
 
 
@@ -541,7 +545,7 @@ def answer_rows(model: CalibratedModel) -> list[dict[str, Any]]:
                 "visit": a.visit, "question": a.question, "verdict": a.verdict, "term": names[0],
                 "rival_term": names[1], "parameter": a.parameter or None, "position_m": a.position, "channel": channel,
                 "size": a.size, "size_se": a.sd, "unit": a.unit or None, "grows": a.grows, "onset_after": after,
-                "onset_by": by, "gain_nats": a.gain,
+                "onset_by": by, "gain_nats": a.gain, "reservation": model.reservation or None,
             }
         )  # fmt: skip
     return rows

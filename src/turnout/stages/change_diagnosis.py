@@ -46,7 +46,8 @@ from turnout.stages.mismatch_groups import (
     visits,
 )
 from turnout.stages.mismatch_inputs import gather_inputs, track_of
-from turnout.stages.mismatch_rows import UNPROVEN_SWITCH, finding_row
+from turnout.stages.mismatch_rows import finding_row
+from turnout.stages.unproven import reservation
 from turnout.workflow.scan import scan
 
 if TYPE_CHECKING:
@@ -160,25 +161,9 @@ def _diagnose(
     row = finding_of_change(answer, test, len(informed), n_recordings, threshold)
     if changes:
         row["sentence"] += f"; accepted before: {', '.join(c.words for c in changes)}"
-    row["sentence"] += reservation(track)
+    if unproven := reservation(track):
+        row["sentence"] += f". {unproven}"
     return row | {"notes": "\n".join(notes) or None}
-
-
-def reservation(track: TurnoutTrack) -> str:
-    """Sentence that a finding ends with on a track whose diagnoses are not proven.
-
-    Parameters
-    ----------
-    track : TurnoutTrack
-        Track of the turnout.
-
-    Returns
-    -------
-    str
-        "" for a track without the blade of a switch.
-    """
-    has_switch = any(t.blade is not None for t in (track.track, *track.tracks.values()))
-    return f". {UNPROVEN_SWITCH}" if has_switch else ""
 
 
 def _fitted_visits(

@@ -12,6 +12,7 @@ from turnout.mismatch.engine.distinguishability import Distinguishability, cheap
 from turnout.mismatch.turnout.candidates.catalogue import list_candidates
 from turnout.mismatch.turnout.planned_case import Plan, PlannedCase, Train
 from turnout.simulate import Sensor, load_track, load_vehicle
+from turnout.stages.unproven import reservation
 
 # Effort of one addition, in hours of two people on site.
 EFFORT_HOURS = {"a second rail temperature": 8.0, "hammer tests at the sensors": 4.0, "a second speed": 1.0}
@@ -70,9 +71,10 @@ def planned_matrix(
     matrix = _matrix(plan, effects)
     extended = {name: (EFFORT_HOURS[name], _matrix(p, effects)) for name, p in _additions(plan, sensors, temperatures)}
     name, resolved, _ = cheapest_addition(matrix, extended)
-    if not resolved:
-        return matrix, "No single addition distinguishes more pairs."
-    return matrix, f"Most would be added by {name}: {resolved} more pairs distinguished."
+    advice = "No single addition distinguishes more pairs."
+    if resolved:
+        advice = f"Most would be added by {name}: {resolved} more pairs distinguished."
+    return matrix, " ".join(filter(None, [advice, reservation(turnout)]))
 
 
 def _folder(config: str | Path | None, subfolder: str) -> Path | None:

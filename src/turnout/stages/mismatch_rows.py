@@ -21,6 +21,7 @@ from turnout.stages.mismatch_curves import (
     reach_of,
 )
 from turnout.stages.mismatch_text import headline, interval, surface_sentence
+from turnout.stages.unproven import UNPROVEN_SWITCH, as_unproven
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
 MAX_CELL_DISTANCE = 0.3  # m: a cell of the residual closer than this is at the finding
 FALSE_DISCOVERY_RATE = 0.05  # expected share of false ones among the frames reported
 SUPPORT_SPACING = 0.6  # m between supports
-UNPROVEN_SWITCH = "Diagnoses of switch panels are not yet proven on concealed data."
 GENERAL_CHECK = "Inspect the track at this position; repeat the measurement after the work"
 GENERAL_TEST = "hammer tests at the points between, and a train of another load and speed"
 
@@ -295,29 +295,6 @@ def finding_tables(
         "mismatch_parameters": parameter_rows(diagnosis, case, row),
         "mismatch_curves": curve_rows(case, diagnosis, comparison, key),
     }
-
-
-def as_unproven(row: Mapping[str, Any], reason: str) -> dict[str, Any]:
-    """A finding where the diagnosis has not been proven: its sentence says so, and a name is at most of grade B.
-
-    Parameters
-    ----------
-    row : mapping
-        Row of ``mismatch_findings``.
-    reason : str
-        What has not been proven.
-
-    Returns
-    -------
-    dict
-        Column -> value.
-
-    Examples
-    --------
-    >>> as_unproven({"grade": "A", "sentence": "Hanging sleeper."}, UNPROVEN_SWITCH)["grade"]
-    'B'
-    """
-    return {**row, "grade": "B" if row["grade"] == "A" else row["grade"], "sentence": f"{row['sentence']} {reason}"}
 
 
 def _identity(group: Group, about: Mapping[str, Any], case: TrackCase) -> dict[str, Any]:

@@ -11,6 +11,7 @@ import pytest
 import small_turnout as small
 
 from turnout.cli.main import main
+from turnout.cli.twin import model_text
 from turnout.config import load_configuration, with_raw
 from turnout.errors import SimulationError
 from turnout.mismatch.calibrated import StateParameter, VisitInformation, estimate_history
@@ -19,11 +20,13 @@ from turnout.mismatch.engine.search import Search
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.calibration import calibrated_parameters, visit_groups
 from turnout.mismatch.turnout.further_passages import names_beyond, with_reserved_passages
+from turnout.simulate.blade import Blade
 from turnout.stages import calibrated_model as calibrated
 from turnout.stages import mismatch
 from turnout.stages.mismatch_groups import groups, visits
 from turnout.stages.mismatch_inputs import gather_inputs, track_of
 from turnout.stages.mismatch_results import diagnose_turnout
+from turnout.stages.unproven import UNPROVEN_SWITCH
 from turnout.workflow.scan import scan
 
 DAYS = ("2025-08-01", "2025-11-01", "2026-02-01", "2026-05-01")
@@ -64,6 +67,21 @@ def test_the_pad_that_became_soft_is_the_change_with_its_size_and_onset(model):
     size, sd = best.size
     assert abs(size - np.log(small.SOFT)) < 3.0 * sd and sd < 0.1
     assert best.interval() == (calibrated.years_of(DAYS[2]), calibrated.years_of(DAYS[3]))
+
+
+def test_the_model_of_a_track_with_a_switch_says_that_its_answers_are_not_proven(model, year, monkeypatch):
+    """Both what is printed and its rows; a track without a blade has no such sentence."""
+    plain, work = model
+    assert not any(UNPROVEN_SWITCH in line for line in model_text("t1", plain))
+    assert all(row["reservation"] is None for row in calibrated.answer_rows(plain))
+    track, accepted = calibrated.track_of(load_configuration(year / "config").turnout("t1"))
+    blade = Blade(12.0, 17.0, 22.0, track.track.rail, 3e8, 3e4)
+    with_switch = replace(track, tracks={"diverging": track.track.with_(blade=blade)})
+    monkeypatch.setattr(calibrated, "track_of", lambda *_: (with_switch, accepted))
+    switch = calibrated.calibrate_turnout("t1", year / "config", year / "raw", work)
+    assert switch.computed == () and list(model_text("t1", switch))[-1] == UNPROVEN_SWITCH
+    rows = calibrated.answer_rows(switch)
+    assert rows and all(row["reservation"] == UNPROVEN_SWITCH for row in rows)
 
 
 def test_a_visit_that_differs_is_not_used_and_the_others_agree_with_the_file(model):

@@ -5,8 +5,8 @@ import pytest
 from turnout.simulate import uniform_track
 from turnout.simulate.blade import Blade
 from turnout.simulate.turnout_track import TurnoutTrack
-from turnout.stages.change_diagnosis import reservation
-from turnout.stages.mismatch_rows import UNPROVEN_SWITCH, as_unproven
+from turnout.stages import distinguish
+from turnout.stages.unproven import UNPROVEN_SWITCH, as_unproven, reservation
 
 
 @pytest.mark.parametrize(("grade", "expected"), [("A", "B"), ("B", "B"), (None, None)])
@@ -23,3 +23,13 @@ def test_a_change_on_a_track_with_a_blade_is_unproven_too():
     assert reservation(TurnoutTrack(plain)) == ""
     assert UNPROVEN_SWITCH in reservation(TurnoutTrack(switch))
     assert UNPROVEN_SWITCH in reservation(TurnoutTrack(plain, tracks={"diverging": switch}))
+
+
+def test_a_planned_campaign_at_a_switch_says_so_too(monkeypatch):
+    """What a plan can tell apart is computed in the model alone."""
+    plain = uniform_track(30.0)
+    switch = plain.with_(blade=Blade(3.0, 9.0, 12.0, plain.rail, 3e8, 3e4))
+    for track, expected in ((plain, False), (switch, True)):
+        monkeypatch.setattr(distinguish, "load_track", lambda *_, track=track, **__: TurnoutTrack(track))
+        _, advice = distinguish.planned_matrix("t", [6.0], [6.0], [15.0], [], [], ["local_ballast", "local_pad"])
+        assert (UNPROVEN_SWITCH in advice) is expected
