@@ -17,7 +17,7 @@ Function = TypeVar("Function", bound=Callable)
 FASTMATH_FLAGS = {"contract", "reassoc", "nsz", "arcp"}
 # numba only checks whether the file of the function itself has changed. But a kernel contains the code of the kernels
 # it calls and the constants they import. So the cache folder has the fingerprint of all modules with kernels.
-FINGERPRINTED_MODULES = ("turnout.simulate.march", "turnout.modal.mixed_kernels")
+FINGERPRINTED_MODULES = ("turnout.simulate.march", "turnout.modal.fit_kernels")
 
 
 def kernel(function: Function) -> Function:

@@ -13,8 +13,19 @@ SERIES_TERMS = 14  # terms of the exponential series that sums q^k near q = 1
 
 
 @cache
-def _power_sums(n: int) -> np.ndarray:
-    """(3, SERIES_TERMS) sums over k of (k / n) to the power p + j."""
+def power_sums(n: int) -> np.ndarray:
+    """Sums over k of (k / n) to the power p + j, for series of geometric sums.
+
+    Parameters
+    ----------
+    n : int
+        Number of samples.
+
+    Returns
+    -------
+    (3, SERIES_TERMS) array of float
+        Row p, term j.
+    """
     k = np.arange(n) / n
     return np.array([[np.sum(k ** (p + j)) for j in range(SERIES_TERMS)] for p in range(3)])
 
@@ -134,29 +145,76 @@ def linearise(theta: np.ndarray, decays: np.ndarray, rate: float, drift: np.ndar
     ----------
     Golub and Pereyra 1973; Kaufman 1975.
     """
-    if np.any(np.abs(theta[..., 1]) >= 1.0):
-        raise ValueError(f"need damping ratios below 1, the highest is {np.max(np.abs(theta[..., 1])):.3g}")
     # At the first use, since numba takes a third of a second to import.
     from turnout.modal.wave_kernels import fit_waves
 
-    n_decay, n = decays.shape
-    n_mode = theta.shape[1]
-    # One group of decays for each set of modes: all decays in one group, or each in its own.
-    group = np.ascontiguousarray(decays, dtype=float).reshape(len(theta), -1, n)
-    gram, coefficient, residual, rss, score, information = fit_waves(
-        np.ascontiguousarray(theta, dtype=float),
-        rate,
-        group,
-        np.ascontiguousarray(drift, dtype=float),
-        _power_sums(n),
-    )
-    coefficient, residual = coefficient.reshape(n_decay, -1), residual.reshape(n_decay, n)
+    theta, group = group_decays(theta, decays)
+    return linearisation_of(fit_waves(theta, rate, group, contiguous(drift), power_sums(group.shape[-1])))
+
+
+def contiguous(values: np.ndarray) -> np.ndarray:
+    """Values as compiled sums need them.
+
+    Parameters
+    ----------
+    values : array of float
+        Any.
+
+    Returns
+    -------
+    array of float
+        Contiguous; ``values`` itself if it is.
+    """
+    return np.ascontiguousarray(values, dtype=float)
+
+
+def group_decays(theta: np.ndarray, decays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Modes, and the decays of each set of them: all decays in one group, or each in its own.
+
+    Parameters
+    ----------
+    theta : (n_group, n_mode, 2) array of float
+        ln of the frequency in Hz, and damping ratio.
+    decays : (n_decay, n) array of float
+        Decays of a group follow each other.
+
+    Returns
+    -------
+    (n_group, n_mode, 2) array of float, (n_group, n_decay / n_group, n) array of float
+        Both contiguous.
+
+    Raises
+    ------
+    ValueError
+        For a damping ratio of 1 or more in magnitude.
+    """
+    if np.any(np.abs(theta[..., 1]) >= 1.0):
+        raise ValueError(f"need damping ratios below 1, the highest is {np.max(np.abs(theta[..., 1])):.3g}")
+    return contiguous(theta), contiguous(decays).reshape(len(theta), -1, decays.shape[1])
+
+
+def linearisation_of(fit: tuple[np.ndarray, ...]) -> Linearisation:
+    """Results of :func:`~turnout.modal.wave_kernels.fit_waves` without their groups.
+
+    Parameters
+    ----------
+    fit : tuple of array
+        What it returns.
+
+    Returns
+    -------
+    Linearisation
+        One row per decay.
+    """
+    gram, coefficient, residual, rss, score, information = fit
+    p = score.shape[-1]
+    coefficient = coefficient.reshape(-1, coefficient.shape[-1])
     return Linearisation(
-        information.reshape(n_decay, 2 * n_mode, 2 * n_mode),
-        score.reshape(n_decay, 2 * n_mode),
+        information.reshape(-1, p, p),
+        score.reshape(-1, p),
         rss.ravel(),
-        coefficient[:, :n_mode] - 1j * coefficient[:, n_mode : 2 * n_mode],
-        residual,
+        coefficient[:, : p // 2] - 1j * coefficient[:, p // 2 : p],
+        residual.reshape(-1, residual.shape[-1]),
         gram,
         coefficient,
     )

@@ -4,16 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from turnout.modal.least_squares import Linearisation, linearise
+from turnout.modal.least_squares import Linearisation, contiguous, group_decays, linearisation_of, power_sums
 
-MAX_STEP = np.array([0.2, 0.15])  # of ln f and of zeta in one iteration
-SEARCH_RSS_STEPS = 4  # iterations over which an improvement is measured: steps may alternate between two values
-SEARCH_RSS_STEP = 1.0  # improvement in variances of the noise that no choice depends on: limits are chi-squared of 2 n
-SEARCH_EXCURSION = 0.002  # share of the sum of squares above its smallest value, of the order of a test's limit
-SEARCH_RSS_SHARE = 0.1  # improvement in shares of the distance to go
+MAX_STEP = (0.2, 0.15)  # of ln f and of zeta in one iteration
 MAX_PRINCIPAL = 8  # combinations of the decays that hold the signal
-RIDGE = 1e-10  # keeps matrices of two nearly equal modes invertible; distinct modes differ by 1e-6 and more
 MIN_DAMPING, MAX_DAMPING = 1e-5, 0.95  # damping ratios during the fit
+LIMITS = (*MAX_STEP, MIN_DAMPING, MAX_DAMPING)
 MAX_FREQUENCY_STEP = np.log(2.0)  # of ln f in a single impact: an octave away it is another resonance
 
 
@@ -130,35 +126,17 @@ def fit_common(
     (n_mode, 2) array of float, bool
         Ln f [Hz] and zeta of each mode; whether the fit converged.
     """
-    n_mode = len(start)
-    mean = np.array(start, dtype=float)
-    dof = degrees_of_freedom(decays, n_mode, len(drift))
+    dof = degrees_of_freedom(decays, len(start), len(drift))
     decays, dropped_power = _principal_decays(decays)
+    # At the first use, since numba takes a third of a second to import.
+    from turnout.modal.fit_kernels import iterate_common
 
-    def linearise_at(theta: np.ndarray) -> Linearisation:
-        return linearise(theta[None], decays, rate, drift)
-
-    current = linearise_at(mean)
-    for _ in range(iterations):
-        information = current.information.sum(axis=0)
-        step = _solve(information, current.score.sum(axis=0)).reshape(n_mode, 2)
-        scale = min(1.0, *(MAX_STEP / np.maximum(np.abs(step).max(axis=0), 1e-300)))
-        sigma2 = (current.rss.sum() + dropped_power) / dof
-        size = np.sqrt(max(0.0, step.ravel() @ information @ step.ravel()) / max(sigma2, 1e-300))
-        for _ in range(8):
-            trial = mean + scale * step
-            trial[:, 1] = np.clip(trial[:, 1], MIN_DAMPING, MAX_DAMPING)
-            candidate = linearise_at(trial)
-            if candidate.rss.sum() <= current.rss.sum():
-                break
-            scale *= 0.4
-        else:
-            return mean, True
-        converged = np.max(np.abs(trial - mean)) < 1e-12 or size < tolerance
-        mean, current = trial, candidate
-        if converged:
-            return mean, True
-    return mean, False
+    theta, group = group_decays(np.asarray(start, dtype=float)[None], decays)
+    terms = power_sums(group.shape[-1])
+    mean, _, converged = iterate_common(
+        theta[0], rate, group, contiguous(drift), terms, dof, dropped_power, iterations, tolerance, LIMITS
+    )
+    return mean, converged
 
 
 def _principal_decays(decays: np.ndarray) -> tuple[np.ndarray, float]:
@@ -222,59 +200,22 @@ def fit_mixed(
     if theta is None:  # do not fit shared modes first: the spread between impacts would look like a second mode
         theta = np.repeat(np.asarray(start, dtype=float)[None], len(decays), axis=0)
     # At the first use, since numba takes a third of a second to import.
-    from turnout.modal.mixed_kernels import shrink
+    from turnout.modal.fit_kernels import iterate_mixed
 
     n_decay, n_mode = theta.shape[:2]
     dof = degrees_of_freedom(decays, n_mode, len(drift))
-    rss: list[float] = []
-    for count in range(1, iterations + 1):
-        linearisation = linearise(theta, decays, rate, drift)
-        sigma2 = max(linearisation.rss.sum() / dof, 1e-300)
-        rss.append(float(linearisation.rss.sum()))
-        free, covariance, variance, spread, centre, shrunken = shrink(
-            theta.reshape(n_decay, -1),
-            linearisation.information.reshape(n_decay, -1, 2 * n_mode, 2 * n_mode).sum(axis=1),
-            linearisation.score.reshape(n_decay, -1, 2 * n_mode).sum(axis=1),
-            sigma2,
-        )
-        shrunken = _limit_step(shrunken.reshape(theta.shape), theta)
-        change = np.max(np.abs((shrunken - theta).reshape(n_decay, -1)) / np.sqrt(variance + spread))
-        converged = bool(change < tolerance) and count > 1
-        if converged or (is_search and _is_decided(rss, sigma2, target_rss)):
-            converged = True
-            break
-        if count < iterations:
-            theta = shrunken
+    theta, group = group_decays(theta, decays)
+    terms, target = power_sums(group.shape[-1]), -np.inf if target_rss is None else float(target_rss)
+    theta, waves, step, sigma2, converged = iterate_mixed(
+        theta, rate, group, contiguous(drift), terms, dof, iterations, tolerance, is_search, target, LIMITS
+    )
+    free, covariance, _, spread, centre, _ = step
     # The steps are free, as the modes that they lead to are limited. What is reported is in its domain.
     unshrunken, is_limited = _limit_to_domain(free.reshape(theta.shape), theta)
     mean, _ = _limit_to_domain(centre.reshape(n_mode, 2), np.median(unshrunken, axis=0))
     converged = converged or n_decay == 1
+    linearisation = linearisation_of(waves)
     return MixedFit(mean, theta, unshrunken, covariance, spread, sigma2, linearisation, converged, is_limited)
-
-
-def _is_decided(rss: list[float], sigma2: float, target_rss: float | None) -> bool:
-    """Whether more iterations cannot change a choice of modes.
-
-    The smallest sum of squares either no longer falls by ``SEARCH_RSS_STEP`` variances of the noise, or it falls by
-    less than ``SEARCH_RSS_SHARE`` of its distance from ``target_rss``: a sequence whose improvements each are at most
-    nine tenths of the one before never arrives there. A step that leads away from it says nothing yet.
-
-    >>> rss = [2000.0, 1012.0, 1010.0, 1009.5, 1008.5]
-    >>> [_is_decided([*rss, 1008.2], 1.0, target) for target in (None, 950.0)]  # 3.8 is less than a tenth of 58.2
-    [False, True]
-    >>> plateau = [2000.0, 1008.5, 1008.4, 1008.3, 1008.2]
-    >>> _is_decided([*plateau, 1008.1], 1.0, None), _is_decided([*plateau, 1020.0], 1.0, None)
-    (True, False)
-    """
-    if len(rss) < 2 + SEARCH_RSS_STEPS:
-        return False
-    lowest = min(rss)
-    if max(rss[-SEARCH_RSS_STEPS:]) > (1.0 + SEARCH_EXCURSION) * lowest:
-        return False
-    improvement = min(rss[:-SEARCH_RSS_STEPS]) - lowest
-    if improvement < SEARCH_RSS_STEP * sigma2:
-        return True
-    return target_rss is not None and improvement < SEARCH_RSS_SHARE * (lowest - target_rss)
 
 
 def _limit_to_domain(free: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -287,25 +228,3 @@ def _limit_to_domain(free: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, n
     limited[..., 0] = np.clip(limited[..., 0], theta[..., 0] - MAX_FREQUENCY_STEP, theta[..., 0] + MAX_FREQUENCY_STEP)
     limited[..., 1] = np.clip(limited[..., 1], -MAX_DAMPING, MAX_DAMPING)
     return limited, (limited != free).any(axis=-1)
-
-
-def _limit_step(theta: np.ndarray, previous: np.ndarray) -> np.ndarray:
-    """The new modes, with the step limited and the damping between its limits."""
-    theta = previous + np.clip(theta - previous, -MAX_STEP, MAX_STEP)
-    theta[..., 1] = np.clip(theta[..., 1], MIN_DAMPING, MAX_DAMPING)
-    return theta
-
-
-def _normalise(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    diagonal = np.sqrt(np.maximum(np.einsum("...jj->...j", matrix), 1e-300))
-    return diagonal, matrix / (diagonal[..., :, None] * diagonal[..., None, :])
-
-
-def _inverse(matrix: np.ndarray) -> np.ndarray:
-    diagonal, scaled = _normalise(matrix)
-    size = matrix.shape[-1]
-    return np.linalg.inv(scaled + RIDGE * np.eye(size)) / (diagonal[..., :, None] * diagonal[..., None, :])
-
-
-def _solve(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    return _inverse(matrix) @ vector
