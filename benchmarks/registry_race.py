@@ -14,9 +14,10 @@ from turnout.registry.compaction import compact
 from turnout.registry.connection import connect
 from turnout.registry.database import open_registry
 from turnout.registry.generation import load, schema_of
+from turnout.registry.generation_history import history
 from turnout.registry.lock import registry_lock
 from turnout.registry.parquet import write_sorted
-from turnout.registry.publication import history, publish
+from turnout.registry.publication import publish
 from turnout.registry.schema import tables
 
 ROWS = 20_000

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from turnout.config.settings.receptance import ReceptanceSettings
-    from turnout.hammer_test.segmentation import Cut
+    from turnout.hammer_test.impact_window import Cut
     from turnout.records import Impact
 
 # Least number of impacts from which the spread of a test is estimated.

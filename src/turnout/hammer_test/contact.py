@@ -6,7 +6,6 @@ frequency at which its force spectrum has fallen by 20 dB.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -14,32 +13,11 @@ from scipy.fft import next_fast_len, rfft
 from scipy.signal import find_peaks
 
 from turnout.constants import MAD_TO_SD
+from turnout.hammer_test.impact_window import Contact
 
 if TYPE_CHECKING:
     from turnout.config.settings.receptance import ReceptanceSettings
-    from turnout.hammer_test.segmentation import Cut
-
-
-@dataclass(frozen=True)
-class Contact:
-    """The main contact of an impact, in samples of its window and SI units.
-
-    ``onset`` and ``end`` are the first and last sample above the contact level around the peak, ``top`` the
-    peak's sample, ``half_width`` the number of samples above half the peak (interpolated).
-    """
-
-    onset: int
-    end: int
-    top: int
-    peak: float
-    half_width: float
-    impulse: float
-    noise_force: float
-    noise_acceleration: float
-    zero_acceleration: float
-
-
-NO_CONTACT = Contact(0, 0, 0, *[float("nan")] * 6)  # of an impact that was not measured
+    from turnout.hammer_test.impact_window import Cut
 
 
 def measure_contact(cut: Cut, level: float) -> Contact:

@@ -11,7 +11,7 @@ from turnout.records import Rejection
 
 if TYPE_CHECKING:
     from turnout.config.settings.receptance import ReceptanceSettings
-    from turnout.hammer_test.segmentation import Cut
+    from turnout.hammer_test.impact_window import Cut
 
 # s, end of a record over which its remaining amplitude is taken: a period of the slowest mode.
 TAIL_TIME = 0.01

@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from turnout.config.settings.receptance import ReceptanceSettings
-    from turnout.hammer_test.contact import Contact
-    from turnout.hammer_test.segmentation import Cut
+    from turnout.hammer_test.impact_window import Contact, Cut
 
 # Steps: a parabola one step deep over m equal samples falls by 9 steps within as many samples again, and 1 by rounding.
 MAX_NATURAL_FALL = 12.0
@@ -185,7 +184,7 @@ def top_share(force: np.ndarray, contact: Contact, polarity: int = 1) -> float |
 
     Examples
     --------
-    >>> from turnout.hammer_test.contact import Contact
+    >>> from turnout.hammer_test.impact_window import Contact
     >>> x = np.sin(np.pi * np.arange(61) / 60)
     >>> about = Contact(1, 59, 30, 1.0, 40.0, 0.0, 0.0, 0.0, 0.0)
     >>> print(f"{top_share(x, about):.2f} {top_share(np.minimum(x, 0.9), about):.2f}")

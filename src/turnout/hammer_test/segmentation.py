@@ -2,49 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.constants import MAD_TO_SD
-from turnout.hammer_test.contact import NO_CONTACT, Contact
+from turnout.hammer_test.impact_window import Cut
 from turnout.records import Recording, Rejection
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from turnout.config.settings.receptance import ReceptanceSettings
-    from turnout.records import Channel
-
-
-@dataclass
-class Cut:
-    """One window of a recording around one impact, from which an ``Impact`` is made.
-
-    ``force`` [N] has its zero line subtracted; ``polarity`` (+1, -1) is the sign of the impact. ``first`` and ``last``
-    are the first and last sample above the trigger, counted from the start of the window. ``zeros`` were subtracted
-    from force and acceleration: add them to get the recorded values. ``contact``, ``contact_end``, ``decay_start`` and
-    ``band_edge`` [Hz] are set when the impact is measured; a rejected cut may stay without them.
-    """
-
-    force: np.ndarray
-    acceleration: np.ndarray
-    rate: float
-    first: int
-    last: int
-    polarity: int
-    force_noise: float
-    recording: Recording
-    channels: tuple[Channel, Channel]
-    zeros: tuple[float, float] = (0.0, 0.0)
-    record: int = 0
-    rejections: list[Rejection] = field(default_factory=list)
-    notes: list[Rejection] = field(default_factory=list)
-    contact: Contact = NO_CONTACT
-    contact_end: int = 0
-    decay_start: int = 0
-    band_edge: float = float("nan")
 
 
 def cut_impacts(recordings: Sequence[Recording], force: str, response: str, settings: ReceptanceSettings) -> list[Cut]:

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from turnout.passage.axle_patterns import Pattern
     from turnout.passage.axles import AxleFinding
     from turnout.passage.result import PassageSensor
-    from turnout.passage.sensor_stack import SensorEnvelopes
+    from turnout.passage.sensor_envelopes import SensorEnvelopes
     from turnout.passage.train_type import TypeFinding
 
 MAX_SHORT_SPAN, SHORT_SPAN_ERROR = 10.0, 0.3  # m: span of a short row of sensors; position error of each in it

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from turnout.config.settings.passage import PassageSettings
     from turnout.passage.axle_patterns import Pattern
-    from turnout.passage.sensor_stack import SensorEnvelopes
+    from turnout.passage.sensor_envelopes import SensorEnvelopes
 
 MIN_EVIDENCE = 10.0  # nat, least log Bayes factor of a comb against no train
 # Largest gain by another shape of the vehicles, as a share of the evidence, less what free numbers gain by chance.

@@ -17,7 +17,7 @@ from turnout.passage.kinematics import Motion
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from turnout.passage.sensor_stack import SensorEnvelopes
+    from turnout.passage.sensor_envelopes import SensorEnvelopes
 
 GRID_STEP = 0.04  # m, step of the grid along the train
 

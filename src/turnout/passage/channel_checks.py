@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from turnout.config.settings.passage import PassageSettings
     from turnout.passage.result import PassageSensor
-    from turnout.passage.sensor_stack import SensorEnvelopes
+    from turnout.passage.sensor_envelopes import SensorEnvelopes
     from turnout.records import Channel
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from turnout.passage.axle_patterns import Vehicle
     from turnout.passage.kinematics import Motion
-    from turnout.passage.sensor_stack import SensorEnvelopes
+    from turnout.passage.sensor_envelopes import SensorEnvelopes
 
 COMB_STEP = 0.2  # m, step of the grid along the train
 TOOTH_HALF_WIDTH = 2.4  # m either side of a wheel: less than bogie and gap, else a tooth could be a bogie

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from turnout.config.settings.passage import PassageSettings
     from turnout.passage.axle_patterns import Vehicle
-    from turnout.passage.sensor_stack import SensorEnvelopes
+    from turnout.passage.sensor_envelopes import SensorEnvelopes
 
 BEYOND_START, BEYOND_END = 5.0, 27.0  # m beyond the last wheel, where wheels of a further vehicle would be
 # Share of the mean amplitude along the row above which a further vehicle runs there. In 68 simulated cases of one

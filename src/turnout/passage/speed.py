@@ -16,7 +16,7 @@ from turnout.passage.kinematics import Motion
 from turnout.passage.result import SpeedFinding
 
 if TYPE_CHECKING:
-    from turnout.passage.sensor_stack import SensorEnvelopes
+    from turnout.passage.sensor_envelopes import SensorEnvelopes
 
 
 def slowness_from_sensors(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 
-from turnout.passage.sensor_stack import SensorEnvelopes, levels
+from turnout.passage.sensor_envelopes import SensorEnvelopes, levels
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

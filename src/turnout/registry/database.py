@@ -19,6 +19,7 @@ from turnout.registry.catalogue import create_catalogue, use_generation
 from turnout.registry.catalogue_template import catalogue_template
 from turnout.registry.connection import OFFLINE_CONFIG, connect
 from turnout.registry.generation import Generation, load
+from turnout.registry.generation_history import find_generation
 from turnout.registry.schema import literal
 
 if TYPE_CHECKING:
@@ -81,8 +82,6 @@ def open_registry(
 
 def _open_generation(folder: Path, as_of: int | str | datetime) -> duckdb.DuckDBPyConnection:
     """Views of an earlier generation in a database in memory."""
-    from turnout.registry.publication import find_generation  # it publishes what this module builds
-
     generation, time = find_generation(folder, as_of)
     connection = duckdb.connect(":memory:", config=OFFLINE_CONFIG)
     connection.execute("set enable_progress_bar = false")

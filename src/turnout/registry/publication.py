@@ -1,4 +1,4 @@
-"""Publish a generation, keep the earlier ones for a day, and find the generation of a time.
+"""Publish a generation, and keep the earlier ones for a day.
 
 Each published generation also leaves ``generations/<number>-<time>.json``. The files that a generation names stay for a
 day after its successor was published, so that a reader that opened it, or asks about yesterday, still finds them.
@@ -6,10 +6,8 @@ day after its successor was published, so that a reader that opened it, or asks 
 
 from __future__ import annotations
 
-import re
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from turnout.errors import RegistryError
 from turnout.registry.database import build_database
@@ -19,18 +17,11 @@ from turnout.registry.generation import (
     Generation,
     commit,
     delete_files,
-    load,
-    read_generation,
     write_durably,
 )
+from turnout.registry.generation_history import HISTORY_FOLDER, TIME_FORMAT, entries_of
 
-if TYPE_CHECKING:
-    from os import PathLike
-
-HISTORY_FOLDER = "generations"
 KEPT_TIME = timedelta(days=1)
-TIME_FORMAT = "%Y%m%dT%H%M%S%fZ"
-_ENTRY = re.compile(r"(\d+)-(\d{8}T\d{12}Z)\.json")
 
 
 def publish(registry_dir: Path, generation: Generation) -> None:
@@ -53,7 +44,7 @@ def publish(registry_dir: Path, generation: Generation) -> None:
     expired = _expired_generations(root, generation.number, now)
     due = _due_for_deletion(generation, expired)
     entry = root / HISTORY_FOLDER / f"{generation.number:06d}-{now.strftime(TIME_FORMAT)}.json"
-    former = [path for number, (path, _) in _entries(root).items() if number >= generation.number]
+    former = [path for number, (path, _) in entries_of(root).items() if number >= generation.number]
     try:
         entry.parent.mkdir(parents=True, exist_ok=True)
         write_durably(entry, generation.to_json().encode())
@@ -67,85 +58,9 @@ def publish(registry_dir: Path, generation: Generation) -> None:
         ) from error
     build_database(root, generation)
     delete_files(root, due)
-    for number, (path, _) in _entries(root).items():
+    for number, (path, _) in entries_of(root).items():
         if number < max(expired, default=0):
             path.unlink(missing_ok=True)
-
-
-def history(registry_dir: Path) -> dict[int, tuple[Path, datetime]]:
-    """Kept generations, without one that is being published now or that a killed run left unpublished.
-
-    Parameters
-    ----------
-    registry_dir : Path
-        Folder of the registry.
-
-    Returns
-    -------
-    dict of int to (Path, datetime)
-        Number -> file, time of publication in UTC; in the order of the numbers.
-    """
-    entries = _entries(registry_dir)  # first: what is published meanwhile is left out as a whole
-    newest = load(Path(registry_dir)).number
-    return {number: entry for number, entry in entries.items() if number <= newest}
-
-
-def _entries(registry_dir: Path) -> dict[int, tuple[Path, datetime]]:
-    """The same with generations that are not published."""
-    entries: dict[int, tuple[Path, datetime]] = {}
-    for path in sorted((Path(registry_dir) / HISTORY_FOLDER).glob("*.json")):
-        if match := _ENTRY.fullmatch(path.name):
-            entries[int(match[1])] = path, datetime.strptime(match[2], TIME_FORMAT).replace(tzinfo=UTC)
-    return dict(sorted(entries.items()))
-
-
-def find_generation(registry_dir: PathLike | str, as_of: int | str | datetime) -> tuple[Generation, datetime | None]:
-    """The generation of a number, or the one that readers saw at a time.
-
-    Parameters
-    ----------
-    registry_dir : path-like
-        Folder of the registry.
-    as_of : int or str or datetime
-        Number of a generation, or a time: ISO text or datetime, UTC where it states no zone.
-
-    Returns
-    -------
-    tuple of (Generation, datetime or None)
-        The generation, and its time of publication if known.
-
-    Raises
-    ------
-    RegistryError
-        If it is not kept, or ``as_of`` is neither a number nor a time.
-    """
-    root = Path(registry_dir)
-    generations = history(root)
-    now = load(root)
-    if isinstance(as_of, int) or str(as_of).strip().isdigit():
-        wanted = int(as_of) if isinstance(as_of, int) else int(str(as_of))
-    else:
-        moment = _moment(as_of)
-        wanted = max((number for number, (_, time) in generations.items() if time <= moment), default=-1)
-    if wanted == now.number:
-        return now, generations[wanted][1] if wanted in generations else None
-    if wanted not in generations:
-        listed = ", ".join(f"{number} ({time:%Y-%m-%d %H:%M:%S})" for number, (_, time) in generations.items())
-        raise RegistryError(
-            f"{root}: no generation of {as_of} is kept. Kept are, with the time of publication in UTC: "
-            f"{listed or now.number}. Give one of these numbers, or a later time."
-        )
-    return read_generation(generations[wanted][0]), generations[wanted][1]
-
-
-def _moment(as_of: str | datetime) -> datetime:
-    try:
-        moment = as_of if isinstance(as_of, datetime) else datetime.fromisoformat(as_of.strip())
-    except ValueError:
-        raise RegistryError(
-            f"as of {as_of!r}: no time and no number of a generation. Write 2026-11-24T06:00:00 (UTC), or 17."
-        ) from None
-    return moment if moment.tzinfo else moment.replace(tzinfo=UTC)
 
 
 def _expired_generations(root: Path, number: int, now: datetime) -> set[int]:
@@ -154,7 +69,7 @@ def _expired_generations(root: Path, number: int, now: datetime) -> set[int]:
     A generation expires a day after its publication and two generations later. One with an unknown time (of an earlier
     version of the program), or a time that is still to come (the clock was wrong), expires two generations later.
     """
-    times = {n: time for n, (_, time) in _entries(root).items()}
+    times = {n: time for n, (_, time) in entries_of(root).items()}
     oldest = min((n for n, time in times.items() if now - KEPT_TIME < time <= now), default=number)
     return {n for n in range(number - N_KEPT_GENERATIONS + 1) if n < oldest or times.get(n, now) > now}
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from turnout.config.settings.trend import TrendSettings
-    from turnout.trend.cusum import Charts
+    from turnout.trend.charts import Charts
 
 COLUMNS = {
     "direction": object,

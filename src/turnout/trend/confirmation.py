@@ -14,7 +14,7 @@ from turnout.trend.quantities import is_damping
 
 if TYPE_CHECKING:
     from turnout.config.settings.trend import TrendSettings
-    from turnout.trend.cusum import Charts
+    from turnout.trend.charts import Charts
 
 LEAST_SD = 3.0  # standard deviations that a deviation must have, however large it is in percent
 MIN_EARLIER = 3  # campaigns before one that is compared with their mean while the chart still learns

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from turnout.config.settings.trend import TrendSettings
-    from turnout.trend.cusum import Charts
+    from turnout.trend.charts import Charts
     from turnout.trend.panel import Panel
     from turnout.trend.residuals import Prepared
 

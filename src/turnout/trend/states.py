@@ -20,7 +20,7 @@ from turnout.trend.threshold import run_lengths
 
 if TYPE_CHECKING:
     from turnout.config.settings.trend import TrendSettings
-    from turnout.trend.cusum import Charts
+    from turnout.trend.charts import Charts
     from turnout.trend.residuals import Prepared
 
 DAYS_PER_YEAR = 365.25

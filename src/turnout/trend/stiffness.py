@@ -16,7 +16,7 @@ from scipy.special import chdtri, ndtri
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from turnout.trend.cusum import Charts
+    from turnout.trend.charts import Charts
 
 BANDS = ("ballast", "railpad")
 COMPONENTS = ("ballast", "pad")  # the spring that holds most of the energy of each band

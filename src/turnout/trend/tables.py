@@ -24,7 +24,7 @@ from turnout.trend.threshold import run_lengths
 if TYPE_CHECKING:
     from turnout.config.settings.trend import TrendSettings
     from turnout.registry.schema import Column
-    from turnout.trend.cusum import Charts
+    from turnout.trend.charts import Charts
     from turnout.trend.residuals import Prepared
 
 TABLE_KEYS = ["turnout_id", "section_id", "band", "source"]

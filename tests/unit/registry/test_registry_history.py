@@ -12,8 +12,8 @@ from turnout.errors import RegistryError
 from turnout.registry.compaction import compact
 from turnout.registry.database import open_registry
 from turnout.registry.generation import load
+from turnout.registry.generation_history import HISTORY_FOLDER, TIME_FORMAT, history
 from turnout.registry.integrity import check, vacuum
-from turnout.registry.publication import HISTORY_FOLDER, TIME_FORMAT, history
 
 COUNT = "select count(*) from modes"
 
