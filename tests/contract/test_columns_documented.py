@@ -17,8 +17,8 @@ from turnout.registry.view_texts import view_files
 UNIT_SUFFIX = {
     "_hz": "Hz", "_pct": "%", "_c": "°C", "_t": "t", "_kmh": "km/h", "_ms2": "m/s²", "_at_utc": "UTC", "_utc": "UTC",
     "_m": "m", "_ms": "ms", "_s": "s", "_km": "km", "_deg": "deg", "_n": "N", "_ns": "N s", "_m_n": "m/N",
-    "_pct_per_year": "%/a", "_pct_per_c": "%/°C", "_per_s": "1/s", "_hz_per_c": "Hz/°C", "_days": "d",
-    "_mn_m": "MN/m", "_m2_s3": "(m/s²)²/Hz", "_nats": "nats",
+    "_pct_per_year": "%/a", "_pct_per_c": "%/°C", "_pct_per_c2": "%/°C²", "_per_s": "1/s", "_hz_per_c": "Hz/°C",
+    "_days": "d", "_mn_m": "MN/m", "_m2_s3": "(m/s²)²/Hz", "_nats": "nats",
 }  # fmt: skip
 ALL = [column for columns in tables().values() for column in columns]
 

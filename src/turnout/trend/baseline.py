@@ -21,8 +21,9 @@ SLOPE_PRIOR_SD = 0.5
 class Baseline:
     """Baseline of each chart; (n_chart,) arrays unless stated.
 
-    ``frequency`` f0 [Hz] at ``reference`` temperature [°C]; ``slope`` and its standard error ``slope_se`` [%/°C].
-    ``count`` campaigns; ``freedom``: degrees of freedom after f0, slope and one level per further epoch. ``complete``
+    ``frequency`` f0 [Hz] at ``reference`` temperature [°C]; ``slope`` and its standard error ``slope_se`` [%/°C];
+    ``curvature`` [%/°C²], 0 of a straight law (``turnout.trend.curvature``). ``count`` campaigns; ``freedom``: degrees
+    of freedom after f0, slope, a curvature that is not 0, and one level per further epoch. ``complete``
     where the baseline is long enough. ``without_temperature``: campaigns with a frequency but no temperature.
     ``inside`` is the (n_chart, n_campaign) mask of its campaigns.
     """
@@ -31,6 +32,7 @@ class Baseline:
     reference: np.ndarray
     slope: np.ndarray
     slope_se: np.ndarray
+    curvature: np.ndarray
     count: np.ndarray
     freedom: np.ndarray
     complete: np.ndarray
@@ -125,7 +127,7 @@ def fit_baseline(
         corrected = 100.0 * (frequency / f0 - 1.0) - slope[:, None] * (temperature - t0)
     missing = np.sum(np.isfinite(frequency) & ~np.isfinite(temperature), axis=1)
     fitted = Baseline(
-        f0[:, 0], t0[:, 0], slope, slope_se, n_base, freedom, complete, missing, inside
+        f0[:, 0], t0[:, 0], slope, slope_se, np.zeros(len(slope)), n_base, freedom, complete, missing, inside
     )  # fmt: skip
     return fitted, corrected
 

@@ -1,29 +1,80 @@
-"""Curvature of a temperature law that the straight lines of the sections leave in the median of a turnout."""
+"""Curvature of a temperature law: of sections without siblings, and of the median of a turnout."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
 import numpy as np
-from scipy.stats import f as f_distribution
 
 from turnout.trend.epochs import by_epoch, expand_epochs
 
-SIGNIFICANCE = 0.01  # probability of a curvature in the baseline of a straight law
+if TYPE_CHECKING:
+    from turnout.trend.baseline import Baseline
 
 
-def curvature_term(
-    values: np.ndarray, temperature: np.ndarray, inside: np.ndarray, epoch: np.ndarray, autocorrelation: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    r"""Curved part of each value's temperature law, where the baseline shows one.
+# Prior standard deviation of the curvature about 0 [%/°C²], a choice: at 15 °C from the mean of the year 2.3 %, four
+# times the scatter of a campaign.
+CURVATURE_PRIOR_SD = 0.01
+MIN_DAYS = 300.0  # of a baseline with summer and winter: a curvature of one season says nothing of the other
+
+
+@dataclass(frozen=True)
+class CurvedLaw:
+    """Law b (T - T_0) + c (T - T_0)² of each chart about its ``reference`` T_0 [°C]; (n_chart,) arrays.
+
+    ``slope`` b [%/°C] and ``quadratic`` c [%/°C²] are 0 where the law is straight (``is_curved`` False).
+    ``spread_ratio`` is the standard deviation of the baseline about this law over that about a straight one, 1 there.
+    """
+
+    slope: np.ndarray
+    quadratic: np.ndarray
+    reference: np.ndarray
+    is_curved: np.ndarray
+    spread_ratio: np.ndarray
+
+    def term(self, temperature: np.ndarray) -> np.ndarray:
+        """The law at each temperature.
+
+        Parameters
+        ----------
+        temperature : (n_chart, n_campaign) array of float
+            Rail temperatures. [°C]
+
+        Returns
+        -------
+        (n_chart, n_campaign) array of float
+            0 where the law is straight or the temperature unknown. [%]
+        """
+        applies = self.is_curved[:, None] & np.isfinite(temperature)
+        warmer = np.where(applies, temperature - self.reference[:, None], 0.0)
+        return self.slope[:, None] * warmer + self.quadratic[:, None] * warmer**2
+
+
+def fit_curved_law(
+    values: np.ndarray,
+    temperature: np.ndarray,
+    inside: np.ndarray,
+    epoch: np.ndarray,
+    autocorrelation: np.ndarray,
+    reference: np.ndarray | None = None,
+) -> CurvedLaw:
+    r"""Curved temperature law of each chart, where its baseline shows one.
 
     .. math:: v_i = l_{e(i)} + b (T_i - T_0) + c (T_i - T_0)^2 + r_i
 
-    is fitted to the baseline by least squares. The term is used where the F test of c rejects a straight law at
-    ``SIGNIFICANCE``. Memory leaves n campaigns the information of n (1 - phi) / (1 + phi), which divides the statistic.
+    is fitted to the baseline by least squares, and b and c are drawn towards the straight law by the share
+
+    .. math:: \max(0, 1 - 1/F)
+
+    with F of the test of c: a curvature no larger than its error is none, one of many errors is kept. Memory leaves n
+    campaigns the information of n (1 - phi) / (1 + phi), which divides F. The prior of c is 0 ± ``CURVATURE_PRIOR_SD``:
+    it keeps c bounded where the temperature hardly varied, and a year of temperatures outweighs it a hundred times.
 
     Parameters
     ----------
     values : (n_chart, n_campaign) array of float
-        Medians of the sections, corrected for straight laws; nan does not count. [%]
+        Values corrected for straight laws; nan does not count. [%]
     temperature : (n_chart, n_campaign) array of float
         Rail temperatures; nan does not count. [°C]
     inside : (n_chart, n_campaign) array of bool
@@ -32,20 +83,25 @@ def curvature_term(
         Number of the epoch of each campaign.
     autocorrelation : (n_chart,) array of float
         Memory from campaign to campaign, nan where unknown.
+    reference : (n_chart,) array of float, optional
+        T_0; by default the mean of the baseline. [°C]
 
     Returns
     -------
-    term : (n_chart, n_campaign) array of float
-        The whole fitted b and c terms [%]; 0 where the law is straight or the temperature unknown.
-    spread_ratio : (n_chart,) array of float
-        Standard deviation of the baseline about the curved law over that about a straight one; 1 where it is straight.
+    CurvedLaw
+        Its slope adds to the one that ``values`` are corrected for.
+
+    References
+    ----------
+    James and Stein 1961; the positive part after Baranchik 1964.
     """
     inside = inside & np.isfinite(values) & np.isfinite(temperature)
     n_campaign = inside.sum(axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
-        middle = np.sum(np.where(inside, temperature, 0.0), axis=1) / n_campaign
-        linear = temperature - middle[:, None]
-        x, y, v = (_deviation(part, inside, epoch) for part in (linear, linear**2, values))
+        if reference is None:
+            reference = np.sum(np.where(inside, temperature, 0.0), axis=1) / n_campaign
+        linear = temperature - reference[:, None]
+        x, y, v = (_deviation(column, inside, epoch) for column in (linear, linear**2, values))
         y_on_x = np.sum(x * y, axis=1) / np.sum(x * x, axis=1)
         across = y - y_on_x[:, None] * x  # the square without its straight part
         quadratic = np.sum(across * v, axis=1) / np.sum(across * across, axis=1)
@@ -56,10 +112,73 @@ def curvature_term(
         freedom = n_campaign - (n_level > 0).sum(axis=1) - 2
         phi = np.nan_to_num(autocorrelation)
         statistic = gain / left * freedom * (1.0 - phi) / (1.0 + phi)
-        is_curved = (freedom > 0) & (f_distribution.sf(statistic, 1, np.maximum(freedom, 1)) < SIGNIFICANCE)
-        term = slope[:, None] * linear + quadratic[:, None] * linear**2
-        ratio = np.sqrt(left / (left + gain) * (freedom + 1) / freedom)
-    return np.where(is_curved[:, None] & np.isfinite(term), term, 0.0), np.where(is_curved, ratio, 1.0)
+        information = np.sum(across * across, axis=1)
+        from_data = information / (information + left / freedom / CURVATURE_PRIOR_SD**2)
+        share = np.where(freedom > 0, np.nan_to_num(from_data * np.maximum(1.0 - 1.0 / statistic, 0.0)), 0.0)
+        is_curved = share > 0.0
+        ratio = np.sqrt((left + (1.0 - share) ** 2 * gain) / (left + gain) * (freedom + 1) / freedom)
+    slope, quadratic = (np.where(is_curved, share * term, 0.0) for term in (slope, quadratic))
+    return CurvedLaw(slope, quadratic, reference, is_curved, np.where(is_curved, ratio, 1.0))
+
+
+def with_curved_laws(
+    base: Baseline,
+    values: np.ndarray,
+    temperature: np.ndarray,
+    time: np.ndarray,
+    epoch: np.ndarray,
+    autocorrelation: np.ndarray,
+    lone: np.ndarray,
+) -> tuple[Baseline, np.ndarray]:
+    """Baselines and values with the curved law of each section without siblings, which would remove what they share.
+
+    Baselines shorter than ``MIN_DAYS`` keep their straight law.
+
+    Parameters
+    ----------
+    base : Baseline
+        Baselines with straight laws.
+    values : (n_chart, n_campaign) array of float
+        Frequencies in percent of f0, corrected for straight laws. [%]
+    temperature : (n_chart, n_campaign) array of float
+        Rail temperatures. [°C]
+    time : (n_chart, n_campaign) array of float
+        Time of each campaign. [d]
+    epoch : (n_chart, n_campaign) array of int
+        Number of the epoch of each campaign.
+    autocorrelation : (n_chart,) array of float
+        Memory from campaign to campaign about the straight law, nan where unknown.
+    lone : (n_chart,) array of bool
+        Sections without siblings.
+
+    Returns
+    -------
+    (Baseline, (n_chart, n_campaign) array of float)
+        The same objects where no section has a curved law.
+    """
+    first = np.min(np.where(base.inside, time, np.inf), axis=1, initial=np.inf)
+    latest = np.max(np.where(base.inside, time, -np.inf), axis=1, initial=-np.inf)
+    row = np.flatnonzero(lone & (latest - first >= MIN_DAYS))
+    if not len(row):
+        return base, values
+    last = int(np.max(np.flatnonzero(base.inside.any(axis=0)), initial=-1)) + 1
+    campaigns = np.ix_(row, np.arange(last))
+    law = fit_curved_law(
+        values[campaigns],
+        temperature[campaigns],
+        base.inside[campaigns],
+        epoch[campaigns],
+        autocorrelation[row],
+        base.reference[row],
+    )
+    if not law.is_curved.any():
+        return base, values
+    slope, curvature, freedom, values = base.slope.copy(), base.curvature.copy(), base.freedom.copy(), values.copy()
+    slope[row] += law.slope
+    curvature[row] = law.quadratic
+    freedom[row] -= law.is_curved
+    values[row] -= law.term(temperature[row])
+    return replace(base, slope=slope, curvature=curvature, freedom=freedom), values
 
 
 def _deviation(values: np.ndarray, inside: np.ndarray, epoch: np.ndarray) -> np.ndarray:

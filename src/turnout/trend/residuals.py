@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from turnout.trend.baseline import Baseline, fit_baseline, spread_and_autocorrelation, usual_interval
-from turnout.trend.curvature import curvature_term
+from turnout.trend.curvature import fit_curved_law, with_curved_laws
 from turnout.trend.epochs import by_epoch, epochs_of, expand_epochs
 from turnout.trend.panel import WHOLE_TURNOUT, Panel
 from turnout.trend.siblings import median_of_group, median_of_siblings
@@ -67,25 +67,32 @@ def prepare(panel: Panel, events: pd.DataFrame | None, settings: TrendSettings) 
     epoch, pending, started = epochs_of(panel.charts, time, events)
     base, values = fit_baseline(panel.frequency, panel.temperature, time, epoch, settings)
     baseline_span = slice(0, int(np.max(np.flatnonzero(base.inside.any(axis=0)), initial=-1)) + 1)
-    inside, epoch_base = base.inside[:, baseline_span], epoch[:, baseline_span]
-    level, _ = by_epoch(
-        np.where(inside, values[:, baseline_span], 0.0), inside, epoch_base, int(epoch_base.max(initial=0)) + 1
-    )
-    centred = np.where(inside, values[:, baseline_span] - expand_epochs(level, epoch_base), np.nan)
+    inside, epoch_base, time_base = base.inside[:, baseline_span], epoch[:, baseline_span], time[:, baseline_span]
+    centred = _centred_in_baseline(values[:, baseline_span], inside, epoch_base)
     group = panel.charts["group"].to_numpy()
     median, n_siblings = median_of_siblings(centred, inside, group)
     enough = inside & (n_siblings >= settings.siblings_minimum)
     with_siblings = enough.sum(axis=1) >= settings.siblings_share * np.maximum(inside.sum(axis=1), 1)
     residual = np.where(with_siblings[:, None] & enough, centred - median, np.nan)
-    sd_alone, phi_alone = spread_and_autocorrelation(centred, inside, epoch_base, base.freedom, time[:, baseline_span])
+    sd_alone, phi_alone = spread_and_autocorrelation(centred, inside, epoch_base, base.freedom, time_base)
     freedom_siblings = base.freedom - np.sum(inside & ~enough, axis=1)
-    sd_sibling, phi = spread_and_autocorrelation(residual, enough, epoch_base, freedom_siblings, time[:, baseline_span])
+    sd_sibling, phi = spread_and_autocorrelation(residual, enough, epoch_base, freedom_siblings, time_base)
     with_siblings &= _has_sibling_gain(sd_sibling, sd_alone, group)
+    curved, values = with_curved_laws(base, values, panel.temperature, time, epoch, phi_alone, ~with_siblings)
+    if curved is not base:
+        base, centred = curved, _centred_in_baseline(values[:, baseline_span], inside, epoch_base)
+        sd_alone, phi_alone = spread_and_autocorrelation(centred, inside, epoch_base, base.freedom, time_base)
     section = Prepared(
         panel, panel.charts, time, base, values, epoch, started, pending, usual_interval(time, base.inside),
         np.where(with_siblings, sd_sibling, sd_alone), sd_alone, np.where(with_siblings, phi, phi_alone), with_siblings,
     )  # fmt: skip
     return _with_turnout_charts(section, centred, inside, baseline_span, events, settings)
+
+
+def _centred_in_baseline(values: np.ndarray, inside: np.ndarray, epoch: np.ndarray) -> np.ndarray:
+    """Values of the baseline less the mean of their epoch, nan outside."""
+    level, _ = by_epoch(np.where(inside, values, 0.0), inside, epoch, int(epoch.max(initial=0)) + 1)
+    return np.where(inside, values - expand_epochs(level, epoch), np.nan)
 
 
 def _has_sibling_gain(spread_siblings: np.ndarray, spread_alone: np.ndarray, group: np.ndarray) -> np.ndarray:
@@ -122,10 +129,8 @@ def _with_turnout_charts(
     spread, autocorrelation = spread_and_autocorrelation(
         np.where(window, median, np.nan), window, epoch[:, baseline_span], freedom, time[:, baseline_span]
     )
-    nothing = np.full(len(first), np.nan)
-    base = Baseline(
-        nothing, nothing, nothing, nothing, n_base, freedom, complete, np.zeros(len(first), int), inside_turnout
-    )
+    nothing, no_campaign = np.full(len(first), np.nan), np.zeros(len(first), int)
+    base = Baseline(nothing, nothing, nothing, nothing, nothing, n_base, freedom, complete, no_campaign, inside_turnout)
     joined = Baseline(*(np.concatenate([a, b]) for a, b in zip(vars(p.baseline).values(), vars(base).values())))
     return Prepared(
         p.panel, pd.concat([p.charts, charts], ignore_index=True), np.vstack([p.time, time]), joined, p.values,
@@ -301,7 +306,7 @@ def turnout_residuals(
     """Residuals of the medians of the turnouts, which show a change common to all sections.
 
     Sections in ``alarmed``, whose own alarm is open, do not count: a large change of one section would shift the median
-    of a few. A curvature of the temperature law, which the sections share and their siblings remove, is fitted here.
+    of a few. A curvature of the temperature law that the sections share, and their siblings remove, is fitted here.
 
     Parameters
     ----------
@@ -329,11 +334,11 @@ def turnout_residuals(
     young, young_count = median_of_group(sections.centred, np.isfinite(sections.centred), group)
     whole = np.where(count >= need, median, np.where((young_count >= need) & window[n:], young, np.nan))
     temperature, _ = median_of_group(p.panel.temperature, np.isfinite(p.panel.temperature), group)
-    curve, ratio = curvature_term(whole, temperature, p.baseline.inside[n:], epoch, p.autocorrelation[n:])
-    whole = whole - curve
+    law = fit_curved_law(whole, temperature, p.baseline.inside[n:], epoch, p.autocorrelation[n:])
+    whole = whole - law.term(temperature)
     level, residual = _centre(whole, window[n:] & np.isfinite(whole), epoch)
     common, _ = median_of_group(slope_variance(p, window[:n]), settled[:n] & ~alarmed, group)
-    sigma = np.sqrt((ratio * p.spread[n:])[:, None] ** 2 + np.nan_to_num(common))
+    sigma = np.sqrt((law.spread_ratio * p.spread[n:])[:, None] ** 2 + np.nan_to_num(common))
     return Residuals(whole, residual, np.where(sigma > 0.0, sigma, np.nan), level, np.zeros_like(level), residual)
 
 

@@ -205,6 +205,7 @@ def baseline_rows(charts: Charts, settings: TrendSettings) -> pd.DataFrame:
         rail_temperature_c=base.reference[chart],
         slope_pct_per_c=base.slope[chart],
         slope_se_pct_per_c=base.slope_se[chart],
+        curvature_pct_per_c2=base.curvature[chart],
         level_pct=charts.level[chart, epoch],
         sibling_shift_pct=charts.shift[chart, epoch],
         sd_pct=spread_in(charts, chart, epoch),

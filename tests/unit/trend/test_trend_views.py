@@ -82,6 +82,18 @@ def test_mode_residuals_in_sql_equal_the_chart(con, frames):
     assert found["sibling_median_pct"].notna().mean() > 0.9
 
 
+def test_mode_residuals_in_sql_have_the_curved_laws_of_lone_sections(settings):
+    rows = modes(Fleet(turnouts=3, sections=2, weeks=110, curvature=-0.005), 12)
+    charts = evaluate(rows.astype({k: object for k in KEYS[:4]}), None, settings)
+    tables = {"modes": rows.assign(method="joint"), "charts": chart_rows(charts),
+              "baselines": baseline_rows(charts, settings), "alarms": alarm_rows(charts, settings)}  # fmt: skip
+    with connect_views(tables, rows["measured_at_utc"].max(), rounded=False) as connection:
+        found = plain(connection.execute("select * from mode_residuals(timestamp '2016-01-01')").df())
+    assert (tables["baselines"].query("section_id != '*'")["curvature_pct_per_c2"] < 0.0).all()
+    chart = plain(tables["charts"].query("section_id != '*' and residual_pct.notna()"))
+    assert np.abs(found["residual_pct"] - chart["residual_pct"]).max() < 1e-8
+
+
 def test_cusum_in_sql_equals_the_chart(con, frames):
     found = plain(con.execute("select * from cusum(timestamp '2016-01-01')").df())
     chart = plain(frames["charts"])

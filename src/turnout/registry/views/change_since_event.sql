@@ -12,7 +12,8 @@ with values_pct as (
         b.sd_alone_pct * sqrt((1 + b.phi) / (1 - b.phi)) as sd_pct, b.slope_se_pct_per_c,
         c.residual_pct + b.level_pct as value_pct,
         100 * (c.expected_hz / b.frequency_hz - 1) + c.residual_pct
-            - b.slope_pct_per_c * (c.rail_temperature_c - b.rail_temperature_c) as alone_pct
+            - b.slope_pct_per_c * (c.rail_temperature_c - b.rail_temperature_c)
+            - coalesce(b.curvature_pct_per_c2, 0) * (c.rail_temperature_c - b.rail_temperature_c) ** 2 as alone_pct
     from charts c
     join baselines b using (turnout_id, section_id, band, source, epoch)
     where c.residual_pct is not null and c.section_id <> '*'

@@ -13,7 +13,8 @@ with own as (
         b.epoch_start_utc, b.slope_se_pct_per_c, b.n_baseline, b.sd_alone_pct * sqrt((1 + b.phi) / (1 - b.phi)) as sd_pct,
         coalesce(
             100 * (c.expected_hz / b.frequency_hz - 1) + c.residual_pct
-                - b.slope_pct_per_c * (c.rail_temperature_c - b.rail_temperature_c),
+                - b.slope_pct_per_c * (c.rail_temperature_c - b.rail_temperature_c)
+                - coalesce(b.curvature_pct_per_c2, 0) * (c.rail_temperature_c - b.rail_temperature_c) ** 2,
             c.residual_pct + b.level_pct
         ) as value_pct
     from charts c

@@ -1,5 +1,5 @@
 -- One row per chart and campaign since a date: the residual of the chart, recomputed from modes and baselines.
--- corrected_pct: 100 (f / f0 - 1) - b (T - T0) - level of the epoch. residual_pct: the same minus the median of the
+-- corrected_pct: 100 (f / f0 - 1) - b (T - T0) - c (T - T0)² - level of the epoch. residual_pct: the same minus the median of the
 -- other sections of the turnout, where the chart uses them and three are there, minus their usual difference.
 -- Sections in alarm are not siblings, nor are those that learn their level, except for others that learn too.
 -- A campaign may last into the next day: a value belongs to the last campaign that began before it.
@@ -22,7 +22,9 @@ corrected as (
         m.frequency_hz, b.with_siblings, b.sibling_shift_pct,
         b.complete and c.state <> 'learning' as settled, c.is_sibling,
         100 * (m.frequency_hz / b.frequency_hz - 1)
-            - b.slope_pct_per_c * (m.rail_temperature_c - b.rail_temperature_c) - b.level_pct as corrected_pct
+            - b.slope_pct_per_c * (m.rail_temperature_c - b.rail_temperature_c)
+            - coalesce(b.curvature_pct_per_c2, 0) * (m.rail_temperature_c - b.rail_temperature_c) ** 2
+            - b.level_pct as corrected_pct
     from charts c
     join baselines b using (turnout_id, section_id, band, source, epoch)
     join valued m using (turnout_id, section_id, band, source, measured_at_utc)
