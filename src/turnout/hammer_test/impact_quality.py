@@ -7,6 +7,7 @@ test's medians: weak, out of range, noisy.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -194,12 +195,28 @@ def top_share(force: np.ndarray, contact: Contact, polarity: int = 1) -> float |
         return None
     first = max(0, contact.onset - 2)
     pulse = polarity * force[first : contact.end + 3]
-    fine = CubicSpline(np.arange(pulse.size), pulse)(np.arange(8 * (pulse.size - 1) + 1) / 8.0)
+    fine = _refine(pulse)
     top = int(np.argmax(fine))
     width = [
         crossing(fine, top, share * fine[top], 1) - crossing(fine, top, share * fine[top], -1) for share in (0.95, 0.5)
     ]
     return width[0] / width[1]
+
+
+MAX_SPLINE_SAMPLES = 128  # longest pulse whose weights are kept: a longer one has a spline of its own
+
+
+def _refine(pulse: np.ndarray) -> np.ndarray:
+    """The cubic spline of a pulse at eighths of its sampling interval."""
+    if pulse.size > MAX_SPLINE_SAMPLES:
+        return CubicSpline(np.arange(pulse.size), pulse)(np.arange(8 * (pulse.size - 1) + 1) / 8.0)
+    return _spline_weights(pulse.size) @ pulse
+
+
+@lru_cache(maxsize=MAX_SPLINE_SAMPLES)
+def _spline_weights(n: int) -> np.ndarray:
+    """(8 (n - 1) + 1, n) weights of the samples of a pulse in its spline, which is linear in them."""
+    return CubicSpline(np.arange(n), np.eye(n))(np.arange(8 * (n - 1) + 1) / 8.0)
 
 
 def natural_top(contact: Contact) -> float:

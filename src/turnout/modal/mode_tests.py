@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc, chdtri
 
 from turnout.modal.least_squares import Linearisation, linearise
 from turnout.modal.mixed_effects import MIN_DAMPING, MixedFit, degrees_of_freedom, fit_mixed
@@ -87,7 +87,7 @@ def common_probability(statistic: np.ndarray) -> np.ndarray:
     >>> print(common_probability(np.array([[0.0], [0.0]])))
     [1.]
     """
-    return chi2.sf(statistic.sum(axis=0), 2 * len(statistic))
+    return chdtrc(2 * len(statistic), statistic.sum(axis=0))
 
 
 def share_of_impacts(statistic: np.ndarray, probability: float = 0.01) -> np.ndarray:
@@ -105,7 +105,7 @@ def share_of_impacts(statistic: np.ndarray, probability: float = 0.01) -> np.nda
     (n_mode,) array of float
         Share for each mode, 0 to 1.
     """
-    return (statistic > chi2.isf(probability, 2)).mean(axis=0)
+    return (statistic > chdtri(2, probability)).mean(axis=0)
 
 
 # Distance of the single impacts' mean from the common mode, over the half-power half-width of the mode. One linear step
@@ -356,7 +356,7 @@ def _redundant_mode(
     Poles that differ between impacts look like two poles to a realisation of all impacts, but not to a fit of each.
     """
     statistic = mode_chi_squared(fit.linearisation, fit.sigma2).sum(axis=0)
-    target_rss = fit.rss + fit.sigma2 * float(chi2.isf(settings.false_mode_probability, 4 * len(decays)))
+    target_rss = fit.rss + fit.sigma2 * float(chdtri(4 * len(decays), settings.false_mode_probability))
     for weak in np.argsort(statistic):
         if id(candidates[weak]) in indispensable:
             continue
@@ -368,7 +368,7 @@ def _redundant_mode(
         without = fit_mixed(
             np.delete(fit.shrunken_mean, weak, axis=0), decays, rate, columns, target_rss=target_rss, **SEARCH_OPTIONS
         )
-        probability = float(chi2.sf((without.rss - fit.rss) / fit.sigma2, 4 * len(decays)))
+        probability = float(chdtrc(4 * len(decays), (without.rss - fit.rss) / fit.sigma2))
         if probability > settings.false_mode_probability:
             return int(weak), without, probability
         indispensable.add(id(candidates[weak]))

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import solve_toeplitz
 from scipy.signal import lfilter
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from turnout.modal.least_squares import drift_columns, linearise
 from turnout.modal.mixed_effects import degrees_of_freedom
@@ -43,7 +42,7 @@ def noise_filter(residual: np.ndarray, order_maximum: int) -> np.ndarray:
 
     References
     ----------
-    Yule-Walker equations on the pooled autocovariance; Schwarz 1978.
+    Yule-Walker equations on the pooled autocovariance, by the recursion of Levinson 1947; Schwarz 1978.
 
     Examples
     --------
@@ -53,17 +52,24 @@ def noise_filter(residual: np.ndarray, order_maximum: int) -> np.ndarray:
     """
     n = residual.size
     length = residual.shape[1]
-    lags = np.array([np.sum(residual[:, : length - k] * residual[:, k:]) for k in range(order_maximum + 1)]) / n
+    lags = np.array([_product(residual[:, : length - k], residual[:, k:]) for k in range(order_maximum + 1)]) / n
     lowest_criterion, coefficients = n * np.log(max(lags[0], 1e-300)), np.ones(1)
+    a, variance = np.empty(0), lags[0]
     for order in range(1, order_maximum + 1):
-        if not lags[0] > 0.0:
+        if not variance > 0.0:
             break
-        a = solve_toeplitz(lags[:order], lags[1 : order + 1])
-        variance = lags[0] - a @ lags[1 : order + 1]
+        # Levinson's recursion: the coefficients of an order from those of the one before
+        reflection = (lags[order] - a @ lags[order - 1 : 0 : -1]) / variance
+        a = np.append(a - reflection * a[::-1], reflection)
+        variance *= 1.0 - reflection**2
         criterion = n * np.log(max(variance, 1e-300)) + order * np.log(n)
         if criterion < lowest_criterion:
             lowest_criterion, coefficients = criterion, np.concatenate(([1.0], -a))
     return coefficients
+
+
+def _product(first: np.ndarray, second: np.ndarray) -> float:
+    return float(np.einsum("ij,ij->", first, second))
 
 
 def whiten(decays: np.ndarray, whitening: np.ndarray) -> np.ndarray:
@@ -247,7 +253,7 @@ def significant_background(theta: np.ndarray, decays: np.ndarray, rate: float, l
         drift = linearisation.gram.shape[-1] - 2 * n_mode
         sigma2 = linearisation.rss.sum() / degrees_of_freedom(decays, n_mode, drift)
         index = 2 * n_mode + np.asarray(columns)
-        return chi2.sf(columns_chi_squared(linearisation, sigma2, index), n_decay * len(index))
+        return chdtrc(n_decay * len(index), columns_chi_squared(linearisation, sigma2, index))
 
     n_hum = len(largest.hum)
     hum = tuple(h for i, h in enumerate(largest.hum) if probability(largest, [i, n_hum + i]) < BACKGROUND_SIGNIFICANCE)

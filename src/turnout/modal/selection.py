@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from turnout.modal.era import hankel_rows
 from turnout.modal.least_squares import linearise
@@ -325,7 +325,7 @@ class Selection:
     @property
     def is_visible(self) -> np.ndarray:
         """(n_decay, n_mode) bool: the mode is significant in this impact alone, at 1 %, and determined by it."""
-        visible = self.chi_squared > chi2.isf(0.01, 2)
+        visible = self.chi_squared > chdtri(2, 0.01)
         return visible if self.fit is None else visible & ~self.fit.is_limited
 
 
