@@ -1,4 +1,4 @@
-"""Path data of curves in SVG: the visible points of a curve, with two decimals."""
+"""Path data of curves in SVG: the visible points of a curve, in hundredths of a pixel."""
 
 from __future__ import annotations
 
@@ -62,18 +62,43 @@ def reduce_points(px: np.ndarray, py: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return px[indices], py[indices]
 
 
+HUNDREDTHS = 100  # per pixel
 MIN_TOGETHER = 50  # points from which it is faster to write all numbers of a path together than one by one
-MAX_PIXEL = 1000  # px, numbers written together are below it
-TIE = 1e-6  # distance from the middle of two hundredths, within which the error of a product could turn the rounding
-# Text of a number with two decimals: whole part and point, filled with null bytes in front; decimals; what follows.
-NUMBER = np.dtype([("whole", "S4"), ("decimals", "S2"), ("end", "S1")])
-WHOLE = np.array([f"{k}.".rjust(4, "\0") for k in range(MAX_PIXEL)], dtype="S4")
-DECIMALS = np.array([f"{k:02d}" for k in range(100)], dtype="S2")
-ENDS = np.array([b" ", b"L"], dtype="S1")
+MAX_STEP = 1000  # px, steps written together are below it
+# Text of a step: separator or sign, whole part without a leading zero, decimals without zeros at their end.
+STEP = np.dtype([("sign", "S1"), ("whole", "S3"), ("decimals", "S3")])
+SIGNS = np.array([b" ", b"-"], dtype="S1")
+WHOLE = np.array([str(k) if k else "" for k in range(MAX_STEP)], dtype="S3")
+DECIMALS = np.array([f".{k:02d}".rstrip("0") if k else "" for k in range(HUNDREDTHS)], dtype="S3")
+
+
+def format_pixels(hundredths: int) -> str:
+    """Shortest text of a number of hundredths of a pixel.
+
+    Parameters
+    ----------
+    hundredths : int
+        The number.
+
+    Returns
+    -------
+    str
+        In pixels.
+
+    Examples
+    --------
+    >>> [format_pixels(k) for k in (6200, -450, 7, 0)]
+    ['62', '-4.5', '.07', '0']
+    """
+    whole, rest = divmod(abs(hundredths), HUNDREDTHS)
+    text = (str(whole) if whole else "") + (f".{rest:02d}".rstrip("0") if rest else "")
+    return ("-" if hundredths < 0 else "") + (text or "0")
 
 
 def path_points(px: np.ndarray, py: np.ndarray) -> str:
-    """Path data of points: ``x y`` of each, with the letter L of a straight line between them.
+    """Path data of points: the first one, and the steps from each to the next.
+
+    Points are rounded to hundredths of a pixel before steps are taken, so no error accumulates.
 
     Parameters
     ----------
@@ -83,28 +108,56 @@ def path_points(px: np.ndarray, py: np.ndarray) -> str:
     Returns
     -------
     str
-        Two decimals each, without the first letter M.
+        Without the first letter M.
 
     Examples
     --------
-    >>> path_points(np.array([1.0, 2.5]), np.array([3.0, 4.125]))
-    '1.00 3.00L2.50 4.12'
+    >>> path_points(np.array([1.0, 2.5, 2.0]), np.array([3.0, 3.125, 3.0]))
+    '1 3l1.5 .12-.5-.12'
     """
-    numbers = np.empty((len(px), 2))
-    numbers[:, 0], numbers[:, 1] = px, py
-    text = _format_together(numbers) if len(px) >= MIN_TOGETHER else None
-    return (text or "%.2f %.2fL" * len(px) % tuple(numbers.ravel().tolist()))[:-1]
+    hundredths = np.rint(HUNDREDTHS * np.column_stack([px, py])).astype(np.int64)
+    first = " ".join(map(format_pixels, hundredths[0].tolist()))
+    if len(px) == 1:
+        return first
+    steps = np.diff(hundredths, axis=0).ravel()
+    together = len(px) >= MIN_TOGETHER and int(np.abs(steps).max()) < HUNDREDTHS * MAX_STEP
+    text = _format_together(steps) if together else _format_singly(steps)
+    return first + "l" + text.removeprefix(" ")
 
 
-def _format_together(numbers: np.ndarray) -> str | None:
-    """``x yL`` of each row with two decimals; None where a number is no pixel, or so near to a tie that it may differ
-    from the correctly rounded one."""
-    hundredths = 100.0 * numbers
-    nearest = np.rint(hundredths)
-    inside = numbers.min() > 0.0 and nearest.max() < 100 * MAX_PIXEL
-    if not (inside and np.abs(hundredths - nearest).max() < 0.5 - TIE):
-        return None
-    whole, decimals = np.divmod(nearest.astype(np.int32), 100)
-    texts = np.empty(numbers.shape, NUMBER)
-    texts["whole"], texts["decimals"], texts["end"] = WHOLE[whole], DECIMALS[decimals], ENDS
+def _format_singly(steps: np.ndarray) -> str:
+    return "".join(text if text[0] == "-" else " " + text for text in map(format_pixels, steps.tolist()))
+
+
+def _format_together(steps: np.ndarray) -> str:
+    """Texts of steps below ``MAX_STEP``, from tables of their parts."""
+    size = np.abs(steps)
+    texts = np.empty(len(steps), STEP)
+    texts["sign"] = SIGNS[(steps < 0).astype(np.int8)]
+    texts["whole"], texts["decimals"] = WHOLE[size // HUNDREDTHS], DECIMALS[size % HUNDREDTHS]
+    texts["whole"][size == 0] = b"0"
     return texts.tobytes().translate(None, b"\0").decode("ascii")
+
+
+def path_bars(px: np.ndarray, py: np.ndarray, end: np.ndarray) -> str:
+    """Path data of vertical bars.
+
+    Parameters
+    ----------
+    px, py : (n,) array of float
+        Starts of the bars, in pixels.
+    end : (n,) array of float
+        Vertical pixels of their ends.
+
+    Returns
+    -------
+    str
+        One move and one vertical line for each.
+
+    Examples
+    --------
+    >>> path_bars(np.array([73.325]), np.array([201.0]), np.array([51.0]))
+    'M73.32 201V51'
+    """
+    numbers = np.rint(HUNDREDTHS * np.column_stack([px, py, end])).astype(np.int64).tolist()
+    return "".join("M{} {}V{}".format(*map(format_pixels, bar)) for bar in numbers)

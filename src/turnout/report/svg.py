@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import textwrap
 from dataclasses import dataclass, field
+from itertools import compress
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.report.axis import Axis
 from turnout.report.formatting import escape
-from turnout.report.path_data import path_points, reduce_points, runs
+from turnout.report.path_data import HUNDREDTHS, format_pixels, path_bars, path_points, reduce_points, runs
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -153,7 +154,7 @@ class Chart:
         px, low, high = self.px(x), self.py(low), self.py(high)
         for piece in runs(np.isfinite(px) & np.isfinite(low) & np.isfinite(high)):
             forward, (x_back, y_back) = reduce_points(px[piece], high[piece]), reduce_points(px[piece], low[piece])
-            path = f"M{path_points(*forward)}L{path_points(x_back[::-1], y_back[::-1])}Z"
+            path = f"M{path_points(*(np.append(a, b[::-1]) for a, b in zip(forward, (x_back, y_back))))}Z"
             self.elements.append(f'<path class="{style}"{_series(label)} d="{path}">{_title(label)}</path>')
 
     def points(
@@ -195,14 +196,15 @@ class Chart:
         if low is not None and high is not None:
             bottom, top = self.py(low), self.py(high)
             barred = np.flatnonzero(is_finite & np.isfinite(bottom) & np.isfinite(top))
-            numbers = np.column_stack([px[barred], bottom[barred], top[barred]]).ravel()
             if barred.size:
-                path = "M%.2f %.2fV%.2f" * barred.size % tuple(numbers.tolist())
+                path = path_bars(px[barred], bottom[barred], top[barred])
                 self.elements.append(f'<path class="{style} bar"{_series(series)} d="{path}"/>')
         texts = [""] * len(px) if labels is None else [_title(label) for label in labels]
-        dot = f'<circle class="{style}"{_series(series)} r="{radius:g}" cx="%.2f" cy="%.2f">%s</circle>'
-        dots = zip(px.tolist(), py.tolist(), texts, is_finite.tolist())
-        self.elements += [dot % (x, y, text) for x, y, text, is_drawn in dots if is_drawn]
+        dot = f'<circle class="{style}" r="{radius:g}" cx="%s" cy="%s">%s</circle>'
+        places = ((format_pixels(round(HUNDREDTHS * v)) for v in values[is_finite].tolist()) for values in (px, py))
+        dots = [dot % (*place, text) for place, text in zip(zip(*places), compress(texts, is_finite.tolist()))]
+        if dots:
+            self.elements.append(f"<g{_series(series)}>{''.join(dots)}</g>" if series else "".join(dots))
 
     def vertical(self, x: float, style: str, label: str = "", row: int = 0) -> None:
         """Draw a vertical line with a label at its top, or along the line where it would lie on another line or label.
@@ -246,26 +248,30 @@ class Chart:
         crossed = any(low < other.px < high for other in self._labels if other.px != own)
         return inside and not crossed and not any(r == row and low < b and a < high for r, a, b in occupied)
 
-    def span(self, x_low: float, x_high: float, style: str, label: str = "") -> None:
-        """Shade an interval of the horizontal axis.
+    def span(self, x_low: ArrayLike, x_high: ArrayLike, style: str, label: str = "") -> None:
+        """Shade intervals of the horizontal axis.
 
         Parameters
         ----------
-        x_low : float
-            Start of the interval.
-        x_high : float
-            End of the interval.
+        x_low : float or array
+            Start of each interval.
+        x_high : float or array
+            End of each interval.
         style : str
             Class of the style sheet.
         label : str
             Text on hovering.
         """
-        x_left, x_right = (min(max(float(self.px(v)), LEFT), self.width - RIGHT) for v in (x_low, x_high))
-        if x_right > x_left:
-            self.elements.append(
-                f'<rect class="{style}" data-span="" x="{x_left:.1f}" y="{self.top}" width="{x_right - x_left:.1f}" '
-                f'height="{self.height - self.top - BOTTOM}">{_title(label)}</rect>'
-            )
+        left, right = (np.clip(np.atleast_1d(self.px(v)), LEFT, self.width - RIGHT) for v in (x_low, x_high))
+        ends = np.rint(HUNDREDTHS * np.column_stack([left, right])).astype(np.int64)
+        height = self.height - self.top - BOTTOM
+        path = "".join(
+            f"M{format_pixels(start)} {self.top}h{format_pixels(end - start)}v{height}h{format_pixels(start - end)}z"
+            for start, end in ends.tolist()
+            if end > start
+        )
+        if path:
+            self.elements.append(f'<path class="{style}" data-span="" d="{path}">{_title(label)}</path>')
 
     def text(self, x_share: float, y_share: float, words: str, style: str = "note", anchor: str = "start") -> None:
         """Draw words in the panel.

@@ -314,7 +314,7 @@ def test_the_residual_is_what_was_measured_less_what_was_simulated():
     svg = residual_panel(row, "what was left out")
     assert "4.0 % of the energy before, 0.0 % with what was left out" in svg
     path = re.search(r'<path class="curve-before"[^>]* d="M([^"]*)"', svg)[1]
-    y = np.array([pair.split()[1] for pair in path.split("L")], dtype=float)
+    y = np.cumsum(np.array(re.findall(r"-?[\d.]+", path), dtype=float).reshape(-1, 2)[:, 1])
     # the axis reaches 1.25 times the largest residual on both sides of the middle of 190 - 26 - 40 px
     assert np.ptp(y) == pytest.approx(124.0 / 1.25, abs=0.5)
     assert residual_panel(row, "") == "" and residual_panel(row | {"curve": "spectrum"}, "it") == ""

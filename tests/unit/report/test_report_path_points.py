@@ -1,35 +1,47 @@
-"""Numbers of long paths are written together, and are those that Python writes one by one."""
+"""Path data of curves: the steps add up to the points, rounded to hundredths of a pixel."""
+
+import re
 
 import numpy as np
 import pytest
 
-from turnout.report.path_data import MAX_PIXEL, MIN_TOGETHER, _format_together, path_points
+from turnout.report.path_data import MAX_STEP, MIN_TOGETHER, path_bars, path_points
 
-ONE_BY_ONE = "%.2f %.2f"
+NUMBER = r"-?(?:\d+(?:\.\d+)?|\.\d+)"
 
 
-def expected(points):
-    return "L".join(ONE_BY_ONE % tuple(point) for point in points)
+def points_of(path):
+    """(n, 2) hundredths of a pixel of the points of path data, as a browser reads them."""
+    assert re.fullmatch(rf"M?{NUMBER} {NUMBER}(l({NUMBER} ?)+)?", path)
+    numbers = np.array([float(v) for v in re.findall(NUMBER, path)]).reshape(-1, 2)
+    return np.cumsum(np.rint(100.0 * numbers).astype(int), axis=0)
 
 
 @pytest.mark.parametrize(
     "numbers",
     [
-        np.random.default_rng(1).uniform(0.0, MAX_PIXEL - 1.0, (5000, 2)),
-        np.arange(1, 4001).reshape(-1, 2) / 8.0,  # every fourth is the middle of two hundredths, and exact
-        np.nextafter(np.arange(1, 4001).reshape(-1, 2) / 8.0, 0.0),
-        np.linspace(-2.0, 2.0, 400).reshape(-1, 2),  # above and left of the drawing
-        np.full((MIN_TOGETHER, 2), MAX_PIXEL - 0.001),
-        np.full((MIN_TOGETHER, 2), 1e9),
+        np.random.default_rng(1).uniform(0.0, 999.0, (5000, 2)),
+        np.random.default_rng(2).uniform(0.0, 0.1, (500, 2)),
+        np.cumsum(np.full((3000, 2), 1.0 / 300.0), axis=0),
+        np.linspace(-2.0, 2.0, 400).reshape(-1, 2),
+        np.full((MIN_TOGETHER, 2), 7.0),
+        np.resize([0.0, MAX_STEP - 0.01], (MIN_TOGETHER, 2)).cumsum(axis=0) % (3 * MAX_STEP),
+        np.resize([1.0, -1e6, 1e6], (MIN_TOGETHER, 2)),
     ],
-    ids=["any", "ties", "just below ties", "outside", "rounded to the limit", "far"],
+    ids=["any", "small steps", "no error accumulates", "outside", "no step", "large steps", "far"],
 )
-def test_numbers_are_rounded_as_one_by_one(numbers):
+def test_steps_add_up_to_the_rounded_points(numbers):
     for some in (numbers, numbers[: MIN_TOGETHER - 1], numbers[:1]):
-        assert path_points(some[:, 0], some[:, 1]) == expected(some)
+        path = path_points(some[:, 0], some[:, 1])
+        np.testing.assert_array_equal(points_of(path), np.rint(100.0 * some).astype(int))
 
 
-def test_usual_numbers_are_format_together_and_others_are_not():
-    assert _format_together(np.array([[62.0, 7.25], [999.0, 0.01]])) == "62.00 7.25L999.00 0.01L"
-    for odd in (0.0, -1.0, 0.125, MAX_PIXEL, np.nan):
-        assert _format_together(np.array([[62.0, odd]])) is None
+def test_long_and_short_paths_have_the_same_texts():
+    points = np.random.default_rng(3).uniform(-50.0, 900.0, (2 * MIN_TOGETHER, 2)).round(1)
+    points[10:20] = points[10]
+    together, short = path_points(*points.T), path_points(*points[: MIN_TOGETHER - 1].T)
+    assert together.startswith(short) and " 0 0 0" in short
+
+
+def test_bars_start_and_end_where_they_belong():
+    assert path_bars(np.array([10.0, 0.5]), np.array([20.254, 3.0]), np.array([1.0, 0.0])) == "M10 20.25V1M.5 3V0"

@@ -104,9 +104,10 @@ def _window(row: Mapping[str, Any]) -> str:
 def _grey_out(chart: Chart, frequency: np.ndarray, passed: np.ndarray, row: Mapping[str, Any]) -> None:
     """Shade the lines that fail the gate, and mark the band edge of the hammer."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], (~passed).astype(int), [0]])))
-    for first, last in zip(edges[::2], edges[1::2] - 1):
+    if edges.size:
         half = 0.5 * (frequency[1] - frequency[0])
-        chart.span(frequency[first] - half, frequency[last] + half, "gated", "rejected by the gate")
+        first, last = frequency[edges[::2]], frequency[edges[1::2] - 1]
+        chart.span(first - half, last + half, "gated", "rejected by the gate")
     if row["valid_to_hz"]:
         chart.vertical(row["valid_to_hz"], "edge", "hammer's band edge", row=1)
 

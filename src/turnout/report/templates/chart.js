@@ -54,8 +54,17 @@
     return list;
   }
   function points(path) {  // pairs of pixels of a line or band; lines of other shapes have no values
-    var text = path.getAttribute("d");
-    return /[VH]/.test(text) ? [] : text.split(/[MLZ]/).filter(Boolean).map(function (pair) { return pair.split(" ").map(Number); });
+    var text = path.getAttribute("d"), list = [];
+    if (/[VH]/i.test(text)) { return list; }
+    text.split("M").filter(Boolean).forEach(function (piece) {  // a point, then steps in hundredths of a pixel
+      var numbers = piece.match(/-?(\d+(\.\d+)?|\.\d+)/g), x = 0, y = 0, k;
+      for (k = 0; k + 1 < numbers.length; k += 2) {
+        x += Math.round(100 * numbers[k]);
+        y += Math.round(100 * numbers[k + 1]);
+        list.push([x / 100, y / 100]);
+      }
+    });
+    return list;
   }
   function Plot(svg) {
     var plot = this, box = make("div", { "class": "plot", role: "group", tabindex: "0" });
@@ -82,7 +91,7 @@
     each(this.inner.querySelectorAll("[data-series]"), function (node) {
       var name = node.dataset.series;
       if (!first[name]) { names.push(name); }
-      if (!first[name] || node.tagName === "circle") { first[name] = node; }
+      if (!first[name] || node.tagName === "g") { first[name] = node.querySelector("circle") || node; }
     });
     if (names.length < 2) { return; }
     this.box.classList.add("toggles");
@@ -168,7 +177,7 @@
     this.lines = [];
     this.marks = [];
     var plot = this;
-    each(this.inner.querySelectorAll("path,circle,rect:not([data-span])"), function (node) {
+    each(this.inner.querySelectorAll("path:not([data-span]),circle,rect"), function (node) {
       var title = node.querySelector("title"), at = node.tagName === "circle" ? [+(node.dataset.cx || node.getAttribute("cx")), +(node.dataset.cy || node.getAttribute("cy"))] :
         [+node.getAttribute("x") + node.getAttribute("width") / 2, +node.getAttribute("y")];
       if (node.tagName !== "path") {
@@ -181,7 +190,7 @@
     this.marks.sort(function (a, b) { return a.at[0] - b.at[0] || b.at[1] - a.at[1]; });
     this.cross = make("*path", { "class": "cross", d: "" }, this.inner);
   };
-  function isShown(item) { return item.node.style.display !== "none"; }
+  function isShown(item) { return (item.node.closest("[data-series]") || item.node).style.display !== "none"; }
   Plot.prototype.value = function (py) { return this.y.value((this._y + this._height - py) / this._height); };
   Plot.prototype.read = function (px) {  // words of all series at a pixel of the chart as it was drawn
     var plot = this, nearest = null, texts = [];
