@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from turnout_blind.site import Site
 
 LOCKS = ("place", "wheel", "train", "sensor", "wavelength", "frequency", "clock", "condition", "amplitude")
-# "history": in sites that are visited for years alone; "switch": in switch panels alone
+# "history": in histories, and in single campaigns in the panel that it needs; "switch": in switch panels alone
 STRATA = ("single", "outside", "unidentifiable", "history", "switch")
 
 

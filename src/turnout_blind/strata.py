@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout_blind.site import PLAIN, SWITCH
+from turnout_blind.site import PLAIN
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
@@ -69,8 +69,8 @@ def plan_cases(
     effect_types = {
         s: [k for k, e in sorted(effects.items()) if e.stratum == s] for s in ("single", "outside", "unidentifiable")
     }
-    if panel == SWITCH:
-        effect_types["single"] += [k for k, e in sorted(effects.items()) if e.stratum == "switch"]
+    if panel != PLAIN:  # effects that exist in such a panel alone
+        effect_types["single"] += [k for k, e in sorted(effects.items()) if e.site.get("panel") == panel]
     counts = FULL_COUNTS if full else FAST_COUNTS
     cases: list[tuple[str, tuple[tuple[str, int], ...]]] = [("control", ())] * counts["control"]
     if full:

@@ -16,7 +16,15 @@ from turnout.mismatch.engine.thresholds import THRESHOLDS, threshold_rows
 from turnout.mismatch.engine.verdict import ANSWERS
 from turnout.physics import Parameter
 
-TABLES = ("NUMERICS_RULES", "EFFECT_RULES", "SECOND_RULES", "PAIR_RULES", "NAME_RULES", "RESERVED_RULES")
+TABLES = (
+    "NUMERICS_RULES",
+    "EFFECT_RULES",
+    "SECOND_RULES",
+    "PAIR_RULES",
+    "NAME_RULES",
+    "TOLERATED_RULES",
+    "RESERVED_RULES",
+)
 SIZE = (Parameter("size", "-", 0.0, (0.0, 9.0), "of a shape", "made up 2026"),)
 
 

@@ -369,6 +369,21 @@ class Case:
         """
         return ()
 
+    def tolerated_effects(self, fit: Fit) -> Sequence[Candidate]:
+        """Effects that a wide tolerance of the base model hides, although their size is a finding.
+
+        Parameters
+        ----------
+        fit : Fit
+            Without effects.
+
+        Returns
+        -------
+        sequence of Candidate
+            Each with the parameter that masks it, and the nuisances from which its fit starts.
+        """
+        return ()
+
     def distant_starts(self, fit: Fit) -> Iterable[tuple[Candidate, tuple[float, ...]]]:
         """Starts too far from neutral for a column: predicted, with the masking parameter at its mean.
 

@@ -3,6 +3,7 @@
 Each step of the decision has one table, and the first of its rules that applies decides. ``NUMERICS_RULES``: whether
 the simulation is accurate enough. ``EFFECT_RULES``: the answer on one effect. ``SECOND_RULES``: whether a second effect
 stands beside the first. ``PAIR_RULES``: which of the two remain. ``NAME_RULES``: the grade of a name.
+``TOLERATED_RULES``: whether an effect that the base model tolerates has a name.
 ``RESERVED_RULES``: whether reserved recordings confirm the answer. ``Verdict.trail`` names the rules that applied.
 """
 
@@ -12,7 +13,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from turnout.mismatch.engine.decision_facts import EffectEvidence, NameEvidence, NumericalError, ReservedEvidence
+from turnout.mismatch.engine.decision_facts import (
+    EffectEvidence,
+    NameEvidence,
+    NumericalError,
+    ReservedEvidence,
+    ToleratedEvidence,
+)
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.mismatch.engine.verdict import Verdict, calibrate, posterior, swap_with_unknown
 
@@ -86,7 +93,7 @@ def first_applicable(rules: Sequence[Rule[Facts]], evidence: Facts) -> Rule[Fact
     return next(rule for rule in rules if rule.applies(evidence))
 
 
-HOW, PAIRS = "mismatch.md", "decisions/two-effects.md"
+HOW, PAIRS, SURFACES = "mismatch.md", "decisions/two-effects.md", "decisions/running-surface-priors.md"
 LOCATED, ENDS = "decisions/residual-localization.md", "decisions/joint-fit-convergence.md"
 
 
@@ -179,9 +186,22 @@ RESERVED_RULES: tuple[Rule[ReservedEvidence], ...] = (
          "unknown", "held-out recordings are not predicted as in intact turnouts", HOW),
     Rule("not_contradicted", _always, "", "", HOW),
 )
+TOLERATED_RULES: tuple[Rule[ToleratedEvidence], ...] = (
+    Rule("tolerance_explains_better", lambda e: e.score.gain <= -e.settings.margin, "", "", SURFACES),
+    Rule("size_is_not_material", lambda e: not (e.score.is_reportable and e.score.has_meaning), "", "", SURFACES),
+    Rule("beyond_tolerance", _always, "named", "a tolerance of the base model allows for it", SURFACES),
+)
 # fmt: on
 
-RULES = (*NUMERICS_RULES, *EFFECT_RULES, *SECOND_RULES, *PAIR_RULES, *NAME_RULES, *RESERVED_RULES)
+RULES = (
+    *NUMERICS_RULES,
+    *EFFECT_RULES,
+    *SECOND_RULES,
+    *PAIR_RULES,
+    *NAME_RULES,
+    *TOLERATED_RULES,
+    *RESERVED_RULES,
+)
 
 
 def judge(scores: Sequence[Score], excess: float, settings: MismatchSettings, **facts: Any) -> Verdict:

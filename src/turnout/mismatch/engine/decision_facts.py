@@ -179,6 +179,21 @@ class EffectEvidence:
 
 
 @dataclass(frozen=True)
+class ToleratedEvidence:
+    """What the name of an effect that the base model tolerates rests on.
+
+    Attributes
+    ----------
+    score : Score
+        Of the fit with the effect in place of the tolerance. Its gain is that over the base fit.
+    settings : MismatchSettings
+    """
+
+    score: Score
+    settings: MismatchSettings
+
+
+@dataclass(frozen=True)
 class NumericalError:
     """Weighted sums of squares of the simulation's own error and of the mismatch, of ``n`` independent samples.
 

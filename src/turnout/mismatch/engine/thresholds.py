@@ -163,6 +163,11 @@ class Thresholds:
     min_start_multiple: float = threshold(0.1, "of a start", "a smaller size is no start", "numerical")
     max_start_multiple: float = threshold(3.0, "of a start", "a column is linear no further", ALWAYS)
 
+    held_share: float = threshold(
+        0.1, "of the prior standard deviation", "that a masking parameter keeps beside the effect that it hides",
+        "numerical",
+    )  # fmt: skip
+
     # Prescreening by cheap observations
     n_trial_steps: int = threshold(4, "steps", "of a trial fit", PRESCREEN)
     max_trial_starts: int = threshold(5, "starts", "of an effect of the whole track that are tried", PAIRS)

@@ -26,6 +26,7 @@ from turnout.mismatch.turnout.predicted_case import PredictedCase
 from turnout.mismatch.turnout.prediction import Predictions, Predictor, Terms, Values
 from turnout.mismatch.turnout.priors import CASE, SIMULATION
 from turnout.mismatch.turnout.wheel_roughness import log_mass_ratios
+from turnout.mismatch.turnout.worn_nose import worn_noses
 
 # (predictor, whether a prediction is cheap) -> a cache around the predictor, or the predictor itself
 PredictionCache: TypeAlias = Callable[[Predictor, bool], Predictions]
@@ -252,6 +253,24 @@ class TrackCase(PredictedCase):
         if not self.fitted_passages():
             return ()
         return self.accepted.without(scan_geometry(*self.with_fixed_effects(fit), self.families))
+
+    def tolerated_effects(self, fit: Fit) -> tuple[Candidate, ...]:
+        """Worn noses: dips of the file that are certainly much deeper than it says.
+
+        Parameters
+        ----------
+        fit : Fit
+            Without effects.
+
+        Returns
+        -------
+        tuple[Candidate, ...]
+            Worn noses: dips of the file that are certainly much deeper than it says.
+        """
+        surface = self.predictor.site.surface
+        if not surface or not surface.parameters or not self.fitted_passages():
+            return ()
+        return self.accepted.without(worn_noses(surface, surface.estimate(self, fit), fit))
 
     def distant_starts(self, fit: Fit) -> list[tuple[Candidate, tuple[float, ...]]]:
         """Wheelsets of other masses, for trains whose residual exceeds the control level.
