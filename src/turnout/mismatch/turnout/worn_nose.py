@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from turnout.mismatch.calibrated.constants import CALIBRATION
-from turnout.mismatch.turnout.candidates.catalogue import candidate_of
+from turnout.mismatch.turnout.candidates.catalogue import candidate_of, parameters_with
+from turnout.mismatch.turnout.priors import GEOMETRY
 from turnout.physics.hypothesis import Hypothesis, Masking
 from turnout.physics.surface_dip import SurfaceDip
 from turnout.simulate.wheel_path import Kink
@@ -22,7 +23,8 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.map_fit import Fit
     from turnout.mismatch.turnout.running_surface import RunningSurface
 
-SMOOTH_SHARE = 0.5  # of the sharpness at which the fit of a worn nose starts: between a cosine and a kink
+SHARPNESS = 0.5  # at which the fit of a worn nose starts: between a cosine and a kink
+LENGTH_SHARE = 0.3  # relative standard deviation of the length of the wear, about that of the nose as it was fitted
 
 
 def worn_noses(surface: RunningSurface, estimates: Iterable[Mapping[str, Any]], fit: Fit) -> Iterator[Candidate]:
@@ -57,9 +59,14 @@ def worn_noses(surface: RunningSurface, estimates: Iterable[Mapping[str, Any]], 
         yield candidate_of(
             SurfaceDip,
             Hypothesis(
-                starts=((e["value"] - e["filed"], length, SMOOTH_SHARE, 0.0),),
+                starts=((e["value"] - e["filed"], length, SHARPNESS, 0.0),),
                 fixed={"place": position},
                 where={"place": round(position, 3)},
+                parameters=parameters_with(
+                    SurfaceDip,
+                    length=(length, LENGTH_SHARE * length),
+                    shift=(0.0, GEOMETRY.position_step),
+                ),
                 masking=Masking(own["depth"].name),
                 start_nuisances={p.name: 0.0 for p in own.values()},
             ),

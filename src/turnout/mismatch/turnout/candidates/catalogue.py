@@ -8,6 +8,7 @@ mass make the fit worse, and the derivative points the wrong way.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -107,6 +108,23 @@ def candidate_of(effect: type[physics.PhysicsTerm], hypothesis: Hypothesis) -> C
             must_not_oppose=hypothesis.must_not_oppose,
         ),
     )
+
+
+def parameters_with(effect: type[physics.PhysicsTerm], **priors: tuple[float, float]) -> tuple[physics.Parameter, ...]:
+    """Parameters of an effect with priors about the values of a scan or a fit, whose cost is already counted.
+
+    Parameters
+    ----------
+    effect : type
+        Class of the effect.
+    **priors : tuple of float
+        Mean and standard deviation, by the name of the parameter.
+
+    Returns
+    -------
+    tuple of Parameter
+    """
+    return tuple(replace(p, prior=priors[p.name]) if p.name in priors else p for p in effect.parameters)
 
 
 def sites_of(data: CaseData) -> Iterator[Site]:

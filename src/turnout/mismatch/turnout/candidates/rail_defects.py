@@ -14,14 +14,13 @@ is the gain in chi-squared when the waves give way to the shape, without a simul
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout import physics
 from turnout.mismatch.engine.candidate_search import Projector
-from turnout.mismatch.turnout.candidates.catalogue import candidate_of
+from turnout.mismatch.turnout.candidates.catalogue import candidate_of, parameters_with
 from turnout.mismatch.turnout.candidates.out_of_roundness import polygon_candidates, short_polygon_candidates
 from turnout.mismatch.turnout.candidates.short_corrugation import short_corrugation_candidates
 from turnout.mismatch.turnout.candidates.wheel_flats import flat_candidates
@@ -132,7 +131,7 @@ def _dip(case: TrackCase, scan: RailScan) -> Hypothesis:
         fixed={"place": float(x)},
         where={"place": round(float(x), 3)},
         n_scanned=scanned,
-        parameters=_parameters_with(physics.SurfaceDip, shift=(0.0, GEOMETRY.resolution)),
+        parameters=parameters_with(physics.SurfaceDip, shift=(0.0, GEOMETRY.resolution)),
         promise=float(0.5 * slope[best_index] ** 2 / size[best_index] - np.log(scanned)),
         start_nuisances=scan.waves_without(shapes[best_index] * depth / GEOMETRY.unit_depth),
     )
@@ -167,15 +166,10 @@ def _corrugation(case: TrackCase, scan: RailScan) -> Hypothesis:
         fixed={"start": a, "end": b},
         where={"wavelength": round(float(wavelength), 3), "place": 0.5 * (a + b)},
         n_scanned=scanned,
-        parameters=_parameters_with(physics.RailCorrugation, **priors),
+        parameters=parameters_with(physics.RailCorrugation, **priors),
         promise=float(0.5 * gain - np.log(scanned)),
         start_nuisances=scan.waves_without(1e5 * np.array([sine, cosine]) @ pair),
     )
-
-
-def _parameters_with(term: type[physics.PhysicsTerm], **priors: tuple[float, float]) -> tuple[physics.Parameter, ...]:
-    """Parameters of a term with priors about the values of a scan, whose cost is already counted."""
-    return tuple(replace(p, prior=priors[p.name]) if p.name in priors else p for p in term.parameters)
 
 
 def _path(term: physics.PhysicsTerm, x: np.ndarray) -> np.ndarray:
