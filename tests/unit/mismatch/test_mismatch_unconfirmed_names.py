@@ -59,6 +59,14 @@ def test_a_fall_of_two_standard_errors_withdraws_a_name_of_any_grade(grade, afte
         assert result.trail == (("reserved_fit_falls",) if withdrawn else ("not_contradicted",))
 
 
+@pytest.mark.parametrize(("allowed", "answer"), [(1.0, "named"), (0.5, "unknown")])
+def test_a_fall_within_the_allowed_points_withdraws_no_name(allowed, answer):
+    """Frequency-dependent pads show in impacts. Trains fell from 37.25 to 36.61 %, four standard errors."""
+    name = Verdict("named", ("zener_pad",), "A", 0.95, {"zener_pad": 0.95, "none": 0.05, "unknown": 0.0})
+    (found,) = confirm((name,), Verification(2, 37.25, 36.61, error=0.15), MismatchSettings(fall=allowed))
+    assert found.answer == answer
+
+
 def test_of_two_names_none_is_withdrawn():
     pair = tuple(Verdict("named", (n,), "B", 0.97, dict(POSTERIOR)) for n in ("pad_preload", "dip"))
     assert [v.answer for v in confirm(pair, WORSE, MismatchSettings())] == ["named", "named"]

@@ -179,7 +179,7 @@ NAME_RULES: tuple[Rule[NameEvidence], ...] = (
 RESERVED_RULES: tuple[Rule[ReservedEvidence], ...] = (
     Rule("reserved_predicted_worse", lambda e: e.is_single_name_of_grade_b and e.verification.is_worse, "unknown",
          "{e.verdict.names[0]} leaves more than intact turnouts do and predicts held-out recordings worse", ENDS),
-    Rule("reserved_fit_falls", lambda e: e.is_single_name and e.verification.falls_clearly, "unknown",
+    Rule("reserved_fit_falls", lambda e: e.is_single_name and e.falls_clearly, "unknown",
          "with {e.verdict.names[0]} the fit of held-out recordings falls by two standard errors", HOW),
     Rule("reserved_not_explained",
          lambda e: e.verdict.answer == "none" and e.verification.reserved_excess > THRESHOLDS.max_reserved_excess,
@@ -293,7 +293,7 @@ def confirm(
     tuple of Verdict
         The first is "unknown" if reserved recordings contradict it.
     """
-    evidence = ReservedEvidence(verdicts, verification)
+    evidence = ReservedEvidence(verdicts, verification, settings.fall)
     rule = first_applicable(RESERVED_RULES, evidence)
     first, *further = verdicts
     if rule.answer == "unknown":

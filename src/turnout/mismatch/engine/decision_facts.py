@@ -240,10 +240,19 @@ class NameEvidence:
 
 @dataclass(frozen=True)
 class ReservedEvidence:
-    """The verdicts, and how well the last fit predicts the reserved recordings."""
+    """The verdicts, and how well the last fit predicts the reserved recordings.
+
+    ``allowed_fall`` is the loss of fit there that withdraws no name [%], the setting ``fall``.
+    """
 
     verdicts: tuple[Verdict, ...]
     verification: Verification
+    allowed_fall: float = 0.0
+
+    @property
+    def falls_clearly(self) -> bool:
+        """Whether the fit falls by more than is allowed, and by two standard errors."""
+        return self.verification.falls_by(self.allowed_fall)
 
     @property
     def verdict(self) -> Verdict:

@@ -301,13 +301,24 @@ class Verification:
         """Whether the named model predicts the reserved recordings worse, by more than the standard error."""
         return self.error is not None and self.after is not None and self.after < self.before - self.error
 
-    @property
-    def falls_clearly(self) -> bool:
-        """Whether the fit of the reserved recordings falls by at least two standard errors with the named model."""
+    def falls_by(self, points: float) -> bool:
+        """Whether the fit of the reserved recordings falls by some points and two standard errors with the named model.
+
+        A name may change the reserved recordings by so little that its error there is smaller than that of the model.
+
+        Parameters
+        ----------
+        points : float
+            Loss of fit that is allowed. [%]
+
+        Returns
+        -------
+        bool
+        """
         if self.error is None or self.after is None:
             return False
         fall = self.before - self.after
-        return fall > 0.0 and fall >= THRESHOLDS.loss_errors * self.error
+        return fall > points and fall >= THRESHOLDS.loss_errors * self.error
 
 
 def verify(search: Search, base: Fit, fit: Fit, rival: Score | None) -> Verification:
