@@ -8,7 +8,7 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.kernel_cache import kernel
-from turnout.simulate.band_matrix import factorise, factorise4, solve, upper_rows
+from turnout.simulate.band_matrix import LANES, factorise, factorise4, solve, solve_lanes, upper_rows
 from turnout.simulate.matrices import link_vector
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ def _solve_lines(
     lower = np.zeros((n + 4, width), dtype=np.complex128)
     upper = np.zeros((n, width), dtype=np.complex128)
     pivot, x = np.zeros(n, dtype=np.complex128), np.zeros(n, dtype=np.complex128)
+    lanes = np.zeros(2 * (n + 8) * LANES)
     worst = 0.0
     for line in range(omega.size):
         w = omega[line]
@@ -50,13 +51,39 @@ def _solve_lines(
         else:
             worst = max(worst, factorise(system[: half + 1, :n], lower[:n], pivot))
             upper[:] = upper_rows(lower[:n], n, half, width)
-        for r in range(right.shape[0]):
+        together = right.shape[0] if width == 4 and right.shape[0] > 2 else 0  # at once, the others one by one
+        for first in range(0, together, LANES):
+            _solve_rows(lower[:n], upper, pivot, lanes, right[first : first + LANES], selected, out[line, first:])
+        for r in range(together, right.shape[0]):
             for i in range(n):
                 x[i] = right[r, i]
             solve(lower[:n], upper, pivot, x, 0, n)
             for i in range(selected.size):
                 out[line, r, i] = x[selected[i]]
     return worst
+
+
+@kernel
+def _solve_rows(
+    lower: np.ndarray,
+    upper: np.ndarray,
+    pivot: np.ndarray,
+    lanes: np.ndarray,
+    right: np.ndarray,
+    selected: np.ndarray,
+    out: np.ndarray,
+) -> None:
+    """Rows ``selected`` for up to ``LANES`` right-hand sides in ``out[k]``; ``lanes`` is a workspace."""
+    n = pivot.size
+    lanes[:] = 0.0
+    for r in range(right.shape[0]):
+        for i in range(n):
+            lanes[2 * LANES * (i + 4) + r] = right[r, i]
+    solve_lanes(lower, upper, pivot, lanes, n)
+    for r in range(right.shape[0]):
+        for i in range(selected.size):
+            k = 2 * LANES * (selected[i] + 4) + r
+            out[r, i] = complex(lanes[k], lanes[k + LANES])
 
 
 def _solve_pivoted(matrices: TrackMatrices, omega: np.ndarray, right: np.ndarray) -> np.ndarray:

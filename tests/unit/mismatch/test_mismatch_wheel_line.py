@@ -56,7 +56,7 @@ def test_a_quotient_in_a_switch_is_used_again_until_a_common_value_has_moved(sur
     """By 0, 0.4 and 0.8 of its prior standard deviation. On plain track it is always computed."""
     values_seen = []
 
-    def predict_passage(values, terms, aligned):
+    def predict_passage(values, terms, aligned, with_probes):
         values_seen.append(values["load"])
         return np.array([values["load"] ** 2])
 

@@ -34,3 +34,15 @@ def test_a_complex_frequency_is_solved_as_the_laplace_transform(pivoted):
         system = s**2 * dense(matrices.mass) + s * dense(matrices.damping) + dense(matrices.stiffness)
         expected = np.linalg.solve(system + 1j * dense(matrices.hysteresis), right)
         assert np.max(np.abs(u - expected)) < 1e-9 * np.max(np.abs(expected))
+
+
+@pytest.mark.parametrize("count", [1, 3, 8, 9, 17])
+def test_many_forces_are_solved_as_one_by_one_with_pivoting(count):
+    """Groups of eight, a full one and a rest: LAPACK with pivoting solves each alone."""
+    matrices = assemble(uniform_track(9.0))
+    frequency, places = np.array([0.0, 60.0, 420.0]), [*np.linspace(2.1, 6.9, count)]
+    rows = np.array([0, 11, matrices.n - 1])
+    together = responses(matrices, frequency, places, rows)
+    expected = responses(matrices, frequency, places, rows, pivoted=True)
+    assert together.shape == (3, count, 3)
+    assert np.max(np.abs(together - expected)) < 1e-10 * np.max(np.abs(expected))

@@ -140,6 +140,7 @@ class Predictor:
         self._signals_with_probes: OrderedDict[Hashable, np.ndarray] = OrderedDict()
         self._simulators: OrderedDict[Hashable, PassageSimulator] = OrderedDict()
         self._sensitivities: OrderedDict[Hashable, ReceptanceSensitivity] = OrderedDict()
+        self._transfers: OrderedDict[Hashable, Any] = OrderedDict()
         self._zones_with_file_values: dict[tuple[str, ...], Any] = {}
         # difference quotients of passages, each with the common values (in prior sd) at which it was computed
         self.differences: dict[Hashable, tuple[dict[str, float], np.ndarray]] = {}
@@ -494,7 +495,9 @@ class Predictor:
             )
         )
 
-    def predict_passage(self, values: Values, terms: Terms, aligned: AlignedPassage) -> np.ndarray:
+    def predict_passage(
+        self, values: Values, terms: Terms, aligned: AlignedPassage, with_probes: bool = True
+    ) -> np.ndarray:
         """(n_sensor * n_time,) predicted signals of a passage, one sensor after the other [m/s²].
 
         Parameters
@@ -505,13 +508,16 @@ class Predictor:
             Physics terms of the effects.
         aligned : AlignedPassage
             A passage with its time shift, speed and load.
+        with_probes : bool
+            Whether a simulation also records the probes that derivatives need. One beside the point of the
+            derivatives need not, and must not displace theirs in the cache.
 
         Returns
         -------
         (n_sensor * n_time,) array
             Predicted signals of a passage, one sensor after the other [m/s²].
         """
-        signals = self.sensor_signals(values, terms, aligned)
+        signals = self.sensor_signals(values, terms, aligned, with_probes)
         return np.concatenate(
             [self.channel_output(values, terms, aligned, s, row) for s, row in zip(aligned.sensors, signals)]
         )
@@ -548,7 +554,9 @@ class Predictor:
             aligned.limit_band(signal, rate), rate, time
         )
 
-    def sensor_signals(self, values: Values, terms: Terms, aligned: AlignedPassage) -> np.ndarray:
+    def sensor_signals(
+        self, values: Values, terms: Terms, aligned: AlignedPassage, with_probes: bool = True
+    ) -> np.ndarray:
         """Simulated signals of the sensors before their channels, at four times the rate of the simulation; cached.
 
         Parameters
@@ -559,6 +567,8 @@ class Predictor:
             Physics terms of the effects.
         aligned : AlignedPassage
             A passage with its time shift, speed and load.
+        with_probes : bool
+            Whether a simulation also records the probes.
 
         Returns
         -------
@@ -567,7 +577,7 @@ class Predictor:
         """
         passage_terms, key = self._terms_and_key(values, terms, aligned)
         if key not in self._signals:
-            self._simulate(values, terms, aligned, passage_terms, key)
+            self._simulate(values, terms, aligned, passage_terms, key, with_probes)
         return passage_band.upsample(self._signals[key])
 
     def signals_with_probes(self, values: Values, terms: Terms, aligned: AlignedPassage) -> np.ndarray:
@@ -613,7 +623,13 @@ class Predictor:
         )
 
     def _simulate(
-        self, values: Values, terms: Terms, aligned: AlignedPassage, passage_terms: Terms, key: Hashable
+        self,
+        values: Values,
+        terms: Terms,
+        aligned: AlignedPassage,
+        passage_terms: Terms,
+        key: Hashable,
+        with_probes: bool = True,
     ) -> None:
         """Simulate a passage and cache it. Probe signals are large: their cache is small."""
         _, speed, load = _train_values(values, aligned)
@@ -623,13 +639,35 @@ class Predictor:
         surfaces: Surfaces = tuple(
             (*surface, *path) for surface in self.surface.surfaces(aligned.passage.route, values)
         )
-        probe_points = probes(self, values, terms, aligned)
+        probe_points = probes(self, values, terms, aligned) if with_probes else []
         signals = simulator(
             aligned.passage, vehicle, aligned.speed * (1.0 + speed), sensors, probe_points, surfaces, aligned.sensors
         )
-        self._signals[key], self._signals_with_probes[key] = signals[: len(sensors)].copy(), signals
+        self._signals[key] = signals[: len(sensors)].copy()
         _shorten(self._signals, SIMULATION.signal_cache_size)
-        _shorten(self._signals_with_probes, len(self.aligned_passages) + SIMULATION.probe_cache_spare)
+        if with_probes:
+            self._signals_with_probes[key] = signals
+            _shorten(self._signals_with_probes, 2 * len(self.aligned_passages) + SIMULATION.probe_cache_spare)
+
+    def track_transfer(self, key: Hashable, compute: Callable[[], Any]) -> Any:
+        """A response of the track that passages under the same conditions share; the latest are cached.
+
+        Parameters
+        ----------
+        key : hashable
+            All that the response depends on, beside this predictor.
+        compute : callable
+            () -> the response, of arrays that nobody changes.
+
+        Returns
+        -------
+        Any
+            What ``compute`` returns, or has returned for this key.
+        """
+        if key not in self._transfers:
+            self._transfers[key] = compute()
+            _shorten(self._transfers, SIMULATION.transfer_cache_size)
+        return self._transfers[key]
 
     def passage_simulator(self, values: Values, terms: Terms, passage: PassageInput) -> PassageSimulator:
         """``PassageSimulator`` of a passage's route with these terms, cached.

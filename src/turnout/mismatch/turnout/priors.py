@@ -204,6 +204,7 @@ class SimulationPriors:
     sensitivity_cache_size: int = prior(8, "tracks", "whose receptances are kept", "numerical")
     rail_cache_size: int = prior(9, "rails", "whose tracks are kept", "numerical")
     simulator_cache_size: int = prior(12, "tracks", "whose factorisations are kept", "numerical")
+    transfer_cache_size: int = prior(12, "responses", "of the track to forces that are kept", "numerical")
     template_cache_size: int = prior(
         24, "templates", "of matrices that are kept, and rails and link sets of each", "numerical")
     log_step: float = prior(0.04, "ln", "of the difference quotient by an unsprung mass", "numerical")

@@ -15,7 +15,7 @@ from turnout.mismatch.turnout.passage_band import transfer_lines
 from turnout.mismatch.turnout.priors import RECEPTANCE, SIMULATION
 from turnout.mismatch.turnout.receptance_model import linear_matrices
 from turnout.mismatch.turnout.track_parameters import track_with
-from turnout.mismatch.turnout.wave_response import WaveTransfer
+from turnout.mismatch.turnout.wave_response import WaveTransfer, track_key
 from turnout.mismatch.turnout.wheel_line import rows_under_wheels
 from turnout.simulate.frequency_response import responses
 from turnout.simulate.run import Probe
@@ -111,13 +111,18 @@ def green_functions(
     """
     under = [t.under_conditions(aligned.conditions) for t in terms]
     track = track_with(predictor.track(aligned.passage.route, under), predictor.zone, values)
-    matrices = linear_matrices(track, under)
     frequency = transfer_lines()
-    positions = [predictor.seat(s, values, terms).probe(track).place for s in aligned.sensors]
-    rows = [matrices.index[layer, j] for j in predictor.zone.supports for layer in ("rail", "sleeper")]
-    h = responses(matrices, frequency, positions, rows)
-    omega2 = (2.0 * np.pi * frequency) ** 2
-    return frequency, -omega2[:, None, None, None] * h.reshape(*h.shape[:2], -1, 2)
+    positions = tuple(predictor.seat(s, values, terms).probe(track).place for s in aligned.sensors)
+
+    def compute() -> np.ndarray:
+        matrices = linear_matrices(track, under)
+        rows = [matrices.index[layer, j] for j in predictor.zone.supports for layer in ("rail", "sleeper")]
+        h = responses(matrices, frequency, positions, rows)
+        omega2 = (2.0 * np.pi * frequency) ** 2
+        return -omega2[:, None, None, None] * h.reshape(*h.shape[:2], -1, 2)
+
+    key = "forces", *track_key(predictor, values, aligned, under), positions
+    return frequency, predictor.track_transfer(key, compute)
 
 
 def _static_deflection(
@@ -126,14 +131,18 @@ def _static_deflection(
     """(n_support, 2, n_x) static deflection of the rail at ``positions`` per force on rail seat and sleeper [m/N]."""
     under = [t.under_conditions(aligned.conditions) for t in terms]
     track = track_with(predictor.track(aligned.passage.route, under), predictor.zone, values)
-    matrices = linear_matrices(track, under)
-    names = [(layer, j) for j in predictor.zone.supports for layer in ("rail", "sleeper")]
-    rows = matrices.node_index
-    if track.blade is not None:
-        rows = rows_under_wheels(matrices, track.blade, predictor.surface.surfaces(aligned.passage.route, values))
-    h = responses(matrices, [0.0], names, rows)[0].real
-    inside = [np.interp(positions, matrices.node, row) for row in h]
-    return np.array(inside).reshape(-1, 2, positions.size)
+    surfaces = predictor.surface.surfaces(aligned.passage.route, values) if track.blade is not None else ()
+
+    def compute() -> np.ndarray:
+        matrices = linear_matrices(track, under)
+        names = [(layer, j) for j in predictor.zone.supports for layer in ("rail", "sleeper")]
+        rows = matrices.node_index if track.blade is None else rows_under_wheels(matrices, track.blade, surfaces)
+        h = responses(matrices, [0.0], names, rows)[0].real
+        inside = [np.interp(positions, matrices.node, row) for row in h]
+        return np.array(inside).reshape(-1, 2, positions.size)
+
+    key = "deflection", *track_key(predictor, values, aligned, under), surfaces, positions.tobytes()
+    return predictor.track_transfer(key, compute)
 
 
 def force_responses(

@@ -398,7 +398,11 @@ def predict_near(
                     )
                 )
                 continue
-        predicted += predictor.predict(values, new, [o])
+        if o.name in predictor.aligned_passages:
+            aligned = predictor.aligned_passages[o.name]
+            predicted.append(predictor.predict_passage(values, new, aligned, with_probes=False))
+        else:
+            predicted += predictor.predict(values, new, [o])
     return predicted
 
 

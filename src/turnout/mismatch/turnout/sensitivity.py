@@ -175,10 +175,13 @@ def _quotient(
     name: str,
     step: float,
 ) -> np.ndarray:
+    def predict(increment: float) -> np.ndarray:
+        return predictor.predict_passage({**values, name: values[name] + increment}, terms, aligned, with_probes=False)
+
     try:
-        return (predictor.predict_passage({**values, name: values[name] + step}, terms, aligned) - predicted) / step
+        return (predict(step) - predicted) / step
     except SimulationError:
-        return (predicted - predictor.predict_passage({**values, name: values[name] - step}, terms, aligned)) / step
+        return (predicted - predict(-step)) / step
 
 
 def own_columns(

@@ -20,7 +20,7 @@ from turnout.mismatch.turnout import passage_band
 from turnout.mismatch.turnout.priors import PASSAGE, SIMULATION
 from turnout.mismatch.turnout.receptance_model import linear_matrices
 from turnout.mismatch.turnout.receptance_observation import channel_factor
-from turnout.mismatch.turnout.track_parameters import track_with, vehicle_with
+from turnout.mismatch.turnout.track_parameters import track_value_key, track_with, vehicle_with
 from turnout.mismatch.turnout.wheel_line import points_of_rows, rows_under_wheels
 from turnout.simulate.frequency_response import responses
 
@@ -31,7 +31,9 @@ if TYPE_CHECKING:
     from turnout.mismatch.turnout.passage_observation import AlignedPassage
     from turnout.mismatch.turnout.prediction import Predictor, Terms, Values
     from turnout.simulate.matrices import TrackMatrices
+    from turnout.simulate.track import Track
     from turnout.simulate.vehicle import Vehicle
+    from turnout.simulate.wheel_path import Surfaces
 
 
 class WaveTransfer:
@@ -326,6 +328,41 @@ def _transfers(
     each node (m, n_node), and nodes.
     """
     track = track_with(predictor.track(aligned.passage.route, terms), predictor.zone, values)
+    positions = tuple(predictor.seat(s, values, terms).probe(track).place for s in aligned.sensors)
+    surfaces = predictor.surface.surfaces(aligned.passage.route, values) if track.blade is not None else ()
+    key = "waves", *track_key(predictor, values, aligned, terms), positions, surfaces, beyond
+    return predictor.track_transfer(key, lambda: _rail_transfers(predictor, track, terms, positions, surfaces, beyond))
+
+
+def track_key(predictor: Predictor, values: Values, aligned: AlignedPassage, terms: Terms) -> tuple[Any, ...]:
+    """All that the linear track under a passage depends on.
+
+    Parameters
+    ----------
+    predictor : Predictor
+        Predicts the recordings of the site.
+    values : mapping
+        All nuisances of the site, by name.
+    aligned : AlignedPassage
+        The passage.
+    terms : sequence of PhysicsTerm
+        Effects beside the base model, under the conditions of the passage.
+
+    Returns
+    -------
+    tuple
+    """
+    return aligned.passage.route, track_value_key(predictor.zone, values), repr(tuple(terms))
+
+
+def _rail_transfers(
+    predictor: Predictor,
+    track: Track,
+    terms: Terms,
+    positions: Sequence[float | tuple],
+    surfaces: Surfaces,
+    beyond: float,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     matrices = linear_matrices(track, terms)
     frequency = passage_band.transfer_lines()
     beyond += SIMULATION.node_margin
@@ -334,10 +371,9 @@ def _transfers(
     )
     rows = matrices.node_index
     if track.blade is not None:
-        rows = rows_under_wheels(matrices, track.blade, predictor.surface.surfaces(aligned.passage.route, values))
+        rows = rows_under_wheels(matrices, track.blade, surfaces)
         near = near[near[0] % SIMULATION.node_stride :]  # the node at the toe is not in line with the others
     near = near[:: SIMULATION.node_stride]
-    positions = [predictor.seat(s, values, terms).probe(track).place for s in aligned.sensors]
     h, mean_receptance = rail_receptances(matrices, frequency, near, positions, rows[near])
     return frequency, -((2.0 * np.pi * frequency) ** 2)[:, None, None] * h, mean_receptance, matrices.node[near]
 

@@ -1,0 +1,81 @@
+"""How often derivatives of passages simulate: nothing is computed twice."""
+
+import numpy as np
+import pytest
+
+from turnout import physics
+from turnout.mismatch.turnout import TrackCase, pseudo_forces, wave_response
+from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
+from turnout.mismatch.turnout.prediction import Predictor
+
+
+@pytest.fixture(scope="module")
+def case():
+    return TrackCase(measured_campaign(small_plan((15.0,), hammer_positions=(24.0,)), (), 7))
+
+
+@pytest.fixture
+def simulated(monkeypatch):
+    """Names of the passages that are simulated."""
+    names, simulate = [], Predictor._simulate
+
+    def counted(self, values, terms, aligned, *rest):
+        names.append(aligned.name)
+        return simulate(self, values, terms, aligned, *rest)
+
+    monkeypatch.setattr(Predictor, "_simulate", counted)
+    return names
+
+
+def rolled(case):
+    return [o for o in case.observations if o.name in case.aligned_passages]
+
+
+def start_values(case):
+    return {n.name: case.start_values.get(n.name, n.mean) for n in case.nuisances}
+
+
+def test_derivatives_of_passages_simulate_once_by_wheels_and_once_by_load(case, simulated):
+    """Motion at supports comes from the prediction itself, however many passages are in between."""
+    values, passages = start_values(case), rolled(case)
+    predicted = case.predict(values, (), passages)
+    simulated.clear()
+    case.nuisance_jacobian(values, (), passages, predicted)
+    assert sorted(simulated) == sorted([o.name for o in passages] * 2)
+
+
+def test_derivatives_by_an_effect_leave_the_motion_at_its_supports_in_the_cache(case, simulated):
+    values, passages = start_values(case), rolled(case)
+    before, after = (physics.LocalBallast(39, share) for share in (0.5, 0.51))
+    predicted = case.predict(values, (before,), passages)
+    for _ in range(3):
+        case.predict_near(values, (before,), (after,), passages, predicted)
+    simulated.clear()
+    case.nuisance_jacobian(values, (before,), passages, predicted)
+    assert sorted(simulated) == sorted([o.name for o in passages] * 2)
+
+
+def test_passages_on_one_track_share_its_responses_and_on_another_do_not(case, monkeypatch):
+    """Same column as with nothing kept; a changed pad asks again, a changed speed does not."""
+    solved, responses = [], wave_response.responses
+
+    def counted(*arguments, **options):
+        solved.append(1)
+        return responses(*arguments, **options)
+
+    for module in (wave_response, pseudo_forces):
+        monkeypatch.setattr(module, "responses", counted)
+    values, passages = start_values(case), rolled(case)
+    predicted = case.predict(values, (), passages)
+    shared = case.nuisance_jacobian(values, (), passages, predicted)
+    n_shared = len(solved)
+    assert n_shared <= 3  # waves, forces at supports, static deflection
+    speed = f"speed@{passages[0].name}"
+    case.nuisance_jacobian({**values, speed: values[speed] + 1e-3}, (), passages, predicted)
+    assert len(solved) == n_shared
+    stiff = {**values, "pad_40": values["pad_40"] + 0.3}
+    case.nuisance_jacobian(stiff, (), passages, case.predict(stiff, (), passages))
+    assert len(solved) > n_shared
+    monkeypatch.setattr(Predictor, "track_transfer", lambda self, key, compute: compute())
+    for a, b in zip(shared, case.nuisance_jacobian(values, (), passages, predicted)):
+        assert np.array_equal(a, b)
