@@ -1,4 +1,4 @@
-"""Metadata in unknown words: what contradicts the layout and is read without a message, and remarks on harmless files."""
+"""Metadata in unknown words: what contradicts the layout and is read silently, and remarks on harmless files."""
 
 import os
 from collections import Counter

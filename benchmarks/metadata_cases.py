@@ -14,9 +14,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from tests.unit.readers.test_readers_rate_matrix import FORMATS, N_SAMPLE, SAMPLES, TRUE, described, plain
 
 from benchmarks.metadata_words import BENIGN, KINDS, LANGUAGES, OPAQUE, PHRASES, RATES_UNDER_STRONG, STRONG
-from tests.unit.readers.test_readers_rate_matrix import FORMATS, N_SAMPLE, SAMPLES, TRUE, described, plain
 from turnout.errors import ReadError
 from turnout.readers import read
 
@@ -48,7 +48,15 @@ def harmful_values(kind: str, rng: random.Random):
     r = rng.choice(WRONG_RATES)
     values = {
         "rate": (r, int(r), f"{r:g} Hz", f"{r / 1e3:g} kHz", f"{r:g} S/s", f"{r:.4E}", f"{r / 1e3:g} kS/s", f"{r:g}"),
-        "step": (1 / r, f"{1e6 / r:g} us", f"{1e3 / r:g} ms", f"{1 / r:.6E}", f"{1e6 / r:g} µs", 1e6 / r, f"{1 / r:g} s"),
+        "step": (
+            1 / r,
+            f"{1e6 / r:g} us",
+            f"{1e3 / r:g} ms",
+            f"{1 / r:.6E}",
+            f"{1e6 / r:g} µs",
+            1e6 / r,
+            f"{1 / r:g} s",
+        ),
         "length": (f"{1e3 * N_SAMPLE / r:g} ms", N_SAMPLE / r, f"{N_SAMPLE / r:g} s"),
         "scale": SCALES,
         "offset": OFFSETS,

@@ -2,8 +2,9 @@
 
 A value is a candidate for a rate, a scale or a unit if its unit is one of frequency, time or amplitude, if it says how
 numbers become others ("x100", "1 V = 10 g", "inverted"), or if it is a bare number that a device may have as a setting.
-Values under a name that speaks of something else (``other_subjects``) and values that other modules compare with the
-layout are none.
+Values that other modules compare with the layout are none. Under a name that speaks of something else as a whole
+(``explained_subject``) only a unit of sampling and a number that can be the rate in another unit are. Under a name of
+which only some words do, every candidate is a weak one.
 """
 
 import re
@@ -12,9 +13,19 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 
-from turnout.readers.other_subjects import NONE, STRONG, SUSPECT, WEAK, subject_of
+from turnout.readers.other_subjects import LENGTH, NONE, STRONG, WEAK, explained_subject, subject_of
 from turnout.readers.precision import Interval, readings
-from turnout.readers.rate_words import CERTAIN, NAME_WITH_UNIT, SHORT_UNIT, RateUnit, name_meaning, rate_unit, words_of
+from turnout.readers.rate_words import (
+    CERTAIN,
+    NAME_WITH_UNIT,
+    SAMPLING,
+    SECONDS,
+    SHORT_UNIT,
+    RateUnit,
+    name_meaning,
+    rate_unit,
+    words_of,
+)
 from turnout.readers.scale_words import (
     LEVELS,
     is_fill_name,
@@ -25,8 +36,8 @@ from turnout.readers.scale_words import (
 )
 from turnout.readers.source import CONDITIONS
 from turnout.readers.stated_quantities import quantity_of_text
-from turnout.readers.stated_units import is_unit_of_other, known_unit
-from turnout.readers.statements import USUAL_RATES
+from turnout.readers.stated_units import UNIT_WORD, is_unit_of_other, known_unit
+from turnout.readers.statements import USUAL_RATES, statements_of_value
 from turnout.readers.timing import looks_dated
 from turnout.units import Conversion
 
@@ -35,7 +46,8 @@ RATE_OR_SCALE, SCALE_OR_OFFSET = "rate, scale or offset", "scale or offset"
 AMPLITUDES = frozenset(("force", "acceleration", "voltage", "count"))
 ORDINATES = AMPLITUDES | {"velocity", "displacement", "strain"}
 MAX_TEXT = 1000  # characters of a text that are searched
-MAX_CODE = 10  # a smaller whole number is a count or a code
+MAX_FACTOR = 10_000  # a larger whole number is a code, unless people choose it as a rate or a converter has it
+YEARS = (1990, 2061)
 MIN_PER_SECOND = 1000.0  # a name that ends with seconds may mean a number per second from here on: "ndata_sec"
 MIN_LIMIT = 0.01  # a smaller number is no count, limit or size
 EPOCHS = (6.3e8, 2.9e9)  # s since 1970: years 1990 to 2061
@@ -52,6 +64,9 @@ QUANTITY = re.compile(
     r"(?: per sec(?:ond)?\b)?))?"
 )
 BARE_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
+WHOLE_NUMBER = re.compile(r"\+?\d+(?:\.0*)?")
+WORD_AND_NUMBER = re.compile(r"([^\W\d_]{2,})[\s:=]{1,3}([+-]?\d+(?:\.\d+)?)")
 GROUPED_DIGITS = re.compile(r"\d{1,3} \d{3}\b")
 PIECES = re.compile(r"[;|\n]|,(?!\d)")
 NAMED = re.compile(r"(?:.*[:=]\s*)?([^\W\d][^:=]{0,40}?)\s*[:=]\s*([^:=]+|\d+\s?:\s?\d+)")
@@ -77,7 +92,7 @@ FOREIGN_UNIT = re.compile(
 )
 # Units of other things than samples, rates and times.
 HARMLESS_UNIT = re.compile(
-    r"°?[CF]|K|%|‰|ppm|[kmcµu]?m[²³]?|in|ft|kg|t|lb|oz|[mk]?A|Ah|[mk]?W|[kM]?(?:Ohm|Ω)|[pnµu]?F|[mh]?Pa|m?bar|km/[ht]|mph"
+    r"°?[CF]|K|%|‰|ppm|[kmcµu]?m[²³]?|in|ft|kg|t|lb|oz|[mk]?A|Ah|[mk]?W|[kM]?(?:Ohm|Ω)|[pnµu]?F|[mh]?Pa|m?bar|k[mg]/[^\W\d_]+|mph"
     r"|m/s|rpm|deg|°|rad|[kMG]i?B|bytes?|bits?|Bit|[kMG]?N/mm?|ch|div|dBm|year|y|a|d|h|min|MGT(?:/y)?"
 )
 # Words for what was done to the samples, for what was not, and for what should have been.
@@ -96,8 +111,11 @@ AFFIRMED = frozenset("yes true ja oui si on 1".split())
 # Letters of units in Russian.
 CYRILLIC = str.maketrans(dict(zip("кНмсгВГцдБ", "kNmsgVHzdB")))
 CYRILLIC_LETTER = re.compile(r"[\u0400-\u04ff]")
-# Names that a format defines and its reader uses: start of the abscissa, state of the scaling.
-STANDARD_NAMES = frozenset(("x0", "wfstartoffset", "niscalingstatus", "startoffset"))
+# Names that a format defines: start of the abscissa, state of the scaling, versions, numbers of dimensions.
+STANDARD_NAMES = frozenset(
+    ("x0", "wfstartoffset", "niscalingstatus", "startoffset", "feature", "major", "minor", "writerversion",
+     "readerversion", "netcdf4dimid", "netcdf4coordinates", "nidatatype", "nichannellength")
+)  # fmt: skip
 NO_STATEMENT = frozenset(("", "-", "n/a", "na", "?", "unknown", "nan", "null", "undefined", "not set"))
 DATED = re.compile(r"\d{1,4}[-./]\s?\d{1,2}[-./]\s?\d{1,4}|\d{2}:\d{2}(?::\d{2})?|\d{1,2}[-. ][A-Za-z]{3}[-. ]\d{2,4}")
 
@@ -107,7 +125,9 @@ class Candidate:
     """What a value may state: ``statement`` says of what, ``text`` are its words.
 
     ``is_weak`` is True if only little speaks for it. ``rates`` are the sampling rates that it may mean. ``number`` is
-    the bare number, NaN if it has a unit; ``unit`` the unit if the text is one; ``seconds`` a time. [s]
+    the bare number, NaN if it has a unit; ``unit`` the unit if the text is one; ``seconds`` the times it may mean. [s]
+    ``is_of_other`` is True if the name speaks of something else: then only a number that contradicts the rate plainly
+    counts.
     """
 
     statement: str
@@ -116,7 +136,8 @@ class Candidate:
     rates: tuple[Interval, ...] = ()
     number: float = float("nan")
     unit: str = ""
-    seconds: float = float("nan")
+    seconds: tuple[float, ...] = ()
+    is_of_other: bool = False
 
 
 @lru_cache(maxsize=16384)
@@ -142,18 +163,54 @@ def candidates(name: str, group: str, text: str) -> tuple[Candidate, ...]:
     """
     text = " ".join(text[:MAX_TEXT].split())
     text = text.translate(CYRILLIC) if CYRILLIC_LETTER.search(text) else text
-    subject = STRONG if subject_of(group) == STRONG else subject_of(name)
     is_standard = plain_word(name) in STANDARD_NAMES or is_scale_name(group)
-    if is_standard or subject == STRONG or text.casefold() in NO_STATEMENT or DATED.match(text) or looks_dated(text):
+    if is_standard or text.casefold() in NO_STATEMENT or DATED.match(text) or looks_dated(text):
         return ()
-    return tuple(_of_value(name, text, subject))
+    return tuple(_of_entry(name, group, text))
+
+
+def _of_entry(name: str, group: str, text: str) -> Iterator[Candidate]:
+    """Candidates of an entry or of a named piece of a text, by what its name explains."""
+    subject = STRONG if explained_subject(group) == STRONG else explained_subject(name)
+    if subject == STRONG:
+        yield from _of_other_subject(text)
+        return
+    is_partly_other = STRONG in (subject_of(name), subject_of(group))
+    for candidate in _of_value(name, text, subject):
+        yield replace(candidate, is_weak=True) if is_partly_other else candidate
+
+
+def _of_other_subject(text: str) -> Iterator[Candidate]:
+    """Candidates of a text about something else: rates of sampling, and a number that may be the rate."""
+    is_sampled = SAMPLING.search(text.casefold()) is not None
+    for match in QUANTITY.finditer(text):
+        unit = rate_unit(match[2]) if match[2] else None
+        if unit and (unit.is_sampling or (is_sampled and not unit.is_step)):
+            yield from _of_rate(match[0], match[1], unit, is_weak=True)
+    if BARE_NUMBER.fullmatch(text):
+        yield _number_of_other(text)
+    elif len(unit_text := text.split()[-1]) > 1 and len(text.split()) <= 2 and not re.search(r"\d", text):
+        yield from (replace(c, is_weak=True) for c in _of_unit(unit_text) if c.unit)
+
+
+def _is_compared(name: str, text: str) -> bool:
+    """Whether other modules understand an entry as the rate, and compare it."""
+    is_certain = name_meaning(name).certainty == CERTAIN
+    return is_certain and any(statement.intervals for statement in statements_of_value(name, text))
+
+
+def _number_of_other(number: str) -> Candidate:
+    """A number that its name explains, unless it is the rate in disguise."""
+    return Candidate(RATE, number, True, number=_value(number), is_of_other=True)
 
 
 def _of_value(name: str, text: str, subject: int) -> Iterator[Candidate]:
     if DATED.match(text):
         return
     cells = re.split(r"[;\s]+|,\s?", text)
-    if len(cells) > 1 and all(map(BARE_NUMBER.fullmatch, cells)) and not GROUPED_DIGITS.match(text):
+    if DECIMAL_COMMA.fullmatch(text):
+        yield from _of_number(name, text.replace(",", "."), _unit_of_name(name), subject)
+    elif len(cells) > 1 and all(map(BARE_NUMBER.fullmatch, cells)) and not GROUPED_DIGITS.match(text):
         for cell in cells:
             yield from _of_number(name, cell, _unit_of_name(name), subject)
     elif whole := QUANTITY.fullmatch(text):
@@ -168,8 +225,9 @@ def _of_value(name: str, text: str, subject: int) -> Iterator[Candidate]:
             named = NAMED.fullmatch(piece)
             if named and piece in unread and name_meaning(named[1]).certainty == CERTAIN:
                 yield from _of_value("", named[2].strip(), NONE)  # other modules do not separate it
-            elif named and STRONG not in (subject_of(named[1]), subject_of(piece[: named.start(2)])):
-                yield from _of_value(named[1], named[2].strip(), subject_of(named[1]))
+            elif named:
+                is_other = explained_subject(piece[: named.start(2)]) == STRONG
+                yield from _of_entry(piece[: named.start(2)] if is_other else named[1], "", named[2].strip())
             elif piece and not named:
                 yield from _of_text(name, piece, subject)
 
@@ -184,11 +242,17 @@ def _full_rates(text: str, stated: Iterator[Candidate]) -> Iterator[Candidate]:
 def _of_text(name: str, text: str, subject: int) -> Iterator[Candidate]:
     """Candidates of a piece of free text under a name."""
     if units := tuple(_of_unit(text)):
-        if not is_unit_of_other(name) and (subject == NONE or len(text) > 1):
-            yield from units
+        is_of_other = is_unit_of_other(name)
+        rest = " ".join(word for word in words_of(name) if not UNIT_WORD.fullmatch(word))
+        if not is_of_other or explained_subject(rest) == WEAK:  # "range unit"
+            yield from (replace(c, is_weak=True) if is_of_other else c for c in units)
         return
-    yield from _of_state(name, text)
-    if subject_of(text) == STRONG:
+    if subject_of(name) != STRONG:
+        yield from _of_state(name, text)
+    if not is_scale_name(name) and (counted := WORD_AND_NUMBER.fullmatch(text)):
+        yield from _of_entry(counted[1], "", counted[2])  # "div 1000"
+    if explained_subject(text) == STRONG:
+        yield from _of_other_subject(text)
         return
     ratio = RATIO.fullmatch(text)
     if CONVERSION.search(text) or (ratio and ratio[1] != ratio[2] and not is_ratio_of_drawing(name, text)):
@@ -233,40 +297,37 @@ def _unit_of_name(name: str) -> str:
 
 def _of_number(name: str, number: str, unit: str, subject: int) -> Iterator[Candidate]:
     """Candidates of a bare number under a name."""
-    if name_meaning(name).certainty == CERTAIN or scale_meaning(name) not in ("", LEVELS) or is_fill_name(name):
-        return  # compared by other modules
+    if _is_compared(name, number) or scale_meaning(name) not in ("", LEVELS) or is_fill_name(name):
+        return  # by other modules
     if "_".join(words_of(name)) in CONDITIONS:
         return  # the condition itself: a speed, a temperature
     value = _value(number)
     quantity = QUANTITY.fullmatch(f"{number} {unit}") if rate_unit(unit) or HARMLESS_UNIT.fullmatch(unit) else None
-    is_counted = unit.casefold() in ("s", "sec") and value >= MIN_PER_SECOND
+    is_counted = unit.casefold() in SECONDS and value >= MIN_PER_SECOND
     if quantity and not is_counted:
         yield from _of_quantity(name, quantity, subject)
         return
     if value == 1.0 and any(map(INVERTED.fullmatch, words_of(name))):
         yield Candidate(SCALE, number)
-    if value in (0.0, 1.0) or (subject == WEAK and abs(value) >= MIN_LIMIT):
+    if value in (0.0, 1.0) or (WHOLE_NUMBER.fullmatch(number) and _is_code(value)):
         return
-    if re.fullmatch(r"\+?\d+", number) and _is_count(value, name):
+    if subject == WEAK and LENGTH.search(" ".join(words_of(name))):
+        yield Candidate(DURATION, number, True, number=value, seconds=(value, value / 1000.0))
+    if subject == WEAK and abs(value) >= MIN_LIMIT:
+        yield _number_of_other(number)
         return
     yield Candidate(RATE_OR_SCALE, number, True, _rates_of_number(number), value)
 
 
-def _is_count(value: float, name: str) -> bool:
-    """Whether a whole number is a count, a code or a time stamp rather than a setting."""
+def _is_code(value: float) -> bool:
+    """Whether a whole number is a time stamp, a year or a code rather than a setting."""
     is_epoch = any(EPOCHS[0] <= value / scale <= EPOCHS[1] for scale in (1.0, 1e3, 1e6, 1e9))
-    is_small = value < MAX_CODE
-    return is_epoch or (not SUSPECT.search(" ".join(words_of(name))) if is_small else not _is_round(int(value)))
+    return is_epoch or ((YEARS[0] <= value <= YEARS[1] or value > MAX_FACTOR) and not _is_round(int(value)))
 
 
 def _is_round(value: int) -> bool:
     """Whether a whole number is one that people choose as a factor or a rate, or the largest one of a converter."""
-    return (
-        (value >= MIN_LARGEST and value & (value + 1) == 0)
-        or value % 50 == 0
-        or value % 64 == 0
-        or value in (10, 16, 20, 25, 32)
-    )
+    return (value >= MIN_LARGEST and value & (value + 1) == 0) or value % 50 == 0 or value % 16 == 0
 
 
 def _rates_of_number(number: str) -> tuple[Interval, ...]:
@@ -305,7 +366,7 @@ def _of_quantity(name: str, match: re.Match[str], subject: int, is_part: bool = 
         return
     stated = RateUnit(False, Fraction(1000)) if unit in ("k", "ks", "kS") else rate_unit(unit) if unit else None
     if stated is not None:
-        if name_meaning(name).certainty != CERTAIN:  # else it is compared by other modules
+        if not _is_compared(name, f"{number} {unit}"):
             yield from _of_rate(match[0], number, stated, is_weak=subject == WEAK or len(unit) == 1)
     elif not unit:
         is_round = value.is_integer() and (value % 100 == 0 or value % 1024 == 0)
@@ -327,6 +388,7 @@ def _of_rate(text: str, number: str, unit: RateUnit, is_weak: bool) -> Iterator[
     usual = tuple(i for i in intervals if USUAL_RATES[0] <= i.rate <= USUAL_RATES[1])
     if unit.is_step and not unit.is_sampling and intervals:
         is_long = unit.scale > SHORT_UNIT
-        yield Candidate(RATE if usual else DURATION, text, is_weak or is_long, usual, seconds=1.0 / intervals[0].rate)
+        seconds = tuple(1.0 / interval.rate for interval in intervals)
+        yield Candidate(RATE if usual else DURATION, text, is_weak or is_long, usual, seconds=seconds)
     elif usual:
         yield Candidate(RATE, text, is_weak, usual)

@@ -1,9 +1,10 @@
 """Words for what metadata state beside rate, scale and unit of the samples: identity, counts, dates, settings.
 
-``subject_of`` is the only question: does a name speak of such a thing. A strong word explains any value ("filter",
-"temperature", "trigger"). A weak word ("number", "range", "level") does not where another word of the name speaks of a
-rate, a scale or a unit: "Range factor". Words are compared without case and accents; stems count
-at the beginning of a word and of a part of a compound.
+``subject_of`` asks whether any word of a name speaks of such a thing: then no rule may reject a file because of it. A
+strong word ("filter", "temperature", "trigger") does, a weak word ("number", "range", "level") unless another word
+speaks of a rate, a scale or a unit: "Range factor". ``explained_subject`` asks whether every word does: only then the
+name explains its value. Words are compared without case and accents; stems count at the beginning of a word and of a
+part of a compound.
 """
 
 import re
@@ -12,6 +13,7 @@ from functools import lru_cache
 from turnout.readers.rate_words import words_of
 
 STRONG, WEAK, NONE = 2, 1, 0
+MIN_STEM = 4  # letters: a shorter one is part of too many other words
 
 # Stems (English, German, French, Danish, Swedish, Dutch, Spanish, Italian, Czech, Polish); "$" is the end of a word.
 STRONG_STEMS = (
@@ -58,7 +60,7 @@ STRONG_STEMS = (
     r"|calibration (?:period|interval|due)|time ?(?:const|offset|scale)|start ?offset|span\b(?! of)|time ?zone"
     r"|zeitkonst|constante de temps|transient|referen|bezug|freq\w* (?:range|resp|limit)"
     r"|frequenz(?:bereich|gang)|gamme de freq|usable|nutzbar|tach|puls|rev$|rotat|drehz|heart|cpu|ram$"
-    r"|display|anzeig|plot|screen|zoom|print|map$|karte$|drawing|zeichn"
+    r"|gradient|refresh|display|anzeig|plot|screen|zoom|print|map$|karte$|drawing|zeichn"
 )
 STRONG_WORDS = frozenset(
     (
@@ -83,8 +85,8 @@ WEAK_STEMS = (
 )
 WEAK_WORDS = frozenset(
     (
-        "trace peak max min rms mean std var tau label axis quality point points mode q sensor transducer name file "
-        "files path n no of num size pos ch ver ref reference calibration cal calib calibrated interval"
+        "trace peak max min rms mean std var tau quality point points mode sensor transducer name file "
+        "files path no of num size pos ch ver ref reference calibration cal calib calibrated interval"
     ).split()
 )
 # What says that a name may speak of a rate, a scale or a unit in spite of a weak word.
@@ -102,8 +104,37 @@ BORDER = (
 )
 _STRONG = re.compile(rf"{BORDER}(?:{STRONG_STEMS})".replace("$", r"\b"))
 _WEAK = re.compile(rf"{BORDER}(?:{WEAK_STEMS})".replace("$", r"\b"))
+# Words without a meaning of their own, beside words of another subject.
+_FILLER = re.compile(
+    r"of|the|for|in|on|at|and|or|to|from|by|with|is|has|as|a|an|von|vom|der|die|das|des|dem|den|fur|zu|zum|zur|und|am|im|bei|mit"
+    r"|de|du|d|l|la|le|les|des|et|en|a|au|sur|el|del|los|y|por|di|della|del|dei|il|e|per|af|og|til|pa|i|van|het|een"
+    r"|no|nr|n|id|x|y|z|m|s|c|v|g|k|hz|khz|ms|us|mm|cm|km|kg|kn|mn|mv|ma|db|deg|pct|rpm|kmh|mb|gb|hpa|mbar|nm"
+    r"|rails?|left|right|links|rechts|gauche|droite|min|max|mean|rms|std|nominal|actual|total|current|average|main|new"
+    r"|value|name|text|info|note|data|user|is|used|measured|set|on|off|external|internal|ambient|top|bottom|first|last"
+    r"|next|previous|number|type|line|free|air|site|field|special|general|own|all|each|high|low|fast|slow|auto|manual"
+    r"|head|panel|board|host|device|session|signals?|channels?|ch|nchan|sensor|input|output|pre|post|grid|group|sub|zone"
+    r"|amp|min|med|acc|rel|abs|required|free|sd|core|adc|fpga|valid|shared|local|remote|wf|ni|teds|document|spill"
+    r"|floor|force|load|acceleration|accel|velocity|kraft|beschleunigung|schiene|luft|skinne|voie|gleis|h|min|sec|dbm|dbfs|ppm|degc|nm|mbit|kb|kbit|degree|degrees|percent|amount|h|t|f|r"
+)
 # Words that make a statement about the samples of any subject: "Nyquist", "Empfindlichkeitskorrektur", "channel 2 in".
-_OF_SAMPLES = re.compile(r"\bnyquist|corre[ckz]t|korrekt|correz|\b(?:in|as)$|\w per \w")
+_OF_SAMPLES = re.compile(r"\bnyquist|corre[ckz]t|korrekt|correz|\b(?:in|as)$|(?<!bits)(?<!bytes) per \w")
+
+# A scale is one whatever its subject, apart from figures that are called factors.
+_OF_SCALE = re.compile(
+    r"(?<!quality )(?<!crest )(?<!form )(?<!coverage )(?<!load )(?<!damping )fa[ck]tor|facteur|fattor|[ck]oef"
+    r"|scal(?:e|ing)\b|skal|\bgain"
+    r"|verstark|multipl|umrechn|conver|gananc|guadagn|weight\b|tare|\bunits?\b|einheit|\bspan\b"
+)
+# What a strong word may be the frequency, rate, time or limit of.
+_OF_FREQUENCY = re.compile(
+    r"fre[qck]\w*|rates?|times?|speed|zeit\w*|factor|ratio|period|durations?|spacing|limits?|state|status|check"
+)
+# Words for a stretch of the recording itself: they explain counts of it, but not its length.
+_RECORD = re.compile(r"\b(?:shots?|hits?|impacts?|windows?|fenster|fenetre|coups?|schlag|slag|golpe|colpo)\b")
+LENGTH = re.compile(r"length|lange\b|longueur|lengte|laengde|span\b|extent|durat|dauer|duree|varighed|durac|durat")
+_OTHER_OFFSET = re.compile(r"\b(?:(?:file|trigger|trig|utc|pps|ntp|ptp|clock) ?offset|bias (?:volt|curr)\w*)")
+_BRACKETS = re.compile(r"[\[({][^\[\](){}]*[\])}]")
+_PATH = re.compile(r"[.:/\\]+(?! )")
 
 
 @lru_cache(maxsize=4096)
@@ -125,7 +156,7 @@ def subject_of(name: str) -> int:
     >>> [subject_of(n) for n in ("Filterfrequenz", "Number of blocks", "Range factor", "Skinnetemperatur", "Aufschlag")]
     [2, 1, 0, 2, 0]
     """
-    words = words_of(re.sub(r"[\[({][^\[\](){}]*[\])}]", "", name))
+    words = words_of(_BRACKETS.sub("", name))
     spaced = " ".join(words)
     if _OF_SAMPLES.search(spaced):
         return NONE
@@ -133,3 +164,61 @@ def subject_of(name: str) -> int:
         return STRONG
     is_weak = not WEAK_WORDS.isdisjoint(words) or _WEAK.search(spaced)
     return WEAK if is_weak and not SUSPECT.search(spaced) else NONE
+
+
+@lru_cache(maxsize=4096)
+def explained_subject(name: str) -> int:
+    """How surely a name as a whole speaks of something else: every word must, and a word of a scale never does.
+
+    Parameters
+    ----------
+    name : str
+        Name of an entry, with or without its group; of a path the last part must be explained as well.
+
+    Returns
+    -------
+    int
+        As ``subject_of``; NONE if a word is not known.
+
+    Examples
+    --------
+    >>> [explained_subject(n) for n in ("Filter frequency", "Filter wght", "Temperature factor", "Slot", "slot2.c")]
+    [2, 0, 0, 1, 0]
+    """
+    if _OF_SAMPLES.search(name.casefold()):
+        return NONE
+    name = _BRACKETS.sub("", name)
+    subject = _subject_of_words(words_of(name))
+    last = _PATH.split(name.strip("./:\\ "))[-1]
+    return subject if last == name or not subject else (subject if _subject_of_words(words_of(last)) else NONE)
+
+
+def _subject_of_words(words: tuple[str, ...]) -> int:
+    spaced = " ".join(words)
+    if not words or _OF_SAMPLES.search(spaced) or _OF_SCALE.search(spaced):
+        return NONE
+    strong = (
+        _words_with(_STRONG, spaced)
+        | _words_with(_OTHER_OFFSET, spaced)
+        | {i for i, word in enumerate(words) if word in STRONG_WORDS}
+    )
+    weak = _words_with(_WEAK, spaced) | {i for i, word in enumerate(words) if word in WEAK_WORDS}
+    known = strong | weak
+    if not known or any(i not in known and not _FILLER.fullmatch(word) for i, word in enumerate(words)):
+        is_frequency = bool(strong) and all(
+            i in known or _FILLER.fullmatch(word) or _OF_FREQUENCY.fullmatch(word) for i, word in enumerate(words)
+        )
+        return STRONG if is_frequency else NONE
+    is_record_length = bool(_RECORD.search(spaced) and LENGTH.search(spaced))
+    return STRONG if strong and not is_record_length else WEAK
+
+
+def _words_with(pattern: re.Pattern[str], spaced: str) -> set[int]:
+    """Numbers of the words in which a match lies; a short one must be a whole word."""
+    found: set[int] = set()
+    for match in pattern.finditer(spaced):
+        around = spaced[max(match.start() - 1, 0) : match.end() + 1].strip()
+        if len(match[0]) < MIN_STEM and around != match[0]:
+            continue
+        found.update(range(spaced.count(" ", 0, match.start()), spaced.count(" ", 0, match.end()) + 1))
+    return found

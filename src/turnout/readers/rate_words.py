@@ -318,7 +318,7 @@ def _meaning(words: list[str]) -> tuple[int, bool | None]:
         return NOT, None
     counted = words[-3] if len(words) > 2 and words[-2] == "per" and words[-1] in SECONDS else ""
     is_counted = len(counted) > 2 and bool(SAMPLES.fullmatch(counted))
-    is_rate = bool(RATE.search(joined)) or any(word in RATE_TOKENS or RATE_WORD.fullmatch(word) for word in words)
+    is_rate = any(word in RATE_TOKENS or RATE.search(word) or RATE_WORD.fullmatch(word) for word in words)
     is_rate |= any(word.endswith(("rate", "takt", "hastighed")) and SAMPLING.search(word + spaced) for word in words)
     is_rate |= any(word.endswith(("rate", "takt")) and WEAK_SAMPLING.search(word) for word in words)
     is_rate |= is_counted or (len(counted) > 2 and not NOT_COUNTED.search(counted))

@@ -32,6 +32,7 @@ from turnout.readers.source import MEANINGLESS_UNITS
 from turnout.readers.statements import PLACEHOLDERS, Entry, entries_of_text
 from turnout.units import conversion, to_si
 
+ROUND_YEARS = (2000.0, 2048.0, 2050.0)  # which are factors as well
 YEARS = (1990.0, 2060.0)  # a whole number between them behind a word of calibration is a year
 
 
@@ -142,7 +143,7 @@ def _value_text(value: Any) -> str:
 
 
 def _is_year(number: float) -> bool:
-    return number.is_integer() and YEARS[0] < number < YEARS[1]
+    return number.is_integer() and YEARS[0] < number < YEARS[1] and number not in ROUND_YEARS
 
 
 def _ratio(value: float | str, neutral: float) -> float:

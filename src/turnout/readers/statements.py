@@ -285,7 +285,7 @@ def statements_of(entries: Iterable[Entry], k: int = 0, n: int = 1) -> list[Stat
                 continue
             if reduction == "factor":
                 factors[entry.name.strip().casefold()] = reduction_factor(value)
-            for statement in _statements_of_value(entry.name, value, type(value).__name__):
+            for statement in statements_of_value(entry.name, value, type(value).__name__):
                 is_final = bool(reduction) or entry.is_defined
                 found.setdefault((entry.place, statement.text), (statement, entry.place, is_final))
     factor = math.prod(factors.values())
@@ -304,8 +304,23 @@ def _at_place(statement: Statement, place: str, factor: int) -> Statement:
 
 
 @lru_cache(maxsize=4096)
-def _statements_of_value(name: str, value: Any, kind: str) -> tuple[Statement, ...]:
-    """Statements of one value, without its place: records share most entries. Equal numbers of other types differ."""
+def statements_of_value(name: str, value: Any, kind: str = "str") -> tuple[Statement, ...]:
+    """Statements of one value, without its place: records share most entries. Equal numbers of other types differ.
+
+    Parameters
+    ----------
+    name : str
+        Name of the entry.
+    value : any
+        Its value, a number or a text.
+    kind : str
+        Name of the value's type.
+
+    Returns
+    -------
+    tuple of Statement
+        Empty for a value about something else.
+    """
     return tuple(_statements(Entry("", name, value), value))
 
 

@@ -38,8 +38,13 @@ from turnout.units import IGNORED
 
 MAX_DURATION_RATIO = 8.0  # a time that differs more from the record's duration is one of something else
 DURATION_TOLERANCE = 0.02  # relative
+# Ratios of a wrong rate or duration to the right one that a wrong setting or unit gives.
+PLAIN_MULTIPLES = (0.1, 0.5, 2.0, 10.0)
+MULTIPLES = (*PLAIN_MULTIPLES, *(2.0**k for k in range(-6, 7) if abs(k) > 1), 1e-3, 1e-2, 1e2, 1e3)
+MULTIPLE_TOLERANCE = 1e-4  # relative
 OVERRULED = (SCALE, SCALE_OR_OFFSET, UNIT)  # by a unit of the layout that ends with "!"
 MAX_LISTED = 5  # entries in one message
+MAX_NAMES = 40  # entries that the remedy names, so that one correction of the layout explains them
 MAX_SHOWN = 40  # characters of a value in a message
 MAX_PROBLEM = 200  # characters of all of them
 REASONS_OF = {RATE: "wrong_rate", DURATION: "wrong_rate", SCALE: "scale_unknown", UNIT: "unit_unknown"}
@@ -69,23 +74,32 @@ class RecordFacts:
             False for a statement that contradicts the facts.
         """
         n = self.n_sample
+        counts = (n, n - 1, n * self.n_record, n * self.n_channel, self.n_channel, self.n_record)
+        if candidate.text.isdigit() and candidate.number in counts:
+            return True
         if candidate.unit:
             return any(same_unit(candidate.unit, unit) for unit in self.units)
-        if not np.isnan(candidate.seconds):
-            ratio = candidate.seconds * self.rate / n
-            if 1 / MAX_DURATION_RATIO <= ratio <= MAX_DURATION_RATIO:
-                return abs(ratio - 1.0) <= max(DURATION_TOLERANCE, 2.0 / n)
-            if not candidate.rates:
-                return True
+        if candidate.is_of_other:
+            cycles = candidate.number / self.rate, candidate.number * self.rate  # as a rate, and as a step
+            return not any(_is_multiple(ratio, PLAIN_MULTIPLES) for ratio in cycles)
         rate = around(self.rate, EXACT_PRECISION)
         if any(interval.loose.overlaps(rate) for interval in candidate.rates):
             return True
+        ratios = [seconds * self.rate / n for seconds in candidate.seconds]
+        if any(abs(ratio - 1.0) <= max(DURATION_TOLERANCE, 2.0 / n) for ratio in ratios):
+            return True
+        if any(1 / MAX_DURATION_RATIO <= r <= MAX_DURATION_RATIO or _is_multiple(r, MULTIPLES) for r in ratios):
+            return False
+        if ratios and not candidate.rates:
+            return True
         if np.isnan(candidate.number):  # its unit is known
             return bool(candidate.rates) and not any(is_near_rate(i.rate, self.rate) for i in candidate.rates)
-        if abs(candidate.number * self.rate / n - 1.0) <= DURATION_TOLERANCE:
-            return True
-        counts = (n, n - 1, n * self.n_record, n * self.n_channel, self.n_channel, self.n_record)
-        return candidate.text.isdigit() and candidate.number in counts
+        return abs(candidate.number * self.rate / n - 1.0) <= DURATION_TOLERANCE
+
+
+def _is_multiple(ratio: float, multiples: Sequence[float]) -> bool:
+    """Whether a ratio is one of the multiples, to within rounding."""
+    return any(abs(ratio / multiple - 1.0) <= MULTIPLE_TOLERANCE for multiple in multiples)
 
 
 def unexplained_entries(
@@ -253,7 +267,7 @@ class EntryCheck:
         listed = [f"{entry.name}: {_short_text(entry, candidate)}" for entry, candidate in unexplained[:MAX_LISTED]]
         more = f" and {len(unexplained) - MAX_LISTED} more" if len(unexplained) > MAX_LISTED else ""
         statements = " or ".join(dict.fromkeys(candidate.statement for _, candidate in unexplained))
-        names = "; ".join(dict.fromkeys(entry.name for entry, _ in unexplained[:MAX_LISTED]))
+        names = "; ".join(dict.fromkeys(entry.name for entry, _ in unexplained[:MAX_NAMES]))
         problem = (
             f"{', '.join(dict.fromkeys(listed))[:MAX_PROBLEM]!r}{more} in {unexplained[0][0].place} may state a "
             f"{statements}, and nothing explains it"

@@ -36,10 +36,10 @@ READ_STARTS = [
     "13. Mai 2024 10:00",
 ]
 OTHERS = {
-    "Span": "10 kHz", "CPU clock": "400 MHz", "Line frequency": "50 Hz", "Rail temperature": 31.2, "Full scale": 10.0,
+    "CPU clock": "400 MHz", "Line frequency": "50 Hz", "Rail temperature": 31.2,
     "Sleeper spacing": 0.6,
     "Slope of track": 5, "Trigger polarity": "negative", "File prefix": "k", "Bias voltage": 11.2,
-    "Refresh rate": 60, "Pulse width": "50 us", "Design": 12, "Version": 3, "Created": "2023-05-14 09:00:00",
+    "Refresh rate": 60, "Pulse width": "50 us", "Version": 3, "Created": "2023-05-14 09:00:00",
     "Switch ratio": "1:12", "Data offset": 512, "Crossing angle": "1:9",
 }  # fmt: skip
 

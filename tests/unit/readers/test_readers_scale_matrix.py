@@ -351,8 +351,8 @@ POSSIBLE_SCALES = (  # of the numbers of a channel, by parts of the name
 )  # fmt: skip
 OTHER_SCALES = (  # of other things, or no numbers
     ("Crest factor", 3.0), ("Trigger offset", 12.0), ("UTC offset", 2.0), ("Calibration date", 20240501),
-    ("Kalibrierung", 2023), ("Calibration", "certificate 17"), ("Time scale", 2.0), ("Trigger slope", "+"),
-    ("Damping factor", 0.05), ("Bias voltage", 11.2), ("Full scale", 10.0), ("Gain control", "automatic"),
+    ("Kalibrierung", 2023), ("Calibration", "certificate 17"), ("Trigger slope", "+"),
+    ("Damping factor", 0.05), ("Bias voltage", 11.2), ("Gain control", "automatic"),
     ("File offset", 512), ("PPS offset [µs]", 3.0), ("Track gradient", 12.0),
 )  # fmt: skip
 

@@ -24,12 +24,13 @@ CONTRADICTIONS = [
     ("Aufschlag", 1.25), ("Rapport", 2.5), ("Empfindlichkeitskorrektur", 1.08), ("Note", "accel_g"),
     ("Note", "channel 2 in: g"), ("Channel 2 in", "g"), ("Zuschlag", "x1.1"), ("Conversion", 0.5),
     ("Dataconversion", "a=2.5 b=0.1"), ("Signalkonversion", "x2.5"), ("Schienenaufschlag", "x1.1"),
-    ("speed", "20 kS/s"),
+    ("speed", "20 kS/s"), ("Hub", 3), ("Messgang", 117), ("Full scale", 10.0),
+    ("Time scale", 2.5), ("direction", "20 kS/s"), ("Serial number", "sampled at 20 kHz"), ("Battery", 12800),
 ]  # fmt: skip
 # The same statements in agreement with the record, and values that are about something else.
 HARMLESS = [
     ("Mode", "25.6 kS/s @ 24 bit"), ("Acq", "25.6k"), ("Qtz", 3.90625e-05), ("Nyquist", "12.8 kHz"),
-    ("Sweep", "2.5 ms"), ("Hub", 3), ("Hub", 1.0), ("Values in", "N"), ("Amplifier", "x1"), ("Scaled", "yes"),
+    ("Sweep", "2.5 ms"), ("Hub", 2), ("Hub", 1.0), ("Values in", "N"), ("Amplifier", "x1"), ("Scaled", "yes"),
     ("Filter", "BE 5000 Hz"), ("Note", "accel_b"), ("Note", "channel 2 in: N"), ("Schienentemperatur", 12.5),
     ("Hammerschlag", 12.5), ("Serialport", 2.5), ("Standardversion", 2.5),
     ("Trigger level", "50 N"), ("Rail temperature", 12.5), ("Kilometer", "41,235"), ("Serial", 20000), ("Lot", 41233),
