@@ -17,12 +17,15 @@ from turnout.mismatch.engine.diagnose import diagnose
 from turnout.mismatch.turnout import TrackCase
 from turnout.records import Unit
 from turnout.stages import calibrated_model
+from turnout.stages.accepted_changes import changes_of
 from turnout.stages.budget import Budget, BudgetSpentError, Watch
+from turnout.stages.changed_effects import changed_effects
 from turnout.stages.checkpoint import Checkpoint, Replay
 from turnout.stages.common import quarantine_row
 from turnout.stages.mismatch_groups import Group, groups, members_of
 from turnout.stages.mismatch_inputs import digest_of_model, gather_inputs, track_of
 from turnout.stages.mismatch_rows import finding_tables
+from turnout.stages.visit_time import years_of
 from turnout.workflow.scan import scan
 
 if TYPE_CHECKING:
@@ -135,6 +138,7 @@ def diagnose_visit(
         [unit.config_hash, contents, inputs.digest_content(), digest_of_model(turnout, options.track), algo]
     )
     about = {"turnout": turnout, "visit": unit.label, "identity": identity, "notes": inputs.notes}
+    about["changes"] = changes_of(track.terms)
     about["version"] = calibrated_model.version_of(unit, turnout, raw_root, options.track, algo)
     rows: dict[str, list[dict]] = {name: [] for name in TABLES}
     members = list(groups(turnout, track, inputs, options.sections))
@@ -183,12 +187,17 @@ def _diagnose_group(
     report_progress = options.progress(group, *number) if options.progress else None
     try:
         accepted = tuple(a for a in accepted if a.is_on(group.route))
+        changed = _changed_effects(group, about)
         budget = Budget(options.watch, None if options.watch.deadline is None else replay)
-        case = TrackCase(group.campaign, turnout.settings["mismatch"], accepted=accepted, cache=budget)
-        diagnosis = diagnose(case, turnout.settings["mismatch"], report_progress, store)
+        settings = turnout.settings["mismatch"]
+        case = TrackCase(group.campaign, settings, accepted=(*accepted, *changed), cache=budget)
+        diagnosis = diagnose(case, settings, report_progress, store)
         rows = finding_tables(diagnosis, case, group, about)
         folder = calibrated_model.folder_of(options.fits)
-        calibrated_model.store_visit(folder, group, case, diagnosis.verdict.answer, about, store)
+        fits: Checkpoint | None = store
+        if changed:  # the calibrated model has accepted changes as noise of its process, not as effects of a visit
+            case, fits = TrackCase(group.campaign, settings, accepted=accepted, cache=budget), None
+        calibrated_model.store_visit(folder, group, case, diagnosis.verdict.answer, about, fits)
         rows["twin_states"] = calibrated_model.state_rows(
             folder, turnout, group, case, rows["mismatch_findings"][0], about
         )
@@ -199,6 +208,13 @@ def _diagnose_group(
     store.discard()
     store["rows"] = rows
     return rows
+
+
+def _changed_effects(group: Group, about: Mapping[str, Any]) -> tuple[AcceptedEffect, ...]:
+    """Effects of the changes that were accepted for the turnout before this visit."""
+    supports = group.campaign.turnout.track_of(group.route).support
+    sensors = {s.name: float(s.place) for s in group.campaign.sensors}
+    return changed_effects(about["changes"], years_of(about["visit"]), supports, sensors)
 
 
 def _undiagnosed_row(

@@ -88,6 +88,34 @@ def test_what_was_accepted_is_simulated_and_not_found_again(soft, capsys):
     assert parameter["value_low"] < small.SOFT < parameter["value_high"] < 0.7
 
 
+PAD_CHANGED = """extends: small
+terms:
+  - term: local_pad
+    first: {{value: 18.0, unit: m, source: found}}
+    last: {{value: 18.0, unit: m, source: found}}
+    since: {since}
+    until: {until}
+    accepted: 2026-07-26
+"""
+
+
+@pytest.mark.parametrize(
+    ("since", "until", "verdict"), [("2026-05", "2026-06", "none"), ("2026-08", "2026-09", "named")]
+)
+def test_a_change_that_was_accepted_is_not_found_again_at_a_later_visit(soft, since, until, verdict):
+    """The visit of 2026-07-25 estimates its size, 0.3 of the stiffness; a change that began later is none of it."""
+    (soft / "config/tracks/t1.yaml").write_text(PAD_CHANGED.format(since=f"{since}-01", until=f"{until}-01"))
+    tables = diagnose_turnout("t1")
+    (row,) = tables["mismatch_findings"]
+    assert row["verdict"] == verdict
+    sizes = [p for p in tables["mismatch_parameters"] if p["term"] == "local_pad" and p["accepted"]]
+    assert len(sizes) == (verdict == "none")
+    for size in sizes:
+        assert size["position_m"] == 18.0 and size["value"] == pytest.approx(small.SOFT, abs=0.1)
+    names = {p["parameter"] for p in tables["twin_states"]}
+    assert names and not any("local_pad" in name for name in names)  # of the calibrated model it is no parameter
+
+
 def test_what_was_accepted_is_not_found_again_in_passages_either(soft):
     """The residual is searched for dips and wheels beside what was accepted."""
     assert main(["diagnose", "--turnout", "t1"]) == 0 == main(["diagnose", "--turnout", "t1", "--accept"])
