@@ -24,12 +24,19 @@ ID_GIVEN = "turnout_id in (select unnest($turnouts))"
 HISTORY = "mode_scatter_read"
 MIN_TRACK = 8  # earlier campaigns from which on a page names a mode off the track; quartiles of fewer are too uncertain
 MAX_QUARANTINE_ROWS = 20  # quarantine rows of one reason that a page shows
-# Effect, parameter and size [m] of which a page says when it is reached, as docs/mismatch.md describes
-SIZE_LIMITS = (("hanging_sleeper", "gap", 0.002), ("surface_dip", "depth", 0.001))
+# Effect, parameter, size [m, -] of which a page says when it is reached, and whether it falls to it (docs/mismatch.md)
+SIZE_LIMITS = (
+    ("hanging_sleeper", "gap", 0.002, False),
+    ("surface_dip", "depth", 0.001, False),
+    ("local_ballast", "factor", 0.5, True),
+    ("local_pad", "factor", 0.5, True),
+)
 LIMIT_SQL = f"""
     select turnout_id, finding_id, '{{effect}}' as term, position_m, words
-    from growth_to_limit(effect := '{{effect}}', quantity := '{{quantity}}', size_limit := {{size}})
-    where {ID_GIVEN} and per_year > {Z95_EXACT} * per_year_se and forecast <> 'never'"""
+    from growth_to_limit(effect := '{{effect}}', quantity := '{{quantity}}', size_limit := {{size}},
+        falls := {{falls}})
+    where {ID_GIVEN} and abs(per_year) > {Z95_EXACT} * per_year_se and forecast <> 'never'
+        and {{falls}} = (per_year < 0)"""
 ROWS = {
     "turnouts": f"select * from turnouts where {ID_GIVEN}",
     "sections": f"select * from sections where {ID_GIVEN} order by position_m, label",
@@ -93,7 +100,9 @@ ROWS = {
         from recursive_modes where source = 'hammer' and {ID_GIVEN} order by section_id, band, measured_at_utc""",
     "chart_states": f"select * from chart_states_on(:today) where {ID_GIVEN}",
     "mismatches": f"select * from findings_newest where {ID_GIVEN} and verdict <> 'none' order by level_before desc",
-    "limits": " union all ".join(LIMIT_SQL.format(effect=e, quantity=q, size=size) for e, q, size in SIZE_LIMITS)
+    "limits": " union all ".join(
+        LIMIT_SQL.format(effect=e, quantity=q, size=size, falls=falls) for e, q, size, falls in SIZE_LIMITS
+    )
     + " order by position_m, term",
     "calibrated": f"""
         select turnout_id, visit, found_at_utc, parameter, position_m, value, sd, prior_sd, n_visits, n_recordings

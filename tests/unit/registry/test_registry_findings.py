@@ -252,6 +252,31 @@ def test_the_page_has_the_dates_of_significant_growth_alone(fleet):
     assert mismatches_with_limits([finding], []) == [(finding["sentence"], [])]
 
 
+def test_a_stiffness_that_falls_has_the_dates_of_the_gap_that_it_mirrors(tmp_path):
+    """A factor of 1 - 250 g falls to 0.5 when a gap g reaches 2 mm; one that rises has no date."""
+    from turnout.report.source import FleetSource
+
+    def stiffness(turnout, day, value, error):
+        return visit(turnout, day, term="local_ballast", values=[("factor", value, error, "-", 24.6, None)])
+
+    bench = Bench(tmp_path)
+    turnouts = [{"turnout_id": t, "layout": "l", "config_hash": "h"} for t in ("t1", "t2", "t3")]
+    results = [gap("t1", d, v, s) for d, (v, s) in zip(DAYS, GROWING)]
+    results += [stiffness("t2", d, 1.0 - 250.0 * v, 250.0 * s) for d, (v, s) in zip(DAYS, GROWING)]
+    results += [stiffness("t3", d, 0.6 + 250.0 * v, 250.0 * s) for d, (v, s) in zip(DAYS, GROWING)]
+    bench.register(*results, tables={"turnouts": turnouts})
+    falling = "growth_to_limit(effect := 'local_ballast', quantity := 'factor', size_limit := 0.5, falls := true)"
+    dates = "select forecast, not_before_utc, not_after_utc"
+    with open_registry(bench.registry) as connection:
+        (of_gap,) = connection.execute(f"{dates} from growth_to_limit()").fetchall()
+        of_factor = connection.execute(f"{dates}, words from {falling} where turnout_id = 't2'").fetchone()
+        (rising,) = connection.execute(f"select forecast from {falling} where turnout_id = 't3'").fetchone()
+        assert list(FleetSource(connection).rows_of(["t1", "t2", "t3"])["limits"]) == ["t1", "t2"]
+    assert of_factor[0] == of_gap[0] == "date" and rising == "never"
+    assert all(abs(a - b) < timedelta(minutes=1) for a, b in zip(of_gap[1:], of_factor[1:3]))
+    assert of_factor[3].startswith(f"factor reaches 0.5 not before {of_gap[1]:%Y-%m-%d}, by ")
+
+
 def test_a_gap_that_shrinks_has_no_date_on_the_page(tmp_path):
     from turnout.report.source import FleetSource
 

@@ -1,10 +1,14 @@
 -- One row per position where an effect grows, named or accepted: when it reaches a size, as an interval of dates. The line
 -- through all visits is known with an error; the dates are those at which its 95 % limits reach the size (Fieller 1954).
+-- With falls := true the size lies below: when a stiffness has fallen to it.
 -- needs: parameter_growth, in_service
-create or replace macro growth_to_limit(effect := 'hanging_sleeper', quantity := 'gap', size_limit := 0.002) as table
+create or replace macro growth_to_limit(
+    effect := 'hanging_sleeper', quantity := 'gap', size_limit := 0.002, falls := false
+) as table
 with line as (
     select
-        *, size_limit - mean_value as missing, per_year * (size_limit - mean_value) as towards,
+        *, case when falls then -1 else 1 end as side, side * (size_limit - mean_value) as missing,
+        per_year * (size_limit - mean_value) as towards,
         per_year ** 2 - (1.959964 * per_year_se) ** 2 as growing,
         (size_limit - mean_value) ** 2 - (1.959964 * mean_value_se) ** 2 as short_of
     from parameter_growth
@@ -19,9 +23,9 @@ roots as (
 dates as (
     select
         *, case
-            when value - 1.959964 * value_se >= size_limit then 'reached'
+            when side * (value - size_limit) >= 1.959964 * value_se then 'reached'
             when missing <= 0 or short_of <= 0 or earliest is null then 'open'
-            when per_year <= 0 and growing >= 0 then 'never'
+            when side * per_year <= 0 and growing >= 0 then 'never'
             when mean_at_utc + to_microseconds((earliest * 31557600e6)::bigint) <= found_at_utc then 'open'
             when earliest > 100 then 'never'
             else 'date'
@@ -33,15 +37,19 @@ select
     size_limit as size_limit, forecast,
     case when forecast = 'date' then mean_at_utc + to_microseconds((earliest * 31557600e6)::bigint) end as not_before_utc,
     case
-        when forecast = 'date' and per_year > 0 and growing > 0 and latest < 100
+        when forecast = 'date' and side * per_year > 0 and growing > 0 and latest < 100
         then mean_at_utc + to_microseconds((latest * 31557600e6)::bigint)
     end as not_after_utc,
     quantity || case forecast
         when 'reached' then ' has reached '
         when 'open' then ' may have reached '
-        when 'never' then ' does not grow towards '
+        when 'never' then case when falls then ' does not fall towards ' else ' does not grow towards ' end
         else ' reaches '
-    end || case unit when 'm' then printf('%g mm', 1e3 * size_limit) else printf('%g ', size_limit) || unit end
+    end || case unit
+        when 'm' then printf('%g mm', 1e3 * size_limit)
+        when '-' then printf('%g', size_limit)
+        else printf('%g ', size_limit) || unit
+    end
     || case
         when forecast <> 'date' then ''
         else ' not before ' || strftime(not_before_utc, '%Y-%m-%d')
@@ -51,7 +59,7 @@ select
 from dates
 order by not_before_utc, turnout_id, position_m;
 
--- columns of growth_to_limit(effect := 'hanging_sleeper', quantity := 'gap', size_limit := 0.002)
+-- columns of growth_to_limit(effect := 'hanging_sleeper', quantity := 'gap', size_limit := 0.002, falls := false)
 -- turnout_id | varchar | | turnout
 -- position_m | double | m | position of the effect, to 0.1 m
 -- channel | varchar | | its sensor
