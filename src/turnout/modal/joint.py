@@ -314,7 +314,7 @@ def _estimates(
     error = np.sqrt(np.einsum("ijj->ij", fit.covariance)).reshape(fit.unshrunken.shape)
     strength = np.linalg.norm(records, axis=1)
     systematic = np.hypot(
-        systematic_error(own_estimates(fit, rate), selection.rival_modes, settings.spread_maximum),
+        systematic_error(own_estimates(fit, rate), selection.rival_modes),
         unresolved_pole_error(fit, columns, rate),
     )
     return [

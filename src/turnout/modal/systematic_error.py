@@ -141,26 +141,25 @@ def own_estimates(fit: MixedFit, rate: float) -> OwnEstimates:
     return OwnEstimates(fit.mean, common, common**2 + shared_bound(fit.linearisation, fit.sigma2) ** 2)
 
 
-def choice_variance(
-    mode: np.ndarray, variance: np.ndarray, rivals: Sequence[OwnEstimates], max_distance: float
-) -> np.ndarray:
-    r"""Variance of a mode from the choice among explanations, each weighted by its own error.
+def choice_variance(mode: np.ndarray, variance: np.ndarray, rivals: Sequence[OwnEstimates]) -> np.ndarray:
+    r"""Variance of a mode from the choice among explanations, each weighted by how well it determines the mode.
 
-    .. math:: \frac{\sum_j w_j (\theta_j - \theta)^2}{2 \sum_j w_j}, \quad w_j = 1 / s_j^2, \quad \theta_1 = \theta
+    .. math:: \frac{\sum_j w_j (\theta_j - \theta)^2}{2 \sum_j w_j}, \quad
+              w_j = \zeta_j^2 / s_j^2, \quad \theta_1 = \theta
 
     The distance of two estimates contains the error of both, hence the factor 2. The weights do not come from a
     criterion of the fit as a whole: 18,000 samples distinguish two wrong models with certainty, but do not show which
     of them has this mode right. An explanation that leaves much in the neighbourhood of the mode has a large error
-    there, and says little about it.
+    there, and says little about it. Errors count in half-power half-widths: in them the error of a mode depends on its
+    energy alone, while in ln f and zeta a pole that is too narrow looks better determined than the broad one that it
+    stands for. A mode whose half-power band overlaps may be another explanation of the same resonance.
 
     Parameters
     ----------
     mode, variance : (2,) arrays of float
         ln f [Hz] and zeta in the chosen explanation, with their own variances :math:`s_1^2`.
     rivals : sequence of OwnEstimates
-        Modes of the other explanations.
-    max_distance : float
-        Distance in ln f beyond which it is another mode. An explanation without this mode does not count.
+        Modes of the other explanations. One in which no mode overlaps does not count.
 
     Returns
     -------
@@ -174,24 +173,29 @@ def choice_variance(
     Examples
     --------
     >>> mode, one = np.array([4.60, 0.20]), np.array([1e-4, 1e-4])
-    >>> near, far = np.array([4.64, 0.17]), np.array([6.0, 0.05])
+    >>> near, far = np.array([4.64, 0.20]), np.array([6.0, 0.05])
     >>> rival = OwnEstimates(np.array([near, far]), np.zeros((2, 2)), np.array([one, one]))
-    >>> choice_variance(mode, one, [rival], 0.15), choice_variance(mode, one, [], 0.15)
-    (array([0.0004  , 0.000225]), array([0., 0.]))
+    >>> choice_variance(mode, one, [rival]), choice_variance(mode, one, [])
+    (array([0.0004, 0.    ]), array([0., 0.]))
     """
-    weight = 1.0 / np.maximum(variance, 1e-300)
-    total, weighted = weight.copy(), np.zeros(2)
+    total = _determination(mode, variance)
+    weighted = np.zeros(2)
     for rival in rivals:
         distance = np.abs(rival.mean - mode)
         nearest = int(np.argmin(distance @ [1.0, 0.5]))
-        if distance[nearest, 0] < max_distance:
-            weight = 1.0 / np.maximum(rival.variance[nearest], 1e-300)
-            total += weight
+        if distance[nearest, 0] < mode[1] + rival.mean[nearest, 1]:
+            weight = _determination(rival.mean[nearest], rival.variance[nearest])
+            total = total + weight
             weighted += weight * distance[nearest] ** 2
     return 0.5 * weighted / total
 
 
-def systematic_error(chosen: OwnEstimates, rivals: Sequence[OwnEstimates], max_distance: float) -> np.ndarray:
+def _determination(mode: np.ndarray, variance: np.ndarray) -> np.ndarray:
+    """(2,) squared half-width of a mode over the variances of its ln f and zeta."""
+    return max(float(mode[1]), MIN_DAMPING) ** 2 / np.maximum(variance, 1e-300)
+
+
+def systematic_error(chosen: OwnEstimates, rivals: Sequence[OwnEstimates]) -> np.ndarray:
     """Standard error that all impacts share: of what the chosen explanation leaves of them, and of its choice.
 
     Parameters
@@ -200,13 +204,11 @@ def systematic_error(chosen: OwnEstimates, rivals: Sequence[OwnEstimates], max_d
         Modes of the chosen explanation.
     rivals : sequence of OwnEstimates
         Those of the others.
-    max_distance : float
-        Distance in ln f beyond which a mode of another explanation is another mode.
 
     Returns
     -------
     (n_mode, 2) array of float
         Of ln f and zeta.
     """
-    choice = [choice_variance(m, v, rivals, max_distance) for m, v in zip(chosen.mean, chosen.variance, strict=True)]
+    choice = [choice_variance(m, v, rivals) for m, v in zip(chosen.mean, chosen.variance, strict=True)]
     return np.sqrt(chosen.common**2 + np.reshape(choice, chosen.mean.shape))
