@@ -163,7 +163,9 @@ REASONS = {
     "sign_reversed": "the force is negative at contact: the sign is reversed",
     "clock_backwards": "the time stamps run backwards",
     "duplicate": "the same bytes as another file, or the same impact as in another record",
-    "wrong_time": "the time of the recording is unreadable, implausible or ambiguous, or contradicts its campaign",
+    "wrong_time": "the time of the recording contradicts its campaign, or a passage has none",
+    "start_unknown": "the start time in the file is unreadable, implausible or of another day; the recording is used",
+    "rate_ambiguous": "the file states a rate before a reduction that nothing confirms; its recordings are used",
     "double_hit": "the hammer touched the rail twice",
     "overload": "a channel left its range",
     "out_of_scale": "a value that no such measurement has: the unit or the scale is wrong",
@@ -193,7 +195,7 @@ REASONS = {
     "internal_error": "a fault of this program, with its traceback",
 }
 # Remarks: the recordings are used all the same. No run fails and no turnout is overdue because of one.
-REMARK_REASONS = frozenset(("entry_unknown", "library_warning", "condition_lost"))
+REMARK_REASONS = frozenset(("entry_unknown", "library_warning", "condition_lost", "start_unknown", "rate_ambiguous"))
 # Reasons that concern a channel of a recording: ``turnout.records.Rejection.channel`` names it.
 CHANNEL_REASONS = frozenset(
     (

@@ -48,6 +48,8 @@ ORDINATES = AMPLITUDES | {"velocity", "displacement", "strain"}
 MAX_TEXT = 1000  # characters of a text that are searched
 MAX_FACTOR = 10_000  # a larger whole number is a code, unless people choose it as a rate or a converter has it
 YEARS = (1990, 2061)
+ROUND_RATE = 100.0  # Hz: people choose multiples of it
+MAX_CHANCE = 0.1  # share of all numbers of so many digits that are the inverse of a round rate by chance
 MIN_PER_SECOND = 1000.0  # a name that ends with seconds may mean a number per second from here on: "ndata_sec"
 MIN_LIMIT = 0.01  # a smaller number is no count, limit or size
 EPOCHS = (6.3e8, 2.9e9)  # s since 1970: years 1990 to 2061
@@ -66,6 +68,7 @@ QUANTITY = re.compile(
 BARE_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
 WHOLE_NUMBER = re.compile(r"\+?\d+(?:\.0*)?")
+UPPER_FACTOR = re.compile(r"X\d+")
 WORD_AND_NUMBER = re.compile(r"([^\W\d_]{2,})[\s:=]{1,3}([+-]?\d+(?:\.\d+)?)")
 GROUPED_DIGITS = re.compile(r"\d{1,3} \d{3}\b")
 PIECES = re.compile(r"[;|\n]|,(?!\d)")
@@ -185,10 +188,11 @@ def _of_other_subject(text: str) -> Iterator[Candidate]:
     is_sampled = SAMPLING.search(text.casefold()) is not None
     for match in QUANTITY.finditer(text):
         unit = rate_unit(match[2]) if match[2] else None
-        if unit and (unit.is_sampling or (is_sampled and not unit.is_step)):
+        is_step = unit is not None and unit.is_step and _is_inverse_of_rate(match[1], float(unit.scale))
+        if unit and (unit.is_sampling or is_step or (is_sampled and not unit.is_step)):
             yield from _of_rate(match[0], match[1], unit, is_weak=True)
     if BARE_NUMBER.fullmatch(text):
-        yield _number_of_other(text)
+        yield from _numbers_of_other(text)
     elif len(unit_text := text.split()[-1]) > 1 and len(text.split()) <= 2 and not re.search(r"\d", text):
         yield from (replace(c, is_weak=True) for c in _of_unit(unit_text) if c.unit)
 
@@ -199,9 +203,24 @@ def _is_compared(name: str, text: str) -> bool:
     return is_certain and any(statement.intervals for statement in statements_of_value(name, text))
 
 
-def _number_of_other(number: str) -> Candidate:
-    """A number that its name explains, unless it is the rate in disguise."""
-    return Candidate(RATE, number, True, number=_value(number), is_of_other=True)
+def _numbers_of_other(number: str) -> Iterator[Candidate]:
+    """A number that its name explains, unless it is the rate in disguise, or a step."""
+    yield Candidate(RATE, number, True, number=_value(number), is_of_other=True)
+    if _is_inverse_of_rate(number, 1.0):
+        yield from _of_rate(number, number, RateUnit(True, Fraction(1)), is_weak=True)
+
+
+def _is_inverse_of_rate(number: str, scale: float) -> bool:
+    """Whether a time is that of one sample by its digits: they are the inverse of a round rate, "78.125" µs."""
+    n_digit = len(re.sub(r"[eE].*|\D", "", number).strip("0"))
+    tolerance = 10.0 ** (1 - n_digit)  # relative, of a rounded number
+    times = [float(reading.value) * scale for reading in readings(number)]
+    for rate in (1.0 / time for time in times if time > 0.0):
+        step, n_step = ROUND_RATE / rate, rate / ROUND_RATE
+        is_close = tolerance <= MAX_CHANCE * step and abs(n_step - round(n_step)) * step <= tolerance
+        if is_close and USUAL_RATES[0] <= rate <= USUAL_RATES[1]:
+            return True
+    return False
 
 
 def _of_value(name: str, text: str, subject: int) -> Iterator[Candidate]:
@@ -255,7 +274,9 @@ def _of_text(name: str, text: str, subject: int) -> Iterator[Candidate]:
         yield from _of_other_subject(text)
         return
     ratio = RATIO.fullmatch(text)
-    if CONVERSION.search(text) or (ratio and ratio[1] != ratio[2] and not is_ratio_of_drawing(name, text)):
+    if UPPER_FACTOR.fullmatch(text):
+        yield Candidate(SCALE, text, True)  # or a name of a model
+    elif CONVERSION.search(text) or (ratio and ratio[1] != ratio[2] and not is_ratio_of_drawing(name, text)):
         yield Candidate(SCALE, text[:MAX_SIZE])
     for match in PART_OF_SECOND.finditer(text):
         scale = Fraction(1000 if match[2] == "ms" else 1)
@@ -314,7 +335,7 @@ def _of_number(name: str, number: str, unit: str, subject: int) -> Iterator[Cand
     if subject == WEAK and LENGTH.search(" ".join(words_of(name))):
         yield Candidate(DURATION, number, True, number=value, seconds=(value, value / 1000.0))
     if subject == WEAK and abs(value) >= MIN_LIMIT:
-        yield _number_of_other(number)
+        yield from _numbers_of_other(number)
         return
     yield Candidate(RATE_OR_SCALE, number, True, _rates_of_number(number), value)
 

@@ -352,7 +352,7 @@ def convert_records(
             )
             recordings.append(recording)
             remarked = {
-                e.problem for e in errors if e.reason in ("wrong_rate", "entry_unknown")
+                e.problem for e in errors if e.reason in ("rate_ambiguous", "entry_unknown")
             }  # once for all records
             errors.extend(error for error in channel_errors if error.problem not in remarked)
         except ReadError as error:

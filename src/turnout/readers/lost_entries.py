@@ -33,7 +33,7 @@ def lost_entry_errors(records: Sequence[RawRecord | ReadError], source: Source) 
     Yields
     ------
     ReadError
-        One per entry, with the reason ``wrong_time`` or ``condition_lost``.
+        One per entry, with the reason ``start_unknown`` or ``condition_lost``.
     """
     read = [(k, record, _names(record)) for k, record in enumerate(records) if isinstance(record, RawRecord)]
     if not read:
@@ -110,7 +110,7 @@ def _names(record: RawRecord) -> set[str]:
 
 
 def _error(where: str, name: str, problem: str, source: Source) -> ReadError:
-    return source.error(where, problem, REMEDY, reason="wrong_time" if name == START else "condition_lost")
+    return source.error(where, problem, REMEDY, reason="start_unknown" if name == START else "condition_lost")
 
 
 @lru_cache(maxsize=4096)

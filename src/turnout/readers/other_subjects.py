@@ -209,8 +209,7 @@ def _subject_of_words(words: tuple[str, ...]) -> int:
             i in known or _FILLER.fullmatch(word) or _OF_FREQUENCY.fullmatch(word) for i, word in enumerate(words)
         )
         return STRONG if is_frequency else NONE
-    is_record_length = bool(_RECORD.search(spaced) and LENGTH.search(spaced))
-    return STRONG if strong and not is_record_length else WEAK
+    return STRONG if strong - _words_with(_RECORD, spaced) else WEAK
 
 
 def _words_with(pattern: re.Pattern[str], spaced: str) -> set[int]:

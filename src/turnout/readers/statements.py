@@ -573,7 +573,9 @@ def rate_remark(statements: Sequence[Statement], rate: float, where: str, source
     if meanings[-1].loose.overlaps(around(rate, EXACT_PRECISION)):
         return None
     problem = f"{_reduction_problem(certain[0])}; {rate:.9g} Hz is used"
-    return source.error(where, problem, "Find out which it is, and correct the rate in the layout", reason="wrong_rate")
+    return source.error(
+        where, problem, "Find out which it is, and correct the rate in the layout", reason="rate_ambiguous"
+    )
 
 
 RATE_REMEDY = "Give the rate in the layout, or as hammer_rate_hz or passage_rate_hz in turnouts.tsv"

@@ -347,7 +347,7 @@ def start_errors(
     Yields
     ------
     ReadError
-        With the reason ``wrong_time``.
+        With the reason ``start_unknown``, a remark.
     """
     stated = dict(stamps)
     if other := [(k, text) for k, text in unread.items() if stated.get(k) is not None]:
@@ -378,7 +378,7 @@ def start_errors(
 def _start_error(records: Sequence[int], problem: str, source: Source) -> ReadError:
     numbers = [k + 1 for k in records]
     where = f"record {numbers[0]}" if len(numbers) == 1 else f"records {numbers[0]} to {numbers[-1]}"
-    return source.error(where, problem, CLOCK_REMEDY, reason="wrong_time")
+    return source.error(where, problem, CLOCK_REMEDY, reason="start_unknown")
 
 
 MATLAB_EPOCH = 719529  # datenum of 1970-01-01

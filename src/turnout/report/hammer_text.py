@@ -188,7 +188,7 @@ def _quarantine_lines(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     lines = []
     for (path, reason, finding, remedy), positions in groups.items():
         more = f" ({len(positions)} such places, the last: {positions[-1]})" if len(positions) > 1 else ""
-        what = "note" if reason == "wrong_time" or reason in REMARK_REASONS else "not used"
+        what = "note" if reason in REMARK_REASONS else "not used"
         lines.append(_line(what, f"{path}, {positions[0]}: {finding}{more}. {remedy}."))
     return lines
 

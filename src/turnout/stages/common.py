@@ -111,6 +111,7 @@ def time_contradiction(
     filed_at: datetime | None,
     tolerance: timedelta,
     remedy: str,
+    reason: str = "wrong_time",
 ) -> ReadError | None:
     """Error if the first time noted in a file differs from the time that it is filed under.
 
@@ -126,6 +127,8 @@ def time_contradiction(
         Largest accepted difference.
     remedy : str
         What to do, a sentence without its full stop.
+    reason : str
+        Code of the error; that of a remark where the file is used.
 
     Returns
     -------
@@ -136,7 +139,7 @@ def time_contradiction(
     if filed_at is None or recorded_at is None or abs(recorded_at - filed_at) <= tolerance:
         return None
     observation = f"says it was recorded on {recorded_at:%Y-%m-%d %H:%M}, and is filed under {filed_at:%Y-%m-%d %H:%M}"
-    return ReadError(path, "the file", observation, remedy, "wrong_time")
+    return ReadError(path, "the file", observation, remedy, reason)
 
 
 def quarantine_row(

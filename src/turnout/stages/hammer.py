@@ -86,7 +86,7 @@ def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root: str | Path, algo: 
         if result is not None:
             ids[path] = result.sha256[:32]
             wrong = time_contradiction(
-                path, result.recordings, campaign.started_at, MAX_CAMPAIGN_OFFSET, MISFILED_REMEDY
+                path, result.recordings, campaign.started_at, MAX_CAMPAIGN_OFFSET, MISFILED_REMEDY, "start_unknown"
             )
             if wrong is not None:
                 rows["quarantine"].append(quarantine_row(wrong, base, "hammer", "hammer", None, ids[path]))

@@ -93,7 +93,7 @@ def test_a_start_under_any_name_is_read_or_reported(format, tmp_path):
         if text in READ_STARTS:
             assert recording.started_at.replace(second=0) == datetime(2024, 5, 13, 10) and errors == (), text
         else:
-            assert recording.started_at is None and errors[0].reason == "wrong_time", text
+            assert recording.started_at is None and errors[0].reason == "start_unknown", text
 
 
 @pytest.mark.parametrize("format", sorted(set(FORMATS) - {"uff"}))
@@ -101,6 +101,6 @@ def test_two_start_times_are_reported(format, tmp_path):
     path = written(format, tmp_path, "Recorded", "2023-01-05 10:00:00", start="2024-05-13T10:00:00")
     recording, errors = outcome(path)
     assert recording.started_at == datetime(2024, 5, 13, 10)
-    assert errors[0].reason == "wrong_time" and "two start times" in errors[0].problem
+    assert errors[0].reason == "start_unknown" and "two start times" in errors[0].problem
     path = written(format, tmp_path, "Recorded", "2024-05-13 12:00:00", start="2024-05-13T10:00:00")  # another zone
     assert outcome(path)[1] == ()

@@ -362,7 +362,7 @@ def test_chunks_of_field_recorders_are_statements_of_the_rate(tag, content, tmp_
 def test_a_start_in_a_chunk_that_no_calendar_has_is_reported(tmp_path):
     layout = wav_with(tmp_path, b"bext", broadcast(25600, date=b"2024-02-30"))
     (error,) = read("a.wav", tmp_path, layout).errors
-    assert error.reason == "wrong_time" and "2024-02-30" in str(error)
+    assert error.reason == "start_unknown" and "2024-02-30" in str(error)
 
 
 @pytest.mark.parametrize("rate", [None, 20000.0, 25600.0])

@@ -47,7 +47,7 @@ def test_a_start_time_that_one_record_lacks_is_reported(hammer_test, tmp_path):
     path = write(hammer_test, tmp_path / "a.csv", "csv")
     path.write_text(path.read_text().replace("# started_at_2:", "# begun_2:"))
     (error,) = read(path.name, tmp_path, LAYOUT).errors
-    assert error.reason == "wrong_time" and "record 3: it lacks the start time that the other records have" in str(
+    assert error.reason == "start_unknown" and "record 3: it lacks the start time that the other records have" in str(
         error
     )
 

@@ -367,7 +367,7 @@ def test_a_start_time_that_tells_no_moment_is_reported_in_every_format(format, s
     description = replace(described(TRUE), time_zone="Europe/Copenhagen")
     result = read(name, tmp_path, description)
     (error,) = result.errors
-    assert error.reason == "wrong_time" and STARTS[start] in error.problem
+    assert error.reason == "start_unknown" and STARTS[start] in error.problem
     assert len(result.recordings) == 1
     clock_change = "Europe" in STARTS[start]
     assert (result.recordings[0].started_at is not None) == clock_change
@@ -500,10 +500,10 @@ def test_a_start_time_under_any_name_is_read_or_reported(format, tmp_path):
             result = read(name, tmp_path, described(TRUE))
             is_start, is_time = entry in START_ENTRIES, "02-30" not in text
             assert result.recordings[0].started_at == (expected if is_start and is_time else None), (entry, text)
-            assert [e.reason for e in result.errors] == (["wrong_time"] if is_start and not is_time else [])
+            assert [e.reason for e in result.errors] == (["start_unknown"] if is_start and not is_time else [])
     write_file(tmp_path / name, [("rate", TRUE), ("Recorded on", "2026-05-13 10:00"), ("Start", "2026-05-14 10:00")])
     (error,) = read(name, tmp_path, described(TRUE)).errors
-    assert error.reason == "wrong_time" and "2026-05-14" in error.problem
+    assert error.reason == "start_unknown" and "2026-05-14" in error.problem
 
 
 @pytest.mark.parametrize("format", FORMATS)
@@ -522,7 +522,7 @@ def test_a_reduction_beside_a_rate_is_applied_or_reported(format, name, tmp_path
         return
     assert is_rejected(outcome(path, described(None)), "reduction by 2", "51200 or 25600 Hz")
     rate, remark = outcome(path, described(2 * TRUE))
-    assert rate == 2 * TRUE and remark.reason == "wrong_rate" and "reduction by 2" in str(remark)
+    assert rate == 2 * TRUE and remark.reason == "rate_ambiguous" and "reduction by 2" in str(remark)
     write_file(path, [("Sample rate", TRUE), (word, 1)])
     assert is_true(outcome(path, described(None)))
 

@@ -68,7 +68,7 @@ def test_start_times_of_a_clock_change_and_of_an_epoch_are_reported(make):
     assert night.errors == () and f"{night.recordings[0].started_at:%d %H:%M}" == "12 22:30"
     for name, words in (("gap_hour.csv", "does not exist"), ("slashes.csv", "cannot be read")):
         (error,) = read(name, folder, described).errors
-        assert error.reason == "wrong_time" and words in error.problem
+        assert error.reason == "start_unknown" and words in error.problem
     folder = make("30_tdms_1904")
     result = read("relative.tdms", folder, replace(described, time_zone="UTC"))
     (error,) = result.errors

@@ -115,7 +115,7 @@ def test_a_start_that_is_not_clear_is_none_and_is_reported(stamp, tmp_path):
     result = read("a.csv", tmp_path, NAMED)
     assert result.recordings[0].started_at is None
     (error,) = result.errors
-    assert error.reason == "wrong_time" and error.problem == f"the start time {stamp!r} cannot be read"
+    assert error.reason == "start_unknown" and error.problem == f"the start time {stamp!r} cannot be read"
 
 
 COUNTS = ("Anzahl Messwerte", "# Anzahl Werte", "Number of samples", "Nombre d'échantillons", "Aantal samples",

@@ -26,6 +26,7 @@ CONTRADICTIONS = [
     ("Dataconversion", "a=2.5 b=0.1"), ("Signalkonversion", "x2.5"), ("Schienenaufschlag", "x1.1"),
     ("speed", "20 kS/s"), ("Hub", 3), ("Messgang", 117), ("Full scale", 10.0),
     ("Time scale", 2.5), ("direction", "20 kS/s"), ("Serial number", "sampled at 20 kHz"), ("Battery", 12800),
+    ("Delay", "78.125 us"),
 ]  # fmt: skip
 # The same statements in agreement with the record, and values that are about something else.
 HARMLESS = [

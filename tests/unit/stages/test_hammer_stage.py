@@ -137,7 +137,7 @@ def test_a_file_of_another_day_is_used_and_said(tmp_path):
 
     unit, turnout, _ = lay_out(tmp_path, "A7", change=change)
     rows = hammer_unit(unit, turnout, tmp_path, algo="1")
-    assert [(q["reason_code"], "A7_2" in q["path"]) for q in rows["quarantine"]] == [("wrong_time", True)]
+    assert [(q["reason_code"], "A7_2" in q["path"]) for q in rows["quarantine"]] == [("start_unknown", True)]
     assert len(rows["impacts"]) == 30 and rows["models"][0]["measured_at_utc"] == datetime(2024, 5, 13, 9)
 
 

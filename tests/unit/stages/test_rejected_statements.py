@@ -80,7 +80,7 @@ KINDS = {
     "quantity": ({"Sample rate": RATE}, ("force", "displacement"), "unit_unknown", "displacement"),
     "reduction": ({"Sample rate": 2 * RATE, "Decimation": 2}, (), "wrong_rate", "reduction by 2"),
     "scale ratio": ({"Sample rate": RATE, "Gain": "1:10"}, (), "scale_unknown", "1:10"),
-    "second start": ({"Sample rate": RATE, "Recorded": "2023-01-05 10:00:00"}, (), "wrong_time", "two start times"),
+    "second start": ({"Sample rate": RATE, "Recorded": "2023-01-05 10:00:00"}, (), "start_unknown", "two start times"),
 }  # fmt: skip
 
 
