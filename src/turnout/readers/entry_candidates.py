@@ -262,8 +262,8 @@ def _of_text(name: str, text: str, subject: int) -> Iterator[Candidate]:
     """Candidates of a piece of free text under a name."""
     if units := tuple(_of_unit(text)):
         is_of_other = is_unit_of_other(name)
-        rest = " ".join(word for word in words_of(name) if not UNIT_WORD.fullmatch(word))
-        if not is_of_other or explained_subject(rest) == WEAK:  # "range unit"
+        other_words = " ".join(word for word in words_of(name) if not UNIT_WORD.fullmatch(word))
+        if not is_of_other or explained_subject(other_words) == WEAK:  # "range unit"
             yield from (replace(c, is_weak=True) if is_of_other else c for c in units)
         return
     if subject_of(name) != STRONG:

@@ -203,10 +203,10 @@ def _subject_of_words(words: tuple[str, ...]) -> int:
         | {i for i, word in enumerate(words) if word in STRONG_WORDS}
     )
     weak = _words_with(_WEAK, spaced) | {i for i, word in enumerate(words) if word in WEAK_WORDS}
-    known = strong | weak
-    if not known or any(i not in known and not _FILLER.fullmatch(word) for i, word in enumerate(words)):
+    subjects = strong | weak
+    if not subjects or any(i not in subjects and not _FILLER.fullmatch(word) for i, word in enumerate(words)):
         is_frequency = bool(strong) and all(
-            i in known or _FILLER.fullmatch(word) or _OF_FREQUENCY.fullmatch(word) for i, word in enumerate(words)
+            i in subjects or _FILLER.fullmatch(word) or _OF_FREQUENCY.fullmatch(word) for i, word in enumerate(words)
         )
         return STRONG if is_frequency else NONE
     return STRONG if strong - _words_with(_RECORD, spaced) else WEAK
