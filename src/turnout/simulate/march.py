@@ -375,7 +375,7 @@ def march(
         if lost_port >= 0:
             return LEFT_TRACK, step, lost_port, x[lost_port * stages], iterations
         free_deformation(track, scheme, ports, motion, d, e, e_stand_in, rows, weights, share, dip, d0)
-        flexibility(track, scheme, bodies, ports, rows, weights, local, share, g)
+        flexibility(track, scheme, bodies, ports, rows, weights, local, share, d0, step == 0, g)
         for k in range(1, n_port):
             o, m = order[k], k
             while m > 0 and x[order[m - 1] * stages] > x[o * stages]:

@@ -9,6 +9,8 @@ import numpy as np
 from turnout.kernel_cache import inline_kernel
 from turnout.simulate.kernels import law_force, path_at, rail_weights, ramp_at, solve_dense, window_product
 
+OPEN_GAP = 3e-3  # m; a force of 100 kN moves wheel and rail by less than 0.5 mm, in a step by less still
+
 if TYPE_CHECKING:
     from turnout.simulate.state import PortArrays, RunArrays, SchemeArrays, TrackArrays, VehicleArrays
 
@@ -112,9 +114,14 @@ def flexibility(
     weights: np.ndarray,
     local: np.ndarray,
     share: np.ndarray,
+    d0: np.ndarray,
+    is_first: bool,
     g: np.ndarray,
 ) -> None:
     """Fill ``g``: by how much a unit force at port stage b reduces the deformation of port stage a.
+
+    That between ports at fixed points is that of the first step. It is 0 for wheels more than ``OPEN_GAP`` above a
+    surface, which no force of one step can close.
 
     Parameters
     ----------
@@ -134,6 +141,10 @@ def flexibility(
         Local compliance of the element at each port stage. [m/N]
     share : (n_stage,) array of float
         Share of the stand-in track at each port stage.
+    d0 : (n_stage,) array of float
+        Deformation of each port stage without port forces. [m]
+    is_first : bool
+        Whether this is the first step.
     g : (n_stage, n_stage) array of float
         Overwritten. [m/N]
     """
@@ -142,7 +153,15 @@ def flexibility(
     block_of, block_start, response = bodies.block_of, bodies.block_start, bodies.response
     stand_in_response = bodies.stand_in_response
     for i in range(n_port):
+        i_open = wheel[i] >= 0 and d0[i * stages] < -OPEN_GAP and d0[(i + 1) * stages - 1] < -OPEN_GAP
         for j in range(i, n_port):
+            if body[i] < 0 and body[j] < 0 and not is_first:
+                continue
+            if i_open or (wheel[j] >= 0 and d0[j * stages] < -OPEN_GAP and d0[(j + 1) * stages - 1] < -OPEN_GAP):
+                for p in range(i * stages, (i + 1) * stages):
+                    for q in range(j * stages, (j + 1) * stages):
+                        g[p, q] = g[q, p] = 0.0
+                continue
             body_response = 0.0 * tau[0]
             if body[i] >= 0 and body[j] >= 0 and block_of[body[i]] == block_of[body[j]]:
                 block = block_of[body[i]]

@@ -287,7 +287,7 @@ PATHS = {
     "cosine": (Cosine, {"place": "m", "depth": "m", "length": "m"}),
     "kink": (Kink, {"place": "m", "depth": "m", "length": "m", "share": "-", "power": "-"}),
     "blade_top": (BladeTop, {"start": "m", "length": "m", "depth": "m", "power": "-"}),
-    "stock_fall": (StockFall, {"start": "m", "length": "m", "depth": "m"}),
+    "stock_fall": (StockFall, {"start": "m", "length": "m", "depth": "m", "power": "-"}),
     "corrugation": (Corrugation, {"start": "m", "end": "m", "amplitude": "m", "wavelength": "m"}),
 }
 OPTIONAL_KEYS = ("share", "power")

@@ -205,21 +205,25 @@ class BladeTop:
 
 @dataclass(frozen=True)
 class StockFall:
-    r"""Stock rail from which the wheel moves off, :math:`p = d\,s^2` from ``start`` over ``length`` to ``depth``.
+    r"""Stock rail from which the wheel moves off, :math:`p = d\,s^n` from ``start`` over ``length`` to ``depth``.
 
     The contact runs outwards on the cone of the wheel, which so sinks. ``start`` [m]; ``length`` [m] is negative where
-    the wheel moves off towards smaller x; ``depth`` d [m], beyond which the wheel is on the other rail.
+    the wheel moves off towards smaller x; ``depth`` d [m], beyond which the wheel is on the other rail; ``power`` n.
     """
 
     start: float
     length: float
     depth: float
+    power: float = 2.0
 
     def __post_init__(self) -> None:
         _check_length("stock rail", self.start, abs(self.length))
+        if not self.power >= 1.0:
+            raise SimulationError(f"stock rail at {self.start:.3f} m: power {self.power!r} is below 1.")
 
     def __call__(self, x: ArrayLike, wheel: int = 0) -> np.ndarray:
-        return self.depth * np.clip((np.asarray(x, dtype=float) - self.start) / self.length, 0.0, 1.0) ** 2
+        share = (np.asarray(x, dtype=float) - self.start) / self.length
+        return self.depth * np.clip(share, 0.0, 1.0) ** self.power
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 MAX_SECTION_GAP = 6.0  # m: sections further apart do not respond to the same sleeper
 MAX_PASSAGES = 8  # of a case: each is simulated hundreds of times, and more alike add little
 MAX_AXLES = 96  # of all passages of a case: the simulation time is proportional to them
+MAX_SWITCH_AXLES = 32  # the same in a switch, where an axle costs three times as much
 RESERVED_EVERY = 5  # one of so many recordings is held out from all fits
 MIN_TO_RESERVE = 4  # recordings; with fewer none is held out
 
@@ -52,7 +53,7 @@ def groups(
     track: TurnoutTrack,
     inputs: VisitInputs,
     only: Sequence[str] = (),
-    limits: tuple[int, int] = (MAX_PASSAGES, MAX_AXLES),
+    limits: tuple[int, int] | None = None,
 ) -> Iterator[Group]:
     """Groups of a visit in order of position; sections without a recording are left out.
 
@@ -66,15 +67,17 @@ def groups(
         Recordings of the visit; notes are added.
     only : sequence of str
         Labels of the sections, () for all.
-    limits : (int, int)
-        Largest number of passages of a group, and of all their axles.
+    limits : (int, int) or None
+        Largest number of passages of a group, and of all their axles; None: ``MAX_PASSAGES`` and ``MAX_AXLES``, in a
+        switch ``MAX_SWITCH_AXLES``.
 
     Yields
     ------
     Group
     """
     for route, labels in neighbours_of(turnout, only):
-        campaign = _campaign(turnout, track, inputs, route, labels, limits)
+        max_axles = MAX_AXLES if track.track_of(route).blade is None else MAX_SWITCH_AXLES
+        campaign = _campaign(turnout, track, inputs, route, labels, limits or (MAX_PASSAGES, max_axles))
         if campaign is not None and route not in ("main", *track.routes):
             inputs.notes.append(Note(f"sections {', '.join(labels)}: the track's file has no route {route}; not used"))
         elif campaign is not None:

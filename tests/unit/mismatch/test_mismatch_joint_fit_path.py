@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
-from turnout.mismatch.engine import refit
+from turnout.mismatch.engine import map_fit, refit
 from turnout.mismatch.engine.candidate import EffectSite, RefitStarts
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.levenberg_marquardt import DampedSteps
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.search import Search
@@ -44,6 +45,24 @@ def test_a_dear_jacobian_is_made_anew_on_a_long_way():
     updated = fit_jointly(Bent(True), reused_jacobian=first, iterations=25)
     assert renewed.cost == pytest.approx(full.cost, abs=0.2)
     assert updated.cost > full.cost + 1.0
+
+
+def test_after_a_step_that_costs_more_come_new_derivatives_before_smaller_steps(monkeypatch):
+    """Updated derivatives of the wrong sign cost one trial each time, and the fit ends where it does with true ones."""
+    trials, first_improvement = [], DampedSteps.first_improvement
+
+    def recorded(self, cost, damping, max_tries=None):
+        before = self.joint.evaluations
+        result = first_improvement(self, cost, damping, max_tries)
+        trials.append((self.joint.evaluations - before, result[0] is not None))
+        return result
+
+    monkeypatch.setattr(DampedSteps, "first_improvement", recorded)
+    monkeypatch.setattr(map_fit, "broyden_update", lambda jacobian, *_: [-j for j in jacobian])
+    fit = fit_jointly(Bent(True), iterations=40)
+    failed = [n for n, improved in trials[:-1] if not improved]
+    assert len(failed) >= 3 and max(failed) == 1
+    assert fit.cost == pytest.approx(fit_jointly(Bent(False), iterations=40).cost, abs=0.2)
 
 
 def test_a_dear_fit_on_which_the_verdict_rests_goes_on_for_less(monkeypatch):

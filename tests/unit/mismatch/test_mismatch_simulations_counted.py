@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from turnout import physics
-from turnout.mismatch.turnout import TrackCase, pseudo_forces, wave_response
+from turnout.mismatch.turnout import TrackCase, pseudo_forces, track_under_wheels
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.mismatch.turnout.prediction import Predictor
 
@@ -57,13 +57,13 @@ def test_derivatives_by_an_effect_leave_the_motion_at_its_supports_in_the_cache(
 
 def test_passages_on_one_track_share_its_responses_and_on_another_do_not(case, monkeypatch):
     """Same column as with nothing kept; a changed pad asks again, a changed speed does not."""
-    solved, responses = [], wave_response.responses
+    solved, responses = [], track_under_wheels.responses
 
     def counted(*arguments, **options):
         solved.append(1)
         return responses(*arguments, **options)
 
-    for module in (wave_response, pseudo_forces):
+    for module in (track_under_wheels, pseudo_forces):
         monkeypatch.setattr(module, "responses", counted)
     values, passages = start_values(case), rolled(case)
     predicted = case.predict(values, (), passages)

@@ -5,50 +5,87 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from turnout.constants import GRAVITY
+from turnout.mismatch.engine.case import Observation
+from turnout.mismatch.turnout.passage_observation import with_chatter
 from turnout.mismatch.turnout.sensitivity import _difference
-from turnout.mismatch.turnout.wave_response import rail_receptances
-from turnout.mismatch.turnout.wheel_line import carrying_weights, rows_under_wheels
+from turnout.mismatch.turnout.track_under_wheels import TrackUnderWheels
+from turnout.mismatch.turnout.wheel_line import load_transfer, static_compliances
 from turnout.simulate.blade import Blade, transfer_position
 from turnout.simulate.frequency_response import receptance
 from turnout.simulate.matrices import assemble
+from turnout.simulate.preparation import prepare
+from turnout.simulate.run import Drive, run
 from turnout.simulate.track import uniform_track
+from turnout.simulate.vehicle import lone_wheels
 from turnout.simulate.wheel_path import BladeTop, StockFall
 
 TRACK = uniform_track(30.0, elements_per_bay=2)
 BLADE = Blade(9.0, 15.0, 24.0, TRACK.rail, 3e8, 3e4)
 SURFACES = ((StockFall(10.5, 3.0, 0.02),), (BladeTop(9.0, 3.0, 0.015),))
 FREQUENCY = np.linspace(20.0, 112.0, 8)
+MASS = 6000.0  # kg on a wheel
 
 
-def test_a_wave_behind_the_change_acts_on_the_blade():
-    """Receptance to a sensor on the stock rail from each node under wheels: of the rail before, of the blade behind."""
+@pytest.fixture(scope="module")
+def change():
+    return load_transfer(assemble(TRACK.with_(blade=BLADE)), BLADE, SURFACES, lone_wheels(MASS))
+
+
+def test_a_slow_wheel_changes_where_and_as_gradually_as_stated(change, monkeypatch):
+    """At walking pace, over chairs that do not open, with the nonlinear contact and the deflection of both rails."""
+    monkeypatch.setattr(Blade, "ports", lambda *_: [])
+    prepared = prepare(TRACK.with_(blade=BLADE), 5e-4)
+    outcome = run(prepared, 1.0, vehicle=lone_wheels(MASS), drive=Drive(10.3, 2.0, surfaces=SURFACES))
+    x, (stock, blade) = 10.3 + 2.0 * outcome.time, outcome.surface_force[0]
+    both = x[(stock > 0.0) & (blade > 0.0)]
+    assert both[0] == pytest.approx(change.start, abs=0.01)
+    assert both[-1] == pytest.approx(change.end, abs=0.01)
+    assert change.end - change.start > 0.04
+    middle = np.interp(0.5 * MASS * GRAVITY, blade[(x > both[0]) & (x < both[-1])], both[1:-1])
+    assert middle == pytest.approx(0.5 * (change.start + change.end), abs=0.01)
+
+
+def test_a_force_between_both_rails_is_shared_by_their_flexibility(change):
+    """Two springs: the stiffer side takes more. A pair of opposite forces opens both rails and both contacts."""
     matrices = assemble(TRACK.with_(blade=BLADE))
-    transfer = transfer_position(SURFACES, BLADE)
-    rows = rows_under_wheels(matrices, BLADE, SURFACES)
-    nodes = [int(np.searchsorted(matrices.node, transfer)) + k for k in (-2, 1)]
-    h, about = rail_receptances(matrices, FREQUENCY, np.array(nodes), [12.6], rows[nodes])
-    before = receptance(matrices, FREQUENCY, float(matrices.node[nodes[0]]), 12.6)
-    name = ("blade", *divmod(nodes[1], 2))
-    behind = receptance(matrices, FREQUENCY, name, 12.6)
-    assert h[:, 0] == pytest.approx(np.column_stack([before, behind]), rel=1e-6)
-    on_rail = receptance(matrices, FREQUENCY, float(matrices.node[nodes[1]]), 12.6)
-    assert np.max(np.abs(behind / on_rail - 1.0)) > 0.05
-    assert about[:, 1] == pytest.approx(receptance(matrices, FREQUENCY, name, name), rel=0.1)
+    stock, cross, blade = static_compliances(matrices, transfer_position(SURFACES, BLADE))
+    contact = 1.0 / lone_wheels(MASS).wheel_values("contact")[0].tangent(0.5 * MASS * GRAVITY)
+    assert change.flexibility == pytest.approx(stock + blade - 2.0 * cross + 2.0 * contact)
+    moved = change.share * (blade + contact) + (1.0 - change.share) * cross
+    assert moved == pytest.approx(change.share * cross + (1.0 - change.share) * (stock + contact))  # both move alike
+
+
+def test_the_weight_of_the_blade_rises_over_the_change(change):
+    x = np.array([change.start - 0.01, 0.5 * (change.start + change.end), change.end + 0.01])
+    assert change.blade_weight(x) == pytest.approx([0.0, change.share, 1.0])
+    grid = np.arange(5.0, 20.0, 0.6)
+    averaged = change.mean_blade_weight(grid, 0.6)
+    integral = (change.end - change.start) * change.share + grid[-1] - change.end
+    assert 0.6 * (averaged.sum() - 0.5 * averaged[-1]) == pytest.approx(integral, abs=0.015)
+
+
+def test_a_wave_before_the_change_acts_on_the_stock_rail_and_behind_it_on_the_blade(change):
+    matrices = assemble(TRACK.with_(blade=BLADE))
+    near = np.flatnonzero((matrices.node > 8.0) & (matrices.node < 16.0))
+    near = near[near[0] % 2 :: 2]
+    track = SimpleNamespace(matrices=matrices, load_transfer=change, positions=[12.6])
+    h, about = TrackUnderWheels._receptances_under_wheels(track, FREQUENCY, near)
+    nodes = matrices.node[near]
+    before, behind = int(np.searchsorted(nodes, change.start)) - 2, int(np.searchsorted(nodes, change.end)) + 1
+    assert h[:, 0, before] == pytest.approx(receptance(matrices, FREQUENCY, float(nodes[before]), 12.6), rel=1e-6)
+    name = ("blade", *divmod(int(near[behind]), 2))
+    on_blade = receptance(matrices, FREQUENCY, name, 12.6)
+    assert h[:, 0, behind] == pytest.approx(on_blade, rel=1e-6)
+    on_rail = receptance(matrices, FREQUENCY, float(nodes[behind]), 12.6)
+    assert np.max(np.abs(on_blade / on_rail - 1.0)) > 0.05
+    assert about[:, behind + 2] == pytest.approx(receptance(matrices, FREQUENCY, name, name), rel=0.15)
 
 
 def test_all_wheels_are_on_the_rail_without_a_top_of_the_blade():
     matrices = assemble(TRACK.with_(blade=BLADE))
-    assert (rows_under_wheels(matrices, BLADE, SURFACES[:1]) == matrices.node_index).all()
-    assert (carrying_weights(SURFACES[:1], np.linspace(5.0, 20.0, 9)) == 1.0).all()
-
-
-def test_the_higher_top_carries():
-    transfer = transfer_position(SURFACES, BLADE)
-    stock, blade = carrying_weights(SURFACES, transfer + np.array([-0.5, 0.0, 0.5]))
-    assert stock + blade == pytest.approx(1.0)
-    assert stock[0] > 0.999
-    assert blade[2] > 0.999
-    assert 0.3 < blade[1] < 0.7
+    assert load_transfer(matrices, BLADE, SURFACES[:1], lone_wheels(MASS)) is None
+    assert load_transfer(assemble(TRACK), None, SURFACES, lone_wheels(MASS)) is None
 
 
 @pytest.mark.parametrize(("surfaces", "simulated"), [(SURFACES, [True, False, True]), (SURFACES[:1], [True] * 3)])
@@ -70,3 +107,12 @@ def test_a_quotient_in_a_switch_is_used_again_until_a_common_value_has_moved(sur
         column = _difference(predictor, values, (), aligned, np.array([1.0]), "load", 0.1)
         assert column == pytest.approx(2.1)
         assert (len(values_seen) > before) == is_simulated
+
+
+def test_a_sample_in_a_switch_errs_by_a_tenth_of_its_channel():
+    """Also where nothing moves, since the blade chatters after a wheel."""
+    rows = np.array([[0.0, 3.0, 4.0, 0.0], [0.0, 0.3, 0.4, 0.0]])
+    plain = Observation("a", "a", rows.ravel(), 0.2, rows=2)
+    rms = np.array([2.5, 2.5, 2.5, 2.5, 0.25, 0.25, 0.25, 0.25])
+    assert with_chatter(plain).sigma == pytest.approx(np.hypot(0.2, 0.1 * rms))
+    assert with_chatter(plain).data == pytest.approx(plain.data)

@@ -170,3 +170,15 @@ def test_a_blade_is_as_long_on_every_mesh(toe):
     meshes = (prepare(switch.with_(elements_per_bay=n), 1e-4).matrices for n in (2, 4, 6, 8))
     *coarse, fine = (receptance(matrices, frequency, position, position) for matrices in meshes)
     assert max(np.max(np.abs(h / fine - 1.0)) for h in coarse) < 0.005
+
+
+def test_the_wheel_sinks_by_the_power_of_the_way_that_it_has_moved_off():
+    """Closed form at half the way, in either direction; 2 unless the file gives another."""
+    x = np.array([9.0, 10.5, 12.0, 13.5, 20.0])
+    for power, half in ((1.8, 0.02 * 0.5**1.8), (2.0, 0.005)):
+        expected = pytest.approx([0.0, 0.0, half, 0.02, 0.02])
+        assert StockFall(10.5, 3.0, 0.02, power)(x) == expected
+        assert StockFall(-10.5, -3.0, 0.02, power)(-x) == expected
+    assert StockFall(10.5, 3.0, 0.02).power == 2.0
+    with pytest.raises(SimulationError, match="power"):
+        StockFall(10.5, 3.0, 0.02, 0.5)

@@ -27,7 +27,8 @@ from turnout.mismatch.turnout.track_parameters import vehicle_with
 from turnout.readers import MAX_WHOLE_FILE_SIZE, read
 from turnout.readers.writing import write
 from turnout.simulate import Sensor, load_vehicle
-from turnout.stages import mismatch, mismatch_inputs
+from turnout.simulate.blade import Blade
+from turnout.stages import mismatch, mismatch_groups, mismatch_inputs
 from turnout.stages.accept_finding import with_entry
 from turnout.stages.accepted_effects import AcceptedEffect
 from turnout.stages.calibrate import calibrate_to_files
@@ -184,6 +185,18 @@ def test_a_route_that_the_track_has_not_is_said(folder):
     made = list(groups(turnout, track_of(turnout)[0], found))
     assert [g.labels for g in made] == [("A",)]
     assert [str(note) for note in found.notes] == ["sections B: the track's file has no route diverging; not used"]
+
+
+def test_a_case_in_a_switch_has_a_third_of_the_axles(folder, monkeypatch):
+    """An axle costs three times as much there; limits that are given stay."""
+    limits = []
+    monkeypatch.setattr(mismatch_groups, "_campaign", lambda *arguments: limits.append(arguments[-1]))
+    turnout = turnout_in(folder)
+    plain = track_of(turnout)[0]
+    switch = plain.with_track(blade=Blade(12.0, 17.0, 22.0, plain.track.rail, 3e8, 3e4))
+    for track, given in ((plain, None), (switch, None), (switch, (60, 1000))):
+        assert list(groups(turnout, track, VisitInputs([], {}), limits=given)) == []
+    assert dict.fromkeys(limits) == dict.fromkeys([(8, 96), (8, 32), (60, 1000)])
 
 
 def test_the_result_of_the_newer_recordings_is_accepted(tmp_path, monkeypatch):

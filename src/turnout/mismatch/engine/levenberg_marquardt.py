@@ -96,7 +96,9 @@ class DampedSteps:
         step = step / self.joint.sd
         return float(2.0 * step @ self.right - step @ self.normal @ step)
 
-    def first_improvement(self, cost: float, damping: float) -> tuple[FitPoint | None, float]:
+    def first_improvement(
+        self, cost: float, damping: float, max_tries: int | None = None
+    ) -> tuple[FitPoint | None, float]:
         """First step that costs less, with rising damping.
 
         Parameters
@@ -105,6 +107,8 @@ class DampedSteps:
             Cost before the step.
         damping : float
             Times the diagonal, of the first trial.
+        max_tries : int or None
+            Largest number of trials; None: that of the settings.
 
         Returns
         -------
@@ -115,7 +119,7 @@ class DampedSteps:
             For the next step; 0 without an improvement.
         """
         joint = self.joint
-        for _ in range(THRESHOLDS.max_damping_tries):
+        for _ in range(max_tries or THRESHOLDS.max_damping_tries):
             step = self.damped_step(damping)
             if self.predicted_decrease(step) < THRESHOLDS.min_decrease_share * joint.min_decrease:
                 break

@@ -337,9 +337,11 @@ def _observe_passage(
         timed = AlignedPassage(passage.name, passage, sensors, np.zeros(0), reference, speed) if is_timed else None
         return _Unmatched(passage, correlation, timed)
     try:
-        return passage_observation.observe_passage(passage, sensors, reference, speed, tolerance)
+        aligned, observation = passage_observation.observe_passage(passage, sensors, reference, speed, tolerance)
     except SimulationError as error:
         return str(error)
+    in_switch = aligner.predictor.track(passage.route).blade is not None
+    return aligned, passage_observation.with_chatter(observation) if in_switch else observation
 
 
 def with_errors(predictor: Predictor, values: Values, aligned: AlignedPassage, observation: Observation) -> Observation:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -227,6 +227,27 @@ def observation_of(
         labels,
         rows=len(data),
     )
+
+
+def with_chatter(observation: Observation) -> Observation:
+    """The observation of a passage in a switch: a blade that is lifted off its chairs falls back and chatters.
+
+    When it does so depends on gaps that nobody measures.
+
+    Parameters
+    ----------
+    observation : Observation
+        Of a passage.
+
+    Returns
+    -------
+    Observation
+        With a larger error of each channel.
+    """
+    rows = observation.data.reshape(observation.rows, -1)
+    chatter = PASSAGE.chatter_share * np.sqrt(np.mean(rows**2, axis=1, keepdims=True))
+    sigma = np.hypot(observation.sigma.reshape(rows.shape), chatter)
+    return replace(observation, sigma=sigma.ravel())
 
 
 def coupling_modes(aligned: AlignedPassage, data: np.ndarray) -> np.ndarray:

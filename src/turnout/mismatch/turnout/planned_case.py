@@ -101,6 +101,8 @@ def planned_data(plan: Plan, settings: MismatchSettings, solver: Track1D) -> tup
         data = predictor.predict_passage(values, (), a).reshape(len(a.sensors), -1)
         noise = NOISE_SHARE * np.std(data, axis=1)
         observation = passage_observation.observation_of(a, data, noise, settings.materiality)
+        if predictor.track(a.passage.route).blade is not None:
+            observation = passage_observation.with_chatter(observation)
         observations.append(replace(observation, modes=wheel_modes(predictor, values, a, observation.sigma)))
     return CaseData(campaign, settings, site, pairs, aligned, tuple(observations)), predictor.with_recordings(
         pairs, aligned

@@ -169,6 +169,9 @@ class PassagePriors:
     clipping_blur: float = prior(0.03, "s", "about a sample at the range, which is disturbed by clipping", "numerical")
     range_share: float = prior(0.999, "share of the range", "from which a sample counts as clipped", "numerical")
     coupling_corner_sd: float = prior(0.7, "Hz", "lower corner of an amplifier without a data sheet", ERROR_MODES)
+    chatter_share: float = prior(
+        0.1, "share of the rms", "error of a sample where a blade lies on slide chairs: it chatters after a wheel",
+        "decisions/switch-panels.md")
     noise_floor_share: float = prior(0.02, "share of the rms", "least error of a sample", "convention")
     effective_share: float = prior(0.35, "-", "of the samples that count as independent", "convention")
     min_read_rate: float = prior(2500.0, "Hz", "at which cubic interpolation is right to 0.03 % at 112 Hz", "numerical")
@@ -221,8 +224,8 @@ class SimulationPriors:
         0.5, "prior sd", "of a common value, within which a quotient in a switch is used again; fits stall at 1",
         "numerical")
     path_step: float = prior(0.01, "m", "of a fine path", "numerical")
-    contact_approach: float = prior(
-        1e-4, "m", "of wheel and rail under 100 kN: over so much, two tops share the force", "convention")
+    transfer_step: float = prior(
+        0.002, "m", "between trial positions where a wheel first and last touches two rails", "numerical")
     ring_time: float = prior(0.35, "s", "ringing of the track after the last wheel", LOCAL_RAIL)
     averaging_length: float = prior(
         2.4, "m", "of the rail about a wheel; 0.6 and 1.2 err near the wheel resonance, the whole rail above it",

@@ -15,8 +15,9 @@ from turnout.mismatch.turnout.passage_band import transfer_lines
 from turnout.mismatch.turnout.priors import RECEPTANCE, SIMULATION
 from turnout.mismatch.turnout.receptance_model import linear_matrices
 from turnout.mismatch.turnout.track_parameters import track_with
-from turnout.mismatch.turnout.wave_response import WaveTransfer, track_key
-from turnout.mismatch.turnout.wheel_line import rows_under_wheels
+from turnout.mismatch.turnout.track_under_wheels import track_key
+from turnout.mismatch.turnout.wave_response import WaveTransfer
+from turnout.mismatch.turnout.wheel_line import blade_rows
 from turnout.simulate.frequency_response import responses
 from turnout.simulate.run import Probe
 
@@ -125,24 +126,41 @@ def green_functions(
     return frequency, predictor.track_transfer(key, compute)
 
 
-def _static_deflection(
-    predictor: Predictor, values: Values, terms: Terms, aligned: AlignedPassage, positions: np.ndarray
-) -> np.ndarray:
-    """(n_support, 2, n_x) static deflection of the rail at ``positions`` per force on rail seat and sleeper [m/N]."""
-    under = [t.under_conditions(aligned.conditions) for t in terms]
-    track = track_with(predictor.track(aligned.passage.route, under), predictor.zone, values)
-    surfaces = predictor.surface.surfaces(aligned.passage.route, values) if track.blade is not None else ()
+class _StaticDeflection:
+    """Static deflection of the nodes of stock rail and blade per force on rail seat and sleeper."""
 
-    def compute() -> np.ndarray:
-        matrices = linear_matrices(track, under)
-        names = [(layer, j) for j in predictor.zone.supports for layer in ("rail", "sleeper")]
-        rows = matrices.node_index if track.blade is None else rows_under_wheels(matrices, track.blade, surfaces)
-        h = responses(matrices, [0.0], names, rows)[0].real
-        inside = [np.interp(positions, matrices.node, row) for row in h]
-        return np.array(inside).reshape(-1, 2, positions.size)
+    def __init__(self, predictor: Predictor, values: Values, terms: Terms, aligned: AlignedPassage):
+        under = [t.under_conditions(aligned.conditions) for t in terms]
+        track = track_with(predictor.track(aligned.passage.route, under), predictor.zone, values)
 
-    key = "deflection", *track_key(predictor, values, aligned, under), surfaces, positions.tobytes()
-    return predictor.track_transfer(key, compute)
+        def compute() -> tuple[np.ndarray, np.ndarray]:
+            matrices = linear_matrices(track, under)
+            names = [(layer, j) for j in predictor.zone.supports for layer in ("rail", "sleeper")]
+            rows = np.concatenate([matrices.node_index, blade_rows(matrices)])
+            return matrices.node, responses(matrices, [0.0], names, rows)[0].real
+
+        key = "deflection", *track_key(predictor, values, aligned, under)
+        self.node, deflections = predictor.track_transfer(key, compute)
+        self.stock, self.blade = np.split(deflections, 2, axis=1)
+
+    def at(self, positions: np.ndarray, on_blade: bool = False) -> np.ndarray:
+        """(n_x, n_support, 3) deflection at ``positions`` per force on the targets RAIL, SLEEPER and PAD [m/N].
+
+        Parameters
+        ----------
+        positions : (n_x,) array of float
+            [m]
+        on_blade : bool
+            Of the blade where there is one; else of the stock rail.
+
+        Returns
+        -------
+        (n_x, n_support, 3) array of float
+        """
+        rows = self.blade if on_blade else self.stock
+        inside = np.array([np.interp(positions, self.node, row) for row in rows])
+        inside = inside.reshape(-1, 2, positions.size).transpose(2, 0, 1)
+        return np.concatenate([inside, inside[..., :1] - inside[..., 1:]], axis=-1)
 
 
 def force_responses(
@@ -177,8 +195,8 @@ def force_responses(
     """
     transfer = WaveTransfer(predictor, values, aligned, terms)
     _, g = green_functions(predictor, values, terms, aligned)
-    deflection = _static_deflection(predictor, values, terms, aligned, transfer.path_grid)
-    g, deflection = (np.concatenate([x, x[..., :1] - x[..., 1:]], axis=-1) for x in (g, deflection.transpose(0, 2, 1)))
+    g = np.concatenate([g, g[..., :1] - g[..., 1:]], axis=-1)
+    static = _StaticDeflection(predictor, values, terms, aligned)
     groups = [f if isinstance(f, list) else [f] for f in forces.values()]
     first = np.cumsum([0, *(len(f) for f in groups[:-1])])
     force_list = [f for some in groups for f in some]
@@ -187,13 +205,27 @@ def force_responses(
     history = np.array([force for _, _, force in force_list])
     history = history - history[:, :1]
     clock = (np.arange(history.shape[1]) + 0.5) / predictor.solver.rate
-    paths = np.empty((support.size, transfer.wheel_delays.size, transfer.path_grid.size))
-    for w in range(transfer.wheel_delays.size):
-        when = transfer.times(w, SIMULATION.lead_time)
-        for k, force in enumerate(history):
-            paths[k, w] = np.interp(when, clock, force, 0.0, 0.0) * deflection[support[k], :, target[k]]
+
+    def under_wheels(x: np.ndarray, deflection: np.ndarray) -> np.ndarray:
+        """(n_key, n_wheel, n_x) deflection under each wheel when it is at x, by the forces that act then."""
+        share = deflection[:, support, target].T
+        total = np.empty((support.size, transfer.wheel_delays.size, x.size))
+        for w in range(transfer.wheel_delays.size):
+            when = transfer.times(w, SIMULATION.lead_time, x)
+            for k, force in enumerate(history):
+                total[k, w] = np.interp(when, clock, force, 0.0, 0.0) * share[k]
+        return np.add.reduceat(total, first, axis=0)
+
+    grid, change = transfer.path_grid, transfer.load_transfer
+    deflection = static.at(grid)
+    if change is not None:
+        weight = change.mean_blade_weight(grid, grid[1] - grid[0])[:, None, None]
+        deflection = (1.0 - weight) * deflection + weight * static.at(grid, on_blade=True)
     columns = transfer.force_response(history, g[:, :, support, target], first)
-    columns += transfer.reactions(np.add.reduceat(paths, first, axis=0))
+    columns += transfer.reactions(under_wheels(grid, deflection))
+    if change is not None:
+        x, _ = change.positions()
+        columns += transfer.pair_response(under_wheels(x, static.at(x) - static.at(x, on_blade=True)))
     return dict(zip(forces, columns.T))
 
 

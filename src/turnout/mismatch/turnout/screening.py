@@ -16,7 +16,6 @@ from turnout.mismatch.turnout import receptance_observation
 from turnout.mismatch.turnout.pseudo_forces import PAD, RAIL, SLEEPER, force_responses, support_motion
 from turnout.mismatch.turnout.receptance_model import AddedLinks
 from turnout.mismatch.turnout.wave_response import WaveTransfer
-from turnout.mismatch.turnout.wheel_line import carrying_weights
 from turnout.physics.hypothesis import SupportMotion
 from turnout.physics.term import PhysicsTerm
 from turnout.simulate.blade import is_on_blade
@@ -167,14 +166,13 @@ def _path_changes(case: PredictedCase, fit: Fit, aligned: AlignedPassage, chosen
     if not chosen:
         return {}
     transfer = WaveTransfer(case.predictor, fit.values, aligned, case.all_terms(fit))
-    surfaces, grid = case.predictor.surface.surfaces(aligned.passage.route, fit.values), transfer.fine_grid
-    on_blade = carrying_weights(surfaces, grid)[[is_on_blade(surface) for surface in surfaces]].sum(axis=0)
-    rows = []
+    grid, on_stock, on_blade = transfer.fine_grid, [], []
     for c, k in chosen:
         components = c.term(c.starts[k]).paths(None, aligned.passage.vehicle)
-        weighted = ((on_blade if is_on_blade([p]) else 1.0) * p(grid, 0) for p in components)
-        rows.append(sum(weighted, np.zeros(grid.size)))
-    columns = transfer.train_response(np.array(rows))
+        of_both = [p for p in components if not is_on_blade([p])]
+        on_stock.append(sum((p(grid, 0) for p in of_both), np.zeros(grid.size)))
+        on_blade.append(sum((p(grid, 0) for p in components), np.zeros(grid.size)))
+    columns = transfer.tops_response(np.array(on_stock), np.array(on_blade), transfer.train())
     return {(c.key, k): column for (c, k), column in zip(chosen, columns.T)}
 
 

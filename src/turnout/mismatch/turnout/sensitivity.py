@@ -142,6 +142,23 @@ def _fill_common_columns(
                 jacobian[:, index[name]] = _difference(predictor, values, terms, aligned, predicted, name, step)
 
 
+def is_in_switch(predictor: Predictor, aligned: AlignedPassage) -> bool:
+    """Whether the wheels of a passage change to a blade.
+
+    Parameters
+    ----------
+    predictor : Predictor
+        Predicts the recordings of the site.
+    aligned : AlignedPassage
+        The passage.
+
+    Returns
+    -------
+    bool
+    """
+    return has_blade(predictor.surface.turnout.surfaces(aligned.passage.route))
+
+
 def _difference(
     predictor: Predictor,
     values: Values,
@@ -155,7 +172,7 @@ def _difference(
 
     In a switch it is computed again only where a common value has moved: there a passage costs three times as much.
     """
-    if not has_blade(predictor.surface.turnout.surfaces(aligned.passage.route)):
+    if not is_in_switch(predictor, aligned):
         return _quotient(predictor, values, terms, aligned, predicted, name, step)
     key = (aligned.name, name, tuple(t.name for t in terms if t.effect_type == "path"))
     common = {n: values[n] / sd for n, sd in predictor.site.common_sds.items()}
@@ -248,4 +265,8 @@ def _passage_columns(
         yield f"gain_{sensor.name}", column.ravel()
     yield from _seat_columns(predictor, values, terms, aligned, predicted)
     histories = support_motion(predictor, values, terms, aligned)
-    yield from support_columns(predictor, values, terms, aligned, histories).items()
+    columns = support_columns(predictor, values, terms, aligned, histories)
+    if is_in_switch(predictor, aligned):  # chairs open and close with it
+        name = "ballast_stiffness"
+        columns[name] = _difference(predictor, values, terms, aligned, predicted, name, SIMULATION.log_step)
+    yield from columns.items()

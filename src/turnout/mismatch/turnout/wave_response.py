@@ -8,6 +8,9 @@ a free track carries to the sensors. A force of frequency :math:`f_0` that moves
 
 Here :math:`\tau_n` is the time at the node and T the distance between nodes over v. :math:`F_n` is the force on the
 rail about the node: its receptance is averaged over 2.4 m, since a wheel rings on for a few bays.
+
+In a switch the force acts on the rail that the wheel presses, and a change of one top alone also moves load from one
+rail to the other (``wheel_line``).
 """
 
 from __future__ import annotations
@@ -18,11 +21,9 @@ import numpy as np
 
 from turnout.mismatch.turnout import passage_band
 from turnout.mismatch.turnout.priors import PASSAGE, SIMULATION
-from turnout.mismatch.turnout.receptance_model import linear_matrices
 from turnout.mismatch.turnout.receptance_observation import channel_factor
-from turnout.mismatch.turnout.track_parameters import track_value_key, track_with, vehicle_with
-from turnout.mismatch.turnout.wheel_line import points_of_rows, rows_under_wheels
-from turnout.simulate.frequency_response import responses
+from turnout.mismatch.turnout.track_parameters import vehicle_with
+from turnout.mismatch.turnout.track_under_wheels import TrackUnderWheels
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,16 +31,14 @@ if TYPE_CHECKING:
 
     from turnout.mismatch.turnout.passage_observation import AlignedPassage
     from turnout.mismatch.turnout.prediction import Predictor, Terms, Values
-    from turnout.simulate.matrices import TrackMatrices
-    from turnout.simulate.track import Track
     from turnout.simulate.vehicle import Vehicle
-    from turnout.simulate.wheel_path import Surfaces
 
 
 class WaveTransfer:
     """Transfer from waves to the sensors of one passage, on the track that ``values`` and ``terms`` give.
 
-    ``node`` (n,) are positions of the forces, up to ``beyond`` the ends of the free waves [m].
+    ``node`` (n,) are positions of the forces, up to ``beyond`` the ends of the free waves [m]. ``load_transfer`` is the
+    change of the wheels to the blade of a switch, None elsewhere.
     """
 
     def __init__(
@@ -47,7 +46,10 @@ class WaveTransfer:
     ):
         terms = [t.under_conditions(aligned.conditions) for t in terms]
         self.aligned, waves, vehicle = aligned, predictor.waves, _vehicle(values, aligned, terms)
-        lines, transfer, point, self.node = _transfers(predictor, values, aligned, terms, beyond)
+        track = TrackUnderWheels(predictor, values, aligned, terms, vehicle)
+        self.load_transfer = track.load_transfer
+        lines = passage_band.transfer_lines()
+        transfer, point, pair, self.node = track.transfers(lines, beyond)
         self.speed = aligned.speed * (1.0 + values[f"speed@{aligned.name}"])
         self.sign = 1.0 if aligned.passage.direction == "facing" else -1.0
         self.first = self.sign * min(self.sign * s.place for s in aligned.sensors)
@@ -70,6 +72,7 @@ class WaveTransfer:
         gate = passage_band.band_window(self.grid, PASSAGE.band_low, aligned.high)
         channels = channel_responses(values, terms, aligned, self.grid)
         self.clock = (gate * self.rate * np.exp(2j * np.pi * self.grid * start_time))[:, None] * channels
+        self.pair_transfer = None if pair is None else self._pair_transfer(track, _interpolate(self.grid, lines, pair))
 
     def train(self) -> np.ndarray:
         """(f,) sum over all wheels of their delays."""
@@ -154,39 +157,59 @@ class WaveTransfer:
         cosine_and_sine = np.stack([plus + minus, (plus - minus) * (-1j * self.sign)], axis=-1)
         return self._on_clock(cosine_and_sine.reshape(*cosine_and_sine.shape[:2], -1) * delay[:, None, None])
 
-    def train_response(self, paths: np.ndarray) -> np.ndarray:
-        """(n_sensor * n_time, n_key) response when every wheel follows paths (n_key, n_x) [m] over one period.
+    def tops_response(self, on_stock: np.ndarray, on_blade: np.ndarray, delay: np.ndarray) -> np.ndarray:
+        """Response when the tops of stock rail and blade are lower by some paths.
 
         Parameters
         ----------
-        paths : array
-            (n_key, n_x) deviations of the running surface at ``path_grid`` [m].
+        on_stock, on_blade : (n_key, n_x) array of float
+            Dips at ``fine_grid``; both the same where there is no blade. [m]
+        delay : (f,) array of complex
+            ``train()``, or ``wheel`` of one.
 
         Returns
         -------
-        (n_sensor * n_time, n_key) array
-            Response when every wheel follows paths (n_key, n_x) [m] over one period.
+        (n_sensor * n_time, n_key) array of float
+            [m/s²]
         """
-        plus, minus, a = self._harmonics(paths)
-        return self._on_clock((plus @ a.T + minus @ a.T.conj()) * self.train()[:, None, None])
+        weight = 0.0 if self.load_transfer is None else self.load_transfer.blade_weight(self.fine_grid)
+        plus, minus, a = self._harmonics((1.0 - weight) * on_stock + weight * on_blade)
+        spectrum = plus @ a.T + minus @ a.T.conj()
+        if self.load_transfer is not None and self.pair_transfer is not None:
+            x, _ = self.load_transfer.positions()
+            difference = [np.interp(x, self.fine_grid, d) for d in on_stock - on_blade]
+            spectrum = spectrum + self.pair_transfer @ np.array(difference).T
+        return self._on_clock(spectrum * delay[:, None, None])
 
-    def wheel_response(self, w: int, paths: np.ndarray) -> np.ndarray:
-        """The same for wheel ``w`` alone.
+    def pair_response(self, differences: np.ndarray) -> np.ndarray:
+        """Response to the load that goes from one rail to the other under each wheel.
 
         Parameters
         ----------
-        w : int
-            Index of the wheel, from 0.
-        paths : array
-            (n_key, n_x) deviations of the running surface at ``path_grid`` [m].
+        differences : (n_key, n_wheel, m) array of float
+            Deflection of the stock rail less that of the blade at ``load_transfer.positions()``. [m]
 
         Returns
         -------
-        array
-            The same for wheel ``w`` alone.
+        (n_sensor * n_time, n_key) array of float
+            [m/s²]
         """
-        plus, minus, a = self._harmonics(paths)
-        return self._on_clock((plus @ a.T + minus @ a.T.conj()) * self.wheel(w)[:, None, None])
+        assert self.pair_transfer is not None
+        total: Any = 0.0
+        for w in range(self.wheel_delays.size):
+            total = total + (self.pair_transfer @ differences[:, w].T) * self.wheel(w)[:, None, None]
+        return self._on_clock(total)
+
+    def _pair_transfer(self, track: TrackUnderWheels, pair: np.ndarray) -> np.ndarray:
+        """(f, n_sensor, m) response to the first wheel per difference of both tops at each position of the change."""
+        change = track.load_transfer
+        assert change is not None
+        x, length = change.positions()
+        node = track.matrices.node[track.pair_nodes]
+        shares = np.array([np.interp(x, node, unit) for unit in np.eye(node.size)])
+        times = self.sign * (x - self.first) / self.speed
+        force = np.exp(-2j * np.pi * self.grid[:, None] * times) * (length / self.speed / change.flexibility)
+        return (pair @ shares) * force[:, None, :]
 
     def _harmonics(self, paths: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Spectra of the waves of ``path_grid``, and amplitudes (..., n_wave) of paths (..., n_x) in them."""
@@ -227,7 +250,7 @@ class WaveTransfer:
 
     @property
     def fine_grid(self) -> np.ndarray:
-        """The same for paths of ``train_response`` and ``wheel_response`` with waves shorter than those modelled.
+        """The same for paths of ``tops_response`` with waves shorter than those modelled.
 
         Sampled as coarsely as ``path_grid``, a kink would alias to longer waves.
         """
@@ -236,8 +259,8 @@ class WaveTransfer:
     def _period_grid(self, n: int) -> np.ndarray:
         return self.start + self.period * np.arange(n) / n
 
-    def times(self, w: int, lead: float) -> np.ndarray:
-        """(n_x,) time of wheel ``w`` at ``path_grid``, in the time of the simulation [s].
+    def times(self, w: int, lead: float, x: np.ndarray) -> np.ndarray:
+        """(n_x,) time of wheel ``w`` at ``x``, in the time of the simulation [s].
 
         Parameters
         ----------
@@ -245,13 +268,15 @@ class WaveTransfer:
             Index of the wheel, from 0.
         lead : float
             Time that the simulation starts before the observation [s].
+        x : (n_x,) array of float
+            Positions of the wheel. [m]
 
         Returns
         -------
         (n_x,) array
-            Time of wheel ``w`` at ``path_grid``, in the time of the simulation [s].
+            Time of wheel ``w`` at ``x``, in the time of the simulation [s].
         """
-        return lead + self.sign * (self.path_grid - self.first) / self.speed + self.wheel_delays[w]
+        return lead + self.sign * (x - self.first) / self.speed + self.wheel_delays[w]
 
     def force_response(self, histories: np.ndarray, transfer: np.ndarray, first: np.ndarray) -> np.ndarray:
         """(n_sensor * n_time, n_key) response of the free track to forces (n_force, n) at the rate of the simulation.
@@ -319,102 +344,6 @@ def channel_responses(values: Values, terms: Terms, aligned: AlignedPassage, fre
     """
     factors = [channel_factor(terms, s, frequency) * (1.0 + values[f"gain_{s.name}"]) for s in aligned.sensors]
     return np.column_stack(factors)
-
-
-def _transfers(
-    predictor: Predictor, values: Values, aligned: AlignedPassage, terms: Terms, beyond: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Lines, acceleration of the sensors per force on rail nodes (m, n_sensor, n_node), receptance of the rail about
-    each node (m, n_node), and nodes.
-    """
-    track = track_with(predictor.track(aligned.passage.route, terms), predictor.zone, values)
-    positions = tuple(predictor.seat(s, values, terms).probe(track).place for s in aligned.sensors)
-    surfaces = predictor.surface.surfaces(aligned.passage.route, values) if track.blade is not None else ()
-    key = "waves", *track_key(predictor, values, aligned, terms), positions, surfaces, beyond
-    return predictor.track_transfer(key, lambda: _rail_transfers(predictor, track, terms, positions, surfaces, beyond))
-
-
-def track_key(predictor: Predictor, values: Values, aligned: AlignedPassage, terms: Terms) -> tuple[Any, ...]:
-    """All that the linear track under a passage depends on.
-
-    Parameters
-    ----------
-    predictor : Predictor
-        Predicts the recordings of the site.
-    values : mapping
-        All nuisances of the site, by name.
-    aligned : AlignedPassage
-        The passage.
-    terms : sequence of PhysicsTerm
-        Effects beside the base model, under the conditions of the passage.
-
-    Returns
-    -------
-    tuple
-    """
-    return aligned.passage.route, track_value_key(predictor.zone, values), repr(tuple(terms))
-
-
-def _rail_transfers(
-    predictor: Predictor,
-    track: Track,
-    terms: Terms,
-    positions: Sequence[float | tuple],
-    surfaces: Surfaces,
-    beyond: float,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    matrices = linear_matrices(track, terms)
-    frequency = passage_band.transfer_lines()
-    beyond += SIMULATION.node_margin
-    near = np.flatnonzero(
-        (matrices.node >= predictor.waves.start - beyond) & (matrices.node <= predictor.waves.end + beyond)
-    )
-    rows = matrices.node_index
-    if track.blade is not None:
-        rows = rows_under_wheels(matrices, track.blade, surfaces)
-        near = near[near[0] % SIMULATION.node_stride :]  # the node at the toe is not in line with the others
-    near = near[:: SIMULATION.node_stride]
-    h, mean_receptance = rail_receptances(matrices, frequency, near, positions, rows[near])
-    return frequency, -((2.0 * np.pi * frequency) ** 2)[:, None, None] * h, mean_receptance, matrices.node[near]
-
-
-def rail_receptances(
-    matrices: TrackMatrices,
-    frequency: np.ndarray,
-    near: np.ndarray,
-    positions: Sequence[float | tuple],
-    rows: np.ndarray | None = None,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Receptances between positions and nodes, and of the rail about these nodes.
-
-    The latter are averaged over 2.4 m.
-
-    Parameters
-    ----------
-    matrices : TrackMatrices
-        Of the track.
-    frequency : (m,) array of float
-        Lines. [Hz]
-    near : (n,) array of int
-        Nodes.
-    positions : sequence
-        Positions [m] or degrees of freedom.
-    rows : (n,) array of int or None
-        Row of the deflection under wheels at each node; None: that of the rail.
-
-    Returns
-    -------
-    h : (m, n_place, n) array of complex
-        [m/N]
-    mean_receptance : (m, n) array of complex
-        [m/N]
-    """
-    node = matrices.node[near]
-    rows = matrices.node_index[near] if rows is None else rows
-    h = responses(matrices, frequency, [*positions, *points_of_rows(matrices, rows)], rows)
-    about = np.abs(node[:, None] - node) < 0.5 * SIMULATION.averaging_length
-    mean_receptance = np.diagonal(h[:, len(positions) :], axis1=1, axis2=2) @ (about / about.sum(axis=0))
-    return h[:, : len(positions)], mean_receptance
 
 
 def wheel_and_contact_receptance(vehicle: Vehicle, frequency: np.ndarray) -> np.ndarray:

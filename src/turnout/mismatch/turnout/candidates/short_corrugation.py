@@ -25,7 +25,8 @@ from turnout.mismatch.turnout.candidates.catalogue import candidate_of
 from turnout.mismatch.turnout.matrix_cache import matrices_of
 from turnout.mismatch.turnout.priors import CORRUGATION, PASSAGE, SIMULATION
 from turnout.mismatch.turnout.track_parameters import track_with
-from turnout.mismatch.turnout.wave_response import rail_receptances, wheel_and_contact_receptance
+from turnout.mismatch.turnout.track_under_wheels import rail_receptances
+from turnout.mismatch.turnout.wave_response import wheel_and_contact_receptance
 from turnout.physics.hypothesis import Hypothesis
 from turnout.physics.rail_corrugation import MIN_AMPLITUDE
 
