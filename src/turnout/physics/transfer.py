@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.fft import next_fast_len
 
 from turnout.physics.term import PhysicsTerm
 
@@ -43,6 +42,8 @@ class TransferTerm(PhysicsTerm):
         if sensor.name != self.channel_name:
             return signal
         signal = np.asarray(signal, dtype=float)
+        from scipy.fft import next_fast_len  # not at module level: pages read names of effects without scipy
+
         n = next_fast_len(signal.size + max(2048, signal.size // 8), real=True)
         frequency = np.fft.rfftfreq(n, 1.0 / rate)
         return np.fft.irfft(np.fft.rfft(signal, n) * self.transfer(frequency), n)[: signal.size]

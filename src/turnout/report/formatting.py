@@ -9,8 +9,6 @@ from datetime import datetime
 from functools import cache
 from typing import TYPE_CHECKING
 
-from scipy.special import stdtrit
-
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
     from typing import Any
@@ -57,7 +55,13 @@ def escape(text: str, quote: bool = True) -> str:
 
 @cache
 def student_quantile(n: int) -> float:
-    """97.5 % quantile of Student's t with n - 1 degrees of freedom.
+    r"""97.5 % quantile of Student's t with n - 1 degrees of freedom, from the finite series of its distribution.
+
+    .. math:: P(|t| < \sqrt\nu \tan\theta) = \sin\theta \sum_{k=0}^{\nu/2-1} \frac{(2k-1)!!}{(2k)!!} \cos^{2k}\theta,
+              \qquad \tfrac{2}{\pi} \Bigl(\theta + \sin\theta \sum_{k=0}^{(\nu-3)/2}
+              \frac{(2k)!!}{(2k+1)!!} \cos^{2k+1}\theta\Bigr)
+
+    for even and odd :math:`\nu`. No page needs scipy for it, which takes 20 MB and a tenth of a second to import.
 
     Parameters
     ----------
@@ -67,14 +71,37 @@ def student_quantile(n: int) -> float:
     Returns
     -------
     float
-        Quantile.
+        Quantile; nan for fewer values.
+
+    References
+    ----------
+    Abramowitz and Stegun 1964, 26.7.3 and 26.7.4.
 
     Examples
     --------
     >>> round(student_quantile(30), 3)
     2.045
     """
-    return float(stdtrit(n - 1, 0.975))
+    if n < 2:
+        return math.nan
+    low, high = 0.0, math.pi / 2.0
+    while low < (middle := 0.5 * (low + high)) < high:
+        if _share_within(middle, int(n) - 1) < 0.95:
+            low = middle
+        else:
+            high = middle
+    return math.sqrt(n - 1) * math.tan(middle)
+
+
+def _share_within(theta: float, degrees: int) -> float:
+    """Probability that Student's t is below sqrt(degrees) tan(theta) in magnitude."""
+    sine, square, total = math.sin(theta), math.cos(theta) ** 2, 0.0
+    is_odd = degrees % 2
+    term = math.cos(theta) if is_odd else 1.0
+    for k in range(1, (degrees - is_odd) // 2 + 1):
+        total += term
+        term *= square * (2 * k - 1 + is_odd) / (2 * k + is_odd)
+    return 2.0 / math.pi * (theta + sine * total) if is_odd else sine * total
 
 
 def with_interval(value: float | None, standard_error: float | None, n: int, digits: int = 1) -> str:
