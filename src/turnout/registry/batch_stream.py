@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 CHUNK_SIZE = 4096  # units per chunk that is in memory at once
-CHUNK_ROWS = 8_192  # rows of a chunk, from which on it takes no further unit
+CHUNK_ROWS = 4_096  # rows of a chunk, from which on it takes no further unit
 
 
 def token(path: str | PathLike) -> str:
