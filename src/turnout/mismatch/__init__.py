@@ -8,7 +8,8 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate, Effect, EffectSite, NamingRules, RefitStarts
     from turnout.mismatch.engine.case import Case, Nuisance, Observation
     from turnout.mismatch.engine.diagnose import Diagnosis, diagnose
-    from turnout.mismatch.engine.map_fit import Fit, fit_jointly
+    from turnout.mismatch.engine.fit import Fit
+    from turnout.mismatch.engine.map_fit import fit_jointly
     from turnout.mismatch.engine.verdict import Verdict
 
 __all__ = [
@@ -32,7 +33,7 @@ _MODULES = {
     "Diagnosis": "diagnose",
     "Effect": "candidate",
     "EffectSite": "candidate",
-    "Fit": "map_fit",
+    "Fit": "fit",
     "NamingRules": "candidate",
     "Nuisance": "case",
     "Observation": "case",

@@ -11,7 +11,8 @@ import numpy as np
 
 from turnout.errors import TurnoutError
 from turnout.mismatch.engine.case import Nuisance, Observation
-from turnout.mismatch.turnout.prediction import Predictions, Predictor, Terms, Values
+from turnout.mismatch.turnout.prediction import Predictor
+from turnout.mismatch.turnout.predictions import Predictions, Terms, Values
 
 
 class BudgetSpentError(TurnoutError):

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from turnout.files import write_atomic
-from turnout.mismatch.engine.map_fit import Fit
+from turnout.mismatch.engine.fit import Fit
 
 FORMAT, VERSION = "turnout checkpoint", 2  # version 1 were pickles; they are never read
 SUFFIX = ".npz"

@@ -26,8 +26,8 @@ from turnout.stages.unproven import UNPROVEN_SWITCH, as_unproven
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
     from turnout.mismatch.engine.diagnose import Diagnosis
+    from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.engine.localization import Location
-    from turnout.mismatch.engine.map_fit import Fit
     from turnout.mismatch.engine.verdict import Verdict
     from turnout.mismatch.turnout.campaign import CampaignInput
     from turnout.mismatch.turnout.case import TrackCase

@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.engine.map_fit import JointProblem
+from turnout.mismatch.engine.joint_problem import JointProblem
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from turnout.config.settings.mismatch import MismatchSettings
     from turnout.mismatch.engine.candidate import Candidate
     from turnout.mismatch.engine.case import Case
-    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.engine.search import Search
 
 

@@ -18,8 +18,8 @@ from turnout.mismatch.engine.thresholds import THRESHOLDS
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.engine.localization import ResidualSpace
-    from turnout.mismatch.engine.map_fit import Fit
 
 Values: TypeAlias = Mapping[str, float]  # nuisance parameters by name
 Terms: TypeAlias = Sequence[Any]  # effects in the model, as ``Candidate.term`` gives them

@@ -25,7 +25,7 @@ from turnout.mismatch.engine.verdict import Verdict, calibrate, posterior, swap_
 
 if TYPE_CHECKING:
     from turnout.config.settings.mismatch import MismatchSettings
-    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.engine.reserved_data import Verification
     from turnout.mismatch.engine.score import Score
     from turnout.mismatch.engine.two_effects import PairEvidence, SecondEvidence

@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from turnout.config.settings.mismatch import MismatchSettings
     from turnout.mismatch.engine.case import Case
     from turnout.mismatch.engine.decision import Rule
+    from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.engine.latent_force import LatentForce
-    from turnout.mismatch.engine.map_fit import Fit
     from turnout.mismatch.engine.score import Score
 
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.engine.map_fit import JointProblem, fit_jointly
+from turnout.mismatch.engine.joint_problem import JointProblem
+from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:

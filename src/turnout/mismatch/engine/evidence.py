@@ -20,7 +20,7 @@ from turnout.mismatch.engine.thresholds import THRESHOLDS
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
     from turnout.mismatch.engine.case import Case
-    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.engine.search import Search
     from turnout.mismatch.engine.verdict import Verdict
 

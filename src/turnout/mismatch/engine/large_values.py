@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.engine.map_fit import cost_at
+from turnout.mismatch.engine.joint_problem import cost_at
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.case import Case, Nuisance
-    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.engine.search import Search
 
 

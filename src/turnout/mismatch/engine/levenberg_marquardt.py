@@ -13,7 +13,7 @@ import numpy as np
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
-    from turnout.mismatch.engine.map_fit import JointProblem
+    from turnout.mismatch.engine.joint_problem import JointProblem
 
 
 class FitPoint(NamedTuple):

@@ -23,7 +23,7 @@ from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.case import Case, Observation
-    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.engine.score import Score
 
 AMPLITUDES = np.concatenate(

@@ -16,13 +16,13 @@ from turnout.errors import SimulationError
 from turnout.mismatch.engine.candidate_search import RefitTask, shortlist
 from turnout.mismatch.engine.cross_validation import gain_where_unmasked, held_out_score, single_witness
 from turnout.mismatch.engine.evidence import score_of
-from turnout.mismatch.engine.map_fit import JointProblem, cost_at
+from turnout.mismatch.engine.joint_problem import JointProblem, cost_at
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
     from turnout.mismatch.engine.case import Case
-    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.engine.score import Score
     from turnout.mismatch.engine.search import Search
 

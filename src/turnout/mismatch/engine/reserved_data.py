@@ -10,13 +10,13 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.cross_validation import weighted_mean_square
+from turnout.mismatch.engine.joint_problem import JointProblem
 from turnout.mismatch.engine.levenberg_marquardt import FitPoint
-from turnout.mismatch.engine.map_fit import JointProblem
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.case import Case, Observation
-    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.engine.score import Score
     from turnout.mismatch.engine.search import Search
 

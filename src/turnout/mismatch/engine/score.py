@@ -12,7 +12,7 @@ from turnout.mismatch.engine.thresholds import THRESHOLDS
 if TYPE_CHECKING:
     from turnout.config.settings.mismatch import MismatchSettings
     from turnout.mismatch.engine.candidate import Candidate
-    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.fit import Fit
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
     from turnout.mismatch.engine.case import Case
     from turnout.mismatch.engine.decision import Rule
-    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.engine.score import Score
     from turnout.mismatch.engine.verdict import Verdict
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from turnout.mismatch.engine.case import Nuisance, Observation
-    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.turnout.case import TrackCase
 
 

@@ -12,8 +12,8 @@ from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Observation
+from turnout.mismatch.engine.fit import Fit
 from turnout.mismatch.engine.localization import ResidualSpace
-from turnout.mismatch.engine.map_fit import Fit
 from turnout.mismatch.turnout import sensitivity
 from turnout.mismatch.turnout.accepted_effects import NO_EFFECTS, AcceptedEffect, AcceptedEffects, effects_on
 from turnout.mismatch.turnout.campaign import CampaignInput
@@ -23,7 +23,8 @@ from turnout.mismatch.turnout.observations import CaseData, case_data, with_erro
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.passage_observation import AlignedPassage
 from turnout.mismatch.turnout.predicted_case import PredictedCase
-from turnout.mismatch.turnout.prediction import Predictions, Predictor, Terms, Values
+from turnout.mismatch.turnout.prediction import Predictor
+from turnout.mismatch.turnout.predictions import Predictions, Terms, Values
 from turnout.mismatch.turnout.priors import CASE, SIMULATION
 from turnout.mismatch.turnout.wheel_roughness import log_mass_ratios
 from turnout.mismatch.turnout.worn_nose import worn_noses

@@ -14,7 +14,7 @@ from turnout.mismatch.turnout.wave_response import channel_responses
 if TYPE_CHECKING:
     from typing import Any
 
-    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.turnout.case import TrackCase
     from turnout.mismatch.turnout.passage_observation import AlignedPassage
 

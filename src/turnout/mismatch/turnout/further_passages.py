@@ -16,7 +16,7 @@ from turnout.mismatch.turnout.priors import PASSAGE
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.case import Observation
-    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.turnout.campaign import CampaignInput
     from turnout.mismatch.turnout.case import TrackCase
 

@@ -11,7 +11,7 @@ from turnout.errors import SimulationError
 from turnout.mismatch.calibrated.constants import CALIBRATION
 
 if TYPE_CHECKING:
-    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.engine.search import Search
 
 

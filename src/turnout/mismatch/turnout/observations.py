@@ -18,7 +18,8 @@ from turnout.mismatch.turnout.hammer_case import HammerCase
 from turnout.mismatch.turnout.passage_alignment import PassageAligner, fit_surface
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.passage_observation import AlignedPassage
-from turnout.mismatch.turnout.prediction import Predictor, Values
+from turnout.mismatch.turnout.prediction import Predictor
+from turnout.mismatch.turnout.predictions import Values
 from turnout.mismatch.turnout.priors import ALIGNMENT, CASE, RECEPTANCE
 from turnout.mismatch.turnout.receptance_observation import FrfPair
 from turnout.mismatch.turnout.saturation import SaturationLimit, raw_peak, saturated_channels, without_saturated

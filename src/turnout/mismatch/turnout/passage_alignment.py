@@ -14,7 +14,8 @@ import numpy as np
 from turnout.errors import SimulationError
 from turnout.mismatch.turnout.campaign import CampaignInput, PassageInput
 from turnout.mismatch.turnout.passage_band import band_signals, limit_band, read_at
-from turnout.mismatch.turnout.prediction import Predictor, Values
+from turnout.mismatch.turnout.prediction import Predictor
+from turnout.mismatch.turnout.predictions import Values
 from turnout.mismatch.turnout.priors import ALIGNMENT, SIMULATION
 from turnout.mismatch.turnout.running_surface import POSITION_FIELDS
 from turnout.records import Recording

@@ -11,10 +11,11 @@ import numpy as np
 
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
-from turnout.mismatch.engine.map_fit import Fit
+from turnout.mismatch.engine.fit import Fit
 from turnout.mismatch.turnout.accepted_effects import NO_EFFECTS, AcceptedEffects
 from turnout.mismatch.turnout.passage_observation import AlignedPassage
-from turnout.mismatch.turnout.prediction import Predictions, Predictor, Terms, Values
+from turnout.mismatch.turnout.prediction import Predictor
+from turnout.mismatch.turnout.predictions import Predictions, Terms, Values
 from turnout.mismatch.turnout.receptance_observation import FrfPair
 from turnout.mismatch.turnout.screening import screen_columns
 

@@ -26,14 +26,16 @@ if TYPE_CHECKING:
     from typing import Any, TypeAlias
 
     from turnout.mismatch.turnout.passage_observation import AlignedPassage
-    from turnout.mismatch.turnout.prediction import Predictor, Terms, Values
+    from turnout.mismatch.turnout.prediction import Predictor
+    from turnout.mismatch.turnout.predictions import Terms, Values
+    from turnout.mismatch.turnout.site_model import SiteModel
 
     Force: TypeAlias = tuple[int, int, np.ndarray]  # support, target, (n,) force at the rate of the simulation [N]
 
 RAIL, SLEEPER, PAD = range(3)  # targets; the force of a pad acts on the rail and reversed on the sleeper
 
 
-def probes(predictor: Predictor, values: Values, terms: Terms, aligned: AlignedPassage) -> list[Probe]:
+def probes(predictor: SiteModel, values: Values, terms: Terms, aligned: AlignedPassage) -> list[Probe]:
     """Probes of rail and sleeper at every support of the zone, for pseudo-forces, and of sensors moved by
     ``RECEPTANCE.seat_step``.
 

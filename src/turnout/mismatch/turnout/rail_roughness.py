@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from turnout.mismatch.turnout.passage_observation import AlignedPassage
-    from turnout.mismatch.turnout.prediction import Predictor, Terms, Values
+    from turnout.mismatch.turnout.prediction import Predictor
+    from turnout.mismatch.turnout.predictions import Terms, Values
 
 
 class Waves:

@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 
     from turnout.mismatch.engine.candidate import Candidate
     from turnout.mismatch.engine.case import Observation
-    from turnout.mismatch.turnout.prediction import Predictor, Terms, Values
+    from turnout.mismatch.turnout.prediction import Predictor
+    from turnout.mismatch.turnout.predictions import Terms, Values
     from turnout.mismatch.turnout.receptance_observation import FrfPair
     from turnout.mismatch.turnout.receptance_sensitivity import ReceptanceSensitivity
     from turnout.simulate.force_laws import ForceLaw

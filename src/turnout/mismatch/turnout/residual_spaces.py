@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from turnout.mismatch.engine.case import Observation
-    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.turnout.case import TrackCase
     from turnout.mismatch.turnout.passage_observation import AlignedPassage
     from turnout.mismatch.turnout.receptance_observation import FrfPair

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from typing import Any
 
     from turnout.mismatch.engine.case import Case
-    from turnout.mismatch.engine.map_fit import Fit
-    from turnout.mismatch.turnout.prediction import Values
+    from turnout.mismatch.engine.fit import Fit
+    from turnout.mismatch.turnout.predictions import Values
     from turnout.mismatch.turnout.rail_roughness import Waves
     from turnout.simulate.turnout_track import TurnoutTrack
     from turnout.simulate.wheel_path import PathPart, Surfaces

@@ -23,7 +23,7 @@ from turnout.simulate.blade import is_on_blade
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
     from turnout.mismatch.engine.case import Observation
-    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.turnout.passage_observation import AlignedPassage
     from turnout.mismatch.turnout.predicted_case import PredictedCase
 

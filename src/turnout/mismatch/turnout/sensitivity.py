@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
     from turnout.mismatch.engine.case import Nuisance, Observation
     from turnout.mismatch.turnout.passage_observation import AlignedPassage
-    from turnout.mismatch.turnout.prediction import Predictor, Terms, Values
+    from turnout.mismatch.turnout.prediction import Predictor
+    from turnout.mismatch.turnout.predictions import Terms, Values
     from turnout.mismatch.turnout.receptance_observation import FrfPair
     from turnout.mismatch.turnout.receptance_sensitivity import ReceptanceSensitivity
 

@@ -17,7 +17,7 @@ from turnout.simulate.track import NODE_TOLERANCE, PER_SUPPORT, RailStretch
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from turnout.mismatch.turnout.prediction import Values
+    from turnout.mismatch.turnout.predictions import Values
     from turnout.simulate.rail import Rail
     from turnout.simulate.track import Track
     from turnout.simulate.turnout_track import TurnoutTrack

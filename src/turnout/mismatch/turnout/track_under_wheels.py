@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from typing import Any
 
     from turnout.mismatch.turnout.passage_observation import AlignedPassage
-    from turnout.mismatch.turnout.prediction import Predictor, Terms, Values
+    from turnout.mismatch.turnout.prediction import Predictor
+    from turnout.mismatch.turnout.predictions import Terms, Values
     from turnout.simulate.matrices import TrackMatrices
     from turnout.simulate.vehicle import Vehicle
 

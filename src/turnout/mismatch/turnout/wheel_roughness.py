@@ -26,10 +26,11 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Any
 
-    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.turnout.case import TrackCase
     from turnout.mismatch.turnout.passage_observation import AlignedPassage
-    from turnout.mismatch.turnout.prediction import Predictor, Values
+    from turnout.mismatch.turnout.prediction import Predictor
+    from turnout.mismatch.turnout.predictions import Values
     from turnout.mismatch.turnout.rail_roughness import Waves
     from turnout.simulate.wheel_path import PathPart
 

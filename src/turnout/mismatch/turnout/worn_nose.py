@@ -20,7 +20,7 @@ from turnout.simulate.wheel_path import Kink
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
-    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.turnout.running_surface import RunningSurface
 
 SHARPNESS = 0.5  # at which the fit of a worn nose starts: between a cosine and a kink

@@ -30,7 +30,7 @@ from turnout.physics.hypothesis import (
 from turnout.simulate.blade import transfer_position
 
 if TYPE_CHECKING:
-    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.turnout.case import TrackCase
     from turnout.mismatch.turnout.observations import CaseData
 

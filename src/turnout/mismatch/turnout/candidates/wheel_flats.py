@@ -34,7 +34,7 @@ from turnout.physics.hypothesis import Hypothesis
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
-    from turnout.mismatch.engine.map_fit import Fit
+    from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.turnout.case import TrackCase
     from turnout.mismatch.turnout.passage_observation import AlignedPassage
 

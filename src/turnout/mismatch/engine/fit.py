@@ -1,0 +1,116 @@
+"""Result of a joint fit, with all that later steps of the diagnosis need."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from turnout.mismatch.engine.candidate import Candidate
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Result of a joint fit.
+
+    ``values`` of nuisances, ``psi`` (n_term,) of the terms. ``residuals`` list by observation, ``white`` the same
+    whitened. ``jacobian`` whitened too; [] in a fit ``without_jacobian``, in single precision in an expensive case.
+    ``scale`` noise scale by data type, at least 1. ``cost`` minus twice the log posterior up to a constant.
+    ``covariance`` of nuisances and psi. ``level`` weighted mean square by data type, in units of ``sigma``.
+    ``evidence`` log probability of the data by Laplace's approximation, up to a constant of the case. [nats]
+    """
+
+    values: dict[str, float]
+    candidates: tuple[Candidate, ...]
+    psi: np.ndarray
+    predictions: list[np.ndarray]
+    residuals: list[np.ndarray]
+    jacobian: list[np.ndarray]
+    scale: dict[str, float]
+    level: dict[str, float]
+    cost: float
+    covariance: np.ndarray
+    evaluations: int
+    white: list[np.ndarray]
+    evidence: float = 0.0
+
+    @property
+    def terms(self) -> tuple[Any, ...]:
+        """The terms with their fitted parameters."""
+        return terms_of(self.candidates, self.psi)
+
+    def without_jacobian(self) -> Fit:
+        """The same fit without its Jacobian, by far its largest item."""
+        return replace(self, jacobian=[])
+
+    def with_candidates(self, candidates: Iterable[Candidate]) -> Fit:
+        """The same fit with other candidates, which carry functions and are not stored on disk.
+
+        Parameters
+        ----------
+        candidates : iterable of Candidate
+
+        Returns
+        -------
+        Fit
+        """
+        return replace(self, candidates=tuple(candidates))
+
+    def part(self, candidate: Candidate) -> slice:
+        """Slice of the parameters of a candidate in ``psi``.
+
+        Parameters
+        ----------
+        candidate : Candidate
+
+        Returns
+        -------
+        slice
+
+        Raises
+        ------
+        KeyError
+            If the candidate is not in this fit.
+        """
+        first = 0
+        for fitted in self.candidates:
+            last = first + len(fitted.parameters)
+            if fitted.key == candidate.key:
+                return slice(first, last)
+            first = last
+        raise KeyError(f"{candidate.key} is not in this fit")
+
+    @property
+    def psi_se(self) -> np.ndarray:
+        """(n_term,) standard errors of the terms' parameters; a size also errs by its ``model_error_share``."""
+        errors, first = np.sqrt(np.maximum(np.diag(self.covariance)[len(self.values) :], 0.0)), 0
+        for candidate in self.candidates:
+            if candidate.parameters:
+                size = self.psi[first] - candidate.parameters[0].neutral
+                errors[first] = np.hypot(errors[first], candidate.effect.model_error_share * size)
+            first += len(candidate.parameters)
+        return errors
+
+
+def terms_of(candidates: Sequence[Candidate], psi: np.ndarray) -> tuple[Any, ...]:
+    """Terms of several candidates from their stacked parameters.
+
+    Parameters
+    ----------
+    candidates : sequence of Candidate
+    psi : (n_term,) array of float
+
+    Returns
+    -------
+    tuple of terms
+        As ``Case.predict`` takes them.
+    """
+    terms, first = [], 0
+    for candidate in candidates:
+        last = first + len(candidate.parameters)
+        terms.append(candidate.term(psi[first:last]))
+        first = last
+    return tuple(terms)

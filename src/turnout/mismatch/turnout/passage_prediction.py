@@ -1,0 +1,245 @@
+"""Predictions of passages: simulated signals, and responses of the track that passages share, in caches."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from turnout.mismatch.turnout import passage_band
+from turnout.mismatch.turnout.campaign import PassageInput
+from turnout.mismatch.turnout.passage_model import PassageSimulator, Track1D
+from turnout.mismatch.turnout.passage_observation import AlignedPassage
+from turnout.mismatch.turnout.predictions import Terms, Values
+from turnout.mismatch.turnout.priors import SIMULATION
+from turnout.mismatch.turnout.pseudo_forces import probes
+from turnout.mismatch.turnout.site import Site
+from turnout.mismatch.turnout.site_model import SiteModel, drop_oldest
+from turnout.mismatch.turnout.track_parameters import track_value_key, track_with, vehicle_with
+from turnout.physics.term import PhysicsTerm
+from turnout.simulate.sensor import Sensor
+from turnout.simulate.wheel_path import Surfaces
+
+
+class PassagePredictor(SiteModel):
+    """Predicts the passages of a site."""
+
+    def __init__(self, site: Site, solver: Track1D, rail: Values | None = None):
+        super().__init__(site, solver, rail)
+        self._signals: OrderedDict[Hashable, np.ndarray] = OrderedDict()
+        self._signals_with_probes: OrderedDict[Hashable, np.ndarray] = OrderedDict()
+        self._simulators: OrderedDict[Hashable, PassageSimulator] = OrderedDict()
+        self._transfers: OrderedDict[Hashable, Any] = OrderedDict()
+        # difference quotients of passages, each with the common values (in prior sd) at which it was computed
+        self.differences: dict[Hashable, tuple[dict[str, float], np.ndarray]] = {}
+
+    def predict_passage(
+        self, values: Values, terms: Terms, aligned: AlignedPassage, with_probes: bool = True
+    ) -> np.ndarray:
+        """(n_sensor * n_time,) predicted signals of a passage, one sensor after the other [m/s²].
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        aligned : AlignedPassage
+            A passage with its time shift, speed and load.
+        with_probes : bool
+            Whether a simulation also records the probes that derivatives need. One beside the point of the
+            derivatives need not, and must not displace theirs in the cache.
+
+        Returns
+        -------
+        (n_sensor * n_time,) array
+            Predicted signals of a passage, one sensor after the other [m/s²].
+        """
+        signals = self.sensor_signals(values, terms, aligned, with_probes)
+        return np.concatenate(
+            [self.channel_output(values, terms, aligned, s, row) for s, row in zip(aligned.sensors, signals)]
+        )
+
+    def channel_output(
+        self, values: Values, terms: Terms, aligned: AlignedPassage, sensor: Sensor, signal: np.ndarray
+    ) -> np.ndarray:
+        """Output of the channel of a sensor for the simulated signal ``signal``, at the times of the recording.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        aligned : AlignedPassage
+            A passage with its time shift, speed and load.
+        sensor : Sensor
+            A sensor.
+        signal : array
+            (n,) simulated acceleration [m/s²].
+
+        Returns
+        -------
+        array
+            Output of the channel of a sensor for the simulated signal ``signal``, at the times of the recording.
+        """
+        start = aligned.reference + values[f"time@{aligned.name}"] - SIMULATION.lead_time
+        rate, time = 4.0 * self.solver.rate, aligned.time - start
+        for term in terms:
+            if term.effect_type == "channel":
+                signal = term.under_conditions({"name": aligned.name, "start": start}).channel(signal, rate, sensor)
+        return (1.0 + values[f"gain_{sensor.name}"]) * passage_band.read_at(
+            aligned.limit_band(signal, rate), rate, time
+        )
+
+    def sensor_signals(
+        self, values: Values, terms: Terms, aligned: AlignedPassage, with_probes: bool = True
+    ) -> np.ndarray:
+        """Simulated signals of the sensors before their channels, at four times the rate of the simulation; cached.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        aligned : AlignedPassage
+            A passage with its time shift, speed and load.
+        with_probes : bool
+            Whether a simulation also records the probes.
+
+        Returns
+        -------
+        array
+            Simulated signals of the sensors before their channels, at four times the rate of the simulation; cached.
+        """
+        passage_terms, key = self._terms_and_key(values, terms, aligned)
+        if key not in self._signals:
+            self._simulate(values, terms, aligned, passage_terms, key, with_probes)
+        return passage_band.upsample(self._signals[key])
+
+    def signals_with_probes(self, values: Values, terms: Terms, aligned: AlignedPassage) -> np.ndarray:
+        """Simulated signals of the sensors and of ``probes`` at the rate of the simulation; the latest are cached.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        aligned : AlignedPassage
+            A passage with its time shift, speed and load.
+
+        Returns
+        -------
+        array
+            Simulated signals of the sensors and of ``probes`` at the rate of the simulation; the latest are cached.
+        """
+        passage_terms, key = self._terms_and_key(values, terms, aligned)
+        if key not in self._signals_with_probes:
+            self._simulate(values, terms, aligned, passage_terms, key)
+        return self._signals_with_probes[key]
+
+    def _terms_and_key(
+        self, values: Values, terms: Terms, aligned: AlignedPassage
+    ) -> tuple[tuple[PhysicsTerm, ...], Hashable]:
+        """(terms under the conditions of a passage, cache key of its simulation)."""
+        passage_terms = tuple(
+            t.under_conditions(aligned.conditions) for t in terms if t.effect_type != "channel" or _moves_sensor(t)
+        )
+        path = self.waves.path(values)
+        shape, surfaces = path[0].dip.tobytes() if path else b"", self.surface.surfaces(aligned.passage.route, values)
+        seats = tuple(values.get(f"seat_{s.name}", 0.0) for s in aligned.sensors)
+        return passage_terms, (
+            aligned.name,
+            track_value_key(self.zone, values),
+            _train_values(values, aligned),
+            seats,
+            shape,
+            surfaces,
+            repr(passage_terms),
+        )
+
+    def _simulate(
+        self,
+        values: Values,
+        terms: Terms,
+        aligned: AlignedPassage,
+        passage_terms: Terms,
+        key: Hashable,
+        with_probes: bool = True,
+    ) -> None:
+        """Simulate a passage and cache it. Probe signals are large: their cache is small."""
+        _, speed, load = _train_values(values, aligned)
+        vehicle = vehicle_with(aligned.passage.vehicle, values, aligned.train, load)
+        simulator, path = self.passage_simulator(values, passage_terms, aligned.passage), self.waves.path(values)
+        sensors = [replace(s, place=s.place + values.get(f"seat_{s.name}", 0.0)) for s in aligned.sensors]
+        surfaces: Surfaces = tuple(
+            (*surface, *path) for surface in self.surface.surfaces(aligned.passage.route, values)
+        )
+        probe_points = probes(self, values, terms, aligned) if with_probes else []
+        signals = simulator(
+            aligned.passage, vehicle, aligned.speed * (1.0 + speed), sensors, probe_points, surfaces, aligned.sensors
+        )
+        self._signals[key] = signals[: len(sensors)].copy()
+        drop_oldest(self._signals, SIMULATION.signal_cache_size)
+        if with_probes:
+            self._signals_with_probes[key] = signals
+            drop_oldest(self._signals_with_probes, 2 * len(self.aligned_passages) + SIMULATION.probe_cache_spare)
+
+    def track_transfer(self, key: Hashable, compute: Callable[[], Any]) -> Any:
+        """A response of the track that passages under the same conditions share; the latest are cached.
+
+        Parameters
+        ----------
+        key : hashable
+            All that the response depends on, beside this predictor.
+        compute : callable
+            () -> the response, of arrays that nobody changes.
+
+        Returns
+        -------
+        Any
+            What ``compute`` returns, or has returned for this key.
+        """
+        if key not in self._transfers:
+            self._transfers[key] = compute()
+            drop_oldest(self._transfers, SIMULATION.transfer_cache_size)
+        return self._transfers[key]
+
+    def passage_simulator(self, values: Values, terms: Terms, passage: PassageInput) -> PassageSimulator:
+        """``PassageSimulator`` of a passage's route with these terms, cached.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        passage : PassageInput
+            A train passage.
+
+        Returns
+        -------
+        PassageSimulator
+            ``PassageSimulator`` of a passage's route with these terms, cached.
+        """
+        key = passage.route, track_value_key(self.zone, values), repr(terms)
+        if key not in self._simulators:
+            track = track_with(self.track(passage.route, terms), self.zone, values)
+            self._simulators[key] = PassageSimulator(self.zone.turnout, track, terms, self.solver)
+            drop_oldest(self._simulators, SIMULATION.simulator_cache_size)
+        return self._simulators[key]
+
+
+def _train_values(values: Values, aligned: AlignedPassage) -> tuple[float, float, float]:
+    """Unsprung mass, speed and load of a passage."""
+    return values[f"wheels_{aligned.train}"], values[f"speed@{aligned.name}"], values[f"load@{aligned.name}"]
+
+
+def _moves_sensor(term: PhysicsTerm) -> bool:
+    """Whether a channel term changes the simulation itself, by the position of the sensor."""
+    return type(term).sensor is not PhysicsTerm.sensor

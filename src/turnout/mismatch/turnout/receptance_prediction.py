@@ -1,0 +1,172 @@
+"""Predictions of receptances of hammer tests, with the derivatives of all pairs under the same conditions."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Mapping
+from typing import Any
+
+import numpy as np
+
+from turnout.mismatch.turnout import receptance_observation
+from turnout.mismatch.turnout.passage_model import Track1D
+from turnout.mismatch.turnout.predictions import Terms, Values
+from turnout.mismatch.turnout.priors import SIMULATION
+from turnout.mismatch.turnout.receptance_model import ReceptanceModel
+from turnout.mismatch.turnout.receptance_observation import FrfPair
+from turnout.mismatch.turnout.receptance_sensitivity import ReceptanceSensitivity
+from turnout.mismatch.turnout.site import Site
+from turnout.mismatch.turnout.site_model import SiteModel, drop_oldest
+from turnout.mismatch.turnout.track_parameters import rail_on_grid, track_value_key, track_with, with_rail
+from turnout.simulate.track import Track
+
+
+class ReceptancePredictor(SiteModel):
+    """Predicts the receptances of a site."""
+
+    def __init__(self, site: Site, solver: Track1D, rail: Values | None = None):
+        super().__init__(site, solver, rail)
+        self._rail_tracks: OrderedDict[Hashable, Track] = OrderedDict()
+        self._sensitivities: OrderedDict[Hashable, ReceptanceSensitivity] = OrderedDict()
+
+    def pair_sensitivities(self, values: Values, terms: Terms) -> Callable[[FrfPair], ReceptanceSensitivity]:
+        """Function that gives ``pair_sensitivity`` of a pair at these values, computed once per conditions.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+
+        Returns
+        -------
+        Callable[[FrfPair], ReceptanceSensitivity]
+            Function that gives ``pair_sensitivity`` of a pair at these values, computed once per conditions.
+        """
+        sensitivities: dict[Hashable, ReceptanceSensitivity] = {}
+
+        def sensitivity_of(pair: FrfPair) -> ReceptanceSensitivity:
+            conditions = tuple(sorted(pair.conditions.items()))
+            if conditions not in sensitivities:
+                sensitivities[conditions] = self.pair_sensitivity(values, terms, pair)
+            return sensitivities[conditions]
+
+        return sensitivity_of
+
+    def pair_sensitivity(self, values: Values, terms: Terms, pair: FrfPair) -> ReceptanceSensitivity:
+        """``ReceptanceSensitivity`` of all pairs under the conditions of ``pair``, cached.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        pair : FrfPair
+            Pair of impact position and sensor.
+
+        Returns
+        -------
+        ReceptanceSensitivity
+            ``ReceptanceSensitivity`` of all pairs under the conditions of ``pair``, cached.
+        """
+        track_terms = receptance_observation.track_terms(terms, pair.conditions)
+        rail = rail_on_grid(values, self.rail)
+        pair_keys, seats = self._pairs_and_seats(values, terms, pair.conditions)
+        key = (
+            repr(track_terms),
+            tuple(rail.values()),
+            track_value_key(self.zone, values),
+            pair_keys,
+            tuple(seats.items()),
+        )
+        if key not in self._sensitivities:
+            model = ReceptanceModel(track_with(self._track_near(rail), self.zone, values), track_terms)
+            self._sensitivities[key] = ReceptanceSensitivity(model, pair_keys, seats, self.zone)
+            # all positions at once: rounding depends on what is solved together
+            model.solve((*(position for position, _ in pair_keys), *seats.values()))
+            drop_oldest(self._sensitivities, SIMULATION.sensitivity_cache_size)
+        return self._sensitivities[key]
+
+    def _track_near(self, rail: Values) -> Track:
+        """The main track with ``rail`` values on the grid of ``rail_on_grid``; cached."""
+        key = tuple(rail.values())
+        if key not in self._rail_tracks:
+            self._rail_tracks[key] = with_rail(self.site.nominal, rail).turnout.track_of("main")
+            drop_oldest(self._rail_tracks, SIMULATION.rail_cache_size)
+        return self._rail_tracks[key]
+
+    def _pairs_and_seats(self, values: Values, terms: Terms, conditions: Mapping[str, Any]) -> tuple[tuple, dict]:
+        """(position of the impact, ``FrfPair.seat``) of all pairs under these conditions; positions of these seats."""
+        pairs = [p for p in self.frf_pairs.values() if p.conditions == conditions]
+        sensors, track = {p.seat: p.sensor for p in pairs}, self.track()
+        seats = {seat: self.seat(s, values, terms).probe(track).place for seat, s in sensors.items()}
+        return tuple((p.test.place, p.seat) for p in pairs), seats
+
+    def channel_response(self, values: Values, terms: Terms, pair: FrfPair) -> np.ndarray:
+        """(n_line,) complex factor of the channel of a pair.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        pair : FrfPair
+            Pair of impact position and sensor.
+
+        Returns
+        -------
+        (n_line,) array
+            Complex factor of the channel of a pair.
+        """
+        factor = receptance_observation.channel_factor(terms, pair.sensor, receptance_observation.SHIFTED_LINES)
+        return factor * (1.0 + values.get(f"gain_{pair.channel}", 0.0))
+
+    def receptance(self, values: Values, pair: FrfPair, sensitivity: ReceptanceSensitivity) -> np.ndarray:
+        """(n_line,) receptance of a pair [m/N], corrected to first order for the rail of ``values``.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        pair : FrfPair
+            Pair of impact position and sensor.
+        sensitivity : ReceptanceSensitivity
+            Receptances of all pairs with their derivatives.
+
+        Returns
+        -------
+        (n_line,) array
+            Receptance of a pair [m/N], corrected to first order for the rail of ``values``.
+        """
+        deviation = [values[k] - at for k, at in rail_on_grid(values, self.rail).items()]
+        return sensitivity.receptance(pair) + sensitivity.rail_gradient(pair) @ deviation
+
+    def predict_receptance(
+        self, values: Values, terms: Terms, pair: FrfPair, sensitivity: ReceptanceSensitivity
+    ) -> np.ndarray:
+        """(2n,) Re and Im of the receptance of a pair over its measured magnitude.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        pair : FrfPair
+            Pair of impact position and sensor.
+        sensitivity : ReceptanceSensitivity
+            Receptances of all pairs with their derivatives.
+
+        Returns
+        -------
+        (2n,) array
+            Re and Im of the receptance of a pair over its measured magnitude.
+        """
+        return receptance_observation.split_complex(
+            receptance_observation.scale_lines(
+                pair, self.receptance(values, pair, sensitivity), self.channel_response(values, terms, pair)
+            )
+        )
