@@ -38,13 +38,13 @@ from turnout.readers.csv_header import (
     seconds_per_number,
     time_column,
 )
+from turnout.readers.entries import Entry
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.lost_entries import control_character_errors
 from turnout.readers.named_arrays import RECORD_COUNT_NAMES, SAMPLE_COUNT_NAMES, START_DATE_NAMES, START_NAMES, Metadata
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, RawFile, RawRecord, Source
+from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import entry_statements, scale_problem, scale_statements, without_drawings
-from turnout.readers.statements import Entry
-from turnout.readers.timing import start_fields
 
 
 def read_raw(source: Source) -> RawFile:

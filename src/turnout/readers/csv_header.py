@@ -14,6 +14,7 @@ from mmap import mmap
 import numpy as np
 import pyarrow as pa
 
+from turnout.readers.entries import FREE_TEXT, Entry, entries_of_text
 from turnout.readers.named_arrays import (
     RECORD_COUNT_NAMES,
     SAMPLE_COUNT_NAMES,
@@ -27,7 +28,6 @@ from turnout.readers.scale_words import is_of_drawing, is_scale_name, scale_mean
 from turnout.readers.source import COPY_AGAIN, MEANINGLESS_UNITS, Source
 from turnout.readers.stated_quantities import is_quantity_name
 from turnout.readers.stated_units import is_unit_name
-from turnout.readers.statements import FREE_TEXT, Entry, entries_of_text
 from turnout.units import conversion
 
 TIME_WORDS = (*TIME_NAMES, "zeit", "tid", "temps", "tempo", "tiempo", "tijd")

@@ -38,7 +38,7 @@ from turnout.readers.source import CONDITIONS
 from turnout.readers.stated_quantities import quantity_of_text
 from turnout.readers.stated_units import UNIT_WORD, is_unit_of_other, known_unit
 from turnout.readers.statements import USUAL_RATES, statements_of_value
-from turnout.readers.timing import looks_dated
+from turnout.readers.time_texts import looks_dated
 from turnout.units import Conversion
 
 RATE, SCALE, UNIT, DURATION = "sampling rate", "scale", "unit", "duration"

@@ -17,13 +17,13 @@ from turnout.errors import ReadError
 from turnout.readers import stated_scales
 from turnout.readers.lazy import BlockReader, ChannelStatistics, Column, channel_error
 from turnout.readers.lost_entries import is_single, lost_entry_errors
+from turnout.readers.rate_agreement import rate_remark, resolve
 from turnout.readers.rate_words import CERTAIN, is_rate_name, rate_unit
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
+from turnout.readers.start_times import check_order, is_plausible, start_errors, start_times
 from turnout.readers.stated_quantities import contradicting_quantity, quantity_entries
 from turnout.readers.stated_units import contradicting_unit, is_meaningless, key_of_units
-from turnout.readers.statements import rate_remark, resolve
 from turnout.readers.time_axes import all_statements, is_axis_name
-from turnout.readers.timing import check_order, is_plausible, start_errors, start_times
 from turnout.readers.unexplained_entries import EntryCheck
 from turnout.records import Channel, LongRecording, RawChannel, RawDescription, Recording
 from turnout.units import IGNORED, conversion, to_si

@@ -26,13 +26,14 @@ from typing import Any
 import numpy as np
 
 from turnout.errors import ReadError
+from turnout.readers.entries import MAX_ENTRIES, Entry, entries_of
 from turnout.readers.lazy import ARRAYS, Array, Column
 from turnout.readers.rate_words import is_rate_name
 from turnout.readers.scale_words import is_scale_name
 from turnout.readers.source import CONDITIONS, RawFile, RawRecord, Source
+from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import entry_statements, scale_problem, scale_statements, without_drawings
-from turnout.readers.statements import MAX_ENTRIES, Entry, entries_of
-from turnout.readers.timing import seconds_since_first, start_fields
+from turnout.readers.timing import seconds_since_first
 
 RECORD_NAME = re.compile(r"^(?:record|rec|segment|impact|hit)[_ ]?(\d+)$", re.IGNORECASE)
 

@@ -24,8 +24,8 @@ from turnout.files import sparse_size, special_kind
 from turnout.records import EMPTY_MAPPING
 
 if TYPE_CHECKING:
+    from turnout.readers.entries import Entry
     from turnout.readers.lazy import LazyColumn
-    from turnout.readers.statements import Entry
 
 COPY_AGAIN = "Copy the file again from the logger"
 SYSTEM_ERROR = re.compile(r"errno = (\d{1,9})\b")

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from turnout.readers.entries import Entry, entries_of_text
 from turnout.readers.scale_words import (
     FACTOR,
     NEUTRAL,
@@ -29,7 +30,7 @@ from turnout.readers.scale_words import (
     value_of_word,
 )
 from turnout.readers.source import MEANINGLESS_UNITS
-from turnout.readers.statements import PLACEHOLDERS, Entry, entries_of_text
+from turnout.readers.statements import PLACEHOLDERS
 from turnout.units import conversion, to_si
 
 ROUND_YEARS = (2000.0, 2048.0, 2050.0)  # which are factors as well

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 from turnout.readers.rate_words import words_of
 from turnout.readers.source import RawRecord
-from turnout.readers.timing import looks_dated, parse_time
+from turnout.readers.time_texts import looks_dated, parse_time
 
 START = re.compile(
     r"start|begin|debut|inici|inizi|zacat|trigg|record|aufnahm|aufzeich|mess|mesur|medic|misur|enregistr|registr|grab"

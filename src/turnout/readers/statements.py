@@ -6,10 +6,9 @@ numbers (``precision``); time axes and evenly rising columns are statements as w
 A statement that contradicts it beyond rounding, and an entry that may be a rate and is not understood, are errors.
 """
 
-import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
@@ -17,20 +16,15 @@ from typing import Any
 
 import numpy as np
 
-from turnout.errors import ReadError
+from turnout.readers.entries import MAX_ENTRIES, Entry, entries_of_text
 from turnout.readers.other_subjects import STRONG, subject_of
-from turnout.readers.precision import EXACT_PRECISION, NUMBER, Interval, around, readings
+from turnout.readers.precision import NUMBER, Interval, around, readings
 from turnout.readers.rate_words import CERTAIN, NOT, POSSIBLY, RateUnit, name_meaning, rate_unit, reduction_of_name
-from turnout.readers.scale_words import is_of_drawing, scale_meaning, value_of_word
-from turnout.readers.source import Source
 
 MAX_CLOCK_DRIFT = 1e-4  # relative: two clocks of one logger with separate crystals may differ by this much
 PLAUSIBLE_RATES = (10.0, 1e8)  # Hz: no vibration is sampled outside; a possible statement outside means something else
 USUAL_RATES = (100.0, 1e6)  # Hz: "25.600" is 25600 and not 25.6; a number without unit outside may have another one
 MIN_EPOCH = 10**8  # s since 1970
-MAX_WIDTH = 1e-3  # relative: a statement of fewer digits does not tell the rate; the layout or another one must
-MAX_ENTRIES = 64  # numbers of a list: longer ones are samples
-MAX_TEXT = 4000  # characters of a text that are searched
 PLACEHOLDERS = {"", "-", "none", "n/a", "na", "?", "unknown", "nan", "null", "undefined", "not set", "unset", "[]"}
 ANY_UNIT = tuple(
     RateUnit(is_step, scale)
@@ -41,24 +35,6 @@ ANY_UNIT = tuple(
 )  # fmt: skip
 # s per unit of a time column that does not state its unit
 TIME_SCALES = (1.0, 1e-3, 1e-6, 1e-9, 60.0, 3600.0, 86400.0)
-
-
-@dataclass(frozen=True)
-class Entry:
-    """An entry of the metadata: ``value`` (text, number, list, mapping) under ``name``; ``place`` is where it is.
-
-    ``is_defined`` is True if the format defines it: then it is about the samples as they are in the file. ``is_piece``
-    is True for a part of a free text that is an entry as well.
-    """
-
-    place: str
-    name: str
-    value: Any
-    is_defined: bool = False
-    is_piece: bool = False
-
-
-FREE_TEXT = "text"  # name of an entry that holds a whole text, beside the entries of its pieces
 
 
 @dataclass(frozen=True)
@@ -117,139 +93,6 @@ class Statement:
     def __str__(self) -> str:
         rate = f" ({self.usual.rate:.9g} Hz)" if self.intervals else ""
         return f"{self.text!r}{rate} in {self.place}"
-
-
-def rate_entry(place: str, rate: Any) -> Entry:
-    """Entry of a rate [Hz] that the format itself defines.
-
-    Parameters
-    ----------
-    place : str
-        Where the format states it.
-    rate : any
-        Number, or text as it is printed. [Hz]
-
-    Returns
-    -------
-    Entry
-        Under a name that is understood.
-    """
-    return Entry(place, "sampling rate [Hz]", rate, is_defined=True)
-
-
-def step_entry(place: str, step: Any, unit: str = "s") -> Entry:
-    """Entry of a time step that the format itself defines.
-
-    Parameters
-    ----------
-    place : str
-        Where the format states it.
-    step : any
-        Number, or text as it is printed.
-    unit : str
-        A unit of time; any other text counts as seconds.
-
-    Returns
-    -------
-    Entry
-        Under a name that is understood.
-    """
-    known = rate_unit(unit)
-    return Entry(place, f"sampling interval [{unit if known and known.is_step else 's'}]", step, is_defined=True)
-
-
-def entries_of(variables: Mapping[Any, Any], place: str) -> Iterator[Entry]:
-    """Entries of nested metadata: mappings, lists of them, and texts that hold JSON.
-
-    Parameters
-    ----------
-    variables : mapping
-        Name -> value.
-    place : str
-        Where it is in the file, for messages, "" for the file itself.
-
-    Yields
-    ------
-    Entry
-        Every text, number and short list of numbers.
-    """
-    for name, value in variables.items():
-        name = str(name)
-        path = f"{place}/{name}" if place else name
-        if isinstance(value, np.ndarray) and value.ndim == 0:
-            value = value[()]
-        if isinstance(value, (str, bytes)):
-            text = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
-            value = _decode_json(text)
-        if isinstance(value, Mapping):
-            yield from entries_of(value, path)
-        elif isinstance(value, (list, tuple)) and any(isinstance(v, Mapping) for v in value):
-            for i, v in enumerate(value):
-                if isinstance(v, Mapping):
-                    yield from entries_of(v, f"{path}[{i}]")
-        elif value is not None and not isinstance(value, ReadError) and getattr(value, "size", 1) <= MAX_ENTRIES:
-            yield Entry(path, name, value)
-
-
-def _decode_json(text: str) -> Any:
-    """The mapping or list that a text holds as JSON, else the text."""
-    if not text.lstrip().startswith(("{", "[")):
-        return text
-    try:
-        return json.loads(text)
-    except ValueError:
-        return text
-
-
-# "name: value" with a word, numbers without unit, or a ratio as its value.
-NAMED_PIECE = re.compile(
-    r"(?:[^\d:=]*:)?\s*([^\W\d][^:=]{1,40}?)\s*[:=]\s*"
-    r"([+-]?[.,]?\d[^:=]{0,30}?|[^\W\d]{1,20}\.?|[-+]|[x×]\s?\d+|\d+\s?:\s?\d+)\s*"
-)
-
-RATIO_PIECE = re.compile(  # "scale 1:500 map"
-    r"(?:([^\d:=]*):)?([^\d:=]*[^\W\d])[\s:=]+(1\s?[:/]\s?\d+[^\d:=]{0,30})"
-)
-MAX_RATIO_PIECE = 100  # characters: a longer piece is a description
-
-
-def entries_of_text(text: str, place: str) -> Iterator[Entry]:
-    """Entries of a free text such as a comment: its pieces with a number, "sampled at 25.6 kHz; tip: steel".
-
-    Parameters
-    ----------
-    text : str
-        One or several lines.
-    place : str
-        Where it is, for messages.
-
-    Yields
-    ------
-    Entry
-        Words before (else after) the number as the name; the number with its unit as the value.
-
-    Examples
-    --------
-    >>> [(e.name, e.value) for e in entries_of_text("hammer 3; sampled at 25.6 kHz, tip=steel", "comment")]
-    [('hammer', '3'), ('sampled at', '25.6 kHz')]
-    """
-    for piece in map(str.strip, re.split(r"[;\n\r|]|,\s", text[:MAX_TEXT])):
-        ratio = RATIO_PIECE.fullmatch(piece) if len(piece) <= MAX_RATIO_PIECE else None
-        if ratio and scale_meaning(ratio[2]):
-            subject = f"{ratio[1]} " if is_of_drawing(ratio[1] or "") else ""
-            yield Entry(place, subject + ratio[2].strip(), ratio[3].strip(), is_piece=True)
-            continue
-        named = NAMED_PIECE.fullmatch(piece)
-        if named and (re.search(r"\d", named[2]) or value_of_word(scale_meaning(named[1]), named[2]) is not None):
-            yield Entry(place, named[1].strip(), named[2].strip(), is_piece=True)
-            continue
-        match = re.fullmatch(rf"\s*([^\d]*?)[\s:=,@~≈#]*({NUMBER.pattern})\s*([^\d]*?)[\s.]*", piece)
-        if not match or not (match[1] or match[3]):
-            continue
-        words = match[3].split()
-        n_unit = next((n for n in (3, 2, 1) if rate_unit(" ".join(words[:n])) and len(words) >= n), 1)
-        name = match[1].strip() or " ".join(words[n_unit:]) or "number"
-        yield Entry(place, name, f"{match[2]} {' '.join(words[:n_unit])}".strip(), is_piece=True)
 
 
 def statements_of(entries: Iterable[Entry], k: int = 0, n: int = 1) -> list[Statement]:
@@ -470,202 +313,3 @@ def time_statement(
     return Statement(
         place, f"{rate:.9g} samples per {'second' if is_in_seconds else 'unit of time'}", intervals, certainty, True
     )
-
-
-def resolve(statements: Sequence[Statement], promised: float | None, where: str, source: Source) -> float:
-    """The sampling rate on which all statements of a record and the layout agree to within rounding.
-
-    Parameters
-    ----------
-    statements : sequence of Statement
-        All statements of the file about the record.
-    promised : float or None
-        Rate that the layout states, or None. [Hz]
-    where : str
-        The record, for the message.
-    source : Source
-        The raw file.
-
-    Returns
-    -------
-    float
-        Rate of the layout; without one, that of the most precise statement. [Hz]
-
-    Raises
-    ------
-    ReadError
-        If nothing states the rate, a statement is not understood, or two contradict each other beyond rounding.
-    """
-    for statement in statements:
-        if not statement.intervals:
-            problem = f"{statement.text!r} in {statement.place} may state the sampling rate and is not understood"
-            remedy = "Write it as a number with its unit (Hz, kHz, s, ms, µs), or remove it if it means something else"
-            raise source.error(where, problem, remedy, reason="wrong_rate")
-    certain = [s for s in statements if s.certainty == CERTAIN]
-    layout = None if promised is None else around(promised, EXACT_PRECISION)
-    holding = _most_precise(certain, layout, where, source)
-    if holding is None:
-        if layout is None:
-            raise _no_rate_error(statements, where, source)
-        _check_axes(statements, layout, where, source)
-        _check_possible(statements, layout, where, source)
-        return float(layout.rate)
-    statement, interval = holding
-    _check_axes(statements, interval.widen(MAX_CLOCK_DRIFT if statement.is_clock else 0.0), where, source)
-    if layout is None and len(_common_meanings(certain)) > 1 and statement.factor > 1:
-        raise source.error(where, _reduction_problem(statement), RATE_REMEDY, reason="wrong_rate")
-    if layout is not None:
-        drift = MAX_CLOCK_DRIFT if statement.is_clock else 0.0
-        if not interval.widen(drift).overlaps(layout):
-            raise source.error(
-                where,
-                f"sampled at {interval.rate:.9g} Hz instead of {layout.rate:.9g} Hz, by {statement}",
-                "Correct the rate in the layout, or find out why the logger was set differently",
-                reason="wrong_rate",
-            )
-        return float(layout.rate)
-    if interval.width > MAX_WIDTH:
-        problem = (
-            f"{statement.text!r} in {statement.place} has too few digits: {interval.low:.6g} to {interval.high:.6g} Hz"
-        )
-        raise source.error(where, problem, RATE_REMEDY, reason="wrong_rate")
-    whole = round(interval.rate)
-    is_unique = interval.rate * interval.width < 0.5
-    is_within = max(interval.low, whole * (1 - 1e-12)) <= min(interval.high, whole * (1 + 1e-12))
-    return float(whole) if is_unique and is_within else interval.rate
-
-
-def _common_meanings(certain: Sequence[Statement]) -> list[Interval]:
-    """The meanings of the first statement with which all others agree."""
-    return [i for i in certain[0].intervals if all(s.agrees_with(i) for s in certain[1:])]
-
-
-def _reduction_problem(statement: Statement) -> str:
-    before, after = statement.intervals[0].rate, statement.intervals[-1].rate
-    return (
-        f"{statement} may be the rate before a reduction by {statement.factor}, which the file states as well: its "
-        f"samples may be at {before:.9g} or {after:.9g} Hz"
-    )
-
-
-def rate_remark(statements: Sequence[Statement], rate: float, where: str, source: Source) -> ReadError | None:
-    """Remark on a record whose file states a rate before a reduction that nothing else confirms.
-
-    Parameters
-    ----------
-    statements : sequence of Statement
-        All statements of the file about the record.
-    rate : float
-        Rate with which it is read. [Hz]
-    where : str
-        The record, for the message.
-    source : Source
-        The raw file.
-
-    Returns
-    -------
-    ReadError or None
-        None if nothing is in doubt.
-    """
-    certain = [s for s in statements if s.certainty == CERTAIN and s.intervals]
-    if not any(s.factor > 1 for s in certain) or len(meanings := _common_meanings(certain)) < 2:
-        return None
-    if meanings[-1].loose.overlaps(around(rate, EXACT_PRECISION)):
-        return None
-    problem = f"{_reduction_problem(certain[0])}; {rate:.9g} Hz is used"
-    return source.error(
-        where, problem, "Find out which it is, and correct the rate in the layout", reason="rate_ambiguous"
-    )
-
-
-RATE_REMEDY = "Give the rate in the layout, or as hammer_rate_hz or passage_rate_hz in turnouts.tsv"
-
-
-def _most_precise(
-    certain: Sequence[Statement], layout: Interval | None, where: str, source: Source
-) -> tuple[Statement, Interval] | None:
-    """The most precise statement and its meaning; ReadError if another one contradicts it."""
-    if not certain:
-        return None
-
-    def width(statement: Statement) -> float:
-        return statement.usual.loose_width + (MAX_CLOCK_DRIFT if statement.is_clock else 0.0)
-
-    ordered = sorted(certain, key=width)
-    first = ordered[0]
-    interval = first.meaning_near(layout) if layout is not None else None
-    if interval is None:
-        agreeing = [i for i in first.intervals if all(s.agrees_with(i) for s in ordered[1:])]
-        interval = agreeing[0] if agreeing else first.usual
-        is_usual = first.is_clock and USUAL_RATES[0] <= interval.rate <= USUAL_RATES[1]
-        if layout is None and len(first.intervals) > 1 and not is_usual and len(ordered) == 1:
-            meanings = " or ".join(f"{i.rate:.9g} Hz" for i in first.intervals)
-            problem = f"{first.text!r} in {first.place} may mean {meanings}"
-            problem = _reduction_problem(first) if first.factor > 1 else problem
-            raise source.error(where, problem, RATE_REMEDY, reason="wrong_rate")
-    drift = MAX_CLOCK_DRIFT if first.is_clock else 0.0
-    for other in ordered[1:]:
-        if not other.agrees_with(interval.widen(drift)):
-            remedy = "Find out which of them is right and export the record again with that one alone"
-            if first.is_clock and other.is_clock:
-                remedy = (
-                    "If its columns were sampled at two rates, export all at one rate, or each rate to its own file"
-                )
-            raise source.error(where, f"two rates: {first}, and {other}", remedy, reason="wrong_rate")
-    return first, interval
-
-
-def _check_axes(statements: Sequence[Statement], interval: Interval, where: str, source: Source) -> None:
-    """ReadError if a column that rises evenly does so at another rate than ``interval``, in every unit of time."""
-    for statement in statements:
-        if statement.is_clock and statement.certainty == POSSIBLY and not statement.agrees_with(interval):
-            problem = (
-                f"{statement.place} may be a time axis of {statement.usual.rate:.9g} samples per unit of time, which "
-            )
-            problem += f"is {interval.rate:.9g} Hz in no unit"
-            remedy = (
-                "Correct the rate in the layout; if the column is no time, give it a unit in the layout or the file"
-            )
-            raise source.error(where, problem, remedy, reason="wrong_rate")
-
-
-MAX_RATE_RATIO = 64.0  # a frequency or a time that differs more from the rate in use is one of something else
-
-
-def is_near_rate(rate: float, reference: float) -> bool:
-    """Whether a stated frequency may be meant as the sampling rate.
-
-    Parameters
-    ----------
-    rate : float
-        The frequency. [Hz]
-    reference : float
-        Rate in use. [Hz]
-
-    Returns
-    -------
-    bool
-        False if they differ by a factor above ``MAX_RATE_RATIO``.
-    """
-    return reference / MAX_RATE_RATIO <= rate <= reference * MAX_RATE_RATIO
-
-
-def _check_possible(statements: Sequence[Statement], layout: Interval, where: str, source: Source) -> None:
-    """ReadError if statements that may be about the rate exist and none of them agrees with the layout."""
-    possible = [s for s in statements if s.certainty == POSSIBLY and not s.is_clock]
-    possible = [s for s in possible if any(is_near_rate(i.rate, layout.rate) for i in s.intervals)]
-    if possible and not any(s.meaning_near(layout) for s in possible):
-        entry = f"{possible[0].text!r} in {possible[0].place}"
-        problem = f"{entry} may be a sampling rate, and the layout's is {layout.rate:.9g} Hz"
-        remedy = (
-            f"Correct the rate in the layout; if that entry means something else, write 'rate: {layout.rate:.9g}' "
-            "into the file"
-        )
-        raise source.error(where, problem, remedy, reason="wrong_rate")
-
-
-def _no_rate_error(statements: Sequence[Statement], where: str, source: Source) -> ReadError:
-    problem = "neither the file nor the layout says the sampling rate"
-    if statements:
-        problem += f"; {statements[0].text!r} in {statements[0].place} may"
-    return source.error(where, problem, RATE_REMEDY, reason="wrong_rate")

@@ -12,12 +12,14 @@ from typing import Any, BinaryIO
 import nptdms
 
 from turnout.errors import ReadError
+from turnout.readers.entries import Entry, entries_of
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.named_arrays import RECORD_COUNT_NAMES, START_NAMES, Metadata, natural_sort_key
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
+from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import scale_text, without_drawings
-from turnout.readers.statements import Entry, entries_of
-from turnout.readers.timing import check_simultaneous, parse_time, start_fields, start_offsets
+from turnout.readers.time_texts import parse_time
+from turnout.readers.timing import check_simultaneous, start_offsets
 
 nptdms.log.log_manager.console_handler.setLevel("ERROR")  # turnout.readers passes the warnings on
 BIG_ENDIAN = 1 << 6  # bit of the mask in the lead-in

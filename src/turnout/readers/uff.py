@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 
 from turnout.errors import ReadError
+from turnout.readers.entries import FREE_TEXT, Entry, entries_of_text, step_entry
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.rate_words import rate_unit
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, Source, load, number_or_text
 from turnout.readers.stated_quantities import DEFINED_NAME
 from turnout.readers.stated_scales import entry_statements
-from turnout.readers.statements import FREE_TEXT, Entry, entries_of_text, step_entry
-from turnout.readers.timing import check_simultaneous, is_unread_uff_time, parse_uff_time
+from turnout.readers.time_texts import is_unread_uff_time, parse_uff_time
+from turnout.readers.timing import check_simultaneous
 from turnout.readers.uff_datasets import FileUnits, UffDataset, file_units, read_datasets
 from turnout.units import UNITS, conversion
 

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from turnout.errors import ReadError
+from turnout.readers.entries import MAX_ENTRIES, Entry
 from turnout.readers.entry_candidates import (
     DURATION,
     MAX_TEXT,
@@ -29,10 +30,11 @@ from turnout.readers.entry_candidates import (
     candidates,
 )
 from turnout.readers.precision import EXACT_PRECISION, around
+from turnout.readers.rate_agreement import is_near_rate
 from turnout.readers.source import RawRecord, Source
 from turnout.readers.stated_scales import container_of
 from turnout.readers.stated_units import same_unit, with_stated_units
-from turnout.readers.statements import MAX_ENTRIES, PLAIN_TYPES, Entry, is_near_rate
+from turnout.readers.statements import PLAIN_TYPES
 from turnout.records import RawDescription
 from turnout.units import IGNORED
 

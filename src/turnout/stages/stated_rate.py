@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from turnout.errors import ReadError
+from turnout.readers.rate_agreement import resolve
 from turnout.readers.rate_words import CERTAIN
 from turnout.readers.source import RawRecord, Source
-from turnout.readers.statements import resolve, statements_of
+from turnout.readers.statements import statements_of
 from turnout.readers.time_axes import all_statements
 
 

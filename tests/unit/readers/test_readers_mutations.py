@@ -14,7 +14,7 @@ from benchmarks.mutations import CHANNELS, cases, intact_recordings
 from turnout.errors import ReadError
 from turnout.readers import read
 from turnout.readers.lost_entries import KNOWN, similar_name
-from turnout.readers.timing import parse_time
+from turnout.readers.time_texts import parse_time
 from turnout.readers.writing import write
 from turnout.records import RawChannel, RawDescription
 

@@ -10,7 +10,7 @@ from tests.unit.readers.test_readers_rate_matrix import FORMATS, SENSORS, TRUE, 
 
 from turnout.errors import ReadError
 from turnout.readers import read
-from turnout.readers.statements import Entry
+from turnout.readers.entries import Entry
 from turnout.readers.unexplained_entries import RecordFacts, unexplained_entries
 from turnout.records import RawDescription
 

@@ -1,0 +1,188 @@
+"""Times of day as loggers print and store them."""
+
+import math
+import re
+import unicodedata
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+import numpy as np
+
+MATLAB_EPOCH = 719529  # datenum of 1970-01-01
+DATED = re.compile(
+    r"\d{1,4}[-./]\s?\d{1,2}[-./]\s?\d{1,4}\D+\d{1,2}[:.h-]\d{2}|\d{8}[T _-]?\d{4,6}|\d{4}-?(?:W\d\d|\d{3}T)|\d{4}年"
+)
+ISO_CHARACTERS = re.compile(r"[\dTtWZz:+.,_ -]+")
+WORDED_DATE = re.compile(r"[^\W\d]{3,}\.?.*\d{1,2}:\d{2}")
+CLOCK = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}(?:[.,]\d{1,9})?))?")
+DOTTED_DATE = re.compile(r"(\d{1,2})\.\s?(\d{1,2})\.\s?(\d{4})[\sT,;]+(\d{1,2}):(\d{2}(?::\d{2}(?:[.,]\d{1,9})?)?)")
+MONTHS = {m: i for i, m in enumerate("jan feb mar apr may jun jul aug sep oct nov dec".split(), start=1)}
+
+
+# Beginnings of months in English, German, French, Danish, Italian and Spanish.
+MONTH_WORDS = {
+    1: "jan gen ene", 2: "feb fev", 3: "mar mrz maer", 4: "apr avr abr", 5: "may mai maj mag", 6: "jun juin giu",
+    7: "jul juil lug", 8: "aug aou ago", 9: "sep set", 10: "oct okt ott", 11: "nov", 12: "dec dez dic des",
+}  # fmt: skip
+
+
+def looks_dated(text: str) -> bool:
+    """Whether a text looks like a date with a time of day, in any notation.
+
+    Parameters
+    ----------
+    text : str
+        Value of an entry.
+
+    Returns
+    -------
+    bool
+        False for a date alone.
+
+    Examples
+    --------
+    >>> [looks_dated(text) for text in ("05/13/2024 10:00 AM", "13 May 2024 10:00:00", "20240513T100000", "3.5 mm")]
+    [True, True, True, False]
+    """
+    return bool(DATED.match(text) or (WORDED_DATE.search(text) and _month_of(text) and re.search(r"\d{4}", text)))
+
+
+def _month_of(text: str) -> int:
+    """Number of the only month that a text names, 0 for none or several."""
+    letters = unicodedata.normalize("NFKD", text.casefold())
+    words = re.findall(r"[a-z]{3,}", "".join(c for c in letters if not unicodedata.combining(c)))
+    months = {k for word in words for k, starts in MONTH_WORDS.items() if word.startswith(tuple(starts.split()))}
+    return months.pop() if len(months) == 1 else 0
+
+
+def _parse_worded(text: str) -> datetime | None:
+    """Time of a text that names the month and has a day, a year of four digits and a time of day without AM or PM."""
+    month, clock = _month_of(text), CLOCK.search(text)
+    if not month or not clock or re.search(r"\b[ap]\.?m\b|[+-]\d{2}:?\d{2}\b", text[clock.start() :], re.IGNORECASE):
+        return None
+    remainder = text[: clock.start()] + " " + text[clock.end() :]
+    numbers = re.findall(r"(?<!\d)\d{1,4}(?!\d)", remainder)
+    years, days = [n for n in numbers if len(n) == 4], [n for n in numbers if len(n) <= 2]
+    if (
+        len(years) != 1
+        or len(days) != 1
+        or len(numbers) != 2
+        or re.search(r"[A-Z]{3,4}\b", remainder.replace("UTC", ""))
+    ):
+        return None
+    second = float((clock[3] or "0").replace(",", "."))
+    try:
+        start = datetime(int(years[0]), month, int(days[0]), int(clock[1]), int(clock[2]))
+    except ValueError:
+        return None
+    return (
+        (start + timedelta(seconds=second)).replace(tzinfo=UTC if "UTC" in remainder else None)
+        if second < 60.0
+        else None
+    )
+
+
+def parse_time(value: Any) -> datetime | None:
+    """Time of a time stamp in any of the forms that files use.
+
+    These are ISO 8601 text, also with slashes, or with the month as a word, numpy datetime64 (UTC), seconds since 1970
+    (UTC) and a MATLAB datenum. With dots the day comes first, "13.05.2024 10:00"; dates with slashes that do not begin
+    with the year are ambiguous and not read.
+
+    Parameters
+    ----------
+    value : any
+        The time stamp as a library returns it.
+
+    Returns
+    -------
+    datetime or None
+        The time, with a zone if the file states one; None for any other value.
+
+    Examples
+    --------
+    >>> parse_time("2024-05-13T10:00:00"), parse_time(719529.5)
+    (datetime.datetime(2024, 5, 13, 10, 0), datetime.datetime(1970, 1, 1, 12, 0))
+    """
+    if isinstance(value, datetime):
+        return value
+    if isinstance(value, np.datetime64):
+        stamp = value.astype("datetime64[us]").item()  # a whole number outside the years 1 to 9999, None for NaT
+        return stamp.replace(tzinfo=UTC) if isinstance(stamp, datetime) else None
+    if isinstance(value, bytes):
+        value = value.decode("utf-8", "replace")
+    if isinstance(value, str):
+        if match := DOTTED_DATE.fullmatch(value.strip()):
+            value = f"{match[3]}-{match[2]:0>2}-{match[1]:0>2}T{match[4]:0>2}:{match[5]}"
+        if (zone := re.search(r"[+-]\d{2}:?(\d{2})$", value.strip())) and int(zone[1]) % 15 and ":" in value:
+            return None  # no time zone has such an offset: the text is damaged
+        text = re.sub(r"^(\d{4})/(\d{1,2})/(\d{1,2})(?=\D)", _with_dashes, value.strip())
+        if not ISO_CHARACTERS.fullmatch(text):  # Python skips other characters behind the microseconds
+            return _parse_worded(text)
+        try:
+            return datetime.fromisoformat(text)
+        except ValueError:
+            return None
+    if isinstance(value, (int, float)) and math.isfinite(value):
+        if 6e5 < value < 8e5:
+            return datetime(1970, 1, 1) + timedelta(seconds=round((value - MATLAB_EPOCH) * 86400, 6))
+        if 1e8 < value < 1e11:
+            return datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=value)
+    return None
+
+
+def _with_dashes(match: re.Match[str]) -> str:
+    return f"{match[1]}-{match[2]:0>2}-{match[3]:0>2}"
+
+
+def parse_uff_time(text: str) -> datetime | None:
+    """Time in ID line 3 of a Universal File, DD-MMM-YY HH:MM:SS.
+
+    Two-digit years from 70 on are 1970 to 1999.
+
+    Parameters
+    ----------
+    text : str
+        The line.
+
+    Returns
+    -------
+    datetime or None
+        The time; None for any other text.
+
+    Examples
+    --------
+    >>> parse_uff_time("18-Apr-16 13:49:58")
+    datetime.datetime(2016, 4, 18, 13, 49, 58)
+    """
+    try:
+        date, clock = text.split()[:2]
+        day, month, year = date.split("-")
+        hour, minute, second = clock.split(":")
+        years = int(year) + (0 if len(year) == 4 else 1900 if int(year) >= 70 else 2000)
+        start = datetime(years, MONTHS[month[:3].lower()], int(day), int(hour), int(minute))
+        return start + timedelta(seconds=float(second))
+    except (ValueError, KeyError, OverflowError):
+        return None
+
+
+def is_unread_uff_time(text: str) -> bool:
+    """Whether ID line 3 of a Universal File looks like a date and time and cannot be read as one.
+
+    Parameters
+    ----------
+    text : str
+        The line; it may hold any other text.
+
+    Returns
+    -------
+    bool
+        True for "31-Feb-24 10:00:00" and "2024-02-30".
+
+    Examples
+    --------
+    >>> is_unread_uff_time("31-Feb-24 10:00:00"), is_unread_uff_time("18-Apr-16 13:49:58"), is_unread_uff_time("NONE")
+    (True, False, False)
+    """
+    looks_dated = re.search(r"\d{1,4}[-./](?:\d{1,2}|[A-Za-z]{3})[-./]\d{2,4}|\d{1,2}:\d{2}:\d{2}", text)
+    return bool(looks_dated) and parse_uff_time(text) is None
