@@ -25,9 +25,10 @@ from turnout.readers.named_arrays import (
     matrices,
     raw_file,
 )
+from turnout.readers.packing import apply_packing
 from turnout.readers.scale_words import is_fill_name, is_scale_name
 from turnout.readers.source import RawFile, Source
-from turnout.readers.stated_scales import apply_packing, scale_text, scales_in_text
+from turnout.readers.stated_scales import scale_text, scales_in_text
 
 UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units")
 

@@ -14,14 +14,16 @@ from typing import Any
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers import stated_scales
 from turnout.readers.lazy import BlockReader, ChannelStatistics, Column, channel_error
 from turnout.readers.lost_entries import is_single, lost_entry_errors
+from turnout.readers.packing import fill_values
 from turnout.readers.rate_agreement import rate_remark, resolve
 from turnout.readers.rate_words import CERTAIN, is_rate_name, rate_unit
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
 from turnout.readers.start_times import check_order, is_plausible, start_errors, start_times
 from turnout.readers.stated_quantities import contradicting_quantity, quantity_entries
+from turnout.readers.stated_scales import remedy as scale_remedy
+from turnout.readers.stated_sensitivities import sensitivity_entries, sensitivity_problem
 from turnout.readers.stated_units import contradicting_unit, is_meaningless, key_of_units
 from turnout.readers.time_axes import all_statements, is_axis_name
 from turnout.readers.unexplained_entries import EntryCheck
@@ -173,13 +175,13 @@ def _channel_mapping(index: int, record: RawRecord, raw: RawChannel, where: str,
         remedy = "Correct unit and sensitivity of this channel in the layout"
         raise source.error(place, str(error), remedy, reason="unit_unknown") from error
     if (statement := record.undecided.get(index)) and not (raw.unit or "").endswith("!"):
-        raise source.error(place, statement, stated_scales.remedy(file_unit), reason="scale_unknown")
+        raise source.error(place, statement, scale_remedy(file_unit), reason="scale_unknown")
     is_overruled = (raw.unit or "").endswith("!")
     if not is_overruled:
         _check_stated_units(record, index, raw, place, source)
     if raw.sensitivity is not None and not is_overruled:
         stated = record.entries, raw.sensitivity, raw.sensitivity_unit, raw.quantity, record.names, index
-        if problem := stated_scales.sensitivity_problem(*stated):
+        if problem := sensitivity_problem(*stated):
             remedy = f"Correct the layout; if it is right, set 'unit: {raw.unit or file_unit}!' for this channel"
             raise source.error(place, problem, remedy, reason="scale_unknown")
     is_fraction = record.is_floating_audio and not is_overruled and FULL_SCALE_UNIT.match(raw.unit or "")
@@ -228,7 +230,7 @@ def _is_usable(unit: str, raw: RawChannel) -> bool:
 
 def _check_fill_values(record: RawRecord, mappings: Sequence[ChannelMapping], where: str, source: Source) -> None:
     """ReadError if samples equal a number that the file states for missing samples."""
-    fills = stated_scales.fill_values(record.entries, record.names)
+    fills = fill_values(record.entries, record.names)
     for mapping in mappings:
         column = record.samples[mapping.index]
         for fill in fills[mapping.index]:
@@ -389,12 +391,12 @@ def errors_without_layout(raw: RawFile, source: Source) -> Iterator[ReadError]:
     yield from start_errors([(k, record.started_at) for k, record in records], unread, "UTC", source)
     reported: set[tuple[str, str]] = set()
     for k, record in records:
-        fills = stated_scales.fill_values(record.entries, record.names)
+        fills = fill_values(record.entries, record.names)
         for i, (name, unit, column) in enumerate(zip(record.names, record.units, record.samples)):
             where = f"record {k + 1} of {len(raw.records)}, channel {name!r}"
             if (statement := record.undecided.get(i)) and (name, "scale") not in reported:
                 reported.add((name, "scale"))
-                yield source.error(where, statement, stated_scales.remedy(unit), reason="scale_unknown")
+                yield source.error(where, statement, scale_remedy(unit), reason="scale_unknown")
             if (name, "samples") not in reported and (n := _missing_count(column, fills[i])):
                 reported.add((name, "samples"))
                 problem = "1 sample is missing" if n == 1 else f"{n} samples are missing"
@@ -489,7 +491,7 @@ class Assignments:
     def _stated_of(self, record: RawRecord) -> tuple:
         """What the entries of a record state about units, quantities and sensitivities."""
         sensitivities: tuple[str, ...] = ()
-        if self._has_sensitivity and stated_scales.sensitivity_entries(record.entries):
+        if self._has_sensitivity and sensitivity_entries(record.entries):
             sensitivities = tuple(f"{entry.place}: {entry.name}: {entry.value}" for entry in record.entries)
         quantities = tuple((e.place, e.name, str(e.value)) for e in quantity_entries(record.entries))
         return sensitivities, key_of_units(record.entries), quantities

@@ -6,10 +6,10 @@ from functools import lru_cache
 from typing import Any
 
 from turnout.readers.entries import Entry
+from turnout.readers.entry_owners import owners_of
 from turnout.readers.rate_words import words_of
 from turnout.readers.scale_words import plain_word
 from turnout.readers.source import RawRecord
-from turnout.readers.stated_scales import owners_of
 from turnout.units import conversion
 
 # Names of entries that state the quantity of the numbers, and of the sensor or channel, whose numbers may be volts.

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from turnout.readers.entries import Entry, entries_of_text
+from turnout.readers.entry_owners import container_of, owners_of
 from turnout.readers.scale_words import (
     FACTOR,
     NEUTRAL,
@@ -20,7 +21,6 @@ from turnout.readers.scale_words import (
     POLYNOMIAL,
     POSSIBLY_FACTOR,
     POSSIBLY_OFFSET,
-    is_fill_name,
     is_of_drawing,
     is_ratio_of_drawing,
     is_scale_name,
@@ -30,8 +30,9 @@ from turnout.readers.scale_words import (
     value_of_word,
 )
 from turnout.readers.source import MEANINGLESS_UNITS
+from turnout.readers.stated_numbers import MAX_CHANNELS, finite_numbers, number_and_unit
 from turnout.readers.statements import PLACEHOLDERS
-from turnout.units import conversion, to_si
+from turnout.units import conversion
 
 ROUND_YEARS = (2000.0, 2048.0, 2050.0)  # which are factors as well
 YEARS = (1990.0, 2060.0)  # a whole number between them behind a word of calibration is a year
@@ -171,7 +172,7 @@ def _scale_values(value: Any) -> list[float | str]:
         return ["true"] if value else []
     if isinstance(value, str):
         return _scales_of_text(value)
-    numbers = _numbers(value)
+    numbers = finite_numbers(value)
     if numbers is not None:
         return [float(x) for x in numbers]
     if isinstance(value, np.ndarray):
@@ -182,19 +183,12 @@ def _scale_values(value: Any) -> list[float | str]:
 
 
 NO_SCALE = PLACEHOLDERS | {"unity", "linear", "off", "1:1", "1/1"}
-NUMBER_AND_UNIT = re.compile(r"([+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
-
-
-def _number_and_unit(text: str) -> tuple[float, str] | None:
-    """The number at the beginning of a text and what follows; None without one. A comma is a decimal mark."""
-    match = NUMBER_AND_UNIT.fullmatch(text.strip())
-    return (float(match[1].replace(",", ".")), match[2].strip()) if match else None
 
 
 def _scales_of_text(text: str) -> list[float | str]:
     """Scales of a text: one number with its unit, or a list of these; pieces that are not understood stay texts."""
     pieces = text.strip().strip(";").split(";")
-    if len(pieces) == 1 and (numbers := _numbers(text)) is not None and not re.search(r"[^\d\s.,;eE+-]", text):
+    if len(pieces) == 1 and (numbers := finite_numbers(text)) is not None and not re.search(r"[^\d\s.,;eE+-]", text):
         return [float(x) for x in numbers]
     return [_scale_of_piece(piece.strip()) for piece in pieces if len(pieces) > 1 or piece.strip()]
 
@@ -203,7 +197,7 @@ def _scale_of_piece(text: str) -> float | str:
     """The number of a scale; the text itself if it is not understood, nan if it says that there is none."""
     if text.casefold() in NO_SCALE or says_no_scale(text):
         return math.nan
-    parts = _number_and_unit(text)
+    parts = number_and_unit(text)
     if parts is None:
         return text
     number, unit = parts
@@ -284,70 +278,9 @@ def _scale_name(entry: Entry, names: Sequence[str]) -> str:
     return group if is_scale_name(group) else ""
 
 
-def container_of(entry: Entry) -> str:
-    """The place of an entry without its own name."""
-    return entry.place.removesuffix(entry.name).rstrip("/: ")
-
-
 def _is_inside(inner: str, outer: str) -> bool:
     """Whether a place lies in a group of another place."""
     return inner != outer and inner.startswith(f"{outer}/" if outer else "")
-
-
-def owners_of(entry: Entry, entries: Sequence[Entry], names: Sequence[str]) -> frozenset[int]:
-    """Indices of the channels that the place of an entry, its name or a text beside it name; empty without any."""
-    if owners := named_channels(f"{entry.place} {entry.name}", names):
-        return owners
-    container = container_of(entry)
-    if not container:
-        return frozenset()
-    beside = {
-        other.value.strip().casefold()
-        for other in entries
-        if isinstance(other.value, str) and container_of(other) == container
-    }
-    return frozenset(i for i, name in enumerate(names) if name.strip().casefold() in beside)
-
-
-def named_channels(text: str, names: Sequence[str]) -> frozenset[int]:
-    """Channels whose name is in a text, word by word; of "rail" and "rail 2" the longer one counts.
-
-    Parameters
-    ----------
-    text : str
-        Place and name of an entry.
-    names : sequence of str
-        Names of the channels; those of digits only are not searched.
-
-    Returns
-    -------
-    frozenset of int
-        Indices of the channels.
-
-    Examples
-    --------
-    >>> sorted(named_channels("sensors/rail 2/gain", ["rail", "rail 2", "force"]))
-    [1]
-    """
-    return _named_channels(text, tuple(names))
-
-
-@lru_cache(maxsize=4096)
-def _named_channels(text: str, names: tuple[str, ...]) -> frozenset[int]:
-    words = f" {_words_of(text)} "
-    spaced = {i: name for i, name in enumerate(map(_words_of, names)) if name and not name.isdigit()}
-    found = {i: name for i, name in spaced.items() if f" {name} " in words}
-    return frozenset(
-        i
-        for i, name in found.items()
-        if not any(f" {name} " in f" {other} " and name != other for other in found.values())
-    )
-
-
-@lru_cache(maxsize=4096)
-def _words_of(text: str) -> str:
-    """Words of a text in lower case with one blank between them."""
-    return " ".join(re.split(r"[\W_]+", text.casefold())).strip()
 
 
 def scale_text(facts: Mapping[str, Any]) -> str:
@@ -383,200 +316,6 @@ def scale_problem(statement: str) -> str:
     return f"the file states {statement}, and nothing says whether its numbers already contain it" if statement else ""
 
 
-def _numbers(value: Any) -> np.ndarray | None:
-    """The finite numbers of a value, (n,); None if it holds none or is an array of samples."""
-    if isinstance(value, str):
-        cells = re.split(r"[;\s]+", value.strip())
-        listed = len(cells) == 1 and (value.count(",") > 1 or "." in value)  # else a comma is the decimal mark
-        value = cells[0].split(",") if listed else [cell.replace(",", ".") for cell in cells]
-        if len(value) > 1 and not re.match(r"[+-]?\.?\d", value[1]):  # a number with its unit
-            number = _numbers(value[0])
-            is_level = number is not None and value[1].casefold() == "db"
-            return 10 ** (number / 20) if is_level and number is not None else number
-    if not isinstance(value, (int, float, list, tuple, np.ndarray, np.generic)) or isinstance(value, bool):
-        return None
-    try:
-        numbers = np.ravel(np.asarray(value, dtype=float))
-    except (TypeError, ValueError):
-        return None
-    return numbers if 0 < numbers.size <= MAX_CHANNELS and np.isfinite(numbers).all() else None
-
-
-MAX_CHANNELS = 64  # a longer array is no list of scales but one of samples
-
-
-SENSITIVITY = re.compile(r"sensitiv|empfindlich|sensibi|folsom|gevoelig")
-# What is beside a sensitivity: the frequency and the day at which it was measured, its tolerance, that of the trigger.
-BESIDE_SENSITIVITY = re.compile(r"trigger|seuil|freq|toler|temp|date|datum|uncertain|unsicher|deviation|abweich")
-# Words beside that of the sensitivity that speak of no sensor in particular, without case and accents.
-GENERAL_WORDS = frozenset(
-    "sensor sensors transducer channel channels kanal kanale capteur aufnehmer sensitivity nominal calibrated "
-    "calibration kalibriert nenn value wert of the der des du de".split()
-)
-# Words for the sensors of a quantity.
-SENSOR_WORDS = {
-    "force": re.compile(r"hammer|force|kraft|load"),
-    "acceleration": re.compile(r"acc|beschl"),
-    "velocity": re.compile(r"velocity|geophon|geschw|vitesse"),
-    "displacement": re.compile(r"displ|deflection|weg"),
-    "strain": re.compile(r"strain|dehnung"),
-}
-MAX_SENSITIVITY_DEVIATION = 0.1  # relative: a certificate and a logger's nominal sensitivity differ by less
-PREFIX_RATIOS = tuple(10.0**p for p in (-6, -3, 0, 3, 6))  # of units of one sensitivity
-
-
-def fill_values(entries: Iterable[Entry], names: Sequence[str]) -> tuple[tuple[float, ...], ...]:
-    """Numbers that stand for a missing sample of each channel, as the metadata state.
-
-    Parameters
-    ----------
-    entries : iterable of Entry
-        Metadata of a record.
-    names : sequence of str
-        Names of the channels.
-
-    Returns
-    -------
-    tuple of tuple of float
-        For each channel the values of the entries that are named like a fill value and concern it.
-
-    Examples
-    --------
-    >>> fill_values([Entry("head", "_FillValue", -999), Entry("rail/NoData", "NoData", -1)], ["force", "rail"])
-    ((-999.0,), (-999.0, -1.0))
-    """
-    entries = list(entries)
-    fills: list[list[float]] = [[] for _ in names]
-    for entry in entries:
-        if not is_fill_name(entry.name) or (numbers := _numbers(entry.value)) is None:
-            continue
-        owners = owners_of(entry, entries, names)
-        for i, fill in enumerate(fills):
-            if not owners and numbers.size == len(names):
-                fill.append(float(numbers[i]))
-            elif not owners or i in owners:
-                fill.extend(map(float, numbers))
-    return tuple(map(tuple, fills))
-
-
-def sensitivity_entries(entries: Iterable[Entry]) -> tuple[Entry, ...]:
-    """Entries of the metadata that state the sensitivity of a sensor.
-
-    Parameters
-    ----------
-    entries : iterable of Entry
-        Metadata of a record.
-
-    Returns
-    -------
-    tuple of Entry
-        Without those about a trigger, a frequency, a tolerance, a temperature or a date.
-    """
-    words = ((entry, plain_word(entry.name)) for entry in entries)
-    return tuple(e for e, word in words if SENSITIVITY.search(word) and not BESIDE_SENSITIVITY.search(word))
-
-
-def sensitivity_problem(
-    entries: Iterable[Entry], sensitivity: float, unit: str, quantity: str, names: Sequence[str] = ("",), index: int = 0
-) -> str:
-    """The problem of a message if the metadata state sensitivities of a channel and none is that of the layout.
-
-    Only entries count whose unit can be that of the quantity, or that belong to the channel.
-
-    Parameters
-    ----------
-    entries : iterable of Entry
-        Metadata of a record.
-    sensitivity : float
-        Sensitivity of the channel in the layout.
-    unit : str
-        Its unit.
-    quantity : str
-        Quantity of the channel in the layout.
-    names : sequence of str
-        Names of the channels of the file.
-    index : int
-        The channel among them.
-
-    Returns
-    -------
-    str
-        "" if the file states none, or one that agrees within a tenth; without a unit, up to a prefix such as "m".
-
-    Examples
-    --------
-    >>> stated = [Entry("head", "Sensitivity", "10.2 mV/(m/s²)")]
-    >>> sensitivity_problem(stated, 100.0, "mV/g", "acceleration")
-    ''
-    >>> bool(sensitivity_problem(stated, 35.3, "mV/g", "acceleration"))
-    True
-    """
-    entries = list(entries)
-    compared: list[Entry] = []
-    for entry in sensitivity_entries(entries):
-        owners = owners_of(entry, entries, names)
-        if owners and index not in owners:
-            continue
-        for number, own_unit in _sensitivities(entry):
-            agrees = _agrees(number, own_unit, sensitivity, unit, quantity, bool(owners), entry)
-            if agrees:
-                return ""
-            if agrees is False:
-                compared.append(entry)
-    if not compared:
-        return ""
-    listed = "; ".join(dict.fromkeys(f"{entry.name}: {entry.value}" for entry in compared[:3]))
-    return f"the file states {listed[:100]!r}, and the layout's sensitivity of {sensitivity:g} {unit} is none of these"
-
-
-def _sensitivities(entry: Entry) -> list[tuple[float, str]]:
-    """Numbers of an entry with their unit: behind the number, else in brackets behind the name, else ""."""
-    in_name = re.search(r"[\[(](.+)[\])]\s*$", entry.name)
-    unit = in_name[1] if in_name else ""
-    parts = _number_and_unit(entry.value) if isinstance(entry.value, str) else None
-    if parts and re.match(r"[^\d\s.,;+-]", parts[1]):
-        return [(parts[0], parts[1].replace(" per ", "/"))] if parts[0] else []
-    numbers = _numbers(entry.value)
-    return [] if numbers is None else [(float(x), unit) for x in numbers if x]
-
-
-def _agrees(
-    number: float, own_unit: str, sensitivity: float, unit: str, quantity: str, is_own: bool, entry: Entry
-) -> bool | None:
-    """Whether a stated sensitivity is that of the layout; None if it cannot be compared or is of another sensor."""
-    if not own_unit:
-        if not is_own and not _is_general(entry.name, quantity):
-            return None
-        ratio = abs(number) / sensitivity
-        is_tenfold = abs(ratio / 10.0 ** round(math.log10(ratio)) - 1.0) <= MAX_SENSITIVITY_DEVIATION
-        # Where the ratio is a power of ten, the reciprocal would make a factor of ten look like another unit.
-        ratios = (ratio,) if is_tenfold else (ratio, 1.0 / (abs(number) * sensitivity))
-        return any(abs(r / prefix - 1.0) <= MAX_SENSITIVITY_DEVIATION for r in ratios for prefix in PREFIX_RATIOS)
-    stated, in_layout = _sensitivity_scale(quantity, number, own_unit), _sensitivity_scale(quantity, sensitivity, unit)
-    if stated and in_layout:
-        same_kind = stated[0] == in_layout[0]
-        return abs(stated[1] / in_layout[1] - 1.0) <= MAX_SENSITIVITY_DEVIATION if same_kind else None
-    is_of_other_quantity = any(_sensitivity_scale(other, number, own_unit) for other in SENSOR_WORDS)
-    return False if is_own and is_of_other_quantity else None
-
-
-def _sensitivity_scale(quantity: str, number: float, unit: str) -> tuple[str, float] | None:
-    """(electrical unit, SI per electrical unit) of a sensitivity; None if the unit is none of the quantity."""
-    for electrical in ("V", "count"):
-        try:
-            return electrical, to_si(quantity, electrical, abs(number), unit).scale
-        except ValueError:
-            continue
-    return None
-
-
-def _is_general(name: str, quantity: str) -> bool:
-    """Whether the name of a sensitivity speaks of no other sensor than one of the quantity."""
-    words = [plain_word(word) for word in _words_of(re.sub(r"[\[(].*?[\])]", "", name)).split()]
-    specific = [w for w in words if w not in GENERAL_WORDS and not SENSITIVITY.search(w) and not w.isdigit()]
-    return not specific or any(SENSOR_WORDS[quantity].search(w) for w in specific if quantity in SENSOR_WORDS)
-
-
 def remedy(unit: str) -> str:
     """What to do about a scale of which nothing says whether it was applied.
 
@@ -595,34 +334,3 @@ def remedy(unit: str) -> str:
         f"Find out in the logger's manual whether its numbers already contain it; if they do, set unit: '{label}!' for "
         f"this channel in the layout, else the value of one step, such as unit: '0.4 {label}!'"
     )
-
-
-def apply_packing(numbers: Sequence | np.ndarray, factor: float, offset: float, fills: Sequence[float]) -> np.ndarray:
-    r"""Unpack numbers by the climate and forecast (CF) conventions of netCDF, section 8.1.
-
-    .. math:: x = s p + o, \qquad x = \mathrm{nan} \quad \mathrm{where}\ p\ \mathrm{is\ a\ fill\ value}
-
-    Parameters
-    ----------
-    numbers : (n,) array
-        Packed numbers p.
-    factor, offset : float
-        ``scale_factor`` s and ``add_offset`` o. [unit of the file]
-    fills : sequence of float
-        Values that stand for a missing sample.
-
-    Returns
-    -------
-    (n,) array of float
-        x. [unit of the file]
-
-    Examples
-    --------
-    >>> apply_packing(np.array([10, -99], dtype="int16"), 0.5, 1.0, [-99])
-    array([ 6., nan])
-    """
-    packed = np.asarray(numbers)
-    unpacked = packed * float(factor) + float(offset)
-    for fill in fills:
-        unpacked[packed == fill] = np.nan
-    return unpacked

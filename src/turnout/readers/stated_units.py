@@ -11,9 +11,9 @@ from functools import lru_cache
 from typing import Any
 
 from turnout.readers.entries import MAX_ENTRIES, Entry
+from turnout.readers.entry_owners import container_of, owners_of
 from turnout.readers.rate_words import rate_unit, words_of
 from turnout.readers.source import MEANINGLESS_UNITS, RawRecord
-from turnout.readers.stated_scales import container_of, owners_of
 from turnout.units import Conversion, conversion
 
 # A word for a unit, or a compound that ends with one.

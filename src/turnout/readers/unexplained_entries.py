@@ -29,10 +29,10 @@ from turnout.readers.entry_candidates import (
     Candidate,
     candidates,
 )
+from turnout.readers.entry_owners import container_of
 from turnout.readers.precision import EXACT_PRECISION, around
 from turnout.readers.rate_agreement import is_near_rate
 from turnout.readers.source import RawRecord, Source
-from turnout.readers.stated_scales import container_of
 from turnout.readers.stated_units import same_unit, with_stated_units
 from turnout.readers.statements import PLAIN_TYPES
 from turnout.records import RawDescription

@@ -1,0 +1,79 @@
+"""Channels to which an entry of the metadata belongs, by its place, its name or a text beside it."""
+
+import re
+from collections.abc import Sequence
+from functools import lru_cache
+
+from turnout.readers.entries import Entry
+
+
+def container_of(entry: Entry) -> str:
+    """The place of an entry without its own name."""
+    return entry.place.removesuffix(entry.name).rstrip("/: ")
+
+
+def owners_of(entry: Entry, entries: Sequence[Entry], names: Sequence[str]) -> frozenset[int]:
+    """Indices of the channels that the place of an entry, its name or a text beside it name; empty without any."""
+    if owners := named_channels(f"{entry.place} {entry.name}", names):
+        return owners
+    container = container_of(entry)
+    if not container:
+        return frozenset()
+    beside = {
+        other.value.strip().casefold()
+        for other in entries
+        if isinstance(other.value, str) and container_of(other) == container
+    }
+    return frozenset(i for i, name in enumerate(names) if name.strip().casefold() in beside)
+
+
+def named_channels(text: str, names: Sequence[str]) -> frozenset[int]:
+    """Channels whose name is in a text, word by word; of "rail" and "rail 2" the longer one counts.
+
+    Parameters
+    ----------
+    text : str
+        Place and name of an entry.
+    names : sequence of str
+        Names of the channels; those of digits only are not searched.
+
+    Returns
+    -------
+    frozenset of int
+        Indices of the channels.
+
+    Examples
+    --------
+    >>> sorted(named_channels("sensors/rail 2/gain", ["rail", "rail 2", "force"]))
+    [1]
+    """
+    return _named_channels(text, tuple(names))
+
+
+@lru_cache(maxsize=4096)
+def _named_channels(text: str, names: tuple[str, ...]) -> frozenset[int]:
+    words = f" {spaced_words(text)} "
+    spaced = {i: name for i, name in enumerate(map(spaced_words, names)) if name and not name.isdigit()}
+    found = {i: name for i, name in spaced.items() if f" {name} " in words}
+    return frozenset(
+        i
+        for i, name in found.items()
+        if not any(f" {name} " in f" {other} " and name != other for other in found.values())
+    )
+
+
+@lru_cache(maxsize=4096)
+def spaced_words(text: str) -> str:
+    """Words of a text in lower case with one blank between them.
+
+    Parameters
+    ----------
+    text : str
+        Any text.
+
+    Returns
+    -------
+    str
+        Letters and digits only.
+    """
+    return " ".join(re.split(r"[\W_]+", text.casefold())).strip()

@@ -1,0 +1,75 @@
+"""Packed numbers: values for missing samples, scale and offset by the conventions of netCDF."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from turnout.readers.entries import Entry
+from turnout.readers.entry_owners import owners_of
+from turnout.readers.scale_words import is_fill_name
+from turnout.readers.stated_numbers import finite_numbers
+
+
+def fill_values(entries: Iterable[Entry], names: Sequence[str]) -> tuple[tuple[float, ...], ...]:
+    """Numbers that stand for a missing sample of each channel, as the metadata state.
+
+    Parameters
+    ----------
+    entries : iterable of Entry
+        Metadata of a record.
+    names : sequence of str
+        Names of the channels.
+
+    Returns
+    -------
+    tuple of tuple of float
+        For each channel the values of the entries that are named like a fill value and concern it.
+
+    Examples
+    --------
+    >>> fill_values([Entry("head", "_FillValue", -999), Entry("rail/NoData", "NoData", -1)], ["force", "rail"])
+    ((-999.0,), (-999.0, -1.0))
+    """
+    entries = list(entries)
+    fills: list[list[float]] = [[] for _ in names]
+    for entry in entries:
+        if not is_fill_name(entry.name) or (numbers := finite_numbers(entry.value)) is None:
+            continue
+        owners = owners_of(entry, entries, names)
+        for i, fill in enumerate(fills):
+            if not owners and numbers.size == len(names):
+                fill.append(float(numbers[i]))
+            elif not owners or i in owners:
+                fill.extend(map(float, numbers))
+    return tuple(map(tuple, fills))
+
+
+def apply_packing(numbers: Sequence | np.ndarray, factor: float, offset: float, fills: Sequence[float]) -> np.ndarray:
+    r"""Unpack numbers by the climate and forecast (CF) conventions of netCDF, section 8.1.
+
+    .. math:: x = s p + o, \qquad x = \mathrm{nan} \quad \mathrm{where}\ p\ \mathrm{is\ a\ fill\ value}
+
+    Parameters
+    ----------
+    numbers : (n,) array
+        Packed numbers p.
+    factor, offset : float
+        ``scale_factor`` s and ``add_offset`` o. [unit of the file]
+    fills : sequence of float
+        Values that stand for a missing sample.
+
+    Returns
+    -------
+    (n,) array of float
+        x. [unit of the file]
+
+    Examples
+    --------
+    >>> apply_packing(np.array([10, -99], dtype="int16"), 0.5, 1.0, [-99])
+    array([ 6., nan])
+    """
+    packed = np.asarray(numbers)
+    unpacked = packed * float(factor) + float(offset)
+    for fill in fills:
+        unpacked[packed == fill] = np.nan
+    return unpacked
