@@ -23,7 +23,8 @@ from turnout.readers.named_arrays import (
     TIME_NAMES,
 )
 from turnout.readers.other_subjects import STRONG, subject_of
-from turnout.readers.rate_words import is_rate_name, rate_unit
+from turnout.readers.rate_units import rate_unit
+from turnout.readers.rate_words import is_rate_name
 from turnout.readers.scale_words import is_of_drawing, is_scale_name, scale_meaning, value_of_word
 from turnout.readers.source import COPY_AGAIN, MEANINGLESS_UNITS, Source
 from turnout.readers.stated_quantities import is_quantity_name

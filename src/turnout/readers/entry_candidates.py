@@ -15,17 +15,8 @@ from functools import lru_cache
 
 from turnout.readers.other_subjects import LENGTH, NONE, STRONG, WEAK, explained_subject, subject_of
 from turnout.readers.precision import Interval, readings
-from turnout.readers.rate_words import (
-    CERTAIN,
-    NAME_WITH_UNIT,
-    SAMPLING,
-    SECONDS,
-    SHORT_UNIT,
-    RateUnit,
-    name_meaning,
-    rate_unit,
-    words_of,
-)
+from turnout.readers.rate_units import SECONDS, RateUnit, rate_unit, words_of
+from turnout.readers.rate_words import CERTAIN, NAME_WITH_UNIT, SAMPLING, SHORT_UNIT, name_meaning
 from turnout.readers.scale_words import (
     LEVELS,
     is_fill_name,

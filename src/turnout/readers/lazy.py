@@ -14,7 +14,7 @@ from turnout.readers.source import BLOCK_SIZE, RawRecord, Source
 from turnout.records import Channel
 
 if TYPE_CHECKING:
-    from turnout.readers.interpret import ChannelMapping
+    from turnout.readers.channel_maps import ChannelMapping
 
 Take = Callable[[int, int], np.ndarray]  # (start, stop) -> the samples between these indices
 

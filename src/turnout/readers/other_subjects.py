@@ -10,7 +10,7 @@ part of a compound.
 import re
 from functools import lru_cache
 
-from turnout.readers.rate_words import words_of
+from turnout.readers.rate_units import words_of
 
 STRONG, WEAK, NONE = 2, 1, 0
 MIN_STEM = 4  # letters: a shorter one is part of too many other words

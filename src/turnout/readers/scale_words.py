@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from turnout.readers.other_subjects import STRONG, subject_of
-from turnout.readers.rate_words import rate_unit, words_of
+from turnout.readers.rate_units import rate_unit, words_of
 
 FACTOR_WORDS = frozenset(
     (

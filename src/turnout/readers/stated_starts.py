@@ -5,7 +5,7 @@ from dataclasses import replace
 from datetime import datetime, timedelta
 from functools import lru_cache
 
-from turnout.readers.rate_words import words_of
+from turnout.readers.rate_units import words_of
 from turnout.readers.source import RawRecord
 from turnout.readers.time_texts import looks_dated, parse_time
 

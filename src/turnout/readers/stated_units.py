@@ -12,7 +12,7 @@ from typing import Any
 
 from turnout.readers.entries import MAX_ENTRIES, Entry
 from turnout.readers.entry_owners import container_of, owners_of
-from turnout.readers.rate_words import rate_unit, words_of
+from turnout.readers.rate_units import rate_unit, words_of
 from turnout.readers.source import MEANINGLESS_UNITS, RawRecord
 from turnout.units import Conversion, conversion
 

@@ -19,7 +19,8 @@ import numpy as np
 from turnout.readers.entries import MAX_ENTRIES, Entry, entries_of_text
 from turnout.readers.other_subjects import STRONG, subject_of
 from turnout.readers.precision import NUMBER, Interval, around, readings
-from turnout.readers.rate_words import CERTAIN, NOT, POSSIBLY, RateUnit, name_meaning, rate_unit, reduction_of_name
+from turnout.readers.rate_units import RateUnit, rate_unit
+from turnout.readers.rate_words import CERTAIN, NOT, POSSIBLY, name_meaning, reduction_of_name
 
 MAX_CLOCK_DRIFT = 1e-4  # relative: two clocks of one logger with separate crystals may differ by this much
 PLAUSIBLE_RATES = (10.0, 1e8)  # Hz: no vibration is sampled outside; a possible statement outside means something else

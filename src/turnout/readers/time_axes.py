@@ -5,7 +5,8 @@ from collections.abc import Iterator, Set
 import numpy as np
 
 from turnout.readers.entries import Entry
-from turnout.readers.rate_words import CERTAIN, POSSIBLY, TIME_UNITS, is_time_name, name_meaning, rate_unit, words_of
+from turnout.readers.rate_units import TIME_UNITS, rate_unit, words_of
+from turnout.readers.rate_words import CERTAIN, POSSIBLY, is_time_name, name_meaning
 from turnout.readers.source import MEANINGLESS_UNITS, RawRecord, Source
 from turnout.readers.statements import Statement, statements_of, time_statement
 from turnout.readers.timing import check_time, rate_of_time, seconds_since_first

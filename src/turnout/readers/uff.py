@@ -14,7 +14,7 @@ import numpy as np
 from turnout.errors import ReadError
 from turnout.readers.entries import FREE_TEXT, Entry, entries_of_text, step_entry
 from turnout.readers.lazy import Column, LazyColumn
-from turnout.readers.rate_words import rate_unit
+from turnout.readers.rate_units import rate_unit
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, Source, load, number_or_text
 from turnout.readers.stated_quantities import DEFINED_NAME
 from turnout.readers.stated_scales import entry_statements

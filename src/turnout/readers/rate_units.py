@@ -1,0 +1,110 @@
+"""Units of rates and time steps, and the words of a name without case, accents and punctuation."""
+
+import re
+import unicodedata
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+
+PER = {"per", "pro", "par", "por", "al", "pr", "je"}
+UNIT_PER = re.compile(rf"\s*(?:/|\b(?:{'|'.join(sorted(PER))})\b\.?)\s*")
+SAMPLES = re.compile(
+    r"s|sa|samp|samples?|smpl|pts?|points?|scans?|messwerte?|abtastwerte?|werte?|punkte?|puntos?|punti|malinger|ech"
+    r"|echantillons?|campioni|muestras|count"
+)
+SECONDS = set(
+    "s sec secs second seconds sek sekund sekunde sekunden sekunder seconde secondes secondi secondo segundo "
+    "segundos".split()
+)
+TIME_UNITS = {
+    **dict.fromkeys(SECONDS, Fraction(1)),
+    **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds", "millisekunden"), Fraction(1, 10**3)),
+    **dict.fromkeys(("µs", "us", "usec", "µsec", "microsecond", "microseconds", "mikrosekunden"), Fraction(1, 10**6)),
+    **dict.fromkeys(("ns", "nsec", "nanosecond", "nanoseconds"), Fraction(1, 10**9)),
+    **dict.fromkeys(("ps",), Fraction(1, 10**12)),
+    **dict.fromkeys(("min", "minute", "minutes", "minuten"), Fraction(60)),
+    **dict.fromkeys(("h", "hour", "hours", "stunden"), Fraction(3600)),
+    **dict.fromkeys(("d", "day", "days", "tage"), Fraction(86400)),
+}
+PREFIXES = {"": Fraction(1), "k": Fraction(10**3), "m": Fraction(10**6), "g": Fraction(10**9)}
+RATE_UNIT = re.compile(r"(k|m|g)?(?:hz|hertz|sps)")
+
+
+@dataclass(frozen=True)
+class RateUnit:
+    """Unit of a rate [Hz per unit] or of a step [s per unit]; ``is_sampling`` if it counts samples, as in "kS/s"."""
+
+    is_step: bool
+    scale: Fraction
+    is_sampling: bool = False
+
+
+@lru_cache(maxsize=4096)
+def rate_unit(text: str) -> RateUnit | None:
+    """Unit of a sampling rate or a time step.
+
+    Parameters
+    ----------
+    text : str
+        Unit as it is written, without its number.
+
+    Returns
+    -------
+    RateUnit or None
+        None for any other unit.
+
+    Examples
+    --------
+    >>> rate_unit("kS/s").scale, rate_unit("µs/pt").is_step, rate_unit("Samples per second").scale, rate_unit("V")
+    (Fraction(1000, 1), True, Fraction(1, 1), None)
+    """
+    plain = text.strip("[](){} .").casefold().replace("é", "e").replace("\u03bc", "µ")
+    plain = re.sub(r"\s*(?:/|per\s+)\s*(?:ch|chan|channel|kanal)$", "", plain)
+    if match := RATE_UNIT.fullmatch(plain):
+        return RateUnit(False, PREFIXES[match[1] or ""], plain.endswith("sps"))
+    if plain in TIME_UNITS:
+        return RateUnit(True, TIME_UNITS[plain])
+    if re.fullmatch(r"(?:1/s|s\^?-1|s⁻¹|1/sec)", plain):
+        return RateUnit(False, Fraction(1))
+    parts = UNIT_PER.split(plain)
+    if len(parts) != 2:
+        return None
+    over, under = parts
+    if under in SECONDS:
+        for prefix, scale in PREFIXES.items():
+            if over.startswith(prefix) and SAMPLES.fullmatch(over[len(prefix) :].strip()):
+                return RateUnit(False, scale, True)
+    if SAMPLES.fullmatch(under) and over in TIME_UNITS:
+        return RateUnit(True, TIME_UNITS[over], True)
+    return None
+
+
+def words_of(name: str) -> tuple[str, ...]:
+    """Words of a name, without case, accents and punctuation.
+
+    Parameters
+    ----------
+    name : str
+        Name of an entry or column.
+
+    Returns
+    -------
+    tuple of str
+        Its words in lower case.
+
+    Examples
+    --------
+    >>> words_of("Fréquence d’échantillonnage"), words_of("XIncrement"), words_of("SampleRate_Hz")
+    (('frequence', 'd', 'echantillonnage'), ('x', 'increment'), ('sample', 'rate', 'hz'))
+    """
+    text = (
+        name.replace("_", " ")
+        .replace("ø", "o")
+        .replace("Ø", "O")
+        .replace("æ", "ae")
+        .replace("ß", "ss")
+        .replace("Δ", "delta ")
+    )
+    text = "".join(c for c in unicodedata.normalize("NFKD", text) if not unicodedata.combining(c))
+    text = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", text.replace("/", " per "))
+    return tuple(re.findall(r"[^\W\d_]+", re.sub(r"\b([kmg]) (?=hz\b)", r"\1", text.lower())))
