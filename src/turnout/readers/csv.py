@@ -30,6 +30,13 @@ import pyarrow as pa
 from pyarrow import csv
 
 from turnout.errors import ReadError
+from turnout.readers.array_metadata import (
+    RECORD_COUNT_NAMES,
+    SAMPLE_COUNT_NAMES,
+    START_DATE_NAMES,
+    START_NAMES,
+    Metadata,
+)
 from turnout.readers.csv_header import (
     MISSING_VALUES,
     cell_errors,
@@ -41,7 +48,6 @@ from turnout.readers.csv_header import (
 from turnout.readers.entries import Entry
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.lost_entries import control_character_errors
-from turnout.readers.named_arrays import RECORD_COUNT_NAMES, SAMPLE_COUNT_NAMES, START_DATE_NAMES, START_NAMES, Metadata
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import entry_statements, scale_problem, scale_statements, without_drawings

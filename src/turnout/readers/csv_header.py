@@ -14,14 +14,14 @@ from mmap import mmap
 import numpy as np
 import pyarrow as pa
 
-from turnout.readers.entries import FREE_TEXT, Entry, entries_of_text
-from turnout.readers.named_arrays import (
+from turnout.readers.array_metadata import (
     RECORD_COUNT_NAMES,
     SAMPLE_COUNT_NAMES,
     START_DATE_NAMES,
     START_NAMES,
     TIME_NAMES,
 )
+from turnout.readers.entries import FREE_TEXT, Entry, entries_of_text
 from turnout.readers.other_subjects import STRONG, subject_of
 from turnout.readers.rate_units import rate_unit
 from turnout.readers.rate_words import is_rate_name

@@ -13,9 +13,9 @@ import pyarrow as pa
 from pyarrow import csv
 
 from turnout.errors import ReadError
+from turnout.readers.array_metadata import Metadata
 from turnout.readers.entries import Entry, entries_of, step_entry
 from turnout.readers.lost_entries import control_character_errors
-from turnout.readers.named_arrays import Metadata
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, Source, number_or_text
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import scale_problem, scale_statements, without_drawings

@@ -14,25 +14,33 @@ What is recognised (names in any case, except ``t``):
   3. one array: (record, channel, sample), (channel, sample) or (sample, channel). The channel axis is the one with
      the number of channels, the longer axis is that of the samples;
   4. vectors of equal length, each a channel with the name of its variable.
-
-The names that loggers use in European languages are listed here in lower case, without accents, with "_" for blanks.
 """
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.entries import MAX_ENTRIES, Entry, entries_of
+from turnout.readers.array_metadata import (
+    CHANNEL_NAMES,
+    RECORD_COUNT_NAMES,
+    START_NAMES,
+    TIME_NAMES,
+    UNIT_NAMES,
+    Alphabetical,
+    Attributes,
+    Metadata,
+    holds_samples,
+    list_of_texts,
+    matrices,
+    vectors,
+)
 from turnout.readers.lazy import ARRAYS, Array, Column
-from turnout.readers.rate_words import is_rate_name
-from turnout.readers.scale_words import is_scale_name
-from turnout.readers.source import CONDITIONS, RawFile, RawRecord, Source
+from turnout.readers.source import RawFile, RawRecord, Source
 from turnout.readers.start_times import start_fields
-from turnout.readers.stated_scales import entry_statements, scale_problem, scale_statements, without_drawings
+from turnout.readers.stated_scales import scale_problem, scale_statements, without_drawings
 from turnout.readers.timing import seconds_since_first
 
 RECORD_NAME = re.compile(r"^(?:record|rec|segment|impact|hit)[_ ]?(\d+)$", re.IGNORECASE)
@@ -115,10 +123,6 @@ def natural_sort_key(name: str) -> list[int | str]:
     return [int(piece) if piece.isdigit() else piece for piece in re.split(r"(\d+)", name)]
 
 
-class Alphabetical(dict):
-    """Variables of a file that sorts them alphabetically: their order carries no information."""
-
-
 def match_units(names: Sequence[str], units: list[str], labels: Sequence[str], ordered: bool) -> list[str] | None:
     """Unit of each of ``names``: by the ``labels`` that belong to the units, else by order.
 
@@ -156,295 +160,7 @@ def match_units(names: Sequence[str], units: list[str], labels: Sequence[str], o
     return units if ordered or len(set(units)) == 1 else None
 
 
-START_NAMES = (
-    "started_at", "start_time", "starttime", "wf_start_time", "startzeit", "startzeitpunkt", "messbeginn", "messstart",
-    "beginn_der_messung", "heure_de_debut", "debut_de_mesure", "debut_de_la_mesure", "starttijd", "begintijd",
-    "begin_meting", "zacatek_mereni", "cas_zacatku", "starttid", "starttidspunkt",
-)  # fmt: skip
-# The day of a start whose time of day is in a line of its own.
-START_DATE_NAMES = ("start_date", "startdatum", "date_de_debut", "begindatum", "datum_zacatku", "startdato")
-# Unlike n_samples, which counts per record, these may count the rows of the whole file.
-SAMPLE_COUNT_NAMES = (
-    "number_of_samples", "anzahl_messwerte", "anzahl_der_messwerte", "anzahl_werte", "anzahl_abtastwerte",
-    "anzahl_samples", "anzahl_datenpunkte", "nombre_d_echantillons", "nombre_de_points", "aantal_samples",
-    "aantal_meetwaarden", "aantal_meetpunten", "pocet_vzorku", "antal_samples", "antal_malepunkter",
-    "antal_datapunkter",
-)  # fmt: skip
-
-
-TIME_NAMES = ("time", "t", "time_s")
-CHANNEL_NAMES = ("channels", "channel_names", "names", "labels")
-UNIT_NAMES = ("units", "unit", "channel_units")
-ATTRIBUTES_MARK = " (attributes)"  # behind the name of a variable: the name of its attributes
 STATED_SCALES = "(scales)"  # pairs (channel, statement about its scale) that a reader adds to the variables
-RECORD_COUNT_NAMES = ("n_records", "n_record")
-CONDITION_NAMES = {spelling: name for name in CONDITIONS for spelling in (name, name.replace("_", " "))}
-
-
-class Metadata:
-    """Metadata of the samples of a group of variables; missing entries are taken from the ``parent`` group.
-
-    Parameters
-    ----------
-    variables : mapping
-        Names and values of the group; upper and lower case count as equal, except for "t".
-    source : Source
-        The raw file.
-    parent : Metadata or None
-        Metadata of the group above.
-    place : str
-        Name of the group, for messages.
-    """
-
-    def __init__(self, variables: Mapping, source: Source, parent: "Metadata | None" = None, place: str = ""):
-        self.lower = {(k if k == "t" else k.lower()): v for k, v in variables.items() if k != "T"}
-        self.variables, self.parent, self.source, self.place = variables, parent, source, place
-
-    @cached_property
-    def scale_facts(self) -> dict[str, Any]:
-        """Variables of this group and its parent groups whose names speak of a scale; those of the group count."""
-        own = {
-            name: value
-            for name, value in self.lower.items()
-            if is_scale_name(name) and not _is_nested_text(value)  # nested
-        }
-        return {**(self.parent.scale_facts if self.parent else {}), **own}
-
-    def get(self, names: Sequence[str]) -> Any:
-        """The first variable of ``names``, here or in a parent group; ReadError if it is damaged.
-
-        Parameters
-        ----------
-        names : sequence of str
-            Spellings of one entry, in lower case.
-
-        Returns
-        -------
-        any
-            Value of the first spelling that exists, here or in a parent group; None without one.
-
-        Raises
-        ------
-        ReadError
-            If the variable is damaged.
-        """
-        for name in names:
-            if (value := self.lower.get(name)) is not None:
-                if isinstance(value, ReadError):
-                    raise value
-                return value
-        return self.parent.get(names) if self.parent else None
-
-    def record_value(self, names: Sequence[str], k: int, n: int) -> Any:
-        """As ``get``, but entry ``k`` if there is one entry per record.
-
-        Parameters
-        ----------
-        names : sequence of str
-            Spellings of one entry, in lower case.
-        k : int
-            Number of the record, from 0.
-        n : int
-            Number of records.
-
-        Returns
-        -------
-        any
-            As ``get``, but entry ``k`` if there is one entry per record.
-
-        Raises
-        ------
-        ReadError
-            If the variable is damaged.
-        """
-        value = self.get(names)
-        if isinstance(value, np.ndarray) and value.ndim == 0:
-            value = value[()]
-        if isinstance(value, (list, tuple)) or (isinstance(value, np.ndarray) and value.ndim):
-            value = np.ravel(np.asarray(value))
-            value = value[k if value.size == n else 0] if value.size else None
-        return value.item() if isinstance(value, np.generic) and value.dtype.kind != "M" else value
-
-    def number(self, names: Sequence[str], k: int = 0, n: int = 1) -> float | None:
-        """As ``record_value``, but a float; ReadError if it is no number.
-
-        Parameters
-        ----------
-        names : sequence of str
-            Spellings of one entry, in lower case.
-        k : int
-            Number of the record, from 0.
-        n : int
-            Number of records.
-
-        Returns
-        -------
-        float or None
-            As ``record_value``, but a float.
-
-        Raises
-        ------
-        ReadError
-            If it is no number.
-        """
-        value = self.record_value(names, k, n)
-        try:
-            return None if value is None else float(value)
-        except (TypeError, ValueError) as error:
-            raise self.source.error(f"variable {names[0]!r}", f"{value!r} is no number") from error
-
-    def count(self, names: Sequence[str], k: int = 0, n: int = 1) -> int | None:
-        """As ``number``, but a whole number above 0.
-
-        Parameters
-        ----------
-        names : sequence of str
-            Spellings of one entry, in lower case.
-        k : int
-            Number of the record, from 0.
-        n : int
-            Number of records.
-
-        Returns
-        -------
-        int or None
-            As ``number``, but a whole number above 0.
-
-        Raises
-        ------
-        ReadError
-            If it is no such number.
-        """
-        value = self.number(names, k, n)
-        if value is None or (1 <= value < 2**53 and value == int(value)):
-            return None if value is None else int(value)
-        raise self.source.error(f"variable {names[0]!r}", f"{value!r} is no whole number above 0")
-
-    @cached_property
-    def entries(self) -> tuple[Entry, ...]:
-        """All metadata of the group and of its parents, with their places; records beside this one take no part."""
-        samples = {*vectors(self.variables), *matrices(self.variables)}
-        longest = max((self.variables[name].size for name in samples), default=0)
-        own = {
-            name: value
-            for name, value in self.variables.items()
-            if not isinstance(value, Mapping) or 2 * _longest(value) < longest or not _holds_samples(value)
-            if not isinstance(value, Attributes) or not _is_slow(self.variables.get(value.owner), value.owner, samples)
-        }
-        return (*entries_of(own, self.place), *(self.parent.entries if self.parent else ()))
-
-    def nested_scales(self, names: Sequence[str]) -> dict[int, str]:
-        """Problems about scales that nested metadata state; attributes of single variables take no part.
-
-        An entry of a parent group does not count if this group has one in the same place.
-
-        Parameters
-        ----------
-        names : sequence of str
-            Names of the channels.
-
-        Returns
-        -------
-        dict of int to str
-            Index of the channel -> problem.
-        """
-        level: Metadata | None = self
-        nested: list[Entry] = []
-        while level:
-            inner = {entry.place.casefold() for entry in nested}
-            n_outer = len(level.parent.entries) if level.parent else 0
-            own = level.entries[: len(level.entries) - n_outer]
-            nested += [e for e in own if ATTRIBUTES_MARK not in e.place and e.place.casefold() not in inner]
-            level = level.parent
-        direct = set(self.scale_facts)  # judged by the group itself
-        return entry_statements((e for e in nested if e.place.casefold() not in direct), names)
-
-    def conditions(self, k: int, n: int) -> dict[str, Any]:
-        """Conditions that are stored with the samples.
-
-        Parameters
-        ----------
-        k : int
-            Number of the record, from 0.
-        n : int
-            Number of records.
-
-        Returns
-        -------
-        dict of str to any
-            Name -> value of the conditions that are stored with the samples of record ``k``.
-        """
-        present: set[str] = set()
-        level: Metadata | None = self
-        while level:
-            present |= CONDITION_NAMES.keys() & level.lower.keys()
-            level = level.parent
-        names = sorted({CONDITION_NAMES[name] for name in present}, key=CONDITIONS.index)
-        values = {name: single_value(self.get((name, name.replace("_", " "))), k, n) for name in names}
-        return {name: value for name, value in values.items() if value is not None}
-
-
-def single_value(value: Any, k: int, n: int) -> Any:
-    """The value of record ``k`` of an entry that a typed format may store as an array or a list.
-
-    Parameters
-    ----------
-    value : any
-        The entry as a library returns it.
-    k : int
-        Number of the record, from 0.
-    n : int
-        Number of records.
-
-    Returns
-    -------
-    any
-        A number, a text or None; of several different values that are not one per record the array or the list itself;
-        None for a group and an array that stays in the file.
-
-    Examples
-    --------
-    >>> [single_value(v, 1, 2) for v in (12.5, [12.5], [12.5, 13.0], [1, 2, 3], {"side": "left"})]
-    [12.5, 12.5, 13.0, [1, 2, 3], None]
-    """
-    if isinstance(value, np.generic):
-        return value.item() if value.dtype.kind != "M" else value
-    if isinstance(value, np.ndarray) and value.ndim == 0:
-        return single_value(value[()], k, n)
-    if isinstance(value, (list, tuple, np.ndarray)):
-        values = value.ravel() if isinstance(value, np.ndarray) else value
-        if len(values) == n or (len(values) and all(np.array_equal(v, values[0]) for v in values[1:])):
-            return single_value(values[k if len(values) == n else 0], k, 1)
-        return value if len(values) else None
-    return None if isinstance(value, (Mapping, *ARRAYS)) else value
-
-
-def _is_nested_text(value: Any) -> bool:
-    """Whether a value is the text of a JSON mapping, whose entries are judged each by itself."""
-    is_text = isinstance(value, str) or (isinstance(value, np.ndarray) and value.size == 1 and value.dtype.kind == "U")
-    return is_text and str(np.ravel(value)[0]).lstrip().startswith("{")
-
-
-def list_of_texts(value: Any) -> list[str]:
-    """A list of texts from the form in which a library returns it.
-
-    Parameters
-    ----------
-    value : any
-        Text, bytes, a list or an array of these, or None.
-
-    Returns
-    -------
-    list of str
-        The texts without blanks around them; empty for None.
-    """
-    if value is None:
-        return []
-    if isinstance(value, (str, bytes)):
-        value = [value]
-    return [
-        v.decode("utf-8", "replace") if isinstance(v, bytes) else str(v).strip() for v in np.ravel(np.asarray(value))
-    ]
 
 
 def channel_names(facts: Metadata) -> list[str]:
@@ -498,7 +214,7 @@ def raw_file(variables: Mapping, source: Source, parent: Metadata | None = None)
     facts = Metadata(variables, source, parent)
     expected = facts.count(RECORD_COUNT_NAMES)
     numbered = numbered_names(variables)
-    groups = [name for name, value in variables.items() if isinstance(value, Mapping) and _holds_samples(value)]
+    groups = [name for name, value in variables.items() if isinstance(value, Mapping) and holds_samples(value)]
     if numbered:
         entries = [(value, f"record {i + 1}") for i, value in enumerate(records_in_order(numbered, variables, source))]
     elif groups and not vectors(variables) and not matrices(variables):
@@ -544,42 +260,6 @@ def _with_fields(variables: Mapping[str, Any]) -> Mapping[str, Any]:
 
 def _is_structured(value: Any) -> bool:
     return isinstance(value, np.ndarray) and value.dtype.names is not None and value.ndim == 1
-
-
-class Attributes(dict):
-    """Attributes of the variable ``owner``: metadata, never a group of samples.
-
-    Parameters
-    ----------
-    owner : str
-        Name of the variable.
-    values : mapping of str to any
-        Name -> value.
-    """
-
-    def __init__(self, owner: str, values: Mapping[str, Any]):
-        super().__init__(values)
-        self.owner = owner
-
-
-def _is_slow(value: Any, name: str, samples: set[str]) -> bool:
-    """Whether a variable is an array beside the samples, for example one that is sampled at a lower rate."""
-    return isinstance(value, ARRAYS) and value.size > 1 and name not in samples and name.lower() not in TIME_NAMES
-
-
-def _longest(value: Mapping) -> int:
-    """Size of the largest array in a group or one of its groups."""
-    sizes = (_longest(v) if isinstance(v, Mapping) else v.size if isinstance(v, ARRAYS) else 0 for v in value.values())
-    return max(sizes, default=0)
-
-
-def _holds_samples(value: Mapping) -> bool:
-    """Whether a group or one of its groups holds samples, or a variable that cannot be read."""
-    if isinstance(value, Attributes):
-        return False
-    return bool(vectors(value) or matrices(value)) or any(
-        isinstance(v, ReadError) or (isinstance(v, Mapping) and _holds_samples(v)) for v in value.values()
-    )
 
 
 def _numbered_record(value: Any, k: int, n: int, where: str, facts: Metadata, source: Source) -> RawRecord | ReadError:
@@ -640,54 +320,6 @@ def _units_of(channels: Mapping[str, Array], facts: Metadata, ordered: bool, whe
         remedy = "Write each dataset's unit beside it, or a list 'channels' of their names beside that of the units"
         raise source.error(where, problem, remedy, reason="unit_unknown")
     return units
-
-
-def matrices(variables: Mapping[str, Any]) -> dict[str, Any]:
-    """Arrays that can be samples in two or three dimensions.
-
-    Parameters
-    ----------
-    variables : mapping of str to any
-        Name -> value of any type.
-
-    Returns
-    -------
-    dict of str to any
-        Those that are numeric arrays with at least two numbers along one axis.
-    """
-    arrays = {name: v for name, v in variables.items() if isinstance(v, ARRAYS) and v.dtype.kind in "fiu"}
-    return {name: v for name, v in arrays.items() if v.ndim in (2, 3) and min(v.shape) >= 1 and max(v.shape) > 1}
-
-
-def vectors(variables: Mapping[str, Any]) -> dict[str, Any]:
-    """Vectors that can be channels; those much shorter than the longest are metadata, not samples.
-
-    Parameters
-    ----------
-    variables : mapping of str to any
-        Name -> value of any type.
-
-    Returns
-    -------
-    dict of str to any
-        Numeric vectors that are longer than half of the longest and have no name of metadata.
-    """
-    reserved_names = {
-        *TIME_NAMES,
-        *CHANNEL_NAMES,
-        *UNIT_NAMES,
-        *START_NAMES,
-        *RECORD_COUNT_NAMES,
-        *CONDITIONS,
-    }
-    candidates = {
-        name: v
-        for name, v in variables.items()
-        if isinstance(v, ARRAYS) and v.ndim == 1 and v.dtype.kind in "fiu" and v.size > 1
-        if name.lower() not in reserved_names and not (is_rate_name(name) and v.size <= MAX_ENTRIES)
-    }
-    longest = max((v.size for v in candidates.values()), default=0)
-    return {name: v for name, v in candidates.items() if 2 * v.size > longest}
 
 
 def _record(block: Any, facts: Metadata, k: int, n: int, where: str, source: Source) -> RawRecord:

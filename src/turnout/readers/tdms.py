@@ -12,9 +12,10 @@ from typing import Any, BinaryIO
 import nptdms
 
 from turnout.errors import ReadError
+from turnout.readers.array_metadata import RECORD_COUNT_NAMES, START_NAMES, Metadata
 from turnout.readers.entries import Entry, entries_of
 from turnout.readers.lazy import Column, LazyColumn
-from turnout.readers.named_arrays import RECORD_COUNT_NAMES, START_NAMES, Metadata, natural_sort_key
+from turnout.readers.named_arrays import natural_sort_key
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import scale_text, without_drawings
