@@ -4,7 +4,7 @@ Sums over samples of products of two damped waves are geometric series. The sums
 """
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -50,8 +50,9 @@ class Linearisation:
     coefficient: np.ndarray
 
 
+@lru_cache(maxsize=64)
 def drift_columns(n: int, degree: int) -> np.ndarray:
-    """Orthonormal polynomials over the record; degree -1 gives none.
+    """Orthonormal polynomials over the record; degree -1 gives none. Callers share the array, and must not change it.
 
     Parameters
     ----------
