@@ -50,6 +50,7 @@ class DampedSteps:
             self.right = pull + sum(p[1] / scale[k] for k, p in sums.items())
             step = np.linalg.solve(self.normal, self.right)
             squares = {k: max(0.0, p[2] - 2.0 * step @ p[1] + step @ p[0] @ step) for k, p in sums.items()}
+        self.undamped = step
 
     def damped_step(self, damping: float) -> np.ndarray:
         """Step with a damping added to the diagonal of the normal matrix.
@@ -101,6 +102,10 @@ class DampedSteps:
     ) -> tuple[FitPoint | None, float]:
         """First step that costs less, with rising damping.
 
+        Where the undamped step promises less than half of the least decrease for which the fit goes on, nothing is
+        tried. Along a failed step a parabola falls by at most half of what the linear model promises, so after a failed
+        trial that promised less than the least decrease the others are not tried either.
+
         Parameters
         ----------
         cost : float
@@ -113,15 +118,17 @@ class DampedSteps:
         Returns
         -------
         improvement : FitPoint or None
-            None if no step costs less, or if none predicts more than a share of the least decrease for which the fit
-            goes on.
+            None if no step costs less, or if none promises enough.
         damping : float
             For the next step; 0 without an improvement.
         """
         joint = self.joint
+        if self.predicted_decrease(joint.sd * self.undamped) < THRESHOLDS.min_promise * joint.min_decrease:
+            return None, 0.0
         for _ in range(max_tries or THRESHOLDS.max_damping_tries):
             step = self.damped_step(damping)
-            if self.predicted_decrease(step) < THRESHOLDS.min_decrease_share * joint.min_decrease:
+            promise = self.predicted_decrease(step)
+            if promise < THRESHOLDS.min_decrease_share * joint.min_decrease:
                 break
             trial = np.clip(self.theta + step, joint.low, joint.high)
             predictions = joint.predict_or_none(trial)
@@ -131,6 +138,8 @@ class DampedSteps:
                 if new_cost < cost:
                     next_damping = damping * THRESHOLDS.damping_decrease if damping > THRESHOLDS.min_damping else 0.0
                     return FitPoint(trial, predictions, residuals, new_cost), next_damping
+                if promise < joint.min_decrease:
+                    break
             damping = max(THRESHOLDS.damping_increase * damping, THRESHOLDS.first_damping)
         return None, 0.0
 

@@ -1,0 +1,52 @@
+"""Steps of the joint fit that promise too little are not simulated."""
+
+import numpy as np
+import pytest
+
+from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.joint_problem import JointProblem
+from turnout.mismatch.engine.levenberg_marquardt import DampedSteps
+
+
+class Wall(Case):
+    """A number that a straight step promises to reach, and that falls by ``slope`` instead: nothing helps."""
+
+    expensive = False
+    nuisances = (Nuisance("x", "-", 0.0, 1e3),)
+    observations = (Observation("a", "a", np.array([0.5]), 1.0),)
+
+    def __init__(self, slope):
+        self.slope = slope
+
+    def predict(self, values, terms, observations):
+        return [np.array([min(values["x"], -self.slope * values["x"])])]
+
+
+def trials(slope, least):
+    """Simulations of a step from 0, which promises 0.25 of minus twice the log posterior."""
+    joint = JointProblem(Wall(slope))
+    joint.min_decrease = least
+    start, residuals = np.zeros(1), [np.array([0.5])]
+    steps = DampedSteps(joint, start, residuals, [np.array([[1.0]])])
+    assert steps.predicted_decrease(steps.damped_step(0.0)) == pytest.approx(0.25, rel=1e-5)
+    improvement, _ = steps.first_improvement(joint.cost(start, residuals), 0.0)
+    assert improvement is None
+    return joint.evaluations
+
+
+def test_a_step_that_promises_less_than_half_of_what_ends_the_fit_is_not_tried():
+    assert trials(50.0, 0.51) == 0
+
+
+@pytest.mark.parametrize("slope", [0.5, 50.0])
+def test_after_a_failure_a_step_that_would_end_the_fit_is_not_tried_again(slope):
+    """A parabola with the slope 2 q at its start and a rise at its end falls by q / 2 at most."""
+    assert trials(slope, 0.49) == 1
+    assert trials(slope, 0.26) == 1
+
+
+def test_a_step_that_promises_more_is_tried_with_rising_damping():
+    """Each damping is six times the last, until a trial fails that promised less: 0.25 (1 + 2 d) / (1 + d)²."""
+    least = 0.2
+    promises = [0.25 * (1.0 + 2.0 * d) / (1.0 + d) ** 2 for d in (0.0, *(0.01 * 6.0**k for k in range(7)))]
+    assert trials(50.0, least) == 1 + sum(p >= least for p in promises) == 5
