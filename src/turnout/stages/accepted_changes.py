@@ -20,6 +20,7 @@ from turnout.mismatch.calibrated.answers_of_change import free_shape
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.history import BEFORE_ALL
 from turnout.mismatch.calibrated.model_answer import NAMES, group_of, position_of
+from turnout.mismatch.calibrated.stiffness_under_load import LAWS
 from turnout.stages.accepted_effects import SINCE
 from turnout.stages.visit_time import years_of
 
@@ -28,7 +29,8 @@ if TYPE_CHECKING:
 
 ENTRY_KEYS = ("term", "first", "last", SINCE, "until", "accepted", "note")
 MAX_DISTANCE = 0.35  # m from an end of the change to a candidate: the same support
-GROUPS = {name: tuple(g for g, n in NAMES.items() if n == name) for name in NAMES.values()}
+NOT_ACCEPTED = {NAMES[law.group] for law in LAWS if not law.is_local}  # effects of the whole track under load
+GROUPS = {name: tuple(g for g, n in NAMES.items() if n == name) for name in NAMES.values() if name not in NOT_ACCEPTED}
 GROUPS["hanging_sleeper"] = GROUPS["local_ballast"]
 SURFACE = "surface_dip"
 

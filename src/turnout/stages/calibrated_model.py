@@ -40,6 +40,7 @@ from turnout.mismatch.calibrated import (
 from turnout.mismatch.calibrated.answers_against_file import INTOLERABLE
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.model_answer import NAMES
+from turnout.mismatch.calibrated.stiffness_under_load import candidates_under_load, with_evidence_under_load
 from turnout.mismatch.engine.diagnose import fit_base
 from turnout.mismatch.engine.large_values import fit_large_values
 from turnout.mismatch.engine.search import Search
@@ -473,8 +474,9 @@ def calibrate_turnout(
     history = estimate_history(parameters, visits_of(_without_findings(stored)), events)
     changes = estimate_history(parameters, informed, events, repeats_between_visits=False, accepted=None)
     settings = turnout.settings["mismatch"]
-    candidates = further_candidates(accepted, parameters, change_candidates(parameters, directions, without))
-    against_file = without_accepted(accepted, parameters, events, candidates)
+    local = further_candidates(accepted, parameters, change_candidates(parameters, directions, without))
+    candidates = [*local, *further_candidates(accepted, parameters, candidates_under_load(parameters, without))]
+    against_file = without_accepted(accepted, parameters, events, local)
     deviations = deviations_from_file(
         history.belief, against_file[0], dict(CALIBRATION.least_sizes), intolerable=INTOLERABLE
     )
@@ -490,7 +492,7 @@ def calibrate_turnout(
     )
     return CalibratedModel(
         history,
-        tuple(compare_onsets(changes, candidates)),
+        tuple(with_evidence_under_load(compare_onsets(changes, local), parameters, informed, events, candidates)),
         tuple(deviations),
         {f"{s.visit} {s.sections}": s.answer for s in stored if s.answer not in USED_ANSWERS},
         tuple(missing),

@@ -134,7 +134,7 @@ def test_a_rival_just_below_the_threshold_counts(monkeypatch):
         monkeypatch.setattr(
             answers_of_change,
             "compare_onsets",
-            lambda h, c: sorted(pair, key=lambda e: -e.gain) if c is CANDIDATES else [],
+            lambda h, c: sorted(pair, key=lambda e: -e.gain) if c == CANDIDATES else [],
         )
         found = change_answer(PARAMETERS, visits, [], CANDIDATES, 12.0, 6.0)
         return found.verdict, found.names

@@ -27,6 +27,13 @@ from turnout.mismatch.calibrated.model_answer import (
     supported_names,
     with_rivals,
 )
+from turnout.mismatch.calibrated.stiffness_under_load import (
+    is_all_explained,
+    is_under_load,
+    size_under_load,
+    with_evidence_under_load,
+    with_offsets,
+)
 
 STRETCH_GROUPS = ("ballast", "pad")  # of which adjacent supports change together
 DAMPER_SHARES = (0.5, 1.0)  # change of the logarithm of the damping over that of the stiffness
@@ -149,7 +156,8 @@ def change_answer(
     visit = visits[-1].visit
     levels, history, evidence = _evidence_of_changes(parameters, visits, events, candidates, is_alarmed)
     price = float(np.log(max(len(candidates), 1)))
-    by_name = {p.name: p for p in parameters}
+    with_loads = with_offsets(parameters, visits)
+    by_name = {p.name: p for p in with_loads[0]}
     least = threshold + price
     material = [e for e in evidence if e.gain > least - margin and (is_alarmed or _is_material(e, by_name))]
     material = [e for e in material if e.gain >= e.from_first]
@@ -159,18 +167,19 @@ def change_answer(
         return _answer_without_name(by_stated_errors, visit, by_name)
     leader = material[0]
     other_form = next((e for e in evidence if e.effect.name == leader.effect.name and e is not leader), None)
-    stated = LeadingEffect.of(leader.effect, by_name, leader.size, gain - price, leader.interval(other_form=other_form))
+    size = size_under_load(leader.size) if is_under_load(leader.effect) else leader.size
+    stated = LeadingEffect.of(leader.effect, by_name, size, gain - price, leader.interval(other_form=other_form))
     jump = history.steps[1 + int(np.argmax(leader.gains))].innovation
+    if is_under_load(leader.effect):
+        parameters, visits = with_loads
+    opened = [*events, *_events_of_change(leader, parameters, candidates)]
     with_change = estimate_history(
-        parameters,
-        visits,
-        [*events, *_events_of_change(leader, parameters, candidates)],
-        repeats_between_visits=False,
-        accepted=None,
-        levels=levels,
+        parameters, visits, opened, repeats_between_visits=False, accepted=None, levels=levels
     )
     explained = next(s.innovation for s in with_change.steps if s.visit == leader.onset)
-    if not is_explained(jump, explained):
+    since = float(leader.times[int(np.argmax(leader.gains))])
+    is_rest_expected = not is_under_load(leader.effect) or is_all_explained(parameters, visits, opened, since)
+    if not (is_explained(jump, explained) and is_rest_expected):
         return stated.unknown(visit, CHANGE, by_name[jump.parameter])
     names = [stated.name]
     if stated.name == "local_ballast" and leader.size[0] < 0.0:
@@ -191,17 +200,18 @@ def _evidence_of_changes(
 
     Where an alarm asks, a change of any size is told: there the errors are the stated ones.
     """
+    ordinary = [c for c in candidates if not is_under_load(c)]
     levels = {} if is_alarmed else own_levels(parameters, visits, events)
     for is_last in (is_alarmed, True):
         history = estimate_history(
             parameters, visits, events, repeats_between_visits=False, accepted=None, levels=levels
         )
-        evidence = compare_onsets(history, candidates)
+        evidence = compare_onsets(history, ordinary)
         if is_last or not evidence:
             break
-        change = _events_of_change(evidence[0], parameters, candidates)
+        change = _events_of_change(evidence[0], parameters, ordinary)
         levels = own_levels(parameters, visits, [*events, *change])
-    return levels, history, evidence
+    return levels, history, with_evidence_under_load(evidence, parameters, visits, events, candidates, levels)
 
 
 def _evidence_of_name(material: Sequence[OnsetEvidence], by_name: Mapping[str, StateParameter]) -> float:

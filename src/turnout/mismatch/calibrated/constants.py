@@ -25,7 +25,8 @@ class CalibrationConstants:
     )  # fmt: skip
     default_walk_share: float = threshold(0.1, "prior sd per root year", "random walk of all other parameters", PAGE)
     least_sizes: tuple[tuple[str, float], ...] = threshold(
-        (("ballast", 0.2), ("pad", 0.35), ("gain", 0.08), ("seat", 0.1), ("depth", 0.3)),
+        (("ballast", 0.2), ("pad", 0.35), ("gain", 0.08), ("seat", 0.1), ("depth", 0.3), ("preload", 0.2),
+         ("hardening", 0.2)),
         "unit of the group", "deviations from the file below which nobody would act", PAGE,
     )  # fmt: skip
     model_errors: tuple[tuple[str, float], ...] = threshold(
@@ -38,6 +39,18 @@ class CalibrationConstants:
     )  # fmt: skip
     pad_visit_sd: float = threshold(
         0.1, "ln", "change of all pads between visits by their temperature: 30 K at 0.3 % per kelvin", PAGE
+    )
+    offset_sd: float = threshold(
+        1e-3, "ln", "of stiffness under trains over that under impacts where no effect moves it: none", "numerical"
+    )
+    load_effect_sd: float = threshold(
+        0.7, "ln", "prior of all pads or all ballast under trains over those under impacts: a factor of two", PAGE
+    )
+    linear_error: float = threshold(
+        0.25,
+        "share of the size",
+        "of an effect under load, of which visits are linear: ln stiffness or compliance",
+        PAGE,
     )
     change_sds: float = threshold(5.0, "prior sd", "prior standard deviation of a change of a parameter", PAGE)
     dip_sd: float = threshold(5e-4, "m", "prior standard deviation of the depth of a dip that appears", PAGE)

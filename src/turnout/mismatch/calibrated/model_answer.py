@@ -25,6 +25,8 @@ NAMES = {
     "seat": "sensor_position",
     "depth": "surface_dip",
     "dip": "surface_dip",
+    "preload": "pad_preload",
+    "hardening": "ballast_hardening",
 }
 
 
