@@ -237,40 +237,36 @@ def akaike_criterion(explanation: Explanation, decays: np.ndarray) -> float:
 SPLIT_SHARE = 0.25  # of the statistic of a resonance is left to each of two equal poles that share it
 
 
-def likeliest_explanation(
-    explanations: Sequence[Explanation], decays: np.ndarray, settings: IdentifySettings
-) -> Explanation:
-    r"""The explanation whose modes are used.
+def usable_explanations(explanations: Sequence[Explanation], settings: IdentifySettings) -> list[Explanation]:
+    r"""The explanations among which the Akaike criterion decides; the others are no rivals of the chosen one.
 
-    One that leaves white noise is complete: among such explanations the Akaike criterion decides. Where all leave
+    One that leaves white noise is complete, and where there are such explanations only they are used. Where all leave
     coloured noise or a drift, none is complete, and the criterion may prefer a pole too many that splits the strongest
     resonance. Of two equal parts each has half of its amplitude, and so at most a quarter of the statistic
 
     .. math:: \max_m \sum_i \chi^2_{im}
 
     over the modes that pass all tests, with :math:`\chi^2` from ``mode_chi_squared``. An explanation below
-    ``SPLIT_SHARE`` of the largest one is not used; among the others the Akaike criterion decides.
+    ``SPLIT_SHARE`` of the largest one is not used.
 
     Parameters
     ----------
     explanations : sequence of Explanation
-        Explanations of ``decays``, each with a fit.
-    decays : (n_decay, n) array of float
-        Free decays. [m/s²]
+        Explanations of the same decays, each with a fit.
     settings : IdentifySettings
         Limits of the tests.
 
     Returns
     -------
-    Explanation
-        One of them.
+    list of Explanation
+        At least one of them; empty if there are none.
     """
-    usable = [e for e in explanations if not e.is_doubtful]
-    if not usable:
-        determination = [_determination(e, settings) for e in explanations]
-        least = SPLIT_SHARE * max(determination)
-        usable = [e for e, value in zip(explanations, determination) if value >= least]
-    return min(usable, key=lambda e: akaike_criterion(e, decays))
+    complete = [e for e in explanations if not e.is_doubtful]
+    if complete:
+        return complete
+    determination = [_determination(e, settings) for e in explanations]
+    least = SPLIT_SHARE * max(determination, default=0.0)
+    return [e for e, value in zip(explanations, determination) if value >= least]
 
 
 def _determination(explanation: Explanation, settings: IdentifySettings) -> float:
@@ -398,8 +394,8 @@ def _choose(
         combined = combine(decays, group)
         of_combined = _refit(first, combined, _group_means(first.fit.theta, group), rate, settings)
     explanations = [of_combined, *_alternative_explanations(of_combined, table, combined, rate, settings)]
-    usable = [e for e in explanations if e.fit is not None]
-    chosen = likeliest_explanation(usable, combined, settings) if usable else first
+    usable = usable_explanations([e for e in explanations if e.fit is not None], settings)
+    chosen = min(usable, key=lambda e: akaike_criterion(e, combined), default=first)
     rival_modes = [own_estimates(e.fit, rate) for e in usable if e is not chosen and e.fit is not None]
     if chosen is of_combined:
         return first, rival_modes

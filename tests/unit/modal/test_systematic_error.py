@@ -4,12 +4,16 @@ import numpy as np
 import pytest
 from benchmarks import bench_modes
 
+from turnout.config.settings.identify import IdentifySettings
 from turnout.modal import identify
 from turnout.modal.least_squares import drift_columns
 from turnout.modal.mixed_effects import fit_mixed
+from turnout.modal.noise import Background
+from turnout.modal.selection import Explanation, usable_explanations
 from turnout.modal.state_space import continuous_pole
 from turnout.modal.systematic_error import OwnEstimates, common_error, common_residual, systematic_error
 
+SETTINGS = IdentifySettings()
 RATE, N, N_IMPACT = 20e3, 600, 20
 TRUTH = np.array([[np.log(120.0), 0.2], [np.log(600.0), 0.06]])
 START = TRUTH + 0.005
@@ -104,3 +108,14 @@ def test_a_narrow_pole_that_stands_for_a_broad_resonance_has_the_interval_of_its
     model = identify(list(decays), bench_modes.RATE, bench_modes.SETTINGS)
     assert model.mode("ballast") is not None
     assert not bench_modes.is_mistaken(model.mode("ballast"), [m[:2] for m in modes])
+
+
+def test_beside_a_complete_explanation_an_incomplete_one_is_no_rival():
+    def explanation(leaves_common):
+        fit = fitted(np.random.default_rng(5), (0.0, 700.0, 0.15))
+        return Explanation(fit, [], Background(), leaves_common=leaves_common)
+
+    complete, incomplete = explanation(False), explanation(True)
+    assert [e is complete for e in usable_explanations([incomplete, complete], SETTINGS)] == [True]
+    assert len(usable_explanations([incomplete, incomplete], SETTINGS)) == 2
+    assert usable_explanations([], SETTINGS) == []
