@@ -53,11 +53,11 @@ from turnout.mismatch.turnout.calibration import (
 )
 from turnout.mismatch.turnout.further_passages import names_beyond, with_reserved_passages
 from turnout.mismatch.turnout.nose_starts import fit_from_nose_positions
+from turnout.mismatch.turnout.unproven_panels import reservation
 from turnout.stages.accepted_changes import change_events, changes_of, further_candidates, without_accepted
 from turnout.stages.checkpoint import SUFFIX, read_value, write_value
 from turnout.stages.mismatch_groups import groups, unit_of, visits
 from turnout.stages.mismatch_inputs import digest_of_model, gather_inputs, mismatch_context, track_of
-from turnout.stages.unproven import reservation
 from turnout.stages.visit_time import DAYS_PER_YEAR, day_of, years_of
 from turnout.workflow.scan import scan
 

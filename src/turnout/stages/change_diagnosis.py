@@ -33,6 +33,7 @@ from turnout.mismatch.engine.reserved_data import gain_error, reserved_fit
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.calibration import calibrated_parameters, dip_directions
+from turnout.mismatch.turnout.unproven_panels import reservation
 from turnout.stages import calibrated_model as calibrated
 from turnout.stages.accepted_changes import changes_of, further_candidates
 from turnout.stages.mismatch_groups import (
@@ -47,7 +48,6 @@ from turnout.stages.mismatch_groups import (
 )
 from turnout.stages.mismatch_inputs import gather_inputs, track_of
 from turnout.stages.mismatch_rows import finding_row
-from turnout.stages.unproven import reservation
 from turnout.workflow.scan import scan
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ from turnout.errors import SimulationError
 from turnout.mismatch.engine.distinguishability import Distinguishability, cheapest_addition, distinguishability
 from turnout.mismatch.turnout.candidates.catalogue import list_candidates
 from turnout.mismatch.turnout.planned_case import Plan, PlannedCase, Train
+from turnout.mismatch.turnout.unproven_panels import reservation
 from turnout.simulate import Sensor, load_track, load_vehicle
-from turnout.stages.unproven import reservation
 
 # Effort of one addition, in hours of two people on site.
 EFFORT_HOURS = {"a second rail temperature": 8.0, "hammer tests at the sensors": 4.0, "a second speed": 1.0}

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from turnout import physics
+from turnout.mismatch.turnout.unproven_panels import as_unproven
 from turnout.registry.ids import content_id
 from turnout.stages.accepted_effects import describe_term
 from turnout.stages.mismatch_curves import (
@@ -21,7 +22,6 @@ from turnout.stages.mismatch_curves import (
     reach_of,
 )
 from turnout.stages.mismatch_text import headline, interval, surface_sentence
-from turnout.stages.unproven import UNPROVEN_SWITCH, as_unproven
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
@@ -287,8 +287,8 @@ def finding_tables(
     row["sentence"] = " ".join(
         filter(None, [headline(row), *map(surface_sentence, surface_estimates(case, diagnosis.fit))])
     )
-    if case.predictor.track(group.route).blade is not None:
-        row = as_unproven(row, UNPROVEN_SWITCH)
+    if case.reservation:
+        row = as_unproven(row, case.reservation)
     key = {"finding_id": row["finding_id"], "turnout_id": row["turnout_id"]}
     return {
         "mismatch_findings": [row],

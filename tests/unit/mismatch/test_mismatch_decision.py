@@ -23,6 +23,7 @@ TABLES = (
     "PAIR_RULES",
     "NAME_RULES",
     "TOLERATED_RULES",
+    "UNPROVEN_RULES",
     "RESERVED_RULES",
 )
 SIZE = (Parameter("size", "-", 0.0, (0.0, 9.0), "of a shape", "made up 2026"),)

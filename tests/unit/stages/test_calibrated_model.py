@@ -20,13 +20,13 @@ from turnout.mismatch.engine.search import Search
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.calibration import calibrated_parameters, visit_groups
 from turnout.mismatch.turnout.further_passages import names_beyond, with_reserved_passages
+from turnout.mismatch.turnout.unproven_panels import UNPROVEN_SWITCH
 from turnout.simulate.blade import Blade
 from turnout.stages import calibrated_model as calibrated
 from turnout.stages import mismatch
 from turnout.stages.mismatch_groups import groups, visits
 from turnout.stages.mismatch_inputs import gather_inputs, track_of
 from turnout.stages.mismatch_results import diagnose_turnout
-from turnout.stages.unproven import UNPROVEN_SWITCH
 from turnout.workflow.scan import scan
 
 DAYS = ("2025-08-01", "2025-11-01", "2026-02-01", "2026-05-01")

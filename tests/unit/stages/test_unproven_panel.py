@@ -2,11 +2,11 @@
 
 import pytest
 
+from turnout.mismatch.turnout.unproven_panels import UNPROVEN_SWITCH, as_unproven, reservation
 from turnout.simulate import uniform_track
 from turnout.simulate.blade import Blade
 from turnout.simulate.turnout_track import TurnoutTrack
 from turnout.stages import distinguish
-from turnout.stages.unproven import UNPROVEN_SWITCH, as_unproven, reservation
 
 
 @pytest.mark.parametrize(("grade", "expected"), [("A", "B"), ("B", "B"), (None, None)])

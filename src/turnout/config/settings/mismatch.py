@@ -10,6 +10,7 @@ class MismatchSettings:
     """Settings of ``turnout.mismatch``: when a difference counts, and when it may carry a name."""
 
     enabled: bool = setting(False, why="diagnose in the nightly run; it takes minutes per turnout")
+    unproven_names: bool = setting(False, why="give names at panels whose diagnoses are not proven on concealed data")
     materiality: float = setting(
         0.06, "-", "share of the local amplitude below which a difference causes no action", 0.0, 0.5
     )

@@ -173,6 +173,8 @@ class Case:
         Recordings that are not used, since a source other than the known inputs shows in them.
     mismatched_trains : tuple of str
         Trains, most recordings of which do not agree with their vehicle file.
+    reservation : str
+        Why diagnoses of such a case are not proven on concealed data; "" where they are. Its names are withheld.
     measured_range : (float, float)
         First and last measured position. [m]
     """
@@ -188,6 +190,7 @@ class Case:
     cell_level: Mapping[str, float] = {}
     disturbed_recordings: tuple = ()
     mismatched_trains: tuple = ()
+    reservation: str = ""
     measured_range = (-np.inf, np.inf)
 
     def is_cheap(self, observation: Observation) -> bool:

@@ -4,6 +4,7 @@ Each step of the decision has one table, and the first of its rules that applies
 the simulation is accurate enough. ``EFFECT_RULES``: the answer on one effect. ``SECOND_RULES``: whether a second effect
 stands beside the first. ``PAIR_RULES``: which of the two remain. ``NAME_RULES``: the grade of a name.
 ``TOLERATED_RULES``: whether an effect that the base model tolerates has a name.
+``UNPROVEN_RULES``: whether names are withheld, as this kind of diagnosis is not proven on concealed data.
 ``RESERVED_RULES``: whether reserved recordings confirm the answer. ``Verdict.trail`` names the rules that applied.
 """
 
@@ -19,6 +20,7 @@ from turnout.mismatch.engine.decision_facts import (
     NumericalError,
     ReservedEvidence,
     ToleratedEvidence,
+    UnprovenEvidence,
 )
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.mismatch.engine.verdict import Verdict, calibrate, posterior, swap_with_unknown
@@ -176,6 +178,11 @@ NAME_RULES: tuple[Rule[NameEvidence], ...] = (
     Rule("leaves_some_residual", _always, "B", "", HOW),
 )
 
+UNPROVEN_RULES: tuple[Rule[UnprovenEvidence], ...] = (
+    Rule("panel_not_proven", lambda e: e.reservation and e.has_name and not e.names_are_asked, "unknown",
+         "{e.names} would explain it. {e.reservation}", "decisions/switch-panels.md"),
+    Rule("panel_proven", _always, "", "", "decisions/switch-panels.md"),
+)
 RESERVED_RULES: tuple[Rule[ReservedEvidence], ...] = (
     Rule("reserved_predicted_worse", lambda e: e.is_single_name_of_grade_b and e.verification.is_worse, "unknown",
          "{e.verdict.names[0]} leaves more than intact turnouts do and predicts held-out recordings worse", ENDS),
@@ -200,6 +207,7 @@ RULES = (
     *PAIR_RULES,
     *NAME_RULES,
     *TOLERATED_RULES,
+    *UNPROVEN_RULES,
     *RESERVED_RULES,
 )
 

@@ -239,6 +239,28 @@ class NameEvidence:
 
 
 @dataclass(frozen=True)
+class UnprovenEvidence:
+    """The verdicts of a diagnosis, and why its kind of diagnosis is not proven: ``reservation``, "" where it is.
+
+    ``names_are_asked``: the setting ``unproven_names``.
+    """
+
+    verdicts: tuple[Verdict, ...]
+    reservation: str
+    names_are_asked: bool = False
+
+    @property
+    def has_name(self) -> bool:
+        """Whether any verdict has a name, or a choice of names."""
+        return any(v.answer in ("named", "a_or_b") for v in self.verdicts)
+
+    @property
+    def names(self) -> str:
+        """All names in words."""
+        return " and ".join(" or ".join(v.names) for v in self.verdicts if v.names)
+
+
+@dataclass(frozen=True)
 class ReservedEvidence:
     """The verdicts, and how well the last fit predicts the reserved recordings.
 

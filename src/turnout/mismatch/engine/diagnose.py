@@ -26,6 +26,7 @@ from turnout.mismatch.engine.search import Findings, Search
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.mismatch.engine.tolerated_effects import name_tolerated
 from turnout.mismatch.engine.two_effects import add_second, settle_pair
+from turnout.mismatch.engine.unproven_cases import withhold_names
 from turnout.mismatch.engine.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -113,7 +114,7 @@ def diagnose(
     if numerics is not None:
         verification, latent = verify(search, base, base, None), latent_force_of(search.case, base)
         return Diagnosis((numerics,), base, base, frames, verification, latent)
-    findings = name_tolerated(grade_names(settle_pair(_seek_effects(search, base))))
+    findings = withhold_names(name_tolerated(grade_names(settle_pair(_seek_effects(search, base)))))
     search, base, fit, verdicts = findings.search, findings.base, findings.fit, findings.verdicts
     verification = verify(search, base, fit, _best_rival(verdicts[0]))
     verdicts = confirm(verdicts, verification, search.settings)

@@ -26,6 +26,7 @@ from turnout.mismatch.turnout.predicted_case import PredictedCase
 from turnout.mismatch.turnout.prediction import Predictor
 from turnout.mismatch.turnout.predictions import Predictions, Terms, Values
 from turnout.mismatch.turnout.priors import CASE, SIMULATION
+from turnout.mismatch.turnout.unproven_panels import reservation
 from turnout.mismatch.turnout.wheel_roughness import log_mass_ratios
 from turnout.mismatch.turnout.worn_nose import worn_noses
 
@@ -107,6 +108,7 @@ class TrackCase(PredictedCase):
         super().__init__(predictor, data.observations, nuisances, candidates, accepted, cache(predictor, False))
         self.data, self.families, self.cache, self.start_values = data, families, cache, start_values
         self.reserved, self.disturbed_recordings = data.reserved, data.disturbed
+        self.reservation = reservation(predictor.zone.turnout)
         self.mismatched_trains, self.measured_range = data.mismatched_trains, data.measured_range
         self.control_level = {"hammer": data.settings.hammer_control, "passage": data.settings.passage_control}
         self.cell_level = {"passage": data.settings.cell_control}

@@ -226,6 +226,8 @@ class SimulationPriors:
     path_step: float = prior(0.01, "m", "of a fine path", "numerical")
     transfer_step: float = prior(
         0.002, "m", "between trial positions where a wheel first and last touches two rails", "numerical")
+    transfer_samples: int = prior(
+        21, "samples", "of the change of rail and of a weight over an interval", "numerical")
     ring_time: float = prior(0.35, "s", "ringing of the track after the last wheel", LOCAL_RAIL)
     averaging_length: float = prior(
         2.4, "m", "of the rail about a wheel; 0.6 and 1.2 err near the wheel resonance, the whole rail above it",
@@ -439,6 +441,12 @@ class GeometryPriors:
     half_lengths: tuple[float, ...] = prior((1.8, 3.2, 5.0), "m", "half the length of a corrugated stretch", DEFECTS)
     amplitude_sd: float = prior(3e-5, "m", "prior of the amplitude: corrugation that is ground away", EFFECT_SIZES)
     n_independent_waves: float = prior(12.0, "wavelengths", "that can be distinguished by sensors 6 m apart", DEFECTS)
+    worn_nose_sharpness: float = prior(
+        0.5, "-", "at which the fit of a worn nose starts: between a cosine and a kink", "convention"
+    )
+    worn_nose_length_sd: float = prior(
+        0.3, "share of the length", "of the length of the wear about that of the nose as fitted", "convention"
+    )
 
 
 @dataclass(frozen=True)

@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from turnout.simulate.vehicle import Vehicle
     from turnout.simulate.wheel_path import Surfaces
 
-SAMPLES = 21  # across an interval over which a weight is averaged
-
 
 @dataclass(frozen=True)
 class LoadTransfer:
@@ -77,14 +75,14 @@ class LoadTransfer:
         -------
         (n,) array of float
         """
-        offset = np.linspace(-1.0, 1.0, 2 * SAMPLES + 1)[1:-1]
+        offset = np.linspace(-1.0, 1.0, 2 * SIMULATION.transfer_samples + 1)[1:-1]
         weight = 1.0 - np.abs(offset)
         return self.blade_weight(np.asarray(x)[:, None] + spacing * offset) @ (weight / weight.sum())
 
     def positions(self) -> tuple[np.ndarray, float]:
         """Midpoints of equal intervals of the change, and their length [m]."""
-        length = abs(self.end - self.start) / SAMPLES
-        return min(self.start, self.end) + length * (np.arange(SAMPLES) + 0.5), length
+        length = abs(self.end - self.start) / SIMULATION.transfer_samples
+        return min(self.start, self.end) + length * (np.arange(SIMULATION.transfer_samples) + 0.5), length
 
 
 def has_blade(surfaces: Surfaces) -> bool:

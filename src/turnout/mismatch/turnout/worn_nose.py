@@ -23,9 +23,6 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.turnout.running_surface import RunningSurface
 
-SHARPNESS = 0.5  # at which the fit of a worn nose starts: between a cosine and a kink
-LENGTH_SHARE = 0.3  # relative standard deviation of the length of the wear, about that of the nose as it was fitted
-
 
 def worn_noses(surface: RunningSurface, estimates: Iterable[Mapping[str, Any]], fit: Fit) -> Iterator[Candidate]:
     """Noses as dips beside the nose of the file, those that are certainly worn.
@@ -59,12 +56,12 @@ def worn_noses(surface: RunningSurface, estimates: Iterable[Mapping[str, Any]], 
         yield candidate_of(
             SurfaceDip,
             Hypothesis(
-                starts=((e["value"] - e["filed"], length, SHARPNESS, 0.0),),
+                starts=((e["value"] - e["filed"], length, GEOMETRY.worn_nose_sharpness, 0.0),),
                 fixed={"place": position},
                 where={"place": round(position, 3)},
                 parameters=parameters_with(
                     SurfaceDip,
-                    length=(length, LENGTH_SHARE * length),
+                    length=(length, GEOMETRY.worn_nose_length_sd * length),
                     shift=(0.0, GEOMETRY.position_step),
                 ),
                 masking=Masking(own["depth"].name),
