@@ -266,7 +266,7 @@ class EntryCheck:
         return is_new
 
     def _error(self, where: str, unexplained: Sequence[tuple[Entry, Candidate]], reason: str) -> ReadError:
-        listed = [f"{entry.name}: {_short_text(entry, candidate)}" for entry, candidate in unexplained[:MAX_LISTED]]
+        listed = [f"{entry.name}: {shown_text(entry, candidate)}" for entry, candidate in unexplained[:MAX_LISTED]]
         more = f" and {len(unexplained) - MAX_LISTED} more" if len(unexplained) > MAX_LISTED else ""
         statements = " or ".join(dict.fromkeys(candidate.statement for _, candidate in unexplained))
         names = "; ".join(dict.fromkeys(entry.name for entry, _ in unexplained[:MAX_NAMES]))
@@ -281,6 +281,19 @@ class EntryCheck:
         return self.source.error(where, problem, remedy, reason=reason)
 
 
-def _short_text(entry: Entry, candidate: Candidate) -> str:
+def shown_text(entry: Entry, candidate: Candidate) -> str:
+    """Value of an entry for a message: all of it, or the part that may be a statement.
+
+    Parameters
+    ----------
+    entry : Entry
+        Entry of the metadata.
+    candidate : Candidate
+        What it may state.
+
+    Returns
+    -------
+    str
+    """
     text = _text(entry.value)
     return text if len(text) <= MAX_SHOWN else f"... {candidate.text} ..."

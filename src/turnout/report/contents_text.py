@@ -38,6 +38,9 @@ def contents_lines(contents: FileContents) -> list[str]:
     lines.append(_line("force", _candidates(contents, "force")))
     lines.append(_line("response", _candidates(contents, "response")))
     lines += _event_lines(contents)
+    lines += [
+        _line("unknown", f"{name}: {text} may state a rate, scale or unit") for name, text in contents.unexplained
+    ]
     return lines + [_line("problem", problem) for problem in contents.problems]
 
 
@@ -107,6 +110,7 @@ def contents_values(contents: FileContents) -> dict[str, Any]:
         "started_at": starts[0].isoformat() if starts else None,
         "last_started_at": starts[1].isoformat() if starts else None,
         "has_time_zone": contents.has_zone,
+        "unexplained": dict(contents.unexplained),
         "channels": [
             {
                 "name": c.name,

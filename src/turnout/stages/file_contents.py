@@ -19,6 +19,8 @@ from turnout.readers import FORMATS, MAX_WHOLE_FILE_SIZE, read_unconverted
 from turnout.readers.frequency_responses import FrequencyResponses, find_responses
 from turnout.readers.interpret import errors_without_layout
 from turnout.readers.source import BLOCK_SIZE, RawFile, RawRecord, Source
+from turnout.readers.stated_units import with_stated_units
+from turnout.readers.unexplained_entries import RecordFacts, shown_text, unexplained_entries
 from turnout.stages.channel_roles import ChannelRole, channel_roles
 from turnout.stages.stated_rate import NO_RATE, StatedRate, stated_rate
 
@@ -55,6 +57,7 @@ class FileContents:
 
     ``kind`` is "impacts", "trains", "frequency responses" or "" (neither found). ``n_samples`` is the range of samples
     per record; ``problems`` are damaged records and contradictions. ``events`` belong to channel ``event_channel``.
+    ``unexplained`` are names and values of metadata that may state a rate, scale or unit, and that nothing explains.
     ``starts`` are the times of first and last record; ``has_zone`` tells whether the file states their time zone.
     """
 
@@ -72,6 +75,7 @@ class FileContents:
     events: tuple[Event, ...] = ()
     event_channel: str = ""
     problems: tuple[str, ...] = ()
+    unexplained: tuple[tuple[str, str], ...] = ()
     responses: FrequencyResponses | None = None
     records: tuple[RawRecord, ...] = field(default=(), repr=False)
 
@@ -174,8 +178,16 @@ def _contents(path: Path, source: Source, format_name: str, raw: RawFile) -> Fil
         has_zone=bool(starts) and starts[0].tzinfo is not None,
         channels=channels,
         problems=tuple(dict.fromkeys(problems)),
+        unexplained=tuple(_unexplained_names(first, rate.value, len(found))) if rate.value else (),
     )
     return _with_events(contents) if rate.value else contents
+
+
+def _unexplained_names(record: RawRecord, rate: float, n_record: int) -> Iterator[tuple[str, str]]:
+    units = with_stated_units(record).units
+    facts = RecordFacts(rate, len(record.samples[0]), len(record.names), n_record, units)
+    for entry, candidate in unexplained_entries(record.entries, facts):
+        yield entry.name, shown_text(entry, candidate)
 
 
 def _extremes(records: Sequence[RawRecord], index: int) -> tuple[float, float]:

@@ -131,6 +131,11 @@ def _branch_lines(branch: str, group: Sequence[FileContents], labels: Sequence[s
         yield f"  records: {counts.pop() if len(counts) == 1 else 'null'}  # in one file; null: any number"
         yield f"  samples: {samples.pop() if len(samples) == 1 else 'null'}  # per record; null: any number"
     yield f"  time_zone: UTC  {_zone_comment(first)}"
+    unexplained = dict(entry for c in group for entry in c.unexplained)
+    if unexplained:
+        values = " ".join(", ".join(f"{name} is {text}" for name, text in unexplained.items()).split())
+        listed = json.dumps("; ".join(unexplained), ensure_ascii=False)
+        yield f"  # checked_entries: {listed}  {DECIDE} {values}: name those that state no rate, scale or unit"
     names = _channel_names(first.channels)
     if is_hammer:
         forces, responses = first.with_role("force"), first.with_role("response")

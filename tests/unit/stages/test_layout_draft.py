@@ -4,6 +4,7 @@ import re
 from dataclasses import replace
 from datetime import datetime
 
+import h5py
 import numpy as np
 import pytest
 
@@ -12,6 +13,7 @@ from turnout.config.load import load_layout
 from turnout.errors import ConfigError
 from turnout.readers.writing import write
 from turnout.records import Channel, RawChannel, RawDescription, Recording
+from turnout.report.contents_text import contents_lines
 from turnout.stages.file_contents import file_contents
 from turnout.stages.layout_draft import decisions, layout_draft
 
@@ -148,6 +150,22 @@ def test_a_logger_that_runs_on_has_records_of_any_length(tmp_path, configuration
     assert "records: null" in draft and "samples: null" in draft
     triggered = layout_draft([file_contents(files(tmp_path)[0])])
     assert "records: 4" in triggered and "samples: 4000" in triggered
+
+
+def test_metadata_that_nothing_explains_is_to_be_decided(tmp_path, configuration):
+    """An odd number may be another rate. What agrees with the record, or speaks of something else, is not asked."""
+    path = files(tmp_path)[0]
+    with h5py.File(path, "a") as file:
+        file.attrs.update({"Nube": 51.2, "Rate of sampling": RATE, "Operator": "A. Jensen"})
+    contents = file_contents(path)
+    assert contents.unexplained == (("Nube", "51.2"),)
+    assert "unknown    Nube: 51.2 may state" in "\n".join(contents_lines(contents))
+    draft = layout_draft([contents])
+    (asked,) = [d for d in decisions(draft) if "Nube" in d]
+    assert "Nube is 51.2" in asked
+    layout = configuration / "layouts" / "mine.yaml"
+    layout.write_text(draft.replace("# checked_entries", "checked_entries"), encoding="utf-8")
+    assert load_layout(layout).hammer.descriptions["A7"].checked_entries == ("Nube",)
 
 
 def test_a_zone_that_the_file_leaves_out_is_to_be_decided(tmp_path):
