@@ -1,0 +1,114 @@
+"""An impact first meets a rail: free rails are the bound of every track, and the factors of units leave the range."""
+
+from datetime import date
+
+import numpy as np
+import pytest
+
+from turnout.config.settings.receptance import ReceptanceSettings
+from turnout.demo.hammer import RATE, hammer_test, pulse, response_to, simulated_response
+from turnout.hammer_test import find_impacts
+from turnout.hammer_test.response_quality import find_track_impacts
+from turnout.hammer_test.response_scale import (
+    AREA,
+    MASS,
+    RAILS,
+    RATES,
+    SECOND_MOMENT,
+    SHEAR_COEFFICIENT,
+    SHEAR_MODULUS,
+    YOUNGS_MODULUS,
+    free_rail_mobility,
+    rails_that_resist,
+)
+from turnout.records import Channel, Recording
+
+SECTIONS = "OT", "SP", "CLP", "A7", "A8", "A9", "ASM", "ASD"
+# Response read too large or too small by the confusions lbf/N, g/(m/s²), inch/mm, kN/N; a force the other way round.
+FACTORS = 4.448, 1 / 4.448, 9.81, 1 / 9.81, 25.4, 1 / 25.4, 1000.0, 1 / 1000.0
+CHANNELS = Channel("force", "force"), Channel("rail", "acceleration")
+
+
+def track_test(section, ballast=1.0, railpad=1.0, n=5, seed=1):
+    response = simulated_response(section, ballast, railpad)
+    return hammer_test(response, 12.0, date(2024, 5, 13), 1, np.random.default_rng(seed), n_impacts=n)[0]
+
+
+def rails_of(recordings):
+    return rails_that_resist([i for i in find_impacts(recordings, "force", "rail") if i.accepted])
+
+
+def random_foundation(rng, s):
+    """Stiffness of two-layer supports per metre at a real s: pads of 50 to 1,500 MN/m, ballast of 15 to 300."""
+    pad, ballast = (np.exp(rng.uniform(*np.log(limits))) for limits in ((50e6, 1500e6), (15e6, 300e6)))
+    upper = pad + np.exp(rng.uniform(*np.log((3e3, 60e3)))) * s
+    lower = ballast + np.exp(rng.uniform(*np.log((20e3, 200e3)))) * s + rng.uniform(60.0, 350.0) * s**2
+    return upper * lower / (upper + lower) / rng.uniform(0.5, 0.75)
+
+
+@pytest.mark.parametrize("foundation", [0.0, 3e8])
+@pytest.mark.parametrize("s", RATES)
+def test_the_closed_form_is_the_integral_over_the_wave_number(s, foundation):
+    k = np.concatenate([np.linspace(0.0, 100.0, 20001), np.geomspace(100.0, 1e6, 6000)[1:]])
+    shear, rotation = SHEAR_COEFFICIENT * SHEAR_MODULUS * AREA, MASS / AREA * SECOND_MOMENT * s**2
+    bending = YOUNGS_MODULUS * SECOND_MOMENT * k**2
+    stiffness = MASS * s**2 + foundation + shear * k**2 * (bending + rotation) / (shear + bending + rotation)
+    y = 1.0 / stiffness
+    integral = s / np.pi * (np.sum((y[1:] + y[:-1]) * np.diff(k)) / 2.0 + 1.0 / (shear * k[-1]))
+    assert free_rail_mobility(s, foundation) == pytest.approx(integral, rel=3e-3)
+
+
+def test_every_track_of_rails_or_crossings_is_inside_and_leaves_with_the_least_factor():
+    """Rails 45 to 60 kg/m, or a crossing of up to twice the mass and four times the stiffness of 60E1."""
+    rng, values = np.random.default_rng(20), []
+    for k in range(4000):
+        mass, stiffness = [(45.0, 1500.0), (49.4, 1816.0), (60.2, 3037.0), (60.2, 3037.0)][k % 4]
+        if k % 4 == 3:
+            mass, stiffness = mass * rng.uniform(1.0, 2.0), stiffness * rng.uniform(1.0, 4.0)
+        foundation = random_foundation(rng, RATES[0])
+        free = free_rail_mobility(RATES[0])
+        values.append(free / free_rail_mobility(RATES[0], foundation, mass / MASS, stiffness * 1e-8 / SECOND_MOMENT))
+    values = np.array(values)
+    outside = np.mean((values < RAILS[0]) | (values > RAILS[1]))
+    assert outside <= 1e-3
+    seen = (values * 4.448 <= RAILS[1]), (values / 4.448 >= RAILS[0])
+    assert np.mean(seen[0]) == 0.0 and np.mean(seen[1]) <= 1e-3
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+@pytest.mark.parametrize(("ballast", "railpad"), [(1.0, 1.0), (0.3, 0.4), (2.0, 2.0)])
+def test_tracks_are_accepted_and_each_factor_is_found(section, ballast, railpad):
+    recordings = track_test(section, ballast, railpad)
+    rails = rails_of(recordings)
+    assert RAILS[0] <= rails <= RAILS[1]
+    found = {factor for factor in FACTORS if not RAILS[0] <= rails / factor <= RAILS[1]}
+    assert found == set(FACTORS)
+
+
+@pytest.mark.parametrize("channel", [0, 1])
+@pytest.mark.parametrize("factor", FACTORS)
+def test_a_factor_on_either_channel_rejects_the_test_by_name(channel, factor):
+    scale = np.ones((2, 1))
+    scale[channel] = factor
+    limitless = [Recording(r.samples * scale, RATE, CHANNELS, "a", record=r.record) for r in track_test("SP")]
+    impacts = find_track_impacts(limitless, "force", "rail", ReceptanceSettings())
+    assert {r.reason for i in impacts for r in i.rejections} == {"out_of_scale"}
+
+
+@pytest.mark.parametrize("contact", [0.4e-3, 0.8e-3, 1.5e-3, 3e-3])
+@pytest.mark.parametrize("shift", [-2, 0, 3])
+def test_contact_and_lag_of_a_filter_leave_a_track_inside(contact, shift):
+    rng, recordings = np.random.default_rng(3), []
+    response = simulated_response("CLP", 1.0, 1.0)
+    for k in range(5):
+        force = pulse(6000.0, contact, (100 + rng.uniform()) / RATE)
+        rail = np.roll(response_to(force, response(rng)), shift)
+        samples = np.stack([force, rail]) + rng.normal(size=(2, force.size)) * [[6.0], [0.01 * np.max(np.abs(rail))]]
+        recordings.append(Recording(samples, RATE, CHANNELS, "a", record=k))
+    rails = rails_of(recordings)
+    assert RAILS[0] <= rails <= RAILS[1]
+    assert not RAILS[0] <= rails * 4.448 <= RAILS[1] and not RAILS[0] <= rails / 4.448 <= RAILS[1]
+
+
+def test_without_impacts_or_response_there_is_no_value():
+    assert rails_that_resist([]) is None
