@@ -8,7 +8,7 @@ an impact do not: they meet the rail alone, before the pads and the ballast answ
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -29,7 +29,11 @@ RATES = 5_000.0, 8_000.0
 RAILS = (0.78, 3.45)
 # Ratio of the two values of ``RATES``: supports count less at the higher rate, by a quarter on the stiffest pads.
 RATE_RATIO = (0.74, 1.0)
-LEAD = 5  # samples before the contact, for what filters of linear phase move before it
+# Beyond this ratio the response lacks what a rail does at high frequency: it is delayed, filtered, or a sum of few
+# modes. It then looks heavier than it is, by up to a factor of two, and so the upper limit is twice as high.
+MAX_RAIL_RATIO, INCOMPLETE = 1.2, 2.0
+NOISE_DEVIATIONS = 3.0  # by which noise may move a mobility
+LEAD = 2  # samples before the contact, for what filters move before it; more would add noise with large weights
 ADVICE = (
     "the unit, sensitivity or gain of the response or of the force is wrong (g or m/s², lbf or N, mm or m, volts?), "
     "or the accelerometer is more than 0.2 m beside the hammer; for another structure than a track set "
@@ -52,19 +56,28 @@ def judge_response_scale(impacts: Sequence[Impact], response: str) -> tuple[Impa
     tuple of Impact
         The impacts, with a rejection "out_of_scale" in the accepted ones if the test is out of scale.
     """
-    rails = rails_that_resist([i for i in impacts if i.accepted])
-    if rails is None or RAILS[0] <= rails <= RAILS[1]:
+    measured = rails_that_resist([i for i in impacts if i.accepted])
+    if measured is None or measured.is_track:
         return tuple(impacts)
-    bound = RAILS[0] if rails < RAILS[0] else RAILS[1]
+    rails, limits = measured.rails, measured.limits
+    bound = limits[0] if rails < limits[0] else limits[1]
     detail = (
         f"in its first moments an impact meets the resistance of {rails:.3g} rails 54E1, "
-        f"that of a track is {RAILS[0]:g} to {RAILS[1]:g}: {ADVICE}"
+        f"that of a track is {limits[0]:g} to {limits[1]:g}: {ADVICE}"
     )
     rejection = Rejection("out_of_scale", rails, bound, detail, response)
     return tuple(replace(i, rejections=(rejection,)) if i.accepted else i for i in impacts)
 
 
-def rails_that_resist(impacts: Sequence[Impact]) -> float | None:
+class Resistance(NamedTuple):
+    """Number of rails 54E1 that resist an impact [-], the limits of a track [-], and whether noise leaves it inside."""
+
+    rails: float
+    limits: tuple[float, float]
+    is_track: bool
+
+
+def rails_that_resist(impacts: Sequence[Impact]) -> Resistance | None:
     r"""Mobility of a free rail 54E1 over that of the impacts, at a real Laplace variable.
 
     .. math:: \frac{Y_{54E1}(s)}{Y(s)}, \qquad Y(s) = \frac{\sum F(s) A(s)}{s \sum F(s)^2}, \qquad
@@ -81,29 +94,40 @@ def rails_that_resist(impacts: Sequence[Impact]) -> float | None:
 
     Returns
     -------
-    float or None
-        [-]; None without impacts or without any response, infinity is not returned.
+    Resistance or None
+        None without impacts or without any response.
     """
     if not impacts:
         return None
-    seen = np.array([_mobility(impacts, s) for s in RATES])
-    if not np.all(seen > 0.0):
+    (low, low_error), (high, high_error) = (_mobility(impacts, s) for s in RATES)
+    if not min(low, high) > 0.0:
         return None
-    low, high = np.array([free_rail_mobility(s) for s in RATES]) / seen
+    rails, limits = _resistance(low, high)
+    shifts = np.array([-NOISE_DEVIATIONS, 0.0, NOISE_DEVIATIONS])
+    pairs = [(a, b) for a in low + shifts * low_error for b in high + shifts * high_error if min(a, b) > 0.0]
+    possible = [_resistance(a, b) for a, b in pairs]
+    return Resistance(rails, limits, any(bounds[0] <= r <= bounds[1] for r, bounds in possible))
+
+
+def _resistance(low: float, high: float) -> tuple[float, tuple[float, float]]:
+    """Rails and limits from the mobilities [m/s/N] at the lower and the higher of ``RATES``."""
+    low, high = (free_rail_mobility(s) / y for s, y in zip(RATES, (low, high)))
     excess = np.log(high / low) - np.log(np.clip(high / low, *RATE_RATIO))
-    return float(low * np.exp(-RATES[0] * excess / (RATES[1] - RATES[0])))
+    rails = float(low * np.exp(-RATES[0] * excess / (RATES[1] - RATES[0])))
+    return rails, (RAILS[0], RAILS[1] * (INCOMPLETE if high > MAX_RAIL_RATIO * low else 1.0))
 
 
-def _mobility(impacts: Sequence[Impact], s: float) -> float:
-    """Size of the mobility at a real Laplace variable, averaged over impacts. [m/s/N]"""
-    cross = power = 0.0
+def _mobility(impacts: Sequence[Impact], s: float) -> tuple[float, float]:
+    """Size of the mobility at a real Laplace variable, averaged over impacts, and its error from noise. [m/s/N]"""
+    cross = power = variance = 0.0
     for i in impacts:
         first = max(0, i.onset - LEAD)
         weights = np.exp(-s * (np.arange(first, i.force.size) - i.onset) / i.rate)
         force = float(i.force[i.onset : i.contact_end + 1] @ weights[i.onset - first : i.contact_end + 1 - first])
         cross += force * float(i.acceleration[first:] @ weights)
+        variance += (force * i.noise_acceleration) ** 2 * float(weights @ weights)
         power += force**2
-    return abs(cross) / (s * power) if power > 0.0 else 0.0
+    return (abs(cross) / (s * power), float(np.sqrt(variance)) / (s * power)) if power > 0.0 else (0.0, 0.0)
 
 
 def free_rail_mobility(s: float, foundation: float = 0.0, mass: float = 1.0, stiffness: float = 1.0) -> float:

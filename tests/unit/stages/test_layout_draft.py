@@ -18,7 +18,7 @@ from turnout.stages.file_contents import file_contents
 from turnout.stages.layout_draft import decisions, layout_draft
 
 RATE = 20_000.0
-MASS, FREQUENCY, DAMPING = 80.0, 160.0, 0.08  # kg, as the first metres of a rail, Hz and damping ratio of the only mode
+MASS, FREQUENCY, DAMPING = 250.0, 160.0, 0.08  # kg, Hz and damping ratio of the only mode
 
 
 def hammer_test(scale=1.0, rate=RATE):
