@@ -12,6 +12,7 @@ import numpy as np
 
 from turnout.hammer_test.best_subset import select_best
 from turnout.hammer_test.impacts import find_impacts
+from turnout.hammer_test.limited_response import judge_limited_impacts
 from turnout.hammer_test.response_scale import judge_response_scale
 from turnout.records import Rejection
 
@@ -49,6 +50,7 @@ def find_track_impacts(
     impacts = find_impacts(recordings, force, response, replace(settings, best_impacts=0))
     impacts = judge_causality(impacts, response)
     impacts = judge_saturation(impacts, response)
+    impacts = judge_limited_impacts(impacts, response)
     impacts = judge_response_scale(impacts, response) if settings.softest_blow > 0.0 else impacts
     return select_best(impacts, settings)  # among those that no other test has rejected
 
