@@ -117,16 +117,16 @@ def tops_of(impacts: Sequence[Impact], weaker: np.ndarray) -> list[Top]:
     for k, i in enumerate(impacts):
         force[k, i.onset : i.contact_end + 1] = i.force[i.onset : i.contact_end + 1]
         rail[k, : i.acceleration.size] = i.acceleration
-    force, rail = np.fft.rfft(force), np.fft.rfft(rail)
-    weights = 1.0 / np.sum(np.abs(force) ** 2, axis=1, keepdims=True)
-    power, cross = weights * np.abs(force) ** 2, weights * force.conj() * rail
+    force_spectrum, rail_spectrum = np.fft.rfft(force), np.fft.rfft(rail)
+    weights = 1.0 / np.sum(np.abs(force_spectrum) ** 2, axis=1, keepdims=True)
+    power, cross = weights * np.abs(force_spectrum) ** 2, weights * force_spectrum.conj() * rail_spectrum
     tops = []
     for k, i in enumerate(impacts):
-        others = weaker[weaker != k]
-        total = power[others].sum(axis=0)
-        transfer = cross[others].sum(axis=0) / (total + REGULARISATION * total.max())
+        predicting = weaker[weaker != k]
+        total = power[predicting].sum(axis=0)
+        transfer = cross[predicting].sum(axis=0) / (total + REGULARISATION * total.max())
         early = slice(max(0, i.onset - LEAD), i.onset + round(EARLY_TIME * i.rate))
-        predicted = np.fft.irfft(transfer * force[k], n)[: i.acceleration.size]
+        predicted = np.fft.irfft(transfer * force_spectrum[k], n)[: i.acceleration.size]
         tops.append(_top(i.acceleration[early], predicted[early]))
     return tops
 
@@ -134,13 +134,16 @@ def tops_of(impacts: Sequence[Impact], weaker: np.ndarray) -> list[Top]:
 def _top(measured: np.ndarray, predicted: np.ndarray) -> Top:
     size = np.abs(predicted)
     is_top, is_low = size >= TOP_SHARE * size.max(), size < LOW_SHARE * size.max()
-    gains = [float(measured[part] @ predicted[part] / (predicted[part] @ predicted[part])) for part in (is_low, is_top)]
+    gains = [
+        float(measured[samples] @ predicted[samples] / (predicted[samples] @ predicted[samples]))
+        for samples in (is_low, is_top)
+    ]
     peak = float(np.max(np.abs(measured)))
     if not min(gains) > 0.0:
         return Top(0.0, np.inf, 1.0, peak)
     expected = gains[0] * predicted[is_top]
     levels = np.linspace(0.4, 1.0, 61)[:, None] * np.max(np.abs(expected))
     misfits = np.sum((measured[is_top] - np.clip(expected, -levels, levels)) ** 2, axis=1)
-    best = int(np.argmin(misfits))
-    left = float(misfits[best] / misfits[-1]) if misfits[-1] > 0.0 else 1.0
-    return Top(float(np.log(gains[0] / gains[1])), float(levels[best, 0]), left, peak)
+    closest = int(np.argmin(misfits))
+    misfit_left = float(misfits[closest] / misfits[-1]) if misfits[-1] > 0.0 else 1.0
+    return Top(float(np.log(gains[0] / gains[1])), float(levels[closest, 0]), misfit_left, peak)
