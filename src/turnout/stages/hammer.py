@@ -38,6 +38,7 @@ from turnout.stages.hammer_rows import (
     mode_rows,
     model_row,
     receptance_row,
+    shape_columns,
     validation_columns,
 )
 
@@ -116,12 +117,15 @@ def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root: str | Path, algo: 
     if receptance is None:
         return rows | {"models": [model_row(model, base, identity, counts, None)], "modes": []}
     # a response that took part in the identification validates nothing
-    validation = [] if is_joint else [second[key] for i in used if (key := (i.source, i.record)) in second]
+    pairs = [(i, second[key]) for i in used if (key := (i.source, i.record)) in second]
+    validation = [] if is_joint else [pair[1] for pair in pairs]
     model_columns = model_row(model, base, identity, counts, _lowest_gate_level(receptance, model))
     receptance_columns = receptance_row(receptance, required, model, used[0].decay, base, identity)
+    shapes = shape_columns(model, _cut_pairs(pairs, settings["identify"]))
+    modes = mode_rows(model, receptance, base, identity, temperature)
     return rows | {
         "models": [model_columns | validation_columns(model, _cut(validation, settings["identify"]))],
-        "modes": mode_rows(model, receptance, base, identity, temperature),
+        "modes": [mode | shape for mode, shape in zip(modes, shapes, strict=True)],
         "impact_modes": [impact_mode_row(e, base, identity, names[e["impact"]]) for e in model.per_impact],
         "receptances": [receptance_columns | density_columns(used, receptance_columns["frequency_hz"])],
     }
@@ -143,6 +147,12 @@ def _cut(impacts: Sequence[Impact], settings: IdentifySettings) -> list[Impact]:
     shortest = settings.shortest_decay
     ends = [(i, i.decay_start + round(settings.duration * i.rate)) for i in impacts]
     return [replace(i, acceleration=i.acceleration[:end]) for i, end in ends if len(i.decay) >= shortest * i.rate]
+
+
+def _cut_pairs(pairs: Sequence[tuple[Impact, Impact]], settings: IdentifySettings) -> list[tuple[Impact, Impact]]:
+    """The pairs of which both decays are long enough, cut at the length that the identification uses."""
+    cuts = (_cut(pair, settings) for pair in pairs)
+    return [(cut[0], cut[1]) for cut in cuts if len(cut) == 2]
 
 
 def _identity(

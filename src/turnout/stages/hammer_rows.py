@@ -8,6 +8,7 @@ import numpy as np
 
 from turnout.hammer_test.dynamic_stiffness import dynamic_stiffness
 from turnout.modal.block_errors import blocks_with_errors
+from turnout.modal.mode_shape import two_point_shapes
 from turnout.modal.state_space import validation_fit
 from turnout.records import Impact, ModalModel, Mode, Receptance
 from turnout.signal.spectra import cross_spectra, density_interval
@@ -344,6 +345,35 @@ def validation_columns(model: ModalModel, responses: Sequence[Impact]) -> dict[s
         "validation_fit_pct": float(np.median(fits)) if fits.size else None,
         "n_validation": int(fits.size) if fits.size else None,
     }
+
+
+def shape_columns(model: ModalModel, pairs: Sequence[tuple[Impact, Impact]]) -> list[dict[str, Any]]:
+    """Columns of ``modes`` with the ratio of the amplitudes at the second and at the first response.
+
+    Parameters
+    ----------
+    model : ModalModel
+        Model of the section.
+    pairs : sequence of (Impact, Impact)
+        Accepted impacts with both responses; empty where there is no second one.
+
+    Returns
+    -------
+    list of dict
+        One per mode of the model; empty without shapes.
+    """
+    first, second = ([pair[k].acceleration[pair[0].decay_start :] for pair in pairs] for k in (0, 1))
+    shapes = two_point_shapes(model, first, second)
+    if shapes is None:
+        return [{} for _ in model.modes]
+    return [
+        {
+            "shape_ratio": np.array([s.ratio.real, s.ratio.imag]),
+            "shape_covariance": s.covariance[[0, 0, 1], [0, 1, 1]],
+            "n_shape": len(pairs),
+        }
+        for s in shapes
+    ]
 
 
 def plot_lines(frequency: np.ndarray) -> np.ndarray:

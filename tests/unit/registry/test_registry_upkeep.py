@@ -108,7 +108,8 @@ def damage_truncate(path):
 
 def damage_flip(path):
     content = bytearray(path.read_bytes())
-    content[len(content) // 2] ^= 1
+    footer = int.from_bytes(content[-8:-4], "little")
+    content[(len(content) - footer) // 2] ^= 1  # among the values: a changed footer is another fault, no Parquet file
     path.write_bytes(content)
 
 

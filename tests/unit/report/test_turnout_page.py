@@ -46,6 +46,19 @@ def test_the_curves_of_the_latest_test_are_shown():
     assert "Latest hammer test, 2026-05-01: receptance" in text and "n = 30 impacts" in text
 
 
+@pytest.mark.parametrize(("mac", "words"), [
+    (None, ""), (0.034, "; shape at both responses: modal assurance criterion 0.03 with theirs"),
+])  # fmt: skip
+def test_a_mode_off_its_track_has_its_shape_where_there_is_a_second_response(mac, words):
+    mode = {
+        "section_id": "t/A7", "band": "ballast", "measured_at_utc": datetime(2026, 5, 1, 9), "frequency_hz": 162.0,
+        "damping_ratio": 0.05, "frequency_track_hz": 150.0, "damping_track": 0.067, "residue_ratio": None,
+        "n_history": 9, "shape_mac": mac,
+    }  # fmt: skip
+    text = page(models=[REJECTED], off_track=[mode])
+    assert f"(median of 9 campaigns before: 150.0 Hz, 0.0670{words})." in text
+
+
 def test_a_new_panel_is_a_function_and_one_line(monkeypatch):
     def count_panel(test):
         return f"<svg><text>{len(test.impacts)} impacts in a new panel</text></svg>"

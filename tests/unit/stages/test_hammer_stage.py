@@ -342,6 +342,19 @@ def test_a_second_response_that_takes_part_makes_each_impact_more_certain_and_va
     assert 0.85 < np.median(error[1] / error[0]) < 0.95
 
 
+def test_modes_have_the_ratio_of_both_responses_and_are_else_the_same(tmp_path):
+    """The second sensor sees half of the response; 5 standard errors in two parts."""
+    without, both = (rows_with_second_response(tmp_path / str(c), c)["modes"] for c in (None, "rail_2"))
+    assert len(without) == len(both) > 0
+    for plain, mode in zip(without, both, strict=True):
+        ratio, (v_re, _, v_im) = mode.pop("shape_ratio"), mode.pop("shape_covariance")
+        assert mode.pop("n_shape") == 10
+        assert abs(ratio[0] - 0.5) < 5.0 * np.sqrt(v_re) < 0.1 and abs(ratio[1]) < 5.0 * np.sqrt(v_im) < 0.1
+        assert "shape_ratio" not in plain
+        same = [{k: str(v) for k, v in row.items()} for row in (plain, mode)]
+        assert same[0] == same[1]
+
+
 def with_second_response(test, recordings):
     """The same recordings with a second accelerometer that sees half of the response and its own noise."""
     rng = np.random.default_rng(test)

@@ -61,6 +61,9 @@ where coalesce(m.method, 'joint') = 'joint';
 -- a_block_se | double[] | | their standard errors
 -- c_block | double[] | | c1, c2 of this mode (Tables 1 and 2 of the paper)
 -- c_block_se | double[] | | their standard errors; empty without a fitted receptance
+-- shape_ratio | double[] | | real and imaginary part of the amplitude at the second response over that at the first; empty where the layout has none
+-- shape_covariance | double[] | | variance of the real part, covariance, variance of the imaginary part of shape_ratio, from the spread of the impacts
+-- n_shape | integer | | impacts behind shape_ratio
 -- epoch | bigint | | epoch of the chart, 0 before the first event that resets it
 -- epoch_start_utc | timestamp | UTC | event that started the epoch; empty for epoch 0
 -- epoch_event_id | varchar | | that event

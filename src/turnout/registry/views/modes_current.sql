@@ -32,3 +32,6 @@ select t.* from modes_touched t anti join superseded s on t.model_id = s.old_id;
 -- a_block_se | double[] | | their standard errors
 -- c_block | double[] | | c1, c2 of this mode (Tables 1 and 2 of the paper)
 -- c_block_se | double[] | | their standard errors; empty without a fitted receptance
+-- shape_ratio | double[] | | real and imaginary part of the amplitude at the second response over that at the first; empty where the layout has none
+-- shape_covariance | double[] | | variance of the real part, covariance, variance of the imaginary part of shape_ratio, from the spread of the impacts
+-- n_shape | integer | | impacts behind shape_ratio

@@ -251,7 +251,7 @@ def _off_track(modes: Sequence[Mapping[str, Any]]) -> str:
     entries = [
         f"{day(m['measured_at_utc'])} {m['band']} {m['frequency_hz']:.1f} Hz, damping {m['damping_ratio']:.4f} "
         f"(median of {count_of(m['n_history'], 'campaign')} before: {m['frequency_track_hz']:.1f} Hz, "
-        f"{m['damping_track']:.4f}{_residue_words(m['residue_ratio'])})"
+        f"{m['damping_track']:.4f}{_residue_words(m['residue_ratio'])}{_shape_words(m['shape_mac'])})"
         for m in modes[:MAX_UNUSED_SHOWN]
     ]
     more = len(modes) - MAX_UNUSED_SHOWN
@@ -260,6 +260,10 @@ def _off_track(modes: Sequence[Mapping[str, Any]]) -> str:
 
 def _residue_words(ratio: float | None) -> str:
     return "" if ratio is None else f"; {ratio:.2g} times their c1² + c2²"
+
+
+def _shape_words(mac: float | None) -> str:
+    return "" if mac is None else f"; shape at both responses: modal assurance criterion {mac:.2f} with theirs"
 
 
 def _reason(test: Mapping[str, Any]) -> str:
