@@ -38,8 +38,8 @@ def write_configuration(folder: str | Path, turnout: str, site: Site) -> None:
     folder = Path(folder)
     for name in ("layouts", "tracks", "vehicles"):
         (folder / name).mkdir(parents=True, exist_ok=True)
-    settings = "mismatch: {unproven_names: true}  # a proof needs the names" if site.switch else "{}"
-    (folder / "config.yaml").write_text(f"# All other settings as the program has them.\n{settings}\n")
+    settings = "mismatch: {unproven_names: true}" if site.switch else "{}"  # a proof needs the names
+    (folder / "config.yaml").write_text(f"# All settings as the program has them.\n{settings}\n")
     (folder / "turnouts.tsv").write_text(f"turnout\tlayout\traw\tname\n{turnout}\tsite\t{turnout}\tSite {turnout}\n")
     (folder / "layouts" / "site.yaml").write_text(layout(site))
     (folder / "tracks" / "site.yaml").write_text(track(site))

@@ -212,6 +212,8 @@ def _diagnose_group(
 
 def _changed_effects(group: Group, about: Mapping[str, Any]) -> tuple[AcceptedEffect, ...]:
     """Effects of the changes that were accepted for the turnout before this visit."""
+    if not about["changes"]:
+        return ()
     supports = group.campaign.turnout.track_of(group.route).support
     sensors = {s.name: float(s.place) for s in group.campaign.sensors}
     return changed_effects(about["changes"], years_of(about["visit"]), supports, sensors)

@@ -34,10 +34,6 @@ def trials(slope, least):
     return joint.evaluations
 
 
-def test_a_step_that_promises_less_than_half_of_what_ends_the_fit_is_not_tried():
-    assert trials(50.0, 0.51) == 0
-
-
 @pytest.mark.parametrize("slope", [0.5, 50.0])
 def test_after_a_failure_a_step_that_would_end_the_fit_is_not_tried_again(slope):
     """A parabola with the slope 2 q at its start and a rise at its end falls by q / 2 at most."""

@@ -170,7 +170,7 @@ def test_a_blow_slips_in_a_loose_joint_and_sticks_in_a_tight_one(plan, limit, mo
 def test_a_derivative_goes_to_the_side_where_the_simulation_can():
     """A passage quadratic in the load that cannot be simulated above: the slope from below, 2 x 3 less the step."""
 
-    def simulated(values, terms, made):
+    def simulated(values, terms, made, with_probes):
         if values["load"] > 3.0:
             raise SimulationError("too heavy")
         return np.array([values["load"] ** 2])

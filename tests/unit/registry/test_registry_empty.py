@@ -20,7 +20,7 @@ ARGUMENTS = {
     "event_kind": "'tamping'", "kind_of_event": "'tamping'", "turnout": "'t1'", "from_utc": "'2026-01-01'",
     "to_utc": "'2026-02-01'", "since": "timestamp '2025-01-01'", "k": "1.0", "h": "5.0", "target_pct": "1.5",
     "base_days": "365", "at_most": "20", "above": "0.0003", "kind_of_class": "'speed'",
-    "effect": "'hanging_sleeper'", "quantity": "'gap'", "size_limit": "0.002",
+    "effect": "'hanging_sleeper'", "quantity": "'gap'", "size_limit": "0.002", "falls": "false",
 }  # fmt: skip
 
 

@@ -125,7 +125,7 @@ def test_what_was_accepted_on_the_other_route_is_no_part_of_a_diagnosis(monkeypa
     monkeypatch.setattr(mismatch, "TrackCase", case_of)
     turnout = SimpleNamespace(id="t1", raw="raw", settings={"mismatch": None})
     standing = [AcceptedEffect("local_pad", {"sleeper": 18.0}, {}, route) for route in ("main", "", "diverging")]
-    about = {"visit": "2026-07-25", "identity": "one", "notes": []}
+    about = {"visit": "2026-07-25", "identity": "one", "notes": [], "changes": ()}
     options = mismatch.Options(fits=tmp_path)
     rows = mismatch._diagnose_group(Group(("B",), "diverging", None), turnout, standing, about, options, (0, 1))
     assert given == ["", "diverging"] and "that is all" in rows["quarantine"][0]["found"]

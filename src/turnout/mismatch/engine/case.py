@@ -163,6 +163,9 @@ class Case:
     expensive : bool
         Predictions are expensive. Derivatives of the nuisances are then kept and updated by Broyden's formula, except
         for the observations for which ``is_cheap`` holds.
+    reuses_derivatives : bool
+        Derivatives of earlier points are used again. After a step that costs more, a fit then computes new ones before
+        it tries smaller steps.
     start_values : mapping
         Values of nuisances where fits start, else their means.
     control_level : mapping
@@ -185,6 +188,7 @@ class Case:
     candidates: tuple[Candidate, ...] = ()
     free_laws: tuple[Candidate, ...] = ()
     expensive = False
+    reuses_derivatives = False
     start_values: Values = {}
     control_level: Mapping[str, float] = {}
     cell_level: Mapping[str, float] = {}

@@ -50,7 +50,6 @@ class DampedSteps:
             self.right = pull + sum(p[1] / scale[k] for k, p in sums.items())
             step = np.linalg.solve(self.normal, self.right)
             squares = {k: max(0.0, p[2] - 2.0 * step @ p[1] + step @ p[0] @ step) for k, p in sums.items()}
-        self.undamped = step
 
     def damped_step(self, damping: float) -> np.ndarray:
         """Step with a damping added to the diagonal of the normal matrix.
@@ -102,8 +101,7 @@ class DampedSteps:
     ) -> tuple[FitPoint | None, float]:
         """First step that costs less, with rising damping.
 
-        Where the undamped step promises less than half of the least decrease for which the fit goes on, nothing is
-        tried. Along a failed step a parabola falls by at most half of what the linear model promises, so after a failed
+        Along a failed step a parabola falls by at most half of what the linear model promises, so after a failed
         trial that promised less than the least decrease the others are not tried either.
 
         Parameters
@@ -123,8 +121,6 @@ class DampedSteps:
             For the next step; 0 without an improvement.
         """
         joint = self.joint
-        if self.predicted_decrease(joint.sd * self.undamped) < THRESHOLDS.min_promise * joint.min_decrease:
-            return None, 0.0
         for _ in range(max_tries or THRESHOLDS.max_damping_tries):
             step = self.damped_step(damping)
             promise = self.predicted_decrease(step)

@@ -95,7 +95,7 @@ def _iterate(
     min_decrease, n_since_refresh, damping = joint.min_decrease, 0, 0.0
     for _ in range(joint.iterations):
         steps = DampedSteps(joint, point.theta, point.residuals, jacobian)
-        is_updated = expensive and refresh_steps > 0 and n_since_refresh > 0
+        is_updated = joint.case.reuses_derivatives and refresh_steps > 0 and n_since_refresh > 0
         improvement, damping = steps.first_improvement(point.cost, damping, 1 if is_updated else None)
         if is_updated and not improvement:  # new derivatives before smaller steps
             jacobian, n_since_refresh = _refreshed_jacobian(joint, point, jacobian), 0

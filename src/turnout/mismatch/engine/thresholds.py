@@ -254,10 +254,6 @@ class Thresholds:
         0.1, "share of the least decrease", "for which the fit goes on; steps that predict less are not tried",
         "numerical",
     )  # fmt: skip
-    min_promise: float = threshold(
-        0.5, "share of the least decrease", "for which the fit goes on, that an undamped step must promise to be tried",
-        "numerical",
-    )  # fmt: skip
     n_scale_iterations: int = threshold(5, "iterations", "of the noise scale after an undamped step", "numerical")
     n_reach_iterations: int = threshold(12, "iterations", "of the damping of parameters at their reach", "numerical")
     max_overreach: float = threshold(0.05, "share of the reach", "by which a step may exceed it", "numerical")

@@ -108,6 +108,7 @@ class TrackCase(PredictedCase):
         super().__init__(predictor, data.observations, nuisances, candidates, accepted, cache(predictor, False))
         self.data, self.families, self.cache, self.start_values = data, families, cache, start_values
         self.reserved, self.disturbed_recordings = data.reserved, data.disturbed
+        self.reuses_derivatives = any(sensitivity.is_in_switch(predictor, a) for a in data.aligned_passages.values())
         self.reservation = reservation(predictor.zone.turnout)
         self.mismatched_trains, self.measured_range = data.mismatched_trains, data.measured_range
         self.control_level = {"hammer": data.settings.hammer_control, "passage": data.settings.passage_control}
