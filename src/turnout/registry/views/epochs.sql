@@ -21,10 +21,11 @@ group by turnout_id, section_id, band, event_at_utc;
 
 -- One row per mode of a chart: with the epoch it lies in, 0 before the first event that resets the chart.
 -- Only the joint method: the values of method paper are biased and belong in no chart.
+-- Without the columns of the shape, which no chart uses: with them DuckDB 1.5.0 may not end this join.
 -- needs: modes_current
 create or replace view epochs as
 select
-    m.*,
+    m.* exclude (shape_ratio, shape_covariance, n_shape),
     coalesce(r.epoch, 0) as epoch,
     r.event_at_utc as epoch_start_utc,
     r.event_id as epoch_event_id,
@@ -61,9 +62,6 @@ where coalesce(m.method, 'joint') = 'joint';
 -- a_block_se | double[] | | their standard errors
 -- c_block | double[] | | c1, c2 of this mode (Tables 1 and 2 of the paper)
 -- c_block_se | double[] | | their standard errors; empty without a fitted receptance
--- shape_ratio | double[] | | real and imaginary part of the amplitude at the second response over that at the first; empty where the layout has none
--- shape_covariance | double[] | | variance of the real part, covariance, variance of the imaginary part of shape_ratio, from the spread of the impacts
--- n_shape | integer | | impacts behind shape_ratio
 -- epoch | bigint | | epoch of the chart, 0 before the first event that resets it
 -- epoch_start_utc | timestamp | UTC | event that started the epoch; empty for epoch 0
 -- epoch_event_id | varchar | | that event
