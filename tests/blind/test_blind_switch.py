@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import turnout_blind.switch as module
+from turnout.config.load import load_configuration
 from turnout.config.parameters import read_parameters
 from turnout.simulate.blade import Blade, transfer_position
 from turnout.simulate.preparation import prepare
@@ -16,9 +17,9 @@ from turnout_blind import vehicle
 from turnout_blind.effect import load_effects
 from turnout_blind.grid import Rail as GridRail
 from turnout_blind.history import SWITCH_EFFECTS, HistoryPlan, make_history, plan_histories
-from turnout_blind.nominal_files import track
+from turnout_blind.nominal_files import track, write_configuration
 from turnout_blind.run import simulate_passage
-from turnout_blind.site import SWITCH, draw_site
+from turnout_blind.site import PLAIN, SWITCH, draw_site
 from turnout_blind.strata import plan_cases
 from turnout_blind.switch import Switch, TrueBlade
 from turnout_blind.true_site import uniform_world
@@ -89,6 +90,12 @@ def test_the_file_of_the_owner_has_the_blade_and_both_tops(tmp_path):
     assert site.switch.toe < transfer < site.switch.toe + site.switch.length
     chairs = turnout.track.support[blade.slide_chairs(turnout.track)]
     assert np.all((chairs > site.switch.toe - 0.08) & (chairs < site.switch.heel)) and chairs.size >= 7
+
+
+@pytest.mark.parametrize(("panel", "asked"), [(SWITCH, True), (PLAIN, False)])
+def test_a_proof_asks_for_the_names_that_are_withheld_at_switch_panels(tmp_path, panel, asked):
+    write_configuration(tmp_path, "t", draw_site(np.random.default_rng(3), panel=panel))
+    assert load_configuration(tmp_path).turnout("t").settings["mismatch"].unproven_names is asked
 
 
 @pytest.mark.parametrize("kind", ["chair_gap", "heel", "toe"])

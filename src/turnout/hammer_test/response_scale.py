@@ -162,8 +162,8 @@ def free_rail_mobility(s: float, foundation: float = 0.0, mass: float = 1.0, sti
     Slow changes bend the rail as an Euler beam: :math:`1 / (\sqrt{8 s}\, m^{3/4} (EI)^{1/4})`.
 
     >>> euler = 1.0 / (np.sqrt(8.0 * 10.0) * MASS**0.75 * (YOUNGS_MODULUS * SECOND_MOMENT) ** 0.25)
-    >>> print(f"{free_rail_mobility(10.0) / euler:.1f}")
-    1.0
+    >>> print(f"{free_rail_mobility(10.0) / euler:.2f}")
+    1.00
     """
     shear = SHEAR_COEFFICIENT * SHEAR_MODULUS * AREA * mass
     bending = YOUNGS_MODULUS * SECOND_MOMENT * stiffness

@@ -1,0 +1,33 @@
+"""A case in a switch panel is not proven, and its fits use derivatives again; one on plain track is neither."""
+
+from dataclasses import replace
+
+import pytest
+
+from turnout.mismatch.turnout import TrackCase
+from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
+from turnout.mismatch.turnout.unproven_panels import UNPROVEN_SWITCH
+from turnout.simulate.blade import Blade
+from turnout.simulate.wheel_path import BladeTop, StockFall
+
+
+@pytest.fixture(scope="module")
+def campaign():
+    return measured_campaign(small_plan((15.0,), hammer_positions=(24.0,)), (), 3)
+
+
+def test_a_case_on_plain_track_is_proven(campaign):
+    case = TrackCase(campaign)
+    assert case.reservation == "" and not case.reuses_derivatives
+
+
+@pytest.mark.parametrize("is_crossed", [True, False])
+def test_a_case_with_a_blade_is_not_proven_also_if_no_wheel_changes_to_it(campaign, is_crossed):
+    track = campaign.turnout.track
+    surfaces = ((StockFall(21.6, 3.0, 0.02),), (BladeTop(20.1, 3.0, 0.015),))
+    turnout = replace(campaign.turnout, track=track.with_(blade=Blade(20.1, 27.0, 32.0, track.rail, 3e8, 3e4)))
+    if is_crossed:
+        turnout = replace(turnout, routes={"main": surfaces})
+    case = TrackCase(replace(campaign, turnout=turnout))
+    assert case.reservation == UNPROVEN_SWITCH
+    assert case.reuses_derivatives is is_crossed
