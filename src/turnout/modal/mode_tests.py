@@ -5,7 +5,7 @@ The significance of a mode or a drift comes from chi-squared tests of amplitudes
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +18,18 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from turnout.config.settings.identify import IdentifySettings
-    from turnout.modal.stabilization import Candidate
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A pole that recurs: medians of ``frequency`` [Hz], ``damping``, ``energy``, ``emac``; ``presence`` 0 to 1."""
+
+    frequency: float
+    damping: float
+    energy: float
+    emac: float
+    presence: float
+    members: np.ndarray
 
 
 def mode_chi_squared(linearisation: Linearisation, sigma2: float) -> np.ndarray:

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from turnout.config.settings.identify import IdentifySettings
-    from turnout.modal.stabilization import Candidate
+    from turnout.modal.mode_tests import Candidate
     from turnout.modal.systematic_error import OwnEstimates
 
 MAX_NOISE_PASSES = 3  # fits with a new whitening filter

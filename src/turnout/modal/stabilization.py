@@ -13,7 +13,7 @@ import numpy as np
 from turnout.modal.era import subspaces
 from turnout.modal.least_squares import linearise
 from turnout.modal.mixed_effects import fit_common
-from turnout.modal.mode_tests import mode_chi_squared
+from turnout.modal.mode_tests import Candidate, mode_chi_squared
 from turnout.modal.state_space import continuous_pole, modal_parameters
 
 if TYPE_CHECKING:
@@ -39,18 +39,6 @@ class Stabilisation:
     energy: np.ndarray
     emac: np.ndarray
     n_cell: int
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A pole that recurs: medians of ``frequency`` [Hz], ``damping``, ``energy``, ``emac``; ``presence`` 0 to 1."""
-
-    frequency: float
-    damping: float
-    energy: float
-    emac: float
-    presence: float
-    members: np.ndarray
 
 
 def stabilisation(

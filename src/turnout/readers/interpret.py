@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from turnout.errors import ReadError
+from turnout.readers.blocks import BlockReader, ChannelStatistics, channel_error
 from turnout.readers.channel_maps import Assignments, ChannelMapping
-from turnout.readers.lazy import BlockReader, ChannelStatistics, Column, channel_error
+from turnout.readers.lazy import Column
 from turnout.readers.lost_entries import is_single, lost_entry_errors
 from turnout.readers.packing import fill_values
 from turnout.readers.rate_agreement import rate_remark, resolve

@@ -6,8 +6,9 @@ from examples import oscillator_case as oscillator
 from examples.oscillator_case import LAWS, OscillatorCase
 
 from turnout.mismatch import diagnose
-from turnout.mismatch.engine.decision import NAME_RULES, first_applicable
+from turnout.mismatch.engine.decision import NAME_RULES
 from turnout.mismatch.engine.decision_facts import NameEvidence
+from turnout.mismatch.engine.rule import first_applicable
 
 RATE, N, OMEGA = 500.0, 1500, 2.0 * np.pi * 20.0
 SLIP = np.linspace(0.05, 1.0, 20) * 8.0 / OMEGA**2  # displacement at which each friction element slips

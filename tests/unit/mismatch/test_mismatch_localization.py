@@ -13,13 +13,13 @@ from turnout.mismatch.engine.localization import (
     AMPLITUDES,
     NOISE_FACTORS,
     Location,
-    ResidualSpace,
     locate,
     subspace_evidence,
     weigh_spaces,
 )
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.reserved_data import is_significantly_worse
+from turnout.mismatch.engine.residual_space import ResidualSpace
 from turnout.mismatch.turnout import disturbances
 from turnout.mismatch.turnout.priors import DISTURBANCE
 

@@ -13,11 +13,12 @@ from turnout.mismatch.engine.candidate_search import Entry, Projector, is_same_s
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
 from turnout.mismatch.engine.decision import grade_name, judge
 from turnout.mismatch.engine.diagnose import grade_names
+from turnout.mismatch.engine.findings import Findings
 from turnout.mismatch.engine.hammer_prescreen import informed_values
-from turnout.mismatch.engine.localization import ResidualSpace
 from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.residual_space import ResidualSpace
 from turnout.mismatch.engine.score import Score
-from turnout.mismatch.engine.search import Findings, Search
+from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.two_effects import add_second, settle_pair
 from turnout.mismatch.engine.verdict import Verdict
 from turnout.physics import Parameter

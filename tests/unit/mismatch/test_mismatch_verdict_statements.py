@@ -11,10 +11,11 @@ from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
 from turnout.mismatch.engine.evidence import assess, explained_share, score_of, worst_excess
+from turnout.mismatch.engine.findings import Findings
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.reserved_data import Verification, fit_percent, predict_with_decoy
 from turnout.mismatch.engine.score import Score
-from turnout.mismatch.engine.search import Findings, Search
+from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.two_effects import settle_pair
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.candidates.catalogue import candidate_of, channel_sites

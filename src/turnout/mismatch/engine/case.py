@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from turnout.mismatch.engine.fit import Fit
-    from turnout.mismatch.engine.localization import ResidualSpace
+    from turnout.mismatch.engine.residual_space import ResidualSpace
 
 Values: TypeAlias = Mapping[str, float]  # nuisance parameters by name
 Terms: TypeAlias = Sequence[Any]  # effects in the model, as ``Candidate.term`` gives them

@@ -10,9 +10,9 @@ stands beside the first. ``PAIR_RULES``: which of the two remain. ``NAME_RULES``
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 from turnout.mismatch.engine.decision_facts import (
     EffectEvidence,
@@ -22,6 +22,7 @@ from turnout.mismatch.engine.decision_facts import (
     ToleratedEvidence,
     UnprovenEvidence,
 )
+from turnout.mismatch.engine.rule import Rule, first_applicable
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.mismatch.engine.verdict import Verdict, calibrate, posterior, swap_with_unknown
 
@@ -31,69 +32,6 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.reserved_data import Verification
     from turnout.mismatch.engine.score import Score
     from turnout.mismatch.engine.two_effects import PairEvidence, SecondEvidence
-
-
-Facts = TypeVar("Facts")
-
-
-@dataclass(frozen=True)
-class Rule(Generic[Facts]):
-    """One line of a table of the decision.
-
-    Attributes
-    ----------
-    name : str
-        Entry of ``Verdict.trail``.
-    applies : callable
-        Facts of the step -> whether the rule applies.
-    answer : str
-        Answer of the verdict, or which of two verdicts remain.
-    reason : str
-        Reason in words, a format string with the facts as ``e``.
-    page : str
-        Page below ``docs`` that gives the reason for the rule.
-    cause : str
-        "clock" or "train" if the answer rests on recordings that were not fitted, else "".
-    """
-
-    name: str
-    applies: Callable[[Facts], Any]
-    answer: str
-    reason: str
-    page: str
-    cause: str = ""
-
-    def reason_for(self, evidence: Facts) -> str:
-        """Reason in words for the facts of one step.
-
-        Parameters
-        ----------
-        evidence : facts
-            Those of the rule's table.
-
-        Returns
-        -------
-        str
-        """
-        return self.reason.format(e=evidence)
-
-
-def first_applicable(rules: Sequence[Rule[Facts]], evidence: Facts) -> Rule[Facts]:
-    """First of the rules that applies. The last rule of a table always does.
-
-    Parameters
-    ----------
-    rules : sequence of Rule
-        A table, in order.
-    evidence : facts
-        What its rules ask for.
-
-    Returns
-    -------
-    Rule
-    """
-    return next(rule for rule in rules if rule.applies(evidence))
-
 
 HOW, PAIRS, SURFACES = "mismatch.md", "decisions/two-effects.md", "decisions/running-surface-priors.md"
 LOCATED, ENDS = "decisions/residual-localization.md", "decisions/joint-fit-convergence.md"

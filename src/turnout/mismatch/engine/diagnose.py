@@ -16,13 +16,14 @@ from turnout.mismatch.engine.decision import (
 )
 from turnout.mismatch.engine.decision_facts import NumericalError
 from turnout.mismatch.engine.evidence import assess, excess_ratio, latent_force_of, worst_excess
+from turnout.mismatch.engine.findings import Findings
 from turnout.mismatch.engine.free_laws import free_law_share
 from turnout.mismatch.engine.localization import Location, locate
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.refit import score_candidates
 from turnout.mismatch.engine.reserved_data import Verification, verify
 from turnout.mismatch.engine.residual_attribution import Attribution, attribute, cell_energies
-from turnout.mismatch.engine.search import Findings, Search
+from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.mismatch.engine.tolerated_effects import name_tolerated
 from turnout.mismatch.engine.two_effects import add_second, settle_pair
@@ -32,9 +33,9 @@ from turnout.mismatch.engine.verdict import Verdict
 if TYPE_CHECKING:
     from turnout.config.settings.mismatch import MismatchSettings
     from turnout.mismatch.engine.case import Case
-    from turnout.mismatch.engine.decision import Rule
     from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.engine.latent_force import LatentForce
+    from turnout.mismatch.engine.rule import Rule
     from turnout.mismatch.engine.score import Score
 
 

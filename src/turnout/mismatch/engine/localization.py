@@ -24,25 +24,13 @@ from turnout.mismatch.engine.thresholds import THRESHOLDS
 if TYPE_CHECKING:
     from turnout.mismatch.engine.case import Case, Observation
     from turnout.mismatch.engine.fit import Fit
+    from turnout.mismatch.engine.residual_space import ResidualSpace
     from turnout.mismatch.engine.score import Score
 
 AMPLITUDES = np.concatenate(
     [[0.0], np.geomspace(THRESHOLDS.min_amplitude, THRESHOLDS.max_amplitude, THRESHOLDS.n_amplitudes)]
 )
 NOISE_FACTORS = np.geomspace(1.0, THRESHOLDS.max_noise_factor, THRESHOLDS.n_noise_factors)
-
-
-@dataclass(frozen=True)
-class ResidualSpace:
-    """Columns on some observations, and the subspaces of them.
-
-    ``names`` of the observations. ``columns`` (n, k) on them one behind the other, in the unit of the data.
-    ``combinations`` (frame, level) -> (k, m) combinations of the columns, None for all of them.
-    """
-
-    names: tuple[str, ...]
-    columns: np.ndarray
-    combinations: Mapping[tuple[str, Any], np.ndarray | None]
 
 
 @dataclass(frozen=True)

@@ -12,18 +12,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.engine.decision import TOLERATED_RULES, first_applicable
+from turnout.mismatch.engine.decision import TOLERATED_RULES
 from turnout.mismatch.engine.decision_facts import ToleratedEvidence
 from turnout.mismatch.engine.evidence import explained_share, worst_excess
 from turnout.mismatch.engine.large_values import with_wide_priors
+from turnout.mismatch.engine.rule import first_applicable
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.mismatch.engine.verdict import Verdict, calibrate
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
+    from turnout.mismatch.engine.findings import Findings
     from turnout.mismatch.engine.fit import Fit
-    from turnout.mismatch.engine.search import Findings
 
 
 def name_tolerated(findings: Findings) -> Findings:

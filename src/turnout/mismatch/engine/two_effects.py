@@ -15,7 +15,7 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.cross_validation import held_out_score, signature_overlap
-from turnout.mismatch.engine.decision import PAIR_RULES, SECOND_RULES, first_applicable, judge
+from turnout.mismatch.engine.decision import PAIR_RULES, SECOND_RULES, judge
 from turnout.mismatch.engine.evidence import (
     assess,
     excess_ratio,
@@ -24,9 +24,11 @@ from turnout.mismatch.engine.evidence import (
     residual_structure,
     worst_excess,
 )
+from turnout.mismatch.engine.findings import Findings
 from turnout.mismatch.engine.localization import locate
 from turnout.mismatch.engine.reserved_data import gain_error, reserved_fit
-from turnout.mismatch.engine.search import Findings, Search
+from turnout.mismatch.engine.rule import first_applicable
+from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:

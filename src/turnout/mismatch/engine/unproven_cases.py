@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from turnout.mismatch.engine.decision import UNPROVEN_RULES, first_applicable
+from turnout.mismatch.engine.decision import UNPROVEN_RULES
 from turnout.mismatch.engine.decision_facts import UnprovenEvidence
+from turnout.mismatch.engine.rule import first_applicable
 
 if TYPE_CHECKING:
-    from turnout.mismatch.engine.search import Findings
+    from turnout.mismatch.engine.findings import Findings
 
 
 def withhold_names(findings: Findings) -> Findings:

@@ -12,7 +12,7 @@ from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from turnout.config.settings.mismatch import MismatchSettings
-    from turnout.mismatch.engine.decision import Rule
+    from turnout.mismatch.engine.rule import Rule
     from turnout.mismatch.engine.score import Score
 
 ANSWERS = ("none", "named", "a_or_b", "unknown", "numerics")

@@ -13,7 +13,7 @@ from turnout.errors import SimulationError
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Observation
 from turnout.mismatch.engine.fit import Fit
-from turnout.mismatch.engine.localization import ResidualSpace
+from turnout.mismatch.engine.residual_space import ResidualSpace
 from turnout.mismatch.turnout import sensitivity
 from turnout.mismatch.turnout.accepted_effects import NO_EFFECTS, AcceptedEffect, AcceptedEffects, effects_on
 from turnout.mismatch.turnout.campaign import CampaignInput

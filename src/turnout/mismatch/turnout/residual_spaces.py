@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.mismatch.engine.localization import ResidualSpace
+from turnout.mismatch.engine.residual_space import ResidualSpace
 from turnout.mismatch.turnout import receptance_observation
 from turnout.mismatch.turnout.priors import PASSAGE, TRACK, WHEELS
 from turnout.mismatch.turnout.pseudo_forces import green_functions

@@ -1,0 +1,22 @@
+"""Columns in which an unnamed cause would show, as a case gives them to the localization."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class ResidualSpace:
+    """Columns on some observations, and the subspaces of them.
+
+    ``names`` of the observations. ``columns`` (n, k) on them one behind the other, in the unit of the data.
+    ``combinations`` (frame, level) -> (k, m) combinations of the columns, None for all of them.
+    """
+
+    names: tuple[str, ...]
+    columns: np.ndarray
+    combinations: Mapping[tuple[str, Any], np.ndarray | None]
