@@ -30,8 +30,7 @@ MIN_DEFICIT, DEVIATIONS = 0.03, 4.0
 # Share of the misfit at the tops that a cut prediction leaves. A cut top is flat; a top that is lower because the
 # impact was beside its mark is lower everywhere.
 MAX_MISFIT_LEFT = 0.25
-# Limits of one channel agree within this factor, and no other response of the test exceeds them by more: the overshoot
-# of a steep filter behind a cut top is 9 % (Gibbs).
+# Limits of one channel agree within this factor: the overshoot of a steep filter behind a cut top is 9 % (Gibbs).
 SAME_LIMIT = 1.1
 
 
@@ -40,21 +39,19 @@ class Top:
     """Tops of one response against its prediction.
 
     ``deficit`` [-] is the logarithm of the gain of its low part over that of its tops, ``limit`` [m/s²] the level that
-    cuts the prediction best, ``misfit_left`` [-] what the cut leaves of the squared misfit, ``peak`` [m/s²] is
-    measured.
+    cuts the prediction best, ``misfit_left`` [-] what the cut leaves of the squared misfit.
     """
 
     deficit: float
     limit: float
     misfit_left: float
-    peak: float
 
 
 def judge_limited_impacts(impacts: Sequence[Impact], response: str) -> tuple[Impact, ...]:
     """Reject the impacts of a test whose response was limited, while weaker impacts were not.
 
-    Each of them has lower tops than the weaker impacts predict, a cut explains its misfit, its limit is that of the
-    other limited impacts, and no response of the test is larger. The weaker half of the test must be intact.
+    Each of them has lower tops than the weaker impacts predict, a cut explains its misfit, and its limit is that of
+    the other limited impacts. The weaker half of the test must be intact.
 
     Parameters
     ----------
@@ -78,9 +75,9 @@ def judge_limited_impacts(impacts: Sequence[Impact], response: str) -> tuple[Imp
     least = max(MIN_DEFICIT, DEVIATIONS * MAD_TO_SD * float(np.median(np.abs(deficits[weaker] - usual))))
     lower = [t for t in tops if t.deficit - usual > MIN_DEFICIT and t.misfit_left < MAX_MISFIT_LEFT]
     limits = [t.limit for t in lower if t.deficit - usual > least]
-    limit = float(np.median(limits)) if limits else np.inf
-    if not limits or max(t.peak for t in tops) > SAME_LIMIT * limit:
+    if not limits:
         return tuple(impacts)
+    limit = float(np.median(limits))
     cut = [t for t in lower if 1.0 / SAME_LIMIT < t.limit / limit < SAME_LIMIT]
     rejections = {}
     for impact, top in zip(used, tops):
@@ -138,12 +135,11 @@ def _top(measured: np.ndarray, predicted: np.ndarray) -> Top:
         float(measured[samples] @ predicted[samples] / (predicted[samples] @ predicted[samples]))
         for samples in (is_low, is_top)
     ]
-    peak = float(np.max(np.abs(measured)))
     if not min(gains) > 0.0:
-        return Top(0.0, np.inf, 1.0, peak)
+        return Top(0.0, np.inf, 1.0)
     expected = gains[0] * predicted[is_top]
     levels = np.linspace(0.4, 1.0, 61)[:, None] * np.max(np.abs(expected))
     misfits = np.sum((measured[is_top] - np.clip(expected, -levels, levels)) ** 2, axis=1)
     closest = int(np.argmin(misfits))
     misfit_left = float(misfits[closest] / misfits[-1]) if misfits[-1] > 0.0 else 1.0
-    return Top(float(np.log(gains[0] / gains[1])), float(levels[closest, 0]), misfit_left, peak)
+    return Top(float(np.log(gains[0] / gains[1])), float(levels[closest, 0]), misfit_left)

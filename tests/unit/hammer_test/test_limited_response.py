@@ -75,6 +75,22 @@ def test_intact_impacts_of_different_force_also_beside_the_mark_are_not_called_l
     assert wrong == 0
 
 
+@pytest.mark.parametrize(
+    ("seed", "kind"),
+    [
+        (50060, {"beside": 0.5}),
+        (50096, {"beside": 0.2, "n_limited": 3}),
+        (50206, {"beside": 0.2, "n_limited": 2}),
+        (50240, {"beside": 0.2, "n_limited": 3}),
+    ],
+)
+def test_impacts_beside_the_mark_are_intact_for_two_reasons(seed, kind):
+    """A cut explains their misfit badly (first two tests), or at another level than that of the others (last two)."""
+    recordings, excess = hammer_test(seed, **kind)
+    rejected, _ = newly_rejected(recordings)
+    assert all(excess[k] > 1.0 for k in rejected) and bool(rejected) == ("n_limited" in kind)
+
+
 def stiffness_of(impacts):
     """Smallest dynamic stiffness between 80 and 250 Hz. [N/m]"""
     receptance = receptance_of([i for i in impacts if i.accepted])
