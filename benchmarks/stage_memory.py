@@ -42,6 +42,8 @@ for unit in scan(turnout, root / 'raw').units[:1]:
     assert hammer_unit(unit, turnout, root / 'raw')['models']
 """
 REGISTER = """
+from turnout.arrow_memory import use_system_allocator
+use_system_allocator()
 from pathlib import Path
 from turnout.registry.job import register
 from turnout.workflow.batches import read_results
@@ -51,6 +53,8 @@ assert register([folder / sys.argv[2]], folder / 'registry', read=read_results, 
 """
 
 TREND = """
+from turnout.arrow_memory import use_system_allocator
+use_system_allocator()
 from pathlib import Path
 from turnout.stages.trend import trend_job
 folder = Path(sys.argv[1])

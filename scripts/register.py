@@ -1,6 +1,10 @@
 """Rule register: what all shards have computed goes into the registry."""
 
-from turnout.registry.job import register
-from turnout.workflow.jobs import register_job
+from turnout.arrow_memory import use_system_allocator
+
+use_system_allocator()
+
+from turnout.registry.job import register  # noqa: E402
+from turnout.workflow.jobs import register_job  # noqa: E402
 
 register_job(register, snakemake.output[0], snakemake.log[0], snakemake.params)

@@ -1,9 +1,13 @@
 """Rule trend: the registry as it stands in; every chart and alarm out."""
 
-import logging
+from turnout.arrow_memory import use_system_allocator
 
-from turnout.stages.trend import trend_job
-from turnout.workflow.retries import attempt
+use_system_allocator()
+
+import logging  # noqa: E402
+
+from turnout.stages.trend import trend_job  # noqa: E402
+from turnout.workflow.retries import attempt  # noqa: E402
 
 logging.basicConfig(filename=snakemake.log[0], filemode="w", level="INFO", format="%(levelname)s %(message)s")
 with attempt("trend", snakemake.params.again):

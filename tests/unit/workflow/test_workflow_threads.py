@@ -1,8 +1,10 @@
-"""A stage job and a command start one BLAS thread, whatever the environment has set."""
+"""A stage job and a command start one BLAS thread; jobs of the registry return the memory that Arrow has freed."""
 
 import os
 import subprocess
 import sys
+
+import pytest
 
 CODE = """
 import sys
@@ -31,3 +33,22 @@ def test_a_command_asks_for_one_thread_before_numpy_comes():
     code = "import sys, turnout.cli.main as m; m.use_one_thread = lambda: sys.exit('numpy' in sys.modules)"
     code += "; m.main(['check'])"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("environment", "expected"), [({}, "system"), ({"ARROW_DEFAULT_MEMORY_POOL": "mimalloc"}, "mimalloc")]
+)
+def test_jobs_that_copy_rows_use_the_allocator_of_the_system_unless_the_user_states_one(
+    repository, environment, expected
+):
+    for name in ("register", "trend_update"):
+        lines = (repository / f"scripts/{name}.py").read_text().splitlines()
+        calls = "\n".join(
+            line for line in lines if not line.startswith(('"""', "logging", "with", " ", "register_job"))
+        )
+        code = f"{calls}\nimport pyarrow\nprint(pyarrow.default_memory_pool().backend_name)"
+        bare = {k: v for k, v in os.environ.items() if k != "ARROW_DEFAULT_MEMORY_POOL"}
+        done = subprocess.run(
+            [sys.executable, "-c", code], env=bare | environment, capture_output=True, text=True, check=True
+        )
+        assert done.stdout.strip() == expected
