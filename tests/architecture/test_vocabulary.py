@@ -2,6 +2,7 @@
 
 import ast
 import re
+from functools import cache
 
 import pytest
 
@@ -128,16 +129,27 @@ def test_every_module_is_named_by_a_noun(repository):
     assert not wrong, "\n".join(wrong)
 
 
-@pytest.mark.parametrize("word", sorted(DIALECT))
-def test_no_name_uses_a_word_of_the_dialect(repository, word):
-    pattern = re.compile(rf"(?:^|_){word}(?:_|$)", re.IGNORECASE)
-    wrong = []
+@cache
+def names(repository):
+    """Name -> the first place where it stands, of all variables, functions, classes and arguments."""
+    table = {}
     for path, tree in modules(repository):
         for node in ast.walk(tree):
             name = getattr(node, "id", None) or getattr(node, "name", None) or getattr(node, "arg", None)
-            if isinstance(name, str) and pattern.search(name) and name not in EXCEPTIONS:
-                wrong.append(f"src/{path}:{getattr(node, 'lineno', 0)} {name}: say {DIALECT[word]!r}")
-    assert not wrong, "\n".join(sorted(set(wrong)))
+            if isinstance(name, str):
+                table.setdefault(name, f"src/{path}:{getattr(node, 'lineno', 0)}")
+    return table
+
+
+@pytest.mark.parametrize("word", sorted(DIALECT))
+def test_no_name_uses_a_word_of_the_dialect(repository, word):
+    pattern = re.compile(rf"(?:^|_){word}(?:_|$)", re.IGNORECASE)
+    wrong = [
+        f"{place} {name}: say {DIALECT[word]!r}"
+        for name, place in names(repository).items()
+        if pattern.search(name) and name not in EXCEPTIONS
+    ]
+    assert not wrong, "\n".join(sorted(wrong))
 
 
 def test_the_exceptions_are_few():
