@@ -11,6 +11,7 @@ import io
 import math
 import re
 import zipfile
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 import numpy as np
@@ -213,6 +214,25 @@ def _is_ieee(number_type: Any) -> bool:
     bits = 8 * number_type.get_size()
     names = (f"IEEE_F{bits}{order}" for order in ("LE", "BE"))
     return any(number_type.equal(getattr(h5py.h5t, name)) for name in names if hasattr(h5py.h5t, name))
+
+
+def open_hdf5(source: Source) -> AbstractContextManager[Any]:
+    """The HDF5 file as a context; with a lazy source the datasets keep it open.
+
+    Parameters
+    ----------
+    source : Source
+        The HDF5 file.
+
+    Returns
+    -------
+    context manager of h5py.File
+        The open file.
+    """
+    import h5py
+
+    file = h5py.File(source.path, "r")
+    return nullcontext(file) if source.lazy else file
 
 
 def check_hdf5(file: Any, source: Source) -> None:

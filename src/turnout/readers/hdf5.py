@@ -7,7 +7,6 @@ are applied; a dataset with another gain or offset is rejected unless the layout
 """
 
 from collections.abc import Mapping
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +15,7 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.array_metadata import ATTRIBUTES_MARK, TIME_NAMES, Alphabetical, Attributes, matrices
-from turnout.readers.claims import Hdf5Claims
+from turnout.readers.claims import Hdf5Claims, open_hdf5
 from turnout.readers.lazy import is_large, lazy_array
 from turnout.readers.named_arrays import STATED_SCALES, raw_file
 from turnout.readers.packing import apply_packing
@@ -48,23 +47,6 @@ def read_raw(source: Source) -> RawFile:
     with source.parsed_by("HDF5"), open_hdf5(source) as file:
         variables = _variables(file, "", source, Hdf5Claims(source))
     return raw_file(variables, source)
-
-
-def open_hdf5(source: Source) -> AbstractContextManager[Any]:
-    """The HDF5 file as a context; with a lazy source the datasets keep it open.
-
-    Parameters
-    ----------
-    source : Source
-        The HDF5 file.
-
-    Returns
-    -------
-    context manager of h5py.File
-        The open file.
-    """
-    file = h5py.File(source.path, "r")
-    return nullcontext(file) if source.lazy else file
 
 
 def _variables(group: h5py.Group, path: str, source: Source, claims: Hdf5Claims) -> dict[str, Any]:

@@ -17,9 +17,8 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.array_metadata import Metadata, single_value
-from turnout.readers.claims import check_hdf5
+from turnout.readers.claims import check_hdf5, open_hdf5
 from turnout.readers.entries import entries_of, rate_entry
-from turnout.readers.hdf5 import open_hdf5
 from turnout.readers.lazy import is_large, lazy_array
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
 from turnout.readers.stated_scales import scale_text, without_drawings
