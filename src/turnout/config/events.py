@@ -16,6 +16,7 @@ from turnout.errors import ConfigError
 if TYPE_CHECKING:
     from turnout.config.merge import Variant
 
+RENEWAL = "renewal"  # of the whole structure: what was measured before says nothing of what lies there now
 # Resonances that start a new epoch after each kind of work, where the row does not name them.
 RESETS = {
     "tamping": ("ballast",),
@@ -24,6 +25,7 @@ RESETS = {
     "grinding": (),
     "ballast_cleaning": ("ballast",),
     "sleeper_change": ("ballast", "railpad"),
+    RENEWAL: ("ballast", "railpad"),
     "sensor_change": ("ballast", "railpad"),
     "method_change": ("ballast", "railpad"),
     "other": (),

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from turnout.config import load_configuration, with_raw
-from turnout.config.events import read_events
+from turnout.config.events import RENEWAL, read_events
 from turnout.content import sha256_of
 from turnout.errors import SimulationError
 from turnout.fingerprint import fingerprint
@@ -58,6 +58,7 @@ from turnout.stages.accepted_changes import change_events, changes_of, further_c
 from turnout.stages.checkpoint import SUFFIX, read_value, write_value
 from turnout.stages.mismatch_groups import groups, unit_of, visits
 from turnout.stages.mismatch_inputs import digest_of_model, gather_inputs, mismatch_context, track_of
+from turnout.stages.renewals import renewal_note, since_renewal
 from turnout.stages.visit_time import DAYS_PER_YEAR, day_of, years_of
 from turnout.workflow.scan import scan
 
@@ -79,6 +80,7 @@ OPENED = {
     "sleeper_change": ("sleeper", "pad", "pad_damper", "ballast", "ballast_damper", "wave"),
     "sensor_change": ("gain", "seat"),
 }
+OPENED[RENEWAL] = tuple(sorted({group for opened in OPENED.values() for group in opened}))  # of one section
 # Parameters that all supports share, which work on the whole turnout makes uncertain, too
 BALLAST, PADS = ("ballast_stiffness", "ballast_damping"), ("pad_stiffness", "pad_damping")
 OPENED_COMMON = {
@@ -382,6 +384,7 @@ def state_rows(
     version = {k: v for k, v in about["version"].items() if k != "recordings"}  # of other visits they may be any
     names = {path.stem.rpartition("-")[0] for path in (folder / turnout.id).glob(f"*{SUFFIX}")}
     earlier = {visit: version for visit in names if years_of(visit) <= years_of(about["visit"])}
+    earlier = since_renewal(turnout, earlier)
     stored = read_visits(folder, turnout.id, earlier | {about["visit"]: about["version"]})
     parameters = parameters_of(stored)
     visits_used = visits_of(_without_findings(stored))
@@ -442,13 +445,14 @@ def calibrate_turnout(
     Raises
     ------
     SimulationError
-        The turnout has no recordings, no track file, or no visit that can be fitted.
+        The turnout has no recordings since its renewal, no track file, or no visit that can be fitted.
     """
     turnout = with_raw(load_configuration(config).turnout(turnout_id), Path(raw_root))
-    by_visit = visits(scan(turnout, Path(raw_root)).units)
+    by_visit = since_renewal(turnout, visits(scan(turnout, Path(raw_root)).units))
     if not by_visit:
         raise SimulationError(
-            f"{turnout_id}: no hammer test and no passage below {raw_root}; nothing can be calibrated."
+            f"{turnout_id}: no hammer test and no passage below {raw_root}{renewal_note(turnout)}; "
+            "nothing can be calibrated."
         )
     folder, code = Path(work) / FOLDER, fingerprint("turnout.stages.mismatch")
     code = "-".join([code, *sorted(without)])

@@ -48,6 +48,7 @@ from turnout.stages.mismatch_groups import (
 )
 from turnout.stages.mismatch_inputs import gather_inputs, track_of
 from turnout.stages.mismatch_rows import finding_row
+from turnout.stages.renewals import renewal_note, since_renewal
 from turnout.workflow.scan import scan
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ MAX_FITTED_AXLES = 24  # of all fitted trains: the time of a fit is proportional
 MAX_HELD_OUT_TRAINS = 4
 MAX_HELD_OUT_AXLES = 96
 MIN_GAIN_ERRORS = 2.0  # standard errors by which held-out trains must fit better, to confirm a change of a stretch
-NO_HAMMER_TESTS = "no hammer test of these sections: turnout twin compares what trains alone show"
+NO_HAMMER_TESTS = "no hammer test of these sections{since}: turnout twin compares what trains alone show"
 
 
 @dataclass(frozen=True)
@@ -148,7 +149,7 @@ def _diagnose(
     members = members_of(unit, scan(turnout, Path(raw_root)).units)
     stored, notes = _fitted_visits(members, turnout, raw_root, track, accepted, code, labels)
     if not stored:
-        raise SimulationError("; ".join(notes) or NO_HAMMER_TESTS)
+        raise SimulationError("; ".join(notes) or NO_HAMMER_TESTS.format(since=renewal_note(turnout)))
     threshold = turnout.settings["mismatch"].threshold
     changes = changes_of(track.terms)
     answer, informed = change_of(stored, turnout, changes=changes)
@@ -177,7 +178,7 @@ def _fitted_visits(
 ) -> tuple[list[calibrated.StoredVisit], list[str]]:
     """Information of the hammer tests of each visit, fitted once; and why a visit could not be fitted."""
     folder = FOLDER / "+".join(labels)
-    tests = visits(u for u in members if u.kind == "hammer" and u.section in labels)
+    tests = since_renewal(turnout, visits(u for u in members if u.kind == "hammer" and u.section in labels))
     units = {v: unit_of(turnout.id, v, of, turnout.hashes["mismatch"]) for v, of in tests.items()}
     versions = {v: calibrated.version_of(u, turnout, raw_root, None, code) for v, u in units.items()}
     complete = {s.visit for s in calibrated.read_visits(folder, turnout.id, versions)}

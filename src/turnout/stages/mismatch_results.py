@@ -16,6 +16,7 @@ from turnout.stages.budget import Watch
 from turnout.stages.mismatch import Options, diagnose_visit
 from turnout.stages.mismatch_groups import Group, unit_of, visits
 from turnout.stages.mismatch_inputs import mismatch_context
+from turnout.stages.renewals import since_renewal
 from turnout.workflow.batches import decode, encode
 from turnout.workflow.scan import scan
 
@@ -108,7 +109,10 @@ def diagnose_turnout(
     if unknown := sorted(set(sections) - {s.label for s in turnout.sections}):
         labels = ", ".join(s.label for s in turnout.sections)
         raise SimulationError(f"{turnout_id} has no section {', '.join(unknown)}. Write some of {labels}.")
-    label, units = _visit(turnout_id, visits(scan(turnout, Path(raw_root)).units), visit, raw_root)
+    by_visit = visits(scan(turnout, Path(raw_root)).units)
+    if visit == ALL_VISITS:
+        by_visit = since_renewal(turnout, by_visit)
+    label, units = _visit(turnout_id, by_visit, visit, raw_root)
     unit = unit_of(turnout_id, label, units, turnout.hashes["mismatch"])
     _, passage_tables = mismatch_context(turnout_id, work=work)
     watch = Watch(None if budget is None else time.monotonic() + budget, bar.simulations if bar else None)

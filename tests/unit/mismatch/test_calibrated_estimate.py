@@ -1,5 +1,7 @@
 """The recursive estimate of the calibrated model: exact on linear examples, without trace of withdrawn visits."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -98,6 +100,16 @@ def test_a_withdrawn_visit_leaves_no_trace():
     never_measured = [v for k, v in enumerate(visits) if k != 3]
     assert same_bits(withdrawn, estimate_history(CHAIN, never_measured[::-1], accepted=None).belief)
     assert not same_bits(withdrawn, with_faulty_month)
+
+
+def test_a_gap_of_two_years_adds_the_random_walk_of_two_years_and_loses_nothing():
+    visits, _ = chain_visits(np.random.default_rng(4), 8, np.array([p.mean for p in CHAIN]))
+    late = [replace(v, time=v.time + (2.0 if k >= 4 else 0.0)) for k, v in enumerate(visits)]
+    before, after = estimate_history(CHAIN, late, accepted=None).steps[3:5]
+    walk = np.array([p.walk_sd**2 for p in CHAIN])
+    assert_allclose(after.predicted.sd**2, before.belief.sd**2 + 2.3 * walk, rtol=1e-12)
+    assert_allclose(after.predicted.mean, before.belief.mean, rtol=1e-12)
+    assert np.all(after.belief.sd < [p.sd for p in CHAIN])
 
 
 def test_the_order_of_arrival_does_not_change_a_bit():

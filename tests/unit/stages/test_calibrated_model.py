@@ -5,6 +5,7 @@ import shutil
 from dataclasses import replace
 from datetime import datetime
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from turnout.mismatch.turnout.further_passages import names_beyond, with_reserve
 from turnout.mismatch.turnout.unproven_panels import UNPROVEN_SWITCH
 from turnout.simulate.blade import Blade
 from turnout.stages import calibrated_model as calibrated
-from turnout.stages import mismatch
+from turnout.stages import mismatch, mismatch_results
 from turnout.stages.mismatch_groups import groups, visits
 from turnout.stages.mismatch_inputs import gather_inputs, track_of
 from turnout.stages.mismatch_results import diagnose_turnout
@@ -217,6 +218,44 @@ def test_work_on_the_track_opens_what_it_touches(turnout):
     tamping, sensors = calibrated.events_of(load_configuration("config").turnout("t1"), parameters)
     assert tamping.opened == {"ballast@18.00": 0.1} and sensors.opened == {"gain_A": 0.02}
     assert calibrated.years_of("2026-01-09") < tamping.time < calibrated.years_of("2026-01-11")
+
+
+def record_work(text):
+    Path("config/events.csv").write_text(f"turnout,section,date,kind,resets,note\n{text}")
+
+
+def test_a_rebuilt_turnout_knows_nothing_of_what_lay_there_before(turnout, model):
+    """To the bit the model of the recordings since the renewal; that of a section makes all of its parts uncertain."""
+    shutil.copytree(model[1], "work")
+    rest = [calibrated.years_of(day) for day in DAYS[2:]]
+    record_work(f"t1,,{DAYS[1]},tamping,,\nt1,,2025-12-01,renewal,,\nt2,,2026-04-01,renewal,,\n")
+    renewed = calibrated.calibrate_turnout("t1")
+    assert [s.time for s in renewed.history.steps] == rest and renewed.computed == ()
+    for day in DAYS[:2]:
+        shutil.rmtree(Path("raw/t1/hammer") / day)
+    shutil.rmtree("raw/t1/passages")
+    record_work("")
+    never = calibrated.calibrate_turnout("t1")
+    assert renewed.history.belief.covariance.tobytes() == never.history.belief.covariance.tobytes()
+    assert renewed.history.belief.mean.tobytes() == never.history.belief.mean.tobytes()
+    record_work("t1,A,2025-12-01,renewal,,\n")
+    of_section = calibrated.calibrate_turnout("t1")
+    (event,) = calibrated.events_of(load_configuration("config").turnout("t1"), of_section.history.parameters)
+    assert {"ballast@18.00", "pad@18.00"} <= set(event.opened)
+    record_work("t1,,2026-06-01,renewal,,\n")
+    with pytest.raises(SimulationError, match="no passage below raw since its renewal on 2026-06-01"):
+        calibrated.calibrate_turnout("t1")
+
+
+def test_the_diagnosis_of_all_visits_leaves_out_those_before_a_renewal(turnout, monkeypatch):
+    used = []
+    monkeypatch.setattr(mismatch_results, "diagnose_visit", lambda unit, *_: used.extend(unit.files) or {})
+    record_work("t1,,2026-03-01,renewal,,\n")
+    diagnose_turnout("t1", visit="all")
+    assert {path.split("/")[2] for path, *_ in used} == {DAYS[3]}
+    used.clear()
+    diagnose_turnout("t1", visit=DAYS[0])  # what is asked for by its day is diagnosed
+    assert len(used) == 4
 
 
 def test_a_turnout_without_recordings_says_so(turnout, capsys):
