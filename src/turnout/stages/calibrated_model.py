@@ -59,6 +59,7 @@ from turnout.stages.checkpoint import SUFFIX, read_value, write_value
 from turnout.stages.mismatch_groups import groups, unit_of, visits
 from turnout.stages.mismatch_inputs import digest_of_model, gather_inputs, mismatch_context, track_of
 from turnout.stages.renewals import renewal_note, since_renewal
+from turnout.stages.visit_notes import notes_in_words, summary_of_notes
 from turnout.stages.visit_time import DAYS_PER_YEAR, day_of, years_of
 from turnout.workflow.scan import scan
 
@@ -97,13 +98,17 @@ EVENT_REACH = 6.0  # m from a section that work there may touch
 
 @dataclass(frozen=True)
 class StoredVisit:
-    """Information of one group of sections at one visit: ``answer`` of its diagnosis, "" without one."""
+    """Information of one group of sections at one visit: ``answer`` of its diagnosis, "" without one.
+
+    ``notes`` are those of ``notes_in_words`` on the recordings of the visit.
+    """
 
     visit: str
     sections: str
     answer: str
     groups: tuple[GroupInformation, ...]
     parameters: tuple[StateParameter, ...]
+    notes: tuple[tuple[str, str, bool], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -112,7 +117,8 @@ class CalibratedModel:
 
     ``answers`` are those after the visits, the last two after the newest visit. ``held`` are visits with an open
     finding, which are not used, with their answers. ``computed`` are the visits that were fitted for this call,
-    ``notes`` what could not be. ``reservation`` says that answers on this track are not proven, "" where they are.
+    ``notes`` what could not be, and why recordings were not used or are doubted. ``reservation`` says that answers on
+    this track are not proven, "" where they are.
     """
 
     history: History
@@ -187,7 +193,7 @@ def store_visit(
     answer : str
         Of the diagnosis, "" without one.
     about : mapping
-        turnout, visit and version (as ``version_of``).
+        turnout, visit, version (as ``version_of``), and notes (as ``notes_in_words``) if there are any.
     store : mapping or None
         Fits of the diagnosis, which has the base fit.
 
@@ -213,6 +219,7 @@ def store_visit(
     information = visit_groups(*with_reserved_passages(search.case, fit), sections, group.route)
     value = {
         "version": dict(about["version"]), "visit": about["visit"], "sections": sections, "answer": answer,
+        "notes": [list(note) for note in about.get("notes", ())],
         "parameters": [asdict(p) for p in parameters.values()],
         "groups": [
             {"group": g.group, "n": g.n_recordings, "names": list(g.names), "matrix": g.matrix, "vector": g.vector}
@@ -262,7 +269,8 @@ def read_visits(folder: Path, turnout_id: str, versions: Mapping[str, Mapping[st
             GroupInformation(g["group"], g["n"], tuple(g["names"]), g["matrix"], g["vector"]) for g in value["groups"]
         )
         parameters = tuple(StateParameter(**p) for p in value["parameters"])
-        stored.append(StoredVisit(value["visit"], value["sections"], value["answer"], information, parameters))
+        notes = tuple((visit, words, of_passage) for visit, words, of_passage in value.get("notes", ()))
+        stored.append(StoredVisit(value["visit"], value["sections"], value["answer"], information, parameters, notes))
     return sorted(stored, key=lambda s: (s.visit, s.sections))
 
 
@@ -500,7 +508,7 @@ def calibrate_turnout(
         tuple(deviations),
         {f"{s.visit} {s.sections}": s.answer for s in stored if s.answer not in USED_ANSWERS},
         tuple(missing),
-        tuple(notes),
+        (*notes, *summary_of_notes(note for of in {s.visit: s.notes for s in stored}.values() for note in of)),
         tuple(within_library(answer, without) for answer in answers),
         reservation(turnout_track),
     )
@@ -519,7 +527,11 @@ def _fit_visit(
     turnout_track, accepted = track_of(turnout, track)
     _, passage_tables = mismatch_context(turnout.id, work=work)
     inputs = gather_inputs(units, turnout, raw_root, turnout_track, passage_tables)
-    for group in groups(turnout, turnout_track, inputs, limits=MAX_PASSAGES_AND_AXLES):
+    usable = list(groups(turnout, turnout_track, inputs, limits=MAX_PASSAGES_AND_AXLES))
+    about = {**about, "notes": notes_in_words(about["visit"], inputs.notes)}  # ``groups`` adds some
+    if not usable:
+        return summary_of_notes(about["notes"])
+    for group in usable:
         try:
             on_route = tuple(a for a in accepted if a.is_on(group.route))
             campaign = replace(group.campaign, reserved=names_beyond(group.campaign, MAX_FITTED_AXLES))

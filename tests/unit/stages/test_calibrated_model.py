@@ -258,6 +258,22 @@ def test_the_diagnosis_of_all_visits_leaves_out_those_before_a_renewal(turnout, 
     assert len(used) == 4
 
 
+def test_a_train_of_unknown_type_is_left_out_and_mentioned_again_by_every_call(turnout):
+    """The belief is to the bit that without trains."""
+    for day in DAYS[1:]:
+        shutil.rmtree(Path("raw/t1/hammer") / day)
+    Path("config/vehicles/locomotive.yaml").unlink()
+    (first, again) = (calibrated.calibrate_turnout("t1") for _ in range(2))
+    assert first.computed == (DAYS[0],) and again.computed == ()
+    shutil.rmtree("raw/t1/passages")
+    without = calibrated.calibrate_turnout("t1")
+    assert without.computed == (DAYS[0],) and not without.notes
+    assert first.history.belief.mean.tobytes() == without.history.belief.mean.tobytes()
+    for found in (first, again):
+        assert any(n.startswith(f"2 passages of visit {DAYS[0]}: ") and "type" in n for n in found.notes)
+        assert any(line.startswith("note: 2 passages") for line in model_text("t1", found))
+
+
 def test_a_turnout_without_recordings_says_so(turnout, capsys):
     shutil.rmtree(turnout / "raw")
     with pytest.raises(SimulationError, match="no hammer test and no passage"):
