@@ -36,6 +36,8 @@ class HeelSupport(PhysicsTerm):
     effect_type = "matrix"
     frame = "place"
     site_types = (BladeSite,)
+    column_type = "link"
+    prescreen_group = name  # the base model changes ballast and pads first to hide it
     smallest_reportable = 0.3
     component = "heel"
     parameters = (

@@ -42,6 +42,8 @@ class SlideChairGap(PhysicsTerm):
     effect_type = "port"
     frame = "place"
     site_types = (BladeSite,)
+    column_type = "link"
+    prescreen_group = "chair"  # the base model changes ballast and pads first to hide it
     smallest_reportable = 2e-4
     component = "chair"
     nonlinear_in_size = True

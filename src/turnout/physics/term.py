@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from turnout.simulate.vehicle import Vehicle
 
 EFFECT_TYPES = ("matrix", "port", "path", "channel", "vehicle")
-COLUMN_TYPES = ("support", "track", "path", "channel", "")
+COLUMN_TYPES = ("support", "track", "path", "channel", "link", "")
 FORCE_TARGETS = ("rail", "sleeper", "pad")  # the force of a pad acts on the rail and reversed on the sleeper
 # What an effect is fixed to, and how the page of effects describes it.
 FRAMES = {
@@ -97,7 +97,8 @@ class PhysicsTerm:
     column_type : str
         How its first-order change of a prediction is computed. "support": a force at supports (``pseudo_force``) and a
         change of links in receptances. "track": exactly in receptances, in passages as ``nuisance_change``. "path": a
-        path that all wheels follow. "channel": a change of the known signal. "": by a simulation.
+        path that all wheels follow. "channel": a change of the known signal. "link": a change of links in receptances,
+        in passages by a simulation. "": by a simulation.
     smallest_reportable : float
         Distance of the first ``n_size_parameters`` parameters from neutral below which nobody would act; 0 if the site
         or the scan that suggests it determines it.

@@ -23,6 +23,7 @@ TABLES = (
     "PAIR_RULES",
     "NAME_RULES",
     "TOLERATED_RULES",
+    "LIMIT_RULES",
     "UNPROVEN_RULES",
     "RESERVED_RULES",
 )

@@ -6,6 +6,7 @@ import pytest
 
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
+from turnout.mismatch.turnout.priors import SIMULATION
 from turnout.mismatch.turnout.unproven_panels import UNPROVEN_SWITCH
 from turnout.simulate.blade import Blade
 from turnout.simulate.wheel_path import BladeTop, StockFall
@@ -18,7 +19,7 @@ def campaign():
 
 def test_a_case_on_plain_track_is_proven(campaign):
     case = TrackCase(campaign)
-    assert case.reservation == "" and not case.reuses_derivatives
+    assert case.reservation == "" and not case.reuses_derivatives and case.max_simulations is None
 
 
 @pytest.mark.parametrize("is_crossed", [True, False])
@@ -31,3 +32,8 @@ def test_a_case_with_a_blade_is_not_proven_also_if_no_wheel_changes_to_it(campai
     case = TrackCase(replace(campaign, turnout=turnout))
     assert case.reservation == UNPROVEN_SWITCH
     assert case.reuses_derivatives is is_crossed
+    assert case.max_simulations == (SIMULATION.max_in_switch if is_crossed else None)
+    before, passage = case.n_simulations, next(o for o in case.observations if o.name in case.aligned_passages)
+    values = {n.name: case.start_values.get(n.name, n.mean) for n in case.nuisances}
+    case.predict({**values, "ballast_stiffness": 0.01}, (), [passage])
+    assert case.n_simulations == before + 1

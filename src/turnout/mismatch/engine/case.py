@@ -166,6 +166,8 @@ class Case:
     reuses_derivatives : bool
         Derivatives of earlier points are used again. After a step that costs more, a fit then computes new ones before
         it tries smaller steps.
+    max_simulations : int or None
+        Simulations after which a search ends without an answer; None: no bound.
     start_values : mapping
         Values of nuisances where fits start, else their means.
     control_level : mapping
@@ -189,6 +191,7 @@ class Case:
     free_laws: tuple[Candidate, ...] = ()
     expensive = False
     reuses_derivatives = False
+    max_simulations: int | None = None
     start_values: Values = {}
     control_level: Mapping[str, float] = {}
     cell_level: Mapping[str, float] = {}
@@ -196,6 +199,11 @@ class Case:
     mismatched_trains: tuple = ()
     reservation: str = ""
     measured_range = (-np.inf, np.inf)
+
+    @property
+    def n_simulations(self) -> int:
+        """Simulations that the case has cost so far; 0 for a case without a bound."""
+        return 0
 
     def is_cheap(self, observation: Observation) -> bool:
         """Whether derivatives of an observation cost next to nothing.

@@ -4,6 +4,7 @@ Each step of the decision has one table, and the first of its rules that applies
 the simulation is accurate enough. ``EFFECT_RULES``: the answer on one effect. ``SECOND_RULES``: whether a second effect
 stands beside the first. ``PAIR_RULES``: which of the two remain. ``NAME_RULES``: the grade of a name.
 ``TOLERATED_RULES``: whether an effect that the base model tolerates has a name.
+``LIMIT_RULES``: what a search that is not finished says.
 ``UNPROVEN_RULES``: whether names are withheld, as this kind of diagnosis is not proven on concealed data.
 ``RESERVED_RULES``: whether reserved recordings confirm the answer. ``Verdict.trail`` names the rules that applied.
 """
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.engine.reserved_data import Verification
     from turnout.mismatch.engine.score import Score
+    from turnout.mismatch.engine.search_limit import SearchLimit
     from turnout.mismatch.engine.two_effects import PairEvidence, SecondEvidence
 
 HOW, PAIRS, SURFACES = "mismatch.md", "decisions/two-effects.md", "decisions/running-surface-priors.md"
@@ -116,6 +118,10 @@ NAME_RULES: tuple[Rule[NameEvidence], ...] = (
     Rule("leaves_some_residual", _always, "B", "", HOW),
 )
 
+LIMIT_RULES: tuple[Rule[SearchLimit], ...] = (
+    Rule("search_too_long", _always, "unknown",
+         "the search was not finished within {e.most} simulations of a train", "decisions/switch-panels.md"),
+)
 UNPROVEN_RULES: tuple[Rule[UnprovenEvidence], ...] = (
     Rule("panel_not_proven", lambda e: e.reservation and e.has_name and not e.names_are_asked, "unknown",
          "{e.names} would explain it. {e.reservation}", "decisions/switch-panels.md"),
@@ -145,6 +151,7 @@ RULES = (
     *PAIR_RULES,
     *NAME_RULES,
     *TOLERATED_RULES,
+    *LIMIT_RULES,
     *UNPROVEN_RULES,
     *RESERVED_RULES,
 )

@@ -24,6 +24,7 @@ from turnout.mismatch.engine.refit import score_candidates
 from turnout.mismatch.engine.reserved_data import Verification, verify
 from turnout.mismatch.engine.residual_attribution import Attribution, attribute, cell_energies
 from turnout.mismatch.engine.search import Search
+from turnout.mismatch.engine.search_limit import SearchLimitError, unfinished_verdict
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.mismatch.engine.tolerated_effects import name_tolerated
 from turnout.mismatch.engine.two_effects import add_second, settle_pair
@@ -115,7 +116,10 @@ def diagnose(
     if numerics is not None:
         verification, latent = verify(search, base, base, None), latent_force_of(search.case, base)
         return Diagnosis((numerics,), base, base, frames, verification, latent)
-    findings = withhold_names(name_tolerated(grade_names(settle_pair(_seek_effects(search, base)))))
+    try:
+        findings = withhold_names(name_tolerated(grade_names(settle_pair(_seek_effects(search, base)))))
+    except SearchLimitError as error:
+        findings = Findings(search, base, base, (unfinished_verdict(error.limit, search.settings),))
     search, base, fit, verdicts = findings.search, findings.base, findings.fit, findings.verdicts
     verification = verify(search, base, fit, _best_rival(verdicts[0]))
     verdicts = confirm(verdicts, verification, search.settings)

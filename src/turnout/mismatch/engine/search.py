@@ -11,6 +11,7 @@ import numpy as np
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.search_limit import check_limit
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -132,7 +133,10 @@ class Search:
         ------
         SimulationError
             If the model cannot be simulated at the start or beside it.
+        SearchLimitError
+            If the case has cost more simulations than it may.
         """
+        check_limit(self.case)
         return fit_jointly(
             self.case, candidates, psi, values, reused_jacobian, iterations=self.settings.iterations, stall=stall
         )

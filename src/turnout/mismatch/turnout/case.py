@@ -109,6 +109,7 @@ class TrackCase(PredictedCase):
         self.data, self.families, self.cache, self.start_values = data, families, cache, start_values
         self.reserved, self.disturbed_recordings = data.reserved, data.disturbed
         self.reuses_derivatives = any(sensitivity.is_in_switch(predictor, a) for a in data.aligned_passages.values())
+        self.max_simulations = SIMULATION.max_in_switch if self.reuses_derivatives else None
         self.reservation = reservation(predictor.zone.turnout)
         self.mismatched_trains, self.measured_range = data.mismatched_trains, data.measured_range
         self.control_level = {"hammer": data.settings.hammer_control, "passage": data.settings.passage_control}
@@ -124,6 +125,11 @@ class TrackCase(PredictedCase):
     def settings(self) -> MismatchSettings:
         """Settings of the diagnosis."""
         return self.data.settings
+
+    @property
+    def n_simulations(self) -> int:
+        """Passages that were simulated so far for this site, without their alignment."""
+        return self.predictor.site.count.n
 
     @property
     def notes(self) -> tuple[str, ...]:

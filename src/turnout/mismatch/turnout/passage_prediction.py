@@ -173,6 +173,7 @@ class PassagePredictor(SiteModel):
         with_probes: bool = True,
     ) -> None:
         """Simulate a passage and cache it. Probe signals are large: their cache is small."""
+        self.site.count.n += 1
         _, speed, load = _train_values(values, aligned)
         vehicle = vehicle_with(aligned.passage.vehicle, values, aligned.train, load)
         simulator, path = self.passage_simulator(values, passage_terms, aligned.passage), self.waves.path(values)

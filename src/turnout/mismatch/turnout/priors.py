@@ -223,6 +223,9 @@ class SimulationPriors:
     difference_reach: float = prior(
         0.5, "prior sd", "of a common value, within which a quotient in a switch is used again; fits stall at 1",
         "numerical")
+    max_in_switch: int = prior(
+        1500, "simulations", "of a passage over a switch in one diagnosis: four CPU minutes, a whole turnout has five",
+        "decisions/switch-panels.md")
     path_step: float = prior(0.01, "m", "of a fine path", "numerical")
     transfer_step: float = prior(
         0.002, "m", "between trial positions where a wheel first and last touches two rails", "numerical")
@@ -279,6 +282,19 @@ class SurfacePriors:
     min_data_share: float = prior(
         0.5, "share of the information", "on a number that is attributed to the recordings, at least", RUNNING_SURFACE)
     grid_step: float = prior(0.02, "m", "at which components are looked at near the sensors", "numerical")
+
+
+@dataclass(frozen=True)
+class TopShapePriors:
+    """Error of the shape of the tops of stock rail and blade where wheels change."""
+
+    correlation_length: float = prior(
+        0.4, "m", "of the error along the rail: shorter ones are roughness, longer ones the numbers of the top",
+        "decisions/switch-panels.md")
+    reach: float = prior(1.0, "m", "from the change, beyond which wheels press one rail alone", "convention")
+    step: float = prior(0.02, "m", "between samples of the error", "numerical")
+    kept_variance: float = prior(0.9, "share of the variance", "in the modes that are kept", "numerical")
+    difference_step: float = prior(0.3, "sd", "of the difference quotient by the amplitude of a mode", "numerical")
 
 
 @dataclass(frozen=True)
@@ -483,6 +499,7 @@ PASSAGE = PassagePriors()
 SIMULATION = SimulationPriors()
 ALIGNMENT = AlignmentPriors()
 SURFACE = SurfacePriors()
+TOP_SHAPE = TopShapePriors()
 WHEELS = WheelPriors()
 ROUGHNESS = RoughnessPriors()
 SATURATION = SaturationPriors()
@@ -502,6 +519,7 @@ GROUPS = (
     SIMULATION,
     ALIGNMENT,
     SURFACE,
+    TOP_SHAPE,
     WHEELS,
     ROUGHNESS,
     SATURATION,

@@ -13,6 +13,7 @@ import numpy as np
 from turnout.mismatch.engine.case import Nuisance
 from turnout.mismatch.engine.cross_validation import jackknife_errors
 from turnout.mismatch.turnout.priors import SURFACE, TRACK, WHEELS
+from turnout.mismatch.turnout.top_shape import top_shapes, with_shapes
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -150,11 +151,15 @@ class RunningSurface:
             for k, component, f, s in listed
             if _can_be_off(component, f)
         ]
-        self.names = tuple(u.name for u in self.parameters)
+        depth_spreads = {u.component: u.spread for u in self.parameters if u.field == "depth"}
+        self.shapes = {route: top_shapes(turnout, route, depth_spreads) for route in routes}
+        self.shape_names = tuple(name for shapes in self.shapes.values() for shape in shapes for name in shape.names)
+        self.names = (*(u.name for u in self.parameters), *self.shape_names)
 
     def nuisances(self) -> list[Nuisance]:
-        """Nuisances of every number that may be off."""
-        return [u.nuisance for u in self.parameters]
+        """Nuisances of every number that may be off, and of the shape of tops where wheels change."""
+        shapes = [shape for shapes in self.shapes.values() for shape in shapes]
+        return [*(u.nuisance for u in self.parameters), *(n for shape in shapes for n in shape.nuisances())]
 
     def surfaces(self, route: str, values: Values) -> Surfaces:
         """Surfaces of ``route``, each a tuple of components, with the numbers of ``values``.
@@ -176,10 +181,11 @@ class RunningSurface:
             if values[u.name]:
                 changes.setdefault(u.component, {})[u.field] = u.value_at(values[u.name])
         changed = {component: replace(component, **to) for component, to in changes.items()}
-        return tuple(
+        surfaces = tuple(
             tuple(changed.get(component, component) for component in components)
             for components in self.turnout.surfaces(route)
         )
+        return with_shapes(surfaces, self.shapes.get(route, []), values)
 
     def estimate(self, case: Case, fit: Fit) -> Iterator[dict[str, Any]]:
         r"""Yield a dict for each number that ``fit`` determines better than the file, or that contradicts the file.

@@ -14,11 +14,12 @@ import numpy as np
 from turnout.mismatch.engine.case import Whitened
 from turnout.mismatch.turnout import receptance_observation
 from turnout.mismatch.turnout.pseudo_forces import PAD, RAIL, SLEEPER, force_responses, support_motion
-from turnout.mismatch.turnout.receptance_model import AddedLinks
+from turnout.mismatch.turnout.receptance_model import AddedLinks, tangent_links
 from turnout.mismatch.turnout.wave_response import WaveTransfer
 from turnout.physics.hypothesis import SupportMotion
 from turnout.physics.term import PhysicsTerm
 from turnout.simulate.blade import is_on_blade
+from turnout.simulate.links import links_of
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.turnout.passage_observation import AlignedPassage
     from turnout.mismatch.turnout.predicted_case import PredictedCase
+    from turnout.simulate.links import Link
 
     Starts: TypeAlias = Sequence[tuple[Candidate, int]]  # candidates with the number of one of their starts
     Changes: TypeAlias = dict[tuple[str, int], np.ndarray]  # by key of the candidate and number of the start
@@ -56,6 +58,12 @@ def screen_columns(case: PredictedCase, fit: Fit, observations: Sequence[Observa
     """
     chosen = _starts_by_column_type(case)
     supports, paths, channels = (chosen[column_type] for column_type in FIRST_ORDER_TYPES)
+    exact = chosen["track"]
+    if all(o.name in case.frf_pairs for o in observations):  # effects of links have no first order in passages
+        single = [(c, k) for c, k in chosen["link"] if len(_links_of(case, c, k)) == 1]
+        supports = supports + single
+        chosen["first order"] += [(c.key, k) for c, k in single]
+        exact = exact + [entry for entry in chosen["link"] if entry not in single]
     blank = [np.zeros(o.data.size, dtype=np.float32) for o in observations]
     columns = {key: list(blank) for key in chosen["first order"]}
     added = AddedLinks(case.predictor, fit.values, case.all_terms(fit), supports)
@@ -69,7 +77,7 @@ def screen_columns(case: PredictedCase, fit: Fit, observations: Sequence[Observa
             changes |= _pair_channel_changes(case, fit, o, fit.predictions[i], channels)
         for key, column in changes.items():
             columns[key][i] = column.astype(np.float32)
-    for c, k in chosen["track"]:
+    for c, k in exact:
         columns[c.key, k] = _whole_track_changes(case, fit, c, k, observations)
     return columns
 
@@ -79,16 +87,24 @@ def _starts_by_column_type(case: PredictedCase) -> dict[str, list]:
 
     Without hammer tests, effects of the whole track have a column only if passages have a derivative for them.
     """
-    chosen: dict[str, list] = {column_type: [] for column_type in (*FIRST_ORDER_TYPES, "track", "first order")}
+    chosen: dict[str, list] = {column_type: [] for column_type in (*FIRST_ORDER_TYPES, "track", "link", "first order")}
     for c in case.candidates:
         for k, start in enumerate(c.starts):
             term = c.term(start)
             if term.column_type in FIRST_ORDER_TYPES:
                 chosen["first order"].append((c.key, k))
                 chosen[term.column_type].append((c, k))
+            elif term.column_type == "link":
+                chosen["link"].append((c, k))
             elif term.column_type == "track" and (case.frf_pairs or _has_derivative(term)):
                 chosen["track"].append((c, k))
     return chosen
+
+
+def _links_of(case: PredictedCase, candidate: Candidate, k: int) -> list[Link]:
+    """Links that a start of a candidate adds, with the tangents of its ports."""
+    terms, track = (candidate.term(candidate.starts[k]),), case.predictor.track()
+    return [*links_of(terms, track), *tangent_links(terms, track)]
 
 
 def _has_derivative(term: PhysicsTerm) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.turnout import passage_band, receptance_observation
-from turnout.mismatch.turnout.priors import RECEPTANCE, SIMULATION
+from turnout.mismatch.turnout.priors import RECEPTANCE, SIMULATION, TOP_SHAPE
 from turnout.mismatch.turnout.pseudo_forces import support_columns, support_motion
 from turnout.mismatch.turnout.rail_roughness import wave_columns
 from turnout.mismatch.turnout.wheel_line import has_blade
@@ -135,7 +135,11 @@ def _fill_common_columns(
     parameters: list[tuple[str, float, str | None]] = [
         (f"wheels_{train}", SIMULATION.log_step, train) for train in predictor.site.trains
     ]
-    parameters += [(name, SIMULATION.surface_step, None) for name in predictor.surface.names]
+    shapes = set(predictor.surface.shape_names)
+    parameters += [
+        (name, TOP_SHAPE.difference_step if name in shapes else SIMULATION.surface_step, None)
+        for name in predictor.surface.names
+    ]
     for name, step, train in parameters:
         for o, predicted, jacobian in passages:
             aligned = predictor.aligned_passages[o.name]

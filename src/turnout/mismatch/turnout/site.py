@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from turnout.mismatch.engine.case import Nuisance
@@ -16,11 +16,18 @@ from turnout.mismatch.turnout.track_parameters import Zone, track_nuisances, zon
 from turnout.simulate.sensor import Sensor
 
 
+@dataclass
+class SimulationCount:
+    """Number ``n`` of passages that were simulated."""
+
+    n: int = 0
+
+
 @dataclass(frozen=True)
 class Site:
     """Zone of the track as filed, with the sensors, trains, free waves and running surface of a campaign.
 
-    ``waves`` and ``surface`` are None without passages.
+    ``waves`` and ``surface`` are None without passages. ``count`` is of the simulations of all predictors of the site.
     """
 
     nominal: Zone
@@ -28,6 +35,7 @@ class Site:
     trains: tuple[str, ...]
     waves: Waves | None = None
     surface: RunningSurface | None = None
+    count: SimulationCount = field(default_factory=SimulationCount, compare=False)
 
     def shared_nuisances(self) -> tuple[Nuisance, ...]:
         """Nuisances of track, wheelsets and sensors: those that hammer tests depend on, and the wheelsets."""

@@ -72,8 +72,8 @@ def profile_modes(predictor: Predictor, values: Values, aligned: AlignedPassage,
 
 
 def _components(surface: Sequence[PathPart]) -> list[PathPart]:
-    """Components of a surface except waves, which are the same for all wheels."""
-    return [component for component in surface if not hasattr(component, "wavelength")]
+    """Components of a surface except waves and errors of a top, which are the same for all wheels."""
+    return [c for c in surface if not (hasattr(c, "wavelength") or hasattr(c, "is_shape_error"))]
 
 
 def _deviations(component: PathPart, grid: np.ndarray) -> list[np.ndarray]:

@@ -1,0 +1,43 @@
+"""Gaps of slide chairs and a loose heel in hammer tests: columns in closed form, so that a search tries every chair."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.turnout import TrackCase
+from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
+from turnout.simulate.blade import Blade
+from turnout.simulate.wheel_path import BladeTop, StockFall
+
+
+@pytest.fixture(scope="module")
+def case():
+    plan = small_plan((15.0,), hammer_positions=(24.0,))
+    track = plan.turnout.track
+    turnout = replace(
+        plan.turnout,
+        track=track.with_(blade=Blade(20.1, 25.2, 32.0, track.rail, 3e8, 3e4)),
+        routes={"main": ((StockFall(21.6, 3.0, 0.02),), (BladeTop(20.1, 3.0, 0.015),))},
+    )
+    campaign = replace(measured_campaign(plan, (), 3), turnout=turnout, passages=())
+    return TrackCase(campaign, families=("slide_chair_gap", "heel_support"))
+
+
+def test_columns_in_hammer_tests_are_the_exact_change(case):
+    cheap = case.cheap_case()
+    fit = fit_jointly(cheap, iterations=0)
+    columns = cheap.screen(fit)
+    chairs = [c for c in cheap.candidates if c.family == "slide_chair_gap"]
+    assert len(chairs) >= 3
+    for candidate in cheap.candidates:
+        for k, start in enumerate(candidate.starts):
+            exact = cheap.predict(fit.values, (candidate.term(start),), cheap.observations)
+            for column, new, old in zip(columns[candidate.key, k], exact, fit.predictions):
+                size = np.max(np.abs(new - old))
+                assert column == pytest.approx(new - old, abs=1e-4 * size + 1e-15), candidate.key
+
+
+def test_every_chair_is_tried_on_hammer_tests(case):
+    assert {c.refit.prescreen_group for c in case.candidates} == {"chair", "heel_support"}

@@ -1,0 +1,48 @@
+"""A search that costs more simulations than its case allows ends with "cannot tell" and says why."""
+
+import numpy as np
+import pytest
+
+from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.diagnose import diagnose
+from turnout.physics.term import Parameter
+
+SIZE = (Parameter("size", "-", 0.0, (0.0, 9.0), "of the parabola", "made up 2026"),)
+
+
+class Counted(Case):
+    """Readings of a line with a parabola; every prediction counts as a simulation."""
+
+    control_level = {"reading": 1.5}
+
+    def __init__(self, most):
+        self.x, rng, self.count, self.max_simulations = np.arange(1.0, 41.0) / 10.0, np.random.default_rng(3), 0, most
+        data = [2.0 * self.x + self.x**2 + 0.1 * rng.normal(size=40) for _ in range(3)]
+        self.observations = tuple(Observation(f"o{k}", f"c{k}", d, 0.1, 1.0, "reading") for k, d in enumerate(data))
+        self.nuisances = (Nuisance("slope", "-", 2.0, 1.0),)
+        self.candidates = (Candidate.of("bend", SIZE, lambda psi: psi["size"], ((1.0,),)),)
+
+    @property
+    def n_simulations(self):
+        return self.count
+
+    def predict(self, values, terms, observations):
+        self.count += len(observations)
+        return [values["slope"] * self.x + sum(terms) * self.x**2 for _ in observations]
+
+
+@pytest.mark.parametrize("most", [None, 100_000])
+def test_a_search_within_its_bound_is_not_changed(most):
+    assert diagnose(Counted(most)).names == ("bend",)
+
+
+def test_a_search_beyond_its_bound_cannot_tell():
+    case = Counted(3)
+    found = diagnose(case)
+    assert found.verdict.answer == "unknown" and found.verdict.trail[0] == "search_too_long"
+    assert found.verdict.reason == "the search was not finished within 3 simulations of a train"
+    assert found.fit is found.base and found.names == () and 0.0 < found.probability < 1.0
+    whole = Counted(None)
+    diagnose(whole)
+    assert case.count < whole.count
