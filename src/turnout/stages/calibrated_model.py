@@ -76,8 +76,8 @@ OPENED = {
     "tamping": ("ballast", "ballast_damper", "wave", "surface"),
     "ballast_cleaning": ("ballast", "ballast_damper", "wave", "surface"),
     "pad_exchange": ("pad", "pad_damper"),
-    "rail_change": ("rail", "wave", "surface", "depth", "gain", "seat"),
-    "grinding": ("wave", "surface", "depth"),
+    "rail_change": ("rail", "wave", "surface", "depth", "top_shape", "gain", "seat"),
+    "grinding": ("wave", "surface", "depth", "top_shape"),
     "sleeper_change": ("sleeper", "pad", "pad_damper", "ballast", "ballast_damper", "wave"),
     "sensor_change": ("gain", "seat"),
 }

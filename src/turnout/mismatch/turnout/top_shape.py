@@ -62,7 +62,7 @@ class TopShape:
         """One amplitude for each mode, in standard deviations."""
         top = "blade" if self.on_blade else "stock rail"
         meaning = f"shape of the top of the {top} where wheels change at {self.position:.2f} m"
-        return [Nuisance(n, "-", 0.0, 1.0, meaning=meaning, can_mask=False, group="top_shape") for n in self.names]
+        return [Nuisance(n, "sd", 0.0, 1.0, meaning=meaning, can_mask=False, group="top_shape") for n in self.names]
 
     def path(self, values: Values) -> tuple[TopError, ...]:
         """The error as a component of the top; () where all amplitudes are 0.
