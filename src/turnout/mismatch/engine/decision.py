@@ -20,6 +20,7 @@ from turnout.mismatch.engine.decision_facts import (
     NameEvidence,
     NumericalError,
     ReservedEvidence,
+    SearchLimit,
     ToleratedEvidence,
     UnprovenEvidence,
 )
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.engine.reserved_data import Verification
     from turnout.mismatch.engine.score import Score
-    from turnout.mismatch.engine.search_limit import SearchLimit
     from turnout.mismatch.engine.two_effects import PairEvidence, SecondEvidence
 
 HOW, PAIRS, SURFACES = "mismatch.md", "decisions/two-effects.md", "decisions/running-surface-priors.md"

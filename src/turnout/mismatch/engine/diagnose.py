@@ -117,7 +117,8 @@ def diagnose(
         verification, latent = verify(search, base, base, None), latent_force_of(search.case, base)
         return Diagnosis((numerics,), base, base, frames, verification, latent)
     try:
-        findings = withhold_names(name_tolerated(grade_names(settle_pair(_seek_effects(search, base)))))
+        limited = replace(search, is_limited=True)
+        findings = withhold_names(name_tolerated(grade_names(settle_pair(_seek_effects(limited, base)))))
     except SearchLimitError as error:
         findings = Findings(search, base, base, (unfinished_verdict(error.limit, search.settings),))
     search, base, fit, verdicts = findings.search, findings.base, findings.fit, findings.verdicts

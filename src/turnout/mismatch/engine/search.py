@@ -40,6 +40,8 @@ class Search:
         Called with (number done, total, key of the candidate) after every joint fit.
     label : str
         Effect that is sought, the first part of the keys of its fits.
+    is_limited : bool
+        Whether the bound of the case on simulations holds: in the search for effects, not in a fit without them.
     """
 
     case: Case
@@ -47,6 +49,7 @@ class Search:
     store: MutableMapping[str, Any] = field(default_factory=dict)
     report: Callable[[int, int, str], Any] = _report_nothing
     label: str = ""
+    is_limited: bool = False
 
     @classmethod
     def of(
@@ -134,9 +137,10 @@ class Search:
         SimulationError
             If the model cannot be simulated at the start or beside it.
         SearchLimitError
-            If the case has cost more simulations than it may.
+            If the search is limited and the case has cost more simulations than it may.
         """
-        check_limit(self.case)
+        if self.is_limited:
+            check_limit(self.case)
         return fit_jointly(
             self.case, candidates, psi, values, reused_jacobian, iterations=self.settings.iterations, stall=stall
         )

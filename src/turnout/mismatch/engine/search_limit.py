@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from turnout.errors import TurnoutError
 from turnout.mismatch.engine.decision import LIMIT_RULES, first_applicable
+from turnout.mismatch.engine.decision_facts import SearchLimit
 from turnout.mismatch.engine.verdict import Verdict
 
 if TYPE_CHECKING:
     from turnout.config.settings.mismatch import MismatchSettings
     from turnout.mismatch.engine.case import Case
-
-
-@dataclass(frozen=True)
-class SearchLimit:
-    """Number ``n`` of simulations that a search has cost, and the ``most`` that it may."""
-
-    n: int
-    most: int
 
 
 class SearchLimitError(TurnoutError):
