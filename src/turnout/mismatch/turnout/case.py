@@ -18,6 +18,7 @@ from turnout.mismatch.turnout import sensitivity
 from turnout.mismatch.turnout.accepted_effects import NO_EFFECTS, AcceptedEffect, AcceptedEffects, effects_on
 from turnout.mismatch.turnout.campaign import CampaignInput
 from turnout.mismatch.turnout.candidates.catalogue import distant_starts, has_required_range, list_candidates
+from turnout.mismatch.turnout.disturbances import independent_of_trains
 from turnout.mismatch.turnout.hammer_case import HammerCase
 from turnout.mismatch.turnout.observations import CaseData, case_data, with_errors
 from turnout.mismatch.turnout.passage_model import Track1D
@@ -107,7 +108,7 @@ class TrackCase(PredictedCase):
         nuisances = data.site.nuisances(a.passage for a in data.aligned_passages.values())
         super().__init__(predictor, data.observations, nuisances, candidates, accepted, cache(predictor, False))
         self.data, self.families, self.cache, self.start_values = data, families, cache, start_values
-        self.reserved, self.disturbed_recordings = data.reserved, data.disturbed
+        self.reserved, self.disturbed_recordings = data.reserved, independent_of_trains(data.disturbed)
         self.reuses_derivatives = any(sensitivity.is_in_switch(predictor, a) for a in data.aligned_passages.values())
         self.max_simulations = SIMULATION.max_in_switch if self.reuses_derivatives else None
         self.reservation = reservation(predictor.zone.turnout)

@@ -1,13 +1,17 @@
 """Detect passages in which another source shakes the sensors, from the signal before and after the train.
 
-The mean square of a quiet segment in a band of width W over a time T is chi-squared with 2 W T degrees of freedom, so
-that the ratio of one passage to the others follows Fisher's F. Half of the sensors must show it: a single noisy channel
-is another matter.
+A train shakes the sensors also from afar, the more the nearer and the rougher its wheels are. So stretches with the
+nearest wheel equally far away are compared, and their level relative to that while the same train passes as well. The
+mean square of a stretch in a band of width W over a time T is chi-squared with 2 W T degrees of freedom, so that the
+ratio of one passage to the others follows Fisher's F. Half of the sensors must show it: a single noisy channel is
+another matter.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,22 +20,53 @@ from scipy.stats import binom, f
 from turnout.mismatch.turnout.priors import DISTURBANCE
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     from turnout.mismatch.turnout.passage_observation import AlignedPassage
 
 
 @dataclass(frozen=True)
 class Disturbance:
-    """A disturbed passage: its segment ``when`` "before" or "after" the train exceeds the others by ``excess`` [dB].
+    """A disturbed passage: a stretch ``when`` "before" or "after" the train exceeds the others by ``excess`` [dB].
 
-    ``p`` is the probability of that by chance, over all segments tested.
+    ``p`` is the probability of that by chance, over all stretches tested. ``train`` is its type or number.
     """
 
     name: str
     when: str
     excess: float
     p: float
+    train: str = ""
+
+
+def independent_of_trains(events: Sequence[Disturbance]) -> tuple[Disturbance, ...]:
+    """The disturbed passages, if they show a source that no train carries with it; else none.
+
+    One passage alone may be louder for a reason of its own: its train rings for longer, or is longer than its file. So
+    two trains are needed. Beyond what trains differ by, two passages of one train are enough, or one passage in which
+    the sensors shake before any wheel arrives.
+
+    Parameters
+    ----------
+    events : sequence of Disturbance
+        All disturbed passages.
+
+    Returns
+    -------
+    tuple of Disturbance
+        All of them, or none.
+
+    Examples
+    --------
+    >>> after = [Disturbance("p1", "after", 5.0, 1e-9, "ic3"), Disturbance("p2", "after", 6.0, 1e-9, "ic3")]
+    >>> len(independent_of_trains(after)), len(independent_of_trains([*after, Disturbance("p3", "after", 4, 0, "re")]))
+    (0, 3)
+    """
+    plain = [e for e in events if e.excess > DISTURBANCE.train_difference]
+    is_shared = len({e.train or e.name for e in events}) > 1 or len(plain) > 1
+    return tuple(events) if is_shared or any(e.when == "before" for e in plain) else ()
+
+
+# One stretch of one passage: mean square by sensor, the same over that while the train passes, degrees of freedom.
+Level = tuple[dict[str, float], dict[str, float], float]
 
 
 def disturbances(
@@ -51,34 +86,47 @@ def disturbances(
     Returns
     -------
     list of Disturbance
-        Passages in which another source shook the sensors.
+        Passages in which another source shook the sensors, each with the stretch that shows it most.
     """
-    events: list[Disturbance] = []
-    segments: dict[str, dict[str, tuple[dict[str, float], float]]] = {"before": {}, "after": {}}
-    for aligned in (*passages.values(), *(unmatched or {}).values()):
-        for when, (start, stop) in _quiet_segments(aligned).items():
-            if when == "after" and aligned.name in (unmatched or {}):
-                start += DISTURBANCE.car_length / aligned.speed
+    stretches: dict[tuple[str, float], dict[str, Level]] = {}
+    aligned_passages = {a.name: a for a in (*passages.values(), *(unmatched or {}).values())}
+    for aligned in aligned_passages.values():
+        extra = DISTURBANCE.car_length if aligned.name in (unmatched or {}) else 0.0
+        for stretch, (start, stop) in _quiet_stretches(aligned, extra).items():
             if stop - start >= DISTURBANCE.min_quiet_time:
-                segments[when][aligned.name] = _level(aligned, start, stop)
-    n_segments = sum(len(s) for s in segments.values() if len(s) > 2)
-    for when, levels in segments.items():
-        for name in levels if len(levels) > 2 else ():
-            excess, p = excess_over(*_shared_levels(levels, name))
-            if excess > DISTURBANCE.min_excess and p * n_segments < DISTURBANCE.max_chance:
-                events.append(Disturbance(name, when, excess, min(1.0, p * n_segments)))
-    return events
+                stretches.setdefault(stretch, {})[aligned.name] = _level(aligned, start, stop)
+    compared = {stretch: levels for stretch, levels in stretches.items() if len(levels) > 2}
+    n_tests = sum(len(levels) for levels in compared.values())
+    strongest: dict[str, Disturbance] = {}
+    for (when, _), levels in compared.items():
+        for name in levels:
+            excess, p = _excess_of(levels, name)
+            event = Disturbance(name, when, excess, min(1.0, p * n_tests), aligned_passages[name].train)
+            is_disturbed = excess > DISTURBANCE.min_excess and event.p < DISTURBANCE.max_chance
+            if is_disturbed and (name not in strongest or excess > strongest[name].excess):
+                strongest[name] = event
+    return list(strongest.values())
 
 
-def _quiet_segments(aligned: AlignedPassage) -> dict[str, tuple[float, float]]:
-    """(start, stop) of the segments with every wheel far from every sensor [s]."""
-    train = np.ptp([s.place for s in aligned.sensors]) + aligned.passage.vehicle.wheel_positions[-1]
-    clear_time = DISTURBANCE.min_wheel_distance / aligned.speed
-    end = aligned.passage.recording.duration
-    return {
-        "before": (DISTURBANCE.record_margin, aligned.reference - clear_time),
-        "after": (aligned.reference + train / aligned.speed + clear_time, end - DISTURBANCE.record_margin),
-    }
+def _quiet_stretches(aligned: AlignedPassage, extra: float) -> dict[tuple[str, float], tuple[float, float]]:
+    """{(when, least distance of a wheel from the sensors [m]): (start, stop) [s]}; ``extra`` [m] behind the train."""
+    train = np.ptp([s.place for s in aligned.sensors]) + aligned.passage.vehicle.wheel_positions[-1] + extra
+    first, last = DISTURBANCE.record_margin, aligned.passage.recording.duration - DISTURBANCE.record_margin
+    speed, begin, end = aligned.speed, aligned.reference, aligned.reference + train / aligned.speed
+    stretches = {}
+    for near, far in pairwise((*DISTURBANCE.wheel_distances, np.inf)):
+        stretches["before", near] = (max(first, begin - far / speed), min(last, begin - near / speed))
+        stretches["after", near] = (max(first, end + near / speed), min(last, end + far / speed))
+    return stretches
+
+
+def _excess_of(levels: Mapping[str, Level], name: str) -> tuple[float, float]:
+    """Excess of a passage over others [dB] and its chance: in level, or relative to its train, whichever is less."""
+    outcomes = []
+    for k in (0, 1):
+        values = {passage: (level[k], level[2]) for passage, level in levels.items()}
+        outcomes.append(excess_over(*_shared_levels(values, name)))
+    return min(excess for excess, _ in outcomes), max(p for _, p in outcomes)
 
 
 def _shared_levels(
@@ -92,13 +140,20 @@ def _shared_levels(
     return (np.array([own_levels[s] for s in sensors]), freedom), reference
 
 
-def _level(aligned: AlignedPassage, start: float, stop: float) -> tuple[dict[str, float], float]:
-    """Mean square in the band by sensor, and its degrees of freedom."""
+def _level(aligned: AlignedPassage, start: float, stop: float) -> Level:
+    """Mean square in the band by sensor, alone and over that while the train passes, and its degrees of freedom."""
     recording = aligned.passage.recording
     rows = [recording.index(s.name) for s in aligned.sensors]
-    first, last = int(start * recording.rate), int(stop * recording.rate)
-    level, freedom = band_level(recording.samples[rows][:, first:last], recording.rate)
-    return {s.name: float(v) for s, v in zip(aligned.sensors, level)}, freedom
+    leaves = aligned.reference + aligned.passage.vehicle.wheel_positions[-1] / aligned.speed
+
+    def mean_square(start: float, stop: float) -> tuple[np.ndarray, float]:
+        first, last = int(max(0.0, start) * recording.rate), int(stop * recording.rate)
+        return band_level(recording.samples[rows][:, first:last], recording.rate)
+
+    (level, freedom), (passing, _) = mean_square(start, stop), mean_square(aligned.reference, leaves)
+    names = [s.name for s in aligned.sensors]
+    relative = level / np.maximum(passing, 1e-300)
+    return dict(zip(names, level.tolist())), dict(zip(names, relative.tolist())), freedom
 
 
 def band_level(samples: np.ndarray, rate: float) -> tuple[np.ndarray, float]:

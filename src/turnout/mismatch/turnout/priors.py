@@ -359,13 +359,18 @@ class SaturationPriors:
 class DisturbancePriors:
     """Passages in which another source shakes the sensors."""
 
-    min_wheel_distance: float = prior(
-        12.0, "m", "to the nearest sensor: vibration of the train has decayed there", LOCATED)
+    wheel_distances: tuple[float, ...] = prior(
+        (12.0, 17.0, 24.0, 34.0, 48.0), "m",
+        "of the nearest wheel from the sensors, where stretches begin: each reaches half as far again", LOCATED)
     car_length: float = prior(26.0, "m", "a train that does not match its file may be longer by a car", "convention")
     min_quiet_time: float = prior(0.15, "s", "of the shortest segment that is tested", LOCATED)
     record_margin: float = prior(0.02, "s", "at both ends of a recording that is not tested", "convention")
     band: tuple[float, float] = prior((5.0, 100.0), "Hz", "of the level", LOCATED)
-    min_excess: float = prior(3.0, "dB", "over the other passages; undisturbed ones differ by 1 dB", LOCATED)
+    min_excess: float = prior(
+        3.0, "dB", "over the other passages with wheels as far away; undisturbed ones differ by 1 dB", LOCATED)
+    train_difference: float = prior(
+        10.0, "dB", "between trains, by the roughness of their wheels: one passage shows another source beyond it",
+        "Thompson 2009")
     hann_correlation: float = prior(
         1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0), "-", "variance factor of correlated lines of a Hann window", "Welch 1967")
     max_chance: float = prior(1e-4, "probability", "that it is chance, over all segments", LOCATED)
