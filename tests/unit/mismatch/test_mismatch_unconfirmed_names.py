@@ -1,6 +1,7 @@
 """A name whose shape stays unresolved and that predicts held-out recordings worse is no name."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
 from turnout.mismatch.engine.decision import confirm
 from turnout.mismatch.engine.diagnose import diagnose
-from turnout.mismatch.engine.reserved_data import Verification, reserved_excess_ratio
+from turnout.mismatch.engine.reserved_data import Verification, lost_evidence, reserved_excess_ratio
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.verdict import Verdict
 from turnout.stages.mismatch_rows import sentence
@@ -47,24 +48,51 @@ def test_other_answers_stay(verdict):
     assert found == replace(verdict, trail=("not_contradicted",))
 
 
+def named(family, grade, gain):
+    return Verdict("named", (family,), grade, 0.97, dict(POSTERIOR, **{family: 0.8}), (SimpleNamespace(gain=gain),))
+
+
 @pytest.mark.parametrize("grade", ["A", "B"])
 @pytest.mark.parametrize(("after", "withdrawn"), [(57.8, True), (57.9, True), (58.1, False), (59.9, False)])
-def test_a_fall_of_two_standard_errors_withdraws_a_name_of_any_grade(grade, after, withdrawn):
+def test_a_fall_of_two_standard_errors_withdraws_a_name_of_any_grade_if_its_evidence_contradicts(
+    grade, after, withdrawn
+):
     """59.4 to 57.8 % with a standard error of 0.7 was once kept with grade A."""
-    name = Verdict("named", ("pad_preload",), grade, 0.97, dict(POSTERIOR))
-    (result,) = confirm((name,), Verification(1, 59.4, after, error=0.7), MismatchSettings())
+    check = Verification(1, 59.4, after, error=0.7, lost_evidence=13.0)
+    (result,) = confirm((named("pad_preload", grade, 60.0),), check, MismatchSettings())
     is_unknown = withdrawn or (grade == "B" and after < 59.4 - 0.7)
     assert (result.answer == "unknown") is is_unknown
     if grade == "A":
         assert result.trail == (("reserved_fit_falls",) if withdrawn else ("not_contradicted",))
+        assert not withdrawn or "13 nats" in result.reason
+
+
+@pytest.mark.parametrize(
+    ("gain", "lost", "answer"),
+    [(20.0, 5.0, "named"), (20.0, 7.0, "unknown"), (300.0, 50.0, "named"), (300.0, 61.0, "unknown")],
+)
+def test_the_same_fall_counts_by_the_evidence_that_it_costs(gain, lost, answer):
+    """Half a threshold (6 nats) and a fifth of the evidence: as for any condition that is left out."""
+    check = Verification(1, 59.4, 56.0, error=0.7, lost_evidence=lost)
+    assert confirm((named("zener_pad", "A", gain),), check, MismatchSettings())[0].answer == answer
 
 
 @pytest.mark.parametrize(("allowed", "answer"), [(1.0, "named"), (0.5, "unknown")])
 def test_a_fall_within_the_allowed_points_withdraws_no_name(allowed, answer):
     """Frequency-dependent pads show in impacts. Trains fell from 37.25 to 36.61 %, four standard errors."""
-    name = Verdict("named", ("zener_pad",), "A", 0.95, {"zener_pad": 0.95, "none": 0.05, "unknown": 0.0})
-    (found,) = confirm((name,), Verification(2, 37.25, 36.61, error=0.15), MismatchSettings(fall=allowed))
+    check = Verification(2, 37.25, 36.61, error=0.15, lost_evidence=20.0)
+    (found,) = confirm((named("zener_pad", "A", 40.0),), check, MismatchSettings(fall=allowed))
     assert found.answer == answer
+
+
+def test_lost_evidence_is_the_fall_of_the_log_likelihood():
+    """Of independent samples: half of the difference of the sums of squares over sigma."""
+    rng = np.random.default_rng(4)
+    y, before, after = rng.normal(size=(3, 50))
+    observations = [Observation("a", "a", y, 2.0), Observation("b", "a", y[:20], 0.5)]
+    predictions = [[p, p[:20]] for p in (before, after)]
+    cost = [sum(np.sum(((o.data - p) / o.sigma) ** 2) for o, p in zip(observations, ps)) for ps in predictions]
+    assert lost_evidence(observations, *predictions) == pytest.approx(0.5 * (cost[1] - cost[0]))
 
 
 def test_of_two_names_none_is_withdrawn():

@@ -131,7 +131,7 @@ RESERVED_RULES: tuple[Rule[ReservedEvidence], ...] = (
     Rule("reserved_predicted_worse", lambda e: e.is_single_name_of_grade_b and e.verification.is_worse, "unknown",
          "{e.verdict.names[0]} leaves more than intact turnouts do and predicts held-out recordings worse", ENDS),
     Rule("reserved_fit_falls", lambda e: e.is_single_name and e.falls_clearly, "unknown",
-         "with {e.verdict.names[0]} the fit of held-out recordings falls by two standard errors", HOW),
+         "with {e.verdict.names[0]} held-out recordings lose {e.verification.lost_evidence:.0f} nats", HOW),
     Rule("reserved_not_explained",
          lambda e: e.verdict.answer == "none" and e.verification.reserved_excess > THRESHOLDS.max_reserved_excess,
          "unknown", "held-out recordings are not predicted as in intact turnouts", HOW),
@@ -246,7 +246,7 @@ def confirm(
     tuple of Verdict
         The first is "unknown" if reserved recordings contradict it.
     """
-    evidence = ReservedEvidence(verdicts, verification, settings.fall)
+    evidence = ReservedEvidence(verdicts, verification, settings)
     rule = first_applicable(RESERVED_RULES, evidence)
     first, *further = verdicts
     if rule.answer == "unknown":

@@ -270,19 +270,22 @@ class UnprovenEvidence:
 
 @dataclass(frozen=True)
 class ReservedEvidence:
-    """The verdicts, and how well the last fit predicts the reserved recordings.
-
-    ``allowed_fall`` is the loss of fit there that withdraws no name [%], the setting ``fall``.
-    """
+    """The verdicts, and how well the last fit predicts the reserved recordings; ``settings`` of the diagnosis."""
 
     verdicts: tuple[Verdict, ...]
     verification: Verification
-    allowed_fall: float = 0.0
+    settings: MismatchSettings
 
     @property
     def falls_clearly(self) -> bool:
-        """Whether the fit falls by more than is allowed, and by two standard errors."""
-        return self.verification.falls_by(self.allowed_fall)
+        """Whether the fit falls by more than is allowed and by two standard errors, and contradicts the name by that.
+
+        The evidence lost must be as much as one held-out condition may not lose (``is_contradicted``).
+        """
+        gain = self.verdict.scores[0].gain if self.verdict.scores else 0.0
+        return self.verification.falls_by(self.settings.fall) and is_contradicted(
+            -self.verification.lost_evidence, gain, self.settings
+        )
 
     @property
     def verdict(self) -> Verdict:

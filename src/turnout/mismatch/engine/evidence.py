@@ -13,7 +13,7 @@ from turnout.mismatch.engine.cross_validation import held_out_score, single_type
 from turnout.mismatch.engine.decision import judge
 from turnout.mismatch.engine.decision_facts import is_contradicted, likeliest
 from turnout.mismatch.engine.latent_force import LatentForce, latent_law
-from turnout.mismatch.engine.reserved_data import is_significantly_worse, reserved_fit
+from turnout.mismatch.engine.reserved_data import is_significantly_worse, lost_evidence, reserved_fit
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
@@ -285,9 +285,8 @@ def predicts_reserved(search: Search, base: Fit, score: Score) -> bool:
     if after is None or before is None:
         return before is None
     squares = [weighted_mean_square(case.reserved, p) for p in (before, after)]
-    lost_evidence = 0.5 * sum(o.n_effective for o in case.reserved) * (squares[1] - squares[0])
     has_fallen = is_significantly_worse(case.reserved, before, after, settings.fall) and is_contradicted(
-        -lost_evidence, score.gain, settings
+        -lost_evidence(case.reserved, before, after), score.gain, settings
     )
     return squares[1] <= settings.withdrawn_ratio * squares[0] and not has_fallen
 

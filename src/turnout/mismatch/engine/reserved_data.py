@@ -144,6 +144,26 @@ def is_significantly_worse(
     )
 
 
+def lost_evidence(
+    observations: Sequence[Observation], before: Sequence[np.ndarray], after: Sequence[np.ndarray]
+) -> float:
+    """Fall of the logarithm of the likelihood of observations from one prediction to another [nats].
+
+    Parameters
+    ----------
+    observations : sequence of Observation
+    before, after : sequence of (n,) array of float
+        Two predictions of each.
+
+    Returns
+    -------
+    float
+        Below 0 where ``after`` is the better one.
+    """
+    n = sum(o.n_effective for o in observations)
+    return 0.5 * n * (weighted_mean_square(observations, after) - weighted_mean_square(observations, before))
+
+
 def predict_reserved(case: Case, fit: Fit, observations: Sequence[Observation]) -> list[np.ndarray]:
     """Predictions by the fitted model; only nuisances that the observations own are fitted to them.
 
@@ -285,7 +305,8 @@ class Verification:
     ``decoy``.
 
     ``error`` is the standard error of ``after`` less ``before``. ``reserved_excess`` is the weighted mean square
-    without a term over the control level.
+    without a term over the control level. ``lost_evidence`` is the fall of the logarithm of the likelihood of these
+    recordings [nats], below 0 where the named model predicts them better.
     """
 
     n: int
@@ -295,6 +316,7 @@ class Verification:
     decoy: float | None = None
     error: float | None = None
     reserved_excess: float = 0.0
+    lost_evidence: float = 0.0
 
     @property
     def is_worse(self) -> bool:
@@ -350,8 +372,9 @@ def verify(search: Search, base: Fit, fit: Fit, rival: Score | None) -> Verifica
     rival_percent = reserved_fit(case, rival.fit)[1] if rival else None
     after, after_percent = reserved_fit(case, fit)
     error = None if after is None else gain_error(case.reserved, before, after)
+    lost = 0.0 if after is None else lost_evidence(case.reserved, before, after)
     decoy_percent = fit_percent(case.reserved, decoy)
-    return Verification(n, before_percent, after_percent, rival_percent, decoy_percent, error, excess)
+    return Verification(n, before_percent, after_percent, rival_percent, decoy_percent, error, excess, lost)
 
 
 def reserved_excess_ratio(search: Search, predictions: list[np.ndarray]) -> float:

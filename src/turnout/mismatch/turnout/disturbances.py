@@ -122,10 +122,9 @@ def _quiet_stretches(aligned: AlignedPassage, extra: float) -> dict[tuple[str, f
 
 def _excess_of(levels: Mapping[str, Level], name: str) -> tuple[float, float]:
     """Excess of a passage over others [dB] and its chance: in level, or relative to its train, whichever is less."""
-    outcomes = []
-    for k in (0, 1):
-        values = {passage: (level[k], level[2]) for passage, level in levels.items()}
-        outcomes.append(excess_over(*_shared_levels(values, name)))
+    absolute = {passage: (level, freedom) for passage, (level, _, freedom) in levels.items()}
+    relative = {passage: (level, freedom) for passage, (_, level, freedom) in levels.items()}
+    outcomes = [excess_over(*_shared_levels(values, name)) for values in (absolute, relative)]
     return min(excess for excess, _ in outcomes), max(p for _, p in outcomes)
 
 
