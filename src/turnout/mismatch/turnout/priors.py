@@ -306,6 +306,11 @@ class WheelPriors:
     position_sd: float = prior(0.03, "m", "position of a component from wheel to wheel", CROSSING_PANELS)
     sharpness_sd: float = prior(
         0.5, "-", "shape of a component, as a share of the difference between powers 1.5 and 2", CROSSING_PANELS)
+    slope_length: float = prior(0.02, "m", "over which the slope of a top is taken", "numerical")
+    deviation_step: float = prior(0.3, "sd", "of the difference quotient by a deviation of all wheels", "numerical")
+    sharing_time: float = prior(
+        0.03, "s", "to either side, over which the power of a wheel's response is averaged: half a bogie at 40 m/s",
+        "numerical")
     max_nose_length: float = prior(1.0, "m", "to either side of the deepest point", CROSSING_PANELS)
     min_depth: float = prior(1e-6, "m", "shallower components are ignored", "numerical")
     out_of_round_sd: float = prior(1.5e-5, "m", "first three harmonics of wheels in service", "Johansson 2006")

@@ -20,6 +20,7 @@ from turnout.mismatch.engine.candidate_search import masked_candidates
 from turnout.mismatch.turnout.priors import WHEELS
 from turnout.mismatch.turnout.rail_roughness import amplitude_sd
 from turnout.mismatch.turnout.wave_response import WaveTransfer
+from turnout.mismatch.turnout.wheel_tops import top_modes
 from turnout.simulate.blade import is_on_blade
 
 if TYPE_CHECKING:
@@ -54,21 +55,18 @@ def profile_modes(predictor: Predictor, values: Values, aligned: AlignedPassage,
     (n_sensor * n_time, n_mode) array of float
         [m/s²]
     """
-    grid = transfer.fine_grid
     surfaces = predictor.surface.surfaces(aligned.passage.route, values)
-    one_line = transfer.load_transfer is None  # every wheel is on each of the surfaces
+    if transfer.load_transfer is not None:
+        tops = [(component, is_on_blade(surface)) for surface in surfaces for component in _components(surface)]
+        return top_modes(predictor, values, aligned, transfer, tops)
+    grid = transfer.fine_grid
     paths = [
-        (path, is_on_blade(surface))
-        for surface in surfaces
-        for component in _components(surface)
-        for path in (_deviations(component, grid) if one_line else _deviations_of_top(component, grid))
+        path for surface in surfaces for component in _components(surface) for path in _deviations(component, grid)
     ]
     if not paths:
         return np.zeros((len(aligned.sensors) * aligned.time.size, 0))
-    on_stock = np.array([path if one_line or not on_blade else 0.0 * path for path, on_blade in paths])
-    on_blade = np.array([path if one_line or on_blade else 0.0 * path for path, on_blade in paths])
-    delays = [transfer.wheel(w) for w in range(transfer.wheel_delays.size)]
-    return np.concatenate([transfer.tops_response(on_stock, on_blade, delay) for delay in delays], axis=1)
+    deviations, delays = np.array(paths), [transfer.wheel(w) for w in range(transfer.wheel_delays.size)]
+    return np.concatenate([transfer.tops_response(deviations, deviations, delay) for delay in delays], axis=1)
 
 
 def _components(surface: Sequence[PathPart]) -> list[PathPart]:
@@ -97,14 +95,6 @@ def _deviations(component: PathPart, grid: np.ndarray) -> list[np.ndarray]:
         WHEELS.length_sd * from_middle * slope,
         WHEELS.sharpness_sd * sharper,
     ]
-
-
-def _deviations_of_top(component: PathPart, grid: np.ndarray) -> list[np.ndarray]:
-    """The same for a top that wheels leave or reach at full height, in a switch: deeper and further."""
-    dip = component(grid, 0)
-    if np.max(np.abs(dip)) < WHEELS.min_depth:
-        return []
-    return [WHEELS.depth_sd * dip, WHEELS.position_sd * np.gradient(dip, grid)]
 
 
 def wheel_modes(predictor: Predictor, values: Values, aligned: AlignedPassage, sigma: np.ndarray) -> np.ndarray:
