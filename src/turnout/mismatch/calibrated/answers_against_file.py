@@ -23,9 +23,9 @@ from turnout.mismatch.calibrated.model_answer import (
     least_size,
     name_of,
     position_of,
-    supported_names,
     with_rivals,
 )
+from turnout.mismatch.calibrated.soft_ballast_or_gap import names_of_softer_ballast
 
 INTOLERABLE = {"depth": CALIBRATION.worn_depth}
 
@@ -82,7 +82,7 @@ def file_answer(
         return stated.unknown(visit, FILE, by_name[jump.parameter])
     names = [stated.name]
     if stated.name == "local_ballast" and sizes[first] < 0.0:
-        names = supported_names(parameters, visits, events, steps[first], stated.size, margin)
+        names = names_of_softer_ballast(parameters, visits, events, steps[first], stated.size, margin)
     rivals = [name_of(steps[k], by_name) for k in order if gains[k] > gains[first] - margin]
     return stated.answer(visit, FILE, with_rivals(names, stated, rivals))
 
@@ -122,7 +122,7 @@ def _deviation_answer(
     middle = None if first.positions is None else 0.5 * sum(first.positions)
     position = middle if middle is not None else position_of(first.names[0], by_name[first.names[0]])
     names: tuple[str, ...] = (NAMES[first.group],)
-    if names == ("local_ballast",) and first.size < 0.0:  # as in ``supported_names``
+    if names == ("local_ballast",) and first.size < 0.0:  # as in ``names_of_softer_ballast``
         names = ("local_ballast", "hanging_sleeper")
     return ModelAnswer(
         visit, FILE, "named" if len(names) == 1 else "a_or_b", names, ", ".join(first.names), first.group,

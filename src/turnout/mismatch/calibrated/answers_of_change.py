@@ -24,9 +24,9 @@ from turnout.mismatch.calibrated.model_answer import (
     least_size,
     name_of,
     position_of,
-    supported_names,
     with_rivals,
 )
+from turnout.mismatch.calibrated.soft_ballast_or_gap import names_of_softer_ballast
 from turnout.mismatch.calibrated.stiffness_under_load import (
     is_all_explained,
     is_under_load,
@@ -183,7 +183,7 @@ def change_answer(
         return stated.unknown(visit, CHANGE, by_name[jump.parameter])
     names = [stated.name]
     if stated.name == "local_ballast" and leader.size[0] < 0.0:
-        names = supported_names(parameters, visits, events, leader, _present_size(leader), margin, levels)
+        names = names_of_softer_ballast(parameters, visits, events, leader, _present_size(leader), margin, levels)
     rivals = [name_of(e.effect, by_name) for e in material if e.gain > leader.gain - margin]
     answer = stated.answer(visit, CHANGE, with_rivals(names, stated, rivals))
     return replace(answer, changed=tuple(leader.effect.direction), total=_present_size(leader)[0])

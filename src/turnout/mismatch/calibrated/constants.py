@@ -66,6 +66,10 @@ class CalibrationConstants:
         (0.0, 0.25, 0.5, 0.75, 1.0), "share", "of the softening under impacts that trains still feel above a gap: all "
         "of it where no train closes the gap", PAGE,
     )  # fmt: skip
+    soft_damper_shares: tuple[float, ...] = threshold(
+        (0.0, 0.25, 0.5, 0.75, 1.0), "share", "of the change of ln stiffness that the damper of a softer bed has: a "
+        "half in the effects of the library, but any may be; beside a gap it has all of it", PAGE,
+    )  # fmt: skip
     gap_size_sds: float = threshold(
         10.0, "prior sd or size", "of a softening whose share under trains is asked: wide, to favour no share", PAGE
     )

@@ -4,17 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-
-import numpy as np
+from dataclasses import dataclass
 
 from turnout.mismatch.calibrated.belief import Innovation, StateParameter
-from turnout.mismatch.calibrated.change import ChangeEffect, OnsetEvidence, compare_onsets
+from turnout.mismatch.calibrated.change import ChangeEffect
 from turnout.mismatch.calibrated.constants import CALIBRATION
-from turnout.mismatch.calibrated.file_comparison import evidence_from_first
-from turnout.mismatch.calibrated.history import Event, estimate_history
-from turnout.mismatch.calibrated.information import GroupInformation, VisitInformation
-from turnout.mismatch.calibrated.levels import IMPACTS, kind_of
 
 CHANGE, FILE = QUESTIONS = ("change", "file")
 # Group of a parameter -> the effect of the library that changes it
@@ -175,90 +169,6 @@ def with_rivals(names: Sequence[str], stated: LeadingEffect, rivals: Iterable[st
     list of str
     """
     return [*names, *(n for n in dict.fromkeys(rivals) if n not in (*names, stated.name))]
-
-
-def supported_names(
-    parameters: Sequence[StateParameter],
-    visits: Sequence[VisitInformation],
-    events: Sequence[Event],
-    leader: OnsetEvidence | ChangeEffect,
-    size: tuple[float, float],
-    margin: float,
-    levels: Mapping[str, float] | None = None,
-) -> list[str]:
-    """Names of softer ballast: a gap is felt by impacts on the unloaded track, and less by trains that close it.
-
-    In one fit trains have a size of their own: that of impacts, or the shares of it that a gap leaves, which are
-    equally probable before. The prior of the size is so wide that it favours none: without trains, or without impacts,
-    the evidence decides nothing. A gap that no train closes feels alike under both, as a softer bed does. It is known
-    only where less of the stiffness is left than ballast has that carries anything.
-    An effect without onsets is one of the first visit.
-
-    Parameters
-    ----------
-    parameters : sequence of StateParameter
-    visits : sequence of VisitInformation
-    events : sequence of Event
-    leader : OnsetEvidence or ChangeEffect
-    size : (float, float)
-        Present size and its standard deviation.
-    margin : float
-        [nats]
-    levels : mapping of str to float or None
-        As in ``estimate_history``.
-
-    Returns
-    -------
-    list of str
-    """
-    if size[0] + CALIBRATION.finding_sds * size[1] < np.log(CALIBRATION.least_support):
-        return ["hanging_sleeper"]
-    effect = leader.effect if isinstance(leader, OnsetEvidence) else leader
-    felt = [p for p in parameters if p.name in effect.direction]  # the damper of a support with its spring
-    offsets = {p.name: replace(p, name=f"{p.name} as trains feel it", mean=0.0) for p in felt}
-    all_parameters = [*parameters, *offsets.values()]
-    opened, split = list(events), list(visits)
-    for name, offset in offsets.items():
-        opened = [
-            replace(e, opened={**e.opened, offset.name: e.opened[name]}) if name in e.opened else e for e in opened
-        ]
-        split = [replace(v, groups=tuple(_with_offset(g, name, offset.name) for g in v.groups)) for v in split]
-    sd = CALIBRATION.gap_size_sds * max(effect.sd, abs(size[0]))
-    effects = [
-        ChangeEffect(
-            f"{share:g}",
-            {**effect.direction, **{offsets[name].name: (share - 1.0) * d for name, d in effect.direction.items()}},
-            sd,
-            effect.grows,
-        )
-        for share in (1.0, *CALIBRATION.gap_shares)
-    ]
-    history = estimate_history(
-        all_parameters,
-        split,
-        opened,
-        repeats_between_visits=False,
-        accepted=None,
-        levels=levels,
-    )
-    if isinstance(leader, OnsetEvidence):
-        gains = {e.effect.name: e.gain for e in compare_onsets(history, effects)}
-    else:
-        gains = dict(zip((e.name for e in effects), evidence_from_first(all_parameters, history, effects)[0]))
-    equal, *of_gaps = (gains[e.name] for e in effects)
-    difference = float(np.logaddexp.reduce(of_gaps)) - float(np.log(len(of_gaps))) - equal
-    return ["hanging_sleeper"] if difference > margin else ["local_ballast", "hanging_sleeper"]
-
-
-def _with_offset(group: GroupInformation, name: str, offset: str) -> GroupInformation:
-    """Information of trains on the sum of a parameter and its ``offset``; that of impacts as it is."""
-    if kind_of(group.group) == IMPACTS or name not in group.names:
-        return group
-    k, n = group.names.index(name), len(group.names)
-    terms = np.vstack([np.eye(n), np.eye(n)[k]])  # (n + 1, n)
-    return replace(
-        group, names=(*group.names, offset), matrix=terms @ group.matrix @ terms.T, vector=terms @ group.vector
-    )  # fmt: skip
 
 
 def _nose_near(position: float | None, parameters: Iterable[StateParameter]) -> float | None:
