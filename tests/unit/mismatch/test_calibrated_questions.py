@@ -8,7 +8,6 @@ from scipy import stats
 from turnout.mismatch.calibrated import (
     ChangeEffect,
     GroupInformation,
-    OnsetEvidence,
     StateParameter,
     VisitInformation,
     compare_onsets,
@@ -16,6 +15,7 @@ from turnout.mismatch.calibrated import (
     drift_since,
     estimate_history,
 )
+from turnout.mismatch.calibrated.onset_interval import onset_interval
 
 N_SUPPORT = 5
 SUPPORTS = tuple(
@@ -67,7 +67,8 @@ def test_the_evidence_of_an_onset_is_the_ratio_of_the_probabilities_of_all_data(
     for effect in effects:
         weights = np.array([effect.direction.get(name, 0.0) for name in NAMES])
         for j in range(1, 6):
-            time = [(STEP * (v - j + 1) if effect.grows else 1.0) * (v >= j) for v in range(6)]
+            time = np.array([(v - j + 1.0 if effect.grows else 1.0) * (v >= j) for v in range(6)])
+            time /= time[-1]  # of growth, the prior is that of the size at the last visit
             response = design @ np.kron(time, weights)
             changed = null + effect.sd**2 * np.outer(response, response)
             mean = np.zeros(len(y))
@@ -96,9 +97,10 @@ def test_onsets_are_inside_their_intervals_and_the_support_is_right():
     for _ in range(120):
         first, support = int(rng.integers(1, 12)), int(rng.integers(N_SUPPORT))
         visits, _ = histories(rng, 12, -0.4, first, support=support)
-        best = compare_onsets(change_history(visits), EFFECTS)[0]
+        history = change_history(visits)
+        best = compare_onsets(history, EFFECTS)[0]
         right += best.effect is EFFECTS[support]
-        low, high = best.interval()
+        low, high = onset_interval(history, best.effect)
         inside += low <= STEP * (first - 0.5) <= high
         mean, sd = best.size
         size_inside += abs(mean - 0.4) < 2.0 * sd
@@ -212,19 +214,3 @@ def test_what_is_not_known_or_too_small_is_no_finding():
     assert [d.names for d in deviations_from_file(clear, TRACK, LEAST)] == [("pad@5",)]
     assert not deviations_from_file(clear, TRACK, {"pad": 0.7})
     assert not deviations_from_file(estimate_history(TRACK, []).belief, TRACK, LEAST)
-
-
-def test_the_interval_of_growth_reaches_to_both_sides_of_the_visit_it_is_computed_from():
-    """Onsets of four visits at 0, 1, 2 and 3 years, all weight on one, and shared with the other form."""
-    step, growth = (ChangeEffect("f", {NAMES[0]: 1.0}, 1.0, grows) for grows in (False, True))
-    times, zero = np.arange(4.0), np.zeros(3)
-
-    def evidence(effect, gains):
-        return OnsetEvidence(effect, tuple("abcd"), times, np.array(gains), zero, zero)
-
-    late = evidence(step, [-90.0, -90.0, 0.0])
-    assert late.interval() == (2.0, 3.0)
-    assert evidence(growth, [-90.0, -90.0, 0.0]).interval() == (1.0, 3.0)
-    assert evidence(growth, [0.0, -90.0, -90.0]).interval() == (0.0, 1.0)  # nothing is known before the first visit
-    assert late.interval(other_form=evidence(growth, [-90.0, -90.0, 0.0])) == (1.0, 3.0)
-    assert late.interval(other_form=evidence(growth, [-90.0, -90.0, -9.0])) == (2.0, 3.0)

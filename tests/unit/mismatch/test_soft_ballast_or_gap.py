@@ -26,7 +26,8 @@ SOFT, GAP, EITHER = ("local_ballast",), ("hanging_sleeper",), ("local_ballast", 
 def names_of(question, damper_share, trains_feel=1.0, damper_weight=1.0, size=-1.6, seed=0, sd=SD, repeats=False):
     """Names after four visits, of which two have the change, or all of them against the file.
 
-    Data are mixtures of neighbouring springs and dampers, dampers by ``damper_weight``. With ``repeats`` their error is the same at all visits.
+    Data are mixtures of neighbouring springs and dampers, dampers by ``damper_weight``. With ``repeats`` their error is
+    the same at all visits.
     """
     rng = np.random.default_rng(seed)
     near = [[0.6 ** abs(i - j) for j in range(N_SUPPORT)] for i in range(N_SUPPORT)]

@@ -67,7 +67,7 @@ def test_the_pad_that_became_soft_is_the_change_with_its_size_and_onset(model):
     assert others[0].gain < best.gain - 6.0
     size, sd = best.size
     assert abs(size - np.log(small.SOFT)) < 3.0 * sd and sd < 0.1
-    assert best.interval() == (calibrated.years_of(DAYS[2]), calibrated.years_of(DAYS[3]))
+    assert best.onset == DAYS[3]
 
 
 def test_the_model_of_a_track_with_a_switch_says_that_its_answers_are_not_proven(model, year, monkeypatch):

@@ -26,6 +26,7 @@ from turnout.mismatch.calibrated.model_answer import (
     position_of,
     with_rivals,
 )
+from turnout.mismatch.calibrated.onset_interval import onset_interval
 from turnout.mismatch.calibrated.soft_ballast_or_gap import names_of_softer_ballast
 from turnout.mismatch.calibrated.stiffness_under_load import (
     is_all_explained,
@@ -166,12 +167,15 @@ def change_answer(
         by_stated_errors = estimate_history(parameters, visits, events, repeats_between_visits=False, accepted=None)
         return _answer_without_name(by_stated_errors, visit, by_name)
     leader = material[0]
-    other_form = next((e for e in evidence if e.effect.name == leader.effect.name and e is not leader), None)
     size = size_under_load(leader.size) if is_under_load(leader.effect) else leader.size
-    stated = LeadingEffect.of(leader.effect, by_name, size, gain - price, leader.interval(other_form=other_form))
     jump = history.steps[1 + int(np.argmax(leader.gains))].innovation
     if is_under_load(leader.effect):
         parameters, visits = with_loads
+        history = estimate_history(
+            parameters, visits, events, repeats_between_visits=False, accepted=None, levels=levels
+        )
+    onset = onset_interval(history, leader.effect)
+    stated = LeadingEffect.of(leader.effect, by_name, size, gain - price, onset)
     opened = [*events, *_events_of_change(leader, parameters, candidates)]
     with_change = estimate_history(
         parameters, visits, opened, repeats_between_visits=False, accepted=None, levels=levels

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.history import History, Step
 
 
@@ -16,9 +15,10 @@ class ChangeEffect:
     """An effect that appears at an unknown visit.
 
     ``direction``: parameter -> change per unit of size. ``sd`` is the prior standard deviation of the size; of one that
-    ``grows``, of its growth per year. ``group`` and ``position`` are those of an effect on several parameters of one
-    group; of an effect on one parameter they are known from it. ``not_before``: time before which it cannot begin,
-    since an accepted change explains what happened until then. [years]
+    ``grows``, whose size is per year, that of the change at the last visit: its course tells it from a step, and not
+    its prior. ``group`` and ``position`` are those of an effect on several parameters of one group; of an effect on one
+    parameter they are known from it. ``not_before``: time before which it cannot begin, since an accepted change
+    explains what happened until then. [years]
     """
 
     name: str
@@ -64,46 +64,6 @@ class OnsetEvidence:
         """First visit with the effect, the most probable one."""
         return self.visits[1 + int(np.argmax(self.gains))]
 
-    def interval(
-        self, probability: float = CALIBRATION.interval_probability, other_form: OnsetEvidence | None = None
-    ) -> tuple[float, float]:
-        """Shortest range of time that contains the onset with at least this probability.
-
-        A step has its onset in the interval before its first visit. Growth that is computed from a visit on may begin
-        in the intervals on both sides of that visit, with equal probability.
-
-        Parameters
-        ----------
-        probability : float
-        other_form : OnsetEvidence or None
-            The same change as growth, or as a step: both forms are equally probable before.
-
-        Returns
-        -------
-        start : float
-            Last visit that is certainly without the effect. [years]
-        end : float
-            First visit that certainly has it. [years]
-        """
-        forms = [self] if other_form is None else [self, other_form]
-        top = max(float(form.gains.max()) for form in forms)
-        weights = np.sum([form._interval_weights(top) for form in forms], axis=0)
-        total = np.concatenate([[0.0], np.cumsum(weights / weights.sum())])
-        n = total.size - 1
-        ranges = [(i, j) for i in range(n) for j in range(i + 1, n + 1) if total[j] - total[i] >= probability - 1e-12]
-        i, j = min(ranges, key=lambda r: (self.times[r[1]] - self.times[r[0]], total[r[0]] - total[r[1]]))
-        return float(self.times[i]), float(self.times[j])
-
-    def _interval_weights(self, top: float) -> np.ndarray:
-        """(n_visit - 1,) weights of the intervals between visits in which the onset may lie."""
-        weights = np.exp(self.gains - top)
-        if self.effect.grows and weights.size > 1:
-            both_sides = 0.5 * weights
-            both_sides[:-1] += 0.5 * weights[1:]
-            both_sides[0] += 0.5 * weights[0]
-            return both_sides
-        return weights
-
     @property
     def size(self) -> tuple[float, float]:
         """Size, or growth per year, and its standard deviation over all onsets."""
@@ -117,7 +77,8 @@ def compare_onsets(history: History, effects: Sequence[ChangeEffect]) -> list[On
 
     With an effect of size a from visit j on, the innovation of visit v has the mean :math:`\Lambda_v e_v a`, where
     :math:`e_v = c_v f - u_v`, :math:`c_v` is 1 or the time since the onset, f the direction, and :math:`u_v` what the
-    belief has already absorbed: :math:`u_{v+1} = u_v + P_v \Lambda_v e_v`. With the prior :math:`N(0, s^2)` of a
+    belief has already absorbed: :math:`u_{v+1} = u_v + P_v \Lambda_v e_v`. With the prior :math:`N(0, s^2)` of a (of
+    growth: s is the prior standard deviation of the size at the last visit over the time since the onset)
 
     .. math:: g = \frac{b^2}{2 (A + s^{-2})} - \frac12 \ln(1 + s^2 A), \quad
               A = \sum_v e_v^T (\Lambda_v - \Lambda_v P_v \Lambda_v) e_v, \quad
@@ -149,7 +110,7 @@ def compare_onsets(history: History, effects: Sequence[ChangeEffect]) -> list[On
     steps = history.steps
     if len(steps) < 2 or not effects:
         return []
-    directions = np.column_stack([_direction(history, e) for e in effects])
+    directions = np.column_stack([direction_of(history, e) for e in effects])
     grows = np.array([e.grows for e in effects])
     information, score = (np.zeros((len(steps), len(effects))) for _ in range(2))
     for j in range(len(steps)):
@@ -164,11 +125,13 @@ def compare_onsets(history: History, effects: Sequence[ChangeEffect]) -> list[On
             score[j] += nu @ missing - nu @ gained
             if step.is_used:
                 absorbed = absorbed + gained
-    precision = np.array([e.sd**-2 for e in effects])
+    times = np.array([s.time for s in steps])
+    duration = np.where(grows, np.concatenate([[1.0], times[-1] - times[:-1]])[:, None], 1.0)  # (n_visit, n_effect)
+    precision = (duration / np.array([e.sd for e in effects])) ** 2
     sizes = score / (information + precision)
     gains = 0.5 * score * sizes - 0.5 * np.log1p(information / precision)
     sds = 1.0 / np.sqrt(information + precision)
-    visits, times = tuple(s.visit for s in steps), np.array([s.time for s in steps])
+    visits = tuple(s.visit for s in steps)
     is_too_early = times[:-1, None] < np.array([e.not_before for e in effects])  # (n_visit - 1, n_effect)
     gains[1:][is_too_early] = -np.inf
     evidence = [
@@ -183,7 +146,23 @@ def _updated_covariance(step: Step) -> np.ndarray:
     return step.predicted.update(step.matrix, step.vector).covariance
 
 
-def _direction(history: History, effect: ChangeEffect) -> np.ndarray:
+def direction_of(history: History, effect: ChangeEffect) -> np.ndarray:
+    """Change of all parameters of a history per unit of size of an effect.
+
+    Parameters
+    ----------
+    history : History
+    effect : ChangeEffect
+
+    Returns
+    -------
+    (n_parameter,) array of float
+
+    Raises
+    ------
+    ValueError
+        If the effect has a parameter that is not in the history.
+    """
     names = [p.name for p in history.parameters]
     if unknown := [name for name in effect.direction if name not in names]:
         raise ValueError(f"effect {effect.name!r}: {unknown[0]!r} is no parameter of this model")

@@ -37,8 +37,8 @@ def names_of_softer_ballast(
       Trains close the gap, so they feel less of it, or all of it where none closes it: ``CALIBRATION.gap_shares`` are
       equally probable before.
 
-    An error of the model that is the same at all visits cancels in a change; an effect of the first visit must have its
-    evidence beside it. The prior of the size is so wide that it favours none. Where neither the damper nor trains decide, both names
+    An error of the model that is the same at all visits cancels in a change, and not in an effect of the first visit.
+    The prior of the size is so wide that it favours none. Where neither the damper nor trains decide, both names
     remain: a gap that no train closes feels as a bed that has lost as much damping as stiffness. A sleeper certainly
     hangs where less of the stiffness is left than ballast has that carries anything.
 

@@ -1,0 +1,74 @@
+"""Intervals of onsets: steps and growth from an unknown day, on seeded linear histories of four visits."""
+
+import numpy as np
+import pytest
+
+from turnout.mismatch.calibrated import (
+    ChangeEffect,
+    GroupInformation,
+    StateParameter,
+    VisitInformation,
+    compare_onsets,
+    estimate_history,
+)
+from turnout.mismatch.calibrated.onset_interval import onset_interval
+
+PARAMETER = StateParameter("ballast@1.20", 0.0, 0.1, 0.03, "ballast", 2, 1.2)
+EFFECT = ChangeEffect("softer", {PARAMETER.name: -1.0}, 0.5)
+TIMES = (0.0, 0.7, 1.3, 2.0)  # years
+SD = 0.05
+
+
+def history(rng, change, times=TIMES, sd=SD):
+    """Visits at which ``change(time)`` is added to the parameter, with an error of ``sd``."""
+    x, visits = rng.normal(0.0, PARAMETER.sd), []
+    for v, (time, before) in enumerate(zip(times, (times[0], *times))):
+        x += rng.normal(0.0, PARAMETER.walk_sd * np.sqrt(time - before))
+        y = x + change(time) + sd * rng.normal()
+        group = GroupInformation("A", 1, (PARAMETER.name,), np.array([[sd**-2]]), np.array([y / sd**2]))
+        visits.append(VisitInformation(f"v{v}", time, (group,)))
+    return estimate_history([PARAMETER], visits, repeats_between_visits=False, accepted=None)
+
+
+def growth(start, size):
+    """Growth of one year to its full size."""
+    return lambda time: -size * np.clip(time - start, 0.0, 1.0)
+
+
+@pytest.mark.parametrize("grows", [False, True])
+def test_intervals_contain_the_onset(grows):
+    """300 of each at an unknown day; growth up to half a year before the last visit. 95 % with the error of n."""
+    rng, inside = np.random.default_rng(41), 0
+    for _ in range(300):
+        start, size = rng.uniform(0.0, TIMES[-1] - 0.5 * grows), rng.uniform(0.5, 1.5)
+        change = growth(start, size) if grows else lambda time: -size * (time > start)  # noqa: B023
+        low, high = onset_interval(history(rng, change), EFFECT)
+        inside += low <= start <= high
+    assert inside >= 275  # 285 expected, three standard errors of n
+
+
+@pytest.mark.parametrize("start", [0.55, 0.65])
+def test_growth_that_begins_just_before_a_visit_is_not_dated_after_it(start):
+    """That visit shows next to nothing of it. A change of the later visits alone would be dated between these."""
+    for seed in range(20):
+        low, high = onset_interval(history(np.random.default_rng(seed), growth(start, 1.5), sd=0.02), EFFECT)
+        assert low <= start <= high
+
+
+def test_only_the_last_visit_shows_a_step_as_growth_from_the_visit_before():
+    """Both fit alike, whatever their size: their prior is that of the change at the last visit."""
+    effects = [ChangeEffect("f", EFFECT.direction, EFFECT.sd, grows) for grows in (False, True)]
+    for size in (0.5, 5.0):
+        shown = history(np.random.default_rng(1), lambda time, s=size: -s * (time > 1.9))
+        step, grown = sorted(compare_onsets(shown, effects), key=lambda e: e.effect.grows)
+        assert step.gains[-1] == pytest.approx(grown.gains[-1], abs=1e-9)
+        assert step.sizes[-1] == pytest.approx(grown.sizes[-1] * (TIMES[-1] - TIMES[-2]), rel=1e-9)
+
+
+def test_a_change_has_two_visits_and_begins_after_an_accepted_one():
+    rng = np.random.default_rng(2)
+    with pytest.raises(ValueError, match="two visits"):
+        onset_interval(history(rng, lambda time: 0.0, times=TIMES[:1]), EFFECT)
+    assert onset_interval(history(rng, lambda time: 0.0, times=TIMES[:2]), EFFECT) == TIMES[:2]
+    late = ChangeEffect("softer", EFFECT.direction, EFFECT.sd, not_before=TIMES[2])
+    assert onset_interval(history(rng, growth(0.0, 1.0)), late) == TIMES[2:]
