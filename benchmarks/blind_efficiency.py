@@ -6,8 +6,8 @@ For each site with a clear effect, the visits up to two after it became clear ar
 noise, with the information matrices that the tool has stored and the levels of errors that it found. Printed are the
 evidence of the right name less the price of all candidates, its margin over the best other name, both in nats, and
 whether the site was named. Evidence and margin above the tool's bars without a name: a failure of search or decision.
-Below: a limit of the measurement. A gap has no linear model and is left out; so soft ballast is judged without it. The
-nose is taken as a dip of its wear. Noise adds half a nat on average.
+Below: a limit of the measurement. A gap that trains close has no linear model and is left out as the true effect; as a
+rival of soft ballast it counts. The nose is taken as a dip of its wear. Noise adds half a nat on average.
 """
 
 import argparse
@@ -22,6 +22,7 @@ from turnout.mismatch.calibrated.file_comparison import evidence_from_first
 from turnout.mismatch.calibrated.history import Event
 from turnout.mismatch.calibrated.levels import own_levels
 from turnout.mismatch.calibrated.model_answer import NAMES
+from turnout.mismatch.calibrated.soft_ballast_or_gap import evidence_of_gap
 from turnout.mismatch.turnout.calibration import dip_directions, file_errors
 from turnout.stages import calibrated_model
 from turnout_blind.history import START, parameters_at
@@ -64,7 +65,7 @@ def _distance(name, position, length):
 
 
 def efficiency(folder, case, truth, rows):
-    """(evidence, margin) of the true effect [nats] and the tool's bars for both; None without a linear effect."""
+    """Evidence of the true effect, its margin [nats] and the tool's bars for both; None without a linear effect."""
     turnout = with_raw(load_configuration(folder / "cases" / case / "config").turnout(case), folder / "cases" / case)
     stored = calibrated_model.read_visits(
         folder / "work" / case / "tool" / calibrated_model.FOLDER, case, {v: {} for v in truth["visits"]}
@@ -83,7 +84,7 @@ def efficiency(folder, case, truth, rows):
         steps = [c for c in candidates if not c.grows]
         history = estimate_history(parameters, ideal, events, accepted=None)
         gains, price = evidence_from_first(parameters, history, steps)[0], np.log(len(steps))
-        by_effect = list(zip(steps, gains))
+        by_effect, levels = list(zip(steps, gains)), None
     else:
         explained = [Event(v.time, {}, c, 1.0) for v, c in zip(visits, changes) if c]
         levels = own_levels(parameters, visits, [*events, *explained])
@@ -91,14 +92,19 @@ def efficiency(folder, case, truth, rows):
             parameters, ideal, events, repeats_between_visits=False, accepted=None, levels=levels
         )
         price = np.log(len(candidates))
-        by_effect = [(e.effect, e.gain) for e in compare_onsets(history, candidates)]
+        by_effect = [(e, e.gain) for e in compare_onsets(history, candidates)]
     groups, right = {p.name: p.group for p in parameters}, right_names(effect["kind"])
-    best = {True: -np.inf, False: -np.inf}
-    for candidate, gain in by_effect:
+    best, leaders = {True: -np.inf, False: -np.inf}, {}
+    for leader, gain in by_effect:
+        candidate = getattr(leader, "effect", leader)
         is_right = NAMES[groups.get(candidate.name, candidate.group or "dip")] in right
-        best[is_right] = max(best[is_right], gain - price)
-    settings = turnout.settings["mismatch"]
-    return best[True], best[True] - best[False], settings.threshold, settings.margin
+        if gain - price > best[is_right]:
+            best[is_right], leaders[is_right] = gain - price, leader
+    settings, margin = turnout.settings["mismatch"], best[True] - best[False]
+    if effect["kind"] == "ballast" and effect["parameters"]["factor"] < 1.0:
+        size = np.log(effect["parameters"]["factor"])
+        margin = min(margin, -evidence_of_gap(parameters, ideal, events, leaders[True], size, levels))
+    return best[True], margin, settings.threshold, settings.margin
 
 
 def _without_noise(visit, parameters, change):

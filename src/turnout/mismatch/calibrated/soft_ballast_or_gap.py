@@ -28,19 +28,9 @@ def names_of_softer_ballast(
     margin: float,
     levels: Mapping[str, float] | None = None,
 ) -> list[str]:
-    r"""Which names softer ballast may have, by the evidence of both in one fit of impacts and trains.
+    """Which names softer ballast may have: both where the evidence of one over the other is within the margin.
 
-    - *A softer bed* is felt alike by impacts and trains. Its damper loses any share of what the logarithm of the
-      stiffness loses: ``CALIBRATION.soft_damper_shares`` are equally probable before.
-    - *Beside a gap* only a share s of the bed bears the unloaded sleeper. Stiffness and damping are both
-      proportional to the area in contact, so both become s times what they were: their logarithms change alike.
-      Trains close the gap, so they feel less of it, or all of it where none closes it: ``CALIBRATION.gap_shares`` are
-      equally probable before.
-
-    An error of the model that is the same at all visits cancels in a change, and not in an effect of the first visit.
-    The prior of the size is so wide that it favours none. Where neither the damper nor trains decide, both names
-    remain: a gap that no train closes feels as a bed that has lost as much damping as stiffness. A sleeper certainly
-    hangs where less of the stiffness is left than ballast has that carries anything.
+    A sleeper certainly hangs where less of the stiffness is left than ballast has that carries anything.
 
     Parameters
     ----------
@@ -52,7 +42,7 @@ def names_of_softer_ballast(
     size : (float, float)
         Present size and its standard deviation. [ln]
     margin : float
-        Evidence by which one of both must be more probable. [nats]
+        [nats]
     levels : mapping of str to float or None
         As in ``estimate_history``.
 
@@ -63,10 +53,54 @@ def names_of_softer_ballast(
     """
     if size[0] + CALIBRATION.finding_sds * size[1] < np.log(CALIBRATION.least_support):
         return [GAP]
+    evidence = evidence_of_gap(parameters, visits, events, leader, size[0], levels)
+    if abs(evidence) <= margin:
+        return list(NAMES)
+    return [GAP if evidence > 0.0 else SOFT]
+
+
+def evidence_of_gap(
+    parameters: Sequence[StateParameter],
+    visits: Sequence[VisitInformation],
+    events: Sequence[Event],
+    leader: OnsetEvidence | ChangeEffect,
+    size: float,
+    levels: Mapping[str, float] | None = None,
+) -> float:
+    r"""Evidence of a hanging sleeper over softer ballast, in one fit of impacts and trains.
+
+    - *A softer bed* is felt alike by impacts and trains. Its damper loses any share of what the logarithm of the
+      stiffness loses: ``CALIBRATION.soft_damper_shares`` are equally probable before.
+    - *Beside a gap* only a share s of the bed bears the unloaded sleeper. Stiffness and damping are both
+      proportional to the area in contact, so both become s times what they were: their logarithms change alike.
+      Trains close the gap, so they feel less of it, or all of it where none closes it: ``CALIBRATION.gap_shares`` are
+      equally probable before.
+
+    An error of the model that is the same at all visits cancels in a change, and not in an effect of the first visit.
+    The prior of the size is so wide that it favours none. Where neither the damper nor trains decide, the evidence is
+    small: a gap that no train closes feels as a bed that has lost as much damping as stiffness.
+
+    Parameters
+    ----------
+    parameters : sequence of StateParameter
+    visits : sequence of VisitInformation
+    events : sequence of Event
+    leader : OnsetEvidence or ChangeEffect
+        An effect without onsets is one of the first visit.
+    size : float
+        Present size. [ln]
+    levels : mapping of str to float or None
+        As in ``estimate_history``.
+
+    Returns
+    -------
+    float
+        [nats]
+    """
     effect = leader.effect if isinstance(leader, OnsetEvidence) else leader
     springs, dampers = _supports_of(effect, parameters)
     offsets = {p.name: replace(p, name=f"{p.name} as trains feel it", mean=0.0) for p in (*springs, *dampers)}
-    sd = CALIBRATION.gap_size_sds * max(effect.sd, abs(size[0]))
+    sd = CALIBRATION.gap_size_sds * max(effect.sd, abs(size))
 
     def change(damper_share: float, train_share: float) -> ChangeEffect:
         felt = {p.name: 1.0 for p in springs} | {p.name: damper_share for p in dampers}
@@ -90,9 +124,7 @@ def names_of_softer_ballast(
         else:
             gains = evidence_from_first(all_parameters, history, effects)[0]
         evidence[name] = float(np.logaddexp.reduce(gains) - np.log(len(effects)))
-    if abs(evidence[SOFT] - evidence[GAP]) <= margin:
-        return list(NAMES)
-    return [max(evidence, key=lambda name: evidence[name])]
+    return evidence[GAP] - evidence[SOFT]
 
 
 def _supports_of(
