@@ -132,6 +132,9 @@ RESERVED_RULES: tuple[Rule[ReservedEvidence], ...] = (
          "{e.verdict.names[0]} leaves more than intact turnouts do and predicts held-out recordings worse", ENDS),
     Rule("reserved_fit_falls", lambda e: e.is_single_name and e.falls_clearly, "unknown",
          "with {e.verdict.names[0]} held-out recordings lose {e.verification.lost_evidence:.0f} nats", HOW),
+    Rule("reserved_fit_falls_for_little_evidence", lambda e: e.is_single_name and e.has_fallen, "B",
+         "with {e.verdict.names[0]} the fit of held-out recordings falls by two standard errors, which costs "
+         "{e.verification.lost_evidence:.0f} nats", HOW),
     Rule("reserved_not_explained",
          lambda e: e.verdict.answer == "none" and e.verification.reserved_excess > THRESHOLDS.max_reserved_excess,
          "unknown", "held-out recordings are not predicted as in intact turnouts", HOW),
@@ -244,11 +247,14 @@ def confirm(
     Returns
     -------
     tuple of Verdict
-        The first is "unknown" if reserved recordings contradict it.
+        The first is "unknown" if reserved recordings contradict it, and has grade B if their fit falls for little.
     """
     evidence = ReservedEvidence(verdicts, verification, settings)
     rule = first_applicable(RESERVED_RULES, evidence)
     first, *further = verdicts
     if rule.answer == "unknown":
         first = first.as_unknown(rule.reason_for(evidence), settings)
+    elif rule.answer == "B":
+        reasons = (first.reason, rule.reason_for(evidence))
+        first = replace(first, grade="B", reason="; ".join(r for r in reasons if r))
     return (first.after(rule), *further)

@@ -277,15 +277,18 @@ class ReservedEvidence:
     settings: MismatchSettings
 
     @property
+    def has_fallen(self) -> bool:
+        """Whether the fit falls by more than is allowed, and by two standard errors."""
+        return self.verification.falls_by(self.settings.fall)
+
+    @property
     def falls_clearly(self) -> bool:
-        """Whether the fit falls by more than is allowed and by two standard errors, and contradicts the name by that.
+        """Whether the fit falls, and contradicts the name by that.
 
         The evidence lost must be as much as one held-out condition may not lose (``is_contradicted``).
         """
         gain = self.verdict.scores[0].gain if self.verdict.scores else 0.0
-        return self.verification.falls_by(self.settings.fall) and is_contradicted(
-            -self.verification.lost_evidence, gain, self.settings
-        )
+        return self.has_fallen and is_contradicted(-self.verification.lost_evidence, gain, self.settings)
 
     @property
     def verdict(self) -> Verdict:
