@@ -25,6 +25,7 @@ from turnout.stages.common import quarantine_row
 from turnout.stages.mismatch_groups import Group, groups, members_of
 from turnout.stages.mismatch_inputs import digest_of_model, gather_inputs, track_of
 from turnout.stages.mismatch_rows import finding_tables
+from turnout.stages.visit_notes import notes_in_words
 from turnout.stages.visit_time import years_of
 from turnout.workflow.scan import scan
 
@@ -197,7 +198,8 @@ def _diagnose_group(
         fits: Checkpoint | None = store
         if changed:  # the calibrated model has accepted changes as noise of its process, not as effects of a visit
             case, fits = TrackCase(group.campaign, settings, accepted=accepted, cache=budget), None
-        calibrated_model.store_visit(folder, group, case, diagnosis.verdict.answer, about, fits)
+        stored_about = {**about, "notes": notes_in_words(about["visit"], about["notes"])}
+        calibrated_model.store_visit(folder, group, case, diagnosis.verdict.answer, stored_about, fits)
         rows["twin_states"] = calibrated_model.state_rows(
             folder, turnout, group, case, rows["mismatch_findings"][0], about
         )

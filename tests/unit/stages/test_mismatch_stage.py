@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from turnout.mismatch.turnout import TrackCase
 from turnout.stages import mismatch, mismatch_groups
 from turnout.stages.accept_finding import accept
 from turnout.stages.budget import BudgetSpentError
-from turnout.stages.mismatch_inputs import track_of
+from turnout.stages.mismatch_inputs import Note, track_of
 from turnout.stages.mismatch_results import Results, diagnose_turnout
 
 
@@ -322,3 +323,28 @@ def test_a_finding_of_the_fleet_is_accepted_from_the_registry(soft, tmp_path):
     assert path.name == "t1.yaml" and "local_pad" in words
     with pytest.raises(SimulationError, match="run turnout diagnose"):
         Results("work", "t2", tmp_path / "registry").finding()
+
+
+def test_notes_of_a_visit_are_stored_in_words_with_its_information(tmp_path, monkeypatch):
+    """A diagnosis of a visit with a note ended with a TypeError."""
+    kept = {}
+    monkeypatch.setattr(mismatch, "TrackCase", lambda *_, **__: None)
+    monkeypatch.setattr(mismatch, "diagnose", lambda *_: SimpleNamespace(verdict=SimpleNamespace(answer="none")))
+    monkeypatch.setattr(mismatch, "finding_tables", lambda *_: {"mismatch_findings": [{}]})
+    monkeypatch.setattr(mismatch.calibrated_model, "state_rows", lambda *_: [])
+    monkeypatch.setattr(mismatch.calibrated_model, "store_visit", lambda *given: kept.update(given[4]))
+    about = {
+        "visit": "2024-05-07",
+        "identity": "a",
+        "changes": (),
+        "notes": [Note("too short", "p1"), Note("no force")],
+    }
+    group = SimpleNamespace(labels=("A1",), route="main", campaign=None)
+    turnout = SimpleNamespace(id="t1", settings={"mismatch": None})
+    options = mismatch.Options(fits=str(tmp_path))
+    rows = mismatch._diagnose_group(group, turnout, (), about, options, (0, 1))
+    assert rows["twin_states"] == []
+    assert [list(note) for note in kept["notes"]] == [
+        ["2024-05-07", "too short", True],
+        ["2024-05-07", "no force", False],
+    ]
