@@ -1,5 +1,6 @@
 """Shared by all tests: one BLAS thread, and the folder of other people's recordings where it exists."""
 
+import gc
 import os
 from pathlib import Path
 
@@ -7,6 +8,17 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
 import pytest
+
+
+def pytest_collection(session: pytest.Session) -> None:
+    """No search for unused objects while modules are imported: nearly all of them stay, and each search costs more."""
+    gc.disable()
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Later searches leave out what has been imported."""
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -69,29 +69,14 @@ class Budget:
 
 
 @dataclass(frozen=True)
-class CountedPredictions:
+class CountedPredictions(Predictions):
     """Predictions of a ``predictor`` that count on ``watch``."""
 
     predictor: Predictor
     watch: Watch
 
     def predict(self, values: Values, terms: Terms, observations: Sequence[Observation]) -> list[np.ndarray]:
-        """Predictions, (n,) per observation.
-
-        Parameters
-        ----------
-        values : mapping of str to float
-            Nuisance parameters by name.
-        terms : sequence of PhysicsTerm
-            Terms of the track, the vehicles and the sensors.
-        observations : sequence of Observation
-            Receptances and passages to predict.
-
-        Returns
-        -------
-        list of (n,) array
-            One per observation.
-        """
+        """Those of the predictor, counted."""
         self.watch.tick()
         return self.predictor.predict(values, terms, observations)
 
@@ -103,26 +88,7 @@ class CountedPredictions:
         observations: Sequence[Observation],
         predictions: Sequence[np.ndarray],
     ) -> list[np.ndarray]:
-        """Predictions a small step from ``terms``.
-
-        Parameters
-        ----------
-        values : mapping of str to float
-            Nuisance parameters by name.
-        terms : sequence of PhysicsTerm
-            Terms whose predictions are known.
-        new : sequence of PhysicsTerm
-            Terms a small step from them.
-        observations : sequence of Observation
-            Receptances and passages to predict.
-        predictions : sequence of (n,) array
-            Predictions with ``terms``, one per observation.
-
-        Returns
-        -------
-        list of (n,) array
-            Predictions with ``new``, one per observation.
-        """
+        """Those of the predictor, counted."""
         self.watch.tick()
         return self.predictor.predict_near(values, terms, new, observations, predictions)
 
@@ -134,59 +100,23 @@ class CountedPredictions:
         observations: Sequence[Observation],
         base: Sequence[np.ndarray],
     ) -> list[np.ndarray]:
-        """Derivatives by ``nuisances``.
-
-        Parameters
-        ----------
-        nuisances : sequence of Nuisance
-            Nuisance parameters of the derivatives.
-        values : mapping of str to float
-            Nuisance parameters by name.
-        terms : sequence of PhysicsTerm
-            Terms of the track, the vehicles and the sensors.
-        observations : sequence of Observation
-            Receptances and passages to predict.
-        base : sequence of (n,) array
-            Predictions with ``terms``, one per observation.
-
-        Returns
-        -------
-        list of (n, n_nuisance) array
-            One per observation.
-        """
+        """Those of the predictor, counted."""
         self.watch.tick()
         return self.predictor.nuisance_jacobian(nuisances, values, terms, observations, base)
 
 
-class ReplayedPredictions:
-    """Predictions of a ``predictor`` within a ``Budget``: computed once, then replayed."""
+class ReplayedPredictions(Predictions):
+    """Predictions of a ``predictor`` within a ``Budget``: computed once, then replayed.
+
+    They raise BudgetSpentError if the time is spent and they are not stored.
+    """
 
     def __init__(self, predictor: Predictor, budget: Budget) -> None:
         self.predictor, self.budget = predictor, budget
         self._rail = repr(sorted(predictor.rail.items()))  # passages depend on it
 
     def predict(self, values: Values, terms: Terms, observations: Sequence[Observation]) -> list[np.ndarray]:
-        """Predictions, (n,) per observation.
-
-        Parameters
-        ----------
-        values : mapping of str to float
-            Nuisance parameters by name.
-        terms : sequence of PhysicsTerm
-            Terms of the track, the vehicles and the sensors.
-        observations : sequence of Observation
-            Receptances and passages to predict.
-
-        Returns
-        -------
-        list of (n,) array
-            One per observation.
-
-        Raises
-        ------
-        BudgetSpentError
-            The time is spent and the predictions are not stored.
-        """
+        """Those of the predictor, or as they were stored."""
         key = self._key("p", values, terms, observations)
         return self._compute_once(key, lambda: self.predictor.predict(values, terms, observations))
 
@@ -198,31 +128,7 @@ class ReplayedPredictions:
         observations: Sequence[Observation],
         predictions: Sequence[np.ndarray],
     ) -> list[np.ndarray]:
-        """Predictions a small step from ``terms``.
-
-        Parameters
-        ----------
-        values : mapping of str to float
-            Nuisance parameters by name.
-        terms : sequence of PhysicsTerm
-            Terms whose predictions are known.
-        new : sequence of PhysicsTerm
-            Terms a small step from them.
-        observations : sequence of Observation
-            Receptances and passages to predict.
-        predictions : sequence of (n,) array
-            Predictions with ``terms``, one per observation.
-
-        Returns
-        -------
-        list of (n,) array
-            Predictions with ``new``, one per observation.
-
-        Raises
-        ------
-        BudgetSpentError
-            The time is spent and the predictions are not stored.
-        """
+        """Those of the predictor, or as they were stored."""
         key = self._key(f"m:{new!r}", values, terms, observations)
         return self._compute_once(
             key, lambda: self.predictor.predict_near(values, terms, new, observations, predictions)
@@ -236,31 +142,7 @@ class ReplayedPredictions:
         observations: Sequence[Observation],
         base: Sequence[np.ndarray],
     ) -> list[np.ndarray]:
-        """Derivatives by ``nuisances``.
-
-        Parameters
-        ----------
-        nuisances : sequence of Nuisance
-            Nuisance parameters of the derivatives.
-        values : mapping of str to float
-            Nuisance parameters by name.
-        terms : sequence of PhysicsTerm
-            Terms of the track, the vehicles and the sensors.
-        observations : sequence of Observation
-            Receptances and passages to predict.
-        base : sequence of (n,) array
-            Predictions with ``terms``, one per observation.
-
-        Returns
-        -------
-        list of (n, n_nuisance) array
-            One per observation.
-
-        Raises
-        ------
-        BudgetSpentError
-            The time is spent and the derivatives are not stored.
-        """
+        """Those of the predictor, or as they were stored."""
         key = self._key("j", values, terms, observations)
         return self._compute_once(
             key, lambda: self.predictor.nuisance_jacobian(nuisances, values, terms, observations, base)

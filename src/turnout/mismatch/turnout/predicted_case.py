@@ -82,22 +82,7 @@ class PredictedCase(Case):
         return (*self.accepted.terms(fit.values), *fit.terms)
 
     def predict(self, values: Values, terms: Terms, observations: Sequence[Observation]) -> list[np.ndarray]:
-        """Predictions, (n,) per observation.
-
-        Parameters
-        ----------
-        values : mapping of str to float
-            Values of the parameters by their name.
-        terms : Terms
-            Physics terms of the effects.
-        observations : sequence of Observation
-            Receptances and passages.
-
-        Returns
-        -------
-        list[array]
-            Predictions, (n,) per observation.
-        """
+        """Predictions with the accepted effects."""
         return self.predictions.predict(values, (*self.accepted.terms(values), *terms), observations)
 
     def predict_near(
@@ -108,50 +93,14 @@ class PredictedCase(Case):
         observations: Sequence[Observation],
         predictions: Sequence[np.ndarray],
     ) -> list[np.ndarray]:
-        """Predictions a small step from ``terms``: receptances follow without solving the track again.
-
-        Parameters
-        ----------
-        values : mapping of str to float
-            Values of the parameters by their name.
-        terms : Terms
-            Physics terms of the effects.
-        new : Terms
-            Terms that are added.
-        observations : sequence of Observation
-            Receptances and passages.
-        predictions : sequence of array
-            (n,) prediction of each observation with ``terms``.
-
-        Returns
-        -------
-        list[array]
-            Predictions a small step from ``terms``: receptances follow without solving the track again.
-        """
+        """Predictions with the accepted effects: receptances follow without solving the track again."""
         accepted = self.accepted.terms(values)
         return self.predictions.predict_near(values, (*accepted, *terms), (*accepted, *new), observations, predictions)
 
     def nuisance_jacobian(
         self, values: Values, terms: Terms, observations: Sequence[Observation], base: Sequence[np.ndarray]
     ) -> list[np.ndarray]:
-        """Derivatives by all nuisances; those by parameters of accepted effects are difference quotients.
-
-        Parameters
-        ----------
-        values : mapping of str to float
-            Values of the parameters by their name.
-        terms : Terms
-            Physics terms of the effects.
-        observations : sequence of Observation
-            Receptances and passages.
-        base : sequence of array
-            (n,) prediction of each observation at ``values``.
-
-        Returns
-        -------
-        list[array]
-            Derivatives by all nuisances; those by parameters of accepted effects are difference quotients.
-        """
+        """Derivatives by all nuisances; those by parameters of accepted effects are difference quotients."""
         all_terms = (*self.accepted.terms(values), *terms)
         jacobians = self.predictions.nuisance_jacobian(self._site_nuisances, values, all_terms, observations, base)
         columns = self.accepted.difference_columns(lambda at: self.predict(at, terms, observations), values, base)

@@ -12,12 +12,12 @@ from turnout.mismatch.turnout import receptance_model, sensitivity
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.passage_observation import AlignedPassage
 from turnout.mismatch.turnout.passage_prediction import PassagePredictor
-from turnout.mismatch.turnout.predictions import Terms, Values
+from turnout.mismatch.turnout.predictions import Predictions, Terms, Values
 from turnout.mismatch.turnout.receptance_observation import FrfPair
 from turnout.mismatch.turnout.receptance_prediction import ReceptancePredictor
 
 
-class Predictor(ReceptancePredictor, PassagePredictor):
+class Predictor(ReceptancePredictor, PassagePredictor, Predictions):
     """Predicts receptances and passages of one site, for any values of its nuisances and any terms.
 
     A predictor never changes but for its caches: another rail or another solver makes another predictor.
@@ -82,27 +82,7 @@ class Predictor(ReceptancePredictor, PassagePredictor):
         return other
 
     def predict(self, values: Values, terms: Terms, observations: Sequence[Observation]) -> list[np.ndarray]:
-        """Predictions of receptances and passages.
-
-        Parameters
-        ----------
-        values : mapping
-            All nuisances of the site, by name.
-        terms : sequence of PhysicsTerm
-            Effects beside the base model.
-        observations : sequence of Observation
-            Of ``frf_pairs`` or ``aligned_passages``, by their names.
-
-        Returns
-        -------
-        list of (n,) array
-            One per observation, in its unit.
-
-        Raises
-        ------
-        SimulationError
-            A passage cannot be simulated at these values.
-        """
+        """Predictions of receptances and passages."""
         predictions, sensitivity_of = [], self.pair_sensitivities(values, terms)
         for o in observations:
             if o.name in self.frf_pairs:
@@ -120,26 +100,7 @@ class Predictor(ReceptancePredictor, PassagePredictor):
         observations: Sequence[Observation],
         predictions: Sequence[np.ndarray],
     ) -> list[np.ndarray]:
-        """Predictions a small step away: receptances follow without solving the track again.
-
-        Parameters
-        ----------
-        values : mapping of str to float
-            Values of the parameters by their name.
-        terms : Terms
-            Physics terms of the effects.
-        new : Terms
-            Terms that are added.
-        observations : sequence of Observation
-            Receptances and passages.
-        predictions : sequence of array
-            (n,) prediction of each observation with ``terms``.
-
-        Returns
-        -------
-        list[array]
-            Predictions a small step away: receptances follow without solving the track again.
-        """
+        """Predictions a small step away: receptances follow without solving the track again."""
         return receptance_model.predict_near(self, values, terms, new, observations, predictions)
 
     def nuisance_jacobian(
@@ -150,24 +111,5 @@ class Predictor(ReceptancePredictor, PassagePredictor):
         observations: Sequence[Observation],
         base: Sequence[np.ndarray],
     ) -> list[np.ndarray]:
-        """Derivatives by ``nuisances``, see ``sensitivity.nuisance_jacobian``.
-
-        Parameters
-        ----------
-        nuisances : sequence of Nuisance
-            Nuisance parameters, one column each.
-        values : mapping of str to float
-            Values of the parameters by their name.
-        terms : Terms
-            Physics terms of the effects.
-        observations : sequence of Observation
-            Receptances and passages.
-        base : sequence of array
-            (n,) prediction of each observation at ``values``.
-
-        Returns
-        -------
-        list[array]
-            Derivatives by ``nuisances``, see ``sensitivity.nuisance_jacobian``.
-        """
+        """Derivatives, see ``sensitivity.nuisance_jacobian``."""
         return sensitivity.nuisance_jacobian(self, nuisances, values, terms, observations, base)

@@ -18,21 +18,26 @@ class Predictions(Protocol):
     """What a case asks of a ``prediction.Predictor``, or of a cache around it."""
 
     def predict(self, values: Values, terms: Terms, observations: Sequence[Observation]) -> list[np.ndarray]:
-        """Predictions of receptances and passages, (n,) per observation.
+        """Predictions of receptances and passages.
 
         Parameters
         ----------
         values : mapping of str to float
-            Values of the parameters by their name.
-        terms : Terms
-            Physics terms of the effects.
+            All nuisance parameters of the site, by name.
+        terms : sequence of PhysicsTerm
+            Effects beside the base model.
         observations : sequence of Observation
-            Receptances and passages.
+            Receptances and passages to predict.
 
         Returns
         -------
-        list[array]
-            Predictions of receptances and passages, (n,) per observation.
+        list of (n,) array
+            One per observation, in its unit.
+
+        Raises
+        ------
+        SimulationError
+            If a passage cannot be simulated at these values.
         """
 
     def predict_near(
@@ -43,25 +48,30 @@ class Predictions(Protocol):
         observations: Sequence[Observation],
         predictions: Sequence[np.ndarray],
     ) -> list[np.ndarray]:
-        """Predictions with ``new`` terms, a small step from ``terms`` with known ``predictions``.
+        """Predictions a small step from known ones, for derivatives.
 
         Parameters
         ----------
         values : mapping of str to float
-            Values of the parameters by their name.
-        terms : Terms
-            Physics terms of the effects.
-        new : Terms
-            Terms that are added.
+            All nuisance parameters of the site, by name.
+        terms : sequence of PhysicsTerm
+            Effects for which the predictions are known.
+        new : sequence of PhysicsTerm
+            The same effects with one parameter changed.
         observations : sequence of Observation
-            Receptances and passages.
-        predictions : sequence of array
-            (n,) prediction of each observation with ``terms``.
+            Receptances and passages to predict.
+        predictions : sequence of (n,) array
+            Those with ``terms``, one per observation.
 
         Returns
         -------
-        list[array]
-            Predictions with ``new`` terms, a small step from ``terms`` with known ``predictions``.
+        list of (n,) array
+            Those with ``new``, one per observation.
+
+        Raises
+        ------
+        SimulationError
+            If a passage cannot be simulated at these values.
         """
 
     def nuisance_jacobian(
@@ -72,23 +82,28 @@ class Predictions(Protocol):
         observations: Sequence[Observation],
         base: Sequence[np.ndarray],
     ) -> list[np.ndarray]:
-        """Derivatives by ``nuisances``, (n, n_nuisance) per observation.
+        """Derivatives of predictions by nuisance parameters.
 
         Parameters
         ----------
         nuisances : sequence of Nuisance
-            Nuisance parameters, one column each.
+            One column each.
         values : mapping of str to float
-            Values of the parameters by their name.
-        terms : Terms
-            Physics terms of the effects.
+            All nuisance parameters of the site, by name.
+        terms : sequence of PhysicsTerm
+            Effects beside the base model.
         observations : sequence of Observation
             Receptances and passages.
-        base : sequence of array
-            (n,) prediction of each observation at ``values``.
+        base : sequence of (n,) array
+            Predictions at these values, one per observation.
 
         Returns
         -------
-        list[array]
-            Derivatives by ``nuisances``, (n, n_nuisance) per observation.
+        list of (n, n_nuisance) array
+            One per observation, in its unit over that of the nuisance.
+
+        Raises
+        ------
+        SimulationError
+            If a passage cannot be simulated a step away.
         """
