@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import toy_fleet as toy
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "unit" / "chains"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "unit" / "stages"))
 import small_turnout as small
 
 LIGHT = '''"""The program's own chain with two families, so that a turnout takes a second; one turnout has a fault."""

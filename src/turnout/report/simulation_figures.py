@@ -116,7 +116,7 @@ def _passage_forces(recording: Recording, truth: PassageTruth) -> Figure:
         bottom.plot(
             truth.wheel_position[wheel, is_near], truth.force[wheel, is_near] / 1e3, lw=0.8, label=f"wheel {wheel + 1}"
         )
-    bottom.set(xlabel="place [m]", ylabel="contact force [kN]", title="every wheel at the crossing (nose at 26.7 m)")
+    bottom.set(xlabel="position [m]", ylabel="contact force [kN]", title="every wheel at the crossing (nose at 26.7 m)")
     bottom.set_ylim(0.0, 1.3 * bottom.get_ylim()[1])  # room for the legend
     bottom.legend(ncol=4, loc="upper center")
     for depth in NOSE_DEPTHS:

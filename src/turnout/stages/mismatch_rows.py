@@ -85,7 +85,7 @@ def location_text(diagnosis: Diagnosis) -> str:
         return str(diagnosis.where)
     frames = [f for f in diagnosis.frames if f.q < FALSE_DISCOVERY_RATE]
     if not frames:
-        return "at no place, sensor or train in particular"
+        return "at no position, sensor or train in particular"
     return ", ".join(f"at {f.frame} {f.level} ({f.effect:+.1f} dB, q = {f.q:.3f})" for f in frames[:2])
 
 

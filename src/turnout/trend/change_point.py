@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import brentq
 from scipy.special import stdtr
 
 from turnout.trend.forecast import DAYS_PER_YEAR, step_autocorrelation
+from turnout.trend.roots import find_root
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -249,8 +249,6 @@ def _sizes(fit: Fits, p: np.ndarray, freedom: int, levels: Sequence[float]) -> l
         def shortfall(x: float) -> float:
             return float(np.sum(p * stdtr(freedom, (x - size) / scale))) - q
 
-        return float(
-            brentq(shortfall, size.min() - half_range, size.max() + half_range, xtol=1e-9 * half_range, maxiter=200)
-        )
+        return find_root(shortfall, size.min() - half_range, size.max() + half_range, 1e-9 * half_range)
 
     return [quantile(q) for q in levels]

@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from scipy.optimize import brentq
 
 from turnout.trend.cusum import cusum
+from turnout.trend.roots import find_root
 
 N_RUNS = 2000  # simulated charts; the probability of an alarm is then known to 0.007
 WEATHER = 0.4  # sd of the weather's temperatures over the amplitude of the season
@@ -78,7 +78,7 @@ def detectable_shift(
         return float(alarms.any(axis=1).mean()) - probability
 
     high = 2.0 * (threshold + allowance) + 4.0
-    return float(brentq(shortfall, 0.0, high, xtol=5e-3)) if shortfall(high) > 0.0 else float("inf")
+    return find_root(shortfall, 0.0, high, 5e-3) if shortfall(high) > 0.0 else float("inf")
 
 
 def simulated_z(campaigns: int, n_base: int, n_learned: int, guard: float, autocorrelation: float) -> np.ndarray:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import brentq
 
 from turnout.trend.quantities import is_damping
+from turnout.trend.roots import find_root
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -74,8 +74,8 @@ def threshold_for(campaigns: float, allowance: float) -> float:
     >>> print(f"{threshold_for(5600, 1.0):.2f} {threshold_for(56000, 0.5):.2f}")
     3.50 9.07
     """
-    return float(
-        brentq(lambda h: np.log(run_length(h, allowance)) - np.log(campaigns), 0.0, 150.0 / allowance, xtol=1e-12)
+    return find_root(
+        lambda h: float(np.log(run_length(h, allowance)) - np.log(campaigns)), 0.0, 150.0 / allowance, 1e-12
     )
 
 

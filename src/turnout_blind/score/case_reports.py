@@ -275,7 +275,7 @@ def _plot_track(axis: Axes, truth: Mapping[str, Any], rows: Sequence[Mapping[str
     """Plot along the rail: sensors, hammer positions, concealed effects (filled) and answers (open)."""
     axis.set_xlim(min(site.sensors) - 2.5, max(site.sensors) + 2.5)
     axis.plot(site.sensors, np.zeros(len(site.sensors)), "^", color="0.4", label="sensor")
-    axis.plot(site.hammer_positions, np.zeros(len(site.hammer_positions)), "v", color="0.7", label="blow")
+    axis.plot(site.hammer_positions, np.zeros(len(site.hammer_positions)), "v", color="0.7", label="impact")
     for name, x in zip(site.names(), site.sensors):
         axis.annotate(name, (x, 0.0), xytext=(0, -14), textcoords="offset points", ha="center", fontsize=8)
     for k, effect in enumerate(truth["effects"]):
@@ -287,7 +287,7 @@ def _plot_track(axis: Axes, truth: Mapping[str, Any], rows: Sequence[Mapping[str
         _plot_mark(axis, x, 2.0 + 0.45 * k, " or ".join(a.names) or a.verdict, a.train, a.axle, color="C3", mfc="none")
     axis.set_yticks([0, 1, 2], ["track", "concealed", "answer"])
     axis.set_ylim(-1.1, 3.3)
-    axis.set_xlabel("place [m]")
+    axis.set_xlabel("position [m]")
     axis.legend(loc="lower right", ncols=2, fontsize=7)
 
 
@@ -299,7 +299,7 @@ def _plot_mark(
         axis.plot(x, y, "o", **style)
         _annotate(axis, x, y, text)
         return
-    wheel = f"axle {axle} of {train}" if axle is not None else train or "no place"
+    wheel = f"axle {axle} of {train}" if axle is not None else train or "no position"
     axis.annotate(f"{text.replace('_', ' ')}: {wheel}", (0.02, y), xycoords=("axes fraction", "data"), fontsize=8)
 
 
