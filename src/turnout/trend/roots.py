@@ -52,21 +52,21 @@ def find_root(function: Callable[[float], float], low: float, high: float, toler
         return low if f_previous == 0.0 else high
     if (f_previous > 0.0) == (f_current > 0.0):
         raise ValueError(f"the function has the same sign at {low:g} and at {high:g}")
-    other, f_other, last_step, step = previous, f_previous, 0.0, 0.0
+    opposite, f_opposite, last_step, step = previous, f_previous, 0.0, 0.0
     for _ in range(MAX_EVALUATIONS):
         if f_previous != 0.0 and f_current != 0.0 and (f_previous > 0.0) != (f_current > 0.0):
-            other, f_other = previous, f_previous
+            opposite, f_opposite = previous, f_previous
             last_step = step = current - previous
-        if abs(f_other) < abs(f_current):
-            previous, current, other = current, other, current
-            f_previous, f_current, f_other = f_current, f_other, f_current
+        if abs(f_opposite) < abs(f_current):
+            previous, current, opposite = current, opposite, current
+            f_previous, f_current, f_opposite = f_current, f_opposite, f_current
         delta = 0.5 * (tolerance + RELATIVE_TOLERANCE * abs(current))
-        bisection = 0.5 * (other - current)
+        bisection = 0.5 * (opposite - current)
         if f_current == 0.0 or abs(bisection) < delta:
             return current
         trial = bisection
         if abs(last_step) > delta and abs(f_current) < abs(f_previous):
-            trial = _interpolated_step((previous, f_previous), (current, f_current), (other, f_other))
+            trial = _interpolated_step((previous, f_previous), (current, f_current), (opposite, f_opposite))
         if 2.0 * abs(trial) < min(abs(last_step), 3.0 * abs(bisection) - delta):
             last_step, step = step, trial
         else:
@@ -78,10 +78,10 @@ def find_root(function: Callable[[float], float], low: float, high: float, toler
 
 
 def _interpolated_step(
-    previous: tuple[float, float], current: tuple[float, float], other: tuple[float, float]
+    previous: tuple[float, float], current: tuple[float, float], opposite: tuple[float, float]
 ) -> float:
     """Step from the current point to the root of the secant, or of the parabola through three points."""
-    (x0, f0), (x1, f1), (x2, f2) = previous, current, other
+    (x0, f0), (x1, f1), (x2, f2) = previous, current, opposite
     if x0 == x2:
         return -f1 * (x1 - x0) / (f1 - f0)
     slope0, slope2 = (f0 - f1) / (x0 - x1), (f2 - f1) / (x2 - x1)

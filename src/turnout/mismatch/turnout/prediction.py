@@ -40,9 +40,9 @@ class Predictor(ReceptancePredictor, PassagePredictor, Predictions):
         Predictor
             The predictor of these recordings; it shares its caches with this one.
         """
-        other = copy(self)
-        other.frf_pairs, other.aligned_passages = dict(frf_pairs), dict(aligned_passages)
-        return other
+        changed = copy(self)
+        changed.frf_pairs, changed.aligned_passages = dict(frf_pairs), dict(aligned_passages)
+        return changed
 
     def recentre(self, values: Values) -> Predictor:
         """The predictor with the track of passages about the rail that ``values`` give.
@@ -59,10 +59,10 @@ class Predictor(ReceptancePredictor, PassagePredictor, Predictions):
         Predictor
             The predictor with the track of passages about the rail that ``values`` give.
         """
-        other = Predictor(self.site, self.solver, values)
-        other.frf_pairs, other.aligned_passages = self.frf_pairs, self.aligned_passages
-        other._rail_tracks = self._rail_tracks
-        return other
+        changed = Predictor(self.site, self.solver, values)
+        changed.frf_pairs, changed.aligned_passages = self.frf_pairs, self.aligned_passages
+        changed._rail_tracks = self._rail_tracks
+        return changed
 
     def with_solver(self, solver: Track1D) -> Predictor:
         """The predictor with another simulation of passages, with empty caches.
@@ -77,9 +77,9 @@ class Predictor(ReceptancePredictor, PassagePredictor, Predictions):
         Predictor
             The predictor with another simulation of passages, with empty caches.
         """
-        other = Predictor(self.site, solver, self.rail)
-        other.frf_pairs, other.aligned_passages = self.frf_pairs, self.aligned_passages
-        return other
+        changed = Predictor(self.site, solver, self.rail)
+        changed.frf_pairs, changed.aligned_passages = self.frf_pairs, self.aligned_passages
+        return changed
 
     def predict(self, values: Values, terms: Terms, observations: Sequence[Observation]) -> list[np.ndarray]:
         """Predictions of receptances and passages."""
