@@ -249,12 +249,13 @@ def test_a_size_errs_by_the_share_its_law_is_loose_as_well():
     assert np.allclose(loose.psi_se**2, fit.psi_se**2 + (0.15 * fit.psi) ** 2, atol=0.0, rtol=1e-12)
 
 
-def test_modes_in_single_precision_whiten_as_in_double():
+@pytest.mark.parametrize("n", [100, 200])  # with one dense matrix, and with the modes
+def test_modes_in_single_precision_whiten_as_in_double(n):
     rng = np.random.default_rng(4)
-    modes, sigma = 30.0 * rng.normal(size=(200, 40)), rng.uniform(0.5, 2.0, 200)
-    x = rng.normal(size=(200, 3)) + modes @ rng.normal(size=(40, 3))
+    modes, sigma = 30.0 * rng.normal(size=(n, 40)), rng.uniform(0.5, 2.0, n)
+    x = rng.normal(size=(n, 3)) + modes @ rng.normal(size=(40, 3))
     exact = np.linalg.solve(np.diag(sigma**2) + modes @ modes.T, x)  # x' C^-1 x is the square of what is whitened
     for kind, close in ((np.float64, 1e-9), (np.float32, 1e-3)):  # a mode of 400 sigma leaves 1e-6 of 400, 200 times
-        o = Observation("a", "a", np.zeros(200), sigma, modes=modes.astype(kind))
+        o = Observation("a", "a", np.zeros(n), sigma, modes=modes.astype(kind))
         white = o.whiten(x)
         assert white.T @ white == pytest.approx(x.T @ exact, rel=close, abs=200 * close)

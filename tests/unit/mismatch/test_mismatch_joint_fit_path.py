@@ -1,5 +1,6 @@
 """Long ways of the joint fit: a dear Jacobian goes stale, a promise does not hold, clipped tops say little."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,8 +10,9 @@ from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine import map_fit, refit
 from turnout.mismatch.engine.candidate import EffectSite, RefitStarts
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.joint_problem import JointProblem
 from turnout.mismatch.engine.levenberg_marquardt import DampedSteps
-from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.map_fit import cost_after, fit_jointly
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.thresholds import THRESHOLDS
@@ -159,10 +161,12 @@ def test_a_law_of_the_whole_track_that_gains_too_little_is_begun_again_farther_o
     case = Bent(True)
     shared, wave = Nuisance("pads", "-", 0.2, 0.1), Nuisance("wave", "m", 0.0, 1.0, can_mask=False)
     case.nuisances = (shared, wave, Nuisance("time@p", "s", 0.0, 1.0, "p"))
-    fit = SimpleNamespace(candidates=(), psi=np.zeros(0), values={"pads": 0.7, "wave": 0.5, "time@p": 0.1}, jacobian=[])
+    values_of_base = {"pads": 0.7, "wave": 0.5, "time@p": 0.1}
+    fit = SimpleNamespace(candidates=(), psi=np.zeros(0), values=values_of_base, jacobian=[], cost=100.0)
     starts, gains = [], iter((15.0, 18.0))
 
-    def fitted(search, candidates, psi, values, *_):
+    def fitted(search, candidates, psi, values, *_, sought_cost):
+        assert sought_cost == 100.0 - search.settings.threshold  # half a threshold [nats] below the fit without it
         starts.append((float(psi[-1]), *values.values()))
         made = SimpleNamespace(gain=next(gains), with_candidates=lambda c: made)
         return SimpleNamespace(without_jacobian=lambda: made)
@@ -175,6 +179,40 @@ def test_a_law_of_the_whole_track_that_gains_too_little_is_begun_again_farther_o
     score = refit._score_task(Search(case), fit, entry)
     assert starts == ([] if begun is None else [(begun, 0.7, 0.5, 0.1), (begun, 0.2, 0.5, 0.1)])
     assert score.gain == (gain if begun is None else 18.0)
+
+
+def test_a_fit_ends_early_only_where_its_steps_do_not_lead_to_the_cost_that_is_sought():
+    """At the start, without a step, if that cost is far below the optimum; never if the optimum is below it."""
+    optimum = fit_jointly(Bent(True), iterations=25)
+    start = fit_jointly(Bent(True), iterations=0)
+    found = fit_jointly(Bent(True), iterations=25, sought_cost=optimum.cost + 1.0)
+    given_up = fit_jointly(Bent(True), iterations=25, sought_cost=-1e6)
+    assert found.cost == optimum.cost < start.cost
+    assert given_up.cost == start.cost and given_up.evaluations < found.evaluations
+
+
+def test_what_a_step_promises_is_what_it_gains_where_the_model_is_linear():
+    """With the prior of all numbers, so that the fit is at its optimum after one step."""
+    case = Bent(False)
+    case._shown = lambda x: 0.02 * case.along @ x  # residuals below their errors: a noise scale of one
+    case.observations = (Observation("all", "all", 0.05 * np.cos(np.arange(60.0)), np.full(60, 0.1)),)
+    joint = JointProblem(case)
+    theta = np.full(12, 0.2)
+    predictions = joint.predict(theta)
+    residuals = joint.residuals(predictions)
+    steps = DampedSteps(joint, theta, residuals, joint.jacobian(theta, predictions))
+    gained = joint.cost(theta, residuals) - fit_jointly(case).cost
+    assert steps.promise == pytest.approx(gained, rel=1e-4) and gained > 0.01
+
+
+def test_a_trial_costs_what_the_fit_costs_without_its_last_derivatives(monkeypatch):
+    asked, jacobian = [], JointProblem.jacobian
+    monkeypatch.setattr(JointProblem, "jacobian", lambda self, *a: asked.append(1) or jacobian(self, *a))
+    case, at = Bent(False), {f"x{k}": 0.5 for k in range(12)}
+    cost = cost_after(case, (), np.zeros(0), at, 3)
+    assert len(asked) == 3  # where each of the three steps starts
+    fit = fit_jointly(case, values=at, iterations=3)
+    assert cost == fit.cost and len(asked) == 3 + 4
 
 
 def test_a_fit_is_not_made_again_where_nobody_would_be_named():
@@ -204,3 +242,16 @@ def test_where_a_channel_was_at_its_range_the_passage_says_no_more_than_its_size
     plain = observation_of(rolling, data, np.full(2, 0.01), 0.06).sigma.reshape(2, -1)
     assert np.all(sigma[topped] >= np.abs(data[0]).max())
     assert np.array_equal(sigma[~topped], plain[~topped])
+
+
+@pytest.mark.parametrize("gain, gives_up", [(40.0, False), (60.0, True)])
+def test_from_a_strong_leader_only_a_base_that_is_better_by_a_threshold_is_sought(monkeypatch, gain, gives_up):
+    """The base is at its optimum already; from the leader's nuisances the fit would come back to it."""
+    case, continued = Bent(True), []
+    base = fit_jointly(case, iterations=25)
+    elsewhere = replace(base, values={name: 0.9 * value for name, value in base.values.items()})
+    leader = Score(SimpleNamespace(key="a"), gain, 0.0, 1.0, elsewhere)
+    monkeypatch.setattr(Search, "converge", lambda search, fit: continued.append(fit) or fit)
+    found = refit._base_from_leader(Search(case), base, [leader])
+    assert bool(continued) == (not gives_up)
+    assert (found.cost > base.cost + 0.2) == gives_up

@@ -81,6 +81,22 @@ def test_links_that_are_others_are_no_small_step(somewhere):
     assert ends.shape[0] == 0 and impedance.shape == (0, receptance_observation.LINES.size)
 
 
+def test_tests_of_several_days_share_what_does_not_depend_on_the_day(somewhere):
+    """The same track and the same pairs, unless its pads are softer on the warmer day: they are then solved twice."""
+    case, values = somewhere
+    pairs = {n: replace(p, conditions={"rail_temperature": 5.0}) for n, p in case.frf_pairs.items()}
+    pairs |= {f"{n} later": replace(p, conditions={"rail_temperature": 25.0}) for n, p in case.frf_pairs.items()}
+    predictor = case.predictor.with_recordings(pairs, {})
+    name = next(iter(case.frf_pairs))
+    for terms, is_shared in (((), True), ((physics.PadTemperature(0.01),), False)):
+        sensitivity_of = predictor.pair_sensitivities(values, terms)
+        early, late = sensitivity_of(pairs[name]), sensitivity_of(pairs[f"{name} later"])
+        assert (early is late) == is_shared
+        assert len(early.row) == len({(p.test.place, p.seat) for p in case.frf_pairs.values()})
+        softer = np.linalg.norm(early.receptance(pairs[name]) - late.receptance(pairs[f"{name} later"]))
+        assert (softer == 0.0) == is_shared
+
+
 def test_an_added_link_changes_a_receptance_as_a_track_that_has_it(somewhere):
     """A pad, and a mass on a spring, at three supports, at their starts: one link each, so exact."""
     case, values = somewhere

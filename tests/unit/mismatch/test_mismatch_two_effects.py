@@ -10,7 +10,7 @@ from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch import diagnose
 from turnout.mismatch.engine.candidate import Candidate, EffectSite, NamingRules
 from turnout.mismatch.engine.candidate_search import Entry, Projector, is_same_site, required_promise
-from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.case import Case, Nuisance, Observation, Whitened
 from turnout.mismatch.engine.decision import grade_name, judge
 from turnout.mismatch.engine.diagnose import grade_names
 from turnout.mismatch.engine.findings import Findings
@@ -226,6 +226,32 @@ def test_a_start_that_turns_promises_what_it_is(whole, share):
     gain, found = projector.score([3.0 * SHAPES["wave"]] * 3, candidate, 0)
     assert found == pytest.approx(share, rel=0.02)
     assert (gain < 0.0) == whole
+
+
+def test_columns_are_scored_together_as_alone():
+    """More than fit into one block; nothing, a column already whitened, and none at all among them. The gain is that of
+    the whole problem solved at once, nuisances and size."""
+    case = Shapes(("wave",), wave=1.0)
+    fit = fit_jointly(case)
+    projector = Projector(case, fit)
+    candidate = Candidate.of("wave", AMOUNT, lambda p: p, ((3.0,),))
+    rng = np.random.default_rng(1)
+    columns = [[rng.normal(size=SHAPES["wave"].size) for _ in range(3)] for _ in range(70)]
+    columns[0] = [3.0 * SHAPES["wave"]] * 3
+    columns[5], columns[6] = None, [0.0 * c for c in columns[6]]
+    columns[7] = [Whitened(o.whiten(c)) for o, c in zip(case.observations, columns[7])]
+    together = projector.scores(columns, [candidate] * 70, [0] * 70)
+    assert together[5] == together[6] == (0.0, 1.0)
+    for column, found in zip(columns, together):
+        assert projector.score(column, candidate, 0) == pytest.approx(found, rel=1e-9)
+    weights = [np.sqrt(o.effective / fit.scale[o.data_type]) for o in case.observations]
+    white = np.concatenate([w * o.whiten(c) for w, o, c in zip(weights, case.observations, columns[0])])
+    rows = np.column_stack([projector.scaled, white])
+    normal = rows.T @ rows + np.diag([1.0] * projector.scaled.shape[1] + [0.0])
+    right = rows.T @ projector.right + np.append(projector.pull, 0.0)
+    size = np.linalg.solve(normal, right)
+    without = np.linalg.solve(normal[:-1, :-1], right[:-1])
+    assert together[0] == pytest.approx((right @ size - right[:-1] @ without, size[-1]), rel=1e-6)
 
 
 def test_a_twin_goes_back_with_its_effect_even_where_nothing_is_learnt_of_it():

@@ -13,6 +13,7 @@ from turnout.mismatch.turnout.wave_response import WaveTransfer
 from turnout.mismatch.turnout.wheel_roughness import (
     _components,
     _deviations,
+    principal_directions,
     profile_modes,
 )
 from turnout.physics.term import PhysicsTerm
@@ -89,3 +90,18 @@ def test_the_signal_of_a_wheel_that_falls_deeper_is_that_of_a_simulation():
     found = modes[:, 4]
     assert found @ change / np.sqrt((found @ found) * (change @ change)) > 0.97
     assert np.linalg.norm(found) == pytest.approx(np.linalg.norm(change), rel=0.1)
+
+
+def test_principal_directions_are_those_of_the_whole_matrix():
+    """Of 60 waves that are combinations of 15, and of 5 more, half of which are too faint."""
+    rng = np.random.default_rng(2)
+    strong = rng.normal(size=(80, 15)) @ rng.normal(size=(15, 60))
+    faint = np.linalg.qr(rng.normal(size=(80, 5)))[0] * np.sqrt([0.2, 0.1, 1e-3, 1e-3, 1e-3])
+    waves = np.column_stack([strong, faint])
+    gram = waves.T @ waves
+    power, vectors = np.linalg.eigh(gram)
+    kept = vectors[:, power > 0.02]
+    found = principal_directions(gram, 0.02)
+    assert found.shape[1] == kept.shape[1]
+    through = waves @ kept
+    assert waves @ found @ (waves @ found).T == pytest.approx(through @ through.T, abs=2e-3)

@@ -1,5 +1,6 @@
 """Linear responses in a switch: of the rail that wheels press, over the surface that carries them."""
 
+from collections import OrderedDict
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,6 +12,7 @@ from turnout.mismatch.turnout.passage_observation import with_chatter
 from turnout.mismatch.turnout.sensitivity import _difference
 from turnout.mismatch.turnout.track_under_wheels import TrackUnderWheels
 from turnout.mismatch.turnout.wheel_line import load_transfer, static_compliances
+from turnout.physics import HangingSleeper, SensorGain
 from turnout.simulate.blade import Blade, transfer_position
 from turnout.simulate.frequency_response import receptance
 from turnout.simulate.matrices import assemble
@@ -88,25 +90,42 @@ def test_all_wheels_are_on_the_rail_without_a_top_of_the_blade():
     assert load_transfer(assemble(TRACK), None, SURFACES, lone_wheels(MASS)) is None
 
 
-@pytest.mark.parametrize(("surfaces", "simulated"), [(SURFACES, [True, False, True]), (SURFACES[:1], [True] * 3)])
-def test_a_quotient_in_a_switch_is_used_again_until_a_common_value_has_moved(surfaces, simulated):
-    """By 0, 0.4 and 0.8 of its prior standard deviation. On plain track it is always computed."""
+def quotient(predictor, moved, terms=()):
+    """A quotient by a load at a ballast stiffness that has ``moved``; whether it was simulated."""
+    aligned = SimpleNamespace(name="a passage", train="a train", passage=SimpleNamespace(load_sd=0.05))
+    before = len(predictor.values_seen)
+    values = {"load": 1.0, "ballast_stiffness": moved}
+    column = _difference(predictor, values, terms, aligned, np.array([1.0]), "load", 0.1)
+    assert column == pytest.approx(2.1)
+    return len(predictor.values_seen) > before
+
+
+def quotients():
+    """A predictor whose only passage is the square of its load."""
     values_seen = []
 
     def predict_passage(values, terms, aligned, with_probes):
         values_seen.append(values["load"])
         return np.array([values["load"] ** 2])
 
-    predictor = SimpleNamespace(
-        predict_passage=predict_passage, differences={}, site=SimpleNamespace(common_sds={"ballast_stiffness": 0.25}),
-        surface=SimpleNamespace(turnout=SimpleNamespace(surfaces=lambda route: surfaces)),
+    return SimpleNamespace(
+        predict_passage=predict_passage, differences=OrderedDict(), values_seen=values_seen,
+        site=SimpleNamespace(common_sds={"ballast_stiffness": 0.25}),
     )  # fmt: skip
-    aligned = SimpleNamespace(name="a passage", passage=SimpleNamespace(route="main"))
-    for moved, is_simulated in zip((0.0, 0.1, 0.2), simulated):
-        values, before = {"load": 1.0, "ballast_stiffness": moved}, len(values_seen)
-        column = _difference(predictor, values, (), aligned, np.array([1.0]), "load", 0.1)
-        assert column == pytest.approx(2.1)
-        assert (len(values_seen) > before) == is_simulated
+
+
+def test_a_quotient_is_used_again_until_a_value_has_moved():
+    """By 0, 0.4, 0.8 and 0.6 of its prior standard deviation: the last is near the one before."""
+    predictor = quotients()
+    assert [quotient(predictor, moved) for moved in (0.0, 0.1, 0.2, 0.15)] == [True, False, True, False]
+
+
+def test_a_quotient_with_an_effect_is_used_again_until_its_size_has_moved_by_a_fifth():
+    predictor, gaps = quotients(), (3e-4, 3.5e-4, 4e-4)
+    assert quotient(predictor, 0.0)
+    assert [quotient(predictor, 0.0, (HangingSleeper(5, gap),)) for gap in gaps] == [True, False, True]
+    assert quotient(predictor, 0.0, (HangingSleeper(6, 4e-4),))  # of another sleeper
+    assert [quotient(predictor, 0.0, (SensorGain("A", gain),)) for gain in (1.1, 1.1, 1.11)] == [True, False, True]
 
 
 def test_a_sample_in_a_switch_errs_by_a_tenth_of_its_channel():

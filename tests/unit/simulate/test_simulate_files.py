@@ -184,3 +184,14 @@ def test_whatever_stands_in_a_file_loads_or_is_refused_in_words(tmp_path, monkey
             continue
         except Exception as error:
             raise AssertionError(f"{'.'.join(map(str, way))} = {wrong!r}") from error
+
+
+def test_a_vehicle_file_that_was_changed_is_read_again(tmp_path):
+    path = tmp_path / "v.yaml"
+    path.write_text(VEHICLE)
+    before = load_vehicle(path, 0.0)
+    assert load_vehicle(path, 0.0) == before
+    heavier = VEHICLE.replace("mass: {value: 24.6", "mass: {value: 25.6", 1)
+    assert heavier != VEHICLE
+    path.write_text(heavier)
+    assert load_vehicle(path, 0.0) != before

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from turnout.errors import SimulationError
+from turnout.mismatch.engine.case import Whitened
 from turnout.mismatch.engine.joint_problem import JointProblem
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
@@ -199,13 +200,10 @@ def _screened_entries(case: Case, fit: Fit, candidates: Sequence[Candidate]) -> 
         if candidate.refit.promise is not None:
             start = np.asarray(candidate.starts[0])
             yield Entry(candidate.refit.promise, candidate, start, dict(candidate.refit.nuisances))
-            continue
-        for k in range(len(candidate.starts)):
-            changes = columns.get((candidate.key, k))
-            if changes is None:
-                changes = _predicted_change(case, fit, candidate, k)
-            gain, share = projector.score(changes, candidate, k)
-            yield Entry(0.5 * gain - np.log(candidate.site.n_scanned), candidate, scaled_start(candidate, k, share), {})
+    chosen = [(c, k) for c in candidates if c.refit.promise is None for k in range(len(c.starts))]
+    changes = [columns.get((c.key, k)) or _predicted_change(case, fit, c, k) for c, k in chosen]
+    for (candidate, k), (gain, share) in zip(chosen, projector.scores(changes, *zip(*chosen)) if chosen else ()):
+        yield Entry(0.5 * gain - np.log(candidate.site.n_scanned), candidate, scaled_start(candidate, k, share), {})
 
 
 def _distant_entry(case: Case, fit: Fit, projector: Projector, at_start: Candidate, candidate: Candidate) -> Entry:
@@ -390,20 +388,63 @@ class Projector:
         share : float
             Multiple of the start's distance from neutral.
         """
-        if changes is None:
-            return 0.0, 1.0
-        white = [o.whiten(p) if p.any() else p for o, p in zip(self.joint.observations, changes)]
-        weight = [np.sqrt(o.effective / self.fit.scale[o.data_type]) for o in self.joint.observations]
-        column = np.concatenate([w * p for w, p in zip(weight, white)])
-        across = self.scaled.T @ column
-        size = float(column @ column - across @ self.normal @ across)
-        slope = float(column @ self.right - across @ self.shift)
-        if size <= 1e-12 * float(column @ column) or size <= 0.0:
-            return 0.0, 1.0
-        optimum = slope / size if not candidate.refit.nonlinear_in_size else 1.0
-        most = _max_multiple(candidate, candidate.starts[start])
-        share = float(np.clip(optimum, THRESHOLDS.min_start_multiple, most))
-        return 2.0 * share * slope - share**2 * size, share
+        return self.scores([changes], [candidate], [start])[0]
+
+    def scores(
+        self,
+        changes: Sequence[Sequence[np.ndarray] | None],
+        candidates: Sequence[Candidate],
+        starts: Sequence[int],
+    ) -> list[tuple[float, float]]:
+        """``score`` of several columns, which are whitened and projected together.
+
+        Parameters
+        ----------
+        changes : sequence of list of (n,) array of float, or None
+            Change of each observation at each start; None if it cannot be simulated.
+        candidates : sequence of Candidate
+        starts : sequence of int
+            Number of the start of each candidate.
+
+        Returns
+        -------
+        list of (gain, share)
+        """
+        found = []
+        for first in range(0, len(changes), THRESHOLDS.n_columns_together):
+            together = slice(first, first + THRESHOLDS.n_columns_together)
+            columns = self._weighted_columns(changes[together])
+            across = self.scaled.T @ columns
+            squares = np.sum(columns**2, axis=0)
+            sizes = squares - np.sum(across * (self.normal @ across), axis=0)
+            slopes = self.right @ columns - self.shift @ across
+            numbers = zip(squares, sizes, slopes, candidates[together], starts[together])
+            found += [_best_gain(square, size, slope, c, k) for square, size, slope, c, k in numbers]
+        return found
+
+    def _weighted_columns(self, changes: Sequence[Sequence[np.ndarray] | None]) -> np.ndarray:
+        """(n, n_change) changes of all observations, whitened and weighted; 0 for those that are None."""
+        blocks = []
+        for i, o in enumerate(self.joint.observations):
+            block = np.zeros((o.data.size, len(changes)))
+            parts = {k: c[i] for k, c in enumerate(changes) if c is not None and c[i].any()}
+            plain = [k for k, part in parts.items() if not isinstance(part, Whitened)]
+            if plain:
+                block[:, plain] = o.whiten(np.column_stack([parts[k] for k in plain]))
+            for k in set(parts) - set(plain):
+                block[:, k] = parts[k]
+            blocks.append(np.sqrt(o.effective / self.fit.scale[o.data_type]) * block)
+        return np.concatenate(blocks)
+
+
+def _best_gain(square: float, size: float, slope: float, candidate: Candidate, start: int) -> tuple[float, float]:
+    """``Projector.score`` from the square of a column, without and with nuisances projected out, and its slope."""
+    if size <= 1e-12 * square or size <= 0.0:
+        return 0.0, 1.0
+    optimum = slope / size if not candidate.refit.nonlinear_in_size else 1.0
+    most = _max_multiple(candidate, candidate.starts[start])
+    share = float(np.clip(optimum, THRESHOLDS.min_start_multiple, most))
+    return float(2.0 * share * slope - share**2 * size), share
 
 
 def _max_multiple(candidate: Candidate, start: Sequence[float]) -> float:

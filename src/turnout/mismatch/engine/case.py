@@ -77,6 +77,14 @@ class Observation:
         directions = (scaled @ eigenvectors[:, keep] / np.sqrt(eigenvalues)).astype(self.modes.dtype)
         return directions, 1.0 - 1.0 / np.sqrt(1.0 + eigenvalues)
 
+    @cached_property
+    def _small_operator(self) -> np.ndarray | None:
+        """(n, n) matrix of ``whiten`` of an observation with modes; None if one product with it is not faster."""
+        if self._subspace is None or self.data.size > THRESHOLDS.max_dense_size:
+            return None
+        directions, shrinkage = self._subspace
+        return (np.eye(self.data.size) - (directions * shrinkage) @ directions.T) / self.sigma
+
     def whiten(self, values: np.ndarray) -> np.ndarray:
         r"""Values over the standard deviation of all random errors: :math:`C^{-1/2} x`.
 
@@ -102,6 +110,8 @@ class Observation:
         """
         if isinstance(values, Whitened):
             return np.asarray(values)
+        if self._small_operator is not None:
+            return self._small_operator @ values
         scaled = values / (self.sigma if values.ndim == 1 else self.sigma[:, None])
         if self._subspace is None:
             return scaled

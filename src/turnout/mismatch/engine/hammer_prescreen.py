@@ -15,7 +15,7 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.candidate_search import Projector, scaled_start
-from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.map_fit import cost_after, fit_jointly
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -123,10 +123,10 @@ class _Prescreen:
         psi, candidates = np.concatenate([self.broad_fit.psi, start]), (*self.accepted, candidate)
         values, steps = _prior_means(self.broad_case), THRESHOLDS.n_trial_steps
         try:
-            fit = fit_jointly(self.broad_case, candidates, psi, values, iterations=steps)
+            cost = cost_after(self.broad_case, candidates, psi, values, steps)
         except SimulationError:
             return -np.inf
-        return 0.5 * (self.broad_fit.cost - fit.cost)
+        return 0.5 * (self.broad_fit.cost - cost)
 
 
 def prescreen(search: Search, fit: Fit, families: Collection[str] | None = None) -> list[PrescreenFit]:
@@ -207,13 +207,16 @@ def _prior_means(case: Case) -> dict[str, float]:
 
 def _column_starts(case: Case, cheap_case: Case, fit: Fit) -> list[_Start]:
     """Starts of every candidate that shows in the cheap observations, scaled by their columns."""
-    projector, columns, starts = Projector(cheap_case, fit), cheap_case.screen(fit), []
+    columns = cheap_case.screen(fit)
     accepted_keys = {c.key for c in fit.candidates}
-    for candidate in case.candidates:
-        for k in range(len(candidate.starts)):
-            changes = columns.get((candidate.key, k))
-            if candidate.key in accepted_keys or changes is None or not any(p.any() for p in changes):
-                continue
-            gain, share = projector.score(changes, candidate, k)
-            starts.append(_Start(0.5 * gain, candidate, scaled_start(candidate, k, share)))
-    return starts
+    chosen = [
+        (c, k)
+        for c in case.candidates
+        if c.key not in accepted_keys
+        for k in range(len(c.starts))
+        if any(p.any() for p in columns.get((c.key, k)) or ())
+    ]
+    if not chosen:
+        return []
+    scores = Projector(cheap_case, fit).scores([columns[c.key, k] for c, k in chosen], *zip(*chosen))
+    return [_Start(0.5 * gain, c, scaled_start(c, k, share)) for (c, k), (gain, share) in zip(chosen, scores)]

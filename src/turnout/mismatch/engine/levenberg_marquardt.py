@@ -29,6 +29,8 @@ class DampedSteps:
     """Damped steps from ``theta``.
 
     The noise scale is that after the undamped step. With the scale of a bad start, the priors would weigh too much.
+
+    ``promise`` is the decrease of the cost by that step if the problem were linear.
     """
 
     def __init__(
@@ -50,6 +52,7 @@ class DampedSteps:
             self.right = pull + sum(p[1] / scale[k] for k, p in sums.items())
             step = np.linalg.solve(self.normal, self.right)
             squares = {k: max(0.0, p[2] - 2.0 * step @ p[1] + step @ p[0] @ step) for k, p in sums.items()}
+        self.promise = float(step @ self.right)
 
     def damped_step(self, damping: float) -> np.ndarray:
         """Step with a damping added to the diagonal of the normal matrix.

@@ -30,6 +30,7 @@ def fit_jointly(
     iterations: int = THRESHOLDS.n_steps,
     min_gain: float = THRESHOLDS.min_gain,
     stall: float = THRESHOLDS.stall,
+    sought_cost: float = np.inf,
 ) -> Fit:
     r"""Maximum of the posterior of nuisances and term parameters together.
 
@@ -57,6 +58,8 @@ def fit_jointly(
         A step that gains less is the last. [nats]
     stall : float
         The same for an expensive case, as a share of the cost per sample.
+    sought_cost : float
+        The fit ends where it is if even a multiple of what a step promises leads to a higher cost.
 
     Returns
     -------
@@ -68,23 +71,61 @@ def fit_jointly(
         If the model cannot be simulated at the start, or beside a point at which derivatives are needed.
     """
     joint = JointProblem(case, candidates, observations, iterations, min_gain, stall)
-    psi = np.array([p.neutral for p in joint.parameters]) if start is None else np.asarray(start, dtype=float)
-    start_values = {**case.start_values, **(values or {})}
-    theta = np.concatenate([[start_values.get(n.name, n.mean) for n in case.nuisances], psi])
-    predictions = joint.predict(theta)
-    residuals = joint.residuals(predictions)
-    point = FitPoint(theta, predictions, residuals, joint.cost(theta, residuals))
+    point = _start_point(joint, start, values)
+    theta, predictions, *_ = point
     if not theta.size:
         return _fit_result(joint, point, [np.zeros((o.data.size, 0)) for o in joint.observations])
     jacobian = joint.jacobian(theta, predictions, reused_jacobian)
     if reused_jacobian is not None:
         jacobian = joint.with_new_cheap_columns(theta, predictions, jacobian)
     refresh_steps = THRESHOLDS.n_refresh_steps if reused_jacobian is None else 0
-    return _fit_result(joint, *_iterate(joint, point, jacobian, refresh_steps))
+    return _fit_result(joint, *_iterate(joint, point, jacobian, refresh_steps, sought_cost))
+
+
+def cost_after(
+    case: Case, candidates: Iterable[Candidate], start: ArrayLike, values: Mapping[str, float], iterations: int
+) -> float:
+    """Cost of a joint fit to cheap observations after a few steps, without the derivatives that a ``Fit`` needs.
+
+    Parameters
+    ----------
+    case : Case
+        Not an expensive one.
+    candidates : iterable of Candidate
+        Effects in the model.
+    start : (n_term,) array of float
+        Parameters of the effects where the steps start.
+    values : mapping
+        Nuisance parameters there.
+    iterations : int
+        Largest number of steps.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    SimulationError
+        If the model cannot be simulated at the start, or beside a point at which derivatives are needed.
+    """
+    joint = JointProblem(case, candidates, iterations=iterations)
+    point = _start_point(joint, start, values)
+    return _iterate(joint, point, joint.jacobian(point.theta, point.predictions), 0, np.inf)[0].cost
+
+
+def _start_point(joint: JointProblem, start: ArrayLike | None, values: Mapping[str, float] | None) -> FitPoint:
+    """Start of a fit: effects at ``start``, None: neutral; other nuisances where the case says, or at their mean."""
+    psi = np.array([p.neutral for p in joint.parameters]) if start is None else np.asarray(start, dtype=float)
+    start_values = {**joint.case.start_values, **(values or {})}
+    theta = np.concatenate([[start_values.get(n.name, n.mean) for n in joint.case.nuisances], psi])
+    predictions = joint.predict(theta)
+    residuals = joint.residuals(predictions)
+    return FitPoint(theta, predictions, residuals, joint.cost(theta, residuals))
 
 
 def _iterate(
-    joint: JointProblem, point: FitPoint, jacobian: list[np.ndarray], refresh_steps: int
+    joint: JointProblem, point: FitPoint, jacobian: list[np.ndarray], refresh_steps: int, sought_cost: float
 ) -> tuple[FitPoint, list[np.ndarray]]:
     """Steps until nothing is gained.
 
@@ -93,8 +134,10 @@ def _iterate(
     """
     expensive = joint.case.expensive
     min_decrease, n_since_refresh, damping = joint.min_decrease, 0, 0.0
-    for _ in range(joint.iterations):
+    for iteration in range(joint.iterations):
         steps = DampedSteps(joint, point.theta, point.residuals, jacobian)
+        if point.cost - THRESHOLDS.promise_factor * steps.promise > sought_cost:
+            break
         is_updated = joint.case.reuses_derivatives and refresh_steps > 0 and n_since_refresh > 0
         improvement, damping = steps.first_improvement(point.cost, damping, 1 if is_updated else None)
         if is_updated and not improvement:  # new derivatives before smaller steps
@@ -113,6 +156,8 @@ def _iterate(
             and (n_since_refresh == 1 or not (expensive and refresh_steps))
         ):
             break
+        if iteration + 1 == joint.iterations:  # no step follows
+            continue
         if not expensive or 0 < refresh_steps <= n_since_refresh or (refresh_steps and gain < min_decrease):
             jacobian, n_since_refresh = _refreshed_jacobian(joint, point, jacobian), 0
     else:

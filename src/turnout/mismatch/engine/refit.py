@@ -153,15 +153,21 @@ def _refine_leaders(search: Search, fit: Fit, ranked: list[Score]) -> list[Score
 def _base_from_leader(search: Search, fit: Fit, ranked: Sequence[Score]) -> Fit | None:
     """``fit`` computed again from the leader's nuisances, to convergence.
 
-    None if nobody leads, the case is not expensive, or the simulation fails.
+    If the leader is far above the threshold, the fit ends where it does not lead a threshold below ``fit``. None if
+    nobody leads, the case is not expensive, or the simulation fails.
     """
     if not search.case.expensive or not ranked or ranked[0].gain <= search.settings.threshold:
         return None
-    leader = ranked[0]
+    leader, threshold = ranked[0], search.settings.threshold
+    is_strong = leader.gain > THRESHOLDS.far_start_gain * threshold  # a small shortfall is none of its evidence
+    sought_cost = fit.cost - 2.0 * threshold if is_strong else np.inf
 
     def compute() -> Fit | None:
         try:
-            return search.converge(search.fit(fit.candidates, fit.psi, leader.fit.values, stall=THRESHOLDS.fine_stall))
+            refit = search.fit(
+                fit.candidates, fit.psi, leader.fit.values, stall=THRESHOLDS.fine_stall, sought_cost=sought_cost
+            )
+            return search.converge(refit) if refit.cost < sought_cost else refit
         except SimulationError:
             return None
 
@@ -277,7 +283,8 @@ def _score_from_farther(search: Search, fit: Fit, task: RefitTask, score: Score,
 
         def compute(start_values: dict[str, float] = start_values) -> Fit | None:
             try:
-                return search.fit(candidates, psi, start_values, fit.jacobian).without_jacobian()
+                sought = search.least_cost_of_interest(fit)
+                return search.fit(candidates, psi, start_values, fit.jacobian, sought_cost=sought).without_jacobian()
             except SimulationError:
                 return None
 
@@ -324,7 +331,7 @@ def _refit(search: Search, fit: Fit, task: RefitTask, is_far: bool) -> Fit | Non
         if candidate.refit.from_base and not task.values:
             psi = _backtrack(case, candidates, psi, fit)
         jacobian = _start_jacobian(case, fit, candidates, psi, values, is_far)
-        refit = search.fit(candidates, psi, values, jacobian)
+        refit = search.fit(candidates, psi, values, jacobian, sought_cost=search.least_cost_of_interest(fit))
     except SimulationError:
         return None
     return refit.without_jacobian() if case.expensive else refit

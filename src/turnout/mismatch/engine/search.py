@@ -114,6 +114,7 @@ class Search:
         values: Mapping[str, float],
         reused_jacobian: list[np.ndarray] | None = None,
         stall: float = THRESHOLDS.stall,
+        sought_cost: float = np.inf,
     ) -> Fit:
         """Joint fit of candidates from these parameters and nuisances, with the steps of a refit.
 
@@ -127,6 +128,8 @@ class Search:
             Nuisance columns that are updated instead of recomputed.
         stall : float
             Gain per sample that ends the fit of an expensive case.
+        sought_cost : float
+            The fit ends where its steps do not promise to reach it.
 
         Returns
         -------
@@ -142,8 +145,24 @@ class Search:
         if self.is_limited:
             check_limit(self.case)
         return fit_jointly(
-            self.case, candidates, psi, values, reused_jacobian, iterations=self.settings.iterations, stall=stall
-        )
+            self.case, candidates, psi, values, reused_jacobian,
+            iterations=self.settings.iterations, stall=stall, sought_cost=sought_cost,
+        )  # fmt: skip
+
+    def least_cost_of_interest(self, fit: Fit) -> float:
+        """Cost that a candidate beside ``fit`` must reach to be of interest: a gain of half a threshold.
+
+        Parameters
+        ----------
+        fit : Fit
+            Without the candidate.
+
+        Returns
+        -------
+        float
+            Infinite for a cheap case, whose candidates are compared by held-out conditions.
+        """
+        return fit.cost - self.settings.threshold if self.case.expensive else np.inf
 
     def continue_fit(self, fit: Fit, stall: float = THRESHOLDS.stall) -> Fit:
         """The fit continued from where it is, with new derivatives.

@@ -238,6 +238,15 @@ class Thresholds:
     min_derivative_size: float = threshold(
         0.1, "largest steps", "the least distance from neutral, the third of these scales", "numerical"
     )
+    promise_factor: float = threshold(
+        3.0, "promises", "that further steps may gain: a fit ends if that is less than what is sought", FITS
+    )
+    max_dense_size: int = threshold(
+        128, "samples", "of an observation whose errors are whitened by one dense matrix: a receptance", "numerical"
+    )
+    n_columns_together: int = threshold(
+        64, "columns", "of starts that are projected together: more need memory and save no time", "numerical"
+    )
     nuisance_step: float = threshold(
         0.1, "prior standard deviations", "step of a difference quotient by a nuisance", "numerical"
     )

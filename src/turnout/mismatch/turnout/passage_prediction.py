@@ -33,8 +33,8 @@ class PassagePredictor(SiteModel):
         self._signals_with_probes: OrderedDict[Hashable, np.ndarray] = OrderedDict()
         self._simulators: OrderedDict[Hashable, PassageSimulator] = OrderedDict()
         self._transfers: OrderedDict[Hashable, Any] = OrderedDict()
-        # difference quotients of passages, each with the common values (in prior sd) at which it was computed
-        self.differences: dict[Hashable, tuple[dict[str, float], np.ndarray]] = {}
+        # difference quotients of passages, each with the values on which it depends
+        self.differences: OrderedDict[Hashable, tuple[dict[Hashable, float], np.ndarray]] = OrderedDict()
 
     def predict_passage(
         self, values: Values, terms: Terms, aligned: AlignedPassage, with_probes: bool = True

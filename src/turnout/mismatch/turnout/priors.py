@@ -221,8 +221,10 @@ class SimulationPriors:
     node_stride: int = prior(2, "nodes", "every second one is used; in between a force is shared linearly", "numerical")
     node_margin: float = prior(0.3, "m", "of nodes beyond the free waves", "numerical")
     difference_reach: float = prior(
-        0.5, "prior sd", "of a common value, within which a quotient in a switch is used again; fits stall at 1",
-        "numerical")
+        0.5, "prior sd", "of a value, within which a difference quotient is used again; fits stall at 1", "numerical")
+    difference_cache_size: int = prior(600, "quotients", "that are kept", "numerical")
+    difference_size: float = prior(
+        0.4, "ln", "of the size of an effect that counts as a prior sd there: a fifth of it", "numerical")
     max_in_switch: int = prior(
         1500, "simulations", "of a passage over a switch in one diagnosis: four CPU minutes, a whole turnout has five",
         "decisions/switch-panels.md")
@@ -317,6 +319,8 @@ class WheelPriors:
     level: float = prior(-2.0, "dB", "over the limit curve of rails: disc-braked wheels", "convention")
     min_mode_variance: float = prior(
         0.02, "share of the variance", "of a sample below which a mode is left out", "numerical")
+    factor_tolerance: float = prior(
+        0.025, "share of that", "that the factor of the modes may leave in no wave", "numerical")
     faint_share: float = prior(
         0.1, "share of that", "single waves below it are left out before they are combined", "numerical")
     roughness_margin: float = prior(

@@ -382,12 +382,11 @@ def predict_near(
     for o, old in zip(observations, predictions):
         if o.name in predictor.frf_pairs and not channel_changed:
             pair = predictor.frf_pairs[o.name]
-            sensitivity, conditions = sensitivity_of(pair), tuple(sorted(pair.conditions.items()))
-            if conditions not in differences:
-                differences[conditions] = changed_links(
-                    sensitivity.model, receptance_observation.track_terms(new, pair.conditions)
-                )
-            difference = differences[conditions]
+            sensitivity, new_terms = sensitivity_of(pair), receptance_observation.track_terms(new, pair.conditions)
+            key = id(sensitivity), repr(new_terms)
+            if key not in differences:
+                differences[key] = changed_links(sensitivity.model, new_terms)
+            difference = differences[key]
             if difference is not None:
                 change = receptance_change(sensitivity, pair, *difference)
                 predicted.append(

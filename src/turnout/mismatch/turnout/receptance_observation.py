@@ -45,6 +45,11 @@ class FrfPair:
         return self.channel, self.sensor.place, self.sensor.mounting
 
     @cached_property
+    def conditions_key(self) -> tuple:
+        """``conditions`` as something to look up."""
+        return tuple(sorted(self.conditions.items()))
+
+    @cached_property
     def lines(self) -> np.ndarray:
         """(n,) index of its lines in ``LINES``."""
         return np.searchsorted(LINES, self.frequency)

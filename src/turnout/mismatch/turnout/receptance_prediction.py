@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Mapping
-from typing import Any
+from collections.abc import Callable, Hashable
 
 import numpy as np
 
@@ -30,7 +29,7 @@ class ReceptancePredictor(SiteModel):
         self._sensitivities: OrderedDict[Hashable, ReceptanceSensitivity] = OrderedDict()
 
     def pair_sensitivities(self, values: Values, terms: Terms) -> Callable[[FrfPair], ReceptanceSensitivity]:
-        """Function that gives ``pair_sensitivity`` of a pair at these values, computed once per conditions.
+        """Function that gives ``pair_sensitivity`` of a pair at these values, sought once per conditions.
 
         Parameters
         ----------
@@ -42,20 +41,21 @@ class ReceptancePredictor(SiteModel):
         Returns
         -------
         Callable[[FrfPair], ReceptanceSensitivity]
-            Function that gives ``pair_sensitivity`` of a pair at these values, computed once per conditions.
+            Function that gives ``pair_sensitivity`` of a pair at these values, sought once per conditions.
         """
         sensitivities: dict[Hashable, ReceptanceSensitivity] = {}
 
         def sensitivity_of(pair: FrfPair) -> ReceptanceSensitivity:
-            conditions = tuple(sorted(pair.conditions.items()))
-            if conditions not in sensitivities:
-                sensitivities[conditions] = self.pair_sensitivity(values, terms, pair)
-            return sensitivities[conditions]
+            if pair.conditions_key not in sensitivities:
+                sensitivities[pair.conditions_key] = self.pair_sensitivity(values, terms, pair)
+            return sensitivities[pair.conditions_key]
 
         return sensitivity_of
 
     def pair_sensitivity(self, values: Values, terms: Terms, pair: FrfPair) -> ReceptanceSensitivity:
-        """``ReceptanceSensitivity`` of all pairs under the conditions of ``pair``, cached.
+        """``ReceptanceSensitivity`` of all pairs that have the same track as ``pair``, cached.
+
+        Most effects do not depend on conditions, so that the tests of several days share one solution.
 
         Parameters
         ----------
@@ -69,11 +69,11 @@ class ReceptancePredictor(SiteModel):
         Returns
         -------
         ReceptanceSensitivity
-            ``ReceptanceSensitivity`` of all pairs under the conditions of ``pair``, cached.
+            ``ReceptanceSensitivity`` of all pairs that have the same track as ``pair``, cached.
         """
         track_terms = receptance_observation.track_terms(terms, pair.conditions)
         rail = rail_on_grid(values, self.rail)
-        pair_keys, seats = self._pairs_and_seats(values, terms, pair.conditions)
+        pair_keys, seats = self._pairs_and_seats(values, terms, repr(track_terms))
         key = (
             repr(track_terms),
             tuple(rail.values()),
@@ -97,12 +97,19 @@ class ReceptancePredictor(SiteModel):
             drop_oldest(self._rail_tracks, SIMULATION.rail_cache_size)
         return self._rail_tracks[key]
 
-    def _pairs_and_seats(self, values: Values, terms: Terms, conditions: Mapping[str, Any]) -> tuple[tuple, dict]:
-        """(position of the impact, ``FrfPair.seat``) of all pairs under these conditions; positions of these seats."""
-        pairs = [p for p in self.frf_pairs.values() if p.conditions == conditions]
+    def _pairs_and_seats(self, values: Values, terms: Terms, track_terms: str) -> tuple[tuple, dict]:
+        """(position of the impact, ``FrfPair.seat``) of all pairs with these terms on the track; positions of seats."""
+        is_alike: dict[Hashable, bool] = {}
+        pairs = []
+        for p in self.frf_pairs.values():
+            if p.conditions_key not in is_alike:
+                acting = receptance_observation.track_terms(terms, p.conditions)
+                is_alike[p.conditions_key] = repr(acting) == track_terms
+            if is_alike[p.conditions_key]:
+                pairs.append(p)
         sensors, track = {p.seat: p.sensor for p in pairs}, self.track()
         seats = {seat: self.seat(s, values, terms).probe(track).place for seat, s in sensors.items()}
-        return tuple((p.test.place, p.seat) for p in pairs), seats
+        return tuple(dict.fromkeys((p.test.place, p.seat) for p in pairs)), seats
 
     def channel_response(self, values: Values, terms: Terms, pair: FrfPair) -> np.ndarray:
         """(n_line,) complex factor of the channel of a pair.

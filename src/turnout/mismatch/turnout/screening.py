@@ -118,11 +118,14 @@ def _whole_track_changes(
 
     Hammer tests exactly, passages by derivatives of the base fit where it has them.
     """
-    term, changes = candidate.term(candidate.starts[k]), []
+    term = candidate.term(candidate.starts[k])
     names = {n.name: i for i, n in enumerate(case.nuisances)}
+    pairs = [o for o in observations if o.name in case.frf_pairs]
+    predicted = dict(zip((o.name for o in pairs), case.predict(fit.values, (*fit.terms, term), pairs)))
+    changes = []
     for i, (o, old) in enumerate(zip(observations, fit.predictions)):
-        if o.name in case.frf_pairs:
-            changes.append(case.predict(fit.values, (*fit.terms, term), [o])[0] - old)
+        if o.name in predicted:
+            changes.append(predicted[o.name] - old)
             continue
         nuisance_change = term.nuisance_change(case.aligned_passages[o.name].conditions)
         if nuisance_change is None:

@@ -8,13 +8,14 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.turnout import passage_band, receptance_observation
-from turnout.mismatch.turnout.priors import RECEPTANCE, SIMULATION, TOP_SHAPE
+from turnout.mismatch.turnout.priors import PASSAGE, RECEPTANCE, SIMULATION, TOP_SHAPE, TRACK
 from turnout.mismatch.turnout.pseudo_forces import support_columns, support_motion
 from turnout.mismatch.turnout.rail_roughness import wave_columns
+from turnout.mismatch.turnout.site_model import drop_oldest
 from turnout.mismatch.turnout.wheel_line import has_blade
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Hashable, Iterator, Sequence
 
     from turnout.mismatch.engine.case import Nuisance, Observation
     from turnout.mismatch.turnout.passage_observation import AlignedPassage
@@ -175,17 +176,40 @@ def _difference(
 ) -> np.ndarray:
     """Derivative of a passage by one value, to the side that can be simulated.
 
-    In a switch it is computed again only where a common value has moved: there a passage costs three times as much.
+    It is computed again only where a value that it depends on has moved: half of the simulations of a fit would be
+    those of quotients.
     """
-    if not is_in_switch(predictor, aligned):
-        return _quotient(predictor, values, terms, aligned, predicted, name, step)
-    key = (aligned.name, name, tuple(t.name for t in terms if t.effect_type == "path"))
-    common = {n: values[n] / sd for n, sd in predictor.site.common_sds.items()}
-    at, column = predictor.differences.get(key, ({}, predicted))
-    if any(abs(v - at.get(n, np.inf)) > SIMULATION.difference_reach for n, v in common.items()):
+    key = (aligned.name, name, _kinds_of(terms))
+    values_now = _values_of_quotient(predictor, values, terms, aligned)
+    values_then, column = predictor.differences.get(key, ({}, predicted))
+    if any(abs(v - values_then.get(n, np.inf)) > SIMULATION.difference_reach for n, v in values_now.items()):
         column = _quotient(predictor, values, terms, aligned, predicted, name, step)
-        predictor.differences[key] = common, column
+        predictor.differences[key] = values_now, column
+        drop_oldest(predictor.differences, SIMULATION.difference_cache_size)
     return column
+
+
+def _kinds_of(terms: Terms) -> tuple:
+    """Effects and where they act, without their sizes; of channels, on which a column depends exactly, all."""
+    return tuple(repr(t) if t.effect_type == "channel" else (t.name, tuple(t.supports)) for t in terms)
+
+
+def _values_of_quotient(
+    predictor: Predictor, values: Values, terms: Terms, aligned: AlignedPassage
+) -> dict[Hashable, float]:
+    """Values on which a quotient depends: in prior standard deviations, sizes of effects in fifths of themselves."""
+    own_sds = {
+        f"wheels_{aligned.train}": TRACK.wheels_sd,
+        f"load@{aligned.name}": aligned.passage.load_sd,
+        f"time@{aligned.name}": PASSAGE.time_sd,
+        f"speed@{aligned.name}": PASSAGE.speed_sd,
+    }
+    now: dict[Hashable, float] = {n: values.get(n, 0.0) / sd for n, sd in (predictor.site.common_sds | own_sds).items()}
+    for k, term in enumerate(terms):
+        for p in term.parameters if term.effect_type != "channel" else ():
+            size = abs(getattr(term, p.name) - p.neutral)
+            now[k, p.name] = np.log(max(size, 1e-12)) / SIMULATION.difference_size
+    return now
 
 
 def _quotient(
