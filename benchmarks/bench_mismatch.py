@@ -132,6 +132,8 @@ def development():
         with stopwatch() as watch:
             diagnosis = diagnose(TrackCase(campaign))
         costs.append(watch.cpu)
+        answer = diagnosis.verdict.answer
+        yield Bar(f"development: cost of {name}", watch.cpu, 15.0 if answer == "none" else 60.0, "CPU s", note=answer)
         if term is None:
             controls += 1
             alarms += diagnosis.verdict.answer != "none"
