@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import repeat
 from math import isfinite
 from pathlib import Path
@@ -359,6 +360,32 @@ def read_parameters(path: Path | str) -> ParameterSet:
         raise place.below("sources", written).error("is not a mapping", "Write 'key: source' lines below it")
     with as_config_errors(path, "the file"):
         return _parameter_set(content, node, place, sources)
+
+
+def read_unchanged_parameters(path: Path) -> ParameterSet:
+    """The parameter set in a YAML file, which is parsed only once for each content.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    ParameterSet
+        As of ``read_parameters``. Nobody may change it.
+
+    Raises
+    ------
+    ConfigError
+        As ``read_parameters``.
+    """
+    return _parse_content(path, path.read_bytes()) if path.is_file() else read_parameters(path)
+
+
+@lru_cache(maxsize=32)
+def _parse_content(path: Path, content: bytes) -> ParameterSet:
+    return read_parameters(path)
 
 
 def read_content(path: Path) -> tuple[Any, AnyNode | None]:

@@ -6,11 +6,10 @@ Also here: a check for entries of a track file that are outside its track.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from turnout.config.parameters import ParameterSet, read_parameters
+from turnout.config.parameters import ParameterSet, read_parameters, read_unchanged_parameters
 from turnout.errors import ConfigError, SimulationError
 from turnout.installation import shipped_path
 from turnout.simulate.track_file import entries_of_routes, turnout_track
@@ -155,7 +154,7 @@ def load_vehicle(name: str | Path, load: float = 0.5, folder: str | Path | None 
         If the file is not valid.
     """
     path = _find_file(name, folder, "vehicles")
-    parameters = _read_once(path, path.read_bytes()) if path.is_file() else read_parameters(path)
+    parameters = read_unchanged_parameters(path)
     if "compose" not in parameters:
         return train(parameters, load, units)
     parameters.allow_only("name", "title", "compose", "sources")
@@ -165,12 +164,6 @@ def load_vehicle(name: str | Path, load: float = 0.5, folder: str | Path | None 
         vehicles += [vehicle] * entry.count("count", 1)
     combined = couple(str(parameters["name"]), vehicles * units)
     return combined.with_(conditions={"load_share": float(load), "units": int(units)})
-
-
-@lru_cache(maxsize=32)
-def _read_once(path: Path, content: bytes) -> ParameterSet:
-    """``read_parameters``, once for each ``content`` of a file: a visit has few types of train in many passages."""
-    return read_parameters(path)
 
 
 def _find_file(name: str | Path, folder: str | Path | None, subfolder: str) -> Path:

@@ -410,7 +410,7 @@ class Projector:
         -------
         list of (gain, share)
         """
-        found = []
+        gains_and_shares = []
         for first in range(0, len(changes), THRESHOLDS.n_columns_together):
             together = slice(first, first + THRESHOLDS.n_columns_together)
             columns = self._weighted_columns(changes[together])
@@ -419,20 +419,20 @@ class Projector:
             sizes = squares - np.sum(across * (self.normal @ across), axis=0)
             slopes = self.right @ columns - self.shift @ across
             numbers = zip(squares, sizes, slopes, candidates[together], starts[together])
-            found += [_best_gain(square, size, slope, c, k) for square, size, slope, c, k in numbers]
-        return found
+            gains_and_shares += [_best_gain(square, size, slope, c, k) for square, size, slope, c, k in numbers]
+        return gains_and_shares
 
     def _weighted_columns(self, changes: Sequence[Sequence[np.ndarray] | None]) -> np.ndarray:
         """(n, n_change) changes of all observations, whitened and weighted; 0 for those that are None."""
         blocks = []
         for i, o in enumerate(self.joint.observations):
             block = np.zeros((o.data.size, len(changes)))
-            parts = {k: c[i] for k, c in enumerate(changes) if c is not None and c[i].any()}
-            plain = [k for k, part in parts.items() if not isinstance(part, Whitened)]
-            if plain:
-                block[:, plain] = o.whiten(np.column_stack([parts[k] for k in plain]))
-            for k in set(parts) - set(plain):
-                block[:, k] = parts[k]
+            shown = {k: c[i] for k, c in enumerate(changes) if c is not None and c[i].any()}
+            not_white = [k for k, change in shown.items() if not isinstance(change, Whitened)]
+            if not_white:
+                block[:, not_white] = o.whiten(np.column_stack([shown[k] for k in not_white]))
+            for k in set(shown) - set(not_white):
+                block[:, k] = shown[k]
             blocks.append(np.sqrt(o.effective / self.fit.scale[o.data_type]) * block)
         return np.concatenate(blocks)
 

@@ -283,8 +283,9 @@ def _score_from_farther(search: Search, fit: Fit, task: RefitTask, score: Score,
 
         def compute(start_values: dict[str, float] = start_values) -> Fit | None:
             try:
-                sought = search.least_cost_of_interest(fit)
-                return search.fit(candidates, psi, start_values, fit.jacobian, sought_cost=sought).without_jacobian()
+                sought_cost = search.least_cost_of_interest(fit)
+                refit = search.fit(candidates, psi, start_values, fit.jacobian, sought_cost=sought_cost)
+                return refit.without_jacobian()
             except SimulationError:
                 return None
 

@@ -204,12 +204,14 @@ def _values_of_quotient(
         f"time@{aligned.name}": PASSAGE.time_sd,
         f"speed@{aligned.name}": PASSAGE.speed_sd,
     }
-    now: dict[Hashable, float] = {n: values.get(n, 0.0) / sd for n, sd in (predictor.site.common_sds | own_sds).items()}
+    in_units: dict[Hashable, float] = {
+        n: values.get(n, 0.0) / sd for n, sd in (predictor.site.common_sds | own_sds).items()
+    }
     for k, term in enumerate(terms):
         for p in term.parameters if term.effect_type != "channel" else ():
             size = abs(getattr(term, p.name) - p.neutral)
-            now[k, p.name] = np.log(max(size, 1e-12)) / SIMULATION.difference_size
-    return now
+            in_units[k, p.name] = np.log(max(size, 1e-12)) / SIMULATION.difference_size
+    return in_units
 
 
 def _quotient(

@@ -165,8 +165,8 @@ def principal_directions(gram: np.ndarray, least: float) -> np.ndarray:
     factor = np.empty((len(gram), rank), dtype=np.float32)
     factor[order - 1] = np.tril(lower[:, :rank])
     power, vectors = eigh(factor.T @ factor, driver="evd", overwrite_a=True)  # scipy's: half the time of numpy's
-    kept = power > least
-    return factor @ (vectors[:, kept] / np.sqrt(power[kept]))
+    is_kept = power > least
+    return factor @ (vectors[:, is_kept] / np.sqrt(power[is_kept]))
 
 
 def _wave_sds(waves: Waves, radius: float) -> np.ndarray:
