@@ -15,7 +15,7 @@ from turnout.mismatch.turnout.site_model import drop_oldest
 from turnout.mismatch.turnout.wheel_line import has_blade
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable, Iterator, Sequence
+    from collections.abc import Hashable, Iterator, Mapping, Sequence
 
     from turnout.mismatch.engine.case import Nuisance, Observation
     from turnout.mismatch.turnout.passage_observation import AlignedPassage
@@ -176,11 +176,15 @@ def _difference(
 ) -> np.ndarray:
     """Derivative of a passage by one value, to the side that can be simulated.
 
-    It is computed again only where a value that it depends on has moved: half of the simulations of a fit would be
-    those of quotients.
+    It is computed again only where a value that it depends on has moved, in a switch only a common one: there a passage
+    costs three times as much.
     """
-    key = (aligned.name, name, _kinds_of(terms))
-    values_now = _values_of_quotient(predictor, values, terms, aligned)
+    in_switch = is_in_switch(predictor, aligned)
+    paths = tuple(t.name for t in terms if t.effect_type == "path")
+    key = (aligned.name, name, paths if in_switch else _kinds_of(terms))
+    values_now = _in_units_of_reach(values, predictor.site.common_sds)
+    if not in_switch:
+        values_now |= _own_values(values, terms, aligned)
     values_then, column = predictor.differences.get(key, ({}, predicted))
     if any(abs(v - values_then.get(n, np.inf)) > SIMULATION.difference_reach for n, v in values_now.items()):
         column = _quotient(predictor, values, terms, aligned, predicted, name, step)
@@ -194,24 +198,27 @@ def _kinds_of(terms: Terms) -> tuple:
     return tuple(repr(t) if t.effect_type == "channel" else (t.name, tuple(t.supports)) for t in terms)
 
 
-def _values_of_quotient(
-    predictor: Predictor, values: Values, terms: Terms, aligned: AlignedPassage
-) -> dict[Hashable, float]:
-    """Values on which a quotient depends: in prior standard deviations, sizes of effects in fifths of themselves."""
+def _in_units_of_reach(values: Values, sds: Mapping[str, float]) -> dict[Hashable, float]:
+    return {name: values.get(name, 0.0) / sd for name, sd in sds.items()}
+
+
+def _own_values(values: Values, terms: Terms, aligned: AlignedPassage) -> dict[Hashable, float]:
+    """Values of a passage and its effects on which a quotient depends, in the units of ``SIMULATION.difference_reach``.
+
+    Those of the passage in prior standard deviations, logarithms of sizes in units of ``SIMULATION.difference_size``.
+    """
     own_sds = {
         f"wheels_{aligned.train}": TRACK.wheels_sd,
         f"load@{aligned.name}": aligned.passage.load_sd,
         f"time@{aligned.name}": PASSAGE.time_sd,
         f"speed@{aligned.name}": PASSAGE.speed_sd,
     }
-    in_units: dict[Hashable, float] = {
-        n: values.get(n, 0.0) / sd for n, sd in (predictor.site.common_sds | own_sds).items()
-    }
+    own_values = _in_units_of_reach(values, own_sds)
     for k, term in enumerate(terms):
         for p in term.parameters if term.effect_type != "channel" else ():
             size = abs(getattr(term, p.name) - p.neutral)
-            in_units[k, p.name] = np.log(max(size, 1e-12)) / SIMULATION.difference_size
-    return in_units
+            own_values[k, p.name] = np.log(max(size, 1e-12)) / SIMULATION.difference_size
+    return own_values
 
 
 def _quotient(
