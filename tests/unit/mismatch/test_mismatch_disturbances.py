@@ -1,11 +1,15 @@
 """A source that no train carries with it: quiet stretches are compared with wheels equally far away."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from turnout.mismatch.turnout import TrackCase
+from turnout.mismatch.turnout import case as cases
 from turnout.mismatch.turnout.disturbances import Disturbance, disturbances, independent_of_trains
+from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 
 RATE, DURATION, SPAN, SENSORS = 2000.0, 4.0, 20.0, (0.0, 2.0, 4.0, 6.0)
 
@@ -86,3 +90,22 @@ def test_one_passage_that_is_louder_after_its_train_shows_no_source_of_its_own()
     assert len(independent_of_trains([event("after", 5.0), event("after", 5.0, "re")])) == 2
     assert len(independent_of_trains([event("after", 11.0), event("after", 12.0, name="p2")])) == 2
     assert independent_of_trains([event("after", 5.0, ""), event("after", 5.0, "", "p2")])  # trains without a name
+
+
+def test_a_case_is_disturbed_only_by_a_source_that_no_train_carries(monkeypatch):
+    """Both passages are left out of the fit; the answer rests on them only if two trains show the source."""
+    campaign = measured_campaign(small_plan((15.0,), hammer_positions=(24.0,)), (), 3)
+    case_data = cases.case_data
+
+    def disturbed_by(*trains):
+        events = tuple(Disturbance(f"p{k}", "after", 5.0, 1e-9, train) for k, train in enumerate(trains))
+
+        def with_disturbances(*arguments):
+            data, predictor = case_data(*arguments)
+            return replace(data, disturbed=events), predictor
+
+        monkeypatch.setattr(cases, "case_data", with_disturbances)
+        return [e.name for e in TrackCase(campaign).disturbed_recordings]
+
+    assert disturbed_by("ic3", "ic3") == []
+    assert disturbed_by("ic3", "re") == ["p0", "p1"]
