@@ -239,7 +239,7 @@ class Thresholds:
         0.1, "largest steps", "the least distance from neutral, the third of these scales", "numerical"
     )
     promise_factor: float = threshold(
-        3.0, "promises", "that further steps may gain: a fit ends if that is less than what is sought", FITS
+        5.0, "promises", "that further steps may gain: a fit ends if that is less than what is sought", FITS
     )
     max_dense_size: int = threshold(
         128, "samples", "of an observation whose errors are whitened by one dense matrix: a receptance", "numerical"
