@@ -83,7 +83,7 @@ def efficiency(folder, case, truth, rows):
     if truth["pattern"] == START:
         steps = [c for c in candidates if not c.grows]
         history = estimate_history(parameters, ideal, events, accepted=None)
-        gains, price = evidence_from_first(parameters, history, steps)[0], np.log(len(steps))
+        gains, price = evidence_from_first(history, steps)[0], np.log(len(steps))
         by_effect, levels = list(zip(steps, gains)), None
     else:
         explained = [Event(v.time, {}, c, 1.0) for v, c in zip(visits, changes) if c]

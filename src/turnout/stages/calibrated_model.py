@@ -489,9 +489,7 @@ def calibrate_turnout(
     local = further_candidates(accepted, parameters, change_candidates(parameters, directions, without))
     candidates = [*local, *further_candidates(accepted, parameters, candidates_under_load(parameters, without))]
     against_file = without_accepted(accepted, parameters, events, local)
-    deviations = deviations_from_file(
-        history.belief, against_file[0], dict(CALIBRATION.least_sizes), intolerable=INTOLERABLE
-    )
+    deviations = deviations_from_file(history, against_file[0], dict(CALIBRATION.least_sizes), intolerable=INTOLERABLE)
     answers = answers_after_visits(
         parameters,
         informed,

@@ -95,7 +95,7 @@ def test_an_error_of_the_model_is_no_deviation_from_the_file():
         y = rng.normal(0.0, 0.1, 9) + rng.normal(0.0, 0.04, 9)
         group = GroupInformation("A: impacts at 1.20 m", 1, NAMES, np.eye(9) / 0.01**2, y / 0.01**2)
         history = estimate_history(SUPPORTS, [VisitInformation("v0", 0.0, (group,))], [error], accepted=None)
-        counts[True] += bool(deviations_from_file(history.belief, SUPPORTS, {"ballast": 0.2}))
+        counts[True] += bool(deviations_from_file(history, SUPPORTS, {"ballast": 0.2}))
         # as if the file's scatter were all there is
         small = abs(history.belief.mean) > 3.0 * history.belief.sd
         counts[False] += bool(np.any(small & (abs(history.belief.mean) > 0.2)))
@@ -108,7 +108,7 @@ def test_a_deviation_beyond_scatter_and_error_of_the_model_is_stated_with_both()
     group = GroupInformation("A: impacts at 1.20 m", 1, NAMES, np.eye(9) / 0.01**2, y / 0.01**2)
     visit = VisitInformation("v0", 0.0, (group,))
     history = estimate_history(SUPPORTS, [visit], [model_error(SUPPORTS)], accepted=None)
-    (found,) = deviations_from_file(history.belief, SUPPORTS, {"ballast": 0.2})
+    (found,) = deviations_from_file(history, SUPPORTS, {"ballast": 0.2})
     assert found.names == (NAMES[4],) and found.size == pytest.approx(-0.9, abs=0.02)
     assert found.sd == pytest.approx(np.hypot(0.04, 0.01), rel=0.02)
     assert found.ordinary_sd == pytest.approx(np.sqrt(0.1**2 + 0.04**2 - 0.01**2), rel=0.01)

@@ -66,7 +66,7 @@ def file_answer(
     history = estimate_history(parameters, visits, events, accepted=None)
     price = float(np.log(max(len(steps), 1)))
     least = threshold + price
-    gains, sizes, sds = evidence_from_first(parameters, history, steps)
+    gains, sizes, sds = evidence_from_first(history, steps)
     order = [
         k for k in np.argsort(-gains) if gains[k] > least - margin and abs(sizes[k]) >= least_size(steps[k], by_name)
     ]
@@ -112,7 +112,7 @@ def _deviation_answer(
     by_name = {p.name: p for p in parameters}
     groups = {by_name[c.name].group for c in candidates if c.name in by_name}
     least = {g: size for g, size in CALIBRATION.least_sizes if g in groups}
-    deviations = deviations_from_file(history.belief, parameters, least, intolerable=INTOLERABLE)
+    deviations = deviations_from_file(history, parameters, least, intolerable=INTOLERABLE)
     if not deviations:
         if jump is None or jump.is_expected:
             return ModelAnswer(visit, FILE, "none")

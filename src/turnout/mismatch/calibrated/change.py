@@ -114,17 +114,8 @@ def compare_onsets(history: History, effects: Sequence[ChangeEffect]) -> list[On
     grows = np.array([e.grows for e in effects])
     information, score = (np.zeros((len(steps), len(effects))) for _ in range(2))
     for j in range(len(steps)):
-        absorbed = np.zeros_like(directions)
-        for step in steps[j:]:
-            elapsed = np.where(grows & (j > 0), step.time - steps[j - 1].time, 1.0)
-            missing = elapsed * directions - absorbed
-            seen = step.matrix @ missing
-            nu = step.vector - step.matrix @ step.predicted.mean
-            gained = step.belief.covariance @ seen if step.is_used else _updated_covariance(step) @ seen
-            information[j] += np.sum(missing * seen, axis=0) - np.sum(seen * gained, axis=0)
-            score[j] += nu @ missing - nu @ gained
-            if step.is_used:
-                absorbed = absorbed + gained
+        courses = [np.where(grows & (j > 0), step.time - steps[j - 1].time, 1.0) for step in steps[j:]]
+        information[j], score[j] = information_and_score(steps[j:], directions, courses)
     times = np.array([s.time for s in steps])
     duration = np.where(grows, np.concatenate([[1.0], times[-1] - times[:-1]])[:, None], 1.0)  # (n_visit, n_effect)
     precision = (duration / np.array([e.sd for e in effects])) ** 2
@@ -140,6 +131,36 @@ def compare_onsets(history: History, effects: Sequence[ChangeEffect]) -> list[On
         if not is_too_early[:, k].all()
     ]
     return sorted(evidence, key=lambda e: -e.gain)
+
+
+def information_and_score(
+    steps: Sequence[Step], directions: np.ndarray, courses: Sequence[np.ndarray | float]
+) -> tuple[np.ndarray, np.ndarray]:
+    """A and b of ``compare_onsets``, of effects that begin with the first of these steps.
+
+    Parameters
+    ----------
+    steps : sequence of Step
+    directions : (n_parameter, n_effect) array of float
+    courses : sequence of (n_effect,) array of float, or of float
+        Size at each step.
+
+    Returns
+    -------
+    information, score : (n_effect,) array of float
+    """
+    information, score = np.zeros((2, directions.shape[1]))
+    absorbed = np.zeros_like(directions)
+    for step, course in zip(steps, courses, strict=True):
+        missing = course * directions - absorbed
+        seen = step.matrix @ missing
+        nu = step.vector - step.matrix @ step.predicted.mean
+        gained = (step.belief.covariance if step.is_used else _updated_covariance(step)) @ seen
+        information += np.sum(missing * seen, axis=0) - np.sum(seen * gained, axis=0)
+        score += nu @ missing - nu @ gained
+        if step.is_used:
+            absorbed = absorbed + gained
+    return information, score
 
 
 def _updated_covariance(step: Step) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import stats
 
 from turnout.mismatch.calibrated.belief import Belief, StateParameter
-from turnout.mismatch.calibrated.change import ChangeEffect
+from turnout.mismatch.calibrated.change import ChangeEffect, direction_of, information_and_score
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.history import BEFORE_ALL, Event, History
 
@@ -89,7 +89,7 @@ def track_sds(belief: Belief, parameters: Sequence[StateParameter]) -> np.ndarra
 
 
 def deviations_from_file(
-    belief: Belief,
+    history: History,
     parameters: Sequence[StateParameter],
     least_sizes: Mapping[str, float],
     sds: float = CALIBRATION.finding_sds,
@@ -101,15 +101,15 @@ def deviations_from_file(
     see ``model_error``. With the difference :math:`d = m - m_0` of the belief from the file, the mean over a run of
     components is tested three times. It must be as large as the least size of the group. It must be ``sds`` times its
     standard deviation, with the covariance :math:`P + E`. And it must be larger than intact components leave: there
-    :math:`d` has the covariance :math:`P_0 + E - P`, with the two-sided chance of ``sds`` standard deviations over all
-    runs of the group.
+    :math:`d` has the covariance :math:`P_0 + E + Q - P`, with the two-sided chance of ``sds`` standard deviations over
+    all runs of the group. Q is what values have gained since the first visit, as tamping moves each support.
 
     Parameters
     ----------
-    belief : Belief
-        After all visits.
+    history : History
+        Of all visits.
     parameters : sequence of StateParameter
-        Those of the belief, in its order.
+        Those of the history, in its order.
     least_sizes : mapping
         Group -> least size that causes any action, in the unit of the group. Other groups are not compared.
     sds : float
@@ -123,8 +123,8 @@ def deviations_from_file(
     list of Deviation
         No component is in two of them.
     """
-    prior, error = Belief.of_file(parameters), np.diag(model_error_sds(parameters) ** 2)
-    ordinary = prior.covariance + error - belief.covariance
+    prior, error, belief = Belief.of_file(parameters), np.diag(model_error_sds(parameters) ** 2), history.belief
+    ordinary = prior.covariance + error + history.gained - belief.covariance
     difference = belief.mean - prior.mean
     deviations: list[Deviation] = []
     for group, least_size in least_sizes.items():
@@ -174,17 +174,13 @@ def _deviation(run: Sequence[StateParameter], size: float, sd: float, ordinary_s
     return Deviation(run[0].group, tuple(p.name for p in run), size, sd, ordinary_sd, ends, run[0].unit)
 
 
-def evidence_from_first(
-    parameters: Sequence[StateParameter], history: History, candidates: Sequence[ChangeEffect]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    r"""Evidence of effects that were there from the first visit, over the values of the file with their scatter.
+def evidence_from_first(history: History, candidates: Sequence[ChangeEffect]) -> tuple[np.ndarray, ...]:
+    """Evidence of effects that were there from the first visit, over the values of the file with their scatter.
 
-    With the information of all visits, :math:`\Lambda = P^{-1} - P_0^{-1}`, it is that of ``compare_onsets`` for one
-    visit.
+    It is that of ``compare_onsets`` with the first visit as the onset, also of a single visit.
 
     Parameters
     ----------
-    parameters : sequence of StateParameter
     history : History
     candidates : sequence of ChangeEffect
         Whether they grow makes no difference.
@@ -193,19 +189,8 @@ def evidence_from_first(
     -------
     gains, sizes, sds : (n_candidate,) array of float
     """
-    names = [p.name for p in parameters]
-    prior, belief = history.prior, history.belief
-    factor = np.linalg.cholesky(prior.covariance)
-    precision = np.linalg.inv(belief.covariance)
-    score = precision @ (belief.mean - prior.mean)  # information vector about the mean of the file
-    scaled = factor.T @ precision @ factor - np.eye(len(names))
-    eigenvalues, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
-    informed = eigenvalues > CALIBRATION.min_prior_share  # not what an event made less certain than the file
-    w, vectors = eigenvalues[informed], vectors[:, informed]
-    changes = np.array([[c.direction.get(name, 0.0) for name in names] for c in candidates])
-    directions = np.linalg.solve(factor, changes.T).T @ vectors
-    information = directions**2 @ (w / (1.0 + w))
-    b = directions @ (vectors.T @ (factor.T @ score) / (1.0 + w))
+    directions = np.column_stack([direction_of(history, c) for c in candidates])
+    information, score = information_and_score(history.steps, directions, [1.0] * len(history.steps))
     variance = np.array([c.sd**2 for c in candidates])
-    sizes, sds = b / (information + 1.0 / variance), 1.0 / np.sqrt(information + 1.0 / variance)
-    return 0.5 * b * sizes - 0.5 * np.log1p(variance * information), sizes, sds
+    sizes, sds = score / (information + 1.0 / variance), 1.0 / np.sqrt(information + 1.0 / variance)
+    return 0.5 * score * sizes - 0.5 * np.log1p(variance * information), sizes, sds

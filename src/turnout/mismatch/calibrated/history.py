@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
@@ -63,6 +64,14 @@ class History:
     def belief(self) -> Belief:
         """Belief after the last visit; that of the file without any."""
         return self.steps[-1].belief if self.steps else self.prior
+
+    @property
+    def gained(self) -> np.ndarray:
+        """(n, n) covariance that values have gained since the first visit, by their random walk and recorded work."""
+        noise = np.zeros_like(self.prior.covariance)
+        for before, step in pairwise(self.steps):
+            noise = noise + step.predicted.covariance - before.belief.covariance
+        return noise
 
     @property
     def used_steps(self) -> tuple[Step, ...]:

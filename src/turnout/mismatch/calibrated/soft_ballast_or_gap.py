@@ -122,7 +122,7 @@ def evidence_of_gap(
         if is_change:
             gains = np.array([e.gain for e in compare_onsets(history, effects)])
         else:
-            gains = evidence_from_first(all_parameters, history, effects)[0]
+            gains = evidence_from_first(history, effects)[0]
         evidence[name] = float(np.logaddexp.reduce(gains) - np.log(len(effects)))
     return evidence[GAP] - evidence[SOFT]
 
