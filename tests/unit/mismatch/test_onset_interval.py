@@ -55,14 +55,16 @@ def test_growth_that_begins_just_before_a_visit_is_not_dated_after_it(start):
         assert low <= start <= high
 
 
-def test_only_the_last_visit_shows_a_step_as_growth_from_the_visit_before():
-    """Both fit alike, whatever their size: their prior is that of the change at the last visit."""
+@pytest.mark.parametrize("size", [0.5, 5.0])
+def test_what_only_the_last_visit_shows_is_a_step_whatever_its_size(size):
+    """Growth from the visit before is the same. The prior of a step is that of the change, not of a rate."""
     effects = [ChangeEffect("f", EFFECT.direction, EFFECT.sd, grows) for grows in (False, True)]
-    for size in (0.5, 5.0):
-        shown = history(np.random.default_rng(1), lambda time, s=size: -s * (time > 1.9))
-        step, grown = sorted(compare_onsets(shown, effects), key=lambda e: e.effect.grows)
-        assert step.gains[-1] == pytest.approx(grown.gains[-1], abs=1e-9)
-        assert step.sizes[-1] == pytest.approx(grown.sizes[-1] * (TIMES[-1] - TIMES[-2]), rel=1e-9)
+    shown = history(np.random.default_rng(1), lambda time: -size * (time > 1.9))
+    first, second = compare_onsets(shown, effects)
+    assert not first.effect.grows and first.onset == "v3"
+    assert second.gains[-1] == -np.inf and first.gain > second.gain + 3.0
+    two_visits = history(np.random.default_rng(1), lambda time: -size * (time > 0.0), TIMES[:2])
+    assert [e.effect for e in compare_onsets(two_visits, effects)] == [effects[0]]
 
 
 def test_a_change_has_two_visits_and_begins_after_an_accepted_one():

@@ -84,7 +84,8 @@ def compare_onsets(history: History, effects: Sequence[ChangeEffect]) -> list[On
               A = \sum_v e_v^T (\Lambda_v - \Lambda_v P_v \Lambda_v) e_v, \quad
               b = \sum_v e_v^T (\nu_v - \Lambda_v P_v \nu_v)
 
-    which equals the logarithm of the ratio of the probabilities of all data with and without the effect.
+    which equals the logarithm of the ratio of the probabilities of all data with and without the effect. Growth that
+    only the last visit shows is the step there, and counted as that.
 
     Parameters
     ----------
@@ -123,12 +124,13 @@ def compare_onsets(history: History, effects: Sequence[ChangeEffect]) -> list[On
     gains = 0.5 * score * sizes - 0.5 * np.log1p(information / precision)
     sds = 1.0 / np.sqrt(information + precision)
     visits = tuple(s.visit for s in steps)
-    is_too_early = times[:-1, None] < np.array([e.not_before for e in effects])  # (n_visit - 1, n_effect)
-    gains[1:][is_too_early] = -np.inf
+    is_excluded = times[:-1, None] < np.array([e.not_before for e in effects])  # (n_visit - 1, n_effect)
+    is_excluded[-1] |= grows
+    gains[1:][is_excluded] = -np.inf
     evidence = [
         OnsetEvidence(e, visits, times, gains[1:, k], sizes[1:, k], sds[1:, k], float(gains[0, k]))
         for k, e in enumerate(effects)
-        if not is_too_early[:, k].all()
+        if not is_excluded[:, k].all()
     ]
     return sorted(evidence, key=lambda e: -e.gain)
 
