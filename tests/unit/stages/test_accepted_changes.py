@@ -192,9 +192,13 @@ def test_a_night_after_the_acceptance_names_nothing_and_after_its_withdrawal_the
         soft = (lambda track: (physics.LocalBallast(track.nearest_support(small.SLEEPER), 0.4),)) if k > 1 else None
         small.strike(tmp_path, soft, day=datetime.fromisoformat(f"{day}T09:00"), seed=10 * k)
     before, model = row_of_night(), calibrate_turnout("t1")
-    assert before["verdict"] == "a_or_b" and before["position_m"] == 18.0
+    assert (before["verdict"], before["term"], before["position_m"]) == ("named", "local_ballast", 18.0)
+    either = {"verdict": "a_or_b", "rival_term": "hanging_sleeper"}  # which is accepted with --anyway alone
     register([], tmp_path / "registry", read=iter, tables={"turnouts": [{"turnout_id": "t1", "layout": "small"}]})
-    publish(tmp_path / "registry", {"change_findings": [{**before, "found_at_utc": pd.Timestamp("2026-05-01T23:59")}]})
+    publish(
+        tmp_path / "registry",
+        {"change_findings": [{**before, **either, "found_at_utc": pd.Timestamp("2026-05-01T23:59")}]},
+    )
     command = ["diagnose", "--turnout", "t1", "--registry", "registry", "--accept", "--finding", "A, B"]
     assert main(command) != 0 and not (tmp_path / "config/tracks/t1.yaml").exists()
     assert main([*command, "--anyway"]) == 0
@@ -206,7 +210,7 @@ def test_a_night_after_the_acceptance_names_nothing_and_after_its_withdrawal_the
     after = row_of_night()
     assert after["verdict"] == "none" and f"accepted before: {change.words}" in after["sentence"]
     accepted = calibrate_turnout("t1")
-    assert [(a.question, a.verdict) for a in model.answers] == [("change", "a_or_b"), ("file", "none")]
+    assert [(a.question, a.verdict) for a in model.answers] == [("change", "named"), ("file", "none")]
     assert [(a.question, a.verdict) for a in accepted.answers] == [("change", "none"), ("file", "none")]
     assert len(accepted.history.used_steps) == len(DAYS) > len(model.history.used_steps)
     number = [p.name for p in accepted.history.parameters].index("ballast@18.00")
