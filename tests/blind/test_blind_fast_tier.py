@@ -29,8 +29,13 @@ def held(repository):
     return read_archive(folder)
 
 
-def test_all_forty_seals_hold_and_all_effects_follow_from_the_seed(held):
-    truths = verify_archive(held)
+@pytest.fixture(scope="module")
+def truths(held):
+    """Truths by case, every seal of which holds."""
+    return verify_archive(held)
+
+
+def test_all_forty_seals_hold_and_all_effects_follow_from_the_seed(truths):
     strata = [t["stratum"] for t in truths.values()]
     assert len(truths) == 40
     assert {s: strata.count(s) for s in set(strata)} == {
@@ -39,14 +44,14 @@ def test_all_forty_seals_hold_and_all_effects_follow_from_the_seed(held):
     assert len({t["nonce"] for t in truths.values()}) == 40
 
 
-def test_rungs_of_the_ladders_show_more_and_more(held):
+def test_rungs_of_the_ladders_show_more_and_more(truths):
     """Of the singles kept: what the generator says is to be seen grows with the rung, over all kinds together."""
-    single = [t for t in verify_archive(held).values() if t["stratum"] == "single"]
+    single = [t for t in truths.values() if t["stratum"] == "single"]
     rungs = [t["effects"][0]["rung"] for t in single]
     seen = [max(t["visible"].values()) for t in single]
     ranks = [np.argsort(np.argsort(v)) for v in (rungs, seen)]
     assert np.corrcoef(*ranks)[0, 1] > 0.3
-    assert all(max(t["visible"].values()) == 0.0 for t in verify_archive(held).values() if not t["effects"])
+    assert all(max(t["visible"].values()) == 0.0 for t in truths.values() if not t["effects"])
 
 
 def archives_as_sealed():
@@ -87,11 +92,10 @@ def test_the_tool_names_nothing_in_the_blows_of_a_control(again):
     assert answers and not [a.names for a in answers if a.verdict == "named"]
 
 
-def test_kept_answers_are_scored_with_their_truths(held):
+def test_kept_answers_are_scored_with_their_truths(held, truths):
     """Where the tool has spoken: every figure can be had from the kept set alone, and no row is lost."""
     if held["diagnosis"] is None:
         pytest.skip("no tool has spoken about the kept set yet: turnout blind diagnose, reveal, keep")
-    truths = verify_archive(held)
     judged = [judge(truths[c], answers_of(held["rows"][c])) for c in truths if c in held["diagnosis"]["cases"]]
     found = {f.name: f for f in figures(judged)}
     assert sum(isinstance(f, Share) for f in found.values()) >= 15

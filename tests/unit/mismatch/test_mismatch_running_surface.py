@@ -143,16 +143,25 @@ def test_priors_are_those_of_the_track_file(tmp_path):
     assert {type(part).__name__: spread for part, spread in found.items()} == expected
 
 
+@pytest.fixture(scope="module")
+def case(campaign):
+    return TrackCase(campaign)
+
+
+@pytest.fixture(scope="module")
+def certain(campaign):
+    """The same recordings with the numbers of the file for certain."""
+    return TrackCase(replace(campaign, turnout=replace(FILED, spreads={})))
+
+
 @pytest.mark.slow
-def test_a_rough_search_finds_the_nose_from_where_no_straight_step_does(campaign):
+def test_a_rough_search_finds_the_nose_from_where_no_straight_step_does(campaign, case, certain):
     """0.4 m further, 10 ms at 40 m/s: more than a period at 112 Hz. The search is to come within a tenth of the
     shortest wave of 30 Hz of the truth, and all trains look like themselves then."""
-    case = TrackCase(campaign)
     found = {u.name: u.value_at(case.start_values[u.name]) for u in case.predictor.surface.parameters}
     assert abs(found["surface_0_place"] - TRUE.place) < 0.1
     assert found["surface_0_depth"] == pytest.approx(TRUE.depth, rel=0.3)
     assert len(case.aligned_passages) == len(PLAN.trains) and not case.data.unmatched
-    certain = TrackCase(replace(campaign, turnout=replace(FILED, spreads={})))
     assert not set(found) & set(certain.start_values)
     standing = AcceptedEffect(
         "local_pad", {"sleeper": 24.0}, {"factor": (0.7, 0.05)}
@@ -162,10 +171,9 @@ def test_a_rough_search_finds_the_nose_from_where_no_straight_step_does(campaign
 
 
 @pytest.mark.slow
-def test_a_nose_within_its_prior_is_found_as_it_is_and_leaves_what_a_sound_track_leaves(campaign):
+def test_a_nose_within_its_prior_is_found_as_it_is_and_leaves_what_a_sound_track_leaves(case, certain):
     """Place, depth and length of the true nose lie within two standard errors; with the file's numbers for certain
     the same recordings are left with five times as much, and the answer was a dip."""
-    case = TrackCase(campaign)
     fit = fit_jointly(case, iterations=15)
     told = {(t["term"], t["name"]): t for t in surface_estimates(case, fit)}
     for field in ("place", "depth", "length"):
@@ -175,8 +183,8 @@ def test_a_nose_within_its_prior_is_found_as_it_is_and_leaves_what_a_sound_track
     half = 0.5 * SPREADS[NOSE]["depth"] * NOSE.depth  # of what the file leaves open
     assert depth["filed"] == NOSE.depth and depth["se"] < half
     assert ("running_surface_dip", "depth") not in told  # 3.5 m before the free waves: nothing here tells its depth
-    certain = fit_jointly(TrackCase(replace(campaign, turnout=replace(FILED, spreads={}))), iterations=15)
-    assert certain.level["passage"] > 5.0 * fit.level["passage"]
+    fit_of_the_file = fit_jointly(certain, iterations=15)
+    assert fit_of_the_file.level["passage"] > 5.0 * fit.level["passage"]
     assert fit.level["passage"] < case.control_level["passage"]
 
 
