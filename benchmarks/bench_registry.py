@@ -25,6 +25,7 @@ SHARE = float(os.environ.get("TURNOUT_BENCH_SHARE", "1"))
 QUICK_QUESTIONS = ("one section, all its campaigns", "network ranked by 90-day slope")
 OLDER_DUCKDB = "1.5.5"
 REGISTER = (
+    "from turnout.arrow_memory import use_system_allocator; use_system_allocator();"
     "import sys, glob, time, resource; from turnout.registry.job import register;"
     "from turnout.workflow.batches import read_results; b = sorted(glob.glob(sys.argv[1] + '/*.parquet'));"
     "t = time.process_time(); d = register(b, sys.argv[2], read=read_results); c = time.process_time() - t;"
