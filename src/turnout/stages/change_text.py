@@ -1,0 +1,91 @@
+"""The finding of an open alarm in one sentence: what, where, since when, and what the trains say."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from turnout.constants import Z95
+
+
+def sentence_of(row: Mapping[str, Any]) -> str:
+    """The finding in one sentence, every value with its interval and the number of recordings.
+
+    Parameters
+    ----------
+    row : mapping
+        Row of ``change_findings``; without "trains_visit" no train tells of it.
+
+    Returns
+    -------
+    str
+    """
+    basis = f"{row['n_recordings']} hammer tests of {row['n_visits']} visits"
+    if row["verdict"] == "none":
+        least = "at least two visits are needed" if row["n_visits"] < 2 else "no effect at any support has the evidence"
+        return f"{basis} name no change: {least}"
+    position = "" if row["position_m"] is None else f" at {row['position_m']:.1f} m"
+    if row.get("first_m") != row.get("last_m"):
+        position = f" from {row['first_m']:.1f} to {row['last_m']:.1f} m"
+    if row["verdict"] == "unknown":
+        since = _since_words(row)
+        return (
+            f"something has changed{position}{since and f', {since}'}, and no effect of a support explains it ({basis})"
+        )
+    names = " or ".join(n.replace("_", " ") for n in (row["term"], row["rival_term"]) if n)
+    words = f"{names}{position}: {_change_words(row)}{_parameter_words(row)}, {_since_words(row)}; {basis}"
+    if row.get("trains_visit") is None:
+        return f"{words}; no train since then tells more"
+    return words + _train_words(row)
+
+
+def _since_words(row: Mapping[str, Any]) -> str:
+    if row.get("onset_by_utc") is None:
+        return ""
+    return f"since {row['onset_after_utc']:%Y-%m-%d} to {row['onset_by_utc']:%Y-%m-%d} (95 %)"
+
+
+def _change_words(row: Mapping[str, Any]) -> str:
+    """Size of the change as impacts feel it, with its 95 % interval."""
+    half, per_year = Z95 * row["change_se"], " a year" if row["grows"] else ""
+    value, low, high = row["change"], row["change"] - half, row["change"] + half
+    if row["component"] is None:
+        return f"change {value:+.3g} ({low:+.3g} to {high:+.3g}, 95 %) {row['change_unit']}{per_year}"
+    value, low, high = (100.0 * float(np.expm1(end)) for end in (value, low, high))
+    what = f"stiffness of the {row['component']} under impacts"
+    return f"{what} {value:+.0f} % ({low:+.0f} to {high:+.0f}, 95 %){per_year}"
+
+
+def _parameter_words(row: Mapping[str, Any]) -> str:
+    """Size of the effect under trains with its 95 % interval, "" if they do not name it; a share by its meaning."""
+    from turnout.stages.mismatch_text import interval, number_in_words, parameter_in_words
+
+    words = ""
+    for p in json.loads(row.get("parameters_json") or "[]"):
+        low, high = interval(p["term"], p["name"], p["value"], p["se"])
+        value, low_end, high_end = (number_in_words(v, p["unit"]) for v in (p["value"], low, high))
+        name = parameter_in_words(p["term"], p["name"]).rpartition(": ")[2] if p["unit"] == "-" else p["name"]
+        words += f", {name} {value} ({low_end} to {high_end}, 95 %)"
+    return words
+
+
+def _train_words(row: Mapping[str, Any]) -> str:
+    """What the trains decide, and the fit on those held out."""
+    n = row["n_held_out"] or 0
+    fit = ""
+    if n and row["fit_before_pct"] is not None and row["fit_after_pct"] is not None:
+        se = (
+            ""
+            if row["fit_gain_se_pct"] is None
+            else f" (standard error of the difference {row['fit_gain_se_pct']:.1f})"
+        )
+        before, after = row["fit_before_pct"], row["fit_after_pct"]
+        fit = f"; {n} held-out trains fit by {before:.1f} % without it, {after:.1f} % with it{se}"
+    if row["trains_verdict"] == "named":
+        return f"; trains of {row['trains_visit']} name {row['trains_term'].replace('_', ' ')}{fit}"
+    if row["trains_verdict"] == "a_or_b":
+        return f"; trains of {row['trains_visit']} fit either{fit}"
+    return f"; trains of {row['trains_visit']} do not decide ({row['trains_verdict']}){fit}"
