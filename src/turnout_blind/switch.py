@@ -29,6 +29,8 @@ GRAVITY = 9.81
 PLANED_SHARE = 0.55  # mass and bending of the planed toe over those of the full section
 BLADE_POWER, STOCK_POWER = 1.3, 1.8  # exponents of both tops; the owner's file has others
 ONLY_BLADE = 0.25  # length behind the planed part from which wheels cannot touch the stock rail [m]
+FIRST_CHAIR = 0.2  # no chair lies nearer behind the toe: its force is spread over the nodes about it [m]
+BESIDE_SUPPORT = 0.07  # a toe this near behind a bearer would count as on it [m]
 WHEEL_DEPTH_SPREAD, WHEEL_SHIFT = 0.1, 0.03  # each wheel sinks differently and changes elsewhere [-, m]
 
 
@@ -160,13 +162,42 @@ class TrueBlade:
         return np.array([f * self.switch.stock_top(x - shift) for f, shift in wheels]), np.tile(top, (n, 1))
 
 
-def draw_switch(rng: np.random.Generator) -> tuple[Switch, Switch]:
+def clear_of_bearers(toe: float, bearers: np.ndarray) -> float:
+    """The toe, moved by up to a third of a bay so that every bearer behind it has a chair.
+
+    Parameters
+    ----------
+    toe : float
+        Drawn position. [m]
+    bearers : (n,) array of float
+        Positions of the bearers. [m]
+
+    Returns
+    -------
+    float
+        [m]
+
+    Examples
+    --------
+    >>> [round(clear_of_bearers(toe, np.array([2.4, 3.0, 3.6])), 2) for toe in (2.42, 2.6, 2.9, 3.0)]
+    [2.47, 2.6, 2.79, 2.79]
+    """
+    behind = bearers[bearers >= toe]
+    if behind.size and behind[0] - toe <= FIRST_CHAIR:
+        return float(behind[0] - FIRST_CHAIR - 0.01)
+    before = bearers[bearers < toe]
+    return max(toe, float(before[-1]) + BESIDE_SUPPORT) if before.size else toe
+
+
+def draw_switch(rng: np.random.Generator, bearers: np.ndarray) -> tuple[Switch, Switch]:
     """Switch with its heel and the change of the wheels near the sensors, which lie from 2 to 9 m.
 
     Parameters
     ----------
     rng : Generator
         Source of the random numbers.
+    bearers : (n,) array of float
+        Positions of the bearers. [m]
 
     Returns
     -------
@@ -174,7 +205,7 @@ def draw_switch(rng: np.random.Generator) -> tuple[Switch, Switch]:
         True and nominal switch.
     """
     heel, length = float(rng.uniform(7.2, 8.0)), float(rng.uniform(2.2, 3.0))
-    toe = heel - float(rng.uniform(4.6, 5.8))
+    toe = clear_of_bearers(heel - float(rng.uniform(4.6, 5.8)), bearers)
     chair, damping = float(rng.uniform(2e8, 4e8)), float(rng.uniform(1.5e4, 3.5e4))
     true = Switch(
         toe, heel, float(rng.uniform(12e-3, 18e-3)), length, toe + float(rng.uniform(0.3, 0.8)),
@@ -205,7 +236,7 @@ def add_switch(rng: np.random.Generator, world: World, switch: Switch, trains: M
     trains : mapping
         Trains by name.
     """
-    supports = np.flatnonzero(world.position > switch.toe + 0.2)
+    supports = np.flatnonzero(world.position > switch.toe + FIRST_CHAIR)
     n = supports.size
     gap = np.where(world.position[supports] < switch.heel, 0.0, -1.0)
     stiffness = switch.chair * np.exp(0.08 * rng.normal(size=n))

@@ -127,3 +127,18 @@ def test_histories_of_switch_panels_have_its_effects_and_grow(tmp_path):
     assert truth["severities"] == [1.0, 1.0] and truth["visible"][0]["passage_pct"] > 1.0
     assert "slide" not in (tmp_path / "site" / "config" / "tracks" / "site.yaml").read_text()
     assert len([*(tmp_path / "site" / "raw").rglob("passages/*.npz")]) == 2
+
+
+def test_every_bearer_that_the_file_puts_under_the_blade_has_a_chair_in_the_generator():
+    """A toe less than 0.2 m before a bearer left it without a chair, which is a defect that no truth mentions."""
+    positions = np.arange(-45.0, 57.0, 0.6)
+    rail = Rail(6.378e6, 60.2, 2.435e8, 0.2384, 4000.0)
+    values = [SUPPORTS[name] for name in ("pad", "pad_damping", "mass", "ballast", "ballast_damping")]
+    plain = Track(rail, positions, *values, end_length=9.0, end_damping=400.0)
+    for seed in range(300):
+        true, nominal = module.draw_switch(np.random.default_rng(seed), positions)
+        assert true.toe == nominal.toe and 4.5 < true.heel - true.toe < 6.1
+        blade = Blade(round(nominal.toe, 5), round(nominal.heel, 5), 36.0, rail, nominal.chair, nominal.chair_damping)
+        chairs = blade.chairs(plain.with_(blade=blade))
+        behind = np.flatnonzero(positions > true.toe + module.FIRST_CHAIR)
+        assert chairs[0] == behind[0], (seed, true.toe)
