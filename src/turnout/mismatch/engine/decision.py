@@ -20,11 +20,11 @@ from turnout.mismatch.engine.decision_facts import (
     NameEvidence,
     NumericalError,
     ReservedEvidence,
-    SearchLimit,
     ToleratedEvidence,
     UnprovenEvidence,
 )
 from turnout.mismatch.engine.rule import Rule, first_applicable
+from turnout.mismatch.engine.search_limit import SearchLimit
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.mismatch.engine.verdict import Verdict, calibrate, posterior, swap_with_unknown
 
@@ -258,3 +258,23 @@ def confirm(
         reasons = (first.reason, rule.reason_for(evidence))
         first = replace(first, grade="B", reason="; ".join(r for r in reasons if r))
     return (first.after(rule), *further)
+
+
+def unfinished_verdict(limit: SearchLimit, settings: MismatchSettings) -> Verdict:
+    """The verdict of a search that was not finished.
+
+    Parameters
+    ----------
+    limit : SearchLimit
+        What the search has cost.
+    settings : MismatchSettings
+
+    Returns
+    -------
+    Verdict
+        "unknown", with the reason.
+    """
+    rule = first_applicable(LIMIT_RULES, limit)
+    return Verdict(
+        rule.answer, reason=rule.reason_for(limit), probability=settings.certainty(rule.answer), trail=(rule.name,)
+    )

@@ -239,14 +239,6 @@ class NameEvidence:
 
 
 @dataclass(frozen=True)
-class SearchLimit:
-    """Number ``n`` of simulations that a search has cost, and the ``most`` that it may."""
-
-    n: int
-    most: int
-
-
-@dataclass(frozen=True)
 class UnprovenEvidence:
     """The verdicts of a diagnosis, and why its kind of diagnosis is not proven: ``reservation``, "" where it is.
 

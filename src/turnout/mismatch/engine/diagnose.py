@@ -13,6 +13,7 @@ from turnout.mismatch.engine.decision import (
     confirm,
     first_applicable,
     grade_name,
+    unfinished_verdict,
 )
 from turnout.mismatch.engine.decision_facts import NumericalError
 from turnout.mismatch.engine.evidence import assess, excess_ratio, latent_force_of, worst_excess
@@ -24,7 +25,7 @@ from turnout.mismatch.engine.refit import score_candidates
 from turnout.mismatch.engine.reserved_data import Verification, verify
 from turnout.mismatch.engine.residual_attribution import Attribution, attribute, cell_energies
 from turnout.mismatch.engine.search import Search
-from turnout.mismatch.engine.search_limit import SearchLimitError, unfinished_verdict
+from turnout.mismatch.engine.search_limit import SearchLimitError
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.mismatch.engine.tolerated_effects import name_tolerated
 from turnout.mismatch.engine.two_effects import add_second, settle_pair

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from turnout.errors import TurnoutError
-from turnout.mismatch.engine.decision import LIMIT_RULES, first_applicable
-from turnout.mismatch.engine.decision_facts import SearchLimit
-from turnout.mismatch.engine.verdict import Verdict
 
 if TYPE_CHECKING:
-    from turnout.config.settings.mismatch import MismatchSettings
     from turnout.mismatch.engine.case import Case
+
+
+@dataclass(frozen=True)
+class SearchLimit:
+    """Number ``n`` of simulations that a search has cost, and the ``most`` that it may."""
+
+    n: int
+    most: int
 
 
 class SearchLimitError(TurnoutError):
@@ -42,23 +47,3 @@ def check_limit(case: Case) -> None:
     """
     if case.max_simulations is not None and case.n_simulations > case.max_simulations:
         raise SearchLimitError(SearchLimit(case.n_simulations, case.max_simulations))
-
-
-def unfinished_verdict(limit: SearchLimit, settings: MismatchSettings) -> Verdict:
-    """The verdict of a search that was not finished.
-
-    Parameters
-    ----------
-    limit : SearchLimit
-        What the search has cost.
-    settings : MismatchSettings
-
-    Returns
-    -------
-    Verdict
-        "unknown", with the reason.
-    """
-    rule = first_applicable(LIMIT_RULES, limit)
-    return Verdict(
-        rule.answer, reason=rule.reason_for(limit), probability=settings.certainty(rule.answer), trail=(rule.name,)
-    )
