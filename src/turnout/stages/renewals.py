@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from turnout.config.events import RENEWAL, read_events
+from turnout.config.events import RENEWAL, now, read_events
 from turnout.stages.visit_time import DAYS_PER_YEAR, day_of, years_of
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ Value = TypeVar("Value")
 
 
 def renewal_of(turnout: TurnoutConfig) -> float | None:
-    """Day of the newest recorded renewal of the whole turnout, None without one.
+    """Day of the newest recorded renewal of the whole turnout, None without one; a planned one has not happened.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def renewal_of(turnout: TurnoutConfig) -> float | None:
     days = [
         e.at.date().toordinal() / DAYS_PER_YEAR
         for e in recorded
-        if e.turnout == turnout.id and e.kind == RENEWAL and e.section is None
+        if e.turnout == turnout.id and e.kind == RENEWAL and e.section is None and e.at <= now()
     ]
     return max(days, default=None)
 

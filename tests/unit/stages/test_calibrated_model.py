@@ -3,7 +3,7 @@
 import re
 import shutil
 from dataclasses import replace
-from datetime import datetime
+from datetime import datetime, timedelta
 from functools import partial
 from pathlib import Path
 
@@ -253,6 +253,10 @@ def test_the_diagnosis_of_all_visits_leaves_out_those_before_a_renewal(turnout, 
     record_work("t1,,2026-03-01,renewal,,\n")
     diagnose_turnout("t1", visit="all")
     assert {path.split("/")[2] for path, *_ in used} == {DAYS[3]}
+    used.clear()
+    record_work(f"t1,,{datetime.now() + timedelta(days=30):%Y-%m-%d},renewal,,\n")
+    diagnose_turnout("t1", visit="all")  # a planned renewal has not happened
+    assert {path.split("/")[2] for path, *_ in used if "hammer" in path} == set(DAYS)
     used.clear()
     diagnose_turnout("t1", visit=DAYS[0])  # what is asked for by its day is diagnosed
     assert len(used) == 4
