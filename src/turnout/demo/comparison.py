@@ -88,13 +88,20 @@ def compare(connection: duckdb.DuckDBPyConnection, truth: Path, worklist: str) -
     query = "select turnout_id, section_id, band from whole where state = 'inspect this week'"
     alarms = [(turnout, _label(section), band) for turnout, section, band in connection.execute(query).fetchall()]
     further = [alarm for alarm in alarms if alarm not in changed]
-    sections = {chart[:2] for chart in changed}
+    sections = _with_neighbours(connection, {chart[:2] for chart in changed})
     beside, elsewhere = ([a for a in further if (a[:2] in sections) is inside] for inside in (True, False))
     return [
         *rows,
-        Comparison("other charts there", "may follow from these changes", _alarms_text(beside)),
+        Comparison("other charts there and beside", "may follow from these changes", _alarms_text(beside)),
         Comparison("all other sections", "no change", _alarms_text(elsewhere)),
     ]
+
+
+def _with_neighbours(connection: duckdb.DuckDBPyConnection, sections: set[tuple[str, str]]) -> set[tuple[str, str]]:
+    """(turnout, label) of these sections and of those that are diagnosed with them: their impacts feel each other."""
+    groups = connection.execute("select turnout_id, string_split(sections, ', ') from change_findings").fetchall()
+    near = [{(turnout, label) for label in labels} for turnout, labels in groups]
+    return sections.union(*(group for group in near if group & sections))
 
 
 def _alarms_text(alarms: Sequence[tuple[str, str, str]]) -> str:

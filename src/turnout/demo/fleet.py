@@ -18,10 +18,11 @@ from tqdm import tqdm
 
 import turnout.demo.scenario as faults
 from turnout.config import load_configuration
-from turnout.demo.hammer import hammer_test, simulated_response
+from turnout.demo.hammer import hammer_test, response_at
 from turnout.demo.passages import make_passage, make_passages
 from turnout.demo.progress import run_with_progress
 from turnout.demo.scenario import FLEET, SECTIONS, campaign_days, gap_under, rail_temperature, stiffness_factors
+from turnout.demo.track_state import unloaded_track_on
 from turnout.demo.weekly_trains import N_WEEK, simulate_run, weekly_jobs, write_weekly_trains
 from turnout.readers.writing import write
 from turnout.workflow.project import snakefile_options
@@ -125,9 +126,7 @@ def _make_tests(job: Job) -> int:
     """Write three test files of one section and campaign; returns their number."""
     raw, truth, scenario, seed, number, section, day, temperature = job
     rng = np.random.default_rng([seed, crc32(f"{scenario.turnout}/{section}".encode()), number])
-    ballast, railpad = stiffness_factors(scenario, section, day, temperature)
-    hangs = gap_under(scenario, section, day) > 0.0
-    response = simulated_response(section, ballast * scenario.stiffness, railpad * scenario.stiffness, hangs)
+    response = response_at(section, unloaded_track_on(scenario, day, temperature))
     noted_temperature = None if (scenario.turnout, number) == MISSING_TEMPERATURE else temperature
     odd = scenario.odd_campaign
     file_format = odd[1] if odd is not None and odd[0] == number else scenario.format

@@ -1,6 +1,6 @@
 """Simulate a hammer test of the demonstration fleet: ten impacts, the section's response, instruments and faults.
 
-The impulse response of a section is that of the simulated track, with its stiffness changed by given factors.
+The impulse response of a section is that of the simulated track as it is on that day, with all of its changes.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.demo import scenario
+from turnout.demo.track_state import with_stiffness
 from turnout.records import Channel, Recording
 from turnout.simulate.frequency_response import receptance
 from turnout.simulate.hammer import resolve_location
@@ -156,9 +157,25 @@ HALF_LENGTH = 18.0  # m of track on each side of the impact
 PASS_FREQUENCY, STOP_FREQUENCY = 2_500.0, 4_000.0
 
 
-def simulated_response(
-    section: str, ballast: float, railpad: float, hangs: bool = False
-) -> Callable[[np.random.Generator], np.ndarray]:
+def simulated_response(section: str, ballast: float, railpad: float) -> Callable[[np.random.Generator], np.ndarray]:
+    """Response of the rail at a section, if all ballast and all pads of the track have changed alike.
+
+    Parameters
+    ----------
+    section : str
+        Location of the track of config/tracks/tommerup.yaml.
+    ballast, railpad : float
+        Stiffness of ballast and pads over that of the track file. [-]
+
+    Returns
+    -------
+    callable
+        As ``response_at``.
+    """
+    return _with_scatter(*_response_of_changed_track(section, round(ballast, 6), round(railpad, 6)))
+
+
+def response_at(section: str, turnout: TurnoutTrack) -> Callable[[np.random.Generator], np.ndarray]:
     """Response of the rail at a section to an impact there, which scatters from impact to impact.
 
     Impact and response are on the rail head. From impact to impact the frequencies scatter by 0.6 %: hammer and sensor
@@ -167,19 +184,19 @@ def simulated_response(
     Parameters
     ----------
     section : str
-        Location of the track of config/tracks/tommerup.yaml.
-    ballast, railpad : float
-        Stiffness of ballast and pads over that of the track file. [-]
-    hangs : bool
-        The sleeper under the sensor hangs above its ballast, without contact on the unloaded track.
+        Location of the turnout.
+    turnout : TurnoutTrack
+        The unloaded track as it is on that day.
 
     Returns
     -------
     callable
         From a random generator to (N_SAMPLES,) acceleration per unit impulse [m/s² per N s].
     """
-    frequency, accelerance = _accelerance(section, round(ballast, 6), round(railpad, 6), hangs)
+    return _with_scatter(*_accelerance(section, turnout))
 
+
+def _with_scatter(frequency: np.ndarray, accelerance: np.ndarray) -> Callable[[np.random.Generator], np.ndarray]:
     def response(rng: np.random.Generator) -> np.ndarray:
         scaled = np.interp(frequency * (1.0 + FREQUENCY_SPREAD * rng.standard_normal()), frequency, accelerance)
         return np.fft.irfft(scaled, N_SAMPLES) * RATE
@@ -188,22 +205,18 @@ def simulated_response(
 
 
 @lru_cache(maxsize=8)
-def _accelerance(section: str, ballast: float, railpad: float, hangs: bool) -> tuple[np.ndarray, np.ndarray]:
+def _response_of_changed_track(section: str, ballast: float, railpad: float) -> tuple[np.ndarray, np.ndarray]:
+    return _accelerance(section, with_stiffness(load_track("tommerup"), lambda _: (ballast, railpad)))
+
+
+def _accelerance(section: str, turnout: TurnoutTrack) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies [Hz] and accelerance [m/s²/N] up to the Nyquist frequency."""
-    position, track = resolve_location(_turnout(), section)
+    position, track = resolve_location(turnout, section)
     stretch = stretch_of_track(track, position, HALF_LENGTH)
-    support = stretch.nearest_support(position)
-    position = float(stretch.support[support])
-    contact = np.ones(stretch.support.size)
-    contact[support] = 0.0 if hangs else 1.0
-    modified = stretch.with_(
-        ballast_stiffness=ballast * contact * stretch.ballast_stiffness,
-        ballast_damping=contact * stretch.ballast_damping,
-        pad_stiffness=railpad * stretch.pad_stiffness,
-    )
+    position = float(stretch.support[stretch.nearest_support(position)])
     frequency = np.fft.rfftfreq(N_SAMPLES, 1.0 / RATE)
     in_band = (frequency > 0) & (frequency < STOP_FREQUENCY)
-    receptances = receptance(assemble(modified), frequency[in_band], position, position)
+    receptances = receptance(assemble(stretch), frequency[in_band], position, position)
     taper = 0.5 * (
         1.0
         + np.cos(np.pi * np.clip((frequency[in_band] - PASS_FREQUENCY) / (STOP_FREQUENCY - PASS_FREQUENCY), 0.0, 1.0))
@@ -211,8 +224,3 @@ def _accelerance(section: str, ballast: float, railpad: float, hangs: bool) -> t
     accelerance = np.zeros(frequency.size, complex)
     accelerance[in_band] = -((2 * np.pi * frequency[in_band]) ** 2) * receptances * taper
     return frequency, accelerance
-
-
-@lru_cache(maxsize=1)
-def _turnout() -> TurnoutTrack:
-    return load_track("tommerup")

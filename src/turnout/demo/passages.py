@@ -13,10 +13,11 @@ from zlib import crc32
 import numpy as np
 
 from turnout.constants import GRAVITY, KMH
-from turnout.demo.scenario import gap_under, rail_temperature, stiffness_factors
+from turnout.demo.scenario import gap_under, rail_temperature
+from turnout.demo.track_state import track_on
 from turnout.physics.hanging_sleeper import HangingSleeper
 from turnout.readers.writing import write
-from turnout.simulate.parameters import load_track, load_vehicle
+from turnout.simulate.parameters import load_vehicle
 from turnout.simulate.passage import simulate_passage
 from turnout.simulate.sensor import Sensor
 
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
     from turnout.config import TurnoutConfig
     from turnout.demo.scenario import TurnoutScenario
-    from turnout.simulate.track import Track
     from turnout.simulate.turnout_track import TurnoutTrack
     from turnout.simulate.vehicle import Vehicle
 
@@ -116,7 +116,7 @@ def make_passage(job: PassageJob) -> dict[str, Any]:
     """
     raw, scenario, positions, vehicle, truth, seed = job
     moment = datetime.fromisoformat(truth["started_at_utc"])
-    track = track_of(scenario, moment.date(), round(truth["rail_temperature_c"]))
+    track = track_on(scenario, moment.date(), round(truth["rail_temperature_c"]))
     sensors = [passage_sensor(label, position, side, truth["track"]) for label, (position, side) in positions.items()]
     recording = simulate_passage(
         track,
@@ -162,17 +162,3 @@ def _terms_of(scenario: TurnoutScenario, turnout: TurnoutTrack, route: str, day:
 @lru_cache(maxsize=32)
 def vehicle_of(name: str, load: float) -> Vehicle:
     return load_vehicle(name, load)
-
-
-@lru_cache(maxsize=4)
-def track_of(scenario: TurnoutScenario, day: date, temperature: float) -> TurnoutTrack:
-    """The turnout with the stiffness of every section on that day, on both routes."""
-    turnout = load_track("tommerup")
-
-    def scale_stiffness(track: Track) -> Track:
-        factors = np.array([stiffness_factors(scenario, section, day, temperature) for section in track.section])
-        ballast, pad = factors.T * scenario.stiffness
-        return track.with_(ballast_stiffness=ballast * track.ballast_stiffness, pad_stiffness=pad * track.pad_stiffness)
-
-    tracks = {route: scale_stiffness(track) for route, track in turnout.tracks.items()}
-    return replace(turnout, track=scale_stiffness(turnout.track), tracks=tracks)

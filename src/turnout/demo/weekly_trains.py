@@ -18,8 +18,9 @@ import numpy as np
 from scipy import ndimage
 
 from turnout.constants import GRAVITY, KMH
-from turnout.demo.passages import passage_sensor, track_of, vehicle_of
+from turnout.demo.passages import passage_sensor, vehicle_of
 from turnout.demo.scenario import MILLIMETRE, rail_temperature
+from turnout.demo.track_state import track_on
 from turnout.readers.writing import write
 from turnout.records import Recording
 from turnout.simulate.passage import simulate_passage
@@ -123,7 +124,7 @@ def simulate_run(job: RunJob) -> np.ndarray:
         At ``SIMULATED_RATE``. [m/s²]
     """
     scenario, positions, train, run, first_day, last_day = job
-    turnout = track_of(scenario, last_day if run == "later" else first_day, 15)
+    turnout = track_on(scenario, last_day if run == "later" else first_day, 15)
     vehicle = vehicle_of(train.vehicle, LOADED if run == "loaded" else LIGHT)
     parts: list = _wheels(vehicle, turnout.track.start, turnout.track.end, 2 if run == "loaded" else 1)
     if run == "dip" and scenario.weld is not None and scenario.weld.track in ("both", train.track):

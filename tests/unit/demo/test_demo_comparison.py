@@ -47,6 +47,7 @@ def connection():
             ('W1', 'W1/ASM', 'ballast_damping', -50.0, timestamp '2025-01-10', 'inspect this week'),
             ('W1', 'W1/A7', 'railpad', -2.0, timestamp '2025-02-10', 'inspect this week'),
             ('W1', 'W1/A9', 'railpad', null, null, 'cannot tell'),
+            ('W1', 'W1/A9', 'ballast', -4.0, timestamp '2025-01-20', 'inspect this week'),
             ('W1', 'W1/OT', 'amplitude', 31.4, timestamp '2025-11-17', 'inspect this week')
         ) t(turnout_id, section_id, band, change_pct, since_at_utc, state);
         create table maintenance_effect as select 'W1/CLP' as section_id, 'railpad' as band,
@@ -84,7 +85,8 @@ def test_every_fault_and_change_has_a_row_with_what_was_found(connection, truth)
     assert weld.found == "inspect this week: weekly peak acceleration +31 %, from 2025-11-17"
     assert rows["W1 SP, test 2"].found == "truncated"
     assert rows["W1 OT, test 1"].found == "nothing (another reason)"
-    assert rows["other charts there"].found == "1 alarm: W1/ASM ballast damping"
+    # A9 is diagnosed together with ASM, where a sleeper hangs; A7 with nothing that has changed
+    assert rows["other charts there and beside"].found == "2 alarms: W1/ASM ballast damping, W1/A9 ballast"
     assert rows["all other sections"].found == "1 alarm: W1/A7 railpad"
 
 
