@@ -10,6 +10,7 @@ from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.mismatch.turnout.priors import WHEELS
 from turnout.mismatch.turnout.wave_response import WaveTransfer
+from turnout.mismatch.turnout.wheel_flights import Deviation
 from turnout.mismatch.turnout.wheel_roughness import (
     _components,
     _deviations,
@@ -90,6 +91,48 @@ def test_the_signal_of_a_wheel_that_falls_deeper_is_that_of_a_simulation():
     found = modes[:, 4]
     assert found @ change / np.sqrt((found @ found) * (change @ change)) > 0.97
     assert np.linalg.norm(found) == pytest.approx(np.linalg.norm(change), rel=0.1)
+
+
+DEEP = replace(NOSE, depth=1.6e-3)
+
+
+@pytest.mark.slow
+def test_errors_of_wheels_that_leave_the_rail_are_those_of_simulations_with_each_wheel_on_its_own_path():
+    """A deep nose at 44 m/s: every wheel leaves the rail and lands behind it.
+
+    The linear response has a cosine below 0.6 with the simulated one there.
+    """
+    turnout = replace(FILED, routes={"main": ((DEEP,),)}, spreads={DEEP: {"depth": 0.5}})
+    case = TrackCase(replace(measured_campaign(replace(PLAN, turnout=turnout), (), 7), turnout=turnout))
+    aligned = max(case.aligned_passages.values(), key=lambda a: a.speed)
+    values = {n.name: case.start_values.get(n.name, n.mean) for n in case.nuisances}
+    values |= dict.fromkeys((*case.predictor.waves.names, *case.predictor.surface.names), 0.0)
+    signal, forces = case.predictor.predict_over(values, aligned, ())
+    assert np.all(forces.min(axis=1) == 0.0)
+    transfer = WaveTransfer(case.predictor, values, aligned, beyond=WHEELS.roughness_margin)
+    modes = profile_modes(case.predictor, values, aligned, transfer)
+    n_wheel, grid = len(forces), transfer.fine_grid
+    deeper = _deviations(DEEP, grid)[0]
+    linear = transfer.tops_response(deeper[None], deeper[None], transfer.wheel(1))[:, 0]
+    up, down = (
+        case.predictor.predict_over(values, aligned, (OfOneWheel(grid, sign * deeper),))[0] - signal
+        for sign in (1.0, -1.0)
+    )
+    odd, even = modes.reshape(len(modes), n_wheel, 8)[:, 1, [0, 4]].T
+    assert cosine(odd, up - down) > 0.95 and cosine(even, up + down) > 0.95
+    assert np.linalg.norm(odd) == pytest.approx(0.5 * np.linalg.norm(up - down), rel=0.15)
+    assert np.linalg.norm(even) == pytest.approx(0.5 * 3.0**0.5 * np.linalg.norm(up + down), rel=0.15)
+    assert cosine(linear, up - down) < 0.6
+
+
+class OfOneWheel(Deviation):
+    """The second wheel alone deviates."""
+
+    wheel = 1
+
+
+def cosine(a, b):
+    return a @ b / np.sqrt((a @ a) * (b @ b))
 
 
 def test_principal_directions_are_those_of_the_whole_matrix():

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from turnout.mismatch.turnout.campaign import PassageInput
     from turnout.physics.term import PhysicsTerm
-    from turnout.simulate.run import Probe
+    from turnout.simulate.run import Outcome, Probe
     from turnout.simulate.sensor import Sensor
     from turnout.simulate.track import Track
     from turnout.simulate.turnout_track import TurnoutTrack
@@ -57,7 +57,21 @@ class PassageSimulator:
         surfaces: Surfaces | None = None,
         described: Sequence[Sensor] | None = None,
     ) -> np.ndarray:
-        """(n_sensor + n_probe, n) signals over ``surfaces``, by default those of the file.
+        """(n_sensor + n_probe, n) signals of ``outcome``, with its parameters. [m/s², or as the probe]"""
+        return self.outcome(passage, vehicle, speed, sensors, probes, surfaces, described, forces=False).signals
+
+    def outcome(
+        self,
+        passage: PassageInput,
+        vehicle: Vehicle,
+        speed: float,
+        sensors: Sequence[Sensor],
+        probes: Sequence[Probe] = (),
+        surfaces: Surfaces | None = None,
+        described: Sequence[Sensor] | None = None,
+        forces: bool = True,
+    ) -> Outcome:
+        """Signals and wheel forces over ``surfaces``, by default those of the file.
 
         At time 0 the first wheel is ``SIMULATION.lead_time`` before the first sensor, at its position in ``described``.
 
@@ -77,11 +91,13 @@ class PassageSimulator:
             Running surfaces; None: those of the track file.
         described : sequence of Sensor or None
             Sensors at the positions of the file, which define time 0; None: ``sensors``.
+        forces : bool
+            Whether the forces of wheels are returned.
 
         Returns
         -------
-        (n_sensor + n_probe, n) array of float
-            Signals at the rate of the simulation. [m/s², or as the probe]
+        Outcome
+            Its signals are those of the sensors and probes, at the rate of the simulation. [m/s², or as the probe]
         """
         for term in self.terms:
             vehicle = term.vehicle(vehicle)
@@ -95,8 +111,7 @@ class PassageSimulator:
         )
         seats = [place_sensor(s, self.terms).probe(self.track) for s in sensors]
         drive = Drive(start, speed, sign, surfaces or self.turnout.surfaces(passage.route), path_step=0.01)
-        outcome = run(self.prepared, distance / speed, [*seats, *probes], vehicle, drive, forces=False, tolerance=1e-3)
-        return outcome.signals
+        return run(self.prepared, distance / speed, [*seats, *probes], vehicle, drive, forces=forces, tolerance=1e-3)
 
 
 def place_sensor(sensor: Sensor, terms: Sequence[PhysicsTerm]) -> Sensor:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -20,8 +20,9 @@ from turnout.mismatch.turnout.site import Site
 from turnout.mismatch.turnout.site_model import SiteModel, drop_oldest
 from turnout.mismatch.turnout.track_parameters import track_value_key, track_with, vehicle_with
 from turnout.physics.term import PhysicsTerm
+from turnout.simulate.run import Outcome, Probe
 from turnout.simulate.sensor import Sensor
-from turnout.simulate.wheel_path import Surfaces
+from turnout.simulate.wheel_path import PathPart, Surfaces
 
 
 class PassagePredictor(SiteModel):
@@ -173,23 +174,62 @@ class PassagePredictor(SiteModel):
         with_probes: bool = True,
     ) -> None:
         """Simulate a passage and cache it. Probe signals are large: their cache is small."""
+        probe_points = probes(self, values, terms, aligned) if with_probes else []
+        signals = self._outcome(values, aligned, passage_terms, probe_points).signals
+        self._signals[key] = signals[: len(aligned.sensors)].copy()
+        drop_oldest(self._signals, SIMULATION.signal_cache_size)
+        if with_probes:
+            self._signals_with_probes[key] = signals
+            drop_oldest(self._signals_with_probes, 2 * len(self.aligned_passages) + SIMULATION.probe_cache_spare)
+
+    def _outcome(
+        self,
+        values: Values,
+        aligned: AlignedPassage,
+        passage_terms: Terms,
+        probe_points: Sequence[Probe] = (),
+        further_path: Sequence[PathPart] = (),
+        forces: bool = False,
+    ) -> Outcome:
+        """Simulate a passage, with ``further_path`` added to every running surface."""
         self.site.count.n += 1
         _, speed, load = _train_values(values, aligned)
         vehicle = vehicle_with(aligned.passage.vehicle, values, aligned.train, load)
         simulator, path = self.passage_simulator(values, passage_terms, aligned.passage), self.waves.path(values)
         sensors = [replace(s, place=s.place + values.get(f"seat_{s.name}", 0.0)) for s in aligned.sensors]
         surfaces: Surfaces = tuple(
-            (*surface, *path) for surface in self.surface.surfaces(aligned.passage.route, values)
+            (*surface, *path, *further_path) for surface in self.surface.surfaces(aligned.passage.route, values)
         )
-        probe_points = probes(self, values, terms, aligned) if with_probes else []
-        signals = simulator(
-            aligned.passage, vehicle, aligned.speed * (1.0 + speed), sensors, probe_points, surfaces, aligned.sensors
-        )
-        self._signals[key] = signals[: len(sensors)].copy()
-        drop_oldest(self._signals, SIMULATION.signal_cache_size)
-        if with_probes:
-            self._signals_with_probes[key] = signals
-            drop_oldest(self._signals_with_probes, 2 * len(self.aligned_passages) + SIMULATION.probe_cache_spare)
+        return simulator.outcome(
+            aligned.passage, vehicle, aligned.speed * (1.0 + speed), sensors, probe_points, surfaces, aligned.sensors,
+            forces,
+        )  # fmt: skip
+
+    def predict_over(
+        self, values: Values, aligned: AlignedPassage, further_path: Sequence[PathPart]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Signals and wheel forces of a passage whose wheels meet a further path, without terms; not cached.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        aligned : AlignedPassage
+            A passage with its time shift, speed and load.
+        further_path : sequence of path parts
+            Added to every running surface.
+
+        Returns
+        -------
+        signals : (n_sensor * n_time,) array of float
+            One sensor after the other. [m/s²]
+        forces : (n_wheel, n) array of float
+            At the rate of the simulation. [N]
+        """
+        outcome = self._outcome(values, aligned, (), (), further_path, forces=True)
+        signals = passage_band.upsample(outcome.signals)
+        rows = [self.channel_output(values, (), aligned, s, row) for s, row in zip(aligned.sensors, signals)]
+        return np.concatenate(rows), outcome.force
 
     def track_transfer(self, key: Hashable, compute: Callable[[], Any]) -> Any:
         """A response of the track that passages under the same conditions share; the latest are cached.

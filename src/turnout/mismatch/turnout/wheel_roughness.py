@@ -21,6 +21,7 @@ from turnout.mismatch.engine.candidate_search import masked_candidates
 from turnout.mismatch.turnout.priors import WHEELS
 from turnout.mismatch.turnout.rail_roughness import amplitude_sd
 from turnout.mismatch.turnout.wave_response import WaveTransfer
+from turnout.mismatch.turnout.wheel_flights import flight_modes
 from turnout.mismatch.turnout.wheel_tops import top_modes
 from turnout.simulate.blade import is_on_blade
 
@@ -67,7 +68,9 @@ def profile_modes(predictor: Predictor, values: Values, aligned: AlignedPassage,
     if not paths:
         return np.zeros((len(aligned.sensors) * aligned.time.size, 0))
     deviations, delays = np.array(paths), [transfer.wheel(w) for w in range(transfer.wheel_delays.size)]
-    return np.concatenate([transfer.tops_response(deviations, deviations, delay) for delay in delays], axis=1)
+    linear = np.array([transfer.tops_response(deviations, deviations, delay) for delay in delays])
+    simulated = flight_modes(predictor, values, aligned, (grid, deviations), linear)
+    return np.concatenate(list(linear if simulated is None else simulated), axis=1)
 
 
 def _components(surface: Sequence[PathPart]) -> list[PathPart]:

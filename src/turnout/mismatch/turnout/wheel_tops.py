@@ -161,12 +161,32 @@ def share_difference(linear: np.ndarray, common: np.ndarray, n_row: int, window:
     -------
     (n_wheel, n_row * n, n_path) array of float
     """
+    return linear + power_shares(linear, n_row, window) * (common - linear.sum(axis=0))
+
+
+def power_shares(linear: np.ndarray, n_row: int, window: int) -> np.ndarray:
+    """Share of each wheel in the power of responses about each sample.
+
+    Parameters
+    ----------
+    linear : (n_wheel, n_row * n, n_path) array of float
+        Linear responses of each wheel.
+    n_row : int
+        Number of sensors, one after the other.
+    window : int
+        Samples to either side over which the power of a response is averaged.
+
+    Returns
+    -------
+    (n_wheel, n_row * n, n_path) array of float
+        Their sum over the wheels is 1.
+    """
     n_wheel, size, n_path = linear.shape
     square = (linear**2).reshape(n_wheel, n_row, size // n_row, n_path)
     cumulated = np.cumsum(np.pad(square, ((0, 0), (0, 0), (window, window), (0, 0))), axis=2)
     power = (cumulated[:, :, 2 * window :] - cumulated[:, :, : -2 * window])[:, :, : size // n_row]
     power = np.maximum(power, 0.0).reshape(linear.shape) + np.finfo(float).tiny
-    return linear + power / power.sum(axis=0) * (common - linear.sum(axis=0))
+    return power / power.sum(axis=0)
 
 
 def _simulated_responses(
