@@ -55,6 +55,13 @@ from turnout.mismatch.turnout.further_passages import names_beyond, with_reserve
 from turnout.mismatch.turnout.nose_starts import fit_from_nose_positions
 from turnout.mismatch.turnout.unproven_panels import reservation
 from turnout.stages.accepted_changes import change_events, changes_of, further_candidates, without_accepted
+from turnout.stages.agreeing_visits import (
+    AgreeingInformation,
+    FittedGroup,
+    agreeing_visits,
+    packed_groups,
+    unpacked_groups,
+)
 from turnout.stages.checkpoint import SUFFIX, read_value, write_value
 from turnout.stages.mismatch_groups import groups, unit_of, visits
 from turnout.stages.mismatch_inputs import digest_of_model, gather_inputs, mismatch_context, track_of
@@ -70,6 +77,7 @@ if TYPE_CHECKING:
     from turnout.stages.mismatch_groups import Group
 
 FOLDER = "calibrated-model"
+AGREEING = "linearized-again"  # folder of visits that agree with the earlier ones, see ``agreeing_visits``
 USED_ANSWERS = ("none", "")  # "": not diagnosed; a visit with an open finding changes nothing until it is accepted
 # Groups of parameters that a kind of work makes uncertain again
 OPENED = {
@@ -91,6 +99,7 @@ OPENED_COMMON = {
     "sleeper_change": ("sleeper_mass", *BALLAST, *PADS),
 }
 MAX_FITTED_AXLES = 8  # of all fitted passages of a visit: the others are linear about the fit, and cost little
+MAX_FITS_IN_MEMORY = 12  # of the newest visits; others are fitted again where a visit seems to differ
 MAX_PASSAGES_AND_AXLES = (60, 1000)  # of a group of sections at one visit
 NOSE_POSITION = "place of the kink"  # begin of the name of a parameter
 EVENT_REACH = 6.0  # m from a section that work there may touch
@@ -179,7 +188,7 @@ def store_visit(
     answer: str,
     about: Mapping[str, Any],
     store: MutableMapping[str, Any] | None = None,
-) -> None:
+) -> FittedGroup:
     """Write the information of a group of sections at one visit.
 
     Parameters
@@ -196,6 +205,11 @@ def store_visit(
         turnout, visit, version (as ``version_of``), and notes (as ``notes_in_words``) if there are any.
     store : mapping or None
         Fits of the diagnosis, which has the base fit.
+
+    Returns
+    -------
+    FittedGroup
+        The fit that the information is of.
 
     Raises
     ------
@@ -216,19 +230,18 @@ def store_visit(
     partners = {n: dampers[key] for n in may_be_large if (key := _damper_key(parameters[n])) in dampers}
     fit = fit_large_values(search, fit, may_be_large, CALIBRATION.change_sds, partners)
     sections = ", ".join(group.labels)
-    information = visit_groups(*with_reserved_passages(search.case, fit), sections, group.route)
+    fitted = FittedGroup(*with_reserved_passages(search.case, fit), parameters, sections, group.route)
+    information = visit_groups(fitted.case, fitted.fit, sections, group.route)
     value = {
         "version": dict(about["version"]), "visit": about["visit"], "sections": sections, "answer": answer,
         "notes": [list(note) for note in about.get("notes", ())],
         "parameters": [asdict(p) for p in parameters.values()],
-        "groups": [
-            {"group": g.group, "n": g.n_recordings, "names": list(g.names), "matrix": g.matrix, "vector": g.vector}
-            for g in information
-        ],
+        "groups": packed_groups(information),
     }  # fmt: skip
     path = _path(folder, about["turnout"].id, about["visit"], group.labels)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_value(path, value)
+    return replace(fitted, fit=fitted.fit.without_jacobian())
 
 
 def _damper_key(spring: StateParameter) -> str:
@@ -265,9 +278,7 @@ def read_visits(folder: Path, turnout_id: str, versions: Mapping[str, Mapping[st
         wanted = versions.get(value["visit"])
         if wanted is None or any(value["version"].get(k) != v for k, v in wanted.items()):
             continue
-        information = tuple(
-            GroupInformation(g["group"], g["n"], tuple(g["names"]), g["matrix"], g["vector"]) for g in value["groups"]
-        )
+        information = unpacked_groups(value["groups"])
         parameters = tuple(StateParameter(**p) for p in value["parameters"])
         notes = tuple((visit, words, of_passage) for visit, words, of_passage in value.get("notes", ()))
         stored.append(StoredVisit(value["visit"], value["sections"], value["answer"], information, parameters, notes))
@@ -284,6 +295,23 @@ def visits_of(stored: Iterable[StoredVisit]) -> list[VisitInformation]:
         information = tuple(g for s in parts for g in s.groups)
         visits_used.append(VisitInformation(visit, years_of(visit), information))
     return visits_used
+
+
+def with_information(stored: Iterable[StoredVisit], visits_used: Iterable[VisitInformation]) -> list[StoredVisit]:
+    """Stored visits with the information of ``visits_used`` in place of their own.
+
+    Parameters
+    ----------
+    stored : iterable of StoredVisit
+    visits_used : iterable of VisitInformation
+        Of all of these visits.
+
+    Returns
+    -------
+    list of StoredVisit
+    """
+    by_group = {(v.visit, g.group): g for v in visits_used for g in v.groups}
+    return [replace(s, groups=tuple(by_group.get((s.visit, g.group), g) for g in s.groups)) for s in stored]
 
 
 def within_library(answer: ModelAnswer, without: Collection[str]) -> ModelAnswer:
@@ -467,11 +495,20 @@ def calibrate_turnout(
     units_of_visits = {v: unit_of(turnout_id, v, units, turnout.hashes["mismatch"]) for v, units in by_visit.items()}
     versions = {v: version_of(unit, turnout, raw_root, track, code) for v, unit in units_of_visits.items()}
     complete = {s.visit for s in read_visits(folder, turnout_id, versions)}
-    missing, notes = [label for label in by_visit if label not in complete], []
-    for label in missing:
+    missing, notes = [label for label in by_visit if label not in complete], list[str]()
+
+    def fit_visit(label: str) -> list[FittedGroup]:
         about = {"turnout": turnout, "visit": label, "version": versions[label], "without": without}
         print(f"{turnout_id}: fit of visit {label}", file=sys.stderr, flush=True)
-        notes += _fit_visit(folder, by_visit[label], raw_root, work, track, about)
+        fitted, reasons = _fit_visit(folder, by_visit[label], raw_root, work, track, about)
+        notes.extend(reasons)
+        return fitted
+
+    fits = dict[str, list[FittedGroup]]()
+    for label in missing:
+        fits[label] = fit_visit(label)
+        if len(fits) > MAX_FITS_IN_MEMORY:
+            del fits[next(iter(fits))]
     stored = read_visits(folder, turnout_id, versions)
     if not stored:
         raise SimulationError(
@@ -483,6 +520,9 @@ def calibrate_turnout(
     turnout_track, _ = track_of(turnout, track)
     accepted = changes_of(turnout_track.terms)
     events = [*events_of(turnout, parameters, accepted, informed), *file_errors(parameters, directions)]
+    again = AgreeingInformation(folder / AGREEING / turnout_id, versions)
+    informed = agreeing_visits(parameters, informed, events, lambda v: fits.get(v) or fit_visit(v), again)
+    stored = with_information(stored, informed)
     history = estimate_history(parameters, visits_of(_without_findings(stored)), events)
     changes = estimate_history(parameters, informed, events, repeats_between_visits=False, accepted=None)
     settings = turnout.settings["mismatch"]
@@ -519,25 +559,25 @@ def _fit_visit(
     work: str | Path,
     track: str | None,
     about: Mapping[str, Any],
-) -> list[str]:
-    """Fit the groups of a visit and store their information; reasons why a group could not be fitted."""
-    turnout, notes = about["turnout"], []
+) -> tuple[list[FittedGroup], list[str]]:
+    """Fit the groups of a visit and store their information: fits, and reasons why a group could not be fitted."""
+    turnout, fitted, notes = about["turnout"], list[FittedGroup](), list[str]()
     turnout_track, accepted = track_of(turnout, track)
     _, passage_tables = mismatch_context(turnout.id, work=work)
     inputs = gather_inputs(units, turnout, raw_root, turnout_track, passage_tables)
     usable = list(groups(turnout, turnout_track, inputs, limits=MAX_PASSAGES_AND_AXLES))
     about = {**about, "notes": notes_in_words(about["visit"], inputs.notes)}  # ``groups`` adds some
     if not usable:
-        return summary_of_notes(about["notes"])
+        return [], summary_of_notes(about["notes"])
     for group in usable:
         try:
             on_route = tuple(a for a in accepted if a.is_on(group.route))
             campaign = replace(group.campaign, reserved=names_beyond(group.campaign, MAX_FITTED_AXLES))
             case = TrackCase(campaign, turnout.settings["mismatch"], accepted=on_route)
-            store_visit(folder, group, case, "", about)
+            fitted.append(store_visit(folder, group, case, "", about))
         except (SimulationError, np.linalg.LinAlgError) as error:
             notes.append(f"visit {about['visit']}, sections {', '.join(group.labels)}: {error}")
-    return notes
+    return fitted, notes
 
 
 def answer_rows(model: CalibratedModel) -> list[dict[str, Any]]:

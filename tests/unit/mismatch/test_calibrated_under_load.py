@@ -122,7 +122,7 @@ def test_intact_histories_have_no_evidence_of_it():
 
 def test_a_gain_that_no_effect_of_the_library_explains_is_no_pad_under_load():
     """Trains hear it as a pad as well, impacts do not: the best effect leaves a change of impacts, so it is unknown."""
-    visits = history(np.random.default_rng(7), 0.0, gained=0.5 * unit("gain_A1"))
+    visits = history(np.random.default_rng(7), 0.0, gained=unit("gain_A1"))
     alike = [replace(v, groups=(v.groups[0], as_pad(v.groups[1], "gain_A1", "pad@0.60"))) for v in visits]
     answer = answers(alike, candidates_under_load(PARAMETERS))["change"]
     assert answer.verdict == "unknown" and answer.gain is not None and answer.gain > 12.0

@@ -40,9 +40,6 @@ class CalibrationConstants:
     pad_visit_sd: float = threshold(
         0.1, "ln", "change of all pads between visits by their temperature: 30 K at 0.3 % per kelvin", PAGE
     )
-    offset_sd: float = threshold(
-        1e-3, "ln", "of stiffness under trains over that under impacts where no effect moves it: none", "numerical"
-    )
     load_effect_sd: float = threshold(
         0.7, "ln", "prior of all pads or all ballast under trains over those under impacts: a factor of two", PAGE
     )
@@ -82,6 +79,8 @@ class CalibrationConstants:
     nose_start_sds: float = threshold(
         2.0, "prior sd", "of the position of a nose, from which fits begin to either side of that of the file", PAGE
     )
+    max_new_steps: int = threshold(6, "steps", "of a fit that begins at the values which earlier visits predict", PAGE)
+    min_new_gain: float = threshold(0.5, "nats", "of such a step, below which it is the last", PAGE)
     finding_sds: float = threshold(3.0, "standard deviations", "beyond which a value differs from the file", PAGE)
     least_support: float = threshold(
         0.1, "share", "of its stiffness, below which ballast carries nothing: the sleeper hangs", PAGE

@@ -5,8 +5,8 @@ information on the sum of its value and of an offset that impacts do not have. N
 
 .. math:: x_{train} = x + o, \quad \Lambda' = T^T \Lambda T, \quad T = (1, 1)
 
-An offset is 0 unless an effect moves it: one of all pads, or of all ballast, or of the pad at one support. (In numbers
-its standard deviation is ``CALIBRATION.offset_sd``, too small to matter.)
+A constant offset is an error of the model as well: that of all pads, or of all ballast, has the prior of an effect,
+that of one support the scatter of the file. So only what differs between visits is evidence of a change.
 """
 
 from __future__ import annotations
@@ -113,11 +113,12 @@ def with_offsets(
         Trains inform on the sums. Without trains, or without impacts, nothing is known of an offset.
     """
     offsets = {}
-    for _, *both in _springs(parameters):
-        for p in both:
+    for law, spring, damper in _springs(parameters):
+        for p, share in ((spring, 1.0), (damper, DAMPER_SHARE)):
             if p is not None:
+                sd = p.sd if law.is_local else share * CALIBRATION.load_effect_sd
                 offsets[p.name] = StateParameter(
-                    p.name + END, 0.0, CALIBRATION.offset_sd, 0.0, "under load", None, p.position, p.unit, 0.0, False
+                    p.name + END, 0.0, sd, 0.0, "under load", None, p.position, p.unit, 0.0, False
                 )
     return [*parameters, *offsets.values()], [
         replace(v, groups=tuple(_with_sums(g, offsets) for g in v.groups)) for v in visits

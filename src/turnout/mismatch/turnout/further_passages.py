@@ -15,7 +15,7 @@ from turnout.errors import SimulationError
 from turnout.mismatch.turnout.priors import PASSAGE
 
 if TYPE_CHECKING:
-    from turnout.mismatch.engine.case import Observation
+    from turnout.mismatch.engine.case import Case, Observation
     from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.turnout.campaign import CampaignInput
     from turnout.mismatch.turnout.case import TrackCase
@@ -78,7 +78,7 @@ def with_reserved_passages(case: TrackCase, fit: Fit) -> tuple[TrackCase, Fit]:
     extended = copy(case)
     extended.observations = (*case.observations, *observations)
     fit = replace(fit, values=values, jacobian=[*fit.jacobian, *jacobian], white=[*fit.white, *white])
-    return extended, replace(fit, scale={**fit.scale, **_scales(extended, fit)})
+    return extended, replace(fit, scale={**fit.scale, **noise_scales(extended, fit)})
 
 
 def _linear_model(
@@ -105,8 +105,20 @@ def _linear_model(
     return {n.name: at[n.name] for n in nuisances}, rows, residual
 
 
-def _scales(case: TrackCase, fit: Fit) -> dict[str, float]:
-    """Noise scale by data type at the maximum of the linear model, at least 1."""
+def noise_scales(case: Case, fit: Fit) -> dict[str, float]:
+    """Noise scale by data type at the maximum of the linear model, at least 1.
+
+    Parameters
+    ----------
+    case : Case
+    fit : Fit
+        With derivatives and whitened residuals of all observations.
+
+    Returns
+    -------
+    dict
+        Data type -> scale.
+    """
     values = np.array([fit.values[n.name] for n in case.nuisances])
     mean, sd = (np.array([getattr(n, field) for n in case.nuisances]) for field in ("mean", "sd"))
     precision, score = np.diag(sd**-2), (mean - values) / sd**2

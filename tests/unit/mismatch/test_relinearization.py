@@ -1,0 +1,163 @@
+"""Visits whose fits end in another valley than earlier ones: linearized again they agree, unless something changed."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy import optimize, stats
+
+from turnout.mismatch.calibrated import GroupInformation, StateParameter, VisitInformation
+from turnout.mismatch.calibrated.belief import Belief
+from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.turnout.relinearization import NormalPrior, fit_all_recordings, fit_given_belief
+from turnout.stages import agreeing_visits as agreeing
+from turnout.stages.agreeing_visits import AgreeingInformation, FittedGroup, agreeing_visits
+
+ERROR = 0.1
+SHARED = {name: StateParameter(name, 0.0, 2.0, group="surface") for name in ("length", "depth")}
+
+
+class Valleys(Case):
+    """A train measures the square of a length, twelve times, and the sum of depth, length, and a number of its own."""
+
+    nuisances = (
+        Nuisance("length", "-", 0.0, 2.0),
+        Nuisance("depth", "-", 0.0, 2.0),
+        Nuisance("load", "-", 0.0, 0.05, owner="train"),
+    )
+
+    def __init__(self, length, depth, load=0.02, seed=0):
+        noise = ERROR * np.random.default_rng(seed).standard_normal(24)
+        exact = self.predict({"length": length, "depth": depth, "load": load}, (), ())[0]
+        self.observations = (Observation("train", "train", exact + noise, ERROR),)
+
+    def predict(self, values, terms, observations):
+        length, depth, load = (values[n] for n in ("length", "depth", "load"))
+        return [np.repeat([length**2, depth + 0.3 * length**2 + load], 12)]
+
+
+def belief_of(length, depth, sd=0.05):
+    return Belief(("depth", "length"), np.array([depth, length]), sd**2 * np.array([[1.0, 0.4], [0.4, 1.0]]))
+
+
+def cost(case, prior, x):
+    values = dict(zip(("length", "depth", "load"), x))
+    return float(np.sum(((case.observations[0].data - case.predict(values, (), ())[0]) / ERROR) ** 2)) + prior.cost(x)
+
+
+def fitted(case, start):
+    return fit_jointly(case, values={"length": start, "depth": 0.0})
+
+
+def test_steps_end_at_the_maximum_of_a_normal_prior_and_the_data():
+    """Against a general optimizer, with a correlated prior."""
+    case = Valleys(1.1, 0.4)
+    prior = NormalPrior.of_belief(case, SHARED, belief_of(0.9, 0.5))
+    assert prior.mean == pytest.approx([0.9, 0.5, 0.0])
+    assert np.linalg.inv(prior.precision)[:2, :2] == pytest.approx(0.05**2 * np.array([[1.0, 0.4], [0.4, 1.0]]))
+    fit, reached = fit_all_recordings(case, fitted(case, 1.0), prior, {"length": 0.9, "depth": 0.5, "load": 0.0})
+    best = optimize.minimize(lambda x: cost(case, prior, x), prior.mean, method="Nelder-Mead", options={"xatol": 1e-7})
+    assert [fit.values[n.name] for n in case.nuisances] == pytest.approx(best.x, abs=2e-3)
+    assert reached == pytest.approx(best.fun, abs=0.05)
+
+
+def test_steps_that_cost_more_are_damped():
+    """From a length near 0 the undamped step leads to a length of 10 and more."""
+    case = Valleys(1.0, 0.5)
+    prior = NormalPrior.of_file(case)
+    fit, _ = fit_all_recordings(case, fitted(case, 1.0), prior, {"length": 0.05, "depth": 0.5, "load": 0.0})
+    assert fit.values["length"] == pytest.approx(1.0, abs=0.1)
+
+
+def test_the_excess_of_an_unchanged_visit_is_chi_squared_with_the_directions_that_the_data_inform():
+    """Both valleys are equally probable alone. Two directions: 200 visits have a mean of 2 ± 0.14, 95 % below 6.0."""
+    excess = []
+    rng = np.random.default_rng(1)
+    for seed in range(200):
+        belief = belief_of(1.0, 0.5)
+        depth, length = rng.multivariate_normal(belief.mean, belief.covariance)
+        case = Valleys(length, depth, 0.05 * rng.standard_normal(), seed)
+        fit = fitted(case, -1.0)
+        assert fit.values["length"] < 0.0
+        given, of_visit = fit_given_belief(case, replace(fit, scale={"response": 1.0}), SHARED, belief)
+        assert given.values["length"] > 0.0
+        excess.append(of_visit)
+    assert np.mean(excess) == pytest.approx(2.0, abs=0.5)
+    assert np.mean(np.array(excess) < stats.chi2.ppf(0.95, 2)) > 0.9
+
+
+def visit_of(day, case, fit, sections="S1", route="main"):
+    """Information on the shared parameters; the number of the train is integrated out, as for real visits."""
+    rows = np.asarray(fit.jacobian[0], dtype=float)
+    full, at = rows.T @ rows, np.array([fit.values[n.name] for n in case.nuisances])
+    vector = rows.T @ (fit.white[0] + rows @ at)
+    weight = full[:2, 2] / (full[2, 2] + 0.05**-2)
+    matrix, vector = full[:2, :2] - np.outer(weight, full[2, :2]), vector[:2] - weight * vector[2]
+    group = GroupInformation(f"{sections}: train, 100 km/h", 1, ("length", "depth"), matrix, vector)
+    return VisitInformation(day, float(day[:4]), (group,))
+
+
+@pytest.fixture
+def history(monkeypatch):
+    """Visits from lengths and the valleys in which their fits end -> (visits, call of ``agreeing_visits``)."""
+    monkeypatch.setattr(agreeing, "visit_groups", lambda case, fit, *where: visit_of("2000", case, fit, *where).groups)
+
+    def of(lengths, valleys, store=None):
+        cases = {f"{2020 + k}-01-01": Valleys(length, 0.5, seed=k) for k, length in enumerate(lengths)}
+        fits = {day: fitted(case, valley) for (day, case), valley in zip(cases.items(), valleys)}
+        visits = [visit_of(day, cases[day], fits[day]) for day in cases]
+        asked = []
+
+        def fitted_groups(day):
+            asked.append(day)
+            return [FittedGroup(cases[day], fits[day].without_jacobian(), SHARED, "S1", "main")]
+
+        parameters = [replace(p, walk_sd=0.01) for p in SHARED.values()]
+        result = agreeing_visits(parameters, visits, (), fitted_groups, {} if store is None else store)
+        return SimpleNamespace(before=visits, after=result, asked=asked)
+
+    return of
+
+
+def test_a_visit_in_the_other_valley_agrees_once_it_is_linearized_where_the_earlier_ones_are(history):
+    result = history([1.0, 1.0, 1.0], [1.0, -1.0, 1.0])
+    assert result.asked == ["2021-01-01"]
+    assert [a is b for a, b in zip(result.before, result.after)] == [True, False, True]
+    matrix, vector = result.after[1].total(("length", "depth"))
+    assert np.linalg.solve(matrix, vector) == pytest.approx([1.0, 0.5], abs=0.1)
+
+
+@pytest.mark.parametrize("valley", [1.0, -1.0])
+def test_a_change_stays_and_ends_the_search(history, valley):
+    """A length of 1.6 after 1.0: no fit from the earlier values explains it, whichever valley its own fit is in."""
+    result = history([1.0, 1.0, 1.6, 1.6], [1.0, 1.0, valley, -1.0])
+    assert result.asked == ["2022-01-01"]
+    assert all(a is b for a, b in zip(result.before, result.after))
+
+
+def test_a_change_that_no_derivative_shows_where_the_earlier_visits_are_leaves_its_excess(monkeypatch):
+    """A signal that rises from -1 to 1 about a length of 1.3: at 1.0 its derivative is 0, and a fit stays there."""
+
+    def predict(self, values, terms, observations):
+        return [np.repeat([np.tanh((values["length"] - 1.3) / 0.02), values["depth"] + values["load"]], 12)]
+
+    monkeypatch.setattr(Valleys, "predict", predict)
+    case = Valleys(1.31, 0.5)
+    given, excess = fit_given_belief(case, fitted(case, 1.31), SHARED, belief_of(1.0, 0.5))
+    assert given.values["length"] == pytest.approx(1.0, abs=0.05)
+    assert excess > 12 * ((1.0 + np.tanh(0.5)) / ERROR) ** 2 * 0.9
+
+
+def test_what_was_computed_is_read_again_until_the_earlier_visits_differ(history, tmp_path):
+    versions = {f"{2020 + k}-01-01": {"code": "a"} for k in range(3)}
+    store = AgreeingInformation(tmp_path, versions)
+    first = history([1.0, 1.0, 1.0], [1.0, -1.0, 1.0], store)
+    again = history([1.0, 1.0, 1.0], [1.0, -1.0, 1.0], AgreeingInformation(tmp_path, versions))
+    assert (first.asked, again.asked) == (["2021-01-01"], [])
+    for a, b in zip(first.after, again.after):
+        assert all(np.array_equal(x.matrix, y.matrix) for x, y in zip(a.groups, b.groups))
+    assert history([1.02, 1.0, 1.0], [1.0, -1.0, 1.0], AgreeingInformation(tmp_path, versions)).asked == ["2021-01-01"]
+    other_code = {day: {"code": "b"} for day in versions}
+    assert history([1.0, 1.0, 1.0], [1.0, -1.0, 1.0], AgreeingInformation(tmp_path, other_code)).asked == ["2021-01-01"]
