@@ -82,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
         after = load_configuration(args.configuration)
         if acknowledgement_row(cells) not in after.acknowledgements:
             raise ConfigErrors(after.warnings)
-    print(f"{path}: {action} {args.place} {args.band or 'all bands'}. It counts from the next run.")
+    print(f"{path}: {action} {args.place} {args.band or 'all bands'}. It counts from the next run on.")
     if action == "acknowledge" and _has_no_alarm(args.registry, acknowledgement_row(cells)):
         print(f"Note: no alarm is open there in {args.registry} that was raised by then: nothing on the list changes.")
     return 0

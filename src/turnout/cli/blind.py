@@ -16,7 +16,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import at_least_one
+from turnout.cli.options import above_zero, at_least_one
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -58,8 +58,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     diagnose.add_argument("--histories", action="store_true", help="the set has histories: use the calibrated model")
     diagnose.add_argument("--cases", help="only these cases, separated by commas")
-    diagnose.add_argument("--timeout", type=float, default=1800.0, help="elapsed time per case [s] (default 1800)")
-    diagnose.add_argument("--cpu", type=float, default=900.0, help="CPU time per case [s] (default 900)")
+    diagnose.add_argument("--timeout", type=above_zero, default=1800.0, help="elapsed time per case [s] (default 1800)")
+    diagnose.add_argument("--cpu", type=above_zero, default=900.0, help="CPU time per case [s] (default 900)")
     diagnose.add_argument("--again", action="store_true", help="also cases that failed or exceeded their budget")
     diagnose.add_argument("--ablation", metavar="NAME", help="store the findings as those of a reduced tool")
     diagnose.add_argument("--workers", type=at_least_one, default=1, help="cases at a time (default 1)")

@@ -118,5 +118,12 @@ def _target_modes(modes: Iterable[str]) -> dict[str, tuple[float, float]]:
             frequency, damping = (float(v) for v in figures.split("/"))
         except ValueError:
             raise SimulationError(f"--modes {mode!r} is not of the form ballast=99.6/0.292.") from None
+        if not (0.0 < frequency < float("inf") and 0.0 < damping < 1.0):
+            problem = (
+                f"--modes {mode!r}: no resonance has a frequency of {frequency:g} Hz and a damping ratio of {damping:g}"
+            )
+            raise SimulationError(f"{problem}. Write a frequency above 0 Hz and a damping ratio between 0 and 1.")
         targets[band] = (frequency, damping)
+    if {"ballast", "railpad"} <= targets.keys() and targets["ballast"][0] >= targets["railpad"][0]:
+        raise SimulationError("--modes: the ballast resonance lies below the railpad resonance. Exchange the two.")
     return targets

@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
         f"{count_of(len(configuration.ids), 'turnout')} with {count_of(len(layouts), 'layout')}, "
         f"{count_of(n_events, 'event')}, {count_of(n_acks, 'acknowledgement')}"
     )
-    print(f"{args.configuration}: {counts}, {'with faults' if faults else 'sound'}.")
+    print(f"{args.configuration}: {counts}, {'with faults' if faults else 'no fault'}.")
     for fault in faults:
         print(f"  {fault}")
     for event in _planned_events(configuration.events):

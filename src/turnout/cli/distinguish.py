@@ -10,7 +10,7 @@ distinguished. A name needs 12 in the column "none" and 6 against each rival.
 
 import argparse
 
-from turnout.cli.options import above_zero, add_configuration, add_former, add_track
+from turnout.cli.options import above_zero, add_configuration, add_former, add_track, finite_number
 
 GROUP = "Simulate and diagnose"
 HELP = "show which effects a planned campaign can distinguish"
@@ -26,10 +26,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     add_track(parser, help="file in config/tracks (%(default)s)", default="tommerup")
     add_configuration(parser)
-    parser.add_argument("--sensors", nargs="+", type=float, required=True, metavar="M", help="positions of sensors [m]")
-    parser.add_argument("--impacts", nargs="*", type=float, default=(), metavar="M", help="positions of impacts [m]")
-    add_former(parser, "--blows", "--impacts", nargs="*", type=float)
-    parser.add_argument("--temperatures", nargs="+", type=float, default=(15.0,), metavar="C", help="of the rail [°C]")
+    parser.add_argument(
+        "--sensors", nargs="+", type=finite_number, required=True, metavar="M", help="positions of sensors [m]"
+    )
+    parser.add_argument(
+        "--impacts", nargs="*", type=finite_number, default=(), metavar="M", help="positions of impacts [m]"
+    )
+    add_former(parser, "--blows", "--impacts", nargs="*", type=finite_number)
+    parser.add_argument(
+        "--temperatures", nargs="+", type=finite_number, default=(15.0,), metavar="C", help="of the rail [°C]"
+    )
     parser.add_argument("--trains", nargs="*", default=(), help="files in config/vehicles")
     parser.add_argument("--speeds", nargs="+", type=above_zero, default=(160.0,), metavar="KMH", help="[km/h]")
     parser.add_argument("--effects", nargs="+", metavar="EFFECT", help="only these effects")

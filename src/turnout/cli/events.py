@@ -76,7 +76,7 @@ def _enter(args: argparse.Namespace) -> int:
     from pathlib import Path
 
     from turnout.config import load_configuration
-    from turnout.config.events import COLUMNS, turnout_problems
+    from turnout.config.events import COLUMNS, event_of, lead_problem, now, turnout_problems
     from turnout.config.turnouts_table import append_csv, restore_on_error
     from turnout.errors import ConfigError, ConfigErrors
 
@@ -88,7 +88,11 @@ def _enter(args: argparse.Namespace) -> int:
         after = load_configuration(args.configuration)
         if problems := list(turnout_problems(cells, after.ids, after.variants)):
             raise ConfigErrors([ConfigError(path, column, *content) for column, *content in problems])
-    print(f"{path}: {args.kind} at {args.place}, {args.date}. It counts from the next run.")
+        entered = event_of(cells)
+        if problem := lead_problem(entered):
+            raise ConfigError(path, "date", *problem)
+    begin = "from its day" if entered.at > now() else "from the next run"
+    print(f"{path}: {args.kind} at {args.place}, {args.date}. It counts {begin} on.")
     return 0
 
 

@@ -68,6 +68,33 @@ def above_zero(text: str) -> float:
     return number
 
 
+def finite_number(text: str) -> float:
+    """The finite number of ``text``; argparse.ArgumentTypeError otherwise.
+
+    Parameters
+    ----------
+    text : str
+        Value of an option.
+
+    Returns
+    -------
+    float
+        The number.
+
+    Examples
+    --------
+    >>> finite_number("-12.5")
+    -12.5
+    """
+    try:
+        number = float(text)
+    except ValueError:
+        number = float("nan")
+    if not abs(number) < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number")
+    return number
+
+
 def add_configuration(
     parser: argparse.ArgumentParser,
     help: str = "folder of the configuration (%(default)s)",

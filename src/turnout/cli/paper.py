@@ -17,7 +17,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import add_registry
+from turnout.cli.options import above_zero, add_registry
 
 if TYPE_CHECKING:
     from typing import Any
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 GROUP = "Results"
 HELP = "print the tables of the paper for a turnout and a campaign"
+PAPER_TRAIN = "IC3"  # the trains of Table 4, also where none has been recorded
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,9 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--campaign", metavar="DATE", help="its date, YYYY-MM-DD; by default the newest")
     parser.add_argument("--format", choices=("text", "csv", "latex"), default="text", help="form (%(default)s)")
     parser.add_argument("--table", type=int, choices=(1, 2, 3, 4, 5), help="only this table; by default 1 to 4")
-    parser.add_argument("--train-type", default="IC3", help="trains of Table 4 (%(default)s)")
+    parser.add_argument("--train-type", default=PAPER_TRAIN, help="trains of Table 4 (%(default)s)")
     parser.add_argument(
-        "--speed", type=float, default=160.0, help="their speed on the main track in km/h (%(default)g)"
+        "--speed", type=above_zero, default=160.0, help="their speed on the main track in km/h (%(default)g)"
     )
     parser.add_argument(
         "--bars", metavar="FILE", help="write bar charts of the fit by type, speed and axle load as HTML"
@@ -67,6 +68,7 @@ def run(args: argparse.Namespace) -> int:
     from turnout.report.paper_tables import class_rows, class_table, paper_tables, render
 
     with open_registry(args.registry) as connection:
+        _check_train_type(connection, args.turnout, args.train_type)
         campaign = _campaign(connection, args.turnout, args.campaign)
         tables = list(paper_tables(connection, args.turnout, campaign, args.train_type, args.speed))
         bars = class_rows(connection, args.turnout)
@@ -91,6 +93,21 @@ def _write_bars(path: str, connection: duckdb.DuckDBPyConnection, turnout: str, 
     cursor = connection.execute("select * from sections where turnout_id = ? order by position_m, label", [turnout])
     sections = [dict(zip((d[0] for d in cursor.description), row)) for row in cursor.fetchall()]
     Path(path).write_text(bars_page(turnout, rows, sections), encoding="utf-8")
+
+
+def _check_train_type(connection: duckdb.DuckDBPyConnection, turnout: str, wanted: str) -> None:
+    """ConfigError for a train type that no passage of the turnout has."""
+    from turnout.errors import ConfigError
+
+    query = (
+        "select distinct train_type from passages_current where turnout_id = ? and train_type is not null order by 1"
+    )
+    known = [row[0] for row in connection.execute(query, [turnout]).fetchall()]
+    if wanted not in (*known, PAPER_TRAIN):
+        remedy = (
+            f"Write one of {', '.join(known)}" if known else f"Leave it out: {turnout} has no passage of a known type"
+        )
+        raise ConfigError("turnout paper", "--train-type", f"no train of the type {wanted!r}", remedy)
 
 
 def _campaign(connection: duckdb.DuckDBPyConnection, turnout: str, date: str | None) -> str:

@@ -11,7 +11,16 @@ and force of each impact, or the forces of the wheels.
 
 import argparse
 
-from turnout.cli.options import above_zero, add_configuration, add_former, add_raw, add_track, add_turnout
+from turnout.cli.options import (
+    above_zero,
+    add_configuration,
+    add_former,
+    add_raw,
+    add_track,
+    add_turnout,
+    at_least_one,
+    finite_number,
+)
 
 GROUP = "Simulate and diagnose"
 HELP = "simulate a hammer test or a train passage"
@@ -30,19 +39,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     hammer.add_argument(
         "--section", required=True, help="section of the track file, or, without --turnout, a position [m]"
     )
-    hammer.add_argument("--tests", type=int, default=1, help="tests, one file each; --out takes one (default 1)")
-    hammer.add_argument("--impacts", type=int, default=10, help="impacts per test (default 10)")
-    add_former(hammer, "--blows", "--impacts", type=int)
+    hammer.add_argument(
+        "--tests", type=at_least_one, default=1, help="tests, one file each; --out takes one (default 1)"
+    )
+    hammer.add_argument("--impacts", type=at_least_one, default=10, help="impacts per test (default 10)")
+    add_former(hammer, "--blows", "--impacts", type=at_least_one)
     passage = subcommands.add_parser("passage", help="one train over the turnout")
     passage.add_argument("--vehicle", default="ic3", help="file in config/vehicles, or its path (default ic3)")
     passage.add_argument("--speed", type=above_zero, default=160.0, help="speed [km/h] (default 160)")
     passage.add_argument(
         "--load",
-        type=float,
+        type=finite_number,
         default=0.5,
         help="share of the payload, 0 (empty) to 1 (full), overloaded up to 1.5 (default 0.5)",
     )
-    passage.add_argument("--units", type=int, default=1, help="coupled units (default 1)")
+    passage.add_argument("--units", type=at_least_one, default=1, help="coupled units (default 1)")
     passage.add_argument("--route", default="main", help="route of the track file (default main)")
     passage.add_argument("--direction", choices=("facing", "trailing"), default="facing")
     for sub in (hammer, passage):
@@ -54,7 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         sub.add_argument("--out", help="file to write, instead of one below --raw")
         sub.add_argument("--format", help="format of the file (default: by the ending of --out, else hdf5)")
         sub.add_argument("--at", default="2024-05-13T09:00:00", help="UTC of the first sample, no zone (%(default)s)")
-        sub.add_argument("--temperature", type=float, help="rail temperature to note [°C]")
+        sub.add_argument("--temperature", type=finite_number, help="rail temperature to note [°C]")
         sub.add_argument(
             "--seed",
             type=int,

@@ -99,7 +99,7 @@ def row_problems(
     if values["band"] and values["band"] not in BANDS:
         yield "band", f"band is {values['band']!r}", suggestion(values["band"], BANDS)
     if values["action"] == "suppress" and not values["until"]:
-        yield "until", "until is empty", "Write the day on which it is to speak again"
+        yield "until", "until is empty", "Write the day from which the alarm is shown again"
     for column in ("by", "reason"):
         if not values[column]:
             yield column, f"{column} is empty", "Write who and why: it stays in the record"
@@ -113,7 +113,7 @@ def row_problems(
         yield (
             "until",
             f"until {values['until']} is not after at {values['at']}",
-            "Write the day on which it is to speak again",
+            "Write the day from which the alarm is shown again",
         )
 
 

@@ -84,13 +84,30 @@ def read_events(
         errors += [cells.place(name, line, column).error(*problem) for column, *problem in problems]
         if problems:
             continue
-        events.append(_event(cells))
+        events.append(event_of(cells))
         unknown_turnouts = turnout_problems(cells, turnout_ids, variants)
         warnings += [cells.place(name, line, column).error(*problem) for column, *problem in unknown_turnouts]
-        if events[-1].at > now() + MAX_LEAD_TIME:
-            message = f"date {cells['date']} is more than a year ahead"
-            warnings.append(cells.place(name, line, "date").error(message, "Correct it, or enter it nearer to its day"))
+        if problem := lead_problem(events[-1]):
+            warnings.append(cells.place(name, line, "date").error(*problem))
     return sorted(events, key=lambda e: (e.at, e.turnout, e.section or "", e.kind)), errors, warnings
+
+
+def lead_problem(event: Event) -> tuple[str, str] | None:
+    """Problem and remedy of an event that is planned more than a year ahead.
+
+    Parameters
+    ----------
+    event : Event
+        The event.
+
+    Returns
+    -------
+    tuple of (str, str) or None
+        None for an event of the past or of the coming year.
+    """
+    if event.at <= now() + MAX_LEAD_TIME:
+        return None
+    return f"date {event.at:%Y-%m-%d} is more than a year ahead", "Correct it, or enter it nearer to its day"
 
 
 def _row_problems(cells: Mapping[str, str]) -> Iterator[tuple[str, str, str]]:
@@ -196,8 +213,19 @@ def _reset_bands(cells: Mapping[str, str]) -> tuple[str, ...]:
     return tuple(sorted(word for word in cells.get("resets", "").replace("+", " ").split() if word != "none"))
 
 
-def _event(cells: Mapping[str, str]) -> Event:
-    """The event of a valid row."""
+def event_of(cells: Mapping[str, str]) -> Event:
+    """The event of a valid row.
+
+    Parameters
+    ----------
+    cells : mapping of str to str
+        Cells of the row by the names of their columns.
+
+    Returns
+    -------
+    Event
+        With the bands that its kind of work resets, unless the row names others.
+    """
     turnout, kind = cells["turnout"], cells["kind"]
     label = cells["section"].removeprefix(f"{turnout}/") or None
     resets = _reset_bands(cells) if cells.get("resets") else RESETS[kind]

@@ -20,7 +20,7 @@ NO_TABLE = "Run 'turnout add ID LAYOUT' to begin one"
 NO_PROJECT = "Run the command in the folder of a project; 'turnout init FOLDER' makes one"
 ROW = {
     "turnout": Key("text", "id: letters, digits, _ and -", required=True, pattern=ID),
-    "layout": Key("text", "file in config/layouts/ without .yaml", required=True),
+    "layout": Key("text", "the name of a file in config/layouts/, without .yaml", required=True),
     "raw": Key("text", "folder of its raw files below the raw root; empty: its id"),
     "name": Key("text", "name for display"),
     "line": Key("text", "railway line"),

@@ -12,6 +12,8 @@ from turnout.readers.channel_maps import ChannelMapping
 from turnout.readers.source import BLOCK_SIZE, RawRecord, Source
 from turnout.records import Channel
 
+LARGEST_NUMBER = 1e30  # beyond it a number marks a missing sample, as 9.9e37 and 9.91e37 of SCPI instruments
+
 
 @dataclass(frozen=True)
 class BlockReader:
@@ -58,8 +60,8 @@ class BlockReader:
 class ChannelStatistics:
     """Statistics of each channel (n_channel,) over the blocks read so far.
 
-    ``n_bad`` is the number of non-finite samples, ``first_bad`` the index of the first of them, ``value`` the first
-    sample, ``constant`` whether all samples equal it.
+    ``n_bad`` is the number of samples that are not finite or mark missing ones, ``first_bad`` the index of the first of
+    them, ``value`` the first sample, ``constant`` whether all samples equal it.
     """
 
     n_bad: np.ndarray
@@ -125,8 +127,8 @@ class ChannelStatistics:
         for i, row in enumerate(samples):
             self.constant[i] &= bool(row[0] == self.value[i] == row[-1] and row.min() == row.max())
             with np.errstate(over="ignore", invalid="ignore"):
-                suspect = not np.isfinite(row.sum())
-            if suspect and not (finite := np.isfinite(row)).all():
+                suspect = not abs(row.sum()) < LARGEST_NUMBER
+            if suspect and not (finite := np.abs(row) < LARGEST_NUMBER).all():
                 if not self.n_bad[i]:
                     self.first_bad[i] = start + int(np.argmin(finite))
                 self.n_bad[i] += np.count_nonzero(~finite)

@@ -34,6 +34,25 @@ class ChannelMapping:
     offset: float
 
 
+KINDS = {"b": "true or false", "c": "complex numbers", "O": "text or objects", "U": "text", "S": "text", "T": "text"}
+
+
+def kind_of(dtype: Any) -> str:
+    """What an array that holds no real numbers holds, for messages.
+
+    Parameters
+    ----------
+    dtype : numpy.dtype
+        Its data type.
+
+    Returns
+    -------
+    str
+        The name of the data type if nothing plainer is known.
+    """
+    return KINDS.get(dtype.kind, str(dtype))
+
+
 def channel_mappings(
     record: RawRecord, channels: Sequence[RawChannel], where: str, source: Source
 ) -> tuple[ChannelMapping, ...]:
@@ -72,7 +91,7 @@ def channel_mappings(
     if unknown := [
         i for i in unknown if not is_axis_name(record.names[i], record.units[i]) and not is_rate_name(record.names[i])
     ]:
-        names = ", ".join(repr(record.names[i]) for i in unknown)
+        names = _name_list([record.names[i] for i in unknown])
         raise source.error(
             where,
             f"the file has {'channel' if len(unknown) == 1 else 'channels'} {names}, which the layout does not name",
@@ -84,6 +103,15 @@ def channel_mappings(
         for i, channel in zip(indices, channels)
         if channel.quantity != IGNORED
     )
+
+
+MAX_LISTED = 12  # channels that a message names
+
+
+def _name_list(names: Sequence[str]) -> str:
+    """Names for a message, the first ones of a long list."""
+    more = f" and {len(names) - MAX_LISTED} more" if len(names) > MAX_LISTED else ""
+    return ", ".join(map(repr, names[:MAX_LISTED])) + more
 
 
 def index_of(record: RawRecord, wanted: str | int, where: str, source: Source) -> int:
@@ -119,10 +147,14 @@ def index_of(record: RawRecord, wanted: str | int, where: str, source: Source) -
         key = wanted if names is record.names else wanted.strip().casefold()
         if names.count(key) == 1:
             return names.index(key)
+    if wanted in record.not_numbers:
+        problem = f"the channel {wanted!r} holds {record.not_numbers[wanted]}, no real numbers"
+        remedy = "Export its samples as whole or floating-point numbers"
+        raise source.error(where, problem, remedy, reason="channel_missing")
     matches = [i for i, aliases in enumerate(record.aliases) if wanted in aliases]
     if len(matches) == 1:
         return matches[0]
-    available = ", ".join(repr(name) for name in record.names)
+    available = _name_list(record.names)
     similar_names = get_close_matches(wanted, record.names, n=1)
     hint = (
         f"Did you mean {similar_names[0]!r}? Correct the channel map"
@@ -160,6 +192,9 @@ def _sensor_rows(record: RawRecord, channels: Sequence[RawChannel], where: str, 
 
 def _channel_mapping(index: int, record: RawRecord, raw: RawChannel, where: str, source: Source) -> ChannelMapping:
     place, file_unit = f"{where}, channel {raw.name!r}", record.units[index]
+    if (dtype := record.samples[index].dtype).kind not in "fiu":
+        problem = f"its samples are {kind_of(dtype)}, no real numbers"
+        raise source.error(place, problem, "Export them as whole or floating-point numbers", reason="channel_missing")
     try:
         conversion_to_si = to_si(raw.quantity, resolve_unit(file_unit, raw.unit), raw.sensitivity, raw.sensitivity_unit)
     except ValueError as error:

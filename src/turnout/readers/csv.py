@@ -37,14 +37,8 @@ from turnout.readers.array_metadata import (
     START_NAMES,
     Metadata,
 )
-from turnout.readers.csv_header import (
-    MISSING_VALUES,
-    cell_errors,
-    check_thousands,
-    read_head,
-    seconds_per_number,
-    time_column,
-)
+from turnout.readers.csv_cells import MISSING_VALUES, cell_errors, check_thousands
+from turnout.readers.csv_header import read_head, seconds_per_number, time_column
 from turnout.readers.entries import Entry
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.lost_entries import control_character_errors
@@ -71,9 +65,11 @@ def read_raw(source: Source) -> RawFile:
     ReadError
         If the head, the columns or a number cannot be read, or the last line is incomplete.
     """
-    is_utf16 = source.head[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
-    lazy = source.lazy and not is_utf16
-    data = source.memory_map if lazy else _in_utf8(source) if is_utf16 else source.data
+    encoding = utf16_encoding(source.head)
+    lazy = source.lazy and not encoding
+    data = source.memory_map if lazy else _in_utf8(source, encoding) if encoding else source.data
+    if isinstance(data, bytes):
+        data = data.removesuffix(END_OF_FILE)
     if isinstance(data, bytes) and b"\n" not in data:
         data = data.replace(b"\r", b"\n")
     data, remarks = _without_cut_row(data, source)
@@ -126,10 +122,45 @@ def _shape(row: bytes) -> tuple[int, int]:
     return len(cells), len(decimals[1]) if decimals else 0
 
 
-def _in_utf8(source: Source) -> bytes:
+END_OF_FILE = b"\x1a"  # the mark with which programs of DOS end a text
+MIN_UTF16_SIZE = 16  # bytes: fewer do not tell the encoding
+
+
+def utf16_encoding(head: bytes) -> str:
+    """Encoding of a text in UTF-16, by its byte order mark or by the zero bytes of its Latin letters and digits.
+
+    Parameters
+    ----------
+    head : bytes
+        First bytes of the file.
+
+    Returns
+    -------
+    str
+        "" for another text.
+
+    Examples
+    --------
+    >>> utf16_encoding("force;rail".encode("utf-16-le")), utf16_encoding(b"force;rail [m/s2]")
+    ('utf-16-le', '')
+    """
+    if head[:4] == codecs.BOM_UTF32_LE:
+        return ""
+    if head[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
+        return "utf-16"
+    even, odd = head[0::2], head[1::2]
+    if len(head) < MIN_UTF16_SIZE or max(even.count(0), odd.count(0)) < MIN_ZERO_SHARE * len(odd):
+        return ""
+    return "utf-16-le" if not even.count(0) else "utf-16-be" if not odd.count(0) else ""
+
+
+MIN_ZERO_SHARE = 0.9  # of the high bytes of a text of numbers with some other letters
+
+
+def _in_utf8(source: Source, encoding: str) -> bytes:
     """A file that a spreadsheet saved as "Unicode" (UTF-16), converted to UTF-8."""
     with source.parsed_by("Python", "the text in UTF-16"):
-        return source.data.decode("utf-16").encode()
+        return source.data.decode(encoding).encode()
 
 
 def _columns_in_memory(

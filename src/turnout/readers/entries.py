@@ -123,6 +123,10 @@ NAMED_PIECE = re.compile(
     r"([+-]?[.,]?\d[^:=]{0,30}?|[^\W\d]{1,20}\.?|[-+]|[x×]\s?\d+|\d+\s?:\s?\d+)\s*"
 )
 
+# Several of them in one piece: "t0=0 dt=0.0001 s n=3000". A word behind a number is its unit if no mark follows it.
+PAIR = r"([^\W\d][^:=]{0,40}?)\s*[:=]\s*([+-]?[.,]?\d[^\s:=]*+(?:\s+[^\W\d][^\s:=]*+(?!\s*[:=]))?)"
+PAIRS = re.compile(rf"(?:{PAIR}\s*){{2,}}")
+
 RATIO_PIECE = re.compile(  # "scale 1:500 map"
     r"(?:([^\d:=]*):)?([^\d:=]*[^\W\d])[\s:=]+(1\s?[:/]\s?\d+[^\d:=]{0,30})"
 )
@@ -148,8 +152,13 @@ def entries_of_text(text: str, place: str) -> Iterator[Entry]:
     --------
     >>> [(e.name, e.value) for e in entries_of_text("hammer 3; sampled at 25.6 kHz, tip=steel", "comment")]
     [('hammer', '3'), ('sampled at', '25.6 kHz')]
+    >>> [(e.name, e.value) for e in entries_of_text("t0=0 dt=0.1 ms n: 3000", "comment")]
+    [('t0', '0'), ('dt', '0.1 ms'), ('n', '3000')]
     """
     for piece in map(str.strip, re.split(r"[;\n\r|]|,\s", text[:MAX_TEXT])):
+        if PAIRS.fullmatch(piece):
+            yield from (Entry(place, name, value, is_piece=True) for name, value in re.findall(PAIR, piece))
+            continue
         ratio = RATIO_PIECE.fullmatch(piece) if len(piece) <= MAX_RATIO_PIECE else None
         if ratio and scale_meaning(ratio[2]):
             subject = f"{ratio[1]} " if is_of_drawing(ratio[1] or "") else ""

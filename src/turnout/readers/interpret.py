@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.blocks import BlockReader, ChannelStatistics, channel_error
+from turnout.readers.blocks import LARGEST_NUMBER, BlockReader, ChannelStatistics, channel_error
 from turnout.readers.channel_maps import Assignments, ChannelMapping
 from turnout.readers.lazy import Column
 from turnout.readers.lost_entries import is_single, lost_entry_errors
@@ -148,7 +148,7 @@ def _missing_count(column: Column, fills: Sequence[float]) -> int:
     if column.dtype.kind not in "fiu":
         return 0
     blocks = (np.asarray(column[start : start + BLOCK_SIZE]) for start in range(0, len(column), BLOCK_SIZE))
-    return sum(int(np.count_nonzero(~np.isfinite(block) | np.isin(block, fills))) for block in blocks)
+    return sum(int(np.count_nonzero(~(np.abs(block) < LARGEST_NUMBER) | np.isin(block, fills))) for block in blocks)
 
 
 def _count_errors(raw: RawFile, description: RawDescription, source: Source) -> Iterator[ReadError]:

@@ -37,6 +37,8 @@ from turnout.readers.array_metadata import (
     matrices,
     vectors,
 )
+from turnout.readers.channel_maps import kind_of
+from turnout.readers.entries import MAX_ENTRIES
 from turnout.readers.lazy import ARRAYS, Array, Column
 from turnout.readers.source import RawFile, RawRecord, Source
 from turnout.readers.start_times import start_fields
@@ -210,7 +212,7 @@ def raw_file(variables: Mapping, source: Source, parent: Metadata | None = None)
     ReadError
         If the variables do not say which arrays are the samples.
     """
-    variables = _with_fields(variables)
+    variables = _with_vectors(_with_fields(variables))
     facts = Metadata(variables, source, parent)
     expected = facts.count(RECORD_COUNT_NAMES)
     numbered = numbered_names(variables)
@@ -256,6 +258,16 @@ def _with_fields(variables: Mapping[str, Any]) -> Mapping[str, Any]:
     if not any(_is_structured(value) for value in variables.values()):
         return variables
     return {n: {f: v[f] for f in v.dtype.names} if _is_structured(v) else v for n, v in variables.items()}
+
+
+def _with_vectors(variables: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The variables, with vectors for columns (n, 1) and rows (1, n); one alone stays a matrix of one channel."""
+    flat = {name: v for name, v in matrices(variables).items() if v.ndim == 2 and min(v.shape) == 1}
+    if len(flat) < 2 and not vectors(variables):
+        return variables
+    flat = {name: next(iter(v if v.shape[0] == 1 else v.T)) for name, v in flat.items()}
+    changed = {name: flat.get(name, value) for name, value in variables.items()}
+    return Alphabetical(changed) if isinstance(variables, Alphabetical) else changed
 
 
 def _is_structured(value: Any) -> bool:
@@ -357,7 +369,15 @@ def _raw_record(
         conditions=facts.conditions(k, n),
         time=time,
         undecided=_undecided_scales(names, facts),
+        not_numbers={
+            name: kind_of(v.dtype) for name, v in facts.variables.items() if isinstance(v, np.ndarray) and _is_other(v)
+        },
     )
+
+
+def _is_other(array: np.ndarray) -> bool:
+    """Whether an array is as long as samples and holds no real numbers."""
+    return array.size > MAX_ENTRIES and array.dtype.kind not in "fiumM"
 
 
 def _undecided_scales(names: Sequence[str], facts: Metadata) -> dict[int, str]:

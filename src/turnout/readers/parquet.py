@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 
 from turnout.errors import ReadError
 from turnout.readers.array_metadata import RECORD_COUNT_NAMES, START_NAMES, TIME_NAMES, Metadata
+from turnout.readers.channel_maps import kind_of
 from turnout.readers.claims import check_parquet
 from turnout.readers.entries import entries_of
 from turnout.readers.lazy import Column, LazyColumn
@@ -64,6 +65,7 @@ def read_raw(source: Source) -> RawFile:
     if n_row and not names:
         kinds = ", ".join(f"{field.name!r} ({field.type})" for field in list(schema)[:MAX_LISTED])
         raise source.error("the columns", f"none holds one number in a row; there are {kinds}", ROWS_REMEDY, "empty")
+    not_numbers = {name: kind_of(x.dtype) for name, x in columns.items() if x.dtype.kind not in "fiumM"}
     clocks = [name for name, x in columns.items() if name != time and x.dtype.kind in "mM" and _varies(x)]
     fields = {f"column {f.name!r}": _field_notes(f) for f in schema}
     common = tuple(entries_of(_metadata(schema), "metadata"))
@@ -90,6 +92,7 @@ def read_raw(source: Source) -> RawFile:
                 undecided=nested | {i: stated[name] for i, name in enumerate(names) if stated[name]},
                 is_time_in_seconds=time is not None and columns[time].dtype.kind in "mM",
                 clocks=tuple((f"column {name!r}", _seconds(columns[name][span])) for name in clocks),
+                not_numbers=not_numbers,
             )
         )
     return RawFile(tuple(records) if n_row else (), facts.count(RECORD_COUNT_NAMES), remarks)
@@ -126,6 +129,8 @@ def _to_numpy(column: pa.ChunkedArray) -> np.ndarray:
     if pa.types.is_time(column.type):
         whole = column.cast(pa.int64() if column.type.bit_width == 64 else pa.int32()).to_numpy()
         return whole.astype("int64").view(f"timedelta64[{column.type.unit}]") if whole.dtype.kind == "i" else whole
+    if pa.types.is_decimal(column.type):
+        column = column.cast(pa.float64())
     return column.to_numpy()
 
 

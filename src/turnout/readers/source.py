@@ -197,6 +197,7 @@ class RawRecord:
     False: then its unit is not stated. ``clocks`` are further time axes (place, seconds). ``aliases`` are further names
     of the channels.
     ``undecided`` are statements about the scale of channels, by index, of which nothing says whether it is applied.
+    ``not_numbers`` are variables without real numbers, name -> what they hold, for messages about missing channels.
     ``is_floating_audio`` is True for an audio file of floating-point numbers, which may be no fractions of full scale.
     """
 
@@ -213,6 +214,7 @@ class RawRecord:
     aliases: tuple[tuple[str, ...], ...] = ()
     undecided: Mapping[int, str] = field(default_factory=lambda: EMPTY_MAPPING)
     is_floating_audio: bool = False
+    not_numbers: Mapping[str, str] = field(default_factory=lambda: EMPTY_MAPPING)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "units", tuple(self.units) or ("",) * len(self.names))

@@ -27,7 +27,7 @@ OTHER_UNITS = re.compile(
 )
 # Units of the same channel at another place of its measuring chain.
 CHAIN_WORDS = frozenset("raw sensor input electrical signal native adc hardware transducer description roh".split())
-UNIT_IN_NAME = re.compile(r"[\[({]([^\[\](){}]+)[\])}]\s*$")
+UNIT_IN_NAME = re.compile(r"[\[({<]([^\[\](){}<>]+)[\])}>]\s*$")
 LEVEL = re.compile(r"dB")
 
 
@@ -246,8 +246,11 @@ def _last_word(name: str, names: Sequence[str]) -> str:
 
 
 def _split_name(name: str) -> list[str]:
-    """A name without its last word, and that word if there is one; words are separated by blanks or underscores."""
-    plain = re.sub(r"\s+", "_", name.strip())
+    """A name without its last word, and that word if there is one.
+
+    Words are separated by blanks or underscores, a unit of letters alone also by a dot, slash, hyphen or colon.
+    """
+    plain = re.sub(r"\s+|\s*[./:-]\s*(?=[^\W\d_]+$)", "_", name.strip())
     return plain.rsplit("_", 1)
 
 

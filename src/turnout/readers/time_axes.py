@@ -1,6 +1,6 @@
 """Time axes of a record: its time column, and every column that no sensor of the layout uses and that rises evenly."""
 
-from collections.abc import Iterator, Set
+from collections.abc import Iterator, Sequence, Set
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from turnout.readers.timing import check_time, rate_of_time, seconds_since_first
 HEAD_SIZE = 1000  # samples from which a column is judged before all of it is read
 MIN_AXIS_SIZE = 8  # samples: fewer do not tell a time axis from a chance sequence
 MAX_JUMPS = 1  # gaps among the first samples: with more a column rises too unevenly for a time axis
+MAX_RATE_DIFFERENCE = 1e-3  # relative: axes of other rates have other units or contradict each other
 MAX_HEAD_DEVIATION = 1.0  # steps: rounding to printed digits moves a time by less
 
 
@@ -72,9 +73,11 @@ def time_statements(record: RawRecord, measured: Set[int], where: str, source: S
     Raises
     ------
     ReadError
-        If a time axis runs backwards, is not finite, jumps over missing samples, or is not even.
+        If a time axis runs backwards, is not finite, jumps over missing samples, or is not even, or if two of them
+        begin apart.
     """
     statements = []
+    starts: list[tuple[str, float, float, int]] = []
     axes = [] if record.time is None else [("its time column", record.time, record.is_time_in_seconds, CERTAIN)]
     axes += [(place, time, True, CERTAIN) for place, time in record.clocks]
     axes += _columns(record, measured)
@@ -85,7 +88,35 @@ def time_statements(record: RawRecord, measured: Set[int], where: str, source: S
             )
             rate, tolerance, _ = rate_of_time(time)
             statements.append(time_statement(place, rate, tolerance, is_in_seconds, certainty))
+            if certainty == CERTAIN:
+                starts.append((place, float(time[0]), rate, len(time)))
+    _check_same_start(starts, where, source)
     return statements + statements_of(_constant_columns(record, measured))
+
+
+def _check_same_start(starts: Sequence[tuple[str, float, float, int]], where: str, source: Source) -> None:
+    """ReadError if two time axes of one rate begin apart: loggers write one for each group of channels.
+
+    Axes that do not overlap count from other origins, as a clock does, and are not compared.
+
+    Parameters
+    ----------
+    starts : sequence of (str, float, float, int)
+        Place, first time, samples per unit of time and number of samples of each axis.
+    where : str
+        The record, for the message.
+    source : Source
+        The raw file.
+    """
+    for place, start, rate, n_sample in starts[1:]:
+        first_place, first_start, first_rate, _ = starts[0]
+        lag = (start - first_start) * rate
+        if abs(rate / first_rate - 1.0) < MAX_RATE_DIFFERENCE and 0.5 < abs(lag) < n_sample:
+            problem = f"{place} begins {abs(lag):.6g} samples {'after' if lag > 0 else 'before'} {first_place}"
+            remedy = (
+                "Export the channels cut to the stretch that they share; if all were sampled at once, leave one out"
+            )
+            raise source.error(where, problem, remedy, reason="clock_drift")
 
 
 def is_axis_name(name: str, unit: str) -> bool:

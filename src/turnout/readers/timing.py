@@ -84,6 +84,8 @@ def check_time(time: np.ndarray, where: str, source: Source) -> None:
             f"the clock runs backwards or stands still: sample {k} at {time[k]:.9g} s, the next at {time[k + 1]:.9g} s"
         )
         remedy = "Check the logger's clock and export the record again"
+        if time[k] == time[k + 1]:
+            remedy += ", the time with more digits if it was rounded"
         raise source.error(where, problem, remedy, reason="clock_backwards")
     rate, _, gap = rate_of_time(time)
     if gap is not None:

@@ -1,9 +1,12 @@
 """What a user sees who types something wrong: one message that says where, what was found, and what to do."""
 
+import argparse
 import shutil
+from importlib import import_module
 
 import pytest
 
+from turnout.cli import COMMANDS
 from turnout.cli.main import main
 from turnout.workflow import project as project_module
 from turnout.workflow.project import create_project
@@ -46,6 +49,11 @@ WRONG = {
     "query from_worklist --registry README.md": "not a valid DuckDB database file. Name the folder that holds registry",
     "simulate hammer --section X": "no section 'X' in the track file. Write one of OT, SP",
     "diagnose --turnout W1 --sections X": "W1 has no section X. Write some of OT, SP",
+    "events W1 tamping 3024-05-01": "config/events.csv, date: date 3024-05-01 is more than a year ahead. Correct it",
+    "calibrate --section A7 --track tommerup --modes ballast=-5/0.1": "'ballast=-5/0.1': no resonance has a frequency",
+    "calibrate --section A7 --track tommerup --modes ballast=nan/0.1": "Write a frequency above 0 Hz",
+    "calibrate --section A7 --track tommerup --modes ballast=100/1.5": "damping ratio between 0 and 1",
+    "calibrate --section A7 --track tommerup --modes ballast=600/.1 railpad=150/.1": "the ballast resonance lies below",
 }
 
 
@@ -74,6 +82,10 @@ def test_a_layout_without_passages_is_named(project, capsys, command):
             "simulate passage --speed -3",
             "turnout simulate passage: error: argument --speed: '-3' is not a number above",
         ),
+        ("diagnose --turnout W1 --budget nan", "argument --budget: 'nan' is not a number above 0"),
+        ("paper W1 --speed -5", "argument --speed: '-5' is not a number above 0"),
+        ("distinguish --sensors nan", "argument --sensors: 'nan' is not a number"),
+        ("simulate hammer --section A7 --impacts 0", "argument --impacts: '0' is not a whole number of 1 or more"),
     ],
 )
 def test_a_wrong_command_line_ends_with_2(capsys, line, message):
@@ -91,7 +103,7 @@ def test_a_tab_in_yaml_is_named(project, capsys):
 def test_counts_of_one_have_no_plural(project, capsys):
     shutil.rmtree(project / "raw/W1")
     main(["check"])
-    assert "config: 1 turnout with 1 layout, 0 events, 0 acknowledgements, sound." in capsys.readouterr().out
+    assert "config: 1 turnout with 1 layout, 0 events, 0 acknowledgements, no fault." in capsys.readouterr().out
 
 
 def test_a_draft_that_is_not_finished_is_listed(project, capsys):
@@ -136,3 +148,21 @@ def test_a_night_without_a_project_writes_nothing(tmp_path, monkeypatch, capsys)
     assert main(["nightly"]) == 2
     assert "Run the command in the folder of a project" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+def options_of(parser):
+    """All options of a parser and of its subcommands."""
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for subparser in action.choices.values():
+                yield from options_of(subparser)
+        else:
+            yield action
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_no_option_accepts_a_number_that_is_none(command):
+    """``float`` accepts nan and inf."""
+    parser = argparse.ArgumentParser()
+    import_module(f"turnout.cli.{command}").add_arguments(parser)
+    assert not [action.dest for action in options_of(parser) if action.type is float]

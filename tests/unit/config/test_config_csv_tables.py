@@ -73,7 +73,9 @@ def test_a_silence_needs_the_day_on_which_it_ends(tmp_path):
     path.write_text(f"turnout,section,band,action,by,at,until,reason\n{seen}\nt1,,,suppress,me,2026-01-01,,x\n")
     rows, errors = read_acknowledgements(path)
     assert [row["action"] for row in rows] == ["acknowledge"]
-    assert len(errors) == 1 and "line 3, column 29: until is empty. Write the day on which it is to" in str(errors[0])
+    assert len(
+        errors
+    ) == 1 and "line 3, column 29: until is empty. Write the day from which the alarm is shown again" in str(errors[0])
 
 
 def test_a_temperature_under_another_title_is_said_and_the_other_cells_are_used(tmp_path):

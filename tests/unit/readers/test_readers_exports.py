@@ -1,0 +1,177 @@
+"""Files as other programs export them: each is read to within rounding, or rejected with its true reason."""
+
+import h5py
+import numpy as np
+import pandas
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import scipy.io
+
+from turnout.errors import ReadError
+from turnout.readers import read
+from turnout.records import RawChannel, RawDescription
+
+RATE = 20000.0
+N = 400
+TIME = np.arange(N) / RATE
+FORCE = np.round(4000.0 * np.exp(-(((TIME - 0.005) / 0.0004) ** 2)) + np.sin(9000.0 * TIME), 3)
+RAIL = np.round(60.0 * np.exp(-TIME / 0.004) * np.sin(2 * np.pi * 560.0 * TIME) + 0.1, 4)
+HEAD = "force [N];rail [m/s²]\n"
+
+
+def layout(unit_of_force=None, unit_of_rail=None, force="force", rail="rail"):
+    channels = (
+        RawChannel("force", force, "force", unit=unit_of_force),
+        RawChannel("rail", rail, "acceleration", unit=unit_of_rail),
+    )
+    return RawDescription(channels, rate=RATE)
+
+
+IN_SI = layout("N", "m/s²")
+
+
+def rows(*columns, separator=";"):
+    texts = [[x if isinstance(x, str) else f"{x:.6f}" for x in column] for column in columns or (FORCE, RAIL)]
+    return "".join(separator.join(row) + "\n" for row in zip(*texts, strict=True))
+
+
+def read_text(folder, text, description=None):
+    (folder / "A7.csv").write_bytes(text if isinstance(text, bytes) else text.encode())
+    return read("A7.csv", folder, description or layout())
+
+
+def assert_right(result):
+    assert not result.errors, result.errors
+    (recording,) = result.recordings
+    np.testing.assert_allclose(recording.signal("force"), FORCE, atol=1e-6)
+    np.testing.assert_allclose(recording.signal("rail"), RAIL, atol=1e-6)
+
+
+def only_error(result):
+    assert not result.recordings
+    (error,) = result.errors
+    return error
+
+
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be", "utf-16"])
+def test_a_text_in_utf_16_is_read_with_and_without_a_byte_order_mark(tmp_path, encoding):
+    assert_right(read_text(tmp_path, (HEAD + rows()).encode(encoding)))
+
+
+def test_the_end_mark_of_a_dos_text_is_no_row(tmp_path):
+    assert_right(read_text(tmp_path, HEAD + rows() + "\x1a"))
+
+
+def test_an_end_mark_does_not_complete_a_row_without_line_break(tmp_path):
+    result = read_text(tmp_path, HEAD + rows() + "1.5\x1a")
+    assert [error.reason for error in result.errors] == ["truncated"]
+
+
+@pytest.mark.parametrize("text", ["t0=0 dt=0.0000390625", "n: 400 fs: 25600 Hz", "t0 = 0 sampling rate = 25.6 kHz"])
+def test_several_statements_in_one_line_are_each_compared_with_the_layout(tmp_path, text):
+    error = only_error(read_text(tmp_path, f"{text}\n{HEAD}{rows()}"))
+    assert error.reason == "wrong_rate"
+    assert "sampled at 25600 Hz instead of 20000 Hz" in str(error)
+
+
+@pytest.mark.parametrize("text", ["t0=0 dt=0.00005", "n: 400 fs: 20000 Hz"])
+def test_several_right_statements_in_one_line_are_no_fault(tmp_path, text):
+    assert_right(read_text(tmp_path, f"{text}\n{HEAD}{rows()}"))
+
+
+def two_time_columns(lag):
+    head = "t1 [s];force [N];t2 [s];rail [m/s²]\n"
+    return head + rows([f"{t:.8f}" for t in TIME], FORCE, [f"{t + lag:.8f}" for t in TIME], RAIL)
+
+
+@pytest.mark.parametrize(("lag", "words"), [(2e-3, "40 samples after"), (-1e-3, "20 samples before")])
+def test_two_time_columns_that_begin_apart_are_rejected(tmp_path, lag, words):
+    error = only_error(read_text(tmp_path, two_time_columns(lag)))
+    assert error.reason == "clock_drift"
+    assert f"column 't2' begins {words} its time column" in str(error)
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.4 / RATE, 1.7e9])
+def test_time_columns_of_a_multiplexer_or_of_another_origin_are_no_lag(tmp_path, lag):
+    assert_right(read_text(tmp_path, two_time_columns(lag)))
+
+
+@pytest.mark.parametrize("mark", ["9.9E37", "9.91E+37", "-9.9E37", "1E38", "n/a", "null", "---", "1.#QNAN", "-1.#IND"])
+def test_marks_of_missing_samples_are_no_samples(tmp_path, mark):
+    force = [f"{x:.3f}" for x in FORCE]
+    force[100] = mark
+    error = only_error(read_text(tmp_path, HEAD + rows(force, RAIL)))
+    assert error.reason == "not_finite"
+    assert "1 of 400 samples are missing or not finite, the first is sample 100" in str(error)
+
+
+def test_a_mark_of_a_missing_sample_is_none_in_a_binary_format_either(tmp_path):
+    force = FORCE.copy()
+    force[100] = 9.91e37
+    np.savez(tmp_path / "A7.npz", force=force, rail=RAIL)
+    assert only_error(read("A7.npz", tmp_path, IN_SI)).reason == "not_finite"
+
+
+@pytest.mark.parametrize("name", ["Kraft <kN>", "Kraft.kN", "Kraft/kN", "Kraft - kN", "Kraft: kN", "Kraft kN"])
+def test_a_unit_behind_a_name_is_compared_with_the_layout(tmp_path, name):
+    text = f"{name};rail [m/s²]\n" + rows(FORCE / 1e3, RAIL)
+    error = only_error(read_text(tmp_path, text, layout("N", None, force=name)))
+    assert error.reason == "unit_unknown"
+    assert "'kN'" in str(error) and "'N'" in str(error)
+
+
+@pytest.mark.parametrize("as_row", [False, True])
+def test_vectors_stored_as_matrices_of_one_column_are_channels(tmp_path, as_row):
+    shape = (1, N) if as_row else (N, 1)
+    with h5py.File(tmp_path / "A7.h5", "w") as file:
+        file["force"], file["rail"], file["fs"] = FORCE.reshape(shape), RAIL.reshape(shape), [[RATE]]
+    assert_right(read("A7.h5", tmp_path, IN_SI))
+    np.savez(tmp_path / "A7.npz", force=FORCE.reshape(shape), rail=RAIL, fs=RATE)
+    assert_right(read("A7.npz", tmp_path, IN_SI))
+
+
+def test_one_matrix_of_one_column_is_still_one_channel(tmp_path):
+    np.savez(tmp_path / "A7.npz", data=FORCE[:, None], fs=RATE)
+    description = RawDescription((RawChannel("force", "0", "force", unit="N"),), rate=RATE)
+    (recording,) = read("A7.npz", tmp_path, description).recordings
+    np.testing.assert_array_equal(recording.signal("force"), FORCE)
+
+
+def test_decimal_numbers_of_parquet_are_numbers(tmp_path):
+    table = pa.table({"force": pa.array(FORCE).cast(pa.decimal128(12, 3)), "rail": RAIL})
+    pq.write_table(table, tmp_path / "A7.parquet")
+    assert_right(read("A7.parquet", tmp_path, IN_SI))
+
+
+@pytest.mark.parametrize("format", ["parquet", "mat", "h5"])
+def test_a_channel_that_holds_no_real_numbers_is_named_with_what_it_holds(tmp_path, format):
+    if format == "parquet":
+        pandas.DataFrame({"force": [str(x) for x in FORCE], "rail": RAIL}).to_parquet(tmp_path / "A7.parquet")
+    elif format == "mat":
+        scipy.io.savemat(tmp_path / "A7.mat", {"force": FORCE + 1j, "rail": RAIL})
+    else:
+        with h5py.File(tmp_path / "A7.h5", "w") as file:
+            file["force"], file["rail"] = [str(x) for x in FORCE], RAIL
+    error = only_error(read(f"A7.{format}", tmp_path, IN_SI))
+    assert f"'force' holds {'complex numbers' if format == 'mat' else 'text or objects'}, no real numbers" in str(error)
+
+
+@pytest.mark.parametrize(
+    ("cells", "words"),
+    [("08:30:00.1000;1.0;2.0", "time of a clock"), ("1.0 2.0 3.0", "numbers between blanks")],
+)
+def test_rows_that_cannot_be_read_are_named_by_what_they_are(tmp_path, cells, words):
+    with pytest.raises(ReadError, match=words):
+        read_text(tmp_path, "Zeit;force;rail\n" + f"{cells}\n" * 30)
+
+
+def test_a_stamp_that_stands_still_advises_more_digits(tmp_path):
+    text = "Time [s];force [N];rail [m/s²]\n" + rows([f"{t:.4f}" for t in TIME], FORCE, RAIL)
+    assert "the time with more digits if it was rounded" in str(only_error(read_text(tmp_path, text)))
+
+
+def test_a_transposed_table_does_not_list_all_its_columns(tmp_path):
+    text = "".join(";".join(f"{x:.4f}" for x in row) + "\n" for row in (FORCE, RAIL, 2.0 * RAIL))
+    error = only_error(read_text(tmp_path, text, layout("N", "m/s²", force="0", rail="1")))
+    assert "and 386 more" in str(error)
