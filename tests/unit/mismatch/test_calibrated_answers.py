@@ -70,6 +70,14 @@ def test_a_step_is_named_from_its_first_visit_on_with_its_onset_and_not_before()
     assert last.size == pytest.approx(0.8, abs=4.0 * last.sd)
 
 
+def test_the_evidence_of_a_name_does_not_depend_on_how_finely_its_candidates_are_spaced():
+    """Each candidate counts a third where there are three of each, and the three together as the one did."""
+    visits = histories(np.random.default_rng(1), 5, step("ballast@1.20", 0.8, 3))
+    once, thrice = (change_answer(PARAMETERS, visits, [], n * CANDIDATES, 12.0, 6.0) for n in (1, 3))
+    assert once.names == thrice.names == ("local_ballast",)
+    assert thrice.gain == pytest.approx(once.gain, abs=1e-9)
+
+
 def test_what_grows_is_a_change_whose_onset_lies_in_the_interval():
     visits = histories(np.random.default_rng(2), 6, lambda v: 0.3 * max(v - 1, 0) * np.eye(len(PARAMETERS))[2])
     answer = last_answers(visits)["change"]

@@ -131,8 +131,9 @@ def change_answer(
 ) -> ModelAnswer:
     """What has changed up to the last of these visits.
 
-    Every candidate is equally probable before, so that its evidence is less by the logarithm of their number. By
-    Markov's inequality an intact history then exceeds ``threshold`` with a probability of at most exp(-threshold).
+    Every candidate is equally probable before. The evidence of a name is that of all of its candidates together: the
+    sum of their likelihood ratios over the number of all candidates, however finely positions are spaced. By Markov's
+    inequality an intact history exceeds ``threshold`` with a probability of at most exp(-threshold).
 
     Parameters
     ----------
@@ -146,8 +147,7 @@ def change_answer(
     margin : float
         [nats]
     is_alarmed : bool
-        Whether an open alarm asks: then a change of any size is told, and the evidence of a name is that of all of its
-        candidates together, the mean of their likelihood ratios. The inequality holds for it as well.
+        Whether an open alarm asks: then a change of any size is told.
 
     Returns
     -------
@@ -162,7 +162,7 @@ def change_answer(
     least = threshold + price
     material = [e for e in evidence if e.gain > least - margin and (is_alarmed or _is_material(e, by_name))]
     material = [e for e in material if e.gain >= e.from_first]
-    gain = _evidence_of_name(material, by_name) if is_alarmed else max((e.gain for e in material), default=-np.inf)
+    gain = _evidence_of_name(material, by_name)
     if gain < least:
         by_stated_errors = estimate_history(parameters, visits, events, repeats_between_visits=False, accepted=None)
         return _answer_without_name(by_stated_errors, visit, by_name)
