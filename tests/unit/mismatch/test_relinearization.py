@@ -52,11 +52,14 @@ def fitted(case, start):
 
 
 def test_steps_end_at_the_maximum_of_a_normal_prior_and_the_data():
-    """Against a general optimizer, with a correlated prior."""
+    """Against a general optimizer, with a correlated prior and a deviation of the depth of this visit alone."""
     case = Valleys(1.1, 0.4)
-    prior = NormalPrior.of_belief(case, SHARED, belief_of(0.9, 0.5))
+    with_own = SHARED | {"depth": replace(SHARED["depth"], visit_sd=0.02)}
+    prior = NormalPrior.of_belief(case, with_own, belief_of(0.9, 0.5))
     assert prior.mean == pytest.approx([0.9, 0.5, 0.0])
-    assert np.linalg.inv(prior.precision)[:2, :2] == pytest.approx(0.05**2 * np.array([[1.0, 0.4], [0.4, 1.0]]))
+    assert np.linalg.inv(prior.precision)[:2, :2] == pytest.approx(
+        np.array([[0.05**2, 0.4 * 0.05**2], [0.4 * 0.05**2, 0.05**2 + 0.02**2]])
+    )
     fit, reached = fit_all_recordings(case, fitted(case, 1.0), prior, {"length": 0.9, "depth": 0.5, "load": 0.0})
     best = optimize.minimize(lambda x: cost(case, prior, x), prior.mean, method="Nelder-Mead", options={"xatol": 1e-7})
     assert [fit.values[n.name] for n in case.nuisances] == pytest.approx(best.x, abs=2e-3)
@@ -148,6 +151,13 @@ def test_a_change_that_no_derivative_shows_where_the_earlier_visits_are_leaves_i
     given, excess = fit_given_belief(case, fitted(case, 1.31), SHARED, belief_of(1.0, 0.5))
     assert given.values["length"] == pytest.approx(1.0, abs=0.05)
     assert excess > 12 * ((1.0 + np.tanh(0.5)) / ERROR) ** 2 * 0.9
+
+
+def test_a_fit_that_agrees_but_leaves_much_more_of_the_data_does_not_count(history, monkeypatch):
+    monkeypatch.setattr(agreeing, "fit_given_belief", lambda *a: (fit_given_belief(*a)[0], 30.0))
+    result = history([1.0, 1.0], [1.0, -1.0])
+    assert result.asked == ["2021-01-01"]
+    assert all(a is b for a, b in zip(result.before, result.after))
 
 
 def test_what_was_computed_is_read_again_until_the_earlier_visits_differ(history, tmp_path):
