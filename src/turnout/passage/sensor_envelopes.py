@@ -114,6 +114,7 @@ def levels(samples: np.ndarray, rate: float, step: float, bands: Sequence[tuple[
     quiet_power = quiet_level(powers, max(round(0.05 / step), 1))[..., None]
     values = np.log1p(powers / quiet_power).mean(axis=1)
     quiet = values < np.quantile(values, 0.2, axis=1, keepdims=True)
+    quiet |= values == values.min(axis=1, keepdims=True)  # of a silent channel all values are equal
     centre = np.array([np.median(v[q]) for v, q in zip(values, quiet)])
     scatter = np.array([MAD_TO_SD * np.median(np.abs(v[q] - c)) for v, q, c in zip(values, quiet, centre)])
     block = max(round(0.05 / step), 1)

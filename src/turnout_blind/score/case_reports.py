@@ -34,7 +34,7 @@ UNITS = dict.fromkeys(METRE_KEYS.split(), "m") | {
     "delay": "s", "frequency": "Hz", "mass": "kg", "limit": "m/s²", "coefficient": "1/K", "angle": "rad",
     "phase": "rad",
 }  # fmt: skip
-FIT_LABELS = {"before": "no name", "decoy": "a decoy", "rival": "second best name", "after": "the name"}
+FIT_LABELS = {"before": "base model", "decoy": "decoy", "rival": "second best effect", "after": "named effect"}
 MIN_SPECTRUM_CHANGE = (
     0.05  # median difference of two spectra (logarithm) below which their curves coincide in a picture
 )
@@ -314,7 +314,7 @@ def _annotate(axis: Axes, x: float, y: float, text: str) -> None:
 def _plot_fits(axis: Axes, rows: Sequence[Mapping[str, Any]] | None, oracle: float | None) -> None:
     """Plot the fits of the held-out recordings."""
     row = (rows or [{}])[0]
-    fits = {label: row.get(f"fit_{name}_pct") for name, label in FIT_LABELS.items()} | {"with the true effect": oracle}
+    fits = {label: row.get(f"fit_{name}_pct") for name, label in FIT_LABELS.items()} | {"true effect": oracle}
     stated: dict[str, Any] = {name: value for name, value in fits.items() if value is not None}
     axis.barh(list(stated), list(stated.values()), color="C0")
     axis.set_xlabel("fit on held-out recordings [%]")
