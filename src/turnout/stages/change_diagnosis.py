@@ -434,7 +434,8 @@ def finding_of_change(
         if test.finding["term"] == names[0]:
             row["parameters_json"] = test.finding["parameters_json"]
     if names and answer.gain is not None and nats < threshold:
-        words = f"no name: the evidence of what fits best is {nats:.1f} of {threshold:g} nats: {sentence_of(row)}"
+        evidence = f"the likeliest has {nats:.1f} of {threshold:g} nats of evidence"
+        words = f"no effect is named; {evidence}: {sentence_of(row)}"
         return row | {"verdict": "none", "term": None, "rival_term": None, "component": None, "sentence": words}
     return row | {"sentence": sentence_of(row)}
 

@@ -204,7 +204,7 @@ def test_hammer_tests_and_trains_give_one_answer(given, test, expected):
 
 def test_no_change_and_too_few_visits_are_no_name():
     nothing = ModelAnswer("2026-05-01", "change", "none")
-    assert "no effect at any support has the evidence" in finding_of_change(nothing, None, 4, 8)["sentence"]
+    assert "no change at any support has enough evidence" in finding_of_change(nothing, None, 4, 8)["sentence"]
     assert "at least two visits are needed" in finding_of_change(nothing, None, 1, 2)["sentence"]
     unknown = ModelAnswer("2026-05-01", "change", "unknown", (), "pad@18.00", "pad", 18.0)
     row = finding_of_change(unknown, None, 4, 8)
@@ -221,7 +221,7 @@ def test_held_out_trains_may_add_the_evidence_that_a_suspicion_lacks(nats, verdi
     assert row["verdict"] == verdict and row["gain_nats"] == 8.0 + nats
     is_name = verdict == "named"
     assert (row["term"] == "local_ballast") == is_name
-    assert row["sentence"].startswith("no name: the evidence") != is_name
+    assert row["sentence"].startswith("no effect is named; the likeliest has") != is_name
     assert "local ballast at 18.0 m" in row["sentence"]
 
 

@@ -259,7 +259,7 @@ def _off_track(modes: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _residue_words(ratio: float | None) -> str:
-    return "" if ratio is None else f"; {ratio:.2g} times their c1² + c2²"
+    return "" if ratio is None else f"; squared residue {ratio:.2g} times theirs"
 
 
 def _shape_words(mac: float | None) -> str:
