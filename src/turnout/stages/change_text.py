@@ -25,8 +25,9 @@ def sentence_of(row: Mapping[str, Any]) -> str:
     """
     basis = f"{row['n_recordings']} hammer tests of {row['n_visits']} visits"
     if row["verdict"] == "none":
-        least = "at least two visits are needed" if row["n_visits"] < 2 else "no change at any support has enough evidence"
-        return f"{basis}: {least}"
+        if row["n_visits"] < 2:
+            return f"{basis}: at least two visits are needed"
+        return f"{basis}: no change at any support has enough evidence"
     position = "" if row["position_m"] is None else f" at {row['position_m']:.1f} m"
     if row.get("first_m") != row.get("last_m"):
         position = f" from {row['first_m']:.1f} to {row['last_m']:.1f} m"
