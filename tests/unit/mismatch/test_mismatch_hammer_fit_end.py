@@ -64,3 +64,23 @@ def test_what_is_at_its_bound_stays_and_the_others_take_their_best():
     best = np.sum((y - 0.5 * x) * x**2) / np.sum(x**4)
     assert step[0] == pytest.approx(0.0, abs=1e-9)
     assert theta[1] + step[1] == pytest.approx(best, rel=1e-3)  # the prior of 10 takes (0.1 / 10)² / sum x⁴ off
+
+
+class Arctangent(Case):
+    """The arctangent of a number, zero as measured. From 1.3917 Newton's step leads to -1.3917, and back for ever."""
+
+    nuisances = (Nuisance("x", "-", 0.0, 1e3),)
+    observations = (Observation("a", "a", np.zeros(1), np.full(1, 0.01)),)
+
+    def predict(self, values, terms, observations):
+        return [np.arctan([values["x"]])]
+
+    def nuisance_jacobian(self, values, terms, observations, base):
+        return [np.array([[1.0 / (1.0 + values["x"] ** 2)]])]
+
+
+@pytest.mark.parametrize("start", [1.39, 1.391, -1.3917])
+def test_a_step_to_the_other_side_of_a_valley_is_no_end_of_a_fit(start):
+    """2 x / (1 + x²) = arctan x has its root at 1.39175. Just below it a full step gains less than half a nat."""
+    options = {"iterations": THRESHOLDS.max_cheap_steps, "min_gain": THRESHOLDS.min_cheap_step_gain}
+    assert abs(fit_jointly(Arctangent(), values={"x": start}, **options).values["x"]) < 0.02

@@ -8,7 +8,7 @@ actual errors finds the minimum: smooth errors would accept a resonance at a wro
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -78,13 +78,36 @@ class _Prescreen:
             broad_fit = _fit_cheaply(self.broad_case, candidates, psi, _prior_means(self.broad_case))
             if broad_fit.cost > max_cost:
                 return None
-            refit = _fit_cheaply(self.cheap_case, candidates, broad_fit.psi, broad_fit.values)
+            refit = self._fit_actual(candidates, broad_fit)
         except SimulationError:
             return None
         gain = refit.evidence - self.base.evidence - np.log(candidate.site.n_scanned)
         values = informed_values(self.cheap_case, refit, candidate)
         level, before = (max(f.level.values()) for f in (refit, self.base))
         return PrescreenFit(gain, candidate, refit.psi[n:], values, level, before)
+
+    def _fit_actual(self, candidates: Sequence[Candidate], broad_fit: Fit) -> Fit:
+        """Fit with the actual errors from ``broad_fit``, and if that costs more than no effect, also from the base.
+
+        A model with an effect more cannot be worse: such a fit has ended in another basin than the base.
+        """
+        refit = _fit_cheaply(self.cheap_case, candidates, broad_fit.psi, broad_fit.values)
+        if refit.cost <= self.base.cost:
+            return refit
+        other = _fit_cheaply(self.cheap_case, candidates, broad_fit.psi, self.base.values)
+        return min(refit, other, key=lambda f: f.cost)
+
+    def base_shortfall(self, best: PrescreenFit) -> float:
+        """Evidence that the base lacks, since it stopped before its optimum: what it gains from the nuisances of a fit.
+
+        It is none of the evidence of any effect. [nats]
+        """
+        values = {**self.base.values, **best.values}
+        try:
+            continued = _fit_cheaply(self.cheap_case, self.accepted, self.base.psi, values)
+        except SimulationError:
+            return 0.0
+        return max(0.0, continued.evidence - self.base.evidence)
 
     def likeliest_starts(self, starts: Sequence[_Start]) -> list[tuple[Candidate, np.ndarray]]:
         """The most promising sites of a family, each with its best start.
@@ -164,7 +187,11 @@ def prescreen(search: Search, fit: Fit, families: Collection[str] | None = None)
         successful = [f for f in fits if f is not None]
         if successful:
             best_fits.append(max(successful, key=lambda f: f.gain))
-    return sorted(best_fits, key=lambda f: -f.gain)
+    best_fits.sort(key=lambda f: -f.gain)
+    if not best_fits or best_fits[0].gain <= search.settings.promise:
+        return best_fits
+    shortfall = step.base_shortfall(best_fits[0])
+    return [replace(f, gain=f.gain - shortfall) for f in best_fits]
 
 
 def informed_values(case: Case, fit: Fit, candidate: Candidate) -> dict[str, float]:

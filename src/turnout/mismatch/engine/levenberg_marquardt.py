@@ -44,12 +44,12 @@ class DampedSteps:
             old = sums.get(o.data_type, (0.0, 0.0, 0.0, 0.0))
             new = rows.T @ rows, rows.T @ right, float(right @ right), o.n_effective
             sums[o.data_type] = tuple(a + b for a, b in zip(old, new))
-        pull = (joint.mean - theta) / joint.sd
+        self.sums, self.pull = sums, (joint.mean - theta) / joint.sd
         squares = {data_type: p[2] for data_type, p in sums.items()}
         for _ in range(THRESHOLDS.n_scale_iterations):
             scale = {data_type: max(1.0, squares[data_type] / sums[data_type][3]) for data_type in sums}
             self.normal = np.eye(theta.size) + sum(p[0] / scale[k] for k, p in sums.items())
-            self.right = pull + sum(p[1] / scale[k] for k, p in sums.items())
+            self.right = self.pull + sum(p[1] / scale[k] for k, p in sums.items())
             step = np.linalg.solve(self.normal, self.right)
             squares = {k: max(0.0, p[2] - 2.0 * step @ p[1] + step @ p[0] @ step) for k, p in sums.items()}
         self.promise = float(step @ self.right)
@@ -99,6 +99,27 @@ class DampedSteps:
         step = step / self.joint.sd
         return float(2.0 * step @ self.right - step @ self.normal @ step)
 
+    def linear_decrease(self, step: np.ndarray) -> float:
+        """Decrease of the cost, with the noise scales at their best values, if the residuals were linear.
+
+        ``predicted_decrease`` has fixed scales; far from the optimum it promises much more.
+
+        Parameters
+        ----------
+        step : (n,) array of float
+            In the units of the parameters.
+
+        Returns
+        -------
+        float
+        """
+        step = step / self.joint.sd
+        value = float(self.pull @ self.pull - np.sum((self.pull - step) ** 2))
+        for normal, slope, square, n in self.sums.values():
+            after = max(0.0, square - 2.0 * step @ slope + step @ normal @ step)
+            value += n * (_cost_per_sample(square / n) - _cost_per_sample(after / n))
+        return value
+
     def first_improvement(
         self, cost: float, damping: float, max_tries: int | None = None
     ) -> tuple[FitPoint | None, float]:
@@ -135,12 +156,27 @@ class DampedSteps:
                 residuals = joint.residuals(predictions)
                 new_cost = joint.cost(trial, residuals)
                 if new_cost < cost:
-                    next_damping = damping * THRESHOLDS.damping_decrease if damping > THRESHOLDS.min_damping else 0.0
+                    next_damping = self._next_damping(damping, (cost - new_cost) / self.linear_decrease(step))
                     return FitPoint(trial, predictions, residuals, new_cost), next_damping
                 if promise < joint.min_decrease:
                     break
             damping = max(THRESHOLDS.damping_increase * damping, THRESHOLDS.first_damping)
         return None, 0.0
+
+    def _next_damping(self, damping: float, kept_share: float) -> float:
+        """Damping after a step that kept this share of its promise: less, or more in a cheap case after a poor one.
+
+        An expensive case has old derivatives, which new ones improve more than smaller steps.
+        """
+        if kept_share < THRESHOLDS.min_kept_promise and not self.joint.case.expensive:
+            return max(THRESHOLDS.damping_increase * damping, THRESHOLDS.first_damping)
+        return damping * THRESHOLDS.damping_decrease if damping > THRESHOLDS.min_damping else 0.0
+
+
+def _cost_per_sample(mean_square: float) -> float:
+    """Cost per sample with the noise scale at its best value, as in ``JointProblem.cost``."""
+    scale = max(1.0, mean_square)
+    return float(np.log(scale) + mean_square / scale)
 
 
 def broyden_update(

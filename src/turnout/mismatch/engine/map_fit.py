@@ -152,7 +152,7 @@ def _iterate(
         n_since_refresh += 1
         if (
             gain < min_decrease
-            and not (improvement and damping > THRESHOLDS.first_damping)
+            and not (improvement and damping >= THRESHOLDS.first_damping)
             and (n_since_refresh == 1 or not (expensive and refresh_steps))
         ):
             break

@@ -256,6 +256,10 @@ class Thresholds:
     max_damping_tries: int = threshold(8, "trials", "of one step, each with more damping than the last", "numerical")
     damping_increase: float = threshold(6.0, "-", "factor on the damping after a failed step", "Marquardt 1963")
     damping_decrease: float = threshold(0.2, "-", "factor on the damping after an accepted step", "Marquardt 1963")
+    min_kept_promise: float = threshold(
+        0.25, "share of the promise", "of a step of a cheap case; after one that gains less the next is smaller",
+        "Marquardt 1963",
+    )  # fmt: skip
     hold_damping: float = threshold(1e12, "times the diagonal", "the parameter does not move", "numerical")
     first_damping: float = threshold(1e-2, "times the diagonal", "the first damping", "Marquardt 1963")
     min_damping: float = threshold(1e-4, "times the diagonal", "a smaller damping is set to 0", "numerical")

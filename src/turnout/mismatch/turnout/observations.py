@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from turnout.mismatch.turnout import passage_observation, receptance_observation
 from turnout.mismatch.turnout.campaign import CampaignInput, HammerInput, PassageInput
 from turnout.mismatch.turnout.disturbances import Disturbance, disturbances
 from turnout.mismatch.turnout.hammer_case import HammerCase
+from turnout.mismatch.turnout.lifting_chairs import lifting_chairs, with_lifting_error
 from turnout.mismatch.turnout.passage_alignment import PassageAligner, fit_surface
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.passage_observation import AlignedPassage
@@ -24,6 +25,7 @@ from turnout.mismatch.turnout.priors import ALIGNMENT, CASE, RECEPTANCE
 from turnout.mismatch.turnout.receptance_observation import FrfPair
 from turnout.mismatch.turnout.saturation import SaturationLimit, raw_peak, saturated_channels, without_saturated
 from turnout.mismatch.turnout.site import Site, site_of
+from turnout.mismatch.turnout.track_parameters import track_with, with_rail
 from turnout.mismatch.turnout.wheel_roughness import wheel_modes
 from turnout.simulate.sensor import Sensor
 
@@ -161,8 +163,7 @@ def case_data(campaign: CampaignInput, settings: MismatchSettings, solver: Track
     site = site_of(campaign)
     tests = observe_tests(campaign, settings.pair_tolerance, saturated)
     predictor = Predictor(site, solver).with_recordings(tests.frf_pairs, {})
-    fitted = [o for name, o in tests.observations if name not in campaign.reserved]
-    start_values = _fit_hammer_start(predictor, fitted)
+    predictor, tests, start_values = _fit_hammer_start(predictor, tests, campaign.reserved)
     predictor = predictor.recentre(start_values)
     passages = _observe_passages(campaign, settings.materiality, predictor, start_values)
     recordings = [*tests.observations, *passages.observations]
@@ -243,11 +244,38 @@ def _loose_sensors(test: HammerInput, sensors: Sequence[Sensor]) -> list[Sensor]
     return list(accelerometers.values())
 
 
-def _fit_hammer_start(predictor: Predictor, observations: Sequence[Observation]) -> dict[str, float]:
-    """Nuisances of track and sensors from the hammer tests alone, the start of all fits; {} without a test."""
-    if not observations:
-        return {}
-    return HammerCase(predictor, observations, predictor.site.shared_nuisances()).fit_from_priors()
+def _fit_hammer_start(
+    predictor: Predictor, tests: ObservedTests, reserved: Collection[str]
+) -> tuple[Predictor, ObservedTests, dict[str, float]]:
+    """Predictor, tests, and nuisances of track and sensors from the tests alone, the start of all fits.
+
+    {} without a test. Chairs of a blade that open under impacts are simulated on the track of the file, then on that
+    of the fit.
+    """
+    nuisances = predictor.site.shared_nuisances()
+    values = {n.name: n.mean for n in nuisances}
+    if all(name in reserved for name, _ in tests.observations):
+        return predictor, tests, {}
+    predictor, with_errors_of_chairs = _with_lifting_chairs(predictor, tests, values)
+    for last in [False, True] if predictor.lifting else [True]:
+        fitted = [o for name, o in with_errors_of_chairs.observations if name not in reserved]
+        values = HammerCase(predictor, fitted, nuisances).fit_from_priors()
+        if not last:
+            predictor, with_errors_of_chairs = _with_lifting_chairs(predictor, tests, values)
+    return predictor, with_errors_of_chairs, values
+
+
+def _with_lifting_chairs(predictor: Predictor, tests: ObservedTests, values: Values) -> tuple[Predictor, ObservedTests]:
+    """Predictor and tests with chairs that open on the track of ``values``; the same ones without slide chairs."""
+    zone, pairs = predictor.site.nominal, list(tests.frf_pairs.values())
+    lifting = lifting_chairs(track_with(with_rail(zone, values).turnout.track_of("main"), zone, values), pairs)
+    if lifting is None:
+        return predictor, tests
+    observations = [
+        (name, with_lifting_error(o, pair, lifting.change(pair, ())))
+        for (name, o), pair in zip(tests.observations, pairs)
+    ]
+    return predictor.with_lifting(lifting), replace(tests, observations=tuple(observations))
 
 
 @dataclass(frozen=True)

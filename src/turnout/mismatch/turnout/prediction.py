@@ -9,6 +9,7 @@ import numpy as np
 
 from turnout.mismatch.engine.case import Nuisance, Observation
 from turnout.mismatch.turnout import receptance_model, sensitivity
+from turnout.mismatch.turnout.lifting_chairs import LiftingChairs
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.passage_observation import AlignedPassage
 from turnout.mismatch.turnout.passage_prediction import PassagePredictor
@@ -44,6 +45,23 @@ class Predictor(ReceptancePredictor, PassagePredictor, Predictions):
         changed.frf_pairs, changed.aligned_passages = dict(frf_pairs), dict(aligned_passages)
         return changed
 
+    def with_lifting(self, lifting: LiftingChairs) -> Predictor:
+        """The predictor of impacts that open the chairs of a blade.
+
+        Parameters
+        ----------
+        lifting : LiftingChairs
+            Changes of receptances by them.
+
+        Returns
+        -------
+        Predictor
+            It shares its caches with this one.
+        """
+        changed = copy(self)
+        changed.lifting = lifting
+        return changed
+
     def recentre(self, values: Values) -> Predictor:
         """The predictor with the track of passages about the rail that ``values`` give.
 
@@ -61,6 +79,7 @@ class Predictor(ReceptancePredictor, PassagePredictor, Predictions):
         """
         changed = Predictor(self.site, self.solver, values)
         changed.frf_pairs, changed.aligned_passages = self.frf_pairs, self.aligned_passages
+        changed.lifting = self.lifting
         changed._rail_tracks = self._rail_tracks
         return changed
 
@@ -79,6 +98,7 @@ class Predictor(ReceptancePredictor, PassagePredictor, Predictions):
         """
         changed = Predictor(self.site, solver, self.rail)
         changed.frf_pairs, changed.aligned_passages = self.frf_pairs, self.aligned_passages
+        changed.lifting = self.lifting
         return changed
 
     def predict(self, values: Values, terms: Terms, observations: Sequence[Observation]) -> list[np.ndarray]:

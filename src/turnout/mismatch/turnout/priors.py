@@ -30,6 +30,7 @@ EFFECT_SIZES = "decisions/blind-effect-sizes.md"
 FITS = "decisions/joint-fit-convergence.md"
 PRESCREEN = "decisions/hammer-prescreen.md"
 GUIDE = "mismatch.md"
+SWITCH_PANELS = "decisions/switch-panels.md"
 KNOTHE, OSCARSSON = "Knothe and Grassie 1993", "Oscarsson 2002"
 
 
@@ -136,6 +137,10 @@ class ReceptancePriors:
     lowest_band: float = prior(31.25, "Hz", "start of the octave bands of a residual", "convention")
     broad_error: float = prior(
         0.1, "-", "relative error in the first, broad fit: its optimum has a wide basin", PRESCREEN)
+    lifting_rate: float = prior(5e3, "Hz", "steps of an impact that opens slide chairs: five for a period", "numerical")
+    lifting_error: float = prior(
+        0.5, "share of the change", "by chairs that open: the file has neither their gaps nor the section at the toe",
+        SWITCH_PANELS)
     tangent_motion: float = prior(1e-6, "m", "under an impact, for the secant of a port", FRICTION)
     free_rate: float = prior(
         0.021, "m/s", "sliding rate of a free joint under an impact: friction of 0.3 kN fits best with 20 mm/s",

@@ -303,6 +303,9 @@ class AddedLinks:
         u, v = (x.T for x in sensitivity.motion(ends, pair))
         change = np.zeros((receptance_observation.LINES.size, len(chosen)), dtype=complex)
         np.add.at(change.T, owner, -(response * (u * v)[:, index]).T)
+        if predictor.lifting is not None:
+            for i, (candidate, k) in enumerate(chosen):
+                change[:, i] += predictor.lifting.difference(pair, self.terms, candidate.term(candidate.starts[k]))
         columns = receptance_observation.split_complex(
             receptance_observation.scale_lines(pair, change, predictor.channel_response(self.values, self.terms, pair))
         )

@@ -182,8 +182,7 @@ def _local_magnitude_ratio(pair: FrfPair) -> np.ndarray:
 
     Model errors fill the antiresonances.
     """
-    near = np.abs(np.log2(pair.frequency[:, None] / pair.frequency)) < RECEPTANCE.magnitude_octaves
-    return np.maximum(np.sqrt(near @ pair.size**2 / near.sum(axis=1)) / pair.size, 1.0)
+    return np.maximum(local_rms(pair.frequency, pair.size) / pair.size, 1.0)
 
 
 def error_modes(pair: FrfPair, h: np.ndarray, tolerance: float) -> np.ndarray:
@@ -209,16 +208,51 @@ def error_modes(pair: FrfPair, h: np.ndarray, tolerance: float) -> np.ndarray:
     """
     octave = np.log2(pair.frequency)
     position = getattr(pair.sensor, "place", pair.test.place)
-    size = tolerance * np.hypot(1.0, (position - pair.test.place) / RECEPTANCE.doubling_distance)
-    kernel = np.exp(-0.5 * ((octave[:, None] - octave) / RECEPTANCE.smoothing_octaves) ** 2)
-    power, vectors = np.linalg.eigh(kernel)
-    keep = power > 1e-3
-    smooth = size * vectors[:, keep] * np.sqrt(power[keep])
+    smooth = tolerance * np.hypot(1.0, (position - pair.test.place) / RECEPTANCE.doubling_distance)
+    smooth = smooth * smooth_functions(pair.frequency)
     calibration = np.column_stack([np.full(octave.size, tolerance), tolerance * (octave - np.log2(200.0)) / 2.0])
     unit = (h / np.abs(h) * _local_magnitude_ratio(pair))[:, None]
     delay = (-2j * np.pi * pair.frequency * RECEPTANCE.delay_sd * h / np.abs(h))[:, None]
     columns = np.column_stack([unit * smooth, 1j * unit * smooth, (h / np.abs(h))[:, None] * calibration, delay])
     return np.concatenate([columns.real, columns.imag])
+
+
+def smooth_functions(frequency: np.ndarray) -> np.ndarray:
+    """Functions of frequency whose random sum has variance 1 and is smooth over ``RECEPTANCE.smoothing_octaves``.
+
+    Parameters
+    ----------
+    frequency : (n,) array of float
+        [Hz]
+
+    Returns
+    -------
+    (n, m) array of float
+    """
+    octave = np.log2(frequency)
+    kernel = np.exp(-0.5 * ((octave[:, None] - octave) / RECEPTANCE.smoothing_octaves) ** 2)
+    power, vectors = np.linalg.eigh(kernel)
+    keep = power > 1e-3
+    return np.asarray(vectors[:, keep] * np.sqrt(power[keep]))
+
+
+def local_rms(frequency: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Root mean square over a third of an octave about each line.
+
+    Parameters
+    ----------
+    frequency : (n,) array of float
+        [Hz]
+    size : (n,) array of float
+        Magnitudes.
+
+    Returns
+    -------
+    (n,) array of float
+        In the unit of ``size``.
+    """
+    near = np.abs(np.log2(frequency[:, None] / frequency)) < RECEPTANCE.magnitude_octaves
+    return np.asarray(np.sqrt(near @ size**2 / near.sum(axis=1)))
 
 
 def track_terms(terms: Sequence[PhysicsTerm], conditions: Mapping[str, Any]) -> tuple[PhysicsTerm, ...]:

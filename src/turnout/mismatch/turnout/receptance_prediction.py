@@ -8,6 +8,7 @@ from collections.abc import Callable, Hashable
 import numpy as np
 
 from turnout.mismatch.turnout import receptance_observation
+from turnout.mismatch.turnout.lifting_chairs import LiftingChairs
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.predictions import Terms, Values
 from turnout.mismatch.turnout.priors import SIMULATION
@@ -21,12 +22,13 @@ from turnout.simulate.track import Track
 
 
 class ReceptancePredictor(SiteModel):
-    """Predicts the receptances of a site."""
+    """Predicts the receptances of a site; ``lifting`` are chairs that open under impacts, None without a blade."""
 
     def __init__(self, site: Site, solver: Track1D, rail: Values | None = None):
         super().__init__(site, solver, rail)
         self._rail_tracks: OrderedDict[Hashable, Track] = OrderedDict()
         self._sensitivities: OrderedDict[Hashable, ReceptanceSensitivity] = OrderedDict()
+        self.lifting: LiftingChairs | None = None
 
     def pair_sensitivities(self, values: Values, terms: Terms) -> Callable[[FrfPair], ReceptanceSensitivity]:
         """Function that gives ``pair_sensitivity`` of a pair at these values, sought once per conditions.
@@ -172,8 +174,10 @@ class ReceptancePredictor(SiteModel):
         (2n,) array
             Re and Im of the receptance of a pair over its measured magnitude.
         """
+        receptance = self.receptance(values, pair, sensitivity)
+        if self.lifting is not None:
+            receptance = receptance + self.lifting.change(pair, terms)
+        channel_response = self.channel_response(values, terms, pair)
         return receptance_observation.split_complex(
-            receptance_observation.scale_lines(
-                pair, self.receptance(values, pair, sensitivity), self.channel_response(values, terms, pair)
-            )
+            receptance_observation.scale_lines(pair, receptance, channel_response)
         )

@@ -1,0 +1,86 @@
+"""Slide chairs that open under impacts: receptances with them agree with a march in time."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from turnout.mismatch.turnout import TrackCase
+from turnout.mismatch.turnout.lifting_chairs import lifting_chairs, with_lifting_error
+from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
+from turnout.physics.slide_chair_gap import SlideChairGap
+from turnout.simulate.blade import Blade
+from turnout.simulate.wheel_path import BladeTop, StockFall
+
+
+@pytest.fixture(scope="module")
+def case():
+    """Three impacts amid the blade, on a track that is exactly as filed, simulated with chairs that press only."""
+    plan = small_plan((15.0,), passages=False, hammer_positions=(23.4,))
+    track = plan.turnout.track
+    turnout = replace(
+        plan.turnout,
+        track=track.with_(blade=Blade(20.1, 25.2, 32.0, track.rail, 3e8, 3e4)),
+        routes={"main": ((StockFall(21.6, 3.0, 0.02),), (BladeTop(20.1, 3.0, 0.015),))},
+    )
+    return TrackCase(measured_campaign(replace(plan, turnout=turnout, n_impacts=3), (), 3))
+
+
+def rms_error(case, lifting):
+    """Relative error of the receptances of the file's track, rms over all lines and sensors."""
+    predictor = case.predictor.with_lifting(lifting)
+    values = {n.name: n.mean for n in case.nuisances}
+    predicted = predictor.predict(values, (), case.observations)
+    errors = [o.data - p for o, p in zip(case.observations, predicted)]
+    return float(np.sqrt(np.mean(np.concatenate(errors) ** 2) * 2.0))
+
+
+def file_chairs(case):
+    return lifting_chairs(case.predictor.site.nominal.turnout.track_of("main"), case.frf_pairs.values())
+
+
+def test_receptances_with_chairs_that_open_agree_with_a_march_in_time(case):
+    """The recordings are a march at 20 kHz with the hammer as a mass; receptances alone err by a tenth and more."""
+    assert rms_error(case, None) > 0.1
+    assert rms_error(case, file_chairs(case)) < 0.35 * rms_error(case, None)
+
+
+def test_only_a_track_with_slide_chairs_has_them(case):
+    assert rms_error(case, case.predictor.lifting) < 0.35 * rms_error(case, None)
+    assert case.cheap_case().predictor.lifting is case.predictor.lifting
+    plain = case.predictor.site.nominal.turnout.track_of("main").with_(blade=None)
+    assert lifting_chairs(plain, case.frf_pairs.values()) is None
+
+
+def test_a_weak_impact_opens_no_chair(case):
+    """At a hundredth of the force no bearer falls away from the blade faster than its weight draws it."""
+    chairs = file_chairs(case)
+    weak = replace(
+        chairs,
+        tests=tuple(replace(t, impact=replace(t.impact, force=0.01 * t.impact.force)) for t in chairs.tests),
+        changes={},
+    )
+    for pair in case.frf_pairs.values():
+        assert np.max(np.abs(weak.change(pair, ()))) < 1e-3 * np.max(np.abs(chairs.change(pair, ())))
+
+
+def test_chairs_without_contact_have_none_to_lose(case):
+    chairs = file_chairs(case)
+    track = chairs.track
+    gaps = [SlideChairGap(j, 2e-3) for j in track.blade.slide_chairs(track)]
+    for pair in case.frf_pairs.values():
+        some, none = chairs.change(pair, gaps[:1]), chairs.change(pair, gaps)
+        assert np.max(np.abs(none)) < 1e-4 * np.max(np.abs(some))
+        small = SlideChairGap(gaps[0].support, 1e-4)  # it closes under the weight of the blade
+        assert np.array_equal(chairs.change(pair, (small,)), chairs.change(pair, ()))
+
+
+def test_the_change_is_uncertain_by_half_of_its_size(case):
+    """Its error is among the modes of an observation: their variance is a quarter of the mean square of the change."""
+    chairs, pairs = file_chairs(case), case.frf_pairs
+    for o in case.observations:
+        plain = replace(o, modes=None)
+        change = chairs.change(pairs[o.name], ())
+        modes = with_lifting_error(plain, pairs[o.name], change).modes
+        size = np.abs(change[pairs[o.name].lines]) / pairs[o.name].size
+        assert np.mean(np.sum(modes**2, axis=1)) == pytest.approx(0.25 * np.mean(size**2), rel=0.3)
