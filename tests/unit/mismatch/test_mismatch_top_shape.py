@@ -44,6 +44,12 @@ def test_all_modes_together_have_the_covariance_of_the_process():
     assert far < 0.1 * near
 
 
+def test_beyond_the_reach_of_the_change_the_top_is_exact():
+    distance = TOP_SHAPE.reach * np.array([-1.6, -1.2, 0.0, 1.2, 1.6])
+    covariance = top_covariance(distance, 1.0)
+    assert covariance[2, 2] == 1.0 and np.abs(np.delete(np.delete(covariance, 2, 0), 2, 1)).max() < 1e-30
+
+
 def test_kept_modes_are_the_fewest_with_the_stated_share_of_the_variance():
     distance = np.linspace(-TOP_SHAPE.reach, TOP_SHAPE.reach, 41)
     covariance = top_covariance(distance, 1.0)
