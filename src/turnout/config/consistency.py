@@ -6,7 +6,8 @@ from zoneinfo import available_timezones
 
 from turnout.config.document import Branch, merge_branches
 from turnout.config.filename_pattern import compile_pattern
-from turnout.config.schema import settings_keys, suggestion
+from turnout.config.schema import suggestion
+from turnout.config.settings_schema import settings_keys
 from turnout.errors import ConfigError
 
 # (quantity, unit, sensitivity, sensitivity_unit) -> conversion, as turnout.units.to_si

@@ -7,9 +7,11 @@ from pathlib import Path
 
 from turnout.config.document import load, plain_values
 from turnout.config.key_text import describe_key, yaml_text
-from turnout.config.schema import FleetWideKey, Group, Key, NamedEntries, default_of, layout_keys, settings_keys
+from turnout.config.layout_schema import layout_keys
+from turnout.config.schema import FleetWideKey, Group, Key, NamedEntries
 from turnout.config.settings import parts
 from turnout.config.settings_page import settings_page
+from turnout.config.settings_schema import default_of, settings_keys
 
 WIDTH = 112
 HEAD = """\

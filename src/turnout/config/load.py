@@ -12,8 +12,10 @@ from turnout.config.campaign_notes import Campaigns, read_campaigns, read_trains
 from turnout.config.consistency import ToSi, check_consistency
 from turnout.config.document import Branch, Frozen, Place, leaves, load, merge_branches, plain_values
 from turnout.config.events import Event, read_events
+from turnout.config.layout_schema import layout_keys
 from turnout.config.merge import ROW_KEYS, SECTION_ROW_KEYS, Variant, with_row
-from turnout.config.schema import NO_TURNOUT, check, check_ranges, layout_keys, settings_keys, suggestion
+from turnout.config.schema import NO_TURNOUT, check, suggestion
+from turnout.config.settings_schema import check_ranges, settings_keys
 from turnout.config.turnout import TurnoutConfig
 from turnout.config.turnouts_table import Row, read_table
 from turnout.errors import ConfigError, ConfigErrors, ReadError

@@ -10,8 +10,8 @@ from functools import cached_property
 from typing import Any
 
 from turnout.config.document import Branch, Frozen, Leaf, Place, merge_branches, plain_values
-from turnout.config.schema import fill_settings
 from turnout.config.settings import parts
+from turnout.config.settings_schema import fill_settings
 from turnout.config.turnout import HammerConfig, PassageConfig, Section
 from turnout.config.turnouts_table import Row
 from turnout.records import RawChannel, RawDescription

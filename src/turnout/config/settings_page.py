@@ -7,7 +7,9 @@ from turnout.config.events import COLUMNS as EVENT_COLUMNS
 from turnout.config.events import RESETS
 from turnout.config.filename_pattern import FIELDS
 from turnout.config.key_text import describe_key, yaml_text
-from turnout.config.schema import FLEET_WIDE, Key, NamedEntries, layout_keys, settings_keys
+from turnout.config.layout_schema import FLEET_WIDE, layout_keys
+from turnout.config.schema import Key, NamedEntries
+from turnout.config.settings_schema import settings_keys
 from turnout.config.turnouts_table import ROW
 
 HEAD = """# Settings, columns and keys

@@ -12,7 +12,8 @@ from typing import Any
 
 from turnout.config.csv_table import TableError, header_of
 from turnout.config.document import Place, as_config_errors
-from turnout.config.schema import HAMMER_RATE, ID, PASSAGE_RATE, Key, suggestion, value_problem
+from turnout.config.layout_schema import HAMMER_RATE, PASSAGE_RATE
+from turnout.config.schema import ID, Key, suggestion, value_problem
 from turnout.errors import ConfigError
 from turnout.files import write_atomic
 

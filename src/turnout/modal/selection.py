@@ -13,6 +13,14 @@ import numpy as np
 from scipy.special import chdtri
 
 from turnout.modal.era import hankel_rows
+from turnout.modal.explanation import (
+    Explanation,
+    akaike_criterion,
+    explain,
+    leaves_common,
+    polish,
+    usable_explanations,
+)
 from turnout.modal.least_squares import linearise
 from turnout.modal.mixed_effects import MixedFit
 from turnout.modal.mode_tests import (
@@ -39,15 +47,6 @@ if TYPE_CHECKING:
 
     from turnout.config.settings.identify import IdentifySettings
     from turnout.modal.systematic_error import OwnEstimates
-
-from turnout.modal.explanation import (
-    Explanation,
-    leaves_common,
-    akaike_criterion,
-    explain,
-    polish,
-    usable_explanations,
-)
 
 START_TIMES = (0.0, 5e-4, 1e-3)  # s, times at which the realisations start
 

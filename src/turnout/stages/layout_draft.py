@@ -7,7 +7,8 @@ import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from turnout.config.schema import LABEL, QUANTITIES
+from turnout.config.layout_schema import QUANTITIES
+from turnout.config.schema import LABEL
 from turnout.errors import ConfigError
 from turnout.stages.file_contents import ChannelContents, FileContents
 from turnout.units import SI, conversion
