@@ -111,6 +111,14 @@ def test_clipping_is_found_hard_analog_and_soft(hammer, family):
         assert words in impacts[6].rejections[0].detail
 
 
+@pytest.mark.parametrize(("level", "is_flat"), [(0.9, True), (1.0, False)])
+def test_a_test_in_which_all_impacts_are_cut_alike_is_no_shape_of_the_tip(hammer, level, is_flat):
+    """A half-sine cut at 0.9 of its peak is flat over acos(0.855) / acos(0.45) = 0.49 of its half width, all alike."""
+    force = np.minimum(hammer.force(peak=8000.0, family="half-sine"), 8000.0 * level)
+    impacts = hammer.impacts([hammer.recording(hammer.samples(force, (5e-3, 1e-3)), k) for k in range(6)])
+    assert [findings(i) for i in impacts] == [["overload"] if is_flat else []] * 6
+
+
 def test_a_clipped_response_and_a_known_range_are_overloads(hammer):
     recordings = hammer.recordings(5)
     samples = recordings[0].samples.copy()

@@ -6,6 +6,7 @@ import pytest
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
 from turnout.mismatch.engine.diagnose import diagnose
+from turnout.mismatch.engine.search_limit import SearchLimit, SearchLimitError, check_limit
 from turnout.physics.term import Parameter
 
 SIZE = (Parameter("size", "-", 0.0, (0.0, 9.0), "of the parabola", "made up 2026"),)
@@ -30,6 +31,22 @@ class Counted(Case):
     def predict(self, values, terms, observations):
         self.count += len(observations)
         return [values["slope"] * self.x + sum(terms) * self.x**2 for _ in observations]
+
+
+@pytest.mark.parametrize(("most", "count"), [(None, 10_000), (5, 4), (5, 5), (0, 0)])
+def test_a_search_may_cost_what_its_bound_says(most, count):
+    case = Counted(most)
+    case.count = count
+    check_limit(case)
+
+
+@pytest.mark.parametrize(("most", "count"), [(5, 6), (0, 1)])
+def test_one_simulation_more_ends_it_with_both_numbers(most, count):
+    case = Counted(most)
+    case.count = count
+    with pytest.raises(SearchLimitError, match=f"has cost {count} simulations, of at most {most}") as end:
+        check_limit(case)
+    assert end.value.limit == SearchLimit(count, most)
 
 
 @pytest.mark.parametrize("most", [None, 100_000])

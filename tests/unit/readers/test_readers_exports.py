@@ -175,3 +175,30 @@ def test_a_transposed_table_does_not_list_all_its_columns(tmp_path):
     text = "".join(";".join(f"{x:.4f}" for x in row) + "\n" for row in (FORCE, RAIL, 2.0 * RAIL))
     error = only_error(read_text(tmp_path, text, layout("N", "m/s²", force="0", rail="1")))
     assert "and 386 more" in str(error)
+
+
+@pytest.mark.parametrize(("late", "is_gap"), [(0.4, False), (0.6, True), (1.0, True)])
+def test_samples_are_missing_where_time_jumps_by_half_a_step_more(tmp_path, late, is_gap):
+    time = TIME + late / RATE * (np.arange(N) >= 200)
+    text = "Time [s];force [N];rail [m/s²]\n" + rows([f"{t:.9f}" for t in time], FORCE, RAIL)
+    result = read_text(tmp_path, text)
+    assert [error.reason for error in result.errors] == (["truncated"] if is_gap else [])
+
+
+@pytest.mark.parametrize(
+    ("column", "is_axis"),
+    [
+        (np.arange(N), False),  # counts the samples
+        (1.5 * np.arange(N), True),
+        (TIME * RATE / 25600.0, True),
+        ((np.arange(N) + 30 * (np.arange(N) >= 200)) / 25600.0, True),  # with one gap it still is an axis
+        ((np.arange(N) + 30 * (np.arange(N) >= 200) + 30 * (np.arange(N) >= 300)) / 25600.0, False),
+        (np.arange(1.0, N + 1.0) ** 2, False),  # rises too unevenly
+        (-TIME, False),
+    ],
+)
+def test_a_column_that_rises_evenly_is_compared_with_the_rate_also_if_it_is_ignored(tmp_path, column, is_axis):
+    channels = (*layout().channels, RawChannel("other", "Uhr", "ignored"))
+    text = "Uhr;force [N];rail [m/s²]\n" + rows([f"{x:.8f}" for x in column], FORCE, RAIL)
+    result = read_text(tmp_path, text, RawDescription(channels, rate=RATE))
+    assert bool(result.errors) == is_axis, result.errors

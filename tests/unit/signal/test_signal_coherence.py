@@ -72,3 +72,8 @@ def test_limits_widen_with_fewer_records_and_lie_around_the_estimate():
     low30, high30 = coherence.coherence_limits(z, 30)
     assert (low10 <= low30).all() and (high10 >= high30).all() and (low30 < z).all()
     assert (high30[z > coherence.zero_coherence_level(30)] > z[z > coherence.zero_coherence_level(30)] - 0.05).all()
+
+
+def test_one_record_allows_no_statement():
+    low, high = coherence.coherence_limits([0.0, 0.3, 1.0, np.nan], 1)
+    assert low[:3].tolist() == [0.0] * 3 and high[:3].tolist() == [1.0] * 3 and np.isnan([low[3], high[3]]).all()

@@ -6,7 +6,7 @@ from tests.oracles.march_numpy import march_numpy
 
 from turnout.errors import SimulationError
 from turnout.physics import LocalPad
-from turnout.simulate.blade import GRAVITY, Blade
+from turnout.simulate.blade import GRAVITY, Blade, transfer_position
 from turnout.simulate.frequency_response import receptance
 from turnout.simulate.preparation import prepare
 from turnout.simulate.rail import Rail, shape_functions
@@ -44,6 +44,24 @@ def test_two_rails_share_a_load_as_the_symmetric_and_the_antisymmetric_case_say(
     against = winkler(pad, spacing)
     assert on_blade[matrices.index[("blade", j, 0)]] == pytest.approx(0.5 * (together + against), rel=2e-3)
     assert on_blade[matrices.index[("rail", j)]] == pytest.approx(0.5 * (together - against), rel=2e-3)
+
+
+@pytest.mark.parametrize(("toe", "heel", "end"), [(9.0, 15.0, 24.0), (21.0, 15.0, 6.0), (9.3, 15.0, 24.2)])
+def test_chairs_are_the_supports_from_toe_to_end_and_slide_before_the_heel(toe, heel, end):
+    blade, x = Blade(toe, heel, end, TRACK.rail, 3e8, 3e4), TRACK.support
+    last = TRACK.nearest_support(end)
+    low, high = min(toe, x[last]) - 1e-6, max(toe, x[last]) + 1e-6
+    under = [j for j in range(x.size) if low < x[j] < high and j != last][:: 1 if toe < end else -1]
+    assert blade.chairs(TRACK) == under
+    slides = [j for j in under if (x[j] < heel - 1e-6 if toe < end else x[j] > heel + 1e-6)]
+    assert blade.slide_chairs(TRACK) == slides and slides != under
+
+
+def test_wheels_change_rails_only_between_a_surface_of_each():
+    stock, top = SURFACES
+    assert transfer_position(SURFACES, BLADE) is not None
+    for surfaces in ((), (stock,), (stock, stock), (top,), (top, top)):
+        assert transfer_position(surfaces, BLADE) is None
 
 
 def test_a_blade_of_nothing_leaves_the_plain_track():
