@@ -19,9 +19,10 @@ from turnout.physics.hypothesis import (
     TrackSite,
     TrainSite,
 )
-from turnout.physics.term import COLUMN_TYPES, EFFECT_TYPES, FORCE_TARGETS, FRAMES
+from turnout.physics.term import COLUMN_TYPES, FORCE_TARGETS, FRAMES
 from turnout.simulate import Sensor, car, simulate_hammer, simulate_passage, uniform_track
 from turnout.simulate.blade import Blade
+from turnout.simulate.effect import EFFECT_TYPES
 from turnout.simulate.preparation import prepare
 from turnout.simulate.run import run
 from turnout.simulate.sensor import record_signal

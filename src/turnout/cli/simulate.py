@@ -18,7 +18,6 @@ from turnout.cli.options import (
     add_raw,
     add_track,
     add_turnout,
-    at_least_one,
     finite_number,
 )
 
@@ -39,11 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     hammer.add_argument(
         "--section", required=True, help="section of the track file, or, without --turnout, a position [m]"
     )
-    hammer.add_argument(
-        "--tests", type=at_least_one, default=1, help="tests, one file each; --out takes one (default 1)"
-    )
-    hammer.add_argument("--impacts", type=at_least_one, default=10, help="impacts per test (default 10)")
-    add_former(hammer, "--blows", "--impacts", type=at_least_one)
+    hammer.add_argument("--tests", type=int, default=1, help="tests, one file each; --out takes one (default 1)")
+    hammer.add_argument("--impacts", type=int, default=10, help="impacts per test (default 10)")
+    add_former(hammer, "--blows", "--impacts", type=int)
     passage = subcommands.add_parser("passage", help="one train over the turnout")
     passage.add_argument("--vehicle", default="ic3", help="file in config/vehicles, or its path (default ic3)")
     passage.add_argument("--speed", type=above_zero, default=160.0, help="speed [km/h] (default 160)")
@@ -53,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=0.5,
         help="share of the payload, 0 (empty) to 1 (full), overloaded up to 1.5 (default 0.5)",
     )
-    passage.add_argument("--units", type=at_least_one, default=1, help="coupled units (default 1)")
+    passage.add_argument("--units", type=int, default=1, help="coupled units (default 1)")
     passage.add_argument("--route", default="main", help="route of the track file (default main)")
     passage.add_argument("--direction", choices=("facing", "trailing"), default="facing")
     for sub in (hammer, passage):

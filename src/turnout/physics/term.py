@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
 
 import numpy as np
 
 from turnout.errors import SimulationError
+from turnout.simulate.effect import Effect
 
 if TYPE_CHECKING:
     from turnout.physics.hypothesis import Hypothesis, SupportMotion
-    from turnout.simulate.force_laws import Port
-    from turnout.simulate.links import Link
-    from turnout.simulate.sensor import Sensor
     from turnout.simulate.track import Track
-    from turnout.simulate.vehicle import Vehicle
 
-EFFECT_TYPES = ("matrix", "port", "path", "channel", "vehicle")
 COLUMN_TYPES = ("support", "track", "path", "channel", "link", "")
 FORCE_TARGETS = ("rail", "sleeper", "pad")  # the force of a pad acts on the rail and reversed on the sleeper
 # What an effect is fixed to, and how the page of effects describes it.
@@ -56,7 +52,7 @@ class SleeperState(Protocol):
     sleeper_velocity: np.ndarray
 
 
-class PhysicsTerm:
+class PhysicsTerm(Effect):
     """Base class of all effects. An effect is a frozen dataclass with fields for its positions and its parameters.
 
     Everything that is known of an effect is a class attribute or a method of its class. Fields named ``sleeper``,
@@ -65,14 +61,8 @@ class PhysicsTerm:
 
     Attributes
     ----------
-    name : str
-        Name of the effect in rows, track files and options.
     parameters : tuple of Parameter
         What a fit estimates; their names are fields.
-    effect_type : str
-        How it enters the simulation, one of ``EFFECT_TYPES``.
-    scales_track : bool
-        Whether its links are a multiple of the track's springs; other terms then act on the result.
     frame : str
         What it is fixed to, one of ``FRAMES``.
     left_out : str
@@ -140,10 +130,7 @@ class PhysicsTerm:
         Values of the first parameter that are simulated although no derivative of the base model extends that far.
     """
 
-    name: ClassVar[str] = ""
     parameters: ClassVar[tuple[Parameter, ...]] = ()
-    effect_type: ClassVar[str] = ""
-    scales_track: ClassVar[bool] = False
     frame: ClassVar[str] = ""
 
     left_out: ClassVar[str] = ""
@@ -197,104 +184,7 @@ class PhysicsTerm:
         """
         return ()
 
-    # What the effect adds to a simulation
-
-    def links(self, track: Track) -> Sequence[Link]:
-        """Matrix entries that the effect adds. Naming a new degree of freedom creates it.
-
-        Parameters
-        ----------
-        track : Track
-            The track without the effect.
-
-        Returns
-        -------
-        sequence of Link
-        """
-        return ()
-
-    def ports(self, track: Track) -> Sequence[Port]:
-        """Scalar forces that matrices cannot describe.
-
-        Parameters
-        ----------
-        track : Track
-            The track without the effect.
-
-        Returns
-        -------
-        sequence of Port
-        """
-        return ()
-
-    @property
-    def withheld_share(self) -> float:
-        """Share of the ballast of a sleeper that the ports of this term remove."""
-        return 0.0
-
-    def paths(self, track: Track | None, vehicle: Vehicle | None) -> Sequence[Callable[..., np.ndarray]]:
-        """Parts of a wheel's path.
-
-        Parameters
-        ----------
-        track : Track
-            The track under the wheels.
-        vehicle : Vehicle
-            The vehicle whose wheels follow the path.
-
-        Returns
-        -------
-        sequence of callable
-            (x, wheel) -> dip [m]. An attribute ``wheel`` restricts a part to one wheel; ``per_wheel = True`` has it
-            evaluated for each wheel.
-        """
-        return ()
-
-    def rail(self, track: Track) -> Track:
-        """The track with changed rails; its supports are changed by links."""
-        return track
-
-    def sensor(self, sensor: Sensor) -> Sensor:
-        """The sensor at its true position, if its description is wrong."""
-        return sensor
-
-    def under_conditions(self, conditions: Mapping[str, Any]) -> Self:
-        """The same term under the conditions of one recording.
-
-        Parameters
-        ----------
-        conditions : mapping
-            What is known of the recording: ``rail_temperature`` [°C], ``axle_loads`` [N], ``train``, ``name``,
-            ``start`` [s].
-
-        Returns
-        -------
-        PhysicsTerm
-            Of the same class.
-        """
-        return self
-
-    def channel(self, signal: np.ndarray, rate: float, sensor: Sensor) -> np.ndarray:
-        """Signal that the channel of a sensor records.
-
-        Parameters
-        ----------
-        signal : (n,) array of float
-            The true signal.
-        rate : float
-            Sampling rate. [Hz]
-        sensor : Sensor
-            The sensor of the channel.
-
-        Returns
-        -------
-        (n,) array of float
-        """
-        return signal
-
-    def vehicle(self, vehicle: Vehicle) -> Vehicle:
-        """The vehicle with the effect."""
-        return vehicle
+    # Its force in a state of the track
 
     def force(self, state: SleeperState) -> np.ndarray:
         """Additional force on each sleeper, of ports that act on sleepers only.

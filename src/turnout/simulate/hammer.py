@@ -22,7 +22,7 @@ from turnout.simulate.turnout_track import TurnoutTrack, stretch_of_track, suppo
 from turnout.simulate.vehicle import lone_wheels
 
 if TYPE_CHECKING:
-    from turnout.physics.term import PhysicsTerm
+    from turnout.simulate.effect import Effect
     from turnout.simulate.run import Probe
 
 # Stiffness of the plastic tip: it gives a contact of 1.2 to 1.5 ms on ballasted track, as the paper's band of 800 Hz
@@ -97,7 +97,7 @@ def simulate_hammer(  # type: ignore[misc]  # the overloads stand for any of the
     hammer: Hammer | None = None,
     sensors: Sequence[Sensor] | None = None,
     n_impacts: int = 10,
-    terms: Sequence[PhysicsTerm] = (),
+    terms: Sequence[Effect] = (),
     seed: int | Sequence[int] = 0,
     rate: float = 20e3,
     duration: float = 0.5,
@@ -126,7 +126,7 @@ def simulate_hammer(  # type: ignore[misc]  # the overloads stand for any of the
         By default ``hammer_sensors(location)``.
     n_impacts : int
         Number of impacts, each with its own speed and position.
-    terms : sequence of PhysicsTerm
+    terms : sequence of Effect
         Effects added to the base model; their support numbers are those of the whole track.
     seed : int
         Seed of the scatter of the impacts and of the noise.
@@ -213,7 +213,7 @@ def simulate_hammer(  # type: ignore[misc]  # the overloads stand for any of the
 def prepare_hammer(
     track: Track | TurnoutTrack,
     location: float | str,
-    terms: Sequence[PhysicsTerm] = (),
+    terms: Sequence[Effect] = (),
     rate: float = 20e3,
     substeps: int = 1,
     half_length: float = 30.0,
@@ -227,7 +227,7 @@ def prepare_hammer(
         The whole track.
     location : float or str
         Position of the impacts [m], or the name of a location of the turnout.
-    terms : sequence of PhysicsTerm
+    terms : sequence of Effect
         Effects added to the base model, with the support numbers of the whole track.
     rate : float
         Sampling rate. [Hz]

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     import numpy as np
 
-    from turnout.physics.term import PhysicsTerm
+    from turnout.simulate.effect import Effect
     from turnout.simulate.force_laws import Port
     from turnout.simulate.track import Track
 
@@ -56,12 +56,12 @@ SPRING_FIELDS = {
 SHARE_TOLERANCE = 1e-9  # rounding error of shares that add up to 1
 
 
-def links_of(terms: Sequence[PhysicsTerm], track: Track) -> list[Link]:
+def links_of(terms: Sequence[Effect], track: Track) -> list[Link]:
     """Links that ``terms`` add to ``track``; terms that scale its springs come first, the others act on the result.
 
     Parameters
     ----------
-    terms : sequence of PhysicsTerm
+    terms : sequence of Effect
         Effects added to the base model.
     track : Track
         The track.
@@ -77,12 +77,12 @@ def links_of(terms: Sequence[PhysicsTerm], track: Track) -> list[Link]:
     return links
 
 
-def ports_of(terms: Sequence[PhysicsTerm], track: Track) -> list[Port]:
+def ports_of(terms: Sequence[Effect], track: Track) -> list[Port]:
     """Ports that ``terms`` add to ``track``; each law uses the springs of the track with the links of the other terms.
 
     Parameters
     ----------
-    terms : sequence of PhysicsTerm
+    terms : sequence of Effect
         Effects added to the base model.
     track : Track
         The track.
@@ -138,40 +138,40 @@ def with_links(track: Track, links: Sequence[Link]) -> Track:
 SUPPORT_FIELDS = ("sleeper", "support", "first", "last")  # fields of terms that are support numbers
 
 
-def shift_supports(term: PhysicsTerm, count: int) -> PhysicsTerm:
+def shift_supports(term: Effect, count: int) -> Effect:
     """The term at the same positions of a track that has ``count`` more supports at its start.
 
     Parameters
     ----------
-    term : PhysicsTerm
+    term : Effect
         The effect.
     count : int
         Number that is added to its support numbers; may be negative.
 
     Returns
     -------
-    PhysicsTerm
+    Effect
         A copy with other support numbers.
     """
     changed = {name: getattr(term, name) + count for name in _support_fields(term)}
     return replace(term, **changed)  # type: ignore[type-var]  # every term is a dataclass
 
 
-def terms_on_stretch(terms: Sequence[PhysicsTerm], inside: np.ndarray) -> tuple[PhysicsTerm, ...]:
+def terms_on_stretch(terms: Sequence[Effect], inside: np.ndarray) -> tuple[Effect, ...]:
     """The terms with the support numbers of a stretch, which has the supports ``inside`` (n_support,) of the track.
 
     Terms outside it are dropped. A range of supports that is partly outside is cut to the part inside.
 
     Parameters
     ----------
-    terms : sequence of PhysicsTerm
+    terms : sequence of Effect
         Effects with the support numbers of the whole track.
     inside : (n_support,) array of bool
         Whether each support of the track is in the stretch; the stretch is contiguous.
 
     Returns
     -------
-    tuple of PhysicsTerm
+    tuple of Effect
         Terms with the numbers of the stretch.
     """
     first, last = int(inside.argmax()), len(inside) - 1 - int(inside[::-1].argmax())
@@ -189,5 +189,5 @@ def terms_on_stretch(terms: Sequence[PhysicsTerm], inside: np.ndarray) -> tuple[
     return tuple(terms_inside)
 
 
-def _support_fields(term: PhysicsTerm) -> set[str]:
+def _support_fields(term: Effect) -> set[str]:
     return {f.name for f in fields(term) if f.name in SUPPORT_FIELDS}  # type: ignore[arg-type]

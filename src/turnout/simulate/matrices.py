@@ -16,7 +16,7 @@ from turnout.simulate.rail import Rail, element_mass, element_stiffness, local_c
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from turnout.physics.term import PhysicsTerm
+    from turnout.simulate.effect import Effect
     from turnout.simulate.track import Track
 
 ROW_ORDER = {"sleeper": 0, "ballast": 1}
@@ -214,14 +214,14 @@ def link_vector(link: Link, index: Mapping[tuple, int]) -> tuple[np.ndarray, np.
         raise SimulationError(f"link {link.tag!r}: the track has no degree of freedom {error.args[0]!r}.") from None
 
 
-def assemble(track: Track, terms: Sequence[PhysicsTerm] = ()) -> TrackMatrices:
+def assemble(track: Track, terms: Sequence[Effect] = ()) -> TrackMatrices:
     """Matrices of ``track`` with the rails that ``terms`` change and the links that they add.
 
     Parameters
     ----------
     track : Track
         The track.
-    terms : sequence of PhysicsTerm
+    terms : sequence of Effect
         Effects added to the base model.
 
     Returns

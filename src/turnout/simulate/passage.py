@@ -22,7 +22,7 @@ from turnout.simulate.wheel_path import PathPart, check_path
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from turnout.physics.term import PhysicsTerm
+    from turnout.simulate.effect import Effect
     from turnout.simulate.run import Outcome
 
 POSITION_TOLERANCE = 1e-6  # m; positions are rounded to this
@@ -78,7 +78,7 @@ def simulate_passage(  # type: ignore[misc]  # the overloads stand for any of th
     direction: str = "facing",
     route: str = "main",
     roughness: float | None = None,
-    terms: Sequence[PhysicsTerm] = (),
+    terms: Sequence[Effect] = (),
     seed: int = 0,
     rail_seed: int | None = None,
     rate: float = 20e3,
@@ -111,7 +111,7 @@ def simulate_passage(  # type: ignore[misc]  # the overloads stand for any of th
         Route of the turnout: "main", "diverging".
     roughness : float or None
         Level above the limit curve of ISO 3095 [dB]; None: that of the turnout.
-    terms : sequence of PhysicsTerm
+    terms : sequence of Effect
         Effects added to the base model.
     seed, rail_seed : int, int or None
         Seeds of the noise and of the rail roughness (None: ``seed``). Trains over one rail share the latter.
@@ -206,7 +206,7 @@ def simulate_passage(  # type: ignore[misc]  # the overloads stand for any of th
 
 def prepare_passage(
     track: Track | TurnoutTrack,
-    terms: Sequence[PhysicsTerm] = (),
+    terms: Sequence[Effect] = (),
     rate: float = 20e3,
     substeps: int = 1,
     scheme: str = "radau",
@@ -218,7 +218,7 @@ def prepare_passage(
     ----------
     track : Track or TurnoutTrack
         The track.
-    terms : sequence of PhysicsTerm
+    terms : sequence of Effect
         Effects added to the base model.
     rate : float
         Sampling rate. [Hz]

@@ -17,7 +17,7 @@ from turnout.simulate.track import Track
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from turnout.physics.term import PhysicsTerm
+    from turnout.simulate.effect import Effect
     from turnout.simulate.integrator import Scheme
 
 MIN_PIVOT_RATIO = 1e-11  # pivot over its diagonal element below which the pivot is a rounded 0
@@ -92,7 +92,7 @@ def prepare(
     track: Track,
     dt: float = 5e-5,
     scheme: str = "radau",
-    terms: Sequence[PhysicsTerm] = (),
+    terms: Sequence[Effect] = (),
     decay: float = WINDOW_DECAY,
     matrices: TrackMatrices | None = None,
 ) -> Prepared:
@@ -109,7 +109,7 @@ def prepare(
         Time step. [s]
     scheme : str
         Name of the integration scheme.
-    terms : sequence of PhysicsTerm
+    terms : sequence of Effect
         Effects added to the base model.
     decay : float
         Exponent of the decay beyond which the response to a force is neglected. [-]

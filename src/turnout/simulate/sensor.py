@@ -14,7 +14,7 @@ from turnout.simulate.run import Probe
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from turnout.physics.term import PhysicsTerm
+    from turnout.simulate.effect import Effect
     from turnout.simulate.track import Track
 
 DERIVATIVE_ORDERS = {"acceleration": 2, "velocity": 1, "displacement": 0}
@@ -81,14 +81,14 @@ class Sensor:
         return Probe(self.place, DERIVATIVE_ORDERS[self.quantity])
 
 
-def actual_sensor(sensor: Sensor, terms: Sequence[PhysicsTerm]) -> Sensor:
+def actual_sensor(sensor: Sensor, terms: Sequence[Effect]) -> Sensor:
     """The sensor at its true position according to ``terms``.
 
     Parameters
     ----------
     sensor : Sensor
         The sensor as described.
-    terms : sequence of PhysicsTerm
+    terms : sequence of Effect
         Effects, of which some move sensors.
 
     Returns
@@ -125,7 +125,7 @@ def record_signal(
     signal: np.ndarray,
     rate: float,
     rng: np.random.Generator,
-    terms: Sequence[PhysicsTerm] = (),
+    terms: Sequence[Effect] = (),
     substeps: int = 1,
 ) -> np.ndarray:
     """Samples that a ``sensor`` records of the true ``signal``.
@@ -144,7 +144,7 @@ def record_signal(
         Sampling rate. [Hz]
     rng : Generator
         Source of the noise; not used by a sensor without noise.
-    terms : sequence of PhysicsTerm
+    terms : sequence of Effect
         Effects of type "channel".
     substeps : int
         Time steps per sample.

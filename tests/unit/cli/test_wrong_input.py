@@ -85,7 +85,6 @@ def test_a_layout_without_passages_is_named(project, capsys, command):
         ("diagnose --turnout W1 --budget nan", "argument --budget: 'nan' is not a number above 0"),
         ("paper W1 --speed -5", "argument --speed: '-5' is not a number above 0"),
         ("distinguish --sensors nan", "argument --sensors: 'nan' is not a number"),
-        ("simulate hammer --section A7 --impacts 0", "argument --impacts: '0' is not a whole number of 1 or more"),
     ],
 )
 def test_a_wrong_command_line_ends_with_2(capsys, line, message):
