@@ -11,6 +11,8 @@ from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from turnout.constants import DAYS_PER_YEAR
+
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from typing import Any
@@ -141,7 +143,7 @@ def _changes(content: dict[str, Any]) -> Iterator[tuple[str, str, str, str]]:
     """(section, band, words, day of the maintenance or "") of each change of one turnout."""
     last = date.fromisoformat(content["days"][-1])
     for change in content["changes"]:
-        years = (last - date.fromisoformat(change["since"])).days / 365.25
+        years = (last - date.fromisoformat(change["since"])).days / DAYS_PER_YEAR
         stiffness = 100.0 * (change["step"] * (1.0 + change["per_year"]) ** years - 1.0)
         cause = f", {change['event'].replace('_', ' ')}" if change["event"] else ""
         words = f"stiffness {stiffness:+.0f} % by {last}, from {change['since']}{cause}"

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from turnout.constants import DAYS_PER_YEAR
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -52,7 +54,7 @@ class Change:
         """
         if day < self.since or (self.until is not None and day >= self.until):
             return 1.0
-        years = (day - self.since).days / 365.25
+        years = (day - self.since).days / DAYS_PER_YEAR
         return self.step * (1.0 + self.per_year) ** years
 
 
@@ -85,7 +87,7 @@ class Gap:
         """
         if day < self.since:
             return 0.0
-        return self.gap + self.per_year * (day - self.since).days / 365.25
+        return self.gap + self.per_year * (day - self.since).days / DAYS_PER_YEAR
 
 
 @dataclass(frozen=True)
@@ -125,7 +127,7 @@ class WornWeld:
         """
         if day < self.since:
             return 0.0
-        return self.depth + self.per_year * (day - self.since).days / 365.25
+        return self.depth + self.per_year * (day - self.since).days / DAYS_PER_YEAR
 
 
 @dataclass(frozen=True)
@@ -205,7 +207,7 @@ def rail_temperature(day: date, rng: np.random.Generator) -> float:
     float
         Temperature. [°C]
     """
-    season = np.sin(2 * np.pi * (day.timetuple().tm_yday - 110) / 365.25)
+    season = np.sin(2 * np.pi * (day.timetuple().tm_yday - 110) / DAYS_PER_YEAR)
     return float(11.0 + 11.0 * season + rng.normal(0.0, 4.0))
 
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from turnout.config import load_configuration, with_raw
 from turnout.config.events import RENEWAL, read_events
+from turnout.constants import DAYS_PER_YEAR
 from turnout.content import sha256_of
 from turnout.errors import SimulationError
 from turnout.fingerprint import fingerprint
@@ -67,7 +68,7 @@ from turnout.stages.mismatch_groups import groups, unit_of, visits
 from turnout.stages.mismatch_inputs import digest_of_model, gather_inputs, mismatch_context, track_of
 from turnout.stages.renewals import renewal_note, since_renewal
 from turnout.stages.visit_notes import notes_in_words, summary_of_notes
-from turnout.stages.visit_time import DAYS_PER_YEAR, day_of, years_of
+from turnout.stages.visit_time import day_of, years_of
 from turnout.workflow.scan import scan
 
 if TYPE_CHECKING:

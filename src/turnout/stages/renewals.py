@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from turnout.config.events import RENEWAL, Event, now, read_events
-from turnout.stages.visit_time import DAYS_PER_YEAR, day_of, years_of
+from turnout.constants import DAYS_PER_YEAR
+from turnout.stages.visit_time import day_of, years_of
 
 if TYPE_CHECKING:
     from turnout.config.turnout import TurnoutConfig

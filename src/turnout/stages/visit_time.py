@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from datetime import date
 
-DAYS_PER_YEAR = 365.25
+from turnout.constants import DAYS_PER_YEAR
 
 
 def years_of(visit: str) -> float:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from turnout.constants import DAYS_PER_YEAR
 from turnout.trend.change_point import Change, find_change
 from turnout.trend.drift import adjusted_p_values
 from turnout.trend.forecast import N_RECENT, forecast
@@ -242,8 +243,8 @@ def _describe_chart(flag: Flag, change: Change, of_section: Change, settings: Tr
         forecast=outlook.verdict,
         forecast_slope_pct_per_year=outlook.slope,
         forecast_slope_se_pct_per_year=outlook.slope_error,
-        not_before_utc=timestamps([now + 365.25 * outlook.not_before])[0],
-        not_after_utc=timestamps([now + 365.25 * outlook.not_after])[0],
+        not_before_utc=timestamps([now + DAYS_PER_YEAR * outlook.not_before])[0],
+        not_after_utc=timestamps([now + DAYS_PER_YEAR * outlook.not_after])[0],
     )
 
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import stdtr
 
-from turnout.trend.forecast import DAYS_PER_YEAR, step_autocorrelation
+from turnout.constants import DAYS_PER_YEAR
+from turnout.trend.forecast import step_autocorrelation
 from turnout.trend.roots import find_root
 
 if TYPE_CHECKING:

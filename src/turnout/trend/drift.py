@@ -3,6 +3,8 @@
 import numpy as np
 from scipy.special import stdtr
 
+from turnout.constants import DAYS_PER_YEAR
+
 
 def slopes(
     residual: np.ndarray, time: np.ndarray, mask: np.ndarray, autocorrelation: np.ndarray
@@ -35,7 +37,7 @@ def slopes(
     1.000
     """
     mask = mask & np.isfinite(residual)
-    years = np.where(mask, time / 365.25, 0.0)
+    years = np.where(mask, time / DAYS_PER_YEAR, 0.0)
     count = mask.sum(axis=1)
     n = np.maximum(count, 1)
     x = np.where(mask, years - (years.sum(axis=1) / n)[:, None], 0.0)

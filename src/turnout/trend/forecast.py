@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import stdtrit
 
+from turnout.constants import DAYS_PER_YEAR
+
 if TYPE_CHECKING:
     from turnout.config.settings.trend import TrendSettings
 
-DAYS_PER_YEAR = 365.25
 N_RECENT = 8  # newest values, whose mean is the present level of a chart
 SETTLING_YEARS = np.geomspace(0.05, 10.0, 40)  # time constants of the settling curve that are tried [a]
 

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from turnout.constants import DAYS_PER_YEAR
+
 if TYPE_CHECKING:
     from typing import Any
 
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
 SECONDS_PER_DAY = 86400.0  # s
 # [d] A first campaign isolated by more than this from the next is left out: a mistyped year or a clock that was reset.
 # A true one, such as an acceptance test, must not start the baseline either.
-ISOLATED_FIRST_GAP = 5 * 365.25
+ISOLATED_FIRST_GAP = 5 * DAYS_PER_YEAR
 
 
 def is_true(flag: Any) -> bool:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from turnout.constants import DAYS_PER_YEAR
 from turnout.trend.detectability import detectable_shift
 from turnout.trend.drift import slopes, span
 from turnout.trend.epochs import by_epoch
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
     from turnout.config.settings.trend import TrendSettings
     from turnout.trend.charts import Charts
     from turnout.trend.residuals import Prepared
-
-DAYS_PER_YEAR = 365.25
 
 
 def detectable_change(charts: Charts, settings: TrendSettings) -> tuple[np.ndarray, np.ndarray]:

@@ -6,8 +6,8 @@ import statsmodels.api as sm
 from scipy import stats
 from scipy.integrate import trapezoid
 
+from turnout.constants import DAYS_PER_YEAR
 from turnout.trend.change_point import find_change, fit_onsets
-from turnout.trend.forecast import DAYS_PER_YEAR
 
 
 def irregular(rng, n, spacing):

@@ -1,5 +1,7 @@
 """Parts of the chart against the slow way of computing them, or another library."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -12,6 +14,7 @@ from turnout.trend.drift import adjusted_p_values, slopes
 from turnout.trend.epochs import epochs_of
 from turnout.trend.forecast import crossing_interval, fit_line, forecast
 from turnout.trend.siblings import median_of_group, median_of_siblings
+from turnout.trend.states import campaigns_a_year
 
 
 def test_cusum_equals_a_plain_loop_with_resets_gaps_and_learning():
@@ -247,3 +250,9 @@ def test_forecast_says_no_date_for_what_settles_and_none_for_what_stands(setting
     assert 0.3 < going.not_before < (5.0 - 3.6) / 1.2 + 0.3  # the limit lies 1.17 years ahead
     assert forecast(time[:8], noise[:8], 0.0, settings).verdict == "too_short"
     assert "too early" in forecast(time[:8], noise[:8], 0.0, settings).sentence
+
+
+def test_campaigns_a_year_are_those_of_the_usual_interval():
+    interval = np.array([365.25, 46.0, 7.0, 1.0, 0.5, 800.0, np.nan])
+    counts = campaigns_a_year(SimpleNamespace(interval=interval))
+    assert counts.tolist() == [1, 8, 52, 365, 366, 0, 0]

@@ -35,6 +35,16 @@ def test_the_verdict_judges_what_is_new_over_the_fleet_and_each_line(tmp_path):
     assert check_quality([fleet.state], fleet.configuration, output).quarantined == 1
 
 
+def test_turnouts_without_a_line_are_judged_with_the_fleet_alone(tmp_path):
+    fleet = Fleet(tmp_path, 10, "fleet: {quarantine_units: 4, quarantine_share: 0.3}\n")
+    table = tmp_path / "config/turnouts.tsv"
+    table.write_text(table.read_text().replace("line 1", ""))
+    for i in (1, 3):  # two of five without a line
+        fleet.put(f"t{i}/2024-05-13/A_1.txt", "damaged")
+    fleet.run()
+    assert judge([fleet.state], fleet.configuration).complaints == ()  # 2 of 10
+
+
 def test_small_nights_add_up_until_they_can_be_judged(tmp_path):
     fleet = Fleet(tmp_path, 1, "fleet: {quarantine_units: 5, quarantine_share: 0.3}\n")
     output = tmp_path / "work/verdict.json"
