@@ -125,7 +125,7 @@ NAMED_PIECE = re.compile(
 
 # Several of them in one piece: "t0=0 dt=0.0001 s n=3000". A word behind a number is its unit if no mark follows it.
 PAIR = r"([^\W\d][^:=]{0,40}?)\s*[:=]\s*([+-]?[.,]?\d[^\s:=]*+(?:\s+[^\W\d][^\s:=]*+(?!\s*[:=]))?)"
-PAIRS = re.compile(rf"(?:{PAIR}\s*){{2,}}")
+PAIRS = re.compile(rf"(?>{PAIR}\s*){{2,}}")  # without steps back into a pair, of which a long text has too many
 
 RATIO_PIECE = re.compile(  # "scale 1:500 map"
     r"(?:([^\d:=]*):)?([^\d:=]*[^\W\d])[\s:=]+(1\s?[:/]\s?\d+[^\d:=]{0,30})"

@@ -1,5 +1,7 @@
 """Files as other programs export them: each is read to within rounding, or rejected with its true reason."""
 
+from time import process_time
+
 import h5py
 import numpy as np
 import pandas
@@ -10,6 +12,7 @@ import scipy.io
 
 from turnout.errors import ReadError
 from turnout.readers import read
+from turnout.readers.entries import entries_of_text
 from turnout.records import RawChannel, RawDescription
 
 RATE = 20000.0
@@ -73,6 +76,15 @@ def test_several_statements_in_one_line_are_each_compared_with_the_layout(tmp_pa
     error = only_error(read_text(tmp_path, f"{text}\n{HEAD}{rows()}"))
     assert error.reason == "wrong_rate"
     assert "sampled at 25600 Hz instead of 20000 Hz" in str(error)
+
+
+@pytest.mark.parametrize("end", ["=", "!!", "b :", ""])
+def test_the_time_to_split_a_line_does_not_explode_with_its_length(end):
+    """With n pairs and steps back, 2^n ways: some hours for this text."""
+    start = process_time()
+    list(entries_of_text("a=1 s " * 40 + end, "line 1"))
+    list(entries_of_text("a: 1 s b " * 40 + end, "line 1"))
+    assert process_time() - start < 2.0
 
 
 @pytest.mark.parametrize("text", ["t0=0 dt=0.00005", "n: 400 fs: 20000 Hz"])
