@@ -5,7 +5,8 @@ import pytest
 
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
-from turnout.mismatch.engine.diagnose import diagnose
+from turnout.mismatch.engine.diagnose import diagnose, fit_base
+from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.search_limit import SearchLimit, SearchLimitError, check_limit
 from turnout.physics.term import Parameter
 
@@ -36,22 +37,32 @@ class Counted(Case):
 @pytest.mark.parametrize(("most", "count"), [(None, 10_000), (5, 4), (5, 5), (0, 0)])
 def test_a_search_may_cost_what_its_bound_says(most, count):
     case = Counted(most)
-    case.count = count
-    check_limit(case)
+    case.count = 7 + count
+    check_limit(case, 7)
 
 
 @pytest.mark.parametrize(("most", "count"), [(5, 6), (0, 1)])
 def test_one_simulation_more_ends_it_with_both_numbers(most, count):
     case = Counted(most)
-    case.count = count
+    case.count = 7 + count
     with pytest.raises(SearchLimitError, match=f"has cost {count} simulations, of at most {most}") as end:
-        check_limit(case)
+        check_limit(case, 7)
     assert end.value.limit == SearchLimit(count, most)
 
 
 @pytest.mark.parametrize("most", [None, 100_000])
 def test_a_search_within_its_bound_is_not_changed(most):
     assert diagnose(Counted(most)).names == ("bend",)
+
+
+def test_what_the_fit_without_effects_costs_is_not_part_of_the_search():
+    """A bound of just what the search costs, less than both together, does not end it."""
+    base, whole = Counted(None), Counted(None)
+    fit_base(Search.of(base))
+    diagnose(whole)
+    assert 0 < base.count < whole.count
+    assert diagnose(Counted(whole.count - base.count)).names == ("bend",)
+    assert diagnose(Counted((whole.count - base.count) // 4)).names == ()
 
 
 def test_a_search_beyond_its_bound_cannot_tell():

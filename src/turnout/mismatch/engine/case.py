@@ -177,7 +177,7 @@ class Case:
         Derivatives of earlier points are used again. After a step that costs more, a fit then computes new ones before
         it tries smaller steps.
     max_simulations : int or None
-        Simulations after which a search ends without an answer; None: no bound.
+        Simulations, beside those of the fit without effects, after which a search ends; None: no bound.
     start_values : mapping
         Values of nuisances where fits start, else their means.
     control_level : mapping

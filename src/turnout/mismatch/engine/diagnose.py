@@ -118,7 +118,7 @@ def diagnose(
         verification, latent = verify(search, base, base, None), latent_force_of(search.case, base)
         return Diagnosis((numerics,), base, base, frames, verification, latent)
     try:
-        limited = replace(search, is_limited=True)
+        limited = replace(search, n_before=case.n_simulations)
         findings = withhold_names(name_tolerated(grade_names(settle_pair(_seek_effects(limited, base)))))
     except SearchLimitError as error:
         findings = Findings(search, base, base, (unfinished_verdict(error.limit, search.settings),))

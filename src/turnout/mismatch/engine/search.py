@@ -40,8 +40,9 @@ class Search:
         Called with (number done, total, key of the candidate) after every joint fit.
     label : str
         Effect that is sought, the first part of the keys of its fits.
-    is_limited : bool
-        Whether the bound of the case on simulations holds: in the search for effects, not in a fit without them.
+    n_before : int or None
+        Simulations that the case had cost when its search for effects began: from there its bound holds. None: in a
+        fit without effects, which has no bound.
     """
 
     case: Case
@@ -49,7 +50,7 @@ class Search:
     store: MutableMapping[str, Any] = field(default_factory=dict)
     report: Callable[[int, int, str], Any] = _report_nothing
     label: str = ""
-    is_limited: bool = False
+    n_before: int | None = None
 
     @classmethod
     def of(
@@ -142,8 +143,8 @@ class Search:
         SearchLimitError
             If the search is limited and the case has cost more simulations than it may.
         """
-        if self.is_limited:
-            check_limit(self.case)
+        if self.n_before is not None:
+            check_limit(self.case, self.n_before)
         return fit_jointly(
             self.case, candidates, psi, values, reused_jacobian,
             iterations=self.settings.iterations, stall=stall, sought_cost=sought_cost,

@@ -33,17 +33,20 @@ class SearchLimitError(TurnoutError):
         self.limit = limit
 
 
-def check_limit(case: Case) -> None:
+def check_limit(case: Case, n_before: int) -> None:
     """Check the bound of a case before a further fit.
 
     Parameters
     ----------
     case : Case
+    n_before : int
+        Simulations before the search, of the fit without effects. They are not part of it.
 
     Raises
     ------
     SearchLimitError
         The case has a bound, and has cost more.
     """
-    if case.max_simulations is not None and case.n_simulations > case.max_simulations:
-        raise SearchLimitError(SearchLimit(case.n_simulations, case.max_simulations))
+    n = case.n_simulations - n_before
+    if case.max_simulations is not None and n > case.max_simulations:
+        raise SearchLimitError(SearchLimit(n, case.max_simulations))

@@ -231,7 +231,7 @@ class SimulationPriors:
     difference_size: float = prior(
         0.4, "ln", "of the size of an effect that counts as a prior sd there: a fifth of it", "numerical")
     max_in_switch: int = prior(
-        1500, "simulations", "of a passage over a switch in one diagnosis: four CPU minutes, a whole turnout has five",
+        1000, "simulations", "of a passage over a switch in one search beside its base fit: three CPU minutes",
         "decisions/switch-panels.md")
     path_step: float = prior(0.01, "m", "of a fine path", "numerical")
     transfer_step: float = prior(
