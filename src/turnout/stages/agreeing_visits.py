@@ -126,6 +126,7 @@ def agreeing_visits(
     events: Sequence[Event],
     fitted_groups: Callable[[str], Sequence[FittedGroup]],
     store: MutableMapping[str, tuple[GroupInformation, ...]],
+    threshold: float,
 ) -> list[VisitInformation]:
     """The visits, those that agree with earlier ones after a new linearization with that information.
 
@@ -141,6 +142,9 @@ def agreeing_visits(
         Visit -> its fits.
     store : mutable mapping
         Key of a visit and the belief before it -> information, () where the visit differs.
+    threshold : float
+        Evidence that a name needs. A visit whose own linear model overstates its difference by less is left as it is:
+        about its own maximum, a true change is described better. [nats]
 
     Returns
     -------
@@ -163,7 +167,9 @@ def agreeing_visits(
         information = store.get(key)
         if information is None:
             try:
-                information = _information_given(parameters, current[: k + 1], events, steps[k], fitted_groups)
+                information = _information_given(
+                    parameters, current[: k + 1], events, steps[k], fitted_groups, threshold
+                )
             except (SimulationError, np.linalg.LinAlgError):
                 information = ()
             store[key] = information
@@ -186,15 +192,17 @@ def _information_given(
     events: Sequence[Event],
     step: Step,
     fitted_groups: Callable[[str], Sequence[FittedGroup]],
+    threshold: float,
 ) -> tuple[GroupInformation, ...]:
     """Information of the last visit, linearized about its most probable values given those before; () if it differs."""
-    excess, information = 0.0, list[GroupInformation]()
+    excess, linear_excess, information = 0.0, 0.0, list[GroupInformation]()
     for group in fitted_groups(step.visit):
-        fit, of_group = fit_given_belief(group.case, group.fit, group.parameters, step.predicted)
-        excess += of_group
-        information += visit_groups(group.case, fit, group.sections, group.route)
+        given = fit_given_belief(group.case, group.fit, group.parameters, step.predicted)
+        excess, linear_excess = excess + given.excess, linear_excess + given.linear_excess
+        information += visit_groups(group.case, given.fit, group.sections, group.route)
     again = [*visits[:-1], replace(visits[-1], groups=tuple(information))]
     innovation = estimate_history(parameters, again, events, repeats_between_visits=False, accepted=None).steps[-1]
     chance = float(stats.chi2.sf(excess, max(innovation.innovation.n_directions, 1)))
-    agrees = innovation.innovation.is_expected and chance >= 0.5 * CALIBRATION.max_chance
+    is_linear_enough = 0.5 * (linear_excess - excess) <= threshold
+    agrees = innovation.innovation.is_expected and chance >= 0.5 * CALIBRATION.max_chance and not is_linear_enough
     return tuple(information) if agrees else ()

@@ -522,11 +522,13 @@ def calibrate_turnout(
     accepted = changes_of(turnout_track.terms)
     events = [*events_of(turnout, parameters, accepted, informed), *file_errors(parameters, directions)]
     again = AgreeingInformation(folder / AGREEING / turnout_id, versions)
-    informed = agreeing_visits(parameters, informed, events, lambda v: fits.get(v) or fit_visit(v), again)
+    settings = turnout.settings["mismatch"]
+    informed = agreeing_visits(
+        parameters, informed, events, lambda v: fits.get(v) or fit_visit(v), again, settings.threshold
+    )
     stored = with_information(stored, informed)
     history = estimate_history(parameters, visits_of(_without_findings(stored)), events)
     changes = estimate_history(parameters, informed, events, repeats_between_visits=False, accepted=None)
-    settings = turnout.settings["mismatch"]
     local = further_candidates(accepted, parameters, change_candidates(parameters, directions, without))
     candidates = [*local, *further_candidates(accepted, parameters, candidates_under_load(parameters, without))]
     against_file = without_accepted(accepted, parameters, events, local)

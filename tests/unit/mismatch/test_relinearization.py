@@ -84,9 +84,9 @@ def test_the_excess_of_an_unchanged_visit_is_chi_squared_with_the_directions_tha
         case = Valleys(length, depth, 0.05 * rng.standard_normal(), seed)
         fit = fitted(case, -1.0)
         assert fit.values["length"] < 0.0
-        given, of_visit = fit_given_belief(case, replace(fit, scale={"response": 1.0}), SHARED, belief)
-        assert given.values["length"] > 0.0
-        excess.append(of_visit)
+        given = fit_given_belief(case, replace(fit, scale={"response": 1.0}), SHARED, belief)
+        assert given.fit.values["length"] > 0.0 and given.linear_excess > 100.0
+        excess.append(given.excess)
     assert np.mean(excess) == pytest.approx(2.0, abs=0.5)
     assert np.mean(np.array(excess) < stats.chi2.ppf(0.95, 2)) > 0.9
 
@@ -118,7 +118,7 @@ def history(monkeypatch):
             return [FittedGroup(cases[day], fits[day].without_jacobian(), SHARED, "S1", "main")]
 
         parameters = [replace(p, walk_sd=0.01) for p in SHARED.values()]
-        result = agreeing_visits(parameters, visits, (), fitted_groups, {} if store is None else store)
+        result = agreeing_visits(parameters, visits, (), fitted_groups, {} if store is None else store, 12.0)
         return SimpleNamespace(before=visits, after=result, asked=asked)
 
     return of
@@ -140,6 +140,26 @@ def test_a_change_stays_and_ends_the_search(history, valley):
     assert all(a is b for a, b in zip(result.before, result.after))
 
 
+def test_a_linear_model_has_the_excess_that_its_derivatives_promise(monkeypatch):
+    """Length and depth + load measured twelve times: against the optimum of the three numbers, by linear algebra."""
+    rows = np.repeat([[1.0, 0.0, 0.0], [0.0, 1.0, 1.0]], 12, axis=0)
+    monkeypatch.setattr(Valleys, "predict", lambda self, v, *a: [rows @ [v["length"], v["depth"], v["load"]]])
+    case, belief = Valleys(1.3, 0.2), belief_of(1.0, 0.5)
+    fit = replace(fitted(case, 1.0), scale={"response": 1.0})
+    given = fit_given_belief(case, fit, SHARED, belief)
+    prior, y = NormalPrior.of_belief(case, SHARED, belief), case.observations[0].data
+
+    def least(mean, precision):
+        x = np.linalg.solve(rows.T @ rows / ERROR**2 + precision, rows.T @ y / ERROR**2 + precision @ mean)
+        return x, float(np.sum(((y - rows @ x) / ERROR) ** 2))
+
+    x, of_data = least(prior.mean, prior.precision)
+    alone, of_data_alone = least(np.zeros(3), np.diag([0.25, 0.25, 400.0]))
+    expected = of_data + prior.cost(x) - of_data_alone - 400.0 * alone[2] ** 2
+    assert given.fit.scale == {"response": 1.0}
+    assert (given.excess, given.linear_excess) == pytest.approx((expected, expected), abs=0.01)
+
+
 def test_a_change_that_no_derivative_shows_where_the_earlier_visits_are_leaves_its_excess(monkeypatch):
     """A signal that rises from -1 to 1 about a length of 1.3: at 1.0 its derivative is 0, and a fit stays there."""
 
@@ -148,16 +168,29 @@ def test_a_change_that_no_derivative_shows_where_the_earlier_visits_are_leaves_i
 
     monkeypatch.setattr(Valleys, "predict", predict)
     case = Valleys(1.31, 0.5)
-    given, excess = fit_given_belief(case, fitted(case, 1.31), SHARED, belief_of(1.0, 0.5))
-    assert given.values["length"] == pytest.approx(1.0, abs=0.05)
-    assert excess > 12 * ((1.0 + np.tanh(0.5)) / ERROR) ** 2 * 0.9
+    given = fit_given_belief(case, fitted(case, 1.31), SHARED, belief_of(1.0, 0.5))
+    assert given.fit.values["length"] == pytest.approx(1.0, abs=0.05)
+    assert given.excess > 12 * ((1.0 + np.tanh(0.5)) / ERROR) ** 2 * 0.9
 
 
 def test_a_fit_that_agrees_but_leaves_much_more_of_the_data_does_not_count(history, monkeypatch):
-    monkeypatch.setattr(agreeing, "fit_given_belief", lambda *a: (fit_given_belief(*a)[0], 30.0))
+    monkeypatch.setattr(agreeing, "fit_given_belief", lambda *a: replace(fit_given_belief(*a), excess=30.0))
     result = history([1.0, 1.0], [1.0, -1.0])
     assert result.asked == ["2021-01-01"]
     assert all(a is b for a, b in zip(result.before, result.after))
+
+
+@pytest.mark.parametrize(("overstated", "stays"), [(23.9, True), (24.1, False)])
+def test_a_visit_stays_as_it_is_where_its_own_linear_model_overstates_less_than_a_name_needs(
+    history, monkeypatch, overstated, stays
+):
+    def given(*a):
+        found = fit_given_belief(*a)
+        return replace(found, linear_excess=found.excess + overstated)
+
+    monkeypatch.setattr(agreeing, "fit_given_belief", given)
+    result = history([1.0, 1.0], [1.0, -1.0])
+    assert result.asked == ["2021-01-01"] and (result.after[1] is result.before[1]) is stays
 
 
 def test_what_was_computed_is_read_again_until_the_earlier_visits_differ(history, tmp_path):

@@ -6,7 +6,7 @@ maxima: whether a visit agrees with what is known from earlier ones, only a fit 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -113,7 +113,7 @@ def fit_all_recordings(case: Case, fit: Fit, prior: NormalPrior, values: Mapping
     Control 38.
     """
     low, high = np.array([n.bounds for n in case.nuisances], dtype=float).T
-    weights = [o.effective / fit.scale[o.data_type] for o in case.observations]
+    weights = _weights(case, fit)
 
     def evaluate(x: np.ndarray) -> Point:
         x = np.clip(x, low, high)
@@ -124,10 +124,7 @@ def fit_all_recordings(case: Case, fit: Fit, prior: NormalPrior, values: Mapping
     x, predicted, white, cost = evaluate(np.array([values[n.name] for n in case.nuisances]))
     rows, damping = _derivatives(case, x, predicted), 0.0
     for _ in range(CALIBRATION.max_new_steps):
-        matrix, score = prior.precision.copy(), -prior.precision @ (x - prior.mean)
-        for w, r, e in zip(weights, rows, white):
-            weighted = w * np.asarray(r, dtype=float).T
-            matrix, score = matrix + weighted @ r, score + weighted @ e
+        matrix, score = _normal_equations(weights, rows, white, prior, x)
         end, damping = _lower_point(x, matrix, score, cost, damping, evaluate)
         if end is None:
             break
@@ -169,10 +166,25 @@ def _lower_point(
     return None, damping
 
 
-def fit_given_belief(
-    case: Case, fit: Fit, parameters: Mapping[str, StateParameter], belief: Belief
-) -> tuple[Fit, float]:
-    r"""The fit of a visit that begins at the values which earlier visits predict, under that belief.
+@dataclass(frozen=True)
+class FitGivenBelief:
+    """A ``fit`` under a belief, and how far it is from the data alone.
+
+    ``excess`` is the cost under the belief less that of the data at the maximum under the prior of the file. It is
+    chi-squared like the innovation where the visit agrees with the belief, since both are twice the logarithm of a
+    ratio of likelihoods, but holds for models that are not linear as well. ``linear_excess`` is the same by the linear
+    model about the maximum under the prior of the file. Where it is larger, that model does not reach so far.
+    """
+
+    fit: Fit
+    excess: float
+    linear_excess: float
+
+
+def fit_given_belief(case: Case, fit: Fit, parameters: Mapping[str, StateParameter], belief: Belief) -> FitGivenBelief:
+    """The fit of a visit that begins at the values which earlier visits predict, under that belief.
+
+    Its noise scale is that which all recordings leave at the maximum under the prior of the file.
 
     Parameters
     ----------
@@ -187,29 +199,38 @@ def fit_given_belief(
 
     Returns
     -------
-    fit : Fit
-        With the noise scale that all recordings leave at the maximum under the prior of the file.
-    excess : float
-        Cost under the belief less that of the data at the maximum under the prior of the file. It is chi-squared like
-        the innovation where the visit agrees with the belief, since both are twice the logarithm of a ratio of
-        likelihoods, but holds for models that are not linear as well.
+    FitGivenBelief
 
     Raises
     ------
     SimulationError
         If the model cannot be simulated at a start.
     """
-    file = NormalPrior.of_file(case)
-    alone, _ = fit_all_recordings(case, fit, file, fit.values)
+    alone, _ = fit_all_recordings(case, fit, NormalPrior.of_file(case), fit.values)
     alone = replace(alone, scale={**alone.scale, **noise_scales(case, alone)})
     prior = NormalPrior.of_belief(case, parameters, belief)
     start = {**_values(case, prior.mean), **{n.name: alone.values[n.name] for n in case.nuisances if n.owner}}
     given, cost = fit_all_recordings(case, alone, prior, start)
-    return given, cost - _data_cost(case, alone)
+    x = np.array([alone.values[n.name] for n in case.nuisances])
+    own = sum(((alone.values[n.name] - n.mean) / n.sd) ** 2 for n in case.nuisances if n.owner)
+    weights = _weights(case, alone)
+    of_data = own + sum(w * float(e @ e) for w, e in zip(weights, alone.white))
+    matrix, score = _normal_equations(weights, alone.jacobian, alone.white, prior, x)
+    linear_excess = prior.cost(x) - own - float(score @ np.linalg.solve(matrix, score))
+    return FitGivenBelief(given, cost - of_data, linear_excess)
 
 
-def _data_cost(case: Case, fit: Fit) -> float:
-    """Minus twice the log likelihood at a fit, with the recordings' own numbers under their prior."""
-    own = sum(((fit.values[n.name] - n.mean) / n.sd) ** 2 for n in case.nuisances if n.owner)
-    weights = (o.effective / fit.scale[o.data_type] for o in case.observations)
-    return float(own + sum(w * float(e @ e) for w, e in zip(weights, fit.white)))
+def _weights(case: Case, fit: Fit) -> list[float]:
+    """Weight of each observation: of its samples, over the noise scale."""
+    return [o.effective / fit.scale[o.data_type] for o in case.observations]
+
+
+def _normal_equations(
+    weights: Sequence[float], rows: Sequence[np.ndarray], white: Sequence[np.ndarray], prior: NormalPrior, x: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Matrix (n, n) and right side (n,) of a Gauss-Newton step from ``x``."""
+    matrix, score = prior.precision.copy(), -prior.precision @ (x - prior.mean)
+    for w, r, e in zip(weights, rows, white):
+        weighted = w * np.asarray(r, dtype=float).T
+        matrix, score = matrix + weighted @ r, score + weighted @ e
+    return matrix, score
