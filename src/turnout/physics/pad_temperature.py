@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Self
 
 from turnout.physics.hypothesis import Hypothesis, TrackSite
 from turnout.physics.term import Parameter, PhysicsTerm
+from turnout.simulate.links import Link
 
 if TYPE_CHECKING:
-    from turnout.simulate.links import Link
     from turnout.simulate.track import Track
 
 REFERENCE = 15.0  # °C, temperature of the pads of the base model
@@ -65,7 +65,7 @@ class PadTemperature(PhysicsTerm):
         if more == 0.0:
             return []
         pads = [track.pad_link(j) for j in range(track.support.size)]
-        return [replace(k, stiffness=more * k.stiffness, damping=0.0, tag="pad_temperature") for k in pads]
+        return [Link(k.ends, more * k.stiffness, 0.0, k.mass, k.loss_factor, "pad_temperature") for k in pads]
 
     def nuisance_change(self, conditions: Mapping[str, Any]) -> tuple[str, float] | None:
         """Change of the logarithm of the common pad stiffness; None without a known temperature."""

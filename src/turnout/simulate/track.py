@@ -90,13 +90,7 @@ class Track:
         if support.ndim != 1 or support.size < 3 or not np.all(np.diff(support) > 0.0):
             raise SimulationError(f"{self.name}: support needs at least 3 rising places, got {support!r}.")
         object.__setattr__(self, "support", support)
-        for name in PER_SUPPORT:
-            object.__setattr__(self, name, self._support_values(name))
-        for name in NOT_NEGATIVE:
-            if np.any(negative := getattr(self, name) < 0.0):
-                j = int(np.argmax(negative))
-                value, position = getattr(self, name)[j], support[j]
-                raise SimulationError(f"{self.name}: {name} of support {j} at {position:.3f} m is negative: {value!r}.")
+        self._set_support_values()
         if self.layers not in (1, 2, 3) or self.elements_per_bay < 1:
             raise SimulationError(f"{self.name}: {self.layers} layers, {self.elements_per_bay} elements per bay.")
         required = {1: (), 2: ("sleeper_mass",), 3: ("sleeper_mass", "ballast_mass")}[self.layers]
@@ -119,14 +113,24 @@ class Track:
                 f"three nodes hold that are {element:.3f} m apart; fewer elements per bay hold more."
             )
 
-    def _support_values(self, name: str) -> np.ndarray:
-        value = np.asarray(getattr(self, name), dtype=float)
-        n = self.support.size
-        if value.ndim and value.shape != (n,):
-            raise SimulationError(f"{self.name}: {name} has {value.size} values for {n} supports.")
-        if not np.all(np.isfinite(value)):
-            raise SimulationError(f"{self.name}: {name} holds {value[~np.isfinite(value)]!r}.")
-        return np.broadcast_to(value, (n,)).copy()
+    def _set_support_values(self) -> None:
+        """Give every support its own values, all in one array: they are checked together, a track is made often."""
+        n, values = self.support.size, np.empty((len(PER_SUPPORT), self.support.size))
+        for row, name in zip(values, PER_SUPPORT):
+            value = np.asarray(getattr(self, name), dtype=float)
+            if value.ndim and value.shape != (n,):
+                raise SimulationError(f"{self.name}: {name} has {value.size} values for {n} supports.")
+            row[:] = value
+            object.__setattr__(self, name, row)
+        if not np.all(np.isfinite(values)):
+            k = int(np.argmin(np.all(np.isfinite(values), axis=1)))
+            raise SimulationError(f"{self.name}: {PER_SUPPORT[k]} holds {values[k][~np.isfinite(values[k])]!r}.")
+        if np.any(negative := values[: len(NOT_NEGATIVE)] < 0.0):
+            k, j = np.argwhere(negative)[0]
+            value, position = values[k, j], self.support[j]
+            raise SimulationError(
+                f"{self.name}: {NOT_NEGATIVE[k]} of support {j} at {position:.3f} m is negative: {value!r}."
+            )
 
     @property
     def start(self) -> float:

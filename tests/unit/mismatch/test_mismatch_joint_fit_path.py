@@ -10,6 +10,7 @@ from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine import map_fit, refit
 from turnout.mismatch.engine.candidate import EffectSite, RefitStarts
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.hammer_prescreen import _Prescreen, _Start
 from turnout.mismatch.engine.joint_problem import JointProblem
 from turnout.mismatch.engine.levenberg_marquardt import DampedSteps
 from turnout.mismatch.engine.map_fit import cost_after, fit_jointly
@@ -213,6 +214,50 @@ def test_a_trial_costs_what_the_fit_costs_without_its_last_derivatives(monkeypat
     assert len(asked) == 3  # where each of the three steps starts
     fit = fit_jointly(case, values=at, iterations=3)
     assert cost == fit.cost and len(asked) == 3 + 4
+
+
+def test_a_trial_ends_early_only_where_its_steps_do_not_lead_to_the_cost_that_is_sought():
+    case, at = Bent(False), {f"x{k}": 0.5 for k in range(12)}
+    start, end = (cost_after(case, (), np.zeros(0), at, steps) for steps in (0, 3))
+    assert cost_after(case, (), np.zeros(0), at, 3, end + 1.0) == end < start
+    assert cost_after(case, (), np.zeros(0), at, 3, -1e6) == start
+
+
+def test_sites_are_tried_until_they_do_not_lead_to_the_two_best(monkeypatch):
+    """In order of what their columns promise; a further family of the group uses the same trials."""
+    gains, sought = {"a": 10.0, "b": 30.0, "c": 20.0, "d": 5.0}, []
+
+    def trial_gain(step, candidate, start, sought_gain):
+        sought.append((candidate.key, sought_gain))
+        return gains[candidate.key]
+
+    def starts():
+        candidate = [
+            SimpleNamespace(key=k, where={"place": k}, refit=SimpleNamespace(prescreen_group="g")) for k in "abcd"
+        ]
+        return [_Start(promise, c, np.zeros(1)) for promise, c in zip((4.0, 9.0, 8.0, 7.0), candidate)]
+
+    monkeypatch.setattr(_Prescreen, "_trial_gain", trial_gain)
+    step = _Prescreen(MismatchSettings(), Bent(False), Bent(False), (), SimpleNamespace(), SimpleNamespace())
+    for _ in range(2):
+        assert [c.key for c, _ in step.likeliest_starts(starts())] == ["b", "c"]
+    assert sought == [("b", -np.inf), ("c", -np.inf), ("d", 20.0), ("a", 20.0)]
+
+
+@pytest.mark.parametrize("order", [(1.0, 2.0, 3.0), (3.0, 1.0, 2.0)])
+def test_of_the_starts_of_a_whole_track_the_one_that_gains_most_is_taken(monkeypatch, order):
+    sought = []
+
+    def trial_gain(step, candidate, start, sought_gain):
+        sought.append(sought_gain)
+        return start[0]
+
+    monkeypatch.setattr(_Prescreen, "_trial_gain", trial_gain)
+    step = _Prescreen(MismatchSettings(), Bent(False), Bent(False), (), SimpleNamespace(), SimpleNamespace())
+    candidate = SimpleNamespace(key="a", where={}, refit=SimpleNamespace(prescreen_group="g"))
+    starts = [_Start(float(k), candidate, np.array([gain])) for k, gain in enumerate(order)]
+    assert step.likeliest_starts(starts)[0][1] == [3.0]
+    assert sought == [-np.inf, *np.maximum.accumulate(order[::-1])[:-1]]  # the most promising start is the last
 
 
 def test_a_fit_is_not_made_again_where_nobody_would_be_named():

@@ -19,6 +19,8 @@ from turnout.mismatch.turnout.passage_alignment import align, low_pass
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.mismatch.turnout.priors import ALIGNMENT
+from turnout.mismatch.turnout.screening import _passage_channel_changes
+from turnout.physics.transfer import TransferTerm
 
 
 @pytest.fixture(scope="module")
@@ -30,6 +32,23 @@ def plan():
 def sound(plan):
     case = TrackCase(measured_campaign(plan, (), 7))
     return case, {n.name: case.start_values.get(n.name, n.mean) for n in case.nuisances}
+
+
+def test_the_column_of_a_linear_channel_is_what_the_case_predicts(sound):
+    """Of every start of every such effect, once beside a gain of the same channel; what is left is the end of the
+    record, at which the case cuts the signal between channel and band."""
+    case, values = sound
+    (o,) = (o for o in case.observations if o.name == "heavy 2")
+    chosen = [(c, k) for c in case.candidates if c.where.get("sensor") == "S3" for k in range(len(c.starts))]
+    chosen = [(c, k) for c, k in chosen if isinstance(c.term(c.starts[k]), TransferTerm)]
+    for terms in ((), (physics.SensorGain("S3", 0.6),)):
+        (before,) = case.predict(values, terms, [o])
+        columns = _passage_channel_changes(case, SimpleNamespace(values=values, terms=terms), o, before, chosen)
+        for c, k in chosen:
+            (after,) = case.predict(values, (*terms, c.term(c.starts[k])), [o])
+            error = np.linalg.norm(columns[c.key, k] - (after - before)) / np.linalg.norm(after - before)
+            assert error < (1e-9 if c.family == "sensor_gain" else 2e-3), (c.key, k)
+    assert {c.family for c, _ in chosen} == {"time_offset", "sensor_gain", "low_pass", "high_pass", "mount_resonance"}
 
 
 @pytest.mark.slow

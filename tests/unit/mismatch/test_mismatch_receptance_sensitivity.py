@@ -132,6 +132,45 @@ def _heard(case, fit, observation, old, chosen):
     return [c for c, k in chosen if (c.key, k) in found], found.values()
 
 
+def test_pairs_of_different_lines_are_predicted_together_as_each_alone(somewhere):
+    """Predictions and derivatives, beside a soft pad; one pair has a third of its lines, one is given twice."""
+    case, values = somewhere
+    term, (first, second, *_) = physics.LocalPad(J, 0.6), case.observations
+    pair = case.frf_pairs[first.name]
+    fewer = replace(pair, frequency=pair.frequency[::3], size=pair.size[::3])
+    predictor = case.predictor.with_recordings({**case.frf_pairs, first.name: fewer}, {})
+    observations = [second, replace(first, data=first.data[: 2 * fewer.size.size], sigma=0.1, modes=None, cells=None)]
+    observations.append(second)
+    together = predictor.predict(values, (term,), observations)
+    whole = case.predictor.predict(values, (term,), [first, second])
+    every_third = np.concatenate([half[::3] for half in np.split(whole[0], 2)])
+    for found, expected in zip(together, (whole[1], every_third, whole[1])):
+        assert np.allclose(found, expected, atol=0.0, rtol=1e-12)
+    near = physics.LocalPad(J, 0.61)
+    steps = predictor.predict_near(values, (term,), (near,), observations, together)
+    whole_step = case.predictor.predict_near(values, (term,), (near,), [first, second], whole)
+    assert np.allclose(steps[1], np.concatenate([half[::3] for half in np.split(whole_step[0], 2)]), rtol=1e-12)
+    assert np.linalg.norm(steps[1] - together[1]) > 1e-5
+    jacobians = predictor.nuisance_jacobian(case.nuisances, values, (term,), observations, together)
+    whole_jacobians = case.predictor.nuisance_jacobian(case.nuisances, values, (term,), [first, second], whole)
+    expected = np.concatenate([half[::3] for half in np.split(whole_jacobians[0], 2)])
+    assert np.allclose(jacobians[1], expected, atol=1e-12 * np.abs(expected).max(), rtol=1e-12)
+    assert np.array_equal(jacobians[0], jacobians[2])
+
+
+@pytest.mark.parametrize("name", ["gain_S3", "rail_shear", f"pad_{J}", "ballast_damping"])
+def test_a_derivative_of_all_pairs_is_where_their_predictions_go(somewhere, name):
+    case, values = somewhere
+    k, step = [n.name for n in case.nuisances].index(name), 1e-5
+    before = case.predict(values, (), case.observations)
+    column = np.concatenate([j[:, k] for j in case.nuisance_jacobian(values, (), case.observations, before)])
+    sides = (
+        np.concatenate(case.predict({**values, name: values[name] + s}, (), case.observations)) for s in (step, -step)
+    )
+    difference = np.subtract(*sides) / (2.0 * step)
+    assert np.linalg.norm(column - difference) < 1e-3 * np.linalg.norm(difference)
+
+
 def test_a_sensor_moved_from_the_rail_to_a_sleeper_is_another_seat(somewhere):
     """The same channel at the same place, mounted otherwise in the second test: each pair is predicted as if alone."""
     case, values = somewhere

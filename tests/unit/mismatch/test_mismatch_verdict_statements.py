@@ -22,7 +22,9 @@ from turnout.mismatch.turnout.candidates.catalogue import candidate_of, channel_
 from turnout.mismatch.turnout.passage_observation import AlignedPassage, observe_passage
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.mismatch.turnout.prediction import Predictor
+from turnout.mismatch.turnout.priors import RECEPTANCE
 from turnout.mismatch.turnout.receptance_model import ReceptanceModel
+from turnout.mismatch.turnout.receptance_sensitivity import ReceptanceSensitivity
 from turnout.mismatch.turnout.residual_spaces import _force_space, source_spaces
 from turnout.mismatch.turnout.saturation import raw_peak
 from turnout.physics import Parameter
@@ -123,9 +125,14 @@ def test_the_receptance_under_the_hammer_is_no_other_a_micrometre_beside_it(plac
 
 
 def test_the_seat_of_a_sensor_beside_the_blow_has_the_derivative_of_its_receptance():
-    model, way = ReceptanceModel(uniform_track(24.0), ()), 1e-3
+    """And on a sleeper, which the seat on the rail does not move, it is 0."""
+    model, way = ReceptanceModel(uniform_track(24.0), ()), RECEPTANCE.seat_step
     difference = (model.receptance(12.2, 12.26 + way) - model.receptance(12.2, 12.26 - way)) / (2.0 * way)
-    assert np.allclose(model.seat_gradient(12.2, 12.26, 1e-3), difference, atol=0.0, rtol=1e-9)
+    seats = {("S", 12.26, "rail"): 12.26, ("S", 12.26, "sleeper"): ("sleeper", 20)}
+    sensitivity = ReceptanceSensitivity(model, [(12.2, seat) for seat in seats], seats, SimpleNamespace())
+    on_rail, on_sleeper = sensitivity.seat_gradients
+    assert np.allclose(on_rail, difference, atol=0.0, rtol=1e-9)
+    assert np.all(on_sleeper == 0.0)
     nodes_alone = (model.nodal_motion(12.2, 12.26 + way) - model.nodal_motion(12.2, 12.26 - way)) / (2.0 * way)
     assert np.max(np.abs(nodes_alone / difference - 1.0)) > 0.05  # what would be left out
 

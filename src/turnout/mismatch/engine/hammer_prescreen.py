@@ -122,7 +122,11 @@ class _Prescreen:
         if group and len(best_starts) == 1:
             return [self._best_of_track(ranked)]
         if group:
-            gains = {s.candidate.key: self._gain_at_site(group, s) for s in best_starts.values()}
+            gains: dict[str, float] = {}
+            for s in sorted(best_starts.values(), key=lambda s: -s.gain):
+                chosen = sorted(gains.values())[-self.settings.scouted_places :]
+                sought_gain = chosen[0] if len(chosen) == self.settings.scouted_places else -np.inf
+                gains[s.candidate.key] = self._gain_at_site(group, s, sought_gain)
             likeliest = sorted(best_starts.values(), key=lambda s: -gains[s.candidate.key])
             return [(s.candidate, s.start) for s in likeliest[: self.settings.scouted_places]]
         likeliest = sorted(best_starts.values(), key=lambda s: -s.gain)[: self.settings.scouted_places]
@@ -131,22 +135,31 @@ class _Prescreen:
     def _best_of_track(self, ranked: Sequence[_Start]) -> tuple[Candidate, np.ndarray]:
         """The best of the most promising starts of a family of the whole track."""
         starts = {tuple(s.start): (s.candidate, s.start) for s in ranked}
-        trials = list(starts.values())[-THRESHOLDS.max_trial_starts :]
-        return max(trials, key=lambda trial: self._trial_gain(*trial)) if trials[1:] else trials[0]
+        best, *others = list(starts.values())[: -THRESHOLDS.max_trial_starts - 1 : -1]
+        best_gain = self._trial_gain(*best, -np.inf) if others else 0.0
+        for trial in others:
+            gain = self._trial_gain(*trial, best_gain)
+            if gain > best_gain:
+                best, best_gain = trial, gain
+        return best
 
-    def _gain_at_site(self, group: str, start: _Start) -> float:
+    def _gain_at_site(self, group: str, start: _Start, sought_gain: float) -> float:
         """Gain of a trial fit at a site, computed for the first family of the group that asks."""
         site = group, tuple(sorted(start.candidate.where.items()))
         if site not in self.trial_gains:
-            self.trial_gains[site] = self._trial_gain(start.candidate, start.start)
+            self.trial_gains[site] = self._trial_gain(start.candidate, start.start, sought_gain)
         return self.trial_gains[site]
 
-    def _trial_gain(self, candidate: Candidate, start: np.ndarray) -> float:
-        """Gain in half the cost after a few steps of the broad fit from the priors."""
+    def _trial_gain(self, candidate: Candidate, start: np.ndarray, sought_gain: float) -> float:
+        """Gain in half the cost after a few steps of the broad fit from the priors.
+
+        The steps end where they do not lead to ``sought_gain``, that of trials at better sites.
+        """
         psi, candidates = np.concatenate([self.broad_fit.psi, start]), (*self.accepted, candidate)
         values, steps = _prior_means(self.broad_case), THRESHOLDS.n_trial_steps
+        sought_cost = self.broad_fit.cost - 2.0 * sought_gain
         try:
-            cost = cost_after(self.broad_case, candidates, psi, values, steps)
+            cost = cost_after(self.broad_case, candidates, psi, values, steps, sought_cost)
         except SimulationError:
             return -np.inf
         return 0.5 * (self.broad_fit.cost - cost)

@@ -40,7 +40,7 @@ class DampedSteps:
         sums: dict[str, tuple[Any, ...]] = {}
         for o, j, r in zip(joint.observations, jacobian, residuals):
             weight = np.sqrt(o.effective)
-            rows, right = weight * j * joint.sd, weight * r
+            rows, right = j * (weight * joint.sd), weight * r
             old = sums.get(o.data_type, (0.0, 0.0, 0.0, 0.0))
             new = rows.T @ rows, rows.T @ right, float(right @ right), o.n_effective
             sums[o.data_type] = tuple(a + b for a, b in zip(old, new))

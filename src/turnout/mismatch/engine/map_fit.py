@@ -83,7 +83,12 @@ def fit_jointly(
 
 
 def cost_after(
-    case: Case, candidates: Iterable[Candidate], start: ArrayLike, values: Mapping[str, float], iterations: int
+    case: Case,
+    candidates: Iterable[Candidate],
+    start: ArrayLike,
+    values: Mapping[str, float],
+    iterations: int,
+    sought_cost: float = np.inf,
 ) -> float:
     """Cost of a joint fit to cheap observations after a few steps, without the derivatives that a ``Fit`` needs.
 
@@ -99,6 +104,8 @@ def cost_after(
         Nuisance parameters there.
     iterations : int
         Largest number of steps.
+    sought_cost : float
+        The steps end where they are if even a multiple of what the next promises leads to a higher cost.
 
     Returns
     -------
@@ -111,7 +118,7 @@ def cost_after(
     """
     joint = JointProblem(case, candidates, iterations=iterations)
     point = _start_point(joint, start, values)
-    return _iterate(joint, point, joint.jacobian(point.theta, point.predictions), 0, np.inf)[0].cost
+    return _iterate(joint, point, joint.jacobian(point.theta, point.predictions), 0, sought_cost)[0].cost
 
 
 def _start_point(joint: JointProblem, start: ArrayLike | None, values: Mapping[str, float] | None) -> FitPoint:

@@ -38,9 +38,27 @@ def limit_band(
         The signals within the band.
     """
     n = samples.shape[-1]
-    size = next_fast_len(n + round(rate * 0.75), real=True)  # the lower edge rings for half a second
+    size = padded_size(n, rate)
     passed = band_window(np.fft.rfftfreq(size, 1.0 / rate), low, high)
     return np.fft.irfft(np.fft.rfft(samples, size) * passed, size)[..., :n]
+
+
+def padded_size(n: int, rate: float) -> int:
+    """Length of a transform in which a signal of ``limit_band`` does not wrap around: its lower edge rings for half a
+    second.
+
+    Parameters
+    ----------
+    n : int
+        Samples of the signal.
+    rate : float
+        Samples per second. [Hz]
+
+    Returns
+    -------
+    int
+    """
+    return next_fast_len(n + round(rate * 0.75), real=True)
 
 
 def band_window(frequency: np.ndarray | Sequence[float], low: float, high: float) -> np.ndarray:

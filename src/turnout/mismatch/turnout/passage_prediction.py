@@ -87,14 +87,59 @@ class PassagePredictor(SiteModel):
         array
             Output of the channel of a sensor for the simulated signal ``signal``, at the times of the recording.
         """
-        start = aligned.reference + values[f"time@{aligned.name}"] - SIMULATION.lead_time
-        rate, time = 4.0 * self.solver.rate, aligned.time - start
+        signal = self.through_channel(values, terms, aligned, sensor, signal)
+        return self.recorded(values, aligned, sensor, aligned.limit_band(signal, 4.0 * self.solver.rate))
+
+    def through_channel(
+        self, values: Values, terms: Terms, aligned: AlignedPassage, sensor: Sensor, signal: np.ndarray
+    ) -> np.ndarray:
+        """A simulated signal with the effects of its channel, at the rate of ``signal`` and without limit to its band.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        aligned : AlignedPassage
+            A passage with its time shift, speed and load.
+        sensor : Sensor
+            A sensor.
+        signal : (n,) array of float
+            Simulated acceleration. [m/s²]
+
+        Returns
+        -------
+        (n,) array of float
+            [m/s²]
+        """
+        conditions = {"name": aligned.name, "start": _start_time(values, aligned)}
         for term in terms:
             if term.effect_type == "channel":
-                signal = term.under_conditions({"name": aligned.name, "start": start}).channel(signal, rate, sensor)
-        return (1.0 + values[f"gain_{sensor.name}"]) * passage_band.read_at(
-            aligned.limit_band(signal, rate), rate, time
-        )
+                signal = term.under_conditions(conditions).channel(signal, 4.0 * self.solver.rate, sensor)
+        return signal
+
+    def recorded(self, values: Values, aligned: AlignedPassage, sensor: Sensor, signal: np.ndarray) -> np.ndarray:
+        """A signal within its band, with the gain of its channel, at the times of the recording.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        aligned : AlignedPassage
+            A passage with its time shift, speed and load.
+        sensor : Sensor
+            A sensor.
+        signal : (n,) array of float
+            At four times the rate of the simulation. [m/s²]
+
+        Returns
+        -------
+        (n_time,) array of float
+            [m/s²]
+        """
+        time = aligned.time - _start_time(values, aligned)
+        return (1.0 + values[f"gain_{sensor.name}"]) * passage_band.read_at(signal, 4.0 * self.solver.rate, time)
 
     def sensor_signals(
         self, values: Values, terms: Terms, aligned: AlignedPassage, with_probes: bool = True
@@ -274,6 +319,11 @@ class PassagePredictor(SiteModel):
             self._simulators[key] = PassageSimulator(self.zone.turnout, track, terms, self.solver)
             drop_oldest(self._simulators, SIMULATION.simulator_cache_size)
         return self._simulators[key]
+
+
+def _start_time(values: Values, aligned: AlignedPassage) -> float:
+    """Time of the recording at which the simulation starts [s]."""
+    return aligned.reference + values[f"time@{aligned.name}"] - SIMULATION.lead_time
 
 
 def _train_values(values: Values, aligned: AlignedPassage) -> tuple[float, float, float]:

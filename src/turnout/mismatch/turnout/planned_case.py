@@ -22,6 +22,7 @@ from turnout.mismatch.turnout.passage_observation import AlignedPassage
 from turnout.mismatch.turnout.prediction import Predictor
 from turnout.mismatch.turnout.priors import SIMULATION
 from turnout.mismatch.turnout.receptance_observation import FrfPair
+from turnout.mismatch.turnout.receptance_samples import PairSamples
 from turnout.mismatch.turnout.site import site_of
 from turnout.mismatch.turnout.wheel_roughness import wheel_modes
 from turnout.records import Recording
@@ -92,7 +93,8 @@ def planned_data(plan: Plan, settings: MismatchSettings, solver: Track1D) -> tup
     values = {n.name: n.mean for n in site.nuisances(campaign.passages)}
     pairs, observations = {}, []
     for pair in predictor.frf_pairs.values():
-        h = predictor.predict_receptance(values, (), pair, predictor.pair_sensitivity(values, (), pair))
+        samples = PairSamples([pair], predictor.pair_sensitivity(values, (), pair))
+        (h,) = predictor.predict_receptances(values, (), samples)
         h = h[: receptance_observation.LINES.size] + 1j * h[receptance_observation.LINES.size :]
         pairs[pair.name] = scaled = receptance_observation.with_magnitude(pair, np.abs(h))
         error = NOISE_SHARE * np.abs(h)

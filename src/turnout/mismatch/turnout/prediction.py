@@ -103,14 +103,13 @@ class Predictor(ReceptancePredictor, PassagePredictor, Predictions):
 
     def predict(self, values: Values, terms: Terms, observations: Sequence[Observation]) -> list[np.ndarray]:
         """Predictions of receptances and passages."""
-        predictions, sensitivity_of = [], self.pair_sensitivities(values, terms)
-        for o in observations:
-            if o.name in self.frf_pairs:
-                pair = self.frf_pairs[o.name]
-                predictions.append(self.predict_receptance(values, terms, pair, sensitivity_of(pair)))
-            else:
-                predictions.append(self.predict_passage(values, terms, self.aligned_passages[o.name]))
-        return predictions
+        predicted: dict[int, np.ndarray] = {}
+        for numbers, samples in self.pair_samples(values, terms, observations):
+            predicted |= zip(numbers, self.predict_receptances(values, terms, samples))
+        for k, o in enumerate(observations):
+            if k not in predicted:
+                predicted[k] = self.predict_passage(values, terms, self.aligned_passages[o.name])
+        return [predicted[k] for k in range(len(observations))]
 
     def predict_near(
         self,

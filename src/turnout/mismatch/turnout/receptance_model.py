@@ -15,7 +15,7 @@ from scipy.sparse import csr_array, lil_array
 from turnout.mismatch.turnout import receptance_observation
 from turnout.mismatch.turnout.matrix_cache import FixedLinks, matrices_of
 from turnout.mismatch.turnout.priors import RECEPTANCE
-from turnout.mismatch.turnout.receptance_observation import LINES, SHIFTED_LINES
+from turnout.mismatch.turnout.receptance_observation import SHIFTED_LINES
 from turnout.mismatch.turnout.track_parameters import SUPPORT_PARAMETERS
 from turnout.physics.term import PhysicsTerm
 from turnout.simulate.frequency_response import responses
@@ -23,8 +23,8 @@ from turnout.simulate.links import Link, links_of, ports_of, with_links
 from turnout.simulate.matrices import link_vector
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-    from typing import Any
+    from collections.abc import Hashable, Iterable, Sequence
+    from typing import TypeAlias
 
     from turnout.mismatch.engine.candidate import Candidate
     from turnout.mismatch.engine.case import Observation
@@ -36,6 +36,9 @@ if TYPE_CHECKING:
     from turnout.simulate.matrices import TrackMatrices
     from turnout.simulate.sensor import Sensor
     from turnout.simulate.track import Track
+
+    # motion of the ends of links under impact and sensor, end, response and term of each link
+    LinkResponses: TypeAlias = tuple[tuple[np.ndarray, np.ndarray], np.ndarray, np.ndarray, csr_array]
 
 
 def tangent_links(terms: Sequence[PhysicsTerm], track: Track) -> list[Link]:
@@ -158,6 +161,43 @@ class ReceptanceModel:
         rows, weights = self.weight[measured]
         return self.displacement(excited)[:, rows] @ weights
 
+    def receptances(
+        self, displacements: np.ndarray, excited: Sequence[float | tuple], measured: float | tuple
+    ) -> np.ndarray:
+        """Receptances from several positions to the same sensor.
+
+        Parameters
+        ----------
+        displacements : (n_excited, n_line, n) array of complex
+            ``displacement`` of each position. [m/N]
+        excited : sequence of float or tuple
+            Positions of the impacts [m], or degrees of freedom of sleepers.
+        measured : float or tuple
+            Position of the sensor [m], or a degree of freedom of a sleeper.
+
+        Returns
+        -------
+        (n_excited, n_line) array of complex
+            [m/N]
+        """
+        if measured not in self.weight:
+            self.weight[measured] = self.matrices.weights(measured)
+        rows, weights = self.weight[measured]
+        h = displacements[:, :, rows] @ weights
+        for k, position in enumerate(excited):
+            h[k] += self._compliance(position, measured)
+        return h
+
+    def _compliance(self, excited: float | tuple, measured: float | tuple) -> float:
+        """Compliance of the rail between two positions within an element [m/N]; 0 of others and of sleepers."""
+        if isinstance(measured, tuple) or isinstance(excited, tuple) or abs(excited - measured) > self._longest_element:
+            return 0.0
+        return self.matrices.compliance(float(excited), float(measured))
+
+    @cached_property
+    def _longest_element(self) -> float:
+        return float(np.max(np.diff(self.matrices.node)))
+
     def position_of(self, sensor: Sensor) -> float | tuple:
         """Position of a sensor on the model.
 
@@ -188,33 +228,7 @@ class ReceptanceModel:
         (n_line,) array
             Complex [m/N].
         """
-        h = self.nodal_motion(excited, measured)
-        if isinstance(measured, tuple) or isinstance(excited, tuple):
-            return h
-        return h + self.matrices.compliance(float(excited), float(measured))
-
-    def seat_gradient(
-        self, excited: float | tuple, measured: float | tuple, step: float = RECEPTANCE.seat_step
-    ) -> np.ndarray:
-        """Derivative by the position of the sensor on the rail, (n_line,) [1/N]; 0 on a sleeper.
-
-        Parameters
-        ----------
-        excited : float or tuple
-            Position of the impact [m], or a degree of freedom of a sleeper.
-        measured : float or tuple
-            Position of the sensor [m], or a degree of freedom of a sleeper.
-        step : float
-            Step of the difference quotient [m].
-
-        Returns
-        -------
-        array
-            Derivative by the position of the sensor on the rail, (n_line,) [1/N]; 0 on a sleeper.
-        """
-        if isinstance(measured, tuple):
-            return np.zeros(LINES.size, dtype=complex)
-        return (self.receptance(excited, measured + step) - self.receptance(excited, measured - step)) / (2.0 * step)
+        return self.nodal_motion(excited, measured) + self._compliance(excited, measured)
 
     @cached_property
     def rows(self) -> tuple[np.ndarray, np.ndarray]:
@@ -273,7 +287,8 @@ class AddedLinks:
 
     def __init__(self, predictor: Predictor, values: Values, terms: Terms, chosen: Sequence[tuple[Candidate, int]]):
         self.predictor, self.values, self.terms, self.chosen = predictor, values, terms, chosen
-        self.link_responses: dict[tuple, tuple[csr_array, np.ndarray, np.ndarray, np.ndarray]] = {}
+        self._by_conditions: dict[Hashable, LinkResponses] = {}
+        self._by_terms: dict[Hashable, LinkResponses] = {}
 
     def changes(self, pair: FrfPair) -> dict[tuple[str, int], np.ndarray]:
         r"""(key, start) -> (n,) change of the observation of a pair.
@@ -296,13 +311,9 @@ class AddedLinks:
         if not chosen:
             return {}
         sensitivity = predictor.pair_sensitivity(self.values, self.terms, pair)
-        conditions = tuple(sorted(pair.conditions.items()))
-        if conditions not in self.link_responses:
-            self.link_responses[conditions] = _link_responses(sensitivity.model, pair.conditions, chosen)
-        ends, index, response, owner = self.link_responses[conditions]
-        u, v = (x.T for x in sensitivity.motion(ends, pair))
-        change = np.zeros((receptance_observation.LINES.size, len(chosen)), dtype=complex)
-        np.add.at(change.T, owner, -(response * (u * v)[:, index]).T)
+        (u, v), index, response, owner = self._responses(sensitivity, pair)
+        row = sensitivity.row_of(pair)
+        change = -(owner @ (response * (u[row] * v[row])[index])).T
         if predictor.lifting is not None:
             for i, (candidate, k) in enumerate(chosen):
                 change[:, i] += predictor.lifting.difference(pair, self.terms, candidate.term(candidate.starts[k]))
@@ -311,29 +322,47 @@ class AddedLinks:
         )
         return {(c.key, k): column for (c, k), column in zip(chosen, columns.T)}
 
+    def _responses(self, sensitivity: ReceptanceSensitivity, pair: FrfPair) -> LinkResponses:
+        """Motion of the ends of all links, end of each, z / (1 + z g) of each, and the candidate of each as a matrix.
+
+        Most candidates do not depend on conditions: those that are alike under them share one response.
+        """
+        if pair.conditions_key not in self._by_conditions:
+            terms = [c.term(c.starts[k]).under_conditions(pair.conditions) for c, k in self.chosen]
+            alike = id(sensitivity), repr(terms)
+            if alike not in self._by_terms:
+                ends, *responses_of_links = _link_responses(sensitivity.model, terms)
+                self._by_terms[alike] = sensitivity.motions(ends), *responses_of_links
+            self._by_conditions[pair.conditions_key] = self._by_terms[alike]
+        return self._by_conditions[pair.conditions_key]
+
 
 def _link_responses(
-    model: ReceptanceModel, conditions: Mapping[str, Any], chosen: Sequence[tuple[Candidate, int]]
-) -> tuple[csr_array, np.ndarray, np.ndarray, np.ndarray]:
-    """(ends (n_end, n), end of each link, z / (1 + z g) of each (n_line, n_link), candidate of each link)."""
+    model: ReceptanceModel, terms: Sequence[PhysicsTerm]
+) -> tuple[csr_array, np.ndarray, np.ndarray, csr_array]:
+    """(ends (n_end, n), end of each link, z / (1 + z g) of each (n_link, n_line), term of each link as a matrix).
+
+    The matrix (n_term, n_link) is 1 where a link belongs to a term, else 0.
+    """
     omega = 2.0 * np.pi * receptance_observation.SHIFTED_LINES
     end_index: dict[tuple, int] = {}
     link_ends, impedance, owner = [], [], []
     track = with_links(model.track, links_of(model.terms, model.track))
-    for i, (c, k) in enumerate(chosen):
-        for ends, z in _impedances(track, c.term(c.starts[k]).under_conditions(conditions), omega):
+    for i, term in enumerate(terms):
+        for ends, z in _impedances(track, term, omega):
             link_ends.append(end_index.setdefault(ends, len(end_index)))
             impedance.append(z)
             owner.append(i)
     weights = lil_array((len(end_index), model.matrices.n))
-    end_receptance = np.empty((omega.size, len(end_index)), dtype=np.complex128)
+    end_receptance = np.empty((len(end_index), omega.size), dtype=np.complex128)
     for ends, k in end_index.items():
         motion = np.asarray(sum(weight * model.displacement(name) for name, weight in ends))
-        end_receptance[:, k] = sum(weight * motion[:, model.matrices.index[name]] for name, weight in ends)
+        end_receptance[k] = sum(weight * motion[:, model.matrices.index[name]] for name, weight in ends)
         for name, weight in ends:
             weights[k, model.matrices.index[name]] += weight
-    index, z = np.array(link_ends, dtype=int), np.array(impedance).reshape(-1, omega.size).T
-    return weights.tocsr(), index, z / (1.0 + z * end_receptance[:, index]), np.array(owner, dtype=int)
+    index, z = np.array(link_ends, dtype=int), np.array(impedance).reshape(-1, omega.size)
+    of_candidate = csr_array((np.ones(index.size), (owner, np.arange(index.size))), shape=(len(terms), index.size))
+    return weights.tocsr(), index, z / (1.0 + z * end_receptance[index]), of_candidate
 
 
 def _impedances(track: Track, term: PhysicsTerm, omega: np.ndarray) -> list[tuple[tuple, np.ndarray]]:
@@ -380,33 +409,37 @@ def predict_near(
     list of (n,) array
         One per observation.
     """
-    predicted, sensitivity_of, differences = [], predictor.pair_sensitivities(values, terms), {}
-    channel_changed = any(a != b and b.effect_type == "channel" for a, b in zip(terms, new))
-    for o, old in zip(observations, predictions):
-        if o.name in predictor.frf_pairs and not channel_changed:
-            pair = predictor.frf_pairs[o.name]
-            sensitivity, new_terms = sensitivity_of(pair), receptance_observation.track_terms(new, pair.conditions)
-            key = id(sensitivity), repr(new_terms)
-            if key not in differences:
-                differences[key] = changed_links(sensitivity.model, new_terms)
-            difference = differences[key]
-            if difference is not None:
-                change = receptance_change(sensitivity, pair, *difference)
-                predicted.append(
-                    old
-                    + receptance_observation.split_complex(
-                        receptance_observation.scale_lines(
-                            pair, change, predictor.channel_response(values, terms, pair)
-                        )
-                    )
-                )
-                continue
+    predicted: dict[int, np.ndarray] = {}
+    if not any(a != b and b.effect_type == "channel" for a, b in zip(terms, new)):
+        predicted = _receptances_near(predictor, values, terms, new, observations, predictions)
+    for k, o in enumerate(observations):
         if o.name in predictor.aligned_passages:
             aligned = predictor.aligned_passages[o.name]
-            predicted.append(predictor.predict_passage(values, new, aligned, with_probes=False))
-        else:
-            predicted += predictor.predict(values, new, [o])
-    return predicted
+            predicted[k] = predictor.predict_passage(values, new, aligned, with_probes=False)
+    others = [k for k in range(len(observations)) if k not in predicted]
+    predicted |= zip(others, predictor.predict(values, new, [observations[k] for k in others]))
+    return [predicted[k] for k in range(len(observations))]
+
+
+def _receptances_near(
+    predictor: Predictor,
+    values: Values,
+    terms: Terms,
+    new: Terms,
+    observations: Sequence[Observation],
+    predictions: Sequence[np.ndarray],
+) -> dict[int, np.ndarray]:
+    """Predictions of ``predict_near`` of those receptances that differ by values of links alone, by number."""
+    near: dict[int, np.ndarray] = {}
+    for numbers, samples in predictor.pair_samples(values, terms, observations, new):
+        conditions = samples.pairs[0].conditions
+        difference = changed_links(samples.sensitivity.model, receptance_observation.track_terms(new, conditions))
+        if difference is None:
+            continue
+        factors = samples.channel_factors(lambda pair: predictor.channel_response(values, terms, pair))
+        change = samples.at(receptance_changes(samples.sensitivity, *difference)) * factors
+        near |= {k: predictions[k] + d for k, d in zip(numbers, samples.observed(change))}
+    return near
 
 
 def changed_links(model: ReceptanceModel, terms: Sequence[PhysicsTerm]) -> tuple[csr_array, np.ndarray] | None:
@@ -446,19 +479,15 @@ def changed_links(model: ReceptanceModel, terms: Sequence[PhysicsTerm]) -> tuple
     return csr_array((weights, rows, first), shape=(len(differs), model.matrices.n)), impedance
 
 
-def receptance_change(
-    sensitivity: ReceptanceSensitivity, pair: FrfPair, ends: csr_array, impedance: np.ndarray
-) -> np.ndarray:
-    r"""Complex change of a pair's receptance [m/N] by links whose impedance changes by z.
+def receptance_changes(sensitivity: ReceptanceSensitivity, ends: csr_array, impedance: np.ndarray) -> np.ndarray:
+    r"""Changes of the receptances of all pairs [m/N] by links whose impedance changes by z.
 
-    It is :math:`-\sum z\,u_w v_w` with u and v the motion of their ends under unit forces at impact and sensor.
+    Each is :math:`-\sum z\,u_w v_w` with u and v the motion of their ends under unit forces at impact and sensor.
 
     Parameters
     ----------
     sensitivity : ReceptanceSensitivity
         Receptances and their derivatives.
-    pair : FrfPair
-        Response channel of a hammer test.
     ends : (n_link, n) sparse array
         Weights of the degrees of freedom at the ends of each link.
     impedance : (n_link, n_line) array of complex
@@ -466,8 +495,8 @@ def receptance_change(
 
     Returns
     -------
-    (n_line,) array of complex
+    (n_pair, n_line) array of complex
         [m/N]
     """
-    u, v = sensitivity.motion(ends, pair)
-    return -np.sum(impedance * u * v, axis=0)
+    u, v = sensitivity.motions(ends)
+    return -np.einsum("pwl,pwl,wl->pl", u, v, impedance)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 
 import numpy as np
 
+from turnout.mismatch.engine.case import Observation
 from turnout.mismatch.turnout import receptance_observation
 from turnout.mismatch.turnout.lifting_chairs import LiftingChairs
 from turnout.mismatch.turnout.passage_model import Track1D
@@ -14,6 +15,7 @@ from turnout.mismatch.turnout.predictions import Terms, Values
 from turnout.mismatch.turnout.priors import SIMULATION
 from turnout.mismatch.turnout.receptance_model import ReceptanceModel
 from turnout.mismatch.turnout.receptance_observation import FrfPair
+from turnout.mismatch.turnout.receptance_samples import PairSamples
 from turnout.mismatch.turnout.receptance_sensitivity import ReceptanceSensitivity
 from turnout.mismatch.turnout.site import Site
 from turnout.mismatch.turnout.site_model import SiteModel, drop_oldest
@@ -45,14 +47,55 @@ class ReceptancePredictor(SiteModel):
         Callable[[FrfPair], ReceptanceSensitivity]
             Function that gives ``pair_sensitivity`` of a pair at these values, sought once per conditions.
         """
-        sensitivities: dict[Hashable, ReceptanceSensitivity] = {}
+        by_conditions: dict[Hashable, ReceptanceSensitivity] = {}
+        by_terms: dict[str, ReceptanceSensitivity] = {}
 
         def sensitivity_of(pair: FrfPair) -> ReceptanceSensitivity:
-            if pair.conditions_key not in sensitivities:
-                sensitivities[pair.conditions_key] = self.pair_sensitivity(values, terms, pair)
-            return sensitivities[pair.conditions_key]
+            if pair.conditions_key not in by_conditions:
+                acting = repr(receptance_observation.track_terms(terms, pair.conditions))
+                if acting not in by_terms:
+                    by_terms[acting] = self.pair_sensitivity(values, terms, pair)
+                by_conditions[pair.conditions_key] = by_terms[acting]
+            return by_conditions[pair.conditions_key]
 
         return sensitivity_of
+
+    def pair_samples(
+        self, values: Values, terms: Terms, observations: Sequence[Observation], new: Terms = ()
+    ) -> list[tuple[list[int], PairSamples]]:
+        """Receptances among the observations, those on the same track together.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the parameters by their name.
+        terms : Terms
+            Physics terms of the effects.
+        observations : sequence of Observation
+            Others than receptances are left out.
+        new : Terms
+            Terms that must act alike on what is taken together as well.
+
+        Returns
+        -------
+        list of (list of int, PairSamples)
+            Numbers of the observations, and their samples.
+        """
+        sensitivity_of, acting = self.pair_sensitivities(values, terms), dict[Hashable, str]()
+        groups: dict[Hashable, list[tuple[int, FrfPair]]] = {}
+        for k, o in enumerate(observations):
+            pair = self.frf_pairs.get(o.name)
+            if pair is None:
+                continue
+            if pair.conditions_key not in acting:
+                acting[pair.conditions_key] = repr(receptance_observation.track_terms(new, pair.conditions))
+            key = id(sensitivity_of(pair)), acting[pair.conditions_key]
+            groups.setdefault(key, []).append((k, pair))
+        samples = []
+        for group in groups.values():
+            numbers, pairs = zip(*group)
+            samples.append((list(numbers), PairSamples(pairs, sensitivity_of(pairs[0]))))
+        return samples
 
     def pair_sensitivity(self, values: Values, terms: Terms, pair: FrfPair) -> ReceptanceSensitivity:
         """``ReceptanceSensitivity`` of all pairs that have the same track as ``pair``, cached.
@@ -153,10 +196,8 @@ class ReceptancePredictor(SiteModel):
         deviation = [values[k] - at for k, at in rail_on_grid(values, self.rail).items()]
         return sensitivity.receptance(pair) + sensitivity.rail_gradient(pair) @ deviation
 
-    def predict_receptance(
-        self, values: Values, terms: Terms, pair: FrfPair, sensitivity: ReceptanceSensitivity
-    ) -> np.ndarray:
-        """(2n,) Re and Im of the receptance of a pair over its measured magnitude.
+    def predict_receptances(self, values: Values, terms: Terms, samples: PairSamples) -> list[np.ndarray]:
+        """Re and Im of the receptance of each pair over its measured magnitude.
 
         Parameters
         ----------
@@ -164,20 +205,16 @@ class ReceptancePredictor(SiteModel):
             Values of the parameters by their name.
         terms : Terms
             Physics terms of the effects.
-        pair : FrfPair
-            Pair of impact position and sensor.
-        sensitivity : ReceptanceSensitivity
-            Receptances of all pairs with their derivatives.
+        samples : PairSamples
+            The pairs.
 
         Returns
         -------
-        (2n,) array
-            Re and Im of the receptance of a pair over its measured magnitude.
+        list of (2n,) array of float
         """
-        receptance = self.receptance(values, pair, sensitivity)
+        sensitivity = samples.sensitivity
+        deviation = [values[k] - at for k, at in rail_on_grid(values, self.rail).items()]
+        h = samples.at(sensitivity.receptances + sensitivity.rail_gradients @ deviation)
         if self.lifting is not None:
-            receptance = receptance + self.lifting.change(pair, terms)
-        channel_response = self.channel_response(values, terms, pair)
-        return receptance_observation.split_complex(
-            receptance_observation.scale_lines(pair, receptance, channel_response)
-        )
+            h = h + np.concatenate([self.lifting.change(pair, terms)[pair.lines] for pair in samples.pairs])
+        return samples.observed(h * samples.channel_factors(lambda pair: self.channel_response(values, terms, pair)))

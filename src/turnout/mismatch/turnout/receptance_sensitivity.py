@@ -13,6 +13,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from turnout.kernel_cache import kernel
+from turnout.mismatch.turnout.priors import RECEPTANCE
 from turnout.mismatch.turnout.receptance_observation import LINES, SHIFTED_LINES
 from turnout.mismatch.turnout.track_parameters import COMMON_PARAMETERS, SUPPORT_PARAMETERS, casting_elements
 from turnout.simulate.rail import element_mass
@@ -99,8 +100,58 @@ class ReceptanceSensitivity:
         self.model, self.seats, self.zone = model, seats, zone
         self.row = {pair: k for k, pair in enumerate(dict.fromkeys(pairs))}
 
-    def _row_of(self, pair: FrfPair) -> int:
+    def row_of(self, pair: FrfPair) -> int:
+        """Row of a pair in the arrays of all pairs.
+
+        Parameters
+        ----------
+        pair : FrfPair
+            Pair of impact position and sensor.
+
+        Returns
+        -------
+        int
+        """
         return self.row[pair.test.place, pair.seat]
+
+    @cached_property
+    def receptances(self) -> np.ndarray:
+        """(n_pair, n_line) complex [m/N]."""
+        return self._receptances_beside(0.0)
+
+    @cached_property
+    def seat_gradients(self) -> np.ndarray:
+        """(n_pair, n_line) derivatives by the position of the sensor on the rail [1/N]; 0 on a sleeper."""
+        step = RECEPTANCE.seat_step
+        return (self._receptances_beside(step) - self._receptances_beside(-step)) / (2.0 * step)
+
+    @cached_property
+    def rail_gradients(self) -> np.ndarray:
+        """(n_pair, n_line, n) derivatives by the logarithms of the uncertain rail values (``rail_sds``)."""
+        return np.concatenate([self._by_rail, self._by_castings], axis=-1)
+
+    @property
+    def gradients(self) -> np.ndarray:
+        """(n_pair, n_line, n) derivatives by the logarithms of common and support values."""
+        return self._by_supports
+
+    def _receptances_beside(self, offset: float) -> np.ndarray:
+        """(n_pair, n_line) receptances with each sensor on the rail moved by ``offset`` [m]."""
+        h, (positions, (impacts, _)) = np.empty((len(self.row), LINES.size), dtype=complex), self._positions
+        places = list(positions)
+        for seat, position in self.seats.items():
+            measured = position if isinstance(position, tuple) else position + offset
+            rows = self._rows_of_seat[seat]
+            h[rows] = self.model.receptances(self._displacements, places, measured)[impacts[rows]]
+        return h
+
+    @cached_property
+    def _rows_of_seat(self) -> dict[tuple, list[int]]:
+        """Rows of the pairs of each seat."""
+        rows: dict[tuple, list[int]] = {seat: [] for seat in self.seats}
+        for (_, seat), k in self.row.items():
+            rows[seat].append(k)
+        return rows
 
     def receptance(self, pair: FrfPair) -> np.ndarray:
         """(n_line,) complex [m/N].
@@ -115,22 +166,7 @@ class ReceptanceSensitivity:
         (n_line,) array
             Complex [m/N].
         """
-        return self.model.receptance(pair.test.place, self.seats[pair.seat])
-
-    def seat_gradient(self, pair: FrfPair) -> np.ndarray:
-        """Derivative by the position of the sensor on the rail, (n_line,) [1/N]; 0 on a sleeper.
-
-        Parameters
-        ----------
-        pair : FrfPair
-            Pair of impact position and sensor.
-
-        Returns
-        -------
-        array
-            Derivative by the position of the sensor on the rail, (n_line,) [1/N]; 0 on a sleeper.
-        """
-        return self.model.seat_gradient(pair.test.place, self.seats[pair.seat])
+        return self.receptances[self.row_of(pair)]
 
     def rail_gradient(self, pair: FrfPair) -> np.ndarray:
         """Derivatives by the logarithms of the uncertain rail values (``rail_sds``), (n_line, n).
@@ -145,7 +181,7 @@ class ReceptanceSensitivity:
         array
             Derivatives by the logarithms of the uncertain rail values (``rail_sds``), (n_line, n).
         """
-        return np.concatenate([self._by_rail[self._row_of(pair)], self._by_castings[self._row_of(pair)]], axis=-1)
+        return self.rail_gradients[self.row_of(pair)]
 
     def gradient(self, pair: FrfPair) -> np.ndarray:
         """Derivatives by the logarithms of common and support values, (n_line, n) in order of ``track_value_names``.
@@ -160,24 +196,29 @@ class ReceptanceSensitivity:
         array
             Derivatives by the logarithms of common and support values, (n_line, n) in order of ``track_value_names``.
         """
-        return self._by_supports[self._row_of(pair)]
+        return self._by_supports[self.row_of(pair)]
 
-    def motion(self, ends: csr_array, pair: FrfPair) -> tuple[np.ndarray, np.ndarray]:
-        """((n_link, n_line), the same) motion of ``ends`` (n_link, n) under unit forces at impact and sensor.
+    def motions(self, ends: csr_array) -> tuple[np.ndarray, np.ndarray]:
+        """Motion of the ends of links under unit forces at impact and sensor of each pair.
 
         Parameters
         ----------
-        ends : sparse array
-            (n_link, n) ends of links in degrees of freedom.
-        pair : FrfPair
-            Pair of impact position and sensor.
+        ends : (n_link, n) sparse array
+            Weights of the degrees of freedom at the ends of each link.
 
         Returns
         -------
-        tuple[array, array]
-            ((n_link, n_line), the same) motion of ``ends`` (n_link, n) under unit forces at impact and sensor.
+        (n_pair, n_link, n_line) array of complex, the same
+            [m/N]
         """
-        return tuple(ends @ self._displacements[position].T for position in self._positions[1][:, self._row_of(pair)])
+        by_position = self._motion_of_positions(ends).transpose(1, 0, 2)
+        first, second = self._positions[1]
+        return by_position[first], by_position[second]
+
+    def _motion_of_positions(self, ends: csr_array) -> np.ndarray:
+        """(n_link, n_place, n_line) motion of the ends of links under unit forces at all positions [m/N]."""
+        used = np.unique(ends.indices)  # few: a product with all columns would copy all displacements
+        return np.moveaxis(self._displacements[..., used] @ ends[:, used].toarray().T, -1, 0)
 
     @cached_property
     def _positions(self) -> tuple[dict[float | tuple, int], np.ndarray]:
@@ -284,7 +325,7 @@ class ReceptanceSensitivity:
         first = np.cumsum([0, *(r.size for r in rows)])
         ends = csr_array((np.concatenate(weights), np.concatenate(rows), first), (len(rows), self.model.matrices.n))
         impedance = np.array(changes) @ np.array([FACTOR["stiffness"], FACTOR["damping"], FACTOR["mass"]])
-        end_motion = (ends @ self._displacements.reshape(-1, ends.shape[1]).T).reshape(len(fields), -1, LINES.size)
+        end_motion = self._motion_of_positions(ends)
         first, second = self._positions[1]
         products = end_motion[:, first] * end_motion[:, second] * impedance[:, None]
         common_columns = [(e, _COMMON_OF[field]) for e, field in enumerate(fields)]

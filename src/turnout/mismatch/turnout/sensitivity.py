@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.turnout import passage_band, receptance_observation
+from turnout.mismatch.turnout import passage_band
 from turnout.mismatch.turnout.priors import PASSAGE, RECEPTANCE, SIMULATION, TOP_SHAPE, TRACK
 from turnout.mismatch.turnout.pseudo_forces import support_columns, support_motion
 from turnout.mismatch.turnout.rail_roughness import wave_columns
@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from turnout.mismatch.turnout.passage_observation import AlignedPassage
     from turnout.mismatch.turnout.prediction import Predictor
     from turnout.mismatch.turnout.predictions import Terms, Values
-    from turnout.mismatch.turnout.receptance_observation import FrfPair
-    from turnout.mismatch.turnout.receptance_sensitivity import ReceptanceSensitivity
+    from turnout.mismatch.turnout.receptance_samples import PairSamples
 
 
 def nuisance_jacobian(
@@ -59,13 +58,14 @@ def nuisance_jacobian(
         One per observation.
     """
     index = {n.name: k for k, n in enumerate(nuisances)}
-    jacobians = [np.zeros((o.data.size, len(nuisances))) for o in observations]
-    sensitivity_of = predictor.pair_sensitivities(values, terms)
-    passages = [(o, p, j) for o, p, j in zip(observations, base, jacobians) if o.name in predictor.aligned_passages]
-    for o, predicted, jacobian in zip(observations, base, jacobians):
-        if o.name in predictor.frf_pairs:
-            pair = predictor.frf_pairs[o.name]
-            fill_pair_columns(predictor, values, terms, pair, sensitivity_of(pair), predicted, jacobian, index)
+    jacobians: dict[int, np.ndarray] = {}
+    for numbers, samples in predictor.pair_samples(values, terms, observations):
+        jacobians |= zip(numbers, pair_jacobians(predictor, values, terms, samples, [base[k] for k in numbers], index))
+    passages = []
+    for k, o in enumerate(observations):
+        if k not in jacobians:
+            jacobians[k] = np.zeros((o.data.size, len(nuisances)))
+            passages.append((o, base[k], jacobians[k]))
     if passages:
         _fill_common_columns(predictor, values, terms, passages, index)
     for o, predicted, jacobian in passages:
@@ -74,20 +74,18 @@ def nuisance_jacobian(
             jacobian[:, index[name]] = column
         first = index[predictor.waves.names[0]]
         jacobian[:, first : first + len(predictor.waves.names)] = wave_columns(predictor, values, terms, aligned)
-    return jacobians
+    return [jacobians[k] for k in range(len(observations))]
 
 
-def fill_pair_columns(
+def pair_jacobians(
     predictor: Predictor,
     values: Values,
     terms: Terms,
-    pair: FrfPair,
-    sensitivity: ReceptanceSensitivity,
-    predicted: np.ndarray,
-    jacobian: np.ndarray,
-    index: dict[str, int],
-) -> None:
-    """Fill the columns of a pair; the values of the track come first among the nuisances.
+    samples: PairSamples,
+    predictions: Sequence[np.ndarray],
+    index: Mapping[str, int],
+) -> list[np.ndarray]:
+    """Derivatives of receptances; the values of the track come first among the nuisances.
 
     Parameters
     ----------
@@ -97,33 +95,34 @@ def fill_pair_columns(
         All nuisances of the site, by name.
     terms : sequence of PhysicsTerm
         Effects beside the base model.
-    pair : FrfPair
-        Response channel of a hammer test.
-    sensitivity : ReceptanceSensitivity
-        Receptances and their derivatives.
-    predicted : (2n,) array of float
-        Prediction of the pair.
-    jacobian : (2n, n_nuisance) array of float
-        It is filled.
-    index : dict
+    samples : PairSamples
+        The pairs.
+    predictions : sequence of (2n,) array of float
+        Prediction of each pair.
+    index : mapping
         Nuisance -> column.
+
+    Returns
+    -------
+    list of (2n, n_nuisance) array of float
+        One per pair.
     """
-    channel_response = predictor.channel_response(values, terms, pair)
-    block = receptance_observation.scale_lines(pair, sensitivity.gradient(pair), channel_response)
-    n, width = block.shape
-    jacobian[:n, :width], jacobian[n:, :width] = block.real, block.imag
-    rail = receptance_observation.split_complex(
-        receptance_observation.scale_lines(pair, sensitivity.rail_gradient(pair), channel_response)
-    )
-    for k, name in enumerate(predictor.rail):
-        jacobian[:, index[name]] = rail[:, k]
-    gain, seat = f"gain_{pair.channel}", f"seat_{pair.channel}"
-    if gain in index:
-        jacobian[:, index[gain]] = predicted / (1.0 + values[gain])
-    if seat in index:
-        jacobian[:, index[seat]] = receptance_observation.split_complex(
-            receptance_observation.scale_lines(pair, sensitivity.seat_gradient(pair), channel_response)
-        )
+    factors = samples.channel_factors(lambda pair: predictor.channel_response(values, terms, pair))
+    sensitivity, stacked = samples.sensitivity, np.zeros((2 * factors.size, len(index)))
+    gradients = samples.at(sensitivity.gradients) * factors[:, None]
+    samples.write(gradients, stacked[:, : gradients.shape[1]])
+    rail = np.empty((2 * factors.size, len(predictor.rail)))
+    samples.write(samples.at(sensitivity.rail_gradients) * factors[:, None], rail)
+    stacked[:, [index[name] for name in predictor.rail]] = rail
+    seat_columns = samples.observed(samples.at(sensitivity.seat_gradients) * factors)
+    jacobians = samples.split(stacked)
+    for pair, jacobian, predicted, by_seat in zip(samples.pairs, jacobians, predictions, seat_columns):
+        gain, seat = f"gain_{pair.channel}", f"seat_{pair.channel}"
+        if gain in index:
+            jacobian[:, index[gain]] = predicted / (1.0 + values[gain])
+        if seat in index:
+            jacobian[:, index[seat]] = by_seat
+    return jacobians
 
 
 def _fill_common_columns(

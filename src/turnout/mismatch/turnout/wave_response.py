@@ -226,6 +226,7 @@ class WaveTransfer:
         """(n_sensor * n_time, n_key) response when each wheel follows a path of its own.
 
         ``paths`` (n_key, n_wheel, n_x) [m] are at ``path_grid``: how wheels respond to motion of the rail under them.
+        In single precision, right to 1e-5 of its size: the products of all waves and wheels are most of the work.
 
         Parameters
         ----------
@@ -237,11 +238,11 @@ class WaveTransfer:
         (n_sensor * n_time, n_key) array
             Response when each wheel follows a path of its own.
         """
-        plus, minus, amplitude = self._harmonics(paths)
+        plus, minus, amplitude = (x.astype(np.complex64) for x in self._harmonics(paths))
         total: Any = 0.0
         for w in range(self.wheel_delays.size):
             a = amplitude[:, w].T
-            total = total + (plus @ a + minus @ a.conj()) * self.wheel(w)[:, None, None]
+            total = total + (plus @ a + minus @ a.conj()) * self.wheel(w).astype(np.complex64)[:, None, None]
         return self._on_clock(total)
 
     @property
@@ -310,8 +311,9 @@ class WaveTransfer:
         return self._on_clock(np.add.reduceat(response, first, axis=-1))
 
     def _on_clock(self, spectrum: np.ndarray) -> np.ndarray:
-        full = np.zeros((self.size // 2 + 1, *spectrum.shape[1:]), dtype=complex)
-        full[self.inside] = spectrum * self.clock[:, :, None]
+        """Signals (n_sensor * n_time, n) of spectra (f, n_sensor, n), in their precision."""
+        full = np.zeros((self.size // 2 + 1, *spectrum.shape[1:]), dtype=spectrum.dtype)
+        full[self.inside] = spectrum * self.clock.astype(spectrum.dtype)[:, :, None]
         n = self.aligned.time.size
         return np.fft.irfft(full, self.size, axis=0)[:n].transpose(1, 0, 2).reshape(n * len(self.aligned.sensors), -1)
 

@@ -129,19 +129,17 @@ def wheel_modes(predictor: Predictor, values: Values, aligned: AlignedPassage, s
         WaveTransfer(predictor, values, aligned, beyond=WHEELS.roughness_margin),
     )
     treads = {radius: _wave_sds(waves, radius) for radius in radii}
-    blocks = [profile_modes(predictor, values, aligned, transfer).astype(np.float32)]
+    blocks = [profile_modes(predictor, values, aligned, transfer).astype(np.float32) / scale]
     rail_sds: tuple[Any, ...] = (0.0, waves.sd[::2], waves.sd[::2])
     for envelope, rail in zip(_envelopes(waves, transfer.node), rail_sds):
-        spectra = transfer.spectra(waves.lengths, envelope)
+        plus, minus = (x.astype(np.complex64) for x in transfer.spectra(waves.lengths, envelope))
         for w, radius in enumerate(radii):
-            sd = np.hypot(treads[radius], rail)
-            columns = (transfer.signals_from(spectra, transfer.wheel(w)) * np.repeat(sd, 2)).astype(np.float32)
-            blocks.append(
-                columns[:, np.sum((columns / scale) ** 2, axis=0) > WHEELS.faint_share * WHEELS.min_mode_variance]
-            )
-    modes = np.concatenate(blocks, axis=1)
-    scaled = modes / scale
-    return modes @ principal_directions(scaled.T @ scaled, WHEELS.min_mode_variance)
+            sd = np.repeat(np.hypot(treads[radius], rail), 2).astype(np.float32)
+            columns = transfer.signals_from((plus, minus), transfer.wheel(w).astype(np.complex64)) * sd / scale
+            power = np.einsum("ij,ij->j", columns, columns)
+            blocks.append(columns[:, power > WHEELS.faint_share * WHEELS.min_mode_variance])
+    scaled = np.concatenate(blocks, axis=1)
+    return scale * (scaled @ principal_directions(scaled.T @ scaled, WHEELS.min_mode_variance))
 
 
 def principal_directions(gram: np.ndarray, least: float) -> np.ndarray:
