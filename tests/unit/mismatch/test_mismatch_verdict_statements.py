@@ -142,9 +142,10 @@ def shown(reference, term):
     time = np.arange(reference - 0.08, reference + 1.0, 1.0 / 360.0)
     sensor = SimpleNamespace(name="A", place=20.0)
     made = AlignedPassage("p", SimpleNamespace(), (sensor,), time, reference, 30.0)
-    predictor = SimpleNamespace(solver=SimpleNamespace(rate=1800.0))
+    predictor = Predictor.__new__(Predictor)
+    predictor.solver = SimpleNamespace(rate=1800.0)
     row = np.cos(2.0 * np.pi * 20.0 * np.arange(14400) / 7200.0)
-    return time, Predictor.channel_output(predictor, {"time@p": 0.0, "gain_A": 0.0}, (term,), made, sensor, row), row
+    return time, predictor.channel_output({"time@p": 0.0, "gain_A": 0.0}, (term,), made, sensor, row), row
 
 
 @pytest.mark.parametrize("reference", [0.45, 0.457, 1.237])
