@@ -135,13 +135,13 @@ class _Prescreen:
     def _best_of_track(self, ranked: Sequence[_Start]) -> tuple[Candidate, np.ndarray]:
         """The best of the most promising starts of a family of the whole track."""
         starts = {tuple(s.start): (s.candidate, s.start) for s in ranked}
-        best, *others = list(starts.values())[: -THRESHOLDS.max_trial_starts - 1 : -1]
-        best_gain = self._trial_gain(*best, -np.inf) if others else 0.0
-        for trial in others:
+        leader, *rivals = list(starts.values())[: -THRESHOLDS.max_trial_starts - 1 : -1]
+        best_gain = self._trial_gain(*leader, -np.inf) if rivals else 0.0
+        for trial in rivals:
             gain = self._trial_gain(*trial, best_gain)
             if gain > best_gain:
-                best, best_gain = trial, gain
-        return best
+                leader, best_gain = trial, gain
+        return leader
 
     def _gain_at_site(self, group: str, start: _Start, sought_gain: float) -> float:
         """Gain of a trial fit at a site, computed for the first family of the group that asks."""

@@ -88,7 +88,7 @@ class PassagePredictor(SiteModel):
             Output of the channel of a sensor for the simulated signal ``signal``, at the times of the recording.
         """
         signal = self.through_channel(values, terms, aligned, sensor, signal)
-        return self.recorded(values, aligned, sensor, aligned.limit_band(signal, 4.0 * self.solver.rate))
+        return self.at_recorded_times(values, aligned, sensor, aligned.limit_band(signal, 4.0 * self.solver.rate))
 
     def through_channel(
         self, values: Values, terms: Terms, aligned: AlignedPassage, sensor: Sensor, signal: np.ndarray
@@ -119,7 +119,9 @@ class PassagePredictor(SiteModel):
                 signal = term.under_conditions(conditions).channel(signal, 4.0 * self.solver.rate, sensor)
         return signal
 
-    def recorded(self, values: Values, aligned: AlignedPassage, sensor: Sensor, signal: np.ndarray) -> np.ndarray:
+    def at_recorded_times(
+        self, values: Values, aligned: AlignedPassage, sensor: Sensor, signal: np.ndarray
+    ) -> np.ndarray:
         """A signal within its band, with the gain of its channel, at the times of the recording.
 
         Parameters

@@ -416,8 +416,8 @@ def predict_near(
         if o.name in predictor.aligned_passages:
             aligned = predictor.aligned_passages[o.name]
             predicted[k] = predictor.predict_passage(values, new, aligned, with_probes=False)
-    others = [k for k in range(len(observations)) if k not in predicted]
-    predicted |= zip(others, predictor.predict(values, new, [observations[k] for k in others]))
+    missing = [k for k in range(len(observations)) if k not in predicted]
+    predicted |= zip(missing, predictor.predict(values, new, [observations[k] for k in missing]))
     return [predicted[k] for k in range(len(observations))]
 
 
@@ -438,7 +438,7 @@ def _receptances_near(
             continue
         factors = samples.channel_factors(lambda pair: predictor.channel_response(values, terms, pair))
         change = samples.at(receptance_changes(samples.sensitivity, *difference)) * factors
-        near |= {k: predictions[k] + d for k, d in zip(numbers, samples.observed(change))}
+        near |= {k: predictions[k] + d for k, d in zip(numbers, samples.to_observations(change))}
     return near
 
 

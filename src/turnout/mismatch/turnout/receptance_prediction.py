@@ -217,4 +217,6 @@ class ReceptancePredictor(SiteModel):
         h = samples.at(sensitivity.receptances + sensitivity.rail_gradients @ deviation)
         if self.lifting is not None:
             h = h + np.concatenate([self.lifting.change(pair, terms)[pair.lines] for pair in samples.pairs])
-        return samples.observed(h * samples.channel_factors(lambda pair: self.channel_response(values, terms, pair)))
+        return samples.to_observations(
+            h * samples.channel_factors(lambda pair: self.channel_response(values, terms, pair))
+        )

@@ -106,7 +106,7 @@ class PairSamples:
         """
         return np.split(stacked, 2 * np.cumsum(self.counts)[:-1])
 
-    def observed(self, values: np.ndarray) -> list[np.ndarray]:
+    def to_observations(self, values: np.ndarray) -> list[np.ndarray]:
         """Values as the observation of each pair has them.
 
         Parameters

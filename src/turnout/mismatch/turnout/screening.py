@@ -216,7 +216,7 @@ class _LinearChannels:
         spectrum = np.zeros(self.size // 2 + 1, dtype=complex)
         spectrum[self.inside] = self._spectra[row] * factor(self.frequency)
         signal = np.fft.irfft(spectrum, self.size)[: self.signals.shape[-1]]
-        return self.case.predictor.recorded(values, self.aligned, sensor, signal)
+        return self.case.predictor.at_recorded_times(values, self.aligned, sensor, signal)
 
 
 def _path_changes(case: PredictedCase, fit: Fit, aligned: AlignedPassage, chosen: Starts) -> Changes:

@@ -114,7 +114,7 @@ def pair_jacobians(
     rail = np.empty((2 * factors.size, len(predictor.rail)))
     samples.write(samples.at(sensitivity.rail_gradients) * factors[:, None], rail)
     stacked[:, [index[name] for name in predictor.rail]] = rail
-    seat_columns = samples.observed(samples.at(sensitivity.seat_gradients) * factors)
+    seat_columns = samples.to_observations(samples.at(sensitivity.seat_gradients) * factors)
     jacobians = samples.split(stacked)
     for pair, jacobian, predicted, by_seat in zip(samples.pairs, jacobians, predictions, seat_columns):
         gain, seat = f"gain_{pair.channel}", f"seat_{pair.channel}"
