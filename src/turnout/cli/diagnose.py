@@ -18,7 +18,6 @@ import time
 from typing import TYPE_CHECKING
 
 from turnout.cli.options import (
-    above_zero,
     add_configuration,
     add_pages,
     add_raw,
@@ -27,6 +26,7 @@ from turnout.cli.options import (
     add_track,
     add_turnout,
     add_work,
+    zero_or_more,
 )
 from turnout.counts import count_of
 
@@ -62,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_registry(parser, help="folder of the registry, for --accept (%(default)s)")
     add_pages(parser, "folder of the page (%(default)s)")
     parser.add_argument(
-        "--budget", type=above_zero, metavar="MINUTES", help="stop after so many minutes; a next run continues"
+        "--budget", type=zero_or_more, metavar="MINUTES", help="stop after so many minutes; a next run continues"
     )
     parser.add_argument("--accept", action="store_true", help="write the named effect into the turnout's track file")
     parser.add_argument(

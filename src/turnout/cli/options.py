@@ -68,6 +68,30 @@ def above_zero(text: str) -> float:
     return number
 
 
+def zero_or_more(text: str) -> float:
+    """The finite number of ``text``, 0 or more; argparse.ArgumentTypeError otherwise.
+
+    Parameters
+    ----------
+    text : str
+        Value of an option.
+
+    Returns
+    -------
+    float
+        The number.
+
+    Examples
+    --------
+    >>> zero_or_more("0")
+    0.0
+    """
+    number = finite_number(text)
+    if number < 0.0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not 0 or more")
+    return number
+
+
 def finite_number(text: str) -> float:
     """The finite number of ``text``; argparse.ArgumentTypeError otherwise.
 
