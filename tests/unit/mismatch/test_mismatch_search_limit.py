@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from turnout.mismatch.engine import search
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case, Nuisance, Observation
 from turnout.mismatch.engine.diagnose import diagnose, fit_base
@@ -55,14 +56,13 @@ def test_a_search_within_its_bound_is_not_changed(most):
     assert diagnose(Counted(most)).names == ("bend",)
 
 
-def test_what_the_fit_without_effects_costs_is_not_part_of_the_search():
-    """A bound of just what the search costs, less than both together, does not end it."""
-    base, whole = Counted(None), Counted(None)
+def test_what_the_fit_without_effects_costs_is_not_part_of_the_search(monkeypatch):
+    """Every fit of a search is checked against what the case had cost before it: the fit without effects."""
+    base, n_before = Counted(None), []
     fit_base(Search.of(base))
-    diagnose(whole)
-    assert 0 < base.count < whole.count
-    assert diagnose(Counted(whole.count - base.count)).names == ("bend",)
-    assert diagnose(Counted((whole.count - base.count) // 4)).names == ()
+    monkeypatch.setattr(search, "check_limit", lambda case, n: n_before.append(n))
+    diagnose(Counted(None))
+    assert base.count > 0 and set(n_before) == {base.count}
 
 
 def test_a_search_beyond_its_bound_cannot_tell():
