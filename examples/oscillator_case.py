@@ -6,7 +6,9 @@ import numpy as np
 from numba import njit
 
 from turnout.mismatch.engine.candidate import Candidate
-from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.case import Case
+from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.engine.observation import Observation
 from turnout.physics.term import Parameter
 
 # Laws of displacement y and velocity v, both over their scales: with a parameter of 1 a law is as strong as the linear

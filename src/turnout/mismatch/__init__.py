@@ -6,10 +6,12 @@ Each name is imported when it is first used: who only reads a finding need not l
 TYPE_CHECKING = False  # as in typing
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate, Effect, EffectSite, NamingRules, RefitStarts
-    from turnout.mismatch.engine.case import Case, Nuisance, Observation
+    from turnout.mismatch.engine.case import Case
     from turnout.mismatch.engine.diagnose import Diagnosis, diagnose
     from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.engine.map_fit import fit_jointly
+    from turnout.mismatch.engine.nuisance import Nuisance
+    from turnout.mismatch.engine.observation import Observation
     from turnout.mismatch.engine.verdict import Verdict
 
 __all__ = [

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from turnout.errors import TurnoutError
-from turnout.mismatch.engine.case import Nuisance, Observation
+from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout.prediction import Predictor
 from turnout.mismatch.turnout.predictions import Predictions, Terms, Values
 

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from typing import Any
 
-    from turnout.mismatch.engine.case import Observation
     from turnout.mismatch.engine.diagnose import Diagnosis
     from turnout.mismatch.engine.fit import Fit
+    from turnout.mismatch.engine.observation import Observation
     from turnout.mismatch.turnout.case import TrackCase
     from turnout.mismatch.turnout.receptance_observation import FrfPair
 

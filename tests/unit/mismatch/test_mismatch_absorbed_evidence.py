@@ -5,8 +5,10 @@ from scipy import stats
 
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.candidate_search import gain_with_wide_prior, masked_candidates
-from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.engine.observation import Observation
 from turnout.physics.term import Parameter
 
 TAU, NOISE, WIDE = 0.1, 0.06, 0.7

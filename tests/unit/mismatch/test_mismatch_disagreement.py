@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
-from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.cross_validation import jackknife_errors
 from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.engine.observation import Observation
 
 X = np.arange(1.0, 31.0)
 

@@ -7,8 +7,10 @@ import pytest
 
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.candidate_search import shortlist
-from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.turnout.candidates.catalogue import distant_starts, residual_of_train
 from turnout.physics import Parameter, UnsprungMass

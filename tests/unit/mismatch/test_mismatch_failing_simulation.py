@@ -8,8 +8,10 @@ import pytest
 from turnout.errors import SimulationError
 from turnout.mismatch import diagnose
 from turnout.mismatch.engine.candidate import Candidate
-from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout import CampaignInput, TrackCase
 from turnout.mismatch.turnout.campaign import PassageInput
 from turnout.mismatch.turnout.candidates.out_of_roundness import short_polygon_candidates, wheel_excess

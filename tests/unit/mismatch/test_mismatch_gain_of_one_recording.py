@@ -8,10 +8,11 @@ import pytest
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.candidate import Candidate, EffectSite
-from turnout.mismatch.engine.case import Case, Observation
+from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.cross_validation import effect_energy, gain_where_unmasked, single_witness
 from turnout.mismatch.engine.decision import judge
 from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.search import Search
 from turnout.physics import Parameter

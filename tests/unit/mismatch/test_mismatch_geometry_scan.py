@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from turnout import physics
-from turnout.mismatch.engine.case import Case, Observation
+from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout.candidates.out_of_roundness import AMPLITUDES, _passage_evidence
 from turnout.mismatch.turnout.candidates.rail_defects import RailScan
 from turnout.mismatch.turnout.candidates.wheel_flats import (

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from turnout import physics
-from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.joint_problem import JointProblem
 from turnout.mismatch.engine.levenberg_marquardt import DampedSteps
 from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan

@@ -9,11 +9,13 @@ import pytest
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine import map_fit, refit
 from turnout.mismatch.engine.candidate import EffectSite, RefitStarts
-from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.hammer_prescreen import _Prescreen, _Start
 from turnout.mismatch.engine.joint_problem import JointProblem
 from turnout.mismatch.engine.levenberg_marquardt import DampedSteps
 from turnout.mismatch.engine.map_fit import cost_after, fit_jointly
+from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.thresholds import THRESHOLDS

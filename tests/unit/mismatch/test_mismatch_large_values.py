@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.large_values import evidence_of_large_values, fit_large_values, with_wide_priors
 from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.search import Search
 
 N, PRIOR, NOISE, WIDE = 7, 0.1, 0.1, 5.0

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import f
 
 from turnout.config.settings.mismatch import MismatchSettings
-from turnout.mismatch.engine.case import Case, Observation
+from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.decision import calibrate, judge
 from turnout.mismatch.engine.localization import (
     AMPLITUDES,
@@ -18,6 +18,7 @@ from turnout.mismatch.engine.localization import (
     weigh_spaces,
 )
 from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.reserved_data import is_significantly_worse
 from turnout.mismatch.engine.residual_space import ResidualSpace
 from turnout.mismatch.turnout import disturbances

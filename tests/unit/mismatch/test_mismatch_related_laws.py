@@ -8,9 +8,9 @@ import pytest
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.candidate_search import Entry, component_rivals, with_fitted_start
-from turnout.mismatch.engine.case import Nuisance
 from turnout.mismatch.engine.decision import judge
 from turnout.mismatch.engine.evidence import is_within_spread
+from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.physics import Parameter

@@ -5,8 +5,10 @@ import pytest
 
 from turnout.mismatch.engine import search
 from turnout.mismatch.engine.candidate import Candidate
-from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.diagnose import diagnose, fit_base
+from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.search_limit import SearchLimit, SearchLimitError, check_limit
 from turnout.physics.term import Parameter

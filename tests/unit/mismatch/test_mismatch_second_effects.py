@@ -8,10 +8,12 @@ import pytest
 from turnout.mismatch import diagnose
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.candidate_search import is_same_site
-from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.cross_validation import signature_overlap, single_type_estimate
 from turnout.mismatch.engine.evidence import score_of
 from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan

@@ -5,9 +5,10 @@ import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine.candidate import Candidate
-from turnout.mismatch.engine.case import Case, Observation
+from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.evidence import score_of
 from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.refit import correct_for_leader
 from turnout.mismatch.engine.search import Search
 from turnout.physics import Parameter

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
-from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.decision import confirm
 from turnout.mismatch.engine.diagnose import diagnose
+from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.reserved_data import Verification, lost_evidence, reserved_excess_ratio
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.verdict import Verdict

@@ -9,10 +9,12 @@ import pytest
 from turnout import physics
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine.candidate import Candidate
-from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.evidence import assess, explained_share, score_of, worst_excess
 from turnout.mismatch.engine.findings import Findings
 from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.reserved_data import Verification, fit_percent, predict_with_decoy
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.search import Search

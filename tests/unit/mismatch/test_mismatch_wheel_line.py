@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from turnout.constants import GRAVITY
-from turnout.mismatch.engine.case import Observation
+from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout.passage_observation import with_chatter
 from turnout.mismatch.turnout.sensitivity import _difference
 from turnout.mismatch.turnout.track_under_wheels import TrackUnderWheels

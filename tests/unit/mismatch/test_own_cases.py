@@ -8,10 +8,11 @@ from examples.oscillator_case import OscillatorCase
 
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.candidate_search import is_same_site
-from turnout.mismatch.engine.case import Case, Observation
+from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.decision import PAIR_RULES
 from turnout.mismatch.engine.localization import _location_of_candidate
 from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.rule import first_applicable
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.two_effects import PairEvidence

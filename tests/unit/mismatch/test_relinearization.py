@@ -9,8 +9,10 @@ from scipy import optimize, stats
 
 from turnout.mismatch.calibrated import GroupInformation, StateParameter, VisitInformation
 from turnout.mismatch.calibrated.belief import Belief
-from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout.relinearization import NormalPrior, fit_all_recordings, fit_given_belief
 from turnout.stages import agreeing_visits as agreeing
 from turnout.stages.agreeing_visits import AgreeingInformation, FittedGroup, agreeing_visits

@@ -11,8 +11,8 @@ import small_turnout as small
 
 from turnout import physics
 from turnout.errors import SimulationError, TurnoutError
-from turnout.mismatch.engine.case import Nuisance
 from turnout.mismatch.engine.fit import Fit
+from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.accepted_effects import effects_on
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan

@@ -7,9 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from turnout.mismatch.engine.case import Case, Nuisance, Observation
+from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.fit import Fit
 from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.engine.observation import Observation
 from turnout.stages.budget import Budget, BudgetSpentError, Watch
 from turnout.stages.checkpoint import Checkpoint, Replay, read_value, write_value
 

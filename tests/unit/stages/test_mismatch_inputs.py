@@ -12,7 +12,7 @@ import small_turnout as small
 from turnout.config import load_configuration, with_raw
 from turnout.errors import SimulationError
 from turnout.hammer_test import find_impacts
-from turnout.mismatch.engine.case import Nuisance
+from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.turnout import HammerInput, PassageInput, TrackCase
 from turnout.mismatch.turnout.passage_observation import (
     AlignedPassage,

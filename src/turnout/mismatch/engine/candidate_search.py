@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.engine.case import Whitened
 from turnout.mismatch.engine.joint_problem import JointProblem
+from turnout.mismatch.engine.observation import Whitened
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:

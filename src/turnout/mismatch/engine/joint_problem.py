@@ -13,7 +13,8 @@ from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
-    from turnout.mismatch.engine.case import Case, Observation
+    from turnout.mismatch.engine.case import Case
+    from turnout.mismatch.engine.observation import Observation
     from turnout.physics import Parameter
 
 

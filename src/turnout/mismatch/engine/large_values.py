@@ -21,8 +21,9 @@ from turnout.mismatch.engine.joint_problem import cost_at
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
-    from turnout.mismatch.engine.case import Case, Nuisance
+    from turnout.mismatch.engine.case import Case
     from turnout.mismatch.engine.fit import Fit
+    from turnout.mismatch.engine.nuisance import Nuisance
     from turnout.mismatch.engine.search import Search
 
 

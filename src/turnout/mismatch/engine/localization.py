@@ -22,8 +22,9 @@ from turnout.mismatch.engine.candidate_search import Projector
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
-    from turnout.mismatch.engine.case import Case, Observation
+    from turnout.mismatch.engine.case import Case
     from turnout.mismatch.engine.fit import Fit
+    from turnout.mismatch.engine.observation import Observation
     from turnout.mismatch.engine.residual_space import ResidualSpace
     from turnout.mismatch.engine.score import Score
 

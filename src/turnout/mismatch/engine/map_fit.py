@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from turnout.mismatch.engine.candidate import Candidate
-    from turnout.mismatch.engine.case import Case, Observation
+    from turnout.mismatch.engine.case import Case
+    from turnout.mismatch.engine.observation import Observation
 
 
 def fit_jointly(

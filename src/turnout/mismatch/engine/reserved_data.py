@@ -15,8 +15,9 @@ from turnout.mismatch.engine.levenberg_marquardt import FitPoint
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
-    from turnout.mismatch.engine.case import Case, Observation
+    from turnout.mismatch.engine.case import Case
     from turnout.mismatch.engine.fit import Fit
+    from turnout.mismatch.engine.observation import Observation
     from turnout.mismatch.engine.score import Score
     from turnout.mismatch.engine.search import Search
 
@@ -40,7 +41,7 @@ def fit_percent(observations: Sequence[Observation], predictions: Sequence[np.nd
 
     Examples
     --------
-    >>> from turnout.mismatch.engine.case import Observation
+    >>> from turnout.mismatch.engine.observation import Observation
     >>> y = np.array([1.0, -1.0, 1.0, -1.0])
     >>> fit_percent([Observation("a", "a", y, 1.0)], [0.9 * y])
     90.0

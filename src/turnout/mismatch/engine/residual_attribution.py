@@ -19,7 +19,7 @@ from turnout.mismatch.engine.thresholds import THRESHOLDS
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from turnout.mismatch.engine.case import Observation
+    from turnout.mismatch.engine.observation import Observation
 
 
 @dataclass(frozen=True)

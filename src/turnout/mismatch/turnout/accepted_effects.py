@@ -13,8 +13,8 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.candidate import Candidate
-from turnout.mismatch.engine.case import Nuisance
 from turnout.mismatch.engine.fit import Fit
+from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.turnout.priors import ACCEPTED
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.track import Track

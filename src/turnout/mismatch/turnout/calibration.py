@@ -21,8 +21,9 @@ from turnout.mismatch.turnout.rail_roughness import Waves
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from turnout.mismatch.engine.case import Nuisance, Observation
     from turnout.mismatch.engine.fit import Fit
+    from turnout.mismatch.engine.nuisance import Nuisance
+    from turnout.mismatch.engine.observation import Observation
     from turnout.mismatch.turnout.case import TrackCase
 
 

@@ -11,8 +11,8 @@ import numpy as np
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.candidate import Candidate
-from turnout.mismatch.engine.case import Observation
 from turnout.mismatch.engine.fit import Fit
+from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.residual_space import ResidualSpace
 from turnout.mismatch.turnout import sensitivity
 from turnout.mismatch.turnout.accepted_effects import NO_EFFECTS, AcceptedEffect, AcceptedEffects, effects_on

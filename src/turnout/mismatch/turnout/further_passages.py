@@ -15,8 +15,9 @@ from turnout.errors import SimulationError
 from turnout.mismatch.turnout.priors import PASSAGE
 
 if TYPE_CHECKING:
-    from turnout.mismatch.engine.case import Case, Observation
+    from turnout.mismatch.engine.case import Case
     from turnout.mismatch.engine.fit import Fit
+    from turnout.mismatch.engine.observation import Observation
     from turnout.mismatch.turnout.campaign import CampaignInput
     from turnout.mismatch.turnout.case import TrackCase
 

@@ -33,7 +33,7 @@ from turnout.simulate.preparation import prepare
 from turnout.simulate.run import Probe, run
 
 if TYPE_CHECKING:
-    from turnout.mismatch.engine.case import Observation
+    from turnout.mismatch.engine.observation import Observation
     from turnout.mismatch.turnout.receptance_observation import FrfPair
     from turnout.physics.term import PhysicsTerm
     from turnout.records import Impact

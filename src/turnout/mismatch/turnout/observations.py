@@ -10,7 +10,7 @@ import numpy as np
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
-from turnout.mismatch.engine.case import Observation
+from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout import passage_observation, receptance_observation
 from turnout.mismatch.turnout.campaign import CampaignInput, HammerInput, PassageInput
 from turnout.mismatch.turnout.disturbances import Disturbance, disturbances

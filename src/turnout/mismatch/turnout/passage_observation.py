@@ -10,7 +10,8 @@ import numpy as np
 
 from turnout.constants import KMH
 from turnout.errors import SimulationError
-from turnout.mismatch.engine.case import Nuisance, Observation
+from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout.campaign import PassageInput
 from turnout.mismatch.turnout.passage_band import band_end, band_signals, limit_band, read_at, sample_rate_of, upsample
 from turnout.mismatch.turnout.priors import PASSAGE, SIMULATION, TRACK

@@ -7,7 +7,8 @@ from copy import copy
 
 import numpy as np
 
-from turnout.mismatch.engine.case import Nuisance, Observation
+from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout import receptance_model, sensitivity
 from turnout.mismatch.turnout.lifting_chairs import LiftingChairs
 from turnout.mismatch.turnout.passage_model import Track1D

@@ -7,7 +7,8 @@ from typing import Protocol, TypeAlias
 
 import numpy as np
 
-from turnout.mismatch.engine.case import Nuisance, Observation
+from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.engine.observation import Observation
 from turnout.physics.term import PhysicsTerm
 
 Values: TypeAlias = Mapping[str, float]  # nuisance parameters by name

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.mismatch.engine.case import Nuisance
+from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.turnout.priors import PASSAGE, ROUGHNESS
 from turnout.mismatch.turnout.wave_response import WaveTransfer
 from turnout.simulate.roughness import level

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from typing import TypeAlias
 
     from turnout.mismatch.engine.candidate import Candidate
-    from turnout.mismatch.engine.case import Observation
+    from turnout.mismatch.engine.observation import Observation
     from turnout.mismatch.turnout.prediction import Predictor
     from turnout.mismatch.turnout.predictions import Terms, Values
     from turnout.mismatch.turnout.receptance_observation import FrfPair

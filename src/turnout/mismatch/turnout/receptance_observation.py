@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from turnout.hammer_test import find_impacts
-from turnout.mismatch.engine.case import Observation
+from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout.campaign import HammerInput
 from turnout.mismatch.turnout.priors import RECEPTANCE
 from turnout.simulate.sensor import Sensor

@@ -7,7 +7,7 @@ from collections.abc import Callable, Hashable, Sequence
 
 import numpy as np
 
-from turnout.mismatch.engine.case import Observation
+from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout import receptance_observation
 from turnout.mismatch.turnout.lifting_chairs import LiftingChairs
 from turnout.mismatch.turnout.passage_model import Track1D

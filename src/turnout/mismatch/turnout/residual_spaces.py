@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from typing import Any
 
-    from turnout.mismatch.engine.case import Observation
     from turnout.mismatch.engine.fit import Fit
+    from turnout.mismatch.engine.observation import Observation
     from turnout.mismatch.turnout.case import TrackCase
     from turnout.mismatch.turnout.passage_observation import AlignedPassage
     from turnout.mismatch.turnout.receptance_observation import FrfPair

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.mismatch.engine.case import Nuisance
 from turnout.mismatch.engine.cross_validation import jackknife_errors
+from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.turnout.priors import SURFACE, TRACK, WHEELS
 from turnout.mismatch.turnout.top_shape import top_shapes, with_shapes
 

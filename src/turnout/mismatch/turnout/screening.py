@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from turnout.mismatch.engine.case import Whitened
+from turnout.mismatch.engine.observation import Whitened
 from turnout.mismatch.turnout import passage_band, receptance_observation
 from turnout.mismatch.turnout.priors import PASSAGE
 from turnout.mismatch.turnout.pseudo_forces import PAD, RAIL, SLEEPER, force_responses, support_motion
@@ -25,8 +25,8 @@ from turnout.simulate.links import links_of
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
-    from turnout.mismatch.engine.case import Observation
     from turnout.mismatch.engine.fit import Fit
+    from turnout.mismatch.engine.observation import Observation
     from turnout.mismatch.turnout.passage_observation import AlignedPassage
     from turnout.mismatch.turnout.predicted_case import PredictedCase
     from turnout.simulate.links import Link

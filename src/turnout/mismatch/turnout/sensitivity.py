@@ -17,7 +17,8 @@ from turnout.mismatch.turnout.wheel_line import has_blade
 if TYPE_CHECKING:
     from collections.abc import Hashable, Iterator, Mapping, Sequence
 
-    from turnout.mismatch.engine.case import Nuisance, Observation
+    from turnout.mismatch.engine.nuisance import Nuisance
+    from turnout.mismatch.engine.observation import Observation
     from turnout.mismatch.turnout.passage_observation import AlignedPassage
     from turnout.mismatch.turnout.prediction import Predictor
     from turnout.mismatch.turnout.predictions import Terms, Values

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from turnout.mismatch.engine.case import Nuisance
+from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.turnout.campaign import CampaignInput, PassageInput
 from turnout.mismatch.turnout.passage_observation import passage_nuisances
 from turnout.mismatch.turnout.priors import TRACK

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.mismatch.engine.case import Nuisance
+from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.turnout.priors import TRACK
 from turnout.simulate.track import NODE_TOLERANCE, PER_SUPPORT, RailStretch
 

@@ -35,8 +35,8 @@ from turnout.physics.out_of_round import MIN_AMPLITUDE
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
-    from turnout.mismatch.engine.case import Observation
     from turnout.mismatch.engine.fit import Fit
+    from turnout.mismatch.engine.observation import Observation
     from turnout.mismatch.turnout.case import TrackCase
     from turnout.mismatch.turnout.passage_observation import AlignedPassage
 
