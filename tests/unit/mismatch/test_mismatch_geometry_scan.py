@@ -16,7 +16,7 @@ from turnout.mismatch.turnout.candidates.wheel_flats import (
     best_flat_on_wheel,
     log_likelihood_ratio,
 )
-from turnout.mismatch.turnout.priors import FLATS
+from turnout.mismatch.turnout.defect_priors import FLATS
 from turnout.mismatch.turnout.rail_roughness import Waves
 from turnout.simulate.vehicle import lone_wheels
 

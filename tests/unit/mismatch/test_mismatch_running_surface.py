@@ -12,9 +12,9 @@ from turnout.config.parameters import read_parameters
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.turnout import TrackCase, passage_alignment
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
-from turnout.mismatch.turnout.priors import SURFACE
 from turnout.mismatch.turnout.rail_roughness import Waves
 from turnout.mismatch.turnout.running_surface import RunningSurface
+from turnout.mismatch.turnout.surface_priors import SURFACE
 from turnout.simulate.track_file import turnout_track
 from turnout.simulate.wheel_path import Dip, Kink, Sections
 from turnout.stages.accepted_effects import AcceptedEffect

@@ -14,8 +14,8 @@ from turnout.mismatch.turnout.candidates.short_corrugation import (
     corrugation_evidence,
     short_corrugation_candidates,
 )
+from turnout.mismatch.turnout.defect_priors import CORRUGATION
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
-from turnout.mismatch.turnout.priors import CORRUGATION
 from turnout.simulate.wheel_path import Corrugation
 
 

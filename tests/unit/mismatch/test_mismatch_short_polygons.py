@@ -12,8 +12,8 @@ from turnout.mismatch.turnout.candidates.out_of_roundness import (
     polygon_evidence,
     short_polygon_candidates,
 )
+from turnout.mismatch.turnout.defect_priors import SHORT_POLYGONS
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
-from turnout.mismatch.turnout.priors import SHORT_POLYGONS
 
 
 def found_in(*terms, seed=7, changed=lambda campaign: campaign):

@@ -11,9 +11,9 @@ from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout.planned_case import small_plan
-from turnout.mismatch.turnout.priors import TOP_SHAPE
 from turnout.mismatch.turnout.rail_roughness import Waves
 from turnout.mismatch.turnout.running_surface import RunningSurface
+from turnout.mismatch.turnout.surface_priors import TOP_SHAPE
 from turnout.mismatch.turnout.top_shape import principal_modes, top_covariance, top_shapes
 from turnout.mismatch.turnout.wheel_line import top
 from turnout.mismatch.turnout.wheel_roughness import _components

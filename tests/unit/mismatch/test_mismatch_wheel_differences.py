@@ -8,7 +8,7 @@ import pytest
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
-from turnout.mismatch.turnout.priors import WHEELS
+from turnout.mismatch.turnout.surface_priors import WHEELS
 from turnout.mismatch.turnout.wave_response import WaveTransfer
 from turnout.mismatch.turnout.wheel_flights import Deviation
 from turnout.mismatch.turnout.wheel_roughness import (

@@ -15,8 +15,8 @@ from turnout.mismatch.calibrated.file_comparison import model_error
 from turnout.mismatch.calibrated.history import BEFORE_ALL, Event
 from turnout.mismatch.calibrated.information import GroupInformation, marginalize
 from turnout.mismatch.calibrated.model_answer import position_of
-from turnout.mismatch.turnout.priors import ROUGHNESS
 from turnout.mismatch.turnout.rail_roughness import Waves
+from turnout.mismatch.turnout.surface_priors import ROUGHNESS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -1,13 +1,14 @@
-"""Numeric constants of the case of a turnout in one place, each with its unit, its reason and its source.
+"""Numeric constants of the case of a turnout, each with its unit, its reason and its source.
 
 Standard deviations of priors, limits of observations and searches, steps of computations. Settings that users change
 are in ``turnout.config.settings.mismatch``. A source is a page below ``docs``, a publication, or one word: "convention"
 (a usual value), "numerical" (accuracy or time of a computation).
+Those of running surface and wheels are in ``surface_priors``, those of the search for defects in ``defect_priors``;
+``prior_table`` lists all.
 """
 
 import math
-from dataclasses import dataclass, fields
-from typing import Any
+from dataclasses import dataclass
 
 from turnout.mismatch.engine.thresholds import threshold as prior
 
@@ -15,7 +16,6 @@ LOCAL_RAIL = "decisions/local-rail-properties.md"
 CROSSING_PANELS = "decisions/crossing-panels.md"
 COMMON_PARAMETERS = "decisions/common-parameter-derivatives.md"
 ERROR_MODES = "decisions/marginalized-errors.md"
-RAIL_ROUGHNESS = "decisions/rail-roughness-parameters.md"
 WHEEL_ROUGHNESS = "decisions/wheel-roughness-errors.md"
 RUNNING_SURFACE = "decisions/running-surface-priors.md"
 WEIGHTING = "decisions/exponential-weighting.md"
@@ -24,10 +24,6 @@ JOINT_RECEPTANCE = "decisions/joint-receptance-evidence.md"
 RADAU_SCHEME = "decisions/radau-scheme.md"
 SATURATED = "decisions/saturation-from-impacts.md"
 LOCATED = "decisions/residual-localization.md"
-DEFECTS = "decisions/rail-and-wheel-defects.md"
-SHORT_WAVES = "decisions/short-wave-corrugation.md"
-EFFECT_SIZES = "decisions/blind-effect-sizes.md"
-FITS = "decisions/joint-fit-convergence.md"
 PRESCREEN = "decisions/hammer-prescreen.md"
 GUIDE = "mismatch.md"
 SWITCH_PANELS = "decisions/switch-panels.md"
@@ -269,83 +265,6 @@ class AlignmentPriors:
 
 
 @dataclass(frozen=True)
-class SurfacePriors:
-    """Uncertain numbers of blade, nose and joints."""
-
-    shape_sd: float = prior(
-        0.25, "ln", "power of a kink with an estimated depth: 1.2 to 3.3, from a V to a cusp", RUNNING_SURFACE)
-    max_step_sd: float = prior(3.0, "prior sd", "by which a position may move in one fit step", FITS)
-    max_relative_step: float = prior(
-        0.3, "share of the length", "by which a component may move in one fit step: the derivative is local",
-        RUNNING_SURFACE)
-    min_depth: float = prior(1e-6, "m", "shallower components are ignored", "numerical")
-    model_error: float = prior(
-        0.1, "ln", "the same at every axle: with long trains depth was 15 % and length 19 % too small", RUNNING_SURFACE)
-    model_position_error: float = prior(
-        0.02, "m", "the same at every axle: with long trains a position was 4 cm off", RUNNING_SURFACE)
-    max_error_ratio: float = prior(0.5, "prior sd", "largest error of a number that is reported", RUNNING_SURFACE)
-    min_deviation_ratio: float = prior(
-        2.0, "prior sd and errors", "from which a number is reported whatever its error", RUNNING_SURFACE)
-    min_data_share: float = prior(
-        0.5, "share of the information", "on a number that is attributed to the recordings, at least", RUNNING_SURFACE)
-    grid_step: float = prior(0.02, "m", "at which components are looked at near the sensors", "numerical")
-
-
-@dataclass(frozen=True)
-class TopShapePriors:
-    """Error of the shape of the tops of stock rail and blade where wheels change."""
-
-    correlation_length: float = prior(
-        0.4, "m", "of the error along the rail: shorter ones are roughness, longer ones the numbers of the top",
-        "decisions/switch-panels.md")
-    reach: float = prior(1.0, "m", "from the change, beyond which wheels press one rail alone", "convention")
-    step: float = prior(0.02, "m", "between samples of the error", "numerical")
-    kept_variance: float = prior(0.9, "share of the variance", "in the modes that are kept", "numerical")
-    difference_step: float = prior(0.3, "sd", "of the difference quotient by the amplitude of a mode", "numerical")
-
-
-@dataclass(frozen=True)
-class WheelPriors:
-    """Roughness and profile of single wheels: error modes of a passage."""
-
-    depth_sd: float = prior(0.2, "-", "relative depth of a component from wheel to wheel", CROSSING_PANELS)
-    length_sd: float = prior(0.15, "-", "relative length of a component from wheel to wheel", CROSSING_PANELS)
-    position_sd: float = prior(0.03, "m", "position of a component from wheel to wheel", CROSSING_PANELS)
-    sharpness_sd: float = prior(
-        0.5, "-", "shape of a component, as a share of the difference between powers 1.5 and 2", CROSSING_PANELS)
-    slope_length: float = prior(0.02, "m", "over which the slope of a top is taken", "numerical")
-    deviation_step: float = prior(0.3, "sd", "of the difference quotient by a deviation of all wheels", "numerical")
-    sharing_time: float = prior(
-        0.03, "s", "to either side, over which the power of a wheel's response is averaged: half a bogie at 40 m/s",
-        "numerical")
-    max_nose_length: float = prior(1.0, "m", "to either side of the deepest point", CROSSING_PANELS)
-    min_depth: float = prior(1e-6, "m", "shallower components are ignored", "numerical")
-    out_of_round_sd: float = prior(1.5e-5, "m", "first three harmonics of wheels in service", "Johansson 2006")
-    level: float = prior(-2.0, "dB", "over the limit curve of rails: disc-braked wheels", "convention")
-    min_mode_variance: float = prior(
-        0.02, "share of the variance", "of a sample below which a mode is left out", "numerical")
-    factor_tolerance: float = prior(
-        0.025, "share of that", "that the factor of the modes may leave in no wave", "numerical")
-    faint_share: float = prior(
-        0.1, "share of that", "single waves below it are left out before they are combined", "numerical")
-    roughness_margin: float = prior(
-        6.0, "m", "beyond the free waves; lightly damped track carries a wheel's noise that far", ERROR_MODES)
-
-
-@dataclass(frozen=True)
-class RoughnessPriors:
-    """Free waves of the rail's roughness."""
-
-    rolling_reach: float = prior(
-        3.0, "m", "before the first and behind the last sensor, from where a wheel still excites them", RAIL_ROUGHNESS)
-    longest_wave: float = prior(3.0, "m", "of the free waves", RAIL_ROUGHNESS)
-    period_ratio: float = prior(
-        1.1, "-", "period of the waves over the length of rail, so that both ends are independent", "numerical")
-    fade_length: float = prior(0.8, "m", "over which waves fade at both ends", "numerical")
-    path_step: float = prior(0.02, "m", "between samples of the path", "numerical")
-
-
-@dataclass(frozen=True)
 class SaturationPriors:
     """Saturated channels, from peaks of impacts and of passages."""
 
@@ -390,125 +309,6 @@ class DisturbancePriors:
     max_chance: float = prior(1e-4, "probability", "that it is chance, over all segments", LOCATED)
 
 
-@dataclass(frozen=True)
-class FlatPriors:
-    """Wheel flats, from their impacts in the sound level and their signal in the band."""
-
-    low_frequency: float = prior(250.0, "Hz", "lower end of the level: roughness hides impacts below 100 Hz", DEFECTS)
-    high_frequency: float = prior(900.0, "Hz", "upper end of the level", DEFECTS)
-    max_frequency_share: float = prior(0.35, "share of the rate", "above, the anti-alias filter may act", "convention")
-    bin_time: float = prior(0.002, "s", "of a bin of the level", DEFECTS)
-    impact_time: float = prior(0.006, "s", "half width of an impact", DEFECTS)
-    background_time: float = prior(0.12, "s", "half width of the background of an impact", DEFECTS)
-    radius_changes: tuple[float, ...] = prior(
-        (-0.05, 0.031, 0.01), "-", "start, end and step, relative to the file: a wheel is turned down in service",
-        DEFECTS)
-    phase_step: float = prior(0.06, "m", "between trial phases", DEFECTS)
-    comparison_step: float = prior(0.02, "m", "between positions where wheels are compared", "numerical")
-    min_common: float = prior(2.0, "deviations", "least median over the wheels that is no noise", "convention")
-    strengths: tuple[float, ...] = prior(
-        (2.0, 4.0, 7.0, 12.0, 20.0), "deviations", "trial levels of an impact beside the sensor", DEFECTS)
-    decays: tuple[float, ...] = prior(
-        (0.3, 0.8, 1.6, 3.0), "deviations per m", "trial decays of the level along the rail", DEFECTS)
-    outlier_share: float = prior(0.05, "share of the data", "that has any other cause", DEFECTS)
-    outlier_density: float = prior(1.0 / 20.0, "1 / deviation", "uniform over 20 deviations", DEFECTS)
-    impact_scatter: float = prior(0.25, "share of the level", "impacts on a sleeper and between two differ", DEFECTS)
-    max_sensor_distance: float = prior(5.0, "m", "farther impacts are masked by nearer wheels", DEFECTS)
-    sensor_weight: float = prior(0.5, "-", "sensors measure the same impact: their data count half", DEFECTS)
-    max_wheels: int = prior(2, "wheels", "that are proposed at most", DEFECTS)
-    max_evidence_gap: float = prior(3.0, "nats", "by which the second may lie behind the first", DEFECTS)
-    min_evidence: float = prior(
-        3.0, "nats", "of the impacts, less the logarithm of the number of wheels, at least", DEFECTS)
-    phase_offsets: tuple[float, ...] = prior(
-        (-0.24, 0.25, 0.06), "m", "start, end and step of trial phases about that of the impacts", DEFECTS)
-    phase_resolution: float = prior(0.15, "m", "of the phases: closer ones are one trial", DEFECTS)
-    fine_phase_offsets: tuple[float, ...] = prior(
-        (-0.03, 0.0, 0.03), "m", "trial phases about the best of them", DEFECTS)
-    medium_length: float = prior(0.05, "m", "of the flat whose phase is searched first", EFFECT_SIZES)
-    lengths: tuple[float, ...] = prior(
-        (0.025, 0.035, 0.045, 0.055, 0.07, 0.09), "m", "trial lengths of a flat", EFFECT_SIZES)
-
-
-@dataclass(frozen=True)
-class PolygonPriors:
-    """Polygonal wheels with waves in the band of the fit."""
-
-    longest_wave: float = prior(1.0, "m", "limit of the waves searched", DEFECTS)
-    n_wavelengths: int = prior(100, "trials", "over 10 m neighbours differ by a third of a period", "numerical")
-    fine_factors: tuple[float, float, int] = prior(
-        (0.985, 1.015, 13), "-", "lowest, highest and number of factors of the wavelength, for its refinement",
-        "numerical")
-    amplitudes: tuple[float, float, int] = prior(
-        (1e-5, 4e-4, 5), "m", "lowest, highest and number of prior sds of cosine and sine", EFFECT_SIZES)
-    angles_per_passage: float = prior(12.0, "angles", "that can be distinguished in a passage", DEFECTS)
-
-
-@dataclass(frozen=True)
-class ShortPolygonPriors:
-    """Polygonal wheels with shorter waves, from the sound level."""
-
-    wheel_reach: float = prior(1.2, "m", "from wheel to sensor; axles of a bogie are at least 1.8 m apart", SHORT_WAVES)
-    bin_width: float = prior(0.04, "ln", "of a bin of the wavelength", SHORT_WAVES)
-    near_offset: float = prior(0.2, "ln", "nearest bins of the background", SHORT_WAVES)
-    far_offset: float = prior(0.6, "ln", "farthest bins of the background", SHORT_WAVES)
-    resolution: float = prior(0.16, "ln", "of 2.4 m of rail at 0.2 m", SHORT_WAVES)
-    wheel_sd: float = prior(0.5, "ln", "level between round wheels; twice that in another simulator", SHORT_WAVES)
-    sensor_sd: float = prior(0.8, "ln", "level of one spectrum", SHORT_WAVES)
-    polygon_sd: float = prior(2.5, "ln", "level of a polygonal wheel over its neighbours", SHORT_WAVES)
-    min_wheels: int = prior(3, "wheels", "of a train, at least, for a median", "convention")
-
-
-@dataclass(frozen=True)
-class GeometryPriors:
-    """Dips and corrugation, from the free waves of the rail."""
-
-    position_step: float = prior(0.1, "m", "between trial positions of a dip", DEFECTS)
-    sensor_margin: float = prior(1.0, "m", "beyond the sensors that is searched", DEFECTS)
-    lengths: tuple[float, ...] = prior((0.25, 0.4, 0.6, 0.9), "m", "trial lengths of a dip", EFFECT_SIZES)
-    sharpnesses: tuple[float, ...] = prior((0.2, 0.9), "-", "trial shapes of a dip", DEFECTS)
-    resolution: float = prior(0.3, "m", "closer dips cannot be distinguished", DEFECTS)
-    unit_depth: float = prior(1e-3, "m", "of a trial dip", "numerical")
-    unit_waves: tuple[tuple[float, float], ...] = prior(
-        ((1e-5, 0.0), (0.0, 1e-5)), "m", "sine and cosine of trial corrugation", "numerical")
-    wavelength_ratio: float = prior(1.02, "-", "shortest trial wavelength over the shortest free wave", "numerical")
-    longest_wave: float = prior(0.75, "m", "longest wave of trial corrugation", DEFECTS)
-    n_wavelengths: int = prior(34, "trials", "of the wavelength of corrugation", "numerical")
-    half_lengths: tuple[float, ...] = prior((1.8, 3.2, 5.0), "m", "half the length of a corrugated stretch", DEFECTS)
-    amplitude_sd: float = prior(3e-5, "m", "prior of the amplitude: corrugation that is ground away", EFFECT_SIZES)
-    n_independent_waves: float = prior(12.0, "wavelengths", "that can be distinguished by sensors 6 m apart", DEFECTS)
-    worn_nose_sharpness: float = prior(
-        0.5, "-", "at which the fit of a worn nose starts: between a cosine and a kink", "convention"
-    )
-    worn_nose_length_sd: float = prior(
-        0.3, "share of the length", "of the length of the wear about that of the nose as fitted", "convention"
-    )
-
-
-@dataclass(frozen=True)
-class CorrugationPriors:
-    """Corrugation with shorter waves, from the sound level."""
-
-    min_wavelength: float = prior(0.05, "m", "limit of the waves searched", SHORT_WAVES)
-    bin_width: float = prior(
-        0.05, "ln", "of a bin of the wavelength: the resolution of 5 m of rail at 0.2 m", SHORT_WAVES)
-    line_bins: int = prior(2, "bins", "to either side over which a line spreads", SHORT_WAVES)
-    background_gap: int = prior(2, "bins", "nearest of the background", SHORT_WAVES)
-    background_reach: int = prior(6, "bins", "farthest of the background", SHORT_WAVES)
-    max_frequency_share: float = prior(0.35, "share of the rate", "above, the anti-alias filter may act", "convention")
-    sensor_sd: float = prior(
-        0.8, "ln", "level of one sensor on intact rail: 0.62 and 1.0 in two simulators", SHORT_WAVES)
-    corrugation_sd: float = prior(2.0, "ln", "prior of the level of corrugation", SHORT_WAVES)
-    min_trains: int = prior(2, "trains", "at least, to distinguish the rail from wheels", SHORT_WAVES)
-    min_speed_ratio: float = prior(
-        1.25, "-", "fastest over slowest passage, to distinguish a wavelength from a frequency", SHORT_WAVES)
-    independent_distance: float = prior(2.0, "m", "closer sensors measure the same rail", SHORT_WAVES)
-    half_lengths: tuple[float, ...] = prior((1.0, 1.8, 3.2, 5.0), "m", "half the length of the stretch", SHORT_WAVES)
-    amplitudes: tuple[float, float, int] = prior(
-        (2e-6, 3e-4, 60), "m", "lowest, highest and number of amplitudes that are tested", SHORT_WAVES)
-    response_error: float = prior(0.15, "-", "relative error of the response at one frequency", SHORT_WAVES)
-    node_stride: int = prior(2, "nodes", "every second one is used", "numerical")
-
-
 # fmt: on
 TRACK = TrackPriors()
 ACCEPTED = AcceptedPriors()
@@ -517,49 +317,5 @@ RECEPTANCE = ReceptancePriors()
 PASSAGE = PassagePriors()
 SIMULATION = SimulationPriors()
 ALIGNMENT = AlignmentPriors()
-SURFACE = SurfacePriors()
-TOP_SHAPE = TopShapePriors()
-WHEELS = WheelPriors()
-ROUGHNESS = RoughnessPriors()
 SATURATION = SaturationPriors()
 DISTURBANCE = DisturbancePriors()
-FLATS = FlatPriors()
-POLYGONS = PolygonPriors()
-SHORT_POLYGONS = ShortPolygonPriors()
-GEOMETRY = GeometryPriors()
-CORRUGATION = CorrugationPriors()
-
-GROUPS = (
-    TRACK,
-    ACCEPTED,
-    CASE,
-    RECEPTANCE,
-    PASSAGE,
-    SIMULATION,
-    ALIGNMENT,
-    SURFACE,
-    TOP_SHAPE,
-    WHEELS,
-    ROUGHNESS,
-    SATURATION,
-    DISTURBANCE,
-    FLATS,
-    POLYGONS,
-    SHORT_POLYGONS,
-    GEOMETRY,
-    CORRUGATION,
-)
-
-
-def prior_rows() -> list[tuple[str, str, Any, str, str, str]]:
-    """Group, name, value, unit, reason and source of every constant, in the order of the code.
-
-    Returns
-    -------
-    list of tuple
-    """
-    return [
-        (type(group).__name__, f.name, f.default, f.metadata["unit"], f.metadata["reason"], f.metadata["source"])
-        for group in GROUPS
-        for f in fields(group)
-    ]

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.mismatch.engine.nuisance import Nuisance
-from turnout.mismatch.turnout.priors import PASSAGE, ROUGHNESS
+from turnout.mismatch.turnout.priors import PASSAGE
+from turnout.mismatch.turnout.surface_priors import ROUGHNESS
 from turnout.mismatch.turnout.wave_response import WaveTransfer
 from turnout.simulate.roughness import level
 from turnout.simulate.wheel_path import Sampled

@@ -12,7 +12,8 @@ import numpy as np
 
 from turnout.mismatch.engine.cross_validation import jackknife_errors
 from turnout.mismatch.engine.nuisance import Nuisance
-from turnout.mismatch.turnout.priors import SURFACE, TRACK, WHEELS
+from turnout.mismatch.turnout.priors import TRACK
+from turnout.mismatch.turnout.surface_priors import SURFACE, WHEELS
 from turnout.mismatch.turnout.top_shape import top_shapes, with_shapes
 
 if TYPE_CHECKING:

@@ -8,10 +8,11 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.turnout import passage_band
-from turnout.mismatch.turnout.priors import PASSAGE, RECEPTANCE, SIMULATION, TOP_SHAPE, TRACK
+from turnout.mismatch.turnout.priors import PASSAGE, RECEPTANCE, SIMULATION, TRACK
 from turnout.mismatch.turnout.pseudo_forces import support_columns, support_motion
 from turnout.mismatch.turnout.rail_roughness import wave_columns
 from turnout.mismatch.turnout.site_model import drop_oldest
+from turnout.mismatch.turnout.surface_priors import TOP_SHAPE
 from turnout.mismatch.turnout.wheel_line import has_blade
 
 if TYPE_CHECKING:

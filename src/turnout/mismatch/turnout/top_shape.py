@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.mismatch.engine.nuisance import Nuisance
-from turnout.mismatch.turnout.priors import TOP_SHAPE
+from turnout.mismatch.turnout.surface_priors import TOP_SHAPE
 from turnout.simulate.blade import is_on_blade, transfer_position
 from turnout.simulate.wheel_path import uniform_spline
 

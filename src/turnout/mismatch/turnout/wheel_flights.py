@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.turnout.priors import WHEELS
+from turnout.mismatch.turnout.surface_priors import WHEELS
 from turnout.mismatch.turnout.wheel_tops import power_shares, share_difference
 
 if TYPE_CHECKING:

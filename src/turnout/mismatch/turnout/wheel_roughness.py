@@ -18,8 +18,8 @@ from scipy.linalg import eigh
 from scipy.linalg.lapack import spstrf
 
 from turnout.mismatch.engine.candidate_search import masked_candidates
-from turnout.mismatch.turnout.priors import WHEELS
 from turnout.mismatch.turnout.rail_roughness import amplitude_sd
+from turnout.mismatch.turnout.surface_priors import WHEELS
 from turnout.mismatch.turnout.wave_response import WaveTransfer
 from turnout.mismatch.turnout.wheel_flights import flight_modes
 from turnout.mismatch.turnout.wheel_tops import top_modes

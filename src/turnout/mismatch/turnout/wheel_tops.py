@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.turnout.priors import WHEELS
+from turnout.mismatch.turnout.surface_priors import WHEELS
 from turnout.physics.term import PhysicsTerm
 
 if TYPE_CHECKING:

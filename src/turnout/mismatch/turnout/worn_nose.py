@@ -13,7 +13,7 @@ import numpy as np
 
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.turnout.candidates.catalogue import candidate_of, parameters_with
-from turnout.mismatch.turnout.priors import GEOMETRY
+from turnout.mismatch.turnout.defect_priors import GEOMETRY
 from turnout.physics.hypothesis import Hypothesis, Masking
 from turnout.physics.surface_dip import SurfaceDip
 from turnout.simulate.wheel_path import Kink

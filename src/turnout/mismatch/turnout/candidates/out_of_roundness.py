@@ -28,7 +28,8 @@ import numpy as np
 from turnout import physics
 from turnout.mismatch.turnout.candidates.catalogue import candidate_of
 from turnout.mismatch.turnout.candidates.short_corrugation import response_energy
-from turnout.mismatch.turnout.priors import CORRUGATION, PASSAGE, POLYGONS, SHORT_POLYGONS
+from turnout.mismatch.turnout.defect_priors import CORRUGATION, POLYGONS, SHORT_POLYGONS
+from turnout.mismatch.turnout.priors import PASSAGE
 from turnout.mismatch.turnout.wave_response import WaveTransfer
 from turnout.physics.hypothesis import Hypothesis
 from turnout.physics.out_of_round import MIN_AMPLITUDE

@@ -24,7 +24,8 @@ from turnout.mismatch.turnout.candidates.catalogue import candidate_of, paramete
 from turnout.mismatch.turnout.candidates.out_of_roundness import polygon_candidates, short_polygon_candidates
 from turnout.mismatch.turnout.candidates.short_corrugation import short_corrugation_candidates
 from turnout.mismatch.turnout.candidates.wheel_flats import flat_candidates
-from turnout.mismatch.turnout.priors import GEOMETRY, PASSAGE
+from turnout.mismatch.turnout.defect_priors import GEOMETRY
+from turnout.mismatch.turnout.priors import PASSAGE
 from turnout.physics.hypothesis import Hypothesis
 
 if TYPE_CHECKING:

@@ -22,8 +22,9 @@ from scipy.signal.windows import tukey
 
 from turnout import physics
 from turnout.mismatch.turnout.candidates.catalogue import candidate_of
+from turnout.mismatch.turnout.defect_priors import CORRUGATION
 from turnout.mismatch.turnout.matrix_cache import matrices_of
-from turnout.mismatch.turnout.priors import CORRUGATION, PASSAGE, SIMULATION
+from turnout.mismatch.turnout.priors import PASSAGE, SIMULATION
 from turnout.mismatch.turnout.track_parameters import track_with
 from turnout.mismatch.turnout.track_under_wheels import rail_receptances
 from turnout.mismatch.turnout.wave_response import wheel_and_contact_receptance

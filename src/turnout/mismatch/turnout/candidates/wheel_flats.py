@@ -28,8 +28,8 @@ from turnout import physics
 from turnout.constants import MAD_TO_SD
 from turnout.errors import SimulationError
 from turnout.mismatch.turnout.candidates.catalogue import candidate_of
+from turnout.mismatch.turnout.defect_priors import FLATS
 from turnout.mismatch.turnout.passage_band import limit_band
-from turnout.mismatch.turnout.priors import FLATS
 from turnout.physics.hypothesis import Hypothesis
 
 if TYPE_CHECKING:
