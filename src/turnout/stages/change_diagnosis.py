@@ -1,7 +1,8 @@
 """Stage change: what an open alarm rests on, from all hammer tests of its sections and the newest trains.
 
 The hammer tests of all visits say what has changed, where and since when: each visit is fitted once and kept on disk.
-Trains after the change then tell a gap from soft ballast, and held-out trains show what the effect is worth.
+Trains of the first and the newest visits then tell a gap from soft ballast, and held-out trains show what the effect is
+worth.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import numpy as np
 from turnout.errors import SimulationError
 from turnout.mismatch.calibrated import (
     ModelAnswer,
+    StateParameter,
     VisitInformation,
     change_answer,
     change_candidates,
@@ -26,6 +28,7 @@ from turnout.mismatch.calibrated import (
 from turnout.mismatch.calibrated.answers_of_change import DAMPER_SHARES
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.model_answer import position_of
+from turnout.mismatch.calibrated.soft_ballast_or_gap import NAMES as SOFT_BALLAST_OR_GAP
 from turnout.mismatch.engine.diagnose import diagnose, fit_base
 from turnout.mismatch.engine.reserved_data import gain_error, reserved_fit
 from turnout.mismatch.engine.search import Search
@@ -60,6 +63,8 @@ if TYPE_CHECKING:
     from turnout.stages.accepted_effects import AcceptedEffect
 
 FOLDER = Path("work/impact-models")
+TRAINS_FOLDER = Path("work/train-models")  # of the first and the newest visits, with their trains
+VISITS_AT_ENDS = 2  # of the history, of which trains are fitted: the first and the newest ones
 MIN_FIT_ERROR = 0.1  # points of fit: standard errors below it are not believed
 SUSPICION = 0.5  # share of the evidence of a name from which trains are asked for the rest
 SUPPORTS = ("ballast", "pad")  # groups of parameters of one support, which trains can test
@@ -146,7 +151,10 @@ def _diagnose(
     except SimulationError as error:
         raise SimulationError(f"no track file ({error})") from None
     members = members_of(unit, scan(turnout, Path(raw_root)).units)
-    stored, notes = _fitted_visits(members, turnout, raw_root, track, accepted, code, labels)
+    about = turnout, raw_root, track, accepted, code
+    own = [u for u in members if u.kind == "passage" or u.section in labels]
+    tests = since_renewal(turnout, visits(u for u in own if u.kind == "hammer"))
+    stored, notes = _fitted_visits(FOLDER / unit.label, labels, tests, *about)
     if not stored:
         raise SimulationError("; ".join(notes) or NO_HAMMER_TESTS.format(since=renewal_note(turnout)))
     threshold = turnout.settings["mismatch"].threshold
@@ -154,11 +162,17 @@ def _diagnose(
     answer, informed = change_of(stored, turnout, changes=changes)
     if answer.verdict == "none":  # trains may have the evidence that impacts lack
         answer, _ = change_of(stored, turnout, SUSPICION * threshold, changes)
+    with_trains: Sequence[calibrated.StoredVisit] = ()
+    if set(answer.names) == set(SOFT_BALLAST_OR_GAP):
+        ends = _first_and_newest_with_trains(since_renewal(turnout, visits(own)))
+        with_trains, more_notes = _fitted_visits(TRAINS_FOLDER / unit.label, labels, ends, *about, passage_tables)
+        notes += more_notes
+        answer, _ = change_of(stored, turnout, SUSPICION * threshold, changes, with_trains)
     test = None
     if answer.verdict in ("named", "a_or_b") and answer.group in SUPPORTS:
         test = _test_on_trains(answer, members, turnout, raw_root, track, accepted, passage_tables, labels)
     n_recordings = sum(v.n_recordings for v in informed)
-    row = finding_of_change(answer, test, len(informed), n_recordings, threshold)
+    row = finding_of_change(answer, test, len(informed), n_recordings, threshold, len(with_trains))
     if changes:
         row["sentence"] += f"; accepted before: {', '.join(c.words for c in changes)}"
     if unproven := reservation(track):
@@ -167,32 +181,43 @@ def _diagnose(
 
 
 def _fitted_visits(
-    members: Sequence[Unit],
+    folder: Path,
+    sections: Collection[str],
+    by_visit: Mapping[str, Sequence[Unit]],
     turnout: TurnoutConfig,
     raw_root: str | Path,
     track: TurnoutTrack,
     accepted: Iterable[AcceptedEffect],
     code: str,
-    labels: Sequence[str],
+    passage_tables: Mapping[str, dict] | None = None,
 ) -> tuple[list[calibrated.StoredVisit], list[str]]:
-    """Information of the hammer tests of each visit, fitted once; and why a visit could not be fitted."""
-    folder = FOLDER / "+".join(labels)
-    tests = since_renewal(turnout, visits(u for u in members if u.kind == "hammer" and u.section in labels))
-    units = {v: unit_of(turnout.id, v, of, turnout.hashes["mismatch"]) for v, of in tests.items()}
+    """Information of the recordings of each visit at these sections, fitted once; and why one could not be fitted."""
+    units = {v: unit_of(turnout.id, v, of, turnout.hashes["mismatch"]) for v, of in by_visit.items()}
     versions = {v: calibrated.version_of(u, turnout, raw_root, None, code) for v, u in units.items()}
     complete = {s.visit for s in calibrated.read_visits(folder, turnout.id, versions)}
     notes = []
-    for label, of in tests.items():
+    for label, of in by_visit.items():
         if label in complete:
             continue
         about = {"turnout": turnout, "visit": label, "version": versions[label]}
-        inputs = gather_inputs(of, turnout, raw_root, track, {})
+        inputs = gather_inputs(of, turnout, raw_root, track, passage_tables or {})
         for group in groups(turnout, track, inputs):
+            if not set(group.labels) <= set(sections):  # trains are recorded all along the turnout
+                continue
+            passages = [p for p in inputs.passages if p.route == group.route]
+            campaign = with_held_out(group.campaign, passages) if passages else group.campaign
             try:
-                calibrated.store_visit(folder, group, _case_of(group, group.campaign, turnout, accepted), "", about)
+                calibrated.store_visit(folder, group, _case_of(group, campaign, turnout, accepted), "", about)
             except (SimulationError, np.linalg.LinAlgError) as error:
                 notes.append(f"visit {label}: {error}")
     return calibrated.read_visits(folder, turnout.id, versions), notes
+
+
+def _first_and_newest_with_trains(by_visit: Mapping[str, Sequence[Unit]]) -> dict[str, Sequence[Unit]]:
+    """Visits whose trains tell most of a change, ``VISITS_AT_ENDS`` at each end. One alone tells nothing of it: {}."""
+    with_both = [v for v in sorted(by_visit) if {u.kind for u in by_visit[v]} >= {"hammer", "passage"}]
+    ends = dict.fromkeys([*with_both[:VISITS_AT_ENDS], *with_both[-VISITS_AT_ENDS:]])
+    return {v: by_visit[v] for v in ends} if len(ends) > 1 else {}
 
 
 def _case_of(
@@ -211,6 +236,7 @@ def change_of(
     turnout: TurnoutConfig,
     threshold: float | None = None,
     changes: Sequence[AcceptedChange] = (),
+    with_trains: Sequence[calibrated.StoredVisit] = (),
 ) -> tuple[ModelAnswer, list[VisitInformation]]:
     """What has changed up to the newest of the visits.
 
@@ -224,6 +250,8 @@ def change_of(
         Evidence that a name needs, None: that of the settings. [nats]
     changes : sequence of AcceptedChange
         Those that are part of the model.
+    with_trains : sequence of StoredVisit
+        Some of the visits, with their trains: these tell soft ballast from a gap.
 
     Returns
     -------
@@ -238,7 +266,19 @@ def change_of(
     events = calibrated.events_of(turnout, parameters, changes, informed)
     candidates = further_candidates(changes, parameters, candidates)
     least = settings.threshold if threshold is None else threshold
-    return change_answer(parameters, informed, events, candidates, least, settings.margin, True), informed
+    told = _with_trains(stored, with_trains) if with_trains else None
+    return change_answer(parameters, informed, events, candidates, least, settings.margin, True, told), informed
+
+
+def _with_trains(
+    stored: Sequence[calibrated.StoredVisit], with_trains: Sequence[calibrated.StoredVisit]
+) -> tuple[Sequence[StateParameter], Sequence[VisitInformation]]:
+    """Parameters and visits, some of them with their trains."""
+    replaced = {s.visit for s in with_trains}
+    mixed = [*with_trains, *(s for s in stored if s.visit not in replaced)]
+    return calibrated.parameters_of([*stored, *with_trains]), sorted(
+        calibrated.visits_of(mixed), key=lambda v: (v.time, v.visit)
+    )
 
 
 def _test_on_trains(
@@ -312,8 +352,9 @@ def supports_of(answer: ModelAnswer) -> list[float]:
 def stretch_finding(case: TrackCase, settings: MismatchSettings, answer: ModelAnswer, route: str) -> dict[str, Any]:
     """Columns of ``mismatch_findings`` of a change of several supports: fit of held-out trains without and with it.
 
-    The fit of the visit has absorbed the change. Without it is the same fit with the change taken back. No effect of
-    the library acts on several supports; that trains feel the change names it if the fit of those held out rises by
+    The fit of the visit has absorbed the change. Without it is the fit with the change taken back and all else fitted
+    again to first order, so that what other parameters explain as well is no evidence. No effect of the library acts
+    on several supports; that trains feel the change names it if the fit of those held out rises by
     ``MIN_GAIN_ERRORS`` standard errors. "gain_nats" is the logarithm of the ratio of their likelihoods. Trains share
     errors of the model, so that n of them count as few.
 
@@ -334,7 +375,7 @@ def stretch_finding(case: TrackCase, settings: MismatchSettings, answer: ModelAn
     assert answer.total is not None
     changed = {n: p for n, p in calibrated_parameters(case, route).items() if p.name in answer.changed}
     taken_back = {n: answer.total * (DAMPER_SHARES[0] if "damper" in p.group else 1.0) for n, p in changed.items()}
-    before = replace(fit, values={n: v - taken_back.get(n, 0.0) for n, v in fit.values.items()})
+    before = replace(fit, values=fit.values_beside({n: fit.values[n] - size for n, size in taken_back.items()}))
     row: dict[str, Any] = {"verdict": "none", "term": None, "parameters_json": None}
     row |= dict.fromkeys(("fit_before_pct", "fit_after_pct", "fit_gain_se_pct")) | {"n_held_out": 0, "gain_nats": 0.0}
     observations = search.case.reserved
@@ -383,7 +424,12 @@ def with_held_out(campaign: CampaignInput, passages: Sequence[Any]) -> CampaignI
 
 
 def finding_of_change(
-    answer: ModelAnswer, test: TrainTest | None, n_visits: int, n_recordings: int, threshold: float = 0.0
+    answer: ModelAnswer,
+    test: TrainTest | None,
+    n_visits: int,
+    n_recordings: int,
+    threshold: float = 0.0,
+    n_with_trains: int = 0,
 ) -> dict[str, Any]:
     """Columns of ``change_findings``: hammer tests and trains together.
 
@@ -401,6 +447,8 @@ def finding_of_change(
         Visits with hammer tests, and their recordings.
     threshold : float
         Evidence that a name needs. [nats]
+    n_with_trains : int
+        Visits whose trains are part of ``answer``.
 
     Returns
     -------
@@ -435,9 +483,9 @@ def finding_of_change(
             row["parameters_json"] = test.finding["parameters_json"]
     if names and answer.gain is not None and nats < threshold:
         evidence = f"the likeliest has {nats:.1f} of {threshold:g} nats of evidence"
-        words = f"no effect is named; {evidence}: {sentence_of(row)}"
+        words = f"no effect is named; {evidence}: {sentence_of(row, n_with_trains)}"
         return row | {"verdict": "none", "term": None, "rival_term": None, "component": None, "sentence": words}
-    return row | {"sentence": sentence_of(row)}
+    return row | {"sentence": sentence_of(row, n_with_trains)}
 
 
 def group_labels(turnout: TurnoutConfig, sections: Iterable[str]) -> list[tuple[str, ...]]:

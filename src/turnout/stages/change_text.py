@@ -11,19 +11,22 @@ import numpy as np
 from turnout.constants import Z95
 
 
-def sentence_of(row: Mapping[str, Any]) -> str:
+def sentence_of(row: Mapping[str, Any], n_with_trains: int = 0) -> str:
     """The finding in one sentence, every value with its interval and the number of recordings.
 
     Parameters
     ----------
     row : mapping
         Row of ``change_findings``; without "trains_visit" no train tells of it.
+    n_with_trains : int
+        Visits whose trains, too, are part of the answer.
 
     Returns
     -------
     str
     """
     basis = f"{row['n_recordings']} hammer tests of {row['n_visits']} visits"
+    basis += f", and the trains of {n_with_trains} of them" if n_with_trains else ""
     if row["verdict"] == "none":
         if row["n_visits"] < 2:
             return f"{basis}: at least two visits are needed"
@@ -89,4 +92,4 @@ def _train_words(row: Mapping[str, Any]) -> str:
         return f"; trains of {row['trains_visit']} name {row['trains_term'].replace('_', ' ')}{fit}"
     if row["trains_verdict"] == "a_or_b":
         return f"; trains of {row['trains_visit']} fit either{fit}"
-    return f"; trains of {row['trains_visit']} do not decide ({row['trains_verdict']}){fit}"
+    return f"; trains of {row['trains_visit']} alone do not decide ({row['trains_verdict']}){fit}"

@@ -15,14 +15,14 @@ from turnout.errors import ConfigError
 from turnout.records import Unit
 from turnout.registry.as_of import whole_list
 from turnout.registry.database import open_registry
-from turnout.stages.change_diagnosis import group_labels
+from turnout.stages.change_diagnosis import VISITS_AT_ENDS, group_labels
 from turnout.stages.mismatch_groups import visits
 from turnout.stages.mismatch_inputs import digest_of_model
 from turnout.workflow.plan import PlannedUnit, is_cut_plan, read_plan
 
 REGISTRY = Path("results/registry")
 KIND = "change"
-MAX_TRAINS = 16  # of a unit: more trains of one visit would only compute it again
+MAX_TRAINS = 16  # of a visit: more trains would only compute it again
 OPEN_SQL = """
     select distinct turnout_id, unnest(string_split(sections, ', ')) as section from {}
     where raised_at_utc is not null or state = 'confirm now' order by all
@@ -94,7 +94,7 @@ def _units(
     own_events = [line for line in lines if line.startswith(f"{turnout.id},")]
     for labels in group_labels(turnout, sections):
         members = [p for p in planned if p.unit.kind == "hammer" and p.unit.section in labels]
-        members += _trains_of_newest_visit(members, [p for p in planned if p.unit.kind == "passage"])
+        members += _trains_of_first_and_newest_visits(members, [p for p in planned if p.unit.kind == "passage"])
         if not members:
             continue
         files = tuple(sorted(f for p in members for f in p.unit.files))
@@ -102,16 +102,23 @@ def _units(
         yield PlannedUnit(Unit(turnout.id, KIND, "+".join(labels), files, config_hash), note)
 
 
-def _trains_of_newest_visit(tests: Sequence[PlannedUnit], trains: Sequence[PlannedUnit]) -> list[PlannedUnit]:
-    """Trains of the newest visit that has hammer tests and trains, those nearest to the day of the tests."""
+def _trains_of_first_and_newest_visits(
+    tests: Sequence[PlannedUnit], trains: Sequence[PlannedUnit]
+) -> list[PlannedUnit]:
+    """Trains of the first and the newest visits with hammer tests and trains, those nearest to the day of the tests.
+
+    Without hammer tests, those of the newest visit.
+    """
     by_unit = {id(p.unit): p for p in (*tests, *trains)}
-    for visit, units in reversed(visits(p.unit for p in (*tests, *trains)).items()):
+    with_trains = []
+    for visit, units in visits(p.unit for p in (*tests, *trains)).items():
         passed = [u for u in units if u.kind == "passage"]
         if passed and (len(passed) < len(units) or not tests):
             day = date.fromisoformat(visit if len(visit) > 7 else f"{visit}-15")
-            passed.sort(key=lambda u: (abs((_day_of(u.label) - day).days), u.label))
-            return [by_unit[id(u)] for u in passed[:MAX_TRAINS]]
-    return []
+            with_trains.append(sorted(passed, key=lambda u: (abs((_day_of(u.label) - day).days), u.label)))
+    ends = [*with_trains[:VISITS_AT_ENDS], *with_trains[-VISITS_AT_ENDS:]] if tests else with_trains[-1:]
+    chosen = {id(of): of for of in ends}
+    return [by_unit[id(u)] for of in chosen.values() for u in of[:MAX_TRAINS]]
 
 
 def _day_of(label: str) -> date:

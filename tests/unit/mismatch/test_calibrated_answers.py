@@ -119,6 +119,25 @@ def test_trains_tell_only_a_gap_that_they_close_from_soft_ballast(trains_feel, n
     assert [a.names for a in answers] == [names] * 10
 
 
+def test_trains_of_some_visits_tell_a_gap_and_leave_the_evidence_of_the_impacts():
+    visits = histories(np.random.default_rng(7), 6, step("ballast@1.20", -1.6, 3), trains_feel=0.0)
+    impacts = [replace(v, groups=v.groups[:1]) for v in visits]
+    ends = [v if k in (0, 5) else i for k, (v, i) in enumerate(zip(visits, impacts))]
+    alone = change_answer(PARAMETERS, impacts, [], CANDIDATES, 12.0, 6.0, True)
+    told = change_answer(PARAMETERS, impacts, [], CANDIDATES, 12.0, 6.0, True, (PARAMETERS, ends))
+    assert (alone.names, told.names) == (SOFT_OR_GAP, ("hanging_sleeper",))
+    assert told.gain == alone.gain and (told.size, told.onset) == (alone.size, alone.onset)
+
+
+def test_a_change_is_as_probable_where_the_file_is_unsure():
+    """The evidence of a step has the same prior at a boundary of two sections; that of a sensor is its own."""
+    unsure = [replace(p, sd=1.3) if p.name == "ballast@1.20" else p for p in PARAMETERS]
+    by_name = {c.name: c.sd for c in change_candidates(unsure)}
+    assert {by_name[p.name] for p in SUPPORTS} == {0.5}
+    assert by_name["gain_A1"] == pytest.approx(0.1)
+    assert {c.sd for c in stretch_candidates(unsure)} == {0.5}
+
+
 def test_trains_that_say_little_of_the_support_do_not_decide():
     visits = []
     for v in histories(np.random.default_rng(1), 4, step("ballast@1.20", -1.6, 2)):

@@ -18,9 +18,10 @@ from turnout.mismatch.calibrated import ModelAnswer
 from turnout.records import Unit
 from turnout.stages import change_diagnosis, change_units
 from turnout.stages.change_diagnosis import TrainTest, change_unit, finding_of_change
+from turnout.stages.mismatch_groups import visits
 from turnout.stages.worklist import worklist_job
 from turnout.workflow.batches import read_results
-from turnout.workflow.plan import write_plans
+from turnout.workflow.plan import PlannedUnit, write_plans
 from turnout.workflow.scan import scan
 from turnout.workflow.shard import run_shard
 from turnout.workflow.state import batch_paths
@@ -169,6 +170,26 @@ def test_a_killed_diagnosis_goes_on_behind_the_last_visit_and_ends_as_without_th
         rows[name] = result.tables
     assert fitted.read_text().split() == [*DAYS, *DAYS]  # no visit twice
     assert rows["killed"] == rows["calm"] and len(rows["calm"]["change_findings"]) == 1
+
+
+def test_trains_are_those_of_the_two_first_and_the_two_newest_visits_with_hammer_tests_and_trains():
+    def at(kind, day):
+        if kind == "passage":
+            return PlannedUnit(Unit("t1", kind, f"{day.replace('-', '')}T090000Z.h5", (), "", None, None), "")
+        return PlannedUnit(Unit("t1", kind, f"A/{day}", (), "", None, day), "")
+
+    days = [f"2026-0{month}-01" for month in range(1, 8)]
+    tests = [at("hammer", day) for day in days]
+    trains = [at("passage", day) for day in days[1:]]  # none at the first visit
+    chosen = change_units._trains_of_first_and_newest_visits(tests, trains)
+    assert [p.unit.label[:8] for p in chosen] == ["20260201", "20260301", "20260601", "20260701"]
+    by_visit = visits(p.unit for p in (*tests, *trains))
+    wanted = change_diagnosis._first_and_newest_with_trains(by_visit)
+    assert list(wanted) == [days[1], days[2], days[5], days[6]]
+    assert change_diagnosis._first_and_newest_with_trains({day: by_visit[day] for day in days[:2]}) == {}
+    assert [p.unit.label for p in change_units._trains_of_first_and_newest_visits([], trains)] == [
+        trains[-1].unit.label
+    ]
 
 
 def answer(verdict="a_or_b", names=("local_ballast", "hanging_sleeper"), **more):

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from turnout.mismatch.calibrated.belief import StateParameter
-from turnout.mismatch.calibrated.change import ChangeEffect, OnsetEvidence, compare_onsets
+from turnout.mismatch.calibrated.change import ChangeEffect, OnsetEvidence, change_sd, compare_onsets
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.history import Event, History, estimate_history
 from turnout.mismatch.calibrated.information import VisitInformation
@@ -64,7 +64,7 @@ def change_candidates(
     """
     local = [p for p in parameters if p.may_change and p.group in NAMES and NAMES[p.group] not in without]
     shapes = {} if shapes is None or NAMES["dip"] in without else shapes
-    candidates = [(p.name, {p.name: 1.0}, CALIBRATION.change_sds * p.sd) for p in local]
+    candidates = [(p.name, {p.name: 1.0}, change_sd(p, parameters)) for p in local]
     candidates += [(name, dict(direction), CALIBRATION.dip_sd) for name, direction in shapes.items()]
     steps = [ChangeEffect(name, d, sd, grows) for name, d, sd in candidates for grows in (False, True)]
     springs = [p for p in local if p.group in STRETCH_GROUPS and p.position is not None]
@@ -116,7 +116,7 @@ def _stretch(
     first, last = run[0].position, run[-1].position
     assert first is not None and last is not None
     where = run[0].name if len(run) == 1 else f"{group}@{first:.2f} to {last:.2f}"
-    name, sd = f"{where}, dampers {share:g}", CALIBRATION.change_sds * run[0].sd
+    name, sd = f"{where}, dampers {share:g}", change_sd(run[0], parameters)
     return [ChangeEffect(name, direction, sd, grows, group, 0.5 * (first + last)) for grows in (False, True)]
 
 
@@ -128,6 +128,7 @@ def change_answer(
     threshold: float,
     margin: float,
     is_alarmed: bool = False,
+    with_trains: tuple[Sequence[StateParameter], Sequence[VisitInformation]] | None = None,
 ) -> ModelAnswer:
     """What has changed up to the last of these visits.
 
@@ -148,6 +149,8 @@ def change_answer(
         [nats]
     is_alarmed : bool
         Whether an open alarm asks: then a change of any size is told.
+    with_trains : (sequence of StateParameter, sequence of VisitInformation) or None
+        What tells soft ballast from a gap, None: ``parameters`` and ``visits``.
 
     Returns
     -------
@@ -187,7 +190,8 @@ def change_answer(
         return stated.unknown(visit, CHANGE, by_name[jump.parameter])
     names = [stated.name]
     if stated.name == "local_ballast" and leader.size[0] < 0.0:
-        names = names_of_softer_ballast(parameters, visits, events, leader, _present_size(leader), margin, levels)
+        told = with_trains or (parameters, visits)
+        names = names_of_softer_ballast(*told, events, leader, _present_size(leader), margin, levels)
     rivals = [name_of(e.effect, by_name) for e in material if e.gain > leader.gain - margin]
     answer = stated.answer(visit, CHANGE, with_rivals(names, stated, rivals))
     return replace(answer, changed=tuple(leader.effect.direction), total=_present_size(leader)[0])
@@ -268,7 +272,7 @@ def free_shape(
     dips = [c for c in candidates if group_of(c, by_name) == "dip" and c.grows == effect.grows]
     numbers = [p for p in parameters if p.group in ("surface", "depth")]
     near = [(position_of(c.name, None), (c.direction, c.sd)) for c in dips]
-    near += [(position_of(p.name, p), ({p.name: 1.0}, CALIBRATION.change_sds * p.sd)) for p in numbers]
+    near += [(position_of(p.name, p), ({p.name: 1.0}, change_sd(p, parameters))) for p in numbers]
     return directions + [d for x, d in near if x is not None and abs(x - at) <= CALIBRATION.nose_reach]
 
 

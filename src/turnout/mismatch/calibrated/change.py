@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from turnout.mismatch.calibrated.belief import StateParameter
+from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.history import History, Step
 
 
@@ -70,6 +72,28 @@ class OnsetEvidence:
         p = self.posterior
         mean = float(p @ self.sizes)
         return mean, float(np.sqrt(p @ (self.size_sds**2 + (self.sizes - mean) ** 2)))
+
+
+def change_sd(parameter: StateParameter, parameters: Sequence[StateParameter]) -> float:
+    """Prior standard deviation of a change of one parameter.
+
+    ``CALIBRATION.change_sds`` standard deviations of its value in the file; of a numbered component, of the value that
+    is known best in its group. Supports are alike: where the file is unsure, as between two sections, a change is no
+    larger.
+
+    Parameters
+    ----------
+    parameter : StateParameter
+    parameters : sequence of StateParameter
+        All of the model.
+
+    Returns
+    -------
+    float
+        In the unit of the parameter.
+    """
+    alike = [p.sd for p in parameters if p.group == parameter.group and p.index is not None]
+    return CALIBRATION.change_sds * (parameter.sd if parameter.index is None else min([parameter.sd, *alike]))
 
 
 def compare_onsets(history: History, effects: Sequence[ChangeEffect]) -> list[OnsetEvidence]:

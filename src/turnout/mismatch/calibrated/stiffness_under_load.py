@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from turnout.mismatch.calibrated.belief import StateParameter
-from turnout.mismatch.calibrated.change import ChangeEffect, OnsetEvidence, compare_onsets
+from turnout.mismatch.calibrated.change import ChangeEffect, OnsetEvidence, change_sd, compare_onsets
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.history import Event, estimate_history
 from turnout.mismatch.calibrated.information import GroupInformation, VisitInformation
@@ -215,7 +215,7 @@ def candidates_under_load(parameters: Sequence[StateParameter], without: Collect
         if NAMES[law.group] in without:
             continue
         direction = {spring.name + END: 1.0} | ({damper.name + END: DAMPER_SHARE} if damper else {})
-        sd = CALIBRATION.change_sds * spring.sd if law.is_local else CALIBRATION.load_effect_sd
+        sd = change_sd(spring, parameters) if law.is_local else CALIBRATION.load_effect_sd
         name = f"{spring.name} under load"
         candidates += [ChangeEffect(name, direction, sd, g, law.group, spring.position) for g in (False, True)]
     return candidates

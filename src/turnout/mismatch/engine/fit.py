@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -58,6 +58,37 @@ class Fit:
         Fit
         """
         return replace(self, candidates=tuple(candidates))
+
+    def values_beside(self, fixed: Mapping[str, float]) -> dict[str, float]:
+        r"""Values of all nuisances where some are held at other values and the rest is fitted again, to first order.
+
+        The cost is :math:`(\theta - \hat\theta)^T C^{-1} (\theta - \hat\theta)` about its minimum. Its minimum with
+        the part f held at :math:`\theta_f` is at
+        :math:`\theta_r = \hat\theta_r + C_{rf} C_{ff}^{-1} (\theta_f - \hat\theta_f)`.
+
+        Parameters
+        ----------
+        fixed : mapping of str to float
+            Nuisance -> value.
+
+        Returns
+        -------
+        dict
+            In the order of ``values``.
+
+        Raises
+        ------
+        KeyError
+            If there is no nuisance of such a name.
+        """
+        names = list(self.values)
+        if unknown := [name for name in fixed if name not in self.values]:
+            raise KeyError(unknown[0])
+        at = [names.index(name) for name in fixed]
+        moved = np.array([value - self.values[name] for name, value in fixed.items()])
+        nuisances = self.covariance[: len(names), : len(names)]
+        shift = nuisances[:, at] @ np.linalg.solve(nuisances[np.ix_(at, at)], moved) if at else np.zeros(len(names))
+        return {name: value + float(d) for (name, value), d in zip(self.values.items(), shift)} | dict(fixed)
 
     def part(self, candidate: Candidate) -> slice:
         """Slice of the parameters of a candidate in ``psi``.
