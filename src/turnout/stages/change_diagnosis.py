@@ -152,8 +152,8 @@ def _diagnose(
         raise SimulationError(f"no track file ({error})") from None
     members = members_of(unit, scan(turnout, Path(raw_root)).units)
     about = turnout, raw_root, track, accepted, code
-    own = [u for u in members if u.kind == "passage" or u.section in labels]
-    tests = since_renewal(turnout, visits(u for u in own if u.kind == "hammer"))
+    recorded_here = [u for u in members if u.kind == "passage" or u.section in labels]
+    tests = since_renewal(turnout, visits(u for u in recorded_here if u.kind == "hammer"))
     stored, notes = _fitted_visits(FOLDER / unit.label, labels, tests, *about)
     if not stored:
         raise SimulationError("; ".join(notes) or NO_HAMMER_TESTS.format(since=renewal_note(turnout)))
@@ -164,7 +164,7 @@ def _diagnose(
         answer, _ = change_of(stored, turnout, SUSPICION * threshold, changes)
     with_trains: Sequence[calibrated.StoredVisit] = ()
     if set(answer.names) == set(SOFT_BALLAST_OR_GAP):
-        ends = _first_and_newest_with_trains(since_renewal(turnout, visits(own)))
+        ends = _first_and_newest_with_trains(since_renewal(turnout, visits(recorded_here)))
         with_trains, more_notes = _fitted_visits(TRAINS_FOLDER / unit.label, labels, ends, *about, passage_tables)
         notes += more_notes
         answer, _ = change_of(stored, turnout, SUSPICION * threshold, changes, with_trains)
@@ -266,8 +266,8 @@ def change_of(
     events = calibrated.events_of(turnout, parameters, changes, informed)
     candidates = further_candidates(changes, parameters, candidates)
     least = settings.threshold if threshold is None else threshold
-    told = _with_trains(stored, with_trains) if with_trains else None
-    return change_answer(parameters, informed, events, candidates, least, settings.margin, True, told), informed
+    mixed = _with_trains(stored, with_trains) if with_trains else None
+    return change_answer(parameters, informed, events, candidates, least, settings.margin, True, mixed), informed
 
 
 def _with_trains(

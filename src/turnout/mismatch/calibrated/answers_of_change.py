@@ -190,8 +190,8 @@ def change_answer(
         return stated.unknown(visit, CHANGE, by_name[jump.parameter])
     names = [stated.name]
     if stated.name == "local_ballast" and leader.size[0] < 0.0:
-        told = with_trains or (parameters, visits)
-        names = names_of_softer_ballast(*told, events, leader, _present_size(leader), margin, levels)
+        information = with_trains or (parameters, visits)
+        names = names_of_softer_ballast(*information, events, leader, _present_size(leader), margin, levels)
     rivals = [name_of(e.effect, by_name) for e in material if e.gain > leader.gain - margin]
     answer = stated.answer(visit, CHANGE, with_rivals(names, stated, rivals))
     return replace(answer, changed=tuple(leader.effect.direction), total=_present_size(leader)[0])
