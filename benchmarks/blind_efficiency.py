@@ -24,7 +24,8 @@ from turnout.mismatch.calibrated.levels import own_levels
 from turnout.mismatch.calibrated.model_answer import NAMES
 from turnout.mismatch.calibrated.soft_ballast_or_gap import evidence_of_gap
 from turnout.mismatch.turnout.calibration import dip_directions, file_errors
-from turnout.stages import calibrated_model
+from turnout.stages import stored_visits
+from turnout.stages.recorded_work import events_of
 from turnout_blind.history import START, parameters_at
 from turnout_blind.reveal import read_revealed
 from turnout_blind.score.histories import MAX_VISITS_LATE, judge_history
@@ -67,17 +68,17 @@ def _distance(name, position, length):
 def efficiency(folder, case, truth, rows):
     """Evidence of the true effect, its margin [nats] and the tool's bars for both; None without a linear effect."""
     turnout = with_raw(load_configuration(folder / "cases" / case / "config").turnout(case), folder / "cases" / case)
-    stored = calibrated_model.read_visits(
-        folder / "work" / case / "tool" / calibrated_model.FOLDER, case, {v: {} for v in truth["visits"]}
+    stored = stored_visits.read_visits(
+        folder / "work" / case / "tool" / stored_visits.FOLDER, case, {v: {} for v in truth["visits"]}
     )
-    parameters, effect = calibrated_model.parameters_of(stored), truth["effects"][0]
+    parameters, effect = stored_visits.parameters_of(stored), truth["effects"][0]
     last = truth["visits"].index(judge_history(truth, rows).clear_visit) + MAX_VISITS_LATE
-    visits = sorted(calibrated_model.visits_of(stored), key=lambda v: v.time)[:last]
+    visits = sorted(stored_visits.visits_of(stored), key=lambda v: v.time)[:last]
     directions = dip_directions(parameters)
     changes = [change_by(effect, share, parameters, directions) if share else {} for share in truth["severities"]]
     if None in changes[:last] or not any(changes[:last]):
         return None
-    events = [*calibrated_model.events_of(turnout, parameters), *file_errors(parameters, directions)]
+    events = [*events_of(turnout, parameters), *file_errors(parameters, directions)]
     candidates = change_candidates(parameters, directions)
     ideal = [_without_noise(v, parameters, change) for v, change in zip(visits, changes)]
     if truth["pattern"] == START:

@@ -141,7 +141,7 @@ def _change(answer: ModelAnswer) -> str:
     if answer.verdict == "none":
         return "none"
     assert answer.onset is not None
-    from turnout.stages.calibrated_model import day_of
+    from turnout.stages.visit_time import day_of
 
     start, end = (day_of(t) for t in answer.onset)
     evidence = "" if answer.gain is None else f" ({answer.gain:.0f} nats)"

@@ -34,8 +34,8 @@ from turnout.mismatch.engine.reserved_data import gain_error, reserved_fit
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.calibration import calibrated_parameters, dip_directions
+from turnout.mismatch.turnout.further_passages import names_beyond
 from turnout.mismatch.turnout.unproven_panels import reservation
-from turnout.stages import calibrated_model as calibrated
 from turnout.stages.accepted_changes import changes_of, further_candidates
 from turnout.stages.change_text import sentence_of
 from turnout.stages.mismatch_groups import (
@@ -50,7 +50,18 @@ from turnout.stages.mismatch_groups import (
 )
 from turnout.stages.mismatch_inputs import gather_inputs, track_of
 from turnout.stages.mismatch_rows import finding_row
+from turnout.stages.recorded_work import events_of
 from turnout.stages.renewals import renewal_note, since_renewal
+from turnout.stages.stored_visits import (
+    MAX_FITTED_AXLES,
+    StoredVisit,
+    parameters_of,
+    read_visits,
+    store_visit,
+    version_of,
+    visits_of,
+)
+from turnout.stages.visit_time import day_of, years_of
 from turnout.workflow.scan import scan
 
 if TYPE_CHECKING:
@@ -72,7 +83,7 @@ SUPPORTS = ("ballast", "pad")  # groups of parameters of one support, which trai
 SUPPORT_EFFECTS = ("local_ballast", "hanging_sleeper", "local_pad")
 MAX_DISTANCE = 0.35  # m from the position of the change to that of a candidate: the same support
 MAX_FITTED_TRAINS = 2
-MAX_FITTED_AXLES = 24  # of all fitted trains: the time of a fit is proportional to them
+MAX_AXLES_OF_TEST = 24  # of all fitted trains of a test: the time of a fit is proportional to them
 MAX_HELD_OUT_TRAINS = 4
 MAX_HELD_OUT_AXLES = 96
 MIN_GAIN_ERRORS = 2.0  # standard errors by which held-out trains must fit better, to confirm a change of a stretch
@@ -135,7 +146,7 @@ def change_unit(
 def _newest_day(unit: Unit, turnout: TurnoutConfig, raw_root: str | Path) -> datetime:
     """End of the day of the newest visit of the unit."""
     newest = max(visits(members_of(unit, scan(turnout, Path(raw_root)).units)), default="1970-01")
-    return datetime.combine(datetime.fromisoformat(calibrated.day_of(calibrated.years_of(newest))), time(23, 59))
+    return datetime.combine(datetime.fromisoformat(day_of(years_of(newest))), time(23, 59))
 
 
 def _diagnose(
@@ -162,7 +173,7 @@ def _diagnose(
     answer, informed = change_of(stored, turnout, changes=changes)
     if answer.verdict == "none":  # trains may have the evidence that impacts lack
         answer, _ = change_of(stored, turnout, SUSPICION * threshold, changes)
-    with_trains: Sequence[calibrated.StoredVisit] = ()
+    with_trains: Sequence[StoredVisit] = ()
     if set(answer.names) == set(SOFT_BALLAST_OR_GAP):
         ends = _first_and_newest_with_trains(since_renewal(turnout, visits(recorded_here)))
         with_trains, more_notes = _fitted_visits(TRAINS_FOLDER / unit.label, labels, ends, *about, passage_tables)
@@ -190,11 +201,11 @@ def _fitted_visits(
     accepted: Iterable[AcceptedEffect],
     code: str,
     passage_tables: Mapping[str, dict] | None = None,
-) -> tuple[list[calibrated.StoredVisit], list[str]]:
+) -> tuple[list[StoredVisit], list[str]]:
     """Information of the recordings of each visit at these sections, fitted once; and why one could not be fitted."""
     units = {v: unit_of(turnout.id, v, of, turnout.hashes["mismatch"]) for v, of in by_visit.items()}
-    versions = {v: calibrated.version_of(u, turnout, raw_root, None, code) for v, u in units.items()}
-    complete = {s.visit for s in calibrated.read_visits(folder, turnout.id, versions)}
+    versions = {v: version_of(u, turnout, raw_root, None, code) for v, u in units.items()}
+    complete = {s.visit for s in read_visits(folder, turnout.id, versions)}
     notes = []
     for label, of in by_visit.items():
         if label in complete:
@@ -204,13 +215,12 @@ def _fitted_visits(
         for group in groups(turnout, track, inputs):
             if not set(group.labels) <= set(sections):  # trains are recorded all along the turnout
                 continue
-            passages = [p for p in inputs.passages if p.route == group.route]
-            campaign = with_held_out(group.campaign, passages) if passages else group.campaign
+            campaign = replace(group.campaign, reserved=names_beyond(group.campaign, MAX_FITTED_AXLES))
             try:
-                calibrated.store_visit(folder, group, _case_of(group, campaign, turnout, accepted), "", about)
+                store_visit(folder, group, _case_of(group, campaign, turnout, accepted), "", about)
             except (SimulationError, np.linalg.LinAlgError) as error:
                 notes.append(f"visit {label}: {error}")
-    return calibrated.read_visits(folder, turnout.id, versions), notes
+    return read_visits(folder, turnout.id, versions), notes
 
 
 def _first_and_newest_with_trains(by_visit: Mapping[str, Sequence[Unit]]) -> dict[str, Sequence[Unit]]:
@@ -232,11 +242,11 @@ def _case_of(
 
 
 def change_of(
-    stored: Sequence[calibrated.StoredVisit],
+    stored: Sequence[StoredVisit],
     turnout: TurnoutConfig,
     threshold: float | None = None,
     changes: Sequence[AcceptedChange] = (),
-    with_trains: Sequence[calibrated.StoredVisit] = (),
+    with_trains: Sequence[StoredVisit] = (),
 ) -> tuple[ModelAnswer, list[VisitInformation]]:
     """What has changed up to the newest of the visits.
 
@@ -259,11 +269,11 @@ def change_of(
     informed : list of VisitInformation
         The visits, in the order of time.
     """
-    parameters = calibrated.parameters_of(stored)
-    informed = sorted(calibrated.visits_of(stored), key=lambda v: (v.time, v.visit))
+    parameters = parameters_of(stored)
+    informed = sorted(visits_of(stored), key=lambda v: (v.time, v.visit))
     settings = turnout.settings["mismatch"]
     candidates = [*change_candidates(parameters, dip_directions(parameters)), *stretch_candidates(parameters)]
-    events = calibrated.events_of(turnout, parameters, changes, informed)
+    events = events_of(turnout, parameters, changes, informed)
     candidates = further_candidates(changes, parameters, candidates)
     least = settings.threshold if threshold is None else threshold
     mixed = _with_trains(stored, with_trains) if with_trains else None
@@ -271,14 +281,12 @@ def change_of(
 
 
 def _with_trains(
-    stored: Sequence[calibrated.StoredVisit], with_trains: Sequence[calibrated.StoredVisit]
+    stored: Sequence[StoredVisit], with_trains: Sequence[StoredVisit]
 ) -> tuple[Sequence[StateParameter], Sequence[VisitInformation]]:
     """Parameters and visits, some of them with their trains."""
     replaced = {s.visit for s in with_trains}
     mixed = [*with_trains, *(s for s in stored if s.visit not in replaced)]
-    return calibrated.parameters_of([*stored, *with_trains]), sorted(
-        calibrated.visits_of(mixed), key=lambda v: (v.time, v.visit)
-    )
+    return parameters_of([*stored, *with_trains]), sorted(visits_of(mixed), key=lambda v: (v.time, v.visit))
 
 
 def _test_on_trains(
@@ -294,7 +302,7 @@ def _test_on_trains(
     """Diagnosis of the newest visit with trains after the change, of the effects at the changed support alone."""
     assert answer.onset is not None and answer.position is not None
     chosen = [u for u in members if u.kind == "passage" or u.section in labels]
-    after = {v: of for v, of in visits(chosen).items() if calibrated.years_of(v) >= answer.onset[1]}
+    after = {v: of for v, of in visits(chosen).items() if years_of(v) >= answer.onset[1]}
     for visit in sorted(after, reverse=True):
         if {u.kind for u in after[visit]} < {"hammer", "passage"}:
             continue
@@ -416,7 +424,7 @@ def with_held_out(campaign: CampaignInput, passages: Sequence[Any]) -> CampaignI
     if names - {p.name for p in passages} or any(p.route != "main" for p in passages):
         return campaign
     trains = split_by_length(passages)
-    fitted = select_passages(trains, MAX_FITTED_TRAINS, MAX_FITTED_AXLES)
+    fitted = select_passages(trains, MAX_FITTED_TRAINS, MAX_AXLES_OF_TEST)
     others = [p for p in trains if all(p is not f for f in fitted)]
     held_out = select_passages(others, MAX_HELD_OUT_TRAINS, MAX_HELD_OUT_AXLES) if others else []
     chosen = [p for p in trains if any(p is c for c in (*fitted, *held_out))]
@@ -473,7 +481,7 @@ def finding_of_change(
     if answer.gain is not None:
         row["gain_nats"] = nats
     if answer.onset is not None:
-        after, by = (datetime.fromisoformat(calibrated.day_of(t)) for t in answer.onset)
+        after, by = (datetime.fromisoformat(day_of(t)) for t in answer.onset)
         row |= {"onset_after_utc": after, "onset_by_utc": by}
     if test is not None:
         fits = ("fit_before_pct", "fit_after_pct", "fit_gain_se_pct", "n_held_out")

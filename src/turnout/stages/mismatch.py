@@ -16,7 +16,7 @@ from turnout.errors import ReadError, SimulationError, TurnoutError
 from turnout.mismatch.engine.diagnose import diagnose
 from turnout.mismatch.turnout import TrackCase
 from turnout.records import Unit
-from turnout.stages import calibrated_model
+from turnout.stages import calibrated_model, stored_visits
 from turnout.stages.accepted_changes import changes_of
 from turnout.stages.budget import Budget, BudgetSpentError, Watch
 from turnout.stages.changed_effects import changed_effects
@@ -140,7 +140,7 @@ def diagnose_visit(
     )
     about = {"turnout": turnout, "visit": unit.label, "identity": identity, "notes": inputs.notes}
     about["changes"] = changes_of(track.terms)
-    about["version"] = calibrated_model.version_of(unit, turnout, raw_root, options.track, algo)
+    about["version"] = stored_visits.version_of(unit, turnout, raw_root, options.track, algo)
     rows: dict[str, list[dict]] = {name: [] for name in TABLES}
     members = list(groups(turnout, track, inputs, options.sections))
     for k, group in enumerate(members):
@@ -194,12 +194,12 @@ def _diagnose_group(
         case = TrackCase(group.campaign, settings, accepted=(*accepted, *changed), cache=budget)
         diagnosis = diagnose(case, settings, report_progress, store)
         rows = finding_tables(diagnosis, case, group, about)
-        folder = calibrated_model.folder_of(options.fits)
+        folder = stored_visits.folder_of(options.fits)
         fits: Checkpoint | None = store
         if changed:  # the calibrated model has accepted changes as noise of its process, not as effects of a visit
             case, fits = TrackCase(group.campaign, settings, accepted=accepted, cache=budget), None
         stored_about = {**about, "notes": notes_in_words(about["visit"], about["notes"])}
-        calibrated_model.store_visit(folder, group, case, diagnosis.verdict.answer, stored_about, fits)
+        stored_visits.store_visit(folder, group, case, diagnosis.verdict.answer, stored_about, fits)
         rows["twin_states"] = calibrated_model.state_rows(
             folder, turnout, group, case, rows["mismatch_findings"][0], about
         )

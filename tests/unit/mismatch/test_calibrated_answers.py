@@ -25,7 +25,8 @@ from turnout.mismatch.calibrated import (
 from turnout.mismatch.calibrated.model_answer import is_explained, position_of
 from turnout.mismatch.turnout.calibration import dip_directions, nose_errors
 from turnout.mismatch.turnout.rail_roughness import Waves
-from turnout.stages.calibrated_model import events_of, within_library
+from turnout.stages.calibrated_model import within_library
+from turnout.stages.recorded_work import events_of
 
 N_SUPPORT, SD, STEP = 5, 0.05, 0.5
 SUPPORTS = [StateParameter(f"ballast@{0.6 * k:.2f}", 0.0, 0.1, 0.03, "ballast", k, 0.6 * k) for k in range(N_SUPPORT)]

@@ -28,6 +28,9 @@ from turnout.stages import mismatch, mismatch_results
 from turnout.stages.mismatch_groups import groups, visits
 from turnout.stages.mismatch_inputs import gather_inputs, track_of
 from turnout.stages.mismatch_results import diagnose_turnout
+from turnout.stages.recorded_work import events_of
+from turnout.stages.stored_visits import read_visits
+from turnout.stages.visit_time import years_of
 from turnout.workflow.scan import scan
 
 DAYS = ("2025-08-01", "2025-11-01", "2026-02-01", "2026-05-01")
@@ -75,7 +78,7 @@ def test_the_model_of_a_track_with_a_switch_says_that_its_answers_are_not_proven
     plain, work = model
     assert not any(UNPROVEN_SWITCH in line for line in model_text("t1", plain))
     assert all(row["reservation"] is None for row in calibrated.answer_rows(plain))
-    track, accepted = calibrated.track_of(load_configuration(year / "config").turnout("t1"))
+    track, accepted = track_of(load_configuration(year / "config").turnout("t1"))
     blade = Blade(12.0, 17.0, 22.0, track.track.rail, 3e8, 3e4)
     with_switch = replace(track, tracks={"diverging": track.track.with_(blade=blade)})
     monkeypatch.setattr(calibrated, "track_of", lambda *_: (with_switch, accepted))
@@ -110,7 +113,7 @@ def test_visits_are_fitted_once_and_again_when_code_or_recordings_change(model, 
     assert repaired.computed == (DAYS[0],)
     assert repaired.history.belief.mean.tobytes() == first.history.belief.mean.tobytes()
     versions = {d: {"code": "other", "model": "", "recordings": ""} for d in DAYS}
-    assert calibrated.read_visits(work / "calibrated-model", "t1", versions) == []
+    assert read_visits(work / "calibrated-model", "t1", versions) == []
 
 
 def test_a_withdrawn_visit_is_as_if_it_had_never_been(turnout, model):
@@ -215,9 +218,9 @@ def test_work_on_the_track_opens_what_it_touches(turnout):
         StateParameter("pad@18.00", 0.0, 0.1, 0.0, "pad", 30, 18.0),
         StateParameter("ln depth of the kink at 18.20 m", 0.0, 0.4, 0.0, "depth"),  # no work on ballast mends a nose
     ]
-    tamping, sensors = calibrated.events_of(load_configuration("config").turnout("t1"), parameters)
+    tamping, sensors = events_of(load_configuration("config").turnout("t1"), parameters)
     assert tamping.opened == {"ballast@18.00": 0.1} and sensors.opened == {"gain_A": 0.02}
-    assert calibrated.years_of("2026-01-09") < tamping.time < calibrated.years_of("2026-01-11")
+    assert years_of("2026-01-09") < tamping.time < years_of("2026-01-11")
 
 
 def record_work(text):
@@ -227,7 +230,7 @@ def record_work(text):
 def test_a_rebuilt_turnout_knows_nothing_of_what_lay_there_before(turnout, model):
     """To the bit the model of the recordings since the renewal; that of a section makes all of its parts uncertain."""
     shutil.copytree(model[1], "work")
-    rest = [calibrated.years_of(day) for day in DAYS[2:]]
+    rest = [years_of(day) for day in DAYS[2:]]
     record_work(f"t1,,{DAYS[1]},tamping,,\nt1,,2025-12-01,renewal,,\nt2,,2026-04-01,renewal,,\n")
     renewed = calibrated.calibrate_turnout("t1")
     assert [s.time for s in renewed.history.steps] == rest and renewed.computed == ()
@@ -240,7 +243,7 @@ def test_a_rebuilt_turnout_knows_nothing_of_what_lay_there_before(turnout, model
     assert renewed.history.belief.mean.tobytes() == never.history.belief.mean.tobytes()
     record_work("t1,A,2025-12-01,renewal,,\n")
     of_section = calibrated.calibrate_turnout("t1")
-    (event,) = calibrated.events_of(load_configuration("config").turnout("t1"), of_section.history.parameters)
+    (event,) = events_of(load_configuration("config").turnout("t1"), of_section.history.parameters)
     assert {"ballast@18.00", "pad@18.00"} <= set(event.opened)
     record_work("t1,,2026-06-01,renewal,,\n")
     with pytest.raises(SimulationError, match="no passage below raw since its renewal on 2026-06-01"):

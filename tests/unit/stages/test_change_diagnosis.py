@@ -19,6 +19,7 @@ from turnout.records import Unit
 from turnout.stages import change_diagnosis, change_units
 from turnout.stages.change_diagnosis import TrainTest, change_unit, finding_of_change
 from turnout.stages.mismatch_groups import visits
+from turnout.stages.visit_time import years_of
 from turnout.stages.worklist import worklist_job
 from turnout.workflow.batches import read_results
 from turnout.workflow.plan import PlannedUnit, write_plans
@@ -127,10 +128,8 @@ def test_a_visit_is_fitted_once_and_a_second_night_computes_nothing(turnout, mon
     monkeypatch.setattr(change_units, "open_alarms", lambda registry: alarms)
     monkeypatch.setattr(change_diagnosis, "_test_on_trains", lambda *_: None)
     fitted = []
-    store = change_diagnosis.calibrated.store_visit
-    monkeypatch.setattr(
-        change_diagnosis.calibrated, "store_visit", lambda *a, **k: (fitted.append(a[4]["visit"]), store(*a, **k))
-    )
+    store = change_diagnosis.store_visit
+    monkeypatch.setattr(change_diagnosis, "store_visit", lambda *a, **k: (fitted.append(a[4]["visit"]), store(*a, **k)))
     assert night().processed == 1 and fitted == list(DAYS)
     assert night().processed == 0 and fitted == list(DAYS)
     small.strike(turnout, soft_ballast, day=datetime(2026, 6, 1, 9), seed=50)
@@ -142,7 +141,7 @@ def test_a_visit_is_fitted_once_and_a_second_night_computes_nothing(turnout, mon
 def test_a_killed_diagnosis_goes_on_behind_the_last_visit_and_ends_as_without_the_kill(year, tmp_path, monkeypatch):
     monkeypatch.setattr(change_units, "open_alarms", lambda registry: {"t1": ["B"]})
     monkeypatch.setattr(change_diagnosis, "_test_on_trains", lambda *_: None)
-    store, fitted, deadly = change_diagnosis.calibrated.store_visit, tmp_path / "fitted", tmp_path / "deadly"
+    store, fitted, deadly = change_diagnosis.store_visit, tmp_path / "fitted", tmp_path / "deadly"
 
     def store_visit(*args, **more):
         store(*args, **more)
@@ -151,7 +150,7 @@ def test_a_killed_diagnosis_goes_on_behind_the_last_visit_and_ends_as_without_th
         if deadly.exists() and args[4]["visit"] == DAYS[1]:
             os.kill(os.getpid(), signal.SIGKILL)
 
-    monkeypatch.setattr(change_diagnosis.calibrated, "store_visit", store_visit)
+    monkeypatch.setattr(change_diagnosis, "store_visit", store_visit)
     rows = {}
     for name in ("killed", "calm"):
         shutil.copytree(year, tmp_path / name)
@@ -195,7 +194,7 @@ def test_trains_are_those_of_the_two_first_and_the_two_newest_visits_with_hammer
 def answer(verdict="a_or_b", names=("local_ballast", "hanging_sleeper"), **more):
     return ModelAnswer(
         "2026-05-01", "change", verdict, names, "ballast@18.00", "ballast", 18.0, -1.0, 0.1, "-",
-        (change_diagnosis.calibrated.years_of("2026-02-01"), change_diagnosis.calibrated.years_of("2026-05-01")), 40.0,
+        (years_of("2026-02-01"), years_of("2026-05-01")), 40.0,
         changed=("ballast@18.00",), total=-1.0, **more,
     )  # fmt: skip
 

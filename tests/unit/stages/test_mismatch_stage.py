@@ -332,7 +332,7 @@ def test_notes_of_a_visit_are_stored_in_words_with_its_information(tmp_path, mon
     monkeypatch.setattr(mismatch, "diagnose", lambda *_: SimpleNamespace(verdict=SimpleNamespace(answer="none")))
     monkeypatch.setattr(mismatch, "finding_tables", lambda *_: {"mismatch_findings": [{}]})
     monkeypatch.setattr(mismatch.calibrated_model, "state_rows", lambda *_: [])
-    monkeypatch.setattr(mismatch.calibrated_model, "store_visit", lambda *given: kept.update(given[4]))
+    monkeypatch.setattr(mismatch.stored_visits, "store_visit", lambda *given: kept.update(given[4]))
     about = {
         "visit": "2024-05-07",
         "identity": "a",

@@ -1,0 +1,79 @@
+"""Recorded work on a turnout, as what it makes uncertain again in the calibrated model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from turnout.config.events import RENEWAL, read_events
+from turnout.constants import DAYS_PER_YEAR
+from turnout.mismatch.calibrated import Event, StateParameter, VisitInformation, change_candidates
+from turnout.mismatch.turnout.calibration import dip_directions
+from turnout.stages.accepted_changes import change_events
+
+if TYPE_CHECKING:
+    from turnout.config.turnout import TurnoutConfig
+    from turnout.stages.accepted_changes import AcceptedChange
+
+# Groups of parameters that a kind of work makes uncertain again
+OPENED = {
+    "tamping": ("ballast", "ballast_damper", "wave", "surface"),
+    "ballast_cleaning": ("ballast", "ballast_damper", "wave", "surface"),
+    "pad_exchange": ("pad", "pad_damper"),
+    "rail_change": ("rail", "wave", "surface", "depth", "top_shape", "gain", "seat"),
+    "grinding": ("wave", "surface", "depth", "top_shape"),
+    "sleeper_change": ("sleeper", "pad", "pad_damper", "ballast", "ballast_damper", "wave"),
+    "sensor_change": ("gain", "seat"),
+}
+OPENED[RENEWAL] = tuple(sorted({group for opened in OPENED.values() for group in opened}))  # of one section
+# Parameters that all supports share, which work on the whole turnout makes uncertain, too
+BALLAST, PADS = ("ballast_stiffness", "ballast_damping"), ("pad_stiffness", "pad_damping")
+OPENED_COMMON = {
+    "tamping": BALLAST,
+    "ballast_cleaning": BALLAST,
+    "pad_exchange": PADS,
+    "sleeper_change": ("sleeper_mass", *BALLAST, *PADS),
+}
+EVENT_REACH = 6.0  # m from a section that work there may touch
+
+
+def events_of(
+    turnout: TurnoutConfig,
+    parameters: Sequence[StateParameter],
+    changes: Sequence[AcceptedChange] = (),
+    visits_used: Sequence[VisitInformation] = (),
+) -> list[Event]:
+    """Recorded work on the turnout, as parameters that it makes as uncertain as the file, and accepted changes.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+    parameters : sequence of StateParameter
+    changes : sequence of AcceptedChange
+        Of its track file.
+    visits_used : sequence of VisitInformation
+        Visits between which accepted changes lie.
+
+    Returns
+    -------
+    list of Event
+    """
+    recorded, _, _ = read_events(Path(turnout.folder) / "events.csv", "events.csv", None, {})
+    positions = {s.label: s.position for s in turnout.sections}
+    events = []
+    for event in recorded:
+        if event.turnout != turnout.id or event.kind not in OPENED:
+            continue
+        at = None if event.section is None else positions.get(event.section.rpartition("/")[2])
+        opened = {
+            p.name: p.sd
+            for p in parameters
+            if p.group in OPENED[event.kind]
+            and (at is None or p.position is None or abs(p.position - at) <= EVENT_REACH)
+        }
+        common = OPENED_COMMON.get(event.kind, ()) if at is None else ()
+        opened |= {p.name: p.sd for p in parameters if p.name.split(" ")[-1] in common}
+        events.append(Event(event.at.date().toordinal() / DAYS_PER_YEAR, opened))
+    candidates = change_candidates(parameters, dip_directions(parameters)) if changes else []
+    return events + change_events(changes, parameters, candidates, visits_used)

@@ -1,0 +1,261 @@
+"""The information of each visit on disk, in one file per group of sections below the work folder.
+
+Each has the versions of its code, track file and recordings. A file of another version is ignored and computed again,
+never read as if it were of this one.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, MutableMapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from turnout.content import sha256_of
+from turnout.mismatch.calibrated import GroupInformation, StateParameter, VisitInformation
+from turnout.mismatch.calibrated.constants import CALIBRATION
+from turnout.mismatch.calibrated.model_answer import NAMES
+from turnout.mismatch.engine.diagnose import fit_base
+from turnout.mismatch.engine.large_values import fit_large_values
+from turnout.mismatch.engine.search import Search
+from turnout.mismatch.turnout import TrackCase
+from turnout.mismatch.turnout.calibration import calibrated_parameters, visit_groups
+from turnout.mismatch.turnout.further_passages import with_reserved_passages
+from turnout.mismatch.turnout.nose_starts import fit_from_nose_positions
+from turnout.stages.agreeing_visits import FittedGroup, packed_groups, unpacked_groups
+from turnout.stages.checkpoint import SUFFIX, read_value, write_value
+from turnout.stages.mismatch_inputs import digest_of_model
+from turnout.stages.visit_time import years_of
+
+if TYPE_CHECKING:
+    from turnout.config.turnout import TurnoutConfig
+    from turnout.records import Unit
+    from turnout.stages.mismatch_groups import Group
+
+FOLDER = "calibrated-model"
+MAX_FITTED_AXLES = 8  # of all fitted passages of a visit: the others are linear about the fit, and cost little
+USED_ANSWERS = ("none", "")  # "": not diagnosed; a visit with an open finding changes nothing until it is accepted
+NOSE_POSITION = "place of the kink"  # begin of the name of a parameter
+
+
+@dataclass(frozen=True)
+class StoredVisit:
+    """Information of one group of sections at one visit: ``answer`` of its diagnosis, "" without one.
+
+    ``notes`` are those of ``notes_in_words`` on the recordings of the visit.
+    """
+
+    visit: str
+    sections: str
+    answer: str
+    groups: tuple[GroupInformation, ...]
+    parameters: tuple[StateParameter, ...]
+    notes: tuple[tuple[str, str, bool], ...] = ()
+
+
+def folder_of(fits: str | Path) -> Path:
+    """Folder of the stored visits beside that of the fits.
+
+    Parameters
+    ----------
+    fits : path
+
+    Returns
+    -------
+    Path
+    """
+    return Path(fits).parent / FOLDER
+
+
+def version_of(
+    unit: Unit, turnout: TurnoutConfig, raw_root: str | Path, track: str | None, code: str
+) -> dict[str, str]:
+    """Versions that the information of a visit depends on.
+
+    Parameters
+    ----------
+    unit : Unit
+        The files of the visit.
+    turnout : TurnoutConfig
+    raw_root : path
+    track : str or None
+        Track file, None: the turnout's own.
+    code : str
+        Fingerprint of the code.
+
+    Returns
+    -------
+    dict
+        "code", "model" (track, vehicles and settings) and "recordings" -> digest.
+    """
+    contents = [[path, sha256_of(file) if (file := Path(raw_root) / path).is_file() else ""] for path, *_ in unit.files]
+    recordings = hashlib.sha256(json.dumps(contents).encode()).hexdigest()[:16]
+    model = f"{turnout.hashes['mismatch']}/{digest_of_model(turnout, track)}"
+    return {"code": code, "model": model, "recordings": recordings}
+
+
+def store_visit(
+    folder: Path,
+    group: Group,
+    case: TrackCase,
+    answer: str,
+    about: Mapping[str, Any],
+    store: MutableMapping[str, Any] | None = None,
+) -> FittedGroup:
+    """Write the information of a group of sections at one visit.
+
+    Parameters
+    ----------
+    folder : Path
+        As ``folder_of``.
+    group : Group
+        The sections.
+    case : TrackCase
+        Their case.
+    answer : str
+        Of the diagnosis, "" without one.
+    about : mapping
+        turnout, visit, version (as ``version_of``), and notes (as ``notes_in_words``) if there are any.
+    store : mapping or None
+        Fits of the diagnosis, which has the base fit.
+
+    Returns
+    -------
+    FittedGroup
+        The fit that the information is of.
+
+    Raises
+    ------
+    SimulationError
+        The base model cannot be simulated.
+    """
+    search, fit = fit_base(Search.of(case, about["turnout"].settings["mismatch"], None, store))
+    assert isinstance(search.case, TrackCase)
+    parameters = calibrated_parameters(search.case, group.route)
+    positions = [nuisance for nuisance, p in parameters.items() if p.name.startswith(NOSE_POSITION)]
+    fit = fit_from_nose_positions(search, fit, positions)
+    may_be_large = [
+        nuisance
+        for nuisance, p in parameters.items()
+        if p.may_change and p.group in dict(CALIBRATION.least_sizes) and NAMES[p.group] not in about.get("without", ())
+    ]
+    dampers = {f"{p.group}_{p.index}": n for n, p in parameters.items() if p.group.endswith("_damper")}
+    partners = {n: dampers[key] for n in may_be_large if (key := _damper_key(parameters[n])) in dampers}
+    fit = fit_large_values(search, fit, may_be_large, CALIBRATION.change_sds, partners)
+    sections = ", ".join(group.labels)
+    fitted = FittedGroup(*with_reserved_passages(search.case, fit), parameters, sections, group.route)
+    information = visit_groups(fitted.case, fitted.fit, sections, group.route)
+    value = {
+        "version": dict(about["version"]), "visit": about["visit"], "sections": sections, "answer": answer,
+        "notes": [list(note) for note in about.get("notes", ())],
+        "parameters": [asdict(p) for p in parameters.values()],
+        "groups": packed_groups(information),
+    }  # fmt: skip
+    path = _path(folder, about["turnout"].id, about["visit"], group.labels)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_value(path, value)
+    return replace(fitted, fit=fitted.fit.without_jacobian())
+
+
+def _damper_key(spring: StateParameter) -> str:
+    return f"{spring.group}_damper_{spring.index}"
+
+
+def _path(folder: Path, turnout_id: str, visit: str, labels: Sequence[str]) -> Path:
+    digest = hashlib.sha256("+".join(labels).encode()).hexdigest()[:12]
+    return folder / turnout_id / f"{visit}-{digest}{SUFFIX}"
+
+
+def read_visits(folder: Path, turnout_id: str, versions: Mapping[str, Mapping[str, str]]) -> list[StoredVisit]:
+    """Stored visits of a turnout. Those of another code, track file or recordings are left out.
+
+    Parameters
+    ----------
+    folder : Path
+        As ``folder_of``.
+    turnout_id : str
+    versions : mapping
+        Visit -> its versions as they are now; those that are missing from it are not compared.
+
+    Returns
+    -------
+    list of StoredVisit
+        In the order of visit and sections.
+    """
+    stored = []
+    for path in sorted((folder / turnout_id).glob(f"*{SUFFIX}")):
+        try:
+            value = read_value(path)
+        except KeyError:  # damaged, or of another format
+            continue
+        wanted = versions.get(value["visit"])
+        if wanted is None or any(value["version"].get(k) != v for k, v in wanted.items()):
+            continue
+        information = unpacked_groups(value["groups"])
+        parameters = tuple(StateParameter(**p) for p in value["parameters"])
+        notes = tuple((visit, words, of_passage) for visit, words, of_passage in value.get("notes", ()))
+        stored.append(StoredVisit(value["visit"], value["sections"], value["answer"], information, parameters, notes))
+    return sorted(stored, key=lambda s: (s.visit, s.sections))
+
+
+def visits_of(stored: Iterable[StoredVisit]) -> list[VisitInformation]:
+    """One ``VisitInformation`` per visit, of all of its groups of sections."""
+    members: dict[str, list[StoredVisit]] = {}
+    for s in stored:
+        members.setdefault(s.visit, []).append(s)
+    visits_used = []
+    for visit, parts in members.items():
+        information = tuple(g for s in parts for g in s.groups)
+        visits_used.append(VisitInformation(visit, years_of(visit), information))
+    return visits_used
+
+
+def with_information(stored: Iterable[StoredVisit], visits_used: Iterable[VisitInformation]) -> list[StoredVisit]:
+    """Stored visits with the information of ``visits_used`` in place of their own.
+
+    Parameters
+    ----------
+    stored : iterable of StoredVisit
+    visits_used : iterable of VisitInformation
+        Of all of these visits.
+
+    Returns
+    -------
+    list of StoredVisit
+    """
+    by_group = {(v.visit, g.group): g for v in visits_used for g in v.groups}
+    return [replace(s, groups=tuple(by_group.get((s.visit, g.group), g) for g in s.groups)) for s in stored]
+
+
+def without_findings(stored: Iterable[StoredVisit]) -> list[StoredVisit]:
+    """Stored visits without an open finding: only these change the belief.
+
+    Parameters
+    ----------
+    stored : iterable of StoredVisit
+
+    Returns
+    -------
+    list of StoredVisit
+    """
+    return [s for s in stored if s.answer in USED_ANSWERS]
+
+
+def parameters_of(stored: Iterable[StoredVisit]) -> tuple[StateParameter, ...]:
+    """All parameters of these visits, each once.
+
+    Parameters
+    ----------
+    stored : iterable of StoredVisit
+
+    Returns
+    -------
+    tuple of StateParameter
+    """
+    by_name: dict[str, StateParameter] = {}
+    for s in stored:
+        for p in s.parameters:
+            by_name.setdefault(p.name, p)
+    return tuple(by_name.values())
