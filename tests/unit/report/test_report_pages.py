@@ -211,7 +211,7 @@ def test_pages_are_written_once_and_again_only_where_the_registry_says_something
     event = {"event_id": "e1", "turnout_id": "tommerup_s2", "event_at_utc": "2024-06-01T00:00:00", "kind": "tamping"}
     event |= {"resets_ballast": True, "resets_railpad": False}
     with open_registry(registry) as connection:
-        known = connection.execute("from events").to_arrow_table().to_pylist()
+        known = connection.sql("from events").to_arrow_table().to_pylist()
     known = [row | {"event_at_utc": row["event_at_utc"].isoformat()} for row in known]
     register([], registry, read=read_results, tables={"events": [*known, event]})
     assert written(folder, lambda: report_job(registry, folder)) == ["tommerup_s2"]
