@@ -19,7 +19,7 @@ from pathlib import Path
 
 from PIL import Image
 
-WIDTH, HEAD, SECTION, FINDING = 1060, 578, 665, 1960  # px
+WIDTH, HEAD, SECTION, FINDING = 1060, 566, 665, 1960  # px
 
 
 def main(source: str, gallery: str, turnout: str = "", section: str = "") -> None:
@@ -46,7 +46,7 @@ def main(source: str, gallery: str, turnout: str = "", section: str = "") -> Non
         picture = Image.new("RGB", (WIDTH, HEAD + SECTION), "white")
         picture.paste(head, (0, 0))
         picture.paste(below, (0, HEAD))
-        picture.save(Path(gallery) / "turnout.png", optimize=True)
+        picture.quantize(128).save(Path(gallery) / "turnout.png", optimize=True)
 
 
 def screenshot(text: str, folder: Path, height: int) -> Image.Image:

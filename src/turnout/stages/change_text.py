@@ -92,4 +92,4 @@ def _train_words(row: Mapping[str, Any]) -> str:
         return f"; trains of {row['trains_visit']} name {row['trains_term'].replace('_', ' ')}{fit}"
     if row["trains_verdict"] == "a_or_b":
         return f"; trains of {row['trains_visit']} fit either{fit}"
-    return f"; trains of {row['trains_visit']} alone do not decide ({row['trains_verdict']}){fit}"
+    return f"; trains of {row['trains_visit']} alone do not decide{fit}"
