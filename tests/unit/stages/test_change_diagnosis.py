@@ -17,7 +17,9 @@ from turnout.config import load_configuration, with_raw
 from turnout.mismatch.calibrated import ModelAnswer
 from turnout.records import Unit
 from turnout.stages import change_diagnosis, change_units
-from turnout.stages.change_diagnosis import TrainTest, change_unit, finding_of_change
+from turnout.stages.change_diagnosis import change_unit
+from turnout.stages.change_finding import finding_of_change
+from turnout.stages.change_trains import TrainTest
 from turnout.stages.mismatch_groups import visits
 from turnout.stages.visit_time import years_of
 from turnout.stages.worklist import worklist_job
@@ -126,7 +128,7 @@ def night():
 def test_a_visit_is_fitted_once_and_a_second_night_computes_nothing(turnout, monkeypatch):
     alarms = {"t1": ["B"]}
     monkeypatch.setattr(change_units, "open_alarms", lambda registry: alarms)
-    monkeypatch.setattr(change_diagnosis, "_test_on_trains", lambda *_: None)
+    monkeypatch.setattr(change_diagnosis, "trains_of_change", lambda *_: None)
     fitted = []
     store = change_diagnosis.store_visit
     monkeypatch.setattr(change_diagnosis, "store_visit", lambda *a, **k: (fitted.append(a[4]["visit"]), store(*a, **k)))
@@ -140,7 +142,7 @@ def test_a_visit_is_fitted_once_and_a_second_night_computes_nothing(turnout, mon
 
 def test_a_killed_diagnosis_goes_on_behind_the_last_visit_and_ends_as_without_the_kill(year, tmp_path, monkeypatch):
     monkeypatch.setattr(change_units, "open_alarms", lambda registry: {"t1": ["B"]})
-    monkeypatch.setattr(change_diagnosis, "_test_on_trains", lambda *_: None)
+    monkeypatch.setattr(change_diagnosis, "trains_of_change", lambda *_: None)
     store, fitted, deadly = change_diagnosis.store_visit, tmp_path / "fitted", tmp_path / "deadly"
 
     def store_visit(*args, **more):
