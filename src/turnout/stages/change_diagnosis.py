@@ -24,6 +24,7 @@ from turnout.mismatch.calibrated import (
     change_candidates,
     stretch_candidates,
 )
+from turnout.mismatch.calibrated.levels import TRAINS, kind_of
 from turnout.mismatch.calibrated.soft_ballast_or_gap import NAMES as SOFT_BALLAST_OR_GAP
 from turnout.mismatch.turnout.calibration import dip_directions
 from turnout.mismatch.turnout.further_passages import names_beyond
@@ -31,13 +32,7 @@ from turnout.mismatch.turnout.unproven_panels import reservation
 from turnout.stages.accepted_changes import changes_of, further_candidates
 from turnout.stages.change_finding import finding_of_change
 from turnout.stages.change_trains import case_of, trains_of_change
-from turnout.stages.mismatch_groups import (
-    groups,
-    members_of,
-    neighbours_of,
-    unit_of,
-    visits,
-)
+from turnout.stages.mismatch_groups import groups, members_of, neighbours_of, unit_of, visits
 from turnout.stages.mismatch_inputs import gather_inputs, track_of
 from turnout.stages.recorded_work import events_of
 from turnout.stages.renewals import renewal_note, since_renewal
@@ -62,7 +57,7 @@ if TYPE_CHECKING:
 
 FOLDER = Path("work/impact-models")
 TRAINS_FOLDER = Path("work/train-models")  # of the first and the newest visits, with their trains
-VISITS_AT_ENDS = 2  # of the history, of which trains are fitted: the first and the newest ones
+VISITS_AT_ENDS = 2  # of which trains are fitted at either end of a history: some 10 CPU s each
 SUSPICION = 0.5  # share of the evidence of a name from which trains are asked for the rest
 SUPPORTS = ("ballast", "pad")  # groups of parameters of one support, which trains can test
 NO_HAMMER_TESTS = "no hammer test of these sections{since}: turnout twin compares what trains alone show"
@@ -135,20 +130,22 @@ def _diagnose(
         raise SimulationError("; ".join(notes) or NO_HAMMER_TESTS.format(since=renewal_note(turnout)))
     threshold = turnout.settings["mismatch"].threshold
     changes = changes_of(track.terms)
-    answer, informed = change_of(stored, turnout, changes=changes)
+    least = threshold
+    answer, informed = change_of(stored, turnout, least, changes)
     if answer.verdict == "none":  # trains may have the evidence that impacts lack
-        answer, _ = change_of(stored, turnout, SUSPICION * threshold, changes)
+        least = SUSPICION * threshold
+        answer, _ = change_of(stored, turnout, least, changes)
     with_trains: Sequence[StoredVisit] = ()
     if set(answer.names) == set(SOFT_BALLAST_OR_GAP):
         ends = _first_and_newest_with_trains(since_renewal(turnout, visits(recorded_here)))
         with_trains, more_notes = _fitted_visits(TRAINS_FOLDER / unit.label, labels, ends, *about, passage_tables)
         notes += more_notes
-        answer, _ = change_of(stored, turnout, SUSPICION * threshold, changes, with_trains)
+        answer, _ = change_of(stored, turnout, least, changes, with_trains)
     test = None
     if answer.verdict in ("named", "a_or_b") and answer.group in SUPPORTS:
-        test = trains_of_change(answer, members, turnout, raw_root, track, accepted, passage_tables, labels)
+        test = trains_of_change(answer, recorded_here, turnout, raw_root, track, accepted, passage_tables, labels)
     n_recordings = sum(v.n_recordings for v in informed)
-    row = finding_of_change(answer, test, len(informed), n_recordings, threshold, len(with_trains))
+    row = finding_of_change(answer, test, len(informed), n_recordings, threshold, _count_with_trains(with_trains))
     if changes:
         row["sentence"] += f"; accepted before: {', '.join(c.words for c in changes)}"
     if unproven := reservation(track):
@@ -191,8 +188,27 @@ def _fitted_visits(
 def _first_and_newest_with_trains(by_visit: Mapping[str, Sequence[Unit]]) -> dict[str, Sequence[Unit]]:
     """Visits whose trains tell most of a change, ``VISITS_AT_ENDS`` at each end. One alone tells nothing of it: {}."""
     with_both = [v for v in sorted(by_visit) if {u.kind for u in by_visit[v]} >= {"hammer", "passage"}]
-    ends = dict.fromkeys([*with_both[:VISITS_AT_ENDS], *with_both[-VISITS_AT_ENDS:]])
-    return {v: by_visit[v] for v in ends} if len(ends) > 1 else {}
+    return {v: by_visit[v] for v in ends_of(with_both)} if len(with_both) > 1 else {}
+
+
+def _count_with_trains(stored: Iterable[StoredVisit]) -> int:
+    """Visits of which a train could be used."""
+    return len({s.visit for s in stored if any(kind_of(g.group) == TRAINS for g in s.groups)})
+
+
+def ends_of(history: Sequence[str]) -> list[str]:
+    """The ``VISITS_AT_ENDS`` first and the ``VISITS_AT_ENDS`` newest visits, each once.
+
+    Parameters
+    ----------
+    history : sequence of str
+        Visits in the order of time.
+
+    Returns
+    -------
+    list of str
+    """
+    return list(dict.fromkeys([*history[:VISITS_AT_ENDS], *history[-VISITS_AT_ENDS:]]))
 
 
 def change_of(

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from turnout.mismatch.calibrated import (
-    ModelAnswer,
-)
+from turnout.mismatch.calibrated import ModelAnswer
 from turnout.stages.change_text import sentence_of
 from turnout.stages.change_trains import TrainTest, supports_of
 from turnout.stages.visit_time import day_of
-
-if TYPE_CHECKING:
-    pass
 
 
 def finding_of_change(

@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from turnout.mismatch.calibrated import (
-    ModelAnswer,
-)
+from turnout.mismatch.calibrated import ModelAnswer
 from turnout.mismatch.calibrated.answers_of_change import DAMPER_SHARES
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.model_answer import position_of
@@ -66,7 +64,7 @@ class TrainTest:
 
 def trains_of_change(
     answer: ModelAnswer,
-    members: Sequence[Unit],
+    recordings: Sequence[Unit],
     turnout: TurnoutConfig,
     raw_root: str | Path,
     track: TurnoutTrack,
@@ -80,8 +78,8 @@ def trains_of_change(
     ----------
     answer : ModelAnswer
         The change, with position and onset.
-    members : sequence of Unit
-        Recordings of the turnout.
+    recordings : sequence of Unit
+        Hammer tests of the sections that have changed, and passages.
     turnout : TurnoutConfig
     raw_root : path
         Folder of all recordings.
@@ -104,8 +102,7 @@ def trains_of_change(
         If the track cannot be simulated.
     """
     assert answer.onset is not None and answer.position is not None
-    chosen = [u for u in members if u.kind == "passage" or u.section in labels]
-    after = {v: of for v, of in visits(chosen).items() if years_of(v) >= answer.onset[1]}
+    after = {v: of for v, of in visits(recordings).items() if years_of(v) >= answer.onset[1]}
     for visit in sorted(after, reverse=True):
         if {u.kind for u in after[visit]} < {"hammer", "passage"}:
             continue
@@ -229,11 +226,30 @@ def stretch_finding(case: TrackCase, settings: MismatchSettings, answer: ModelAn
     level = max(1.0, sum(costs[1]) / sum(o.n_effective for o in observations))
     count = n / (1.0 + CALIBRATION.repeated_error_share * (n - 1))  # as ``repeated_error_weights``, all of one group
     nats = 0.5 * count * (sum(costs[0]) - sum(costs[1])) / n / level
-    # no more than the error of the difference of the fits allows, which is estimated from the residuals
-    row["gain_nats"] = min(nats, 0.5 * ((percents[1] - percents[0]) / max(error, MIN_FIT_ERROR)) ** 2)
+    row["gain_nats"] = evidence_of_rise(nats, percents[1] - percents[0], error)
     if percents[1] - percents[0] > MIN_GAIN_ERRORS * error:
         row |= {"verdict": "named", "term": answer.names[0]}
     return row
+
+
+def evidence_of_rise(nats: float, rise: float, error: float) -> float:
+    """Evidence of held-out trains, no more than the rise of their fit allows: none where it falls.
+
+    Parameters
+    ----------
+    nats : float
+        Logarithm of the ratio of their likelihoods.
+    rise : float
+        Of their fit. [points]
+    error : float
+        Standard error of the rise, estimated from the residuals. [points]
+
+    Returns
+    -------
+    float
+        [nats]
+    """
+    return min(nats, 0.5 * (max(rise, 0.0) / max(error, MIN_FIT_ERROR)) ** 2)
 
 
 def with_held_out(campaign: CampaignInput, passages: Sequence[Any]) -> CampaignInput:

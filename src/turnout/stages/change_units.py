@@ -15,7 +15,7 @@ from turnout.errors import ConfigError
 from turnout.records import Unit
 from turnout.registry.as_of import whole_list
 from turnout.registry.database import open_registry
-from turnout.stages.change_diagnosis import VISITS_AT_ENDS, group_labels
+from turnout.stages.change_diagnosis import ends_of, group_labels
 from turnout.stages.mismatch_groups import visits
 from turnout.stages.mismatch_inputs import digest_of_model
 from turnout.workflow.plan import PlannedUnit, is_cut_plan, read_plan
@@ -110,15 +110,15 @@ def _trains_of_first_and_newest_visits(
     Without hammer tests, those of the newest visit.
     """
     by_unit = {id(p.unit): p for p in (*tests, *trains)}
-    with_trains = []
+    with_trains: dict[str, list[Unit]] = {}
     for visit, units in visits(p.unit for p in (*tests, *trains)).items():
         passed = [u for u in units if u.kind == "passage"]
         if passed and (len(passed) < len(units) or not tests):
             day = date.fromisoformat(visit if len(visit) > 7 else f"{visit}-15")
-            with_trains.append(sorted(passed, key=lambda u: (abs((_day_of(u.label) - day).days), u.label)))
-    ends = [*with_trains[:VISITS_AT_ENDS], *with_trains[-VISITS_AT_ENDS:]] if tests else with_trains[-1:]
-    chosen = {id(of): of for of in ends}
-    return [by_unit[id(u)] for of in chosen.values() for u in of[:MAX_TRAINS]]
+            with_trains[visit] = sorted(passed, key=lambda u: (abs((_day_of(u.label) - day).days), u.label))
+    history = list(with_trains)
+    chosen = ends_of(history) if tests else history[-1:]
+    return [by_unit[id(u)] for visit in chosen for u in with_trains[visit][:MAX_TRAINS]]
 
 
 def _day_of(label: str) -> date:

@@ -14,13 +14,14 @@ import small_turnout as small
 
 from turnout import physics
 from turnout.config import load_configuration, with_raw
-from turnout.mismatch.calibrated import ModelAnswer
+from turnout.mismatch.calibrated import GroupInformation, ModelAnswer
 from turnout.records import Unit
 from turnout.stages import change_diagnosis, change_units
 from turnout.stages.change_diagnosis import change_unit
 from turnout.stages.change_finding import finding_of_change
-from turnout.stages.change_trains import TrainTest
+from turnout.stages.change_trains import TrainTest, evidence_of_rise
 from turnout.stages.mismatch_groups import visits
+from turnout.stages.stored_visits import StoredVisit
 from turnout.stages.visit_time import years_of
 from turnout.stages.worklist import worklist_job
 from turnout.workflow.batches import read_results
@@ -191,6 +192,32 @@ def test_trains_are_those_of_the_two_first_and_the_two_newest_visits_with_hammer
     assert [p.unit.label for p in change_units._trains_of_first_and_newest_visits([], trains)] == [
         trains[-1].unit.label
     ]
+
+
+def test_the_sentence_counts_the_visits_of_which_a_train_was_used():
+    def at(visit, *groups):
+        information = tuple(GroupInformation(g, 1, (), np.zeros((0, 0)), np.zeros(0)) for g in groups)
+        return StoredVisit(visit, "A", "", information, ())
+
+    impacts, train = "A: impacts at 18.00 m", "A: locomotive, 120 km/h"
+    stored = [
+        at("2026-01-01", impacts),
+        at("2026-02-01", impacts, train),
+        at("2026-03-01", train),
+        at("2026-03-01", train),
+    ]
+    assert change_diagnosis._count_with_trains(stored) == 2
+    row = finding_of_change(answer(), None, 4, 8, 12.0, 2)
+    assert "8 hammer tests of 4 visits, and the trains of 2 of them" in row["sentence"]
+    assert "trains of" not in finding_of_change(answer(), None, 4, 8, 12.0)["sentence"].partition(";")[0]
+
+
+@pytest.mark.parametrize(
+    ("nats", "rise", "error", "expected"),
+    [(2.0, 0.5, 0.25, 2.0), (5.0, 0.2, 0.2, 0.5), (2.0, -0.2, 0.2, 0.0), (-1.0, -0.2, 0.2, -1.0), (5.0, 0.1, 0.0, 0.5)],
+)
+def test_held_out_trains_that_fit_worse_add_no_evidence(nats, rise, error, expected):
+    assert evidence_of_rise(nats, rise, error) == pytest.approx(expected)
 
 
 def answer(verdict="a_or_b", names=("local_ballast", "hanging_sleeper"), **more):
