@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from turnout_blind.vehicle import Train
 
 SOURCE = "the owner's register"
-MEAN_SECTION = 0.85  # of the planed blade over its length, as a share of the rail
+TOE_SECTION = 0.6  # of the blade at its toe, as a share of the rail; truth: ``switch.PLANED_SHARE``
 RAIL = (("youngs_modulus", 210.0, "GPa"), ("second_moment", 3037.0, "cm⁴"), ("area", 76.7, "cm²"),
         ("mass", 60.2, "kg/m"), ("shear_modulus", 80.77, "GPa"), ("shear_coefficient", 0.393, "-"),
         ("density", 7850.0, "kg/m³"), ("damping", RAIL_DAMPING, "N s/m²"))  # fmt: skip
@@ -134,13 +134,13 @@ def _casting(crossing: Crossing) -> list[str]:
 
 
 def _blade(switch: Switch) -> list[str]:
-    """The blade, of the section of the rail, up to 6 m behind the last sensor."""
+    """The blade, planed from the section of the rail, and the closure rail behind it."""
     lines = ["blade:", f"  toe: {_value(switch.toe, 'm')}", f"  heel: {_value(switch.heel, 'm')}"]
     lines += [f"  end: {_value(36.0, 'm')}", f"  chair_stiffness: {_value(switch.chair / 1e6, 'MN/m')}"]
-    lines += [f"  chair_damping: {_value(switch.chair_damping / 1e3, 'kN s/m')}", "  rail:"]
+    lines += [f"  chair_damping: {_value(switch.chair_damping / 1e3, 'kN s/m')}"]
+    lines += [f"  planed: {{length: {_value(switch.length, 'm')}, share: {_value(TOE_SECTION, '-')}}}", "  rail:"]
     lines += ["    name: blade", "    beam: timoshenko"]
-    factors = {"second_moment": MEAN_SECTION, "area": MEAN_SECTION, "mass": MEAN_SECTION}
-    return lines + [f"    {name}: {_value(value * factors.get(name, 1.0), unit)}" for name, value, unit in RAIL]
+    return lines + [f"    {name}: {_value(value, unit)}" for name, value, unit in RAIL]
 
 
 def _tops(switch: Switch) -> list[str]:

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +29,7 @@ from turnout.constants import GRAVITY
 from turnout.errors import SimulationError
 from turnout.simulate.force_laws import LiftLaw, Port
 from turnout.simulate.links import Link
+from turnout.simulate.rail import in_series
 
 if TYPE_CHECKING:
     from turnout.simulate.rail import Rail
@@ -41,9 +43,11 @@ AT_SUPPORT = 0.1  # bays; a toe that is closer to a support is on it
 class Blade:
     """Blade from its ``toe`` to its ``heel`` and on to the ``end`` of its model [m], in this order in either direction.
 
-    ``rail`` is its section, of which the planed part is lighter: an average. ``chair_stiffness`` [N/m] and
-    ``chair_damping`` [N s/m] act between blade and bearer at every support. Before the heel the blade rests on them by
-    its own weight, from the heel on it is fastened. The end is at the nearest support.
+    ``rail`` is its section before the heel; behind it the closure rail has the section of the track's rail. The blade
+    is planed over ``planed_length`` from its toe [m], where it has ``planed_share`` of its section; in between the
+    share grows linearly. ``chair_stiffness`` [N/m] and ``chair_damping`` [N s/m] act between blade and bearer at every
+    support. Before the heel the blade rests on them by its own weight, from the heel on it is fastened. The end is at
+    the nearest support.
     """
 
     toe: float
@@ -52,11 +56,15 @@ class Blade:
     rail: Rail
     chair_stiffness: float
     chair_damping: float
+    planed_length: float = 0.0
+    planed_share: float = 1.0
 
     def __post_init__(self) -> None:
-        for name in ("chair_stiffness", "chair_damping"):
+        for name in ("chair_stiffness", "chair_damping", "planed_length"):
             if not getattr(self, name) >= 0.0:
                 raise SimulationError(f"blade: {name} must not be negative, got {getattr(self, name)!r}.")
+        if not 0.0 < self.planed_share <= 1.0:
+            raise SimulationError(f"blade: planed_share must be above 0 and at most 1, got {self.planed_share!r}.")
         if not self.direction * self.toe < self.direction * self.heel <= self.direction * self.end:
             order = f"{self.toe:.3f}, {self.heel:.3f} and {self.end:.3f} m"
             raise SimulationError(f"blade: toe, heel and end at {order} are not in this order.")
@@ -134,6 +142,38 @@ class Blade:
         if per_bay == 1 or not AT_SUPPORT < share < 1.0 - AT_SUPPORT:
             return (bay + round(share)) * per_bay
         return bay * per_bay + min(max(round(share * per_bay), 1), per_bay - 1)
+
+    def element_rail(self, track: Track, start: float, end: float) -> Rail:
+        """Section of an element of the blade; several sections are combined in series.
+
+        Parameters
+        ----------
+        track : Track
+            The track with the stock rail.
+        start : float
+            First node. [m]
+        end : float
+            Second node. [m]
+
+        Returns
+        -------
+        Rail
+        """
+        borders = {self.heel, self.toe + self.direction * self.planed_length}
+        cuts = [start, *sorted(x for x in borders if start < x < end), end]
+        rails = [self._section(track, 0.5 * (a + b)) for a, b in pairwise(cuts)]
+        return in_series(rails, np.diff(cuts) / (end - start)) if len(rails) > 1 else rails[0]
+
+    def _section(self, track: Track, position: float) -> Rail:
+        """Section at a position [m]: planed, full or that of the closure rail."""
+        from_toe = max(self.direction * (position - self.toe), 0.0)
+        if from_toe > self.direction * (self.heel - self.toe):
+            return track.rail_at(position)
+        if from_toe >= self.planed_length:
+            return self.rail
+        share = self.planed_share + (1.0 - self.planed_share) * from_toe / self.planed_length
+        fields = ("bending_stiffness", "mass", "shear_stiffness", "rotary_inertia")
+        return replace(self.rail, **{name: share * getattr(self.rail, name) for name in fields})
 
     def chairs(self, track: Track) -> list[int]:
         """Supports under the blade from the toe to the one before the end.

@@ -28,8 +28,8 @@ class TrackMatrices:
 
     ``index`` maps the name of a degree of freedom to its row. ``node_index`` (n_node,) is the row of a node's
     deflection; its rotation is the next row. ``rails`` has the profile of each element, ``links`` all links. A blade
-    has the rows ``blade_rows`` of its nodes, from the node ``blade_start`` of the rail on, and the section
-    ``blade_rail``.
+    has the rows ``blade_rows`` of its nodes, from the node ``blade_start`` of the rail on, and the sections
+    ``blade_rails`` of its elements.
     """
 
     mass: np.ndarray
@@ -41,7 +41,7 @@ class TrackMatrices:
     index: dict[tuple, int]
     rails: tuple[Rail, ...]
     links: tuple[Link, ...]
-    blade_rail: Rail | None = None
+    blade_rails: tuple[Rail, ...] = ()
     blade_start: int = 0
     blade_rows: tuple[int, ...] = ()
 
@@ -73,10 +73,11 @@ class TrackMatrices:
         """
         h, p, ei, kga = self.elements
         table = [np.stack([v, v]) for v in (self.node_index[:-1], self.node_index[1:], p, 1.0 / ei, 1.0 / kga)]
-        if self.blade_rail is not None:
-            rail, rows, inside = self.blade_rail, self.blade_rows, self._blade_elements
-            shear = 0.0 if rail.beam == "euler" else 1.0 / rail.shear_stiffness
-            values = rows[:-1], rows[1:], rail.shear_ratio(h[inside]), 1.0 / rail.bending_stiffness, shear
+        if self.blade_rails:
+            rails, rows, inside = self.blade_rails, self.blade_rows, self._blade_elements
+            ratio = [float(r.shear_ratio(h_e)) for r, h_e in zip(rails, h[inside])]
+            shear = [0.0 if r.beam == "euler" else 1.0 / r.shear_stiffness for r in rails]
+            values = rows[:-1], rows[1:], ratio, [1.0 / r.bending_stiffness for r in rails], shear
             for line, value in zip(table, values):
                 line[1, inside] = value
         return tuple(table)
@@ -308,9 +309,10 @@ def add_rails(matrices: TrackMatrices, track: Track) -> TrackMatrices:
         matrices.index[("blade", *divmod(k, per_bay)) if k in on_blade else ("rail", *divmod(k, per_bay))]
         for k in range(first, last + 1)
     )
-    blade_rails, node = (track.blade.rail,) * (last - first), matrices.node[first : last + 1]
+    node = matrices.node[first : last + 1]
+    blade_rails = tuple(track.blade.element_rail(track, a, b) for a, b in pairwise(node.tolist()))
     _add_rail(track, blade_rails, node, np.array(rows), mass, damping, stiffness)
-    return replace(changed, blade_rail=track.blade.rail, blade_start=first, blade_rows=rows)
+    return replace(changed, blade_rails=blade_rails, blade_start=first, blade_rows=rows)
 
 
 def _blade_nodes(track: Track) -> range:

@@ -189,7 +189,7 @@ def _two_sided_factors(
 
 def _reach(track: Track, matrices: TrackMatrices, s: complex, exponent: float) -> int:
     """Half width of the windows: decay of EI w'''' + s² m w = 0 down to exp(-``exponent``), in rows."""
-    rails = {*matrices.rails, *([matrices.blade_rail] if matrices.blade_rail else [])}
+    rails = {*matrices.rails, *matrices.blade_rails}
     decay = min(float(np.min(np.abs(np.roots([r.bending_stiffness, 0, 0, 0, s * s * r.mass]).real))) for r in rails)
     span = exponent / decay
     node = matrices.node

@@ -279,7 +279,7 @@ def _blade_force(
 ) -> np.ndarray:
     """(n_wheel, n_step) forces [N] of wheels on the blade, from ``surface_force`` (n_wheel, n_surface, n_step)."""
     total = np.zeros((surface_force.shape[0], surface_force.shape[2]))
-    if vehicle is None or prepared.matrices.blade_rail is None:
+    if vehicle is None or not prepared.matrices.blade_rails:
         return total
     time = (np.arange(total.shape[1]) + 0.5) * prepared.dt
     position = drive.start - drive.direction * np.asarray(vehicle.wheel_positions)[:, None] + speed * time

@@ -199,10 +199,13 @@ BLADE_UNITS = {"toe": "m", "heel": "m", "end": "m", "chair_stiffness": "N/m", "c
 
 def _blade(p: ParameterSet) -> Blade | None:
     """The blade of a switch, None without one."""
-    entry = p.optional_mapping_at("blade").allow_only(*BLADE_UNITS, "rail")
+    entry = p.optional_mapping_at("blade").allow_only(*BLADE_UNITS, "rail", "planed")
     if not entry:
         return None
     values = {name: entry.number(name, unit) for name, unit in BLADE_UNITS.items()}
+    planed = entry.optional_mapping_at("planed").allow_only("length", "share")
+    if planed:
+        values |= {"planed_length": planed.number("length", "m"), "planed_share": planed.number("share", "-")}
     return entry.build(Blade, rail=_rail(entry.mapping_at("rail")), **values)
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from turnout import physics
+from turnout.mismatch.engine.evidence import is_at_control_level
 from turnout.mismatch.turnout.unproven_panels import as_unproven
 from turnout.registry.ids import content_id
 from turnout.stages.accepted_effects import describe_term
@@ -437,6 +438,9 @@ def parameter_rows(diagnosis: Diagnosis, case: TrackCase, row: Mapping[str, Any]
 def surface_estimates(case: TrackCase, fit: Fit) -> list[dict]:
     """Estimates of uncertain numbers of the running surface in the track's file.
 
+    A fit that leaves more of the passages than intact track does is no measurement of them: what is missing in the
+    model has moved these numbers.
+
     Parameters
     ----------
     case : TrackCase
@@ -447,10 +451,10 @@ def surface_estimates(case: TrackCase, fit: Fit) -> list[dict]:
     Returns
     -------
     list of dict
-        As those of ``SurfaceParameter.estimate``.
+        As those of ``SurfaceParameter.estimate``; [] for such a fit.
     """
     surface = case.predictor.site.surface
-    return list(surface.estimate(case, fit)) if surface else []
+    return list(surface.estimate(case, fit)) if surface and is_at_control_level(case, fit, "passage") else []
 
 
 def _mean_position(fixed: Mapping[str, Any]) -> float | None:

@@ -101,7 +101,11 @@ def _parameters_of(term: str) -> tuple[physics.Parameter, ...]:
     return effect.parameters if effect else ()
 
 
-PARAMETER_NAMES = {"power": "power of the flanks (1 straight, 2 parabolas)", "share": "share before the deepest point"}
+PARAMETER_NAMES = {
+    "place": "position",
+    "power": "power of the flanks (1 straight, 2 parabolas)",
+    "share": "share before the deepest point",
+}
 
 
 def headline(finding: Mapping[str, Any]) -> str:
@@ -174,7 +178,7 @@ def surface_sentence(estimate: Mapping[str, Any]) -> str:
     value, low, high, filed = (number_in_words(v, estimate["unit"], 3) for v in values)
     name, feature = (
         PARAMETER_NAMES.get(estimate["name"], estimate["name"]),
-        estimate["term"].removeprefix("running_surface_"),
+        estimate["term"].removeprefix("running_surface_").replace("_", " "),
     )
     subject = f"{name} of the {feature} at {estimate['place']:.1f} m"
     return f"The {subject} is {value} ({low.removesuffix(' mm')} to {high}), the track file has {filed}."

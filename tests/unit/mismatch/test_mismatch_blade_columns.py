@@ -41,3 +41,17 @@ def test_columns_in_hammer_tests_are_the_exact_change(case):
 
 def test_every_chair_is_tried_on_hammer_tests(case):
     assert {c.refit.prescreen_group for c in case.candidates} == {"chair", "heel_support"}
+
+
+@pytest.mark.parametrize("name", ["rail_bending", "rail_shear"])
+def test_derivatives_by_the_rail_contain_the_closure_rail_behind_the_heel(case, name):
+    """Against models on a rail 5 % stiffer and softer; without the closure rail the error is 26 to 31 %."""
+    cheap = case.cheap_case()
+    values = {n.name: 0.0 for n in cheap.nuisances}
+    base = cheap.predict(values, (), cheap.observations)
+    column = [n.name for n in cheap.nuisances].index(name)
+    jacobian = cheap.nuisance_jacobian(values, (), cheap.observations, base)
+    plus, minus = (cheap.predict({**values, name: by}, (), cheap.observations) for by in (0.05, -0.05))
+    exact = np.concatenate([(a - b) / 0.1 for a, b in zip(plus, minus)])
+    linear = np.concatenate([j[:, column] for j in jacobian])
+    assert np.linalg.norm(linear - exact) < 5e-3 * np.linalg.norm(exact)

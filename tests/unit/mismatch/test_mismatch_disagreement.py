@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from turnout.mismatch.engine.case import Case
-from turnout.mismatch.engine.cross_validation import jackknife_errors
+from turnout.mismatch.engine.cross_validation import jackknife_errors, jackknife_steps
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
@@ -30,9 +30,9 @@ def test_it_is_the_standard_error_of_the_mean_of_what_each_would_say():
     slopes = np.array([1.7, 2.0, 2.1, 2.6])
     case = Lines(slopes)
     expected = np.std(slopes, ddof=1) / np.sqrt(4)  # for a mean the jackknife is exact
-    assert jackknife_errors(case, fit_jointly(case), "line") == pytest.approx([expected], rel=1e-6)
+    assert jackknife_errors(jackknife_steps(case, fit_jointly(case), "line")) == pytest.approx([expected], rel=1e-6)
 
 
 def test_recordings_that_agree_add_nothing_and_two_cannot_tell():
     for case in (Lines([2.0, 2.0, 2.0]), Lines([1.0, 2.0]), Lines([1.0, 2.0, 3.0], ["line", "other", "other"])):
-        assert jackknife_errors(case, fit_jointly(case), "line") == pytest.approx([0.0], abs=1e-9)
+        assert jackknife_errors(jackknife_steps(case, fit_jointly(case), "line")) == pytest.approx([0.0], abs=1e-9)

@@ -1,5 +1,7 @@
 """A blade beside its stock rail: closed forms of two beams on common bearers, energy, limits, a wheel changing rail."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from tests.oracles.march_numpy import march_numpy
@@ -65,7 +67,7 @@ def test_wheels_change_rails_only_between_a_surface_of_each():
 
 
 def test_a_blade_of_nothing_leaves_the_plain_track():
-    ghost = TRACK.with_(blade=Blade(9.0, 15.0, 24.0, Rail(1.0, 1e-6, 1e3, 1e-9), 1e-2, 0.0))
+    ghost = TRACK.with_(blade=Blade(9.0, 24.0, 24.0, Rail(1.0, 1e-6, 1e3, 1e-9), 1e-2, 0.0))
     frequency = np.linspace(20.0, 1000.0, 50)
     plain, changed = (receptance(prepare(t, 1e-4).matrices, frequency, 12.0, 13.5) for t in (TRACK, ghost))
     assert np.max(np.abs(changed / plain - 1.0)) < 1e-6
@@ -73,6 +75,42 @@ def test_a_blade_of_nothing_leaves_the_plain_track():
     a, b = (run(prepare(t, 1e-4), 0.2, [Probe(12.0)], lone_wheels(600.0), drive) for t in (TRACK, ghost))
     assert np.max(np.abs(a.force - b.force)) < 1e-3
     assert np.max(np.abs(a.signals - b.signals)) < 1e-5 * np.max(np.abs(a.signals))
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_the_planed_blade_grows_to_its_section_and_ends_at_the_closure_rail(mirrored):
+    """Mass of the blade as the integral of its section; no term of the sum is that of an average section."""
+    rail, length, share = Rail(5e6, 66.0, 2e8, 0.2, 3000.0), 2.5, 0.4
+    toe, heel, end = (23.3, 15.7, 6.0) if mirrored else (6.7, 14.3, 24.0)
+    track = TRACK.with_(blade=Blade(toe, heel, end, rail, 3e8, 3e4, length, share), elements_per_bay=3)
+    matrices = prepare(track, 1e-4).matrices
+    node = matrices.node[matrices.blade_start :][: len(matrices.blade_rows)]
+    mass = sum(r.mass * h for r, h in zip(matrices.blade_rails, np.diff(node)))
+    exact = 66.0 * length * (0.5 * share - 0.5) + 66.0 * abs(heel - toe) + TRACK.rail.mass * abs(end - heel)
+    assert mass == pytest.approx(exact, rel=1e-6)
+    beyond = matrices.blade_rails[0 if mirrored else -1]
+    assert beyond == TRACK.rail
+    middle = matrices.blade_rails[np.searchsorted(node, 0.5 * (toe + heel)) - 1]
+    assert middle == rail
+    ratio, flexibility = matrices.line_elements[2][1], matrices.line_elements[3][1]
+    inside = slice(matrices.blade_start, matrices.blade_start + node.size - 1)
+    assert flexibility[inside] == pytest.approx([1.0 / r.bending_stiffness for r in matrices.blade_rails])
+    assert ratio[inside] == pytest.approx([r.shear_ratio(h) for r, h in zip(matrices.blade_rails, np.diff(node))])
+
+
+def test_a_cantilever_planed_to_a_point_share_bends_as_its_closed_form_says():
+    r"""The overhanging toe, :math:`w = \frac{F}{EI} \int_0^L \frac{x^2 dx}{q + (1-q)x/L} + F \int \frac{dx}{GA(x)}`."""
+    rail, q, length, force, per_bay = Rail(6e6, 60.0, 2.4e8, 0.0), 0.3, 0.6, 1.0, 12
+    track = TRACK.with_(blade=Blade(9.05, 20.0, 24.0, rail, 0.0, 0.0, length, q), elements_per_bay=per_bay)
+    elements = np.linspace(0.0, length, per_bay + 1)
+    w = 0.0  # of the tip beside the clamped end, summed over the elements
+    for a, b in pairwise(elements.tolist()):
+        section, square = track.blade.element_rail(track, 9.05 + a, 9.05 + b), (a * a + a * b + b * b) / 3.0
+        w += force * (b - a) * (square / section.bending_stiffness + 1.0 / section.shear_stiffness)
+    c = (1.0 - q) / length
+    exact = force / rail.bending_stiffness * (length**2 / (2 * c) - q * length / c**2 + q**2 / c**3 * np.log(1.0 / q))
+    exact += force / rail.shear_stiffness * np.log(1.0 / q) / c
+    assert w == pytest.approx(exact, rel=2e-3)
 
 
 @pytest.mark.parametrize("mirrored", [False, True])

@@ -55,12 +55,8 @@ def held_out_score(case: Case, fit: Fit) -> dict[str, float]:
     return densities
 
 
-def jackknife_errors(case: Case, fit: Fit, data_type: str) -> np.ndarray:
-    r"""Jackknife standard errors of all parameters over the recordings of one data type.
-
-    :math:`\sqrt{(m - 1) / m \sum (\theta_i - \bar\theta)^2}` over the m recordings, with one Gauss-Newton step for
-    each. It includes errors of single recordings that are no noise, for example of a vehicle file or a coarse time
-    step.
+def jackknife_steps(case: Case, fit: Fit, data_type: str) -> np.ndarray:
+    """Change of all parameters without one recording of a data type, by one Gauss-Newton step.
 
     Parameters
     ----------
@@ -71,22 +67,40 @@ def jackknife_errors(case: Case, fit: Fit, data_type: str) -> np.ndarray:
 
     Returns
     -------
-    (n,) array of float
-        Of the nuisances, then of the effects' parameters. Zeros for fewer than three recordings.
-
-    References
-    ----------
-    Efron and Stein 1981, The jackknife estimate of variance.
+    (m, n) array of float
+        Of the nuisances, then of the effects' parameters, for each of the m recordings; m = 0 for fewer than three.
     """
     joint, theta, sums = _problem_and_sums(case, fit)
     normal = np.eye(theta.size) + sum(p.gram / fit.scale[p.data_type] for p in sums)
     right = (joint.mean - theta) / joint.sd + sum(p.across / fit.scale[p.data_type] for p in sums)
     selected = [p for p in sums if p.data_type == data_type]
     if len(selected) < THRESHOLDS.min_recordings:
-        return np.zeros(theta.size)
+        return np.zeros((0, theta.size))
     scale = fit.scale[data_type]
-    jackknifed = np.array([np.linalg.solve(normal - p.gram / scale, right - p.across / scale) for p in selected])
-    return joint.sd * np.sqrt((len(selected) - 1) * np.var(jackknifed, axis=0))
+    steps = [np.linalg.solve(normal - p.gram / scale, right - p.across / scale) for p in selected]
+    return joint.sd * np.array(steps)
+
+
+def jackknife_errors(steps: np.ndarray) -> np.ndarray:
+    r"""Jackknife standard errors, :math:`\sqrt{(m - 1) / m \sum (\theta_i - \bar\theta)^2}` over m recordings.
+
+    They include errors of single recordings that are no noise, for example of a vehicle file or a coarse time step.
+
+    Parameters
+    ----------
+    steps : (m, n) array of float
+        From ``jackknife_steps``, or values that follow from them.
+
+    Returns
+    -------
+    (n,) array of float
+        Zeros without a recording.
+
+    References
+    ----------
+    Efron and Stein 1981, The jackknife estimate of variance.
+    """
+    return np.sqrt((len(steps) - 1) * np.var(steps, axis=0)) if len(steps) else np.zeros(steps.shape[1])
 
 
 def single_type_estimate(case: Case, fit: Fit, data_type: str, name: str, sd: float) -> float:

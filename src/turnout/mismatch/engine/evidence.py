@@ -181,6 +181,25 @@ def worst_excess(search: Search, fit: Fit) -> float:
     return max(excess_ratio(search, fit), worst_channel_excess(search.case, fit))
 
 
+def is_at_control_level(case: Case, fit: Fit, data_type: str) -> bool:
+    """Whether a fit leaves no more of the recordings of a data type than it leaves in controls, in each channel.
+
+    Parameters
+    ----------
+    case : Case
+        With control levels of its own.
+    fit : Fit
+    data_type : str
+
+    Returns
+    -------
+    bool
+        Also True where the case has no such control level or recordings.
+    """
+    level = fit.level.get(data_type, 0.0)
+    return level <= case.control_level.get(data_type, np.inf) and worst_channel_excess(case, fit) <= 1.0
+
+
 def worst_channel_excess(case: Case, fit: Fit) -> float:
     """Largest mean square of one channel in one recording over that of controls.
 

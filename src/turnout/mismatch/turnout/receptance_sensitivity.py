@@ -241,12 +241,27 @@ class ReceptanceSensitivity:
 
         with :math:`s = \theta_2 - \theta_1`, :math:`a = (w_2 - w_1)/h - (\theta_1 + \theta_2)/2` of each element and P
         its share of shear: the two modes of the element (Przemieniecki 1968, ch. 11). Its mass hardly depends on them.
+        The closure rail behind a blade is of the same section.
         """
         matrices = self.model.matrices
         h, p, ei, _ = matrices.elements
+        total = rail_derivatives(
+            self._displacements, self._positions[1], matrices.node_index, h, self._rail_weights(h, p, ei)
+        )
+        blade = self.model.track.blade
+        if blade is not None:
+            inside = slice(matrices.blade_start, matrices.blade_start + len(matrices.blade_rails))
+            middle = matrices.node[inside] + 0.5 * h[inside]
+            is_closure = blade.direction * (middle - blade.heel) > 0.0
+            weights = is_closure * self._rail_weights(h[inside], p[inside], ei[inside])
+            rows = np.array(matrices.blade_rows)
+            total += rail_derivatives(self._displacements, self._positions[1], rows, h[inside], weights)
+        return total
+
+    def _rail_weights(self, h: np.ndarray, p: np.ndarray, ei: np.ndarray) -> np.ndarray:
+        """(3, n_element) weights of ``rail_derivatives``."""
         sheared = 12.0 * ei / (h * (1.0 + p) ** 2)
-        weights = np.array([ei / h, sheared, self.model.file_shear_share * sheared * p])
-        return rail_derivatives(self._displacements, self._positions[1], matrices.node_index, h, weights)
+        return np.array([ei / h, sheared, self.model.file_shear_share * sheared * p])
 
     @cached_property
     def _by_castings(self) -> np.ndarray:

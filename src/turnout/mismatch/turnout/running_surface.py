@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.mismatch.engine.cross_validation import jackknife_errors
+from turnout.mismatch.engine.cross_validation import jackknife_errors, jackknife_steps
 from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.turnout.change_position import change_estimate
 from turnout.mismatch.turnout.priors import TRACK
 from turnout.mismatch.turnout.surface_priors import SURFACE, WHEELS
 from turnout.mismatch.turnout.top_shape import top_shapes, with_shapes
+from turnout.simulate.blade import is_on_blade
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -188,6 +190,12 @@ class RunningSurface:
         )
         return with_shapes(surfaces, self.shapes.get(route, []), values)
 
+    def _tops(self, route: str) -> list[PathPart]:
+        """Components of the tops of a route where wheels change to a blade; [] elsewhere."""
+        surfaces = self.turnout.surfaces(route)
+        lines = [is_on_blade(surface) for surface in surfaces]
+        return [c for s in surfaces for c in s] if any(lines) and not all(lines) else []
+
     def estimate(self, case: Case, fit: Fit) -> Iterator[dict[str, Any]]:
         r"""Yield a dict for each number that ``fit`` determines better than the file, or that contradicts the file.
 
@@ -196,6 +204,7 @@ class RunningSurface:
         Values are those of the recordings without the prior, so that repeated visits are not all drawn to the file.
         With the fit's :math:`m, s^2` under a prior of variance :math:`\tau^2` they are :math:`m / c` of variance
         :math:`s^2 / c`, :math:`c = 1 - s^2 / \tau^2`, at least ``SURFACE.min_data_share``.
+        Of the tops of a switch only the position of the change is measured, see ``change_position``.
 
         Parameters
         ----------
@@ -210,10 +219,15 @@ class RunningSurface:
             Yield a dict for each number that ``fit`` determines better than the file, or that contradicts the file.
         """
         index = {n.name: k for k, n in enumerate(case.nuisances)}
-        between_trains = (
-            jackknife_errors(case, fit, "passage") if self.parameters and fit.jacobian else np.zeros(len(index))
-        )
+        has_steps = self.parameters and fit.jacobian
+        steps = jackknife_steps(case, fit, "passage") if has_steps else np.zeros((0, len(index)))
+        between_trains = jackknife_errors(steps)
+        changes = [change_estimate(self, route, case, fit, steps) for route in self.shapes]
+        yield from (c for c in changes if c is not None and c["is_measured"])
+        of_tops = {c for route in self.shapes for c in self._tops(route)}
         for u in self.parameters:
+            if u.component in of_tops:
+                continue
             k = index[u.name]
             model = SURFACE.model_position_error if u.field in POSITION_FIELDS else SURFACE.model_error
             sd, variance = u.nuisance.sd, fit.covariance[k, k]

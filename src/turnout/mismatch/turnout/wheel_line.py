@@ -199,7 +199,7 @@ def blade_rows(matrices: TrackMatrices) -> np.ndarray:
     (n_node,) array of int
     """
     rows = matrices.node_index.copy()
-    if matrices.blade_rail is not None:
+    if matrices.blade_rails:
         rows[matrices.blade_start : matrices.blade_start + len(matrices.blade_rows)] = matrices.blade_rows
     return rows
 
