@@ -57,6 +57,9 @@ def finding_of_change(
     }  # fmt: skip
     if supports := supports_of(answer):
         row |= {"first_m": supports[0], "last_m": supports[-1]}
+    if answer.ends is not None:
+        row |= dict(zip(("first_low_m", "first_high_m"), answer.ends.first))
+        row |= dict(zip(("last_low_m", "last_high_m"), answer.ends.last))
     nats = (answer.gain or 0.0) + (test.finding.get("gain_nats", 0.0) if test is not None else 0.0)
     if answer.gain is not None:
         row["gain_nats"] = nats

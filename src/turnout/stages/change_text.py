@@ -31,9 +31,7 @@ def sentence_of(row: Mapping[str, Any], n_with_trains: int = 0) -> str:
         if row["n_visits"] < 2:
             return f"{basis}: at least two visits are needed"
         return f"{basis}: no change at any support has enough evidence"
-    position = "" if row["position_m"] is None else f" at {row['position_m']:.1f} m"
-    if row.get("first_m") != row.get("last_m"):
-        position = f" from {row['first_m']:.1f} to {row['last_m']:.1f} m"
+    position = _position_words(row)
     if row["verdict"] == "unknown":
         since = _since_words(row)
         return (
@@ -44,6 +42,29 @@ def sentence_of(row: Mapping[str, Any], n_with_trains: int = 0) -> str:
     if row.get("trains_visit") is None:
         return f"{words}; no train since then tells more"
     return words + _train_words(row)
+
+
+def _position_words(row: Mapping[str, Any]) -> str:
+    """Where the change is; of one of adjacent supports how far it reaches, where that is not certain."""
+    if row.get("first_m") is None:
+        return "" if row["position_m"] is None else f" at {row['position_m']:.1f} m"
+    first, last = (f"{row[end]:.1f}" for end in ("first_m", "last_m"))
+    words = f" at {first} m" if first == last else f" from {first} to {last} m"
+    ends = [
+        _end_words("first support", row.get("first_low_m"), row.get("first_high_m"), "before"),
+        _end_words("last support", row.get("last_high_m"), row.get("last_low_m"), "beyond"),
+    ]
+    uncertain = [end for end in ends if end]
+    return f"{words} ({', '.join(uncertain)}, 95 %)" if uncertain else words
+
+
+def _end_words(end: str, outer: float | None, inner: float | None, farther: str) -> str:
+    """Interval of one end, "" if it is certain or not known."""
+    if inner is None or outer == inner:
+        return ""
+    if outer is None:
+        return f"{end} at {inner:.1f} m or {farther}"
+    return f"{end} at {min(outer, inner):.1f} to {max(outer, inner):.1f} m"
 
 
 def _since_words(row: Mapping[str, Any]) -> str:

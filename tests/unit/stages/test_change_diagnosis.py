@@ -3,6 +3,7 @@
 import os
 import shutil
 import signal
+from dataclasses import replace
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -14,7 +15,7 @@ import small_turnout as small
 
 from turnout import physics
 from turnout.config import load_configuration, with_raw
-from turnout.mismatch.calibrated import GroupInformation, ModelAnswer
+from turnout.mismatch.calibrated import GroupInformation, ModelAnswer, StretchEnds
 from turnout.records import Unit
 from turnout.stages import change_diagnosis, change_units
 from turnout.stages.change_diagnosis import change_unit
@@ -249,6 +250,24 @@ def test_hammer_tests_and_trains_give_one_answer(given, test, expected):
     row = finding_of_change(given, test, 4, 8)
     assert (row["verdict"], row["term"], row["rival_term"]) == expected
     assert "-63 % (-70 to -55, 95 %)" in row["sentence"] and "8 hammer tests of 4 visits" in row["sentence"]
+
+
+@pytest.mark.parametrize(
+    ("changed", "first", "last", "words"),
+    [
+        ((18.0, 18.6), (18.0, 18.0), (18.6, 18.6), "local pad from 18.0 to 18.6 m: "),
+        ((18.0,), (17.4, 18.0), (18.0, 18.6), "18.0 m (first support at 17.4 to 18.0 m, last support at 18.0 to 18.6"),
+        ((18.0, 18.6), (18.0, 18.0), (18.6, None), "from 18.0 to 18.6 m (last support at 18.6 m or beyond, 95 %): "),
+        ((18.0, 18.6), (None, 18.0), (18.0, 18.6), "(first support at 18.0 m or before, last support at 18.0 to 18.6"),
+    ],
+)  # fmt: skip
+def test_the_sentence_says_how_far_a_change_may_reach(changed, first, last, words):
+    named = replace(
+        answer("named", ("local_pad",)), changed=tuple(f"pad@{x:.2f}" for x in changed), ends=StretchEnds(first, last)
+    )
+    row = finding_of_change(named, None, 4, 8)
+    assert words in row["sentence"]
+    assert (row["first_low_m"], row["last_high_m"]) == (first[0], last[1])
 
 
 def test_no_change_and_too_few_visits_are_no_name():

@@ -7,7 +7,7 @@ from turnout.mismatch.calibrated.change import ChangeEffect, OnsetEvidence, comp
 from turnout.mismatch.calibrated.file_comparison import Deviation, deviations_from_file, track_sds
 from turnout.mismatch.calibrated.history import Event, History, estimate_history
 from turnout.mismatch.calibrated.information import GroupInformation, VisitInformation
-from turnout.mismatch.calibrated.model_answer import ModelAnswer
+from turnout.mismatch.calibrated.model_answer import ModelAnswer, StretchEnds
 
 __all__ = [
     "Belief",
@@ -20,6 +20,7 @@ __all__ = [
     "ModelAnswer",
     "OnsetEvidence",
     "StateParameter",
+    "StretchEnds",
     "VisitInformation",
     "answers_after_visits",
     "change_answer",

@@ -35,8 +35,8 @@ from turnout.mismatch.calibrated.stiffness_under_load import (
     with_evidence_under_load,
     with_offsets,
 )
+from turnout.mismatch.calibrated.stretch_ends import STRETCH_GROUPS, changes_alike, stretch_ends
 
-STRETCH_GROUPS = ("ballast", "pad")  # of which adjacent supports change together
 DAMPER_SHARES = (0.5, 1.0)  # change of the logarithm of the damping over that of the stiffness
 
 
@@ -194,7 +194,8 @@ def change_answer(
         names = names_of_softer_ballast(*information, events, leader, _present_size(leader), margin, levels)
     rivals = [name_of(e.effect, by_name) for e in material if e.gain > leader.gain - margin]
     answer = stated.answer(visit, CHANGE, with_rivals(names, stated, rivals))
-    return replace(answer, changed=tuple(leader.effect.direction), total=_present_size(leader)[0])
+    ends = stretch_ends(changes_alike(evidence, leader, by_name), by_name)
+    return replace(answer, changed=tuple(leader.effect.direction), total=_present_size(leader)[0], ends=ends)
 
 
 def _evidence_of_changes(
@@ -226,11 +227,7 @@ def _evidence_of_name(material: Sequence[OnsetEvidence], by_name: Mapping[str, S
     """Sum of the likelihood ratios of all candidates with the name and the sign of the first one. [nats]"""
     if not material:
         return -np.inf
-    effect, size = material[0].effect, material[0].size[0]
-    alike = [
-        e.gain for e in material if name_of(e.effect, by_name) == name_of(effect, by_name) and e.size[0] * size > 0.0
-    ]
-    return float(np.logaddexp.reduce(alike))
+    return float(np.logaddexp.reduce([e.gain for e in changes_alike(material, material[0], by_name)]))
 
 
 def _events_of_change(

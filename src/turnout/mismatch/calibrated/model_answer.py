@@ -25,6 +25,18 @@ NAMES = {
 
 
 @dataclass(frozen=True)
+class StretchEnds:
+    """Intervals of the positions of the first and the last support that have changed. [m]
+
+    ``first`` and ``last`` are (least, largest). None is an open end: the change may reach farther than the supports
+    that can be told from each other, or than the longest stretch that is compared.
+    """
+
+    first: tuple[float | None, float]
+    last: tuple[float, float | None]
+
+
+@dataclass(frozen=True)
 class ModelAnswer:
     """Answer of the calibrated model after one ``visit``.
 
@@ -32,7 +44,7 @@ class ModelAnswer:
     ``parameter`` has changed by ``size`` (standard error ``sd``, ``unit``), or by as much per year if it ``grows``.
     ``onset``: last time without and first time with the change [years], None against the file. ``gain`` is the evidence
     less the logarithm of the number of candidates [nats], None where the answer does not rest on one. ``changed`` are
-    all parameters that change alike, ``total`` is the change of each at the visit.
+    all parameters that change alike, ``total`` is the change of each at the visit, ``ends`` are those of their stretch.
     """
 
     visit: str
@@ -50,6 +62,7 @@ class ModelAnswer:
     grows: bool = False
     changed: tuple[str, ...] = ()
     total: float | None = None
+    ends: StretchEnds | None = None
 
 
 @dataclass(frozen=True)
