@@ -55,3 +55,22 @@ def test_derivatives_by_the_rail_contain_the_closure_rail_behind_the_heel(case, 
     exact = np.concatenate([(a - b) / 0.1 for a, b in zip(plus, minus)])
     linear = np.concatenate([j[:, column] for j in jacobian])
     assert np.linalg.norm(linear - exact) < 5e-3 * np.linalg.norm(exact)
+
+
+@pytest.mark.parametrize("name", ["chair_stiffness", "chair_damping"])
+@pytest.mark.parametrize("effect", ["", "slide_chair_gap", "heel_support"])
+def test_derivatives_by_the_chairs_follow_those_that_an_effect_leaves(case, name, effect):
+    """Against central differences. A chair without contact does not follow."""
+    cheap = case.cheap_case()
+    candidates = [c for c in cheap.candidates if c.family == effect]
+    terms = tuple(c.term(c.starts[-1]) for c in candidates[1:2] or candidates[:1])
+    assert bool(terms) is bool(effect)
+    values = {n.name: 0.0 for n in cheap.nuisances} | {name: 0.2}
+    base = cheap.predict(values, terms, cheap.observations)
+    column = [n.name for n in cheap.nuisances].index(name)
+    jacobian = cheap.nuisance_jacobian(values, terms, cheap.observations, base)
+    plus, minus = (cheap.predict({**values, name: 0.2 + by}, terms, cheap.observations) for by in (1e-3, -1e-3))
+    exact = np.concatenate([(a - b) / 2e-3 for a, b in zip(plus, minus)])
+    linear = np.concatenate([j[:, column] for j in jacobian])
+    assert np.linalg.norm(exact) > 0.0
+    assert np.linalg.norm(linear - exact) < 1e-3 * np.linalg.norm(exact)

@@ -13,6 +13,7 @@ from turnout.mismatch.turnout.receptance_model import ReceptanceModel
 from turnout.mismatch.turnout.receptance_sensitivity import ReceptanceSensitivity
 from turnout.mismatch.turnout.track_parameters import COMMON_PARAMETERS, SUPPORT_PARAMETERS, castings_of
 from turnout.simulate import uniform_track
+from turnout.simulate.blade import Blade
 from turnout.simulate.matrices import assemble
 from turnout.simulate.track import RailStretch
 
@@ -53,6 +54,21 @@ def test_a_skeleton_does_not_know_which_track_came_first():
         matrices_of(first)
         found.append(matrices_of(one).stiffness)
     assert np.array_equal(*found)
+
+
+@pytest.mark.parametrize("terms", [(), (physics.HeelSupport(22, 23, 0.3),)], ids=["none", "heel"])
+def test_tracks_that_differ_in_their_chairs_share_a_skeleton_and_are_the_assembled_ones(terms):
+    track = uniform_track(24.0)
+    matrix_cache._templates.clear()
+    for stiffness, damping in ((3e8, 3e4), (2e8, 5e4)):
+        blade = Blade(6.7, 13.0, 18.0, track.rail, stiffness, damping, 2.0, 0.5)
+        full, filled = (f(track.with_(blade=blade), terms) for f in (assemble, matrices_of))
+        assert filled.index == full.index
+        for name in ("mass", "damping", "stiffness"):
+            a, b = getattr(full, name), getattr(filled, name)
+            assert b == pytest.approx(a, rel=1e-9, abs=1e-9 * np.abs(a).max())
+        assert filled.blade_rails == full.blade_rails
+    assert len(matrix_cache._templates) == 1
 
 
 PAIR = SimpleNamespace(test=SimpleNamespace(place=10.7), seat=("S", 11.0))

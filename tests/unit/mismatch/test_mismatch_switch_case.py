@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from turnout.mismatch.turnout import TrackCase
@@ -37,3 +38,9 @@ def test_a_case_with_a_blade_is_not_proven_also_if_no_wheel_changes_to_it(campai
     values = {n.name: case.start_values.get(n.name, n.mean) for n in case.nuisances}
     case.predict({**values, "ballast_stiffness": 0.01}, (), [passage])
     assert case.n_simulations == before + 1
+    (base,) = case.predict(values, (), [passage])
+    (jacobian,) = case.nuisance_jacobian(values, (), [passage], [base])
+    column = [n.name for n in case.nuisances].index("chair_stiffness")
+    (stiffer,) = case.predict({**values, "chair_stiffness": values["chair_stiffness"] + 0.04}, (), [passage])
+    assert np.linalg.norm(stiffer - base) > 0.0
+    assert jacobian[:, column] == pytest.approx((stiffer - base) / 0.04, rel=1e-6, abs=1e-9)

@@ -54,9 +54,16 @@ def matrices_of(track: Track, terms: Sequence[PhysicsTerm] = ()) -> TrackMatrice
     joins = frozenset(tuple(name for name, _ in link.ends) for link in links if len(link.ends) > 1)
     key = (
         track.support.tobytes(), track.elements_per_bay, track.pad_width, track.pad_loss_factor.tobytes(),
-        track.ballast_loss_factor.tobytes(), track.blade, extra, joins,
+        track.ballast_loss_factor.tobytes(), _unit_chairs(track).blade, extra, joins,
     )  # fmt: skip
     return _get_or_compute(_templates, key, lambda: MatrixTemplate(track, links)).fill(track, links)
+
+
+def _unit_chairs(track: Track) -> Track:
+    """The track with 1 for the values of the chairs of its blade."""
+    if track.blade is None:
+        return track
+    return track.with_(blade=replace(track.blade, chair_stiffness=1.0, chair_damping=1.0))
 
 
 def _get_or_compute(cache: OrderedDict[Hashable, _Value], key: Hashable, compute: Callable[[], _Value]) -> _Value:
@@ -98,13 +105,15 @@ class MatrixTemplate:
 
     def __init__(self, track: Track, links: Sequence[Link]):
         zero_links = [replace(k, stiffness=0.0, damping=0.0, mass=0.0, loss_factor=0.0) for k in links]
-        track = track.with_(**{name: np.ones(track.support.size) for name, *_ in SUPPORT_FIELDS})
+        track = _unit_chairs(track.with_(**{name: np.ones(track.support.size) for name, *_ in SUPPORT_FIELDS}))
         self.base = link_matrices(track, [*track.links(), *zero_links])
         support_links = [(j, link) for j in range(track.support.size) for link in track.support_links(j)]
         self.support_entries = {
             tag: self._matrix_entries([(j, k) for j, k in support_links if k.tag == tag])
             for _, _, tag in SUPPORT_FIELDS
         }
+        chairs = [track.blade.chair_link(j) for j in track.blade.chairs(track)] if track.blade else []
+        self.chair_entries = self._matrix_entries((0, link) for link in chairs)
         self.rail_bases: OrderedDict[Hashable, TrackMatrices] = OrderedDict()
         self.link_entries: OrderedDict[Hashable, tuple[np.ndarray, ...]] = OrderedDict()
 
@@ -149,6 +158,10 @@ class MatrixTemplate:
         for name, what, tag in SUPPORT_FIELDS:
             diagonal, row, weight, support = self.support_entries[tag]
             np.add.at(matrices[what], (diagonal, row), weight * (getattr(track, name) - 1.0)[support])
+        if track.blade is not None and self.chair_entries:
+            diagonal, row, weight, _ = self.chair_entries
+            np.add.at(matrices["stiffness"], (diagonal, row), weight * (track.blade.chair_stiffness - 1.0))
+            np.add.at(matrices["damping"], (diagonal, row), weight * (track.blade.chair_damping - 1.0))
         if any(k.loss_factor for k in links) or track.pad_loss_factor.any() or track.ballast_loss_factor.any():
             return assemble(track, (FixedLinks(links),))  # hysteresis depends on the stiffness: assembled in full
         if links:

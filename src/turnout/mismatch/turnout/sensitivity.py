@@ -8,6 +8,7 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.turnout import passage_band
+from turnout.mismatch.turnout.chair_parameters import chair_gradients, chair_nuisances
 from turnout.mismatch.turnout.priors import PASSAGE, RECEPTANCE, SIMULATION, TRACK
 from turnout.mismatch.turnout.pseudo_forces import support_columns, support_motion
 from turnout.mismatch.turnout.rail_roughness import wave_columns
@@ -116,6 +117,9 @@ def pair_jacobians(
     rail = np.empty((2 * factors.size, len(predictor.rail)))
     samples.write(samples.at(sensitivity.rail_gradients) * factors[:, None], rail)
     stacked[:, [index[name] for name in predictor.rail]] = rail
+    for name, gradient in chair_gradients(sensitivity).items():
+        if name in index:
+            samples.write(samples.at(gradient)[:, None] * factors[:, None], stacked[:, index[name] : index[name] + 1])
     seat_columns = samples.to_observations(samples.at(sensitivity.seat_gradients) * factors)
     jacobians = samples.split(stacked)
     for pair, jacobian, predicted, by_seat in zip(samples.pairs, jacobians, predictions, seat_columns):
@@ -305,7 +309,9 @@ def _passage_columns(
     yield from _seat_columns(predictor, values, terms, aligned, predicted)
     histories = support_motion(predictor, values, terms, aligned)
     columns = support_columns(predictor, values, terms, aligned, histories)
+    simulated = [n.name for n in chair_nuisances([predictor.track(aligned.passage.route)])]
     if is_in_switch(predictor, aligned):  # chairs open and close with it
-        name = "ballast_stiffness"
+        simulated.append("ballast_stiffness")
+    for name in simulated:
         columns[name] = _difference(predictor, values, terms, aligned, predicted, name, SIMULATION.log_step)
     yield from columns.items()

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.turnout.chair_parameters import chair_nuisances, chair_values, with_chairs
 from turnout.mismatch.turnout.priors import TRACK
 from turnout.simulate.track import NODE_TOLERANCE, PER_SUPPORT, RailStretch
 
@@ -284,7 +285,7 @@ def track_nuisances(zone: Zone, trains: Iterable[str]) -> list[Nuisance]:
     Returns
     -------
     list of Nuisance
-        First those of ``track_value_names``, then rail and wheelsets.
+        First those of ``track_value_names``, then rail, chairs of a blade and wheelsets.
     """
     nuisances = [
         Nuisance(
@@ -311,6 +312,7 @@ def track_nuisances(zone: Zone, trains: Iterable[str]) -> list[Nuisance]:
                 group="rail",
             )
         )
+    nuisances += chair_nuisances((zone.turnout.track, *zone.turnout.tracks.values()))
     for train in trains:
         nuisances.append(
             Nuisance(
@@ -369,7 +371,7 @@ def track_with(track: Track, zone: Zone, values: Values) -> Track:
     for parameter in SUPPORT_PARAMETERS:
         for j in zone.supports:
             changes[parameter.field][j] *= np.exp(values[f"{parameter.tag}_{j}"])
-    return track.with_(**changes)
+    return with_chairs(track.with_(**changes), values)
 
 
 def track_value_names(zone: Zone) -> list[str]:
@@ -409,7 +411,7 @@ def track_value_key(zone: Zone, values: Values) -> bytes:
     -------
     bytes
     """
-    return np.array(itemgetter(*track_value_names(zone))(values)).tobytes()
+    return np.array((*itemgetter(*track_value_names(zone))(values), *chair_values(values))).tobytes()
 
 
 def vehicle_with(vehicle: Vehicle, values: Values, train: str, load: float) -> Vehicle:
