@@ -158,7 +158,7 @@ REASONS = {
     "entry_unknown": "an entry of the file may state a rate, scale or unit, unexplained; its recordings are used",
     "library_warning": "the library that reads the format warns about the file; its recordings are used",
     "condition_lost": "names, or a condition such as a temperature, are damaged in the file; its recordings are used",
-    "not_finite": "NaN or infinity in the samples",
+    "not_finite": "missing samples: NaN, infinity, or a number that stands for them",
     "dead_channel": "a channel is constant or below its noise floor",
     "sign_reversed": "the force is negative at contact: the sign is reversed",
     "clock_backwards": "the time stamps run backwards",

@@ -8,7 +8,7 @@ from dataclasses import replace
 from os import PathLike
 
 from turnout.errors import ReadError, TurnoutError
-from turnout.readers.formats import FORMATS, Format, detect_format, reject_spreadsheet
+from turnout.readers.formats import FORMATS, Format, detect_format, reject_archive, reject_spreadsheet
 from turnout.readers.interpret import convert_records
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source, load
 from turnout.records import LongRecording, RawDescription, ReadResult, Recording
@@ -239,6 +239,7 @@ def _collected_warnings(source: Source) -> Iterator[list[ReadError]]:
 
 def _format_of(source: Source, description: RawDescription) -> Format:
     reject_spreadsheet(source)
+    reject_archive(source)
     if description.format == "auto":
         return detect_format(source)
     if description.format not in FORMATS:

@@ -376,6 +376,22 @@ def matrices(variables: Mapping[str, Any]) -> dict[str, Any]:
     return {name: v for name, v in arrays.items() if v.ndim in (2, 3) and min(v.shape) >= 1 and max(v.shape) > 1}
 
 
+def is_flag_series(array: Any) -> bool:
+    """Whether an array holds true and false, as the mask of invalid samples does; all equal it says nothing.
+
+    Parameters
+    ----------
+    array : array or LazyColumn
+        Numbers of any type.
+
+    Returns
+    -------
+    bool
+        False for any other type.
+    """
+    return bool(array.dtype.kind == "b" and np.any(array[:]) and not np.all(array[:]))
+
+
 def vectors(variables: Mapping[str, Any]) -> dict[str, Any]:
     """Vectors that can be channels; those much shorter than the longest are metadata, not samples.
 
@@ -387,7 +403,7 @@ def vectors(variables: Mapping[str, Any]) -> dict[str, Any]:
     Returns
     -------
     dict of str to any
-        Numeric vectors that are longer than half of the longest and have no name of metadata.
+        Vectors of numbers or flags that are longer than half of the longest and have no name of metadata.
     """
     reserved_names = {
         *TIME_NAMES,
@@ -400,7 +416,7 @@ def vectors(variables: Mapping[str, Any]) -> dict[str, Any]:
     candidates = {
         name: v
         for name, v in variables.items()
-        if isinstance(v, ARRAYS) and v.ndim == 1 and v.dtype.kind in "fiu" and v.size > 1
+        if isinstance(v, ARRAYS) and v.ndim == 1 and v.size > 1 and (v.dtype.kind in "fiu" or is_flag_series(v))
         if name.lower() not in reserved_names and not (is_rate_name(name) and v.size <= MAX_ENTRIES)
     }
     longest = max((v.size for v in candidates.values()), default=0)

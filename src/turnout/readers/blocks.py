@@ -61,13 +61,16 @@ class ChannelStatistics:
     """Statistics of each channel (n_channel,) over the blocks read so far.
 
     ``n_bad`` is the number of samples that are not finite or mark missing ones, ``first_bad`` the index of the first of
-    them, ``value`` the first sample, ``constant`` whether all samples equal it.
+    them, ``value`` the first sample, ``constant`` whether all samples equal it. ``lowest`` and ``highest`` are the
+    extremes.
     """
 
     n_bad: np.ndarray
     first_bad: np.ndarray
     value: np.ndarray
     constant: np.ndarray
+    lowest: np.ndarray
+    highest: np.ndarray
 
     @classmethod
     def from_record(cls, block_reader: BlockReader, n_sample: int) -> ChannelStatistics:
@@ -115,7 +118,9 @@ class ChannelStatistics:
 
     @classmethod
     def _empty(cls, n: int) -> ChannelStatistics:
-        return cls(np.zeros(n, int), np.full(n, -1), np.zeros(n), np.ones(n, bool))
+        return cls(
+            np.zeros(n, int), np.full(n, -1), np.zeros(n), np.ones(n, bool), np.full(n, np.inf), np.full(n, -np.inf)
+        )
 
     def by_channel(self) -> list[tuple[int, int, float, bool]]:
         """(n_bad, first_bad, value, constant) of each channel."""
@@ -125,7 +130,9 @@ class ChannelStatistics:
         if start == 0:
             self.value = samples[:, 0].copy()
         for i, row in enumerate(samples):
-            self.constant[i] &= bool(row[0] == self.value[i] == row[-1] and row.min() == row.max())
+            self.lowest[i] = min(self.lowest[i], row.min())
+            self.highest[i] = max(self.highest[i], row.max())
+            self.constant[i] = self.lowest[i] == self.value[i] == self.highest[i]
             with np.errstate(over="ignore", invalid="ignore"):
                 suspect = not abs(row.sum()) < LARGEST_NUMBER
             if suspect and not (finite := np.abs(row) < LARGEST_NUMBER).all():

@@ -333,7 +333,7 @@ def _csv(source: Source) -> None:
     lines = source.head.splitlines()[:-1] or [source.head]
     with source.path.open("rb") as file:
         lines.append(file.readline(2**22))
-    _check_columns(max(max(line.count(c) for c in (b",", b";", b"\t")) + 1 for line in lines), source)
+    _check_columns(max(max(line.count(c) for c in (b",", b";", b"\t", b"|")) + 1 for line in lines), source)
 
 
 def _check_columns(n_column: int, source: Source) -> None:

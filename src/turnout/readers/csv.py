@@ -2,16 +2,17 @@
 
 What is recognised:
 
-* separators: comma, semicolon or tab; a decimal comma where the separator is not a comma;
+* separators: comma, semicolon, tab, ``|`` or blanks; a decimal comma where the separator is not a comma;
 * head lines with or without ``#``: ``rate`` or ``dt`` and what ``rate_words`` recognises, ``started_at``,
   ``n_records``, ``n_samples``, conditions, and the words of other languages listed in ``named_arrays``;
 * units in brackets after the names ("force [N]", "force (N)") or in a line of their own;
-* a column of time, and a column ``record`` that numbers the records.
+* a column of time in numbers or as the time of day, "13.05.2026 10:00:00.00005"; a column ``record`` that numbers the
+  records.
 
 Without names channels are called "0", "1" ... All lines of the head are entries in which ``turnout.readers.statements``
 finds the sampling rate.
 
-The text is UTF-8, or UTF-16 with a byte order mark. Head lines that are neither are read as Windows-1252.
+The text is UTF-8, UTF-16, or UTF-32 with a byte order mark. Head lines that are neither are read as Windows-1252.
 A last line without line break may end in a truncated number: it is left out and reported, unless its last number has as
 many decimals as all others.
 """
@@ -37,8 +38,18 @@ from turnout.readers.array_metadata import (
     START_NAMES,
     Metadata,
 )
+from turnout.readers.clock_texts import is_clock_or_date, with_durations
 from turnout.readers.csv_cells import MISSING_VALUES, cell_errors, check_thousands
-from turnout.readers.csv_header import read_head, seconds_per_number, time_column
+from turnout.readers.csv_header import (
+    BLANK,
+    cells_of,
+    decode_line,
+    entries_of_lines,
+    first_cells,
+    read_head,
+    seconds_per_number,
+    time_column,
+)
 from turnout.readers.entries import Entry
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.lost_entries import control_character_errors
@@ -65,7 +76,7 @@ def read_raw(source: Source) -> RawFile:
     ReadError
         If the head, the columns or a number cannot be read, or the last line is incomplete.
     """
-    encoding = utf16_encoding(source.head)
+    encoding = wide_encoding(source.head)
     lazy = source.lazy and not encoding
     data = source.memory_map if lazy else _in_utf8(source, encoding) if encoding else source.data
     if isinstance(data, bytes):
@@ -74,15 +85,24 @@ def read_raw(source: Source) -> RawFile:
         data = data.replace(b"\r", b"\n")
     data, remarks = _without_cut_row(data, source)
     head, names, units, offset, separator, entries = read_head(data, source)
-    read_columns = (
-        _lazy_columns if lazy and "record" not in [name.strip().lower() for name in names] else _columns_in_memory
-    )
+    if separator == BLANK:
+        data = data[:offset] + _with_single_blanks(data[offset:])
+    is_in_memory = separator == BLANK or "record" in [name.strip().lower() for name in names]
+    is_in_memory = is_in_memory or any(map(is_clock_or_date, first_cells(data, offset, separator)))
+    read_columns = _lazy_columns if lazy and not is_in_memory else _columns_in_memory
     time = time_column(names, units)
-    columns = read_columns(source, data, offset, separator, names, time)
+    columns, footer = read_columns(source, data, offset, separator, names, time)
+    entries = (*entries, *footer)
     remarks += control_character_errors(data[:offset], source)
     facts = Metadata(head, source)
     records = tuple(_records(columns, names, units, time, facts, source, entries))
     return RawFile(records, facts.count(RECORD_COUNT_NAMES), remarks)
+
+
+def _with_single_blanks(rows: bytes) -> bytes:
+    """Rows with one blank between two words and none at either end."""
+    rows = re.sub(rb" +", b" ", rows).replace(b"\n ", b"\n")
+    return rows.replace(b" \n", b"\n").replace(b" \r\n", b"\r\n").strip(b" ")
 
 
 N_COMPARED_ROWS = 20  # rows whose last numbers are compared with one that may be cut
@@ -117,7 +137,8 @@ def _without_cut_row(data: bytes | mmap, source: Source) -> tuple[bytes | mmap, 
 
 def _shape(row: bytes) -> tuple[int, int]:
     """Number of separators, and of digits behind the last decimal mark, of a row of numbers."""
-    cells = re.split(rb"[;\t]" if re.search(rb"[;\t]", row) else rb",", row.strip())
+    separator = next((s for s in (rb"[;\t|]", rb",", rb" +") if re.search(s, row.strip())), rb",")
+    cells = re.split(separator, row.strip())
     decimals = re.fullmatch(rb' *"?[+-]?\d*[.,](\d+)(?:[eE][+-]?\d+)?"? *', cells[-1])
     return len(cells), len(decimals[1]) if decimals else 0
 
@@ -126,8 +147,8 @@ END_OF_FILE = b"\x1a"  # the mark with which programs of DOS end a text
 MIN_UTF16_SIZE = 16  # bytes: fewer do not tell the encoding
 
 
-def utf16_encoding(head: bytes) -> str:
-    """Encoding of a text in UTF-16, by its byte order mark or by the zero bytes of its Latin letters and digits.
+def wide_encoding(head: bytes) -> str:
+    """Encoding of a text in UTF-16 or UTF-32, by its byte order mark or by the zero bytes of its letters in UTF-16.
 
     Parameters
     ----------
@@ -141,11 +162,11 @@ def utf16_encoding(head: bytes) -> str:
 
     Examples
     --------
-    >>> utf16_encoding("force;rail".encode("utf-16-le")), utf16_encoding(b"force;rail [m/s2]")
+    >>> wide_encoding("force;rail".encode("utf-16-le")), wide_encoding(b"force;rail [m/s2]")
     ('utf-16-le', '')
     """
-    if head[:4] == codecs.BOM_UTF32_LE:
-        return ""
+    if head[:4] in (codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE):
+        return "utf-32"
     if head[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
         return "utf-16"
     even, odd = head[0::2], head[1::2]
@@ -158,15 +179,15 @@ MIN_ZERO_SHARE = 0.9  # of the high bytes of a text of numbers with some other l
 
 
 def _in_utf8(source: Source, encoding: str) -> bytes:
-    """A file that a spreadsheet saved as "Unicode" (UTF-16), converted to UTF-8."""
-    with source.parsed_by("Python", "the text in UTF-16"):
+    """A file that a spreadsheet saved as "Unicode" (UTF-16), or in UTF-32, converted to UTF-8."""
+    with source.parsed_by("Python", f"the text in {encoding[:6].upper()}"):
         return source.data.decode(encoding).encode()
 
 
 def _columns_in_memory(
     source: Source, data: bytes | mmap, offset: int, separator: str, names: Sequence[str], time: int | None
-) -> list[Column]:
-    """All columns as arrays."""
+) -> tuple[list[Column], tuple[Entry, ...]]:
+    """(all columns as arrays, entries of the lines of text below the numbers)."""
     context = source, data, offset, separator, names
     options = _options(data, offset, separator, len(names))
     line = _line_number(data, offset)
@@ -176,7 +197,7 @@ def _columns_in_memory(
         try:
             table = csv.read_csv(io.BytesIO(memoryview(data)[offset:]), **strict)
             if not table.column(0).null_count:  # an empty line is a row without values
-                return _columns_of(table, *context)
+                return _columns_of(table, *context), ()
         except pa.ArrowInvalid:
             pass
         try:
@@ -187,7 +208,8 @@ def _columns_in_memory(
                 raise
             table = csv.read_csv(io.BytesIO(memoryview(data)[offset:end]), **options)
     _check_one_block(data, offset, end, source)
-    return _columns_of(table, *context)
+    below = [decode_line(text) for text in data[end:].splitlines()]
+    return _columns_of(table, *context), tuple(entries_of_lines(below, separator, names, _line_number(data, end) + 1))
 
 
 def _columns_of(
@@ -195,6 +217,10 @@ def _columns_of(
 ) -> list[Column]:
     """The columns of a table as arrays, whose marks are no marks for thousands."""
     columns = [column.to_numpy(zero_copy_only=False) for column in table.columns]
+    columns = [
+        with_durations(column, f"column {name or i + 1!r}", source)
+        for i, (name, column) in enumerate(zip(names, columns))
+    ]
     for i, column in enumerate(columns):
         check_thousands(column, i, names[i], data, offset, separator, source)
     return columns
@@ -242,8 +268,8 @@ def _check_one_block(data: bytes | mmap, offset: int, end: int, source: Source) 
 
 def _lazy_columns(
     source: Source, data: bytes | mmap, offset: int, separator: str, names: Sequence[str], time: int | None
-) -> list[Column]:
-    """Columns that read their numbers when sliced; a time column is read at once."""
+) -> tuple[list[Column], tuple[Entry, ...]]:
+    """(columns that read their numbers when sliced, no entries); a time column is read at once."""
     options = _options(data, offset, separator, len(names))
     rows = RowReader(source.path, offset, options)
     line = _line_number(data, offset)
@@ -253,7 +279,7 @@ def _lazy_columns(
     columns: list[Column] = [rows.column(i) for i in range(len(names))]
     if time is not None and times is not None:
         columns[time] = times
-    return columns
+    return columns, ()
 
 
 def _line_number(data: bytes | mmap, offset: int) -> int:
@@ -332,15 +358,26 @@ class RowReader:
         return table.column(i).to_numpy()
 
 
+SIZE_OF_FIRST_ROWS = 2**13  # bytes in which a decimal comma is looked for
+
+
 def _options(data: bytes | mmap, offset: int, separator: str, width: int) -> dict[str, Any]:
     """Options of pyarrow for the numbers from byte ``offset`` on."""
     dot_offset = data.find(b".", offset)
     has_decimal_comma = separator != "," and data.find(b",", offset, dot_offset if dot_offset >= 0 else len(data)) >= 0
     if separator == ",":
         has_decimal_comma = re.match(rb'\s*"[+-]?\d*,\d+"', data[offset : offset + 200]) is not None
+    is_text = [is_clock_or_date(cell) for cell in first_cells(data, offset, separator)]
+    if any(is_text):  # dates and times of day have marks of their own
+        end = data.find(b"\n", offset + SIZE_OF_FIRST_ROWS)
+        rows = decode_line(data[offset : end if end >= 0 else len(data)]).splitlines()
+        numbers = [
+            cell for row in rows for cell, is_of_text in zip(cells_of(row, separator), is_text) if not is_of_text
+        ]
+        has_decimal_comma = separator != "," and any("," in cell for cell in numbers)
     decimal_mark = "," if has_decimal_comma else "."
     converting = csv.ConvertOptions(
-        column_types={str(i): pa.float64() for i in range(width)},
+        column_types={str(i): pa.string() if i < len(is_text) and is_text[i] else pa.float64() for i in range(width)},
         decimal_point=decimal_mark,
         null_values=list(MISSING_VALUES),
         strings_can_be_null=True,
@@ -362,9 +399,10 @@ def _records(
     """The records: one of all rows, or one per number in the column ``record``."""
     lower = [name.strip().lower() for name in names]
     number = columns[lower.index("record")] if "record" in lower else None
-    selected = [i for i, name in enumerate(lower) if name != "record" and i != time]
-    if len(selected) > 1 and not names[selected[-1]] and _is_empty(columns[selected[-1]]):
-        selected.pop()
+    time = time if time is not None and columns[time].dtype.kind in "fiu" else None
+    clocks = {i: column.astype(float) * 1e-9 for i, column in enumerate(columns) if column.dtype.kind == "m"}
+    selected = [i for i, name in enumerate(lower) if name != "record" and i != time and columns[i].dtype.kind in "fiu"]
+    selected = [i for i in selected if names[i] or len(selected) == 1 or not _is_empty(columns[i])]
     seconds = None if time is None else np.asarray(columns[time]) * seconds_per_number(units[time], source)
     n_row = len(columns[0])
     edges = [0, n_row]
@@ -396,6 +434,7 @@ def _records(
             time=None if seconds is None else seconds[a:b],
             undecided=undecided,
             is_time_in_seconds=time is not None and bool(units[time].strip()),
+            clocks=tuple((f"column {names[i] or i + 1!r}", seconds[a:b]) for i, seconds in clocks.items()),
             entries=entries,
         )
 

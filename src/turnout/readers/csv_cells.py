@@ -18,6 +18,7 @@ MISSING_VALUES = (
 )  # fmt: skip
 THOUSANDS_MARK = r"[ .,'’\u00a0\u202f]"  # between groups of three digits
 THOUSANDS = re.compile(rf"[+-]?\d{{1,3}}(?:{THOUSANDS_MARK}\d{{3}})+(?:[.,]\d+)?")
+DECIMAL = re.compile(r"[+-]?\d*[.,]\d+(?:[eE][+-]?\d+)?")
 INVALID_VALUE = re.compile(
     r"CSV column #(\d+): (?:Row #(\d+): )?CSV conversion error to \w+: invalid value '(.*)'", re.DOTALL
 )
@@ -26,6 +27,8 @@ OTHER_WIDTH = re.compile(r"CSV parse error: (?:Row #(\d+): )?Expected (\d+) colu
 NO_ROW_REMEDY = (
     f"{COPY_AGAIN}; if the logger's own file has it too, delete the lines that are no samples or leave that record out"
 )
+
+PLAIN_NUMBER_REMEDY = "Export numbers as '-12.5' or '-1.25e1', without other signs and without units"
 
 
 def is_unreadable_number(cell: str) -> bool:
@@ -80,11 +83,12 @@ def cell_errors(source: Source, line: int, names: Sequence[str]) -> Iterator[Non
         column, row, cell = int(match[1]), match[2], match[3]
         where = f"line {line + int(row)}" if row else f"the numbers after line {line}"
         where += f", column {names[column] or str(column + 1)!r}"
-        if THOUSANDS.fullmatch(cell):
+        if THOUSANDS.fullmatch(cell) or DECIMAL.fullmatch(cell):
             problem = f"{cell!r} has marks for thousands, or another decimal mark than other numbers"
             remedy = "Export all numbers with one decimal mark and without marks for thousands"
         else:
-            problem, remedy = f"{cell[:60]!r} is no number", NO_ROW_REMEDY
+            problem = f"{cell[:60]!r} is no number"
+            remedy = PLAIN_NUMBER_REMEDY if re.search(r"\d", cell) else NO_ROW_REMEDY
         raise source.error(where, problem, remedy) from error
 
 

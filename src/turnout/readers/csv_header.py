@@ -17,7 +17,8 @@ from turnout.readers.array_metadata import (
     START_NAMES,
     TIME_NAMES,
 )
-from turnout.readers.csv_cells import THOUSANDS_MARK, is_unreadable_number
+from turnout.readers.clock_texts import is_clock_or_date
+from turnout.readers.csv_cells import NO_ROW_REMEDY, THOUSANDS_MARK, is_unreadable_number
 from turnout.readers.entries import FREE_TEXT, Entry, entries_of_text
 from turnout.readers.other_subjects import STRONG, subject_of
 from turnout.readers.rate_units import rate_unit
@@ -162,8 +163,19 @@ GROUPED_NUMBER = re.compile(rf"\d{{1,3}}(?:{THOUSANDS_MARK}\d{{3}})+(?!\d)")
 Head = tuple[dict[str, float | str], list[str], list[str], int, str, tuple[Entry, ...]]
 
 
-def _decode_line(data: bytes) -> str:
-    """One line as text: UTF-8, else Windows-1252 of older western loggers."""
+def decode_line(data: bytes) -> str:
+    """One line as text: UTF-8, else Windows-1252 of older western loggers.
+
+    Parameters
+    ----------
+    data : bytes
+        The line.
+
+    Returns
+    -------
+    str
+        Its text without line break; a byte that neither encoding has becomes a replacement character.
+    """
     try:
         return data.decode("utf-8-sig").strip("\r\n")
     except UnicodeDecodeError:
@@ -198,19 +210,29 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
     while position < len(data):
         end = data.find(b"\n", position)
         end = len(data) if end < 0 else end
-        line = _decode_line(data[position:end])
+        line = decode_line(data[position:end])
         # a comma is the decimal mark where another separator stands
-        separator = next((s for s in ("\t", ";") if s in line), ",")
-        cells = _cells(line, separator)
-        if any(cells) and all(_is_number(cell) or is_unreadable_number(cell) or cell == "" for cell in cells):
-            texts = [_cells(text, separator) for text in text_lines]
+        separator = next((s for s in SEPARATORS if s in line), ",")
+        cells = cells_of(line, separator)
+        if not _is_row(cells) and _are_rows_of_words(data, position):
+            separator, cells = BLANK, cells_of(line, BLANK)
+        if _is_row(cells):
+            texts = [cells_of(text, separator) for text in text_lines]
+            if separator == BLANK:
+                texts = [words for words in texts if len(words) == len(cells)]
+            texts += _commented_names(head_lines[-1:], texts, len(cells), separator)
+            _check_row_above(texts, head_lines, cells, separator, source)
             names, units = _names(texts, cells)
             notes |= {
                 _plain(a): b
                 for a, b, *rest in (t for t in texts if len(t) > 1)
                 if b and not any(rest) and a not in names and is_scale_name(a)
             }
-            return notes, names, units, position, separator, tuple(_entries(head_lines, separator, names))
+            if separator == BLANK:  # a word is no cell of a head
+                of_names = [_is_line_of_words(cells_of(text, BLANK), names, units) for text in head_lines]
+                entry_lines = ["" if is_of_names else text for text, is_of_names in zip(head_lines, of_names)]
+                return notes, names, units, position, BLANK, tuple(entries_of_lines(entry_lines, ",", names))
+            return notes, names, units, position, separator, tuple(entries_of_lines(head_lines, separator, names))
         match = HEAD_LINE.match(line.strip())
         name = match[1].strip() if match else ""
         plain_name = _plain(name)
@@ -242,17 +264,85 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
     raise source.error("the file", *_no_numbers(text_lines[-1]))
 
 
+def _is_row(cells: Sequence[str]) -> bool:
+    """Whether cells are a row of samples: numbers, or marks of missing ones, beside dates and times of day."""
+    is_of_numbers = [_is_number(cell) or is_unreadable_number(cell) for cell in cells]
+    filled = [cell for cell, is_number in zip(cells, is_of_numbers) if cell and not is_number]
+    return any(is_of_numbers) and all(map(is_clock_or_date, filled))
+
+
+N_ROWS_OF_WORDS = 5  # lines: numbers between blanks may be in a head, too, but not in so many lines
+
+
+def _are_rows_of_words(data: bytes | mmap, position: int) -> bool:
+    """Whether a line and those behind it are rows of as many numbers between blanks, without another separator."""
+    end = position
+    rows = []
+    while len(rows) < N_ROWS_OF_WORDS and end < len(data):
+        start, end = end, (data.find(b"\n", end) + 1) or len(data)
+        line = decode_line(data[start:end])
+        rows.append([] if any(s in line for s in SEPARATORS) else cells_of(line, BLANK))
+    return len(rows) > 1 and len(rows[0]) > 1 and all(len(row) == len(rows[0]) and _is_row(row) for row in rows)
+
+
+def _commented_names(
+    last_line: Sequence[str], texts: Sequence[Sequence[str]], n: int, separator: str
+) -> list[list[str]]:
+    """Cells of the line directly above the numbers if it names the columns behind a #, and no other line does."""
+    names = [cells_of(line.lstrip("#%"), separator) for line in last_line if line.startswith(("#", "%"))]
+    if any(len(text) >= n for text in texts):
+        return []
+    return [cells for cells in names if len(cells) == n and not any(map(_is_number, cells))]
+
+
+def first_cells(data: bytes | mmap, offset: int, separator: str) -> list[str]:
+    """Cells of the first row of samples.
+
+    Parameters
+    ----------
+    data : bytes or mmap
+        Bytes of the file.
+    offset : int
+        Byte of the first number.
+    separator : str
+        Separator of the cells.
+
+    Returns
+    -------
+    list of str
+        Without blanks around them.
+    """
+    end = data.find(b"\n", offset)
+    return cells_of(decode_line(data[offset : end if end >= 0 else len(data)]), separator)
+
+
+def _check_row_above(
+    texts: Sequence[Sequence[str]], lines: Sequence[str], cells: Sequence[str], separator: str, source: Source
+) -> None:
+    """ReadError if the line above the first line of numbers is a row of samples, with a cell that is no number.
+
+    Such a row has numbers, and the names of the columns stand above it. A text in its first cell alone is a label.
+    """
+    row = texts[-1] if texts and texts[-1] == cells_of(lines[-1], separator) else []
+    numbers = [_is_number(cell) for cell in row]
+    is_label = len(row) > 1 and not numbers[0] and all(n or not cell for n, cell in zip(numbers[1:], row[1:]))
+    if len(row) != len(cells) or not any(numbers) or is_label:
+        return
+    if any(len(text) == len(cells) and not any(map(_is_number, text)) for text in texts[:-1]):
+        word = next(cell for cell, is_number in zip(row, numbers) if cell and not is_number)
+        problem = f"{word[:60]!r} is no number, in the first row of samples"
+        raise source.error(f"line {len(lines)}", problem, NO_ROW_REMEDY)
+
+
 CLOCK_TIME = re.compile(r"(?<!\d)\d{1,2}:\d{2}:\d{2}(?!\d)")
 
 
 def _no_numbers(line: str) -> tuple[str, str]:
     """Problem and remedy of a text whose last ``line`` is no line of numbers."""
-    remedy = "Export numbers between semicolons, tabs or commas, the time in seconds"
+    remedy = "Export numbers as '-12.5' between semicolons, tabs, commas or blanks, the time in seconds"
     problem = f"no line of numbers; the last line reads {line[:60]!r}"
     if CLOCK_TIME.search(line):
         return f"{problem}, with the time of a clock", "Export the time in seconds from the start of the record"
-    if len(words := line.split()) > 1 and all(map(_is_number, words)):
-        return f"{problem}, numbers between blanks", remedy
     return problem, remedy
 
 
@@ -277,14 +367,30 @@ def _begins_with_number(value: str) -> bool:
     return bool(value) and _is_number(value.split()[0])
 
 
-def _entries(lines: Sequence[str], separator: str, names: Sequence[str]) -> Iterator[Entry]:
-    """Entries of the head: "name: value" lines, pairs of cells, rows of names above rows of values, and free text.
+def entries_of_lines(
+    lines: Sequence[str], separator: str, names: Sequence[str], first_line: int = 1
+) -> Iterator[Entry]:
+    """Entries of lines of text: "name: value" lines, pairs of cells, names above values, and free text.
 
-    The line of the names of the columns is none.
+    Parameters
+    ----------
+    lines : sequence of str
+        Lines above or below the numbers.
+    separator : str
+        Separator of the cells.
+    names : sequence of str
+        Names of the columns; their line is no entry.
+    first_line : int
+        Number of the first of the lines in the file, from 1.
+
+    Yields
+    ------
+    Entry
+        Each with its line.
     """
-    table = [_cells(line, separator) for line in lines]
+    table = [cells_of(line, separator) for line in lines]
     for i, (line, cells) in enumerate(zip(lines, table)):
-        place = f"line {i + 1}"
+        place = f"line {first_line + i}"
         text = line.strip().lstrip("#%*/!'\" ").strip()
         if not text or _is_line_of(cells, names):
             continue
@@ -311,11 +417,44 @@ def _entries(lines: Sequence[str], separator: str, names: Sequence[str]) -> Iter
 
 def _is_line_of(cells: Sequence[str], names: Sequence[str]) -> bool:
     """Whether these cells are the names of the columns, with or without units."""
+    cells = [cells[0].lstrip("#% "), *cells[1:]]
     bare = [match[1] if (match := NAME_WITH_UNIT.match(cell)) else cell for cell in cells]
     return len(names) > 1 and list(bare[: len(names)]) == list(names)
 
 
-def _cells(line: str, separator: str) -> list[str]:
+def _is_line_of_words(words: Sequence[str], names: Sequence[str], units: Sequence[str]) -> bool:
+    """Whether these words are the names of the columns, or their units."""
+    return bool(words) and (_is_line_of(words, names) or [word.strip("[]() ") for word in words] == list(units))
+
+
+BLANK = " "
+SEPARATORS = ("\t", ";", "|")  # a line with one of them is not separated by commas or blanks
+# a word with a unit in brackets behind it, or a text between quotation marks
+WORD = re.compile(r'"[^"]*"(?: *[\[(][^\])]*[\])])?|[^\s"]+(?: *[\[(][^\])]*[\])])?')
+
+
+def cells_of(line: str, separator: str) -> list[str]:
+    """Cells of a line.
+
+    Parameters
+    ----------
+    line : str
+        The line.
+    separator : str
+        Separator of the cells; between blanks every word is a cell, with the unit in brackets behind it.
+
+    Returns
+    -------
+    list of str
+        Without blanks and quotation marks around them.
+
+    Examples
+    --------
+    >>> cells_of('"force [N]"; -1,5 ', ";"), cells_of("# force [N]  rail (m/s²)", " ")
+    (['force [N]', '-1,5'], ['force [N]', 'rail (m/s²)'])
+    """
+    if separator == BLANK:
+        return [word.replace('"', "") for word in WORD.findall(line.lstrip("#%").strip())]
     if separator == "," and '"' in line:  # a comma between quotation marks is a decimal mark
         return [cell.strip() for cell in next(csv.reader([line]), [])]
     return [cell.strip().strip('"') for cell in line.split(separator)]

@@ -1,8 +1,10 @@
 """Registry of the raw formats: module, file extensions and first bytes of each; detection of the format of a file.
 
-A new format is one file with ``read_raw(source) -> RawFile`` and one line here. Spreadsheets are rejected.
+A new format is one file with ``read_raw(source) -> RawFile`` and one line here. Spreadsheets and packed files are
+rejected.
 """
 
+import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib import import_module
@@ -133,3 +135,39 @@ def reject_spreadsheet(source: Source) -> None:
     if zipped or source.head.startswith(OLD_EXCEL):
         remedy = "Save it from the spreadsheet as CSV, text with separated columns"
         raise source.error("byte 0", "it is a spreadsheet's own file", remedy)
+
+
+ARCHIVES = {  # first bytes: program
+    b"\x1f\x8b": "gzip", b"BZh": "bzip2", b"\xfd7zXZ\x00": "xz", b"\x28\xb5\x2f\xfd": "Zstandard",
+    b"\x04\x22\x4d\x18": "LZ4", b"7z\xbc\xaf\x27\x1c": "7-Zip", b"Rar!\x1a\x07": "RAR",
+}  # fmt: skip
+UNPACK = "Unpack it, and put the file that is in it in its place"
+
+
+def reject_archive(source: Source) -> None:
+    """Stop if a file is packed by a program for compression or archives, whatever its name.
+
+    Parameters
+    ----------
+    source : Source
+        The raw file.
+
+    Raises
+    ------
+    ReadError
+        If it is; the remedy is to unpack it.
+    """
+    program = next((name for start, name in ARCHIVES.items() if source.head.startswith(start)), "")
+    if source.head[257:262] == b"ustar":
+        program = "tar"
+    if program:
+        raise source.error("byte 0", f"it is packed by {program}", UNPACK)
+    if source.head[:4] == b"PK\x03\x04":
+        with source.parsed_by("zipfile"), zipfile.ZipFile(source.path) as archive:
+            names = archive.namelist()
+        if not any(name.endswith(".npy") for name in names):
+            listed = ", ".join(map(repr, names[:MAX_LISTED]))
+            raise source.error("byte 0", f"it is a ZIP archive with {listed}, and no archive of NumPy", UNPACK)
+
+
+MAX_LISTED = 6  # members that a message names

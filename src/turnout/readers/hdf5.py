@@ -6,6 +6,7 @@ checksum, so that damage is limited to one record. ``scale_factor``, ``add_offse
 are applied; a dataset with another gain or offset is rejected unless the layout decides.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -20,7 +21,7 @@ from turnout.readers.lazy import is_large, lazy_array
 from turnout.readers.named_arrays import STATED_SCALES, raw_file
 from turnout.readers.packing import apply_packing
 from turnout.readers.scale_words import is_fill_name, is_scale_name
-from turnout.readers.source import RawFile, Source
+from turnout.readers.source import COPY_AGAIN, RawFile, Source
 from turnout.readers.stated_scales import scale_text, scales_in_text
 
 UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units")
@@ -74,6 +75,7 @@ def _variables(group: h5py.Group, path: str, source: Source, claims: Hdf5Claims)
         try:
             with source.parsed_by("HDF5", f"dataset {name!r} in {path or '/'!r}"):
                 attributes = {k: _attribute(v) for k, v in member.attrs.items()}
+                _check_written(member, attributes, source)
                 large = (
                     source.lazy and is_large(member) and member.dtype.names is None and name.lower() not in TIME_NAMES
                 )
@@ -101,6 +103,23 @@ def _variables(group: h5py.Group, path: str, source: Source, claims: Hdf5Claims)
     if units and not any(key.lower() == "units" for key in variables):
         variables["units"] = units
     return variables
+
+
+NO_VARIABLE = "This is a netCDF dimension but not"  # attribute NAME of an axis for which netCDF writes no values
+
+
+def _check_written(dataset: h5py.Dataset, attributes: Mapping[str, Any], source: Source) -> None:
+    """ReadError if a part of the samples was never written: HDF5 returns the fill value there, 0 as a rule."""
+    if not dataset.size or not dataset.ndim or str(attributes.get("NAME", "")).startswith(NO_VARIABLE):
+        return
+    if dataset.chunks:
+        n = math.prod(-(-length // size) for length, size in zip(dataset.shape, dataset.chunks))
+        problem = f"{n - dataset.id.get_num_chunks()} of its {n} chunks of samples were never written"
+        is_written = dataset.id.get_num_chunks() >= n
+    else:
+        is_written, problem = dataset.id.get_storage_size() > 0 or dataset.is_virtual, "its samples were never written"
+    if not is_written:
+        raise source.error(f"dataset {dataset.name!r}", problem, COPY_AGAIN, reason="truncated")
 
 
 PACKING_ATTRIBUTES = ("scale_factor", "add_offset")  # of the climate and forecast (CF) conventions of netCDF

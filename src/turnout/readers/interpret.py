@@ -15,6 +15,7 @@ from turnout.readers.blocks import LARGEST_NUMBER, BlockReader, ChannelStatistic
 from turnout.readers.channel_maps import Assignments, ChannelMapping
 from turnout.readers.lazy import Column
 from turnout.readers.lost_entries import is_single, lost_entry_errors
+from turnout.readers.missing_codes import count_alone, missing_code
 from turnout.readers.packing import fill_values
 from turnout.readers.rate_agreement import rate_remark, resolve
 from turnout.readers.rate_words import CERTAIN
@@ -25,19 +26,32 @@ from turnout.readers.time_axes import all_statements
 from turnout.readers.unexplained_entries import EntryCheck
 from turnout.records import LongRecording, RawDescription, Recording
 
+MISSING_REMEDY = "Export the record again from the logger; if it is so there too, check the channel's cable and range"
 
-def _check_fill_values(record: RawRecord, mappings: Sequence[ChannelMapping], where: str, source: Source) -> None:
-    """ReadError if samples equal a number that the file states for missing samples."""
+
+def _missing_sample_errors(
+    record: RawRecord, mappings: Sequence[ChannelMapping], statistics: ChannelStatistics, where: str, source: Source
+) -> dict[int, ReadError]:
+    """Errors by index of the channels with samples that the file states to be missing, or that are a code for it."""
+    errors: dict[int, ReadError] = {}
     fills = fill_values(record.entries, record.names)
-    for mapping in mappings:
+    for i, mapping in enumerate(mappings):
         column = record.samples[mapping.index]
-        for fill in fills[mapping.index]:
-            blocks = (column[start : start + BLOCK_SIZE] for start in range(0, len(column), BLOCK_SIZE))
-            if n := sum(int(np.count_nonzero(block == fill)) for block in blocks):
-                problem = f"{n} samples are {fill:g}, which the file states for missing ones"
-                remedy = "Export the record again from the logger; if it is so there too, check the channel's cable"
-                place = f"{where}, channel {mapping.channel.name!r}"
-                raise source.error(place, problem, remedy, reason="not_finite")
+        counts = [(_count_equal(column, x), x, "which the file states for missing ones") for x in fills[mapping.index]]
+        for extreme in (statistics.lowest[i], statistics.highest[i]):
+            code = missing_code((extreme - mapping.offset) / mapping.scale)
+            if code is not None:
+                counts.append((count_alone(column, code), code, "a usual code for a missing one"))
+        if problems := [f"{n} of {len(column)} samples are {x:.7g}, {meaning}" for n, x, meaning in counts if n]:
+            place = f"{where}, channel {mapping.channel.name!r}"
+            errors[i] = source.error(place, problems[0], MISSING_REMEDY, reason="not_finite")
+    return errors
+
+
+def _count_equal(column: Column, value: float) -> int:
+    """Number of samples that equal a value."""
+    blocks = (column[start : start + BLOCK_SIZE] for start in range(0, len(column), BLOCK_SIZE))
+    return sum(int(np.count_nonzero(block == value)) for block in blocks)
 
 
 def convert_records(
@@ -192,7 +206,6 @@ def _recording(
     channel_maps = assignments.mappings(record, where)
     if not channel_maps:
         raise source.error(where, "the layout wants none of its channels", "Name channels in the layout")
-    _check_fill_values(record, channel_maps, where, source)
     block_reader = BlockReader(record, channel_maps, where, source, source.state())
     is_long = max_duration is not None and n_sample / rate > max_duration
     samples = np.empty((0, 0)) if is_long else block_reader(0, n_sample)
@@ -204,6 +217,7 @@ def _recording(
         for i, channel_statistics in enumerate(statistics.by_channel())
         if (e := channel_error(n_sample, channel_statistics, channel_maps[i].channel, where, source))
     }
+    faults = _missing_sample_errors(record, channel_maps, statistics, where, source) | faults
     if faults and (description.kind != "passage" or len(faults) == len(channel_maps)):
         raise next(iter(faults.values()))
     usable = [i for i in range(len(channel_maps)) if i not in faults]

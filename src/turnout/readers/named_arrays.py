@@ -38,6 +38,7 @@ from turnout.readers.array_metadata import (
     vectors,
 )
 from turnout.readers.channel_maps import kind_of
+from turnout.readers.clock_texts import with_durations
 from turnout.readers.entries import MAX_ENTRIES
 from turnout.readers.lazy import ARRAYS, Array, Column
 from turnout.readers.source import RawFile, RawRecord, Source
@@ -212,7 +213,7 @@ def raw_file(variables: Mapping, source: Source, parent: Metadata | None = None)
     ReadError
         If the variables do not say which arrays are the samples.
     """
-    variables = _with_vectors(_with_fields(variables))
+    variables = _with_vectors(_with_durations(_with_fields(variables), source))
     facts = Metadata(variables, source, parent)
     expected = facts.count(RECORD_COUNT_NAMES)
     numbered = numbered_names(variables)
@@ -258,6 +259,19 @@ def _with_fields(variables: Mapping[str, Any]) -> Mapping[str, Any]:
     if not any(_is_structured(value) for value in variables.values()):
         return variables
     return {n: {f: v[f] for f in v.dtype.names} if _is_structured(v) else v for n, v in variables.items()}
+
+
+def _with_durations(variables: Mapping[str, Any], source: Source) -> Mapping[str, Any]:
+    """The variables, with durations in place of texts that are the time of day of each sample."""
+    changed = {
+        name: with_durations(value, f"variable {name!r}", source)
+        for name, value in variables.items()
+        if isinstance(value, np.ndarray) and value.size > MAX_ENTRIES
+    }
+    if all(variables[name] is value for name, value in changed.items()):
+        return variables
+    merged = {**variables, **changed}
+    return Alphabetical(merged) if isinstance(variables, Alphabetical) else merged
 
 
 def _with_vectors(variables: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -353,7 +367,8 @@ def _raw_record(
     names: Sequence[str], samples: list[Column], units: Sequence[str], facts: Metadata, k: int, n: int
 ) -> RawRecord:
     time = facts.get(TIME_NAMES)
-    time = np.asarray(time, dtype=float) if isinstance(time, np.ndarray) and time.size == len(samples[0]) else None
+    is_time = isinstance(time, np.ndarray) and time.dtype.kind in "fiu" and time.size == len(samples[0])
+    time = np.asarray(time, dtype=float) if is_time else None
     clocks = {
         name: value
         for name, value in facts.variables.items()

@@ -13,9 +13,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from turnout.errors import ReadError
-from turnout.readers.array_metadata import RECORD_COUNT_NAMES, START_NAMES, TIME_NAMES, Metadata
+from turnout.readers.array_metadata import RECORD_COUNT_NAMES, START_NAMES, TIME_NAMES, Metadata, is_flag_series
 from turnout.readers.channel_maps import kind_of
 from turnout.readers.claims import check_parquet
+from turnout.readers.clock_texts import with_durations
 from turnout.readers.entries import entries_of
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
@@ -51,7 +52,7 @@ def read_raw(source: Source) -> RawFile:
         schema, n_row = file.schema_arrow, file.metadata.num_rows
         remarks = tuple(_differing_copies(schema.metadata, file.metadata.metadata, source))
         rows = RowGroupReader(file) if source.lazy and "record" not in schema.names else None
-        columns = _columns(file, rows)
+        columns = _columns(file, rows, source)
     notes = _notes_of(schema.metadata)
     facts = Metadata(notes, source)
     units = {field.name: _unit(field) for field in schema}
@@ -61,7 +62,7 @@ def read_raw(source: Source) -> RawFile:
     if numbers is not None:
         edges = [0, *(np.flatnonzero(np.diff(numbers)) + 1), n_row]
     time = next((name for name in columns if name.lower() in TIME_NAMES), None)
-    names = [name for name, x in columns.items() if name != time and x.dtype.kind in "fiu"]
+    names = [name for name, x in columns.items() if name != time and (x.dtype.kind in "fiu" or is_flag_series(x))]
     if n_row and not names:
         kinds = ", ".join(f"{field.name!r} ({field.type})" for field in list(schema)[:MAX_LISTED])
         raise source.error("the columns", f"none holds one number in a row; there are {kinds}", ROWS_REMEDY, "empty")
@@ -110,28 +111,28 @@ def _differing_copies(
             return
 
 
-def _columns(file: pq.ParquetFile, rows: "RowGroupReader | None") -> dict[str, Column]:
+def _columns(file: pq.ParquetFile, rows: "RowGroupReader | None", source: Source) -> dict[str, Column]:
     """Name -> numbers, or a lazy column if ``rows`` is given; a time column is always read."""
     names = file.schema_arrow.names
     if rows is None:
         table = file.read(use_threads=False)
-        return {name: _to_numpy(table.column(name)) for name in names}
+        return {name: _to_numpy(table.column(name), name, source) for name in names}
     lazy_names = [f.name for f in file.schema_arrow if (pa.types.is_floating(f.type) or pa.types.is_integer(f.type))]
     lazy_names = [name for name in lazy_names if name.lower() not in TIME_NAMES]
     table = file.read([name for name in names if name not in lazy_names], use_threads=False)
-    columns: dict[str, Column] = {name: _to_numpy(table.column(name)) for name in table.column_names}
+    columns: dict[str, Column] = {name: _to_numpy(table.column(name), name, source) for name in table.column_names}
     columns |= {name: rows.column(name) for name in lazy_names}
     return {name: columns[name] for name in names}
 
 
-def _to_numpy(column: pa.ChunkedArray) -> np.ndarray:
-    """Values of a column; times of day become durations since midnight."""
+def _to_numpy(column: pa.ChunkedArray, name: str, source: Source) -> np.ndarray:
+    """Values of a column; times of day become durations since midnight, or since the first one where they are text."""
     if pa.types.is_time(column.type):
         whole = column.cast(pa.int64() if column.type.bit_width == 64 else pa.int32()).to_numpy()
         return whole.astype("int64").view(f"timedelta64[{column.type.unit}]") if whole.dtype.kind == "i" else whole
     if pa.types.is_decimal(column.type):
         column = column.cast(pa.float64())
-    return column.to_numpy()
+    return with_durations(column.to_numpy(), f"column {name!r}", source)
 
 
 class RowGroupReader:

@@ -13,6 +13,7 @@ import nptdms
 
 from turnout.errors import ReadError
 from turnout.readers.array_metadata import RECORD_COUNT_NAMES, START_NAMES, Metadata
+from turnout.readers.clock_texts import with_durations
 from turnout.readers.entries import Entry, entries_of
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.named_arrays import natural_sort_key
@@ -183,7 +184,7 @@ def _complete_record(
             raise source.error(place, problem, COPY_AGAIN, reason="truncated")
     _check_steps(channels, where, source)
     with source.parsed_by("npTDMS", where):
-        samples = [_numbers(c, source.lazy) for c in channels]
+        samples = [_numbers(c, source) for c in channels]
     facts = Metadata({**tdms.properties, **groups[channels[0].group_name], **channels[0].properties}, source)
     undecided = {
         i: text
@@ -239,8 +240,8 @@ def _check_steps(channels: Sequence[nptdms.TdmsChannel], where: str, source: Sou
     check_simultaneous([c.name for c in channels], steps, starts, where, source)
 
 
-def _numbers(channel: nptdms.TdmsChannel, lazy: bool) -> Column:
+def _numbers(channel: nptdms.TdmsChannel, source: Source) -> Column:
     """All numbers of a channel, or a lazy column: npTDMS can skip what is not requested."""
-    if not lazy or channel.dtype.kind not in "fiu":
-        return channel[:]
+    if not source.lazy or channel.dtype.kind not in "fiu":
+        return with_durations(channel[:], f"channel {channel.name!r}", source)
     return LazyColumn(lambda start, stop: channel.read_data(start, stop - start), len(channel), channel.dtype)

@@ -91,6 +91,7 @@ def time_statements(record: RawRecord, measured: Set[int], where: str, source: S
             if certainty == CERTAIN:
                 starts.append((place, float(time[0]), rate, len(time)))
     _check_same_start(starts, where, source)
+    _check_counters(record, measured, where, source)
     return statements + statements_of(_constant_columns(record, measured))
 
 
@@ -161,6 +162,28 @@ def _columns(record: RawRecord, measured: Set[int]) -> Iterator[tuple[str, np.nd
         certainty = CERTAIN if by_name or is_time_unit else POSSIBLY
         place = f"column {name!r}" if by_name or is_time_unit else f"column {name!r}, which rises evenly"
         yield place, np.asarray(column[:], dtype=float) * scale, is_time_unit, certainty
+
+
+def _check_counters(record: RawRecord, measured: Set[int], where: str, source: Source) -> None:
+    """ReadError if a column that counts the samples leaves one out.
+
+    A counter that begins again is no gap: it counts within a record, or has reached its largest number.
+    """
+    for i, (name, column) in enumerate(zip(record.names, record.samples)):
+        if i in measured or column.dtype.kind not in "fiu" or len(column) < MIN_AXIS_SIZE:
+            continue
+        steps = np.diff(np.asarray(column[:HEAD_SIZE], dtype=float))
+        if np.count_nonzero(steps == 1.0) < MIN_COUNTING_SHARE * len(steps):
+            continue
+        count = np.asarray(column[:], dtype=float)
+        if (is_jump := np.diff(count) > 1.0).any():
+            k = int(np.argmax(is_jump))
+            problem = f"column {name!r} counts from {count[k]:.12g} to {count[k + 1]:.12g}: samples are missing"
+            remedy = "Copy the file again from the logger; if the gap is there too, the logger lost samples"
+            raise source.error(where, problem, remedy, reason="truncated")
+
+
+MIN_COUNTING_SHARE = 0.9  # of the first steps of a counter are 1; it may begin again some times
 
 
 def _rises_evenly(head: np.ndarray) -> bool:

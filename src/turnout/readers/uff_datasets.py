@@ -351,6 +351,11 @@ def _integer(text: str) -> int:
     return int(text) if text else 0
 
 
+def _number(text: str) -> float:
+    """A number whose exponent may be that of Fortran, "5.0D-05"; 0 for an empty field."""
+    return float(text.replace("D", "E").replace("d", "e") or 0)
+
+
 def _header(lines: Sequence[str]) -> Header:
     """Fields of records 1 to 11; ValueError for an invalid number."""
     first = _fields(lines[0], [6, 1, 6, 6])
@@ -370,9 +375,9 @@ def _header(lines: Sequence[str]) -> Header:
             "response": (dof[4], _integer(dof[5]), _integer(dof[6])),
             "reference": (dof[7], _integer(dof[8]), _integer(dof[9])),
             "promised": promised,
-            "start": float(form[3] or 0),
-            "step": float(form[4] or 0),
-            "step_text": form[4],
+            "start": _number(form[3]),
+            "step": _number(form[4]),
+            "step_text": form[4].upper().replace("D", "E"),
             "labels": tuple((_integer(a[0]), a[4], a[5]) for a in axes),
         },
         "double": ordinate_type in (4, 6),

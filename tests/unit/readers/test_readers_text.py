@@ -232,20 +232,20 @@ def test_a_time_column_of_another_language_is_held_against_the_promised_rate(tit
 @pytest.mark.parametrize(
     ("row", "what", "remedy"),
     [
-        ("08:00:00.5;1,0;2,0", "with the time of a clock", "Export the time in seconds from the start of the record"),
+        ("08:00:00:500;1,0;2,0", "with the time of a clock", "Export the time in seconds from the start of the record"),
         (
-            "1.0  2.0",
-            "numbers between blanks",
-            "Export numbers between semicolons, tabs or commas, the time in seconds",
+            "1.0/2.0",
+            "",
+            "Export numbers as '-12.5' between semicolons, tabs, commas or blanks, the time in seconds",
         ),
     ],
 )
 def test_a_table_in_which_no_line_is_numbers_alone_is_quoted(row, what, remedy, tmp_path):
-    """A clock, spaces between: the copy is whole, another one will not help."""
+    """A clock of another form, another separator: the copy is whole, another one will not help."""
     (tmp_path / "a.csv").write_text("force;acc\n" + f"{row}\n" * 50)
     with pytest.raises(ReadError) as caught:
         read("a.csv", tmp_path, NAMED)
-    problem = f"no line of numbers; the last line reads '{row}', {what}"
+    problem = f"no line of numbers; the last line reads '{row}'{what and ', '}{what}"
     assert str(caught.value) == f"a.csv, the file: {problem}. {remedy}."
 
 

@@ -1,6 +1,7 @@
 """Universal Files of several vendors, against pyuff where it reads them, and the traps of the format."""
 
 import gzip
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -260,6 +261,19 @@ def test_ordinates_without_a_label_are_in_the_units_of_dataset_164(code, length,
     assert (not result.errors) == (code == 1)
     if code != 1:
         assert result.errors[0].reason == "unit_unknown"
+
+
+def test_exponents_of_fortran_are_read_in_header_and_samples(tmp_path):
+    recording = Recording(
+        np.random.default_rng(58).normal(size=(2, 64)), 25600.0, (Channel("f", "force"), Channel("a", "acceleration"))
+    )
+    path = write([recording], tmp_path / "a.uff", "uff58")
+    text = path.read_text()
+    path.write_text(re.sub(r"(\d)[eE]([+-]\d\d)", r"\1D\2", text))
+    assert path.read_text() != text
+    channels = (RawChannel("f", "f", "force"), RawChannel("a", "a", "acceleration"))
+    (found,) = read(path.name, tmp_path, RawDescription(channels, rate=25600.0)).recordings
+    assert found.samples == pytest.approx(recording.samples, rel=1e-5)
 
 
 def universal_file(tmp_path, *changes):

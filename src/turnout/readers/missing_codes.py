@@ -1,0 +1,78 @@
+"""Numbers that loggers write for a sample that is missing or out of range, without stating them in the metadata."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from turnout.readers.lazy import Column
+from turnout.readers.source import BLOCK_SIZE
+
+OTHER_CODES = (999.25, 2.0**15, 2.0**31)  # nulls of well logs; lowest codes of converters with 16 and 32 bits
+MIN_NINES = 3  # before the decimal point: 99 and 99.9 are common measured values
+
+
+def missing_code(value: float) -> float | None:
+    """The code for a missing sample that a number is by its form: nines alone, or a limit of a converter.
+
+    Parameters
+    ----------
+    value : float
+        A number of the file, to seven digits.
+
+    Returns
+    -------
+    float or None
+        The code; None for any other number. A measured value may have this form by chance.
+
+    Examples
+    --------
+    >>> [missing_code(value) for value in (-9999.0000001, 99999.9, -32768.0, 9998.0, 99.0)]
+    [-9999.0, 99999.9, -32768.0, None, None]
+    """
+    size = abs(float(value))
+    text = f"{size:.7g}"
+    digits, _, decimals = text.partition(".")
+    if len(digits) >= MIN_NINES and set(digits + decimals) == {"9"}:
+        return math.copysign(float(text), value)
+    return next((math.copysign(code, value) for code in OTHER_CODES if math.isclose(size, code)), None)
+
+
+def count_alone(column: Column, code: float) -> int:
+    """Number of samples that equal a code to which the signal jumps, as that of no sensor does.
+
+    The steps into and out of the code have to be larger than every other step of the channel. A measured value of this
+    form has neighbours that are near to it.
+
+    Parameters
+    ----------
+    column : (n,) array or LazyColumn
+        Samples of a channel as they are in the file.
+    code : float
+        The code.
+
+    Returns
+    -------
+    int
+        0 if the signal does not jump to the code.
+
+    Examples
+    --------
+    >>> count_alone(np.array([0.0, 2.0, -9999.0, 1.0]), -9999.0), count_alone(np.array([0.0, 700.0, 999.0]), 999.0)
+    (1, 0)
+    """
+    count, smallest_jump, largest_step = 0, np.inf, 0.0
+    for block in _overlapping_blocks(column):
+        is_code = block == np.asarray(code).astype(block.dtype)
+        steps = np.abs(np.diff(block.astype(float)))
+        into_code = is_code[:-1] ^ is_code[1:]
+        largest_step = max(largest_step, steps[~into_code].max(initial=0.0))
+        smallest_jump = min(smallest_jump, steps[into_code].min(initial=np.inf))
+        count += int(np.count_nonzero(is_code[:BLOCK_SIZE]))
+    return count if largest_step < smallest_jump < np.inf else 0
+
+
+def _overlapping_blocks(column: Column) -> Iterator[np.ndarray]:
+    """Consecutive blocks of samples, each with the first sample of the next one."""
+    for start in range(0, len(column), BLOCK_SIZE):
+        yield np.asarray(column[start : min(start + BLOCK_SIZE + 1, len(column))])

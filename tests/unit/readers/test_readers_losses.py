@@ -1,0 +1,315 @@
+"""Samples that a file lost without a sign: codes, gaps of a counter, unwritten chunks, masks, packed files.
+
+Each case is read right, or rejected with its place; a measured value of the same form is read.
+"""
+
+import bz2
+import gzip
+import io
+import lzma
+import tarfile
+import zipfile
+
+import h5py
+import numpy as np
+import pyarrow as pa
+import pytest
+from nptdms import ChannelObject, TdmsWriter
+from pyarrow import parquet
+
+from turnout.errors import ReadError
+from turnout.readers import read
+from turnout.records import RawChannel, RawDescription
+
+N = 3000
+FORCE = np.random.default_rng(5).normal(0.0, 1.0, N)
+FORCE[600:630] += 4000.0 * np.sin(np.pi * np.arange(30) / 30) ** 2
+RAIL = np.random.default_rng(6).normal(0.0, 20.0, N)
+CHANNELS = (RawChannel("force", "force", "force", unit="N"), RawChannel("rail", "rail", "acceleration", unit="m/s²"))
+HAMMER, PASSAGE = (RawDescription(CHANNELS, kind=kind, rate=20000.0) for kind in ("hammer", "passage"))
+
+
+def text_of(rows, head="force [N];rail [m/s²]"):
+    return head + "\n" + "".join(f"{row}\n" for row in rows)
+
+
+def rows_of(rail=RAIL):
+    return [f"{a:.5f};{b:.6g}" for a, b in zip(FORCE, rail)]
+
+
+def reason_of(root, name, description=HAMMER):
+    """Reason and message of the only error; no recording is left."""
+    try:
+        result = read(name, root, description)
+    except ReadError as error:
+        return error.reason, str(error)
+    (error,) = result.errors
+    assert not result.recordings
+    return error.reason, str(error)
+
+
+@pytest.mark.parametrize("samples", [[700], [0], [N - 1], [700, 701, 702, 2000]])
+@pytest.mark.parametrize("code", [-9999.0, 999.0, -999.25, 99999.9, -32768.0, 9999.99])
+def test_a_code_for_a_missing_sample_is_no_measured_value(code, samples, tmp_path):
+    rail = RAIL.copy()
+    rail[samples] = code
+    (tmp_path / "a.csv").write_text(text_of(rows_of(rail)))
+    reason, message = reason_of(tmp_path, "a.csv")
+    assert reason == "not_finite"
+    assert f"channel 'rail': {len(samples)} of {N} samples are {code:.7g}, a usual code for a missing one" in message
+    passage = read("a.csv", tmp_path, PASSAGE)
+    assert [c.name for c in passage.recordings[0].channels] == ["force"]  # it costs its channel alone
+
+
+@pytest.mark.parametrize("dtype", ["f4", "f8", "i4"])
+def test_a_code_is_found_in_any_type_and_in_a_record_that_stays_in_the_file(dtype, tmp_path):
+    n = 300_000  # the code lies in the second block
+    rail = np.round(np.random.default_rng(1).normal(0.0, 20.0, n)).astype(dtype)
+    rail[262_144] = -9999
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.attrs["rate"] = 20000.0
+        file["rail"], file["force"] = rail, np.random.default_rng(2).normal(size=n)
+    channels = (CHANNELS[0], RawChannel("rail", "rail", "acceleration", unit="0.02 m/s²!"))
+    result = read("a.h5", tmp_path, RawDescription(channels, "passage", rate=20000.0), 1.0, max_whole_file_size=0)
+    (error,) = result.errors
+    assert error.reason == "not_finite" and f"1 of {n} samples are -9999" in str(error)
+    assert [c.name for c in result.long_recordings[0].channels] == ["force"]
+
+
+def test_a_measured_value_of_this_form_has_near_neighbours(tmp_path):
+    rail = RAIL.copy()
+    rail[700:707] = [200.0, 600.0, 950.0, 999.0, 900.0, 500.0, 100.0]
+    (tmp_path / "a.csv").write_text(text_of(rows_of(rail)))
+    result = read("a.csv", tmp_path, HAMMER)
+    assert result.errors == () and result.recordings[0].signal("rail").max() == 999.0
+
+
+@pytest.mark.parametrize("gap", [400, 2000])
+def test_a_counter_that_jumps_lost_samples_and_one_that_begins_again_did_not(gap, tmp_path):
+    ignored = RawDescription((*CHANNELS, RawChannel("n", "n", "ignored")), rate=20000.0)
+    count = np.arange(N)
+    count[gap:] += 17
+    (tmp_path / "a.csv").write_text(text_of(map("{};{}".format, count, rows_of()), "n;force [N];rail [m/s²]"))
+    reason, message = reason_of(tmp_path, "a.csv", ignored)
+    assert reason == "truncated" and "samples are missing" in message and str(gap - 1) in message
+    for count in (np.arange(N), np.arange(N) % 256, 1 + np.arange(N) % 1000):
+        (tmp_path / "a.csv").write_text(text_of(map("{};{}".format, count, rows_of()), "n;force [N];rail [m/s²]"))
+        assert read("a.csv", tmp_path, ignored).errors == ()
+
+
+@pytest.mark.parametrize("row", ["0.5;OVER", "0.5;(0.4)", "0.5;---.--", "0.5;#"])
+def test_the_first_row_is_not_lost_for_one_cell_that_is_no_number(row, tmp_path):
+    (tmp_path / "a.csv").write_text(text_of([row, *rows_of()]))
+    _, message = reason_of(tmp_path, "a.csv")
+    assert f"line 2: {row.split(';')[1]!r} is no number, in the first row of samples" in message
+
+
+@pytest.mark.parametrize("line", ["Range;5000", "hammer;beside the rail", "N;m/s²"])
+def test_a_label_below_the_names_is_no_row_of_samples(line, tmp_path):
+    (tmp_path / "a.csv").write_text(text_of([line, *rows_of()]))
+    assert read("a.csv", tmp_path, HAMMER).recordings[0].n_sample == N
+
+
+@pytest.mark.parametrize(
+    ("line", "reason"),
+    [("Units: kN, g", ("entry_unknown", "unit_unknown")), ("Sampling rate: 25.6 kHz", ("wrong_rate",))],
+)
+def test_what_is_stated_below_the_numbers_counts(line, reason, tmp_path):
+    (tmp_path / "a.csv").write_text(text_of([*rows_of(), line, "End of data"], "force;rail"))
+    found, message = reason_of(tmp_path, "a.csv")
+    assert found in reason and f"line {N + 2}" in message
+
+
+def test_empty_columns_without_a_name_are_no_channels_wherever_they_are(tmp_path):
+    rows = [";" + row.replace(";", ";;") + ";" for row in rows_of()]
+    (tmp_path / "a.csv").write_text(text_of(rows, ";force [N];;rail [m/s²];"))
+    (recording,) = read("a.csv", tmp_path, HAMMER).recordings
+    np.testing.assert_allclose(recording.signal("rail"), RAIL, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("cell", "remedy"),
+    [
+        ("0,25", "one decimal mark"),
+        ("0.25-", "without other signs"),
+        ("−0.25", "without other signs"),
+        ("OVER", "Copy"),
+    ],
+)
+def test_the_remedy_is_that_of_the_cell(cell, remedy, tmp_path):
+    (tmp_path / "a.csv").write_text(text_of([*rows_of()[:50], f"0.5;{cell}", *rows_of()]), encoding="utf-8")
+    _, message = reason_of(tmp_path, "a.csv")
+    assert "line 52" in message and remedy in message
+
+
+@pytest.mark.parametrize("encoding", ["utf-32", "utf-16"])
+def test_wide_characters_are_read(encoding, tmp_path):
+    (tmp_path / "a.csv").write_text(text_of(rows_of()), encoding=encoding)
+    assert read("a.csv", tmp_path, HAMMER).recordings[0].n_sample == N
+
+
+@pytest.mark.parametrize("part", ["chunks", "whole"])
+def test_samples_of_hdf5_that_were_never_written_are_no_zeros(part, tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.attrs["rate"] = 20000.0
+        file["force"] = FORCE
+        rail = file.create_dataset("rail", (N,), "f8", chunks=(500,) if part == "chunks" else None)
+        if part == "chunks":
+            rail[:1500] = RAIL[:1500]
+    reason, message = reason_of(tmp_path, "a.h5")
+    assert reason == "truncated" and "dataset '/rail'" in message and "never written" in message
+    with h5py.File(tmp_path / "a.h5", "a") as file:
+        file["rail"][:] = RAIL
+        axis = file.create_dataset("sample", (N,), "f4")  # netCDF writes no values for such an axis
+        axis.attrs["NAME"] = f"This is a netCDF dimension but not a netCDF variable. {N:>10}"
+    assert "rail" not in reason_of(tmp_path, "a.h5")[1]  # the axis is a channel that the layout does not name
+
+
+@pytest.mark.parametrize("format", ["npz", "h5", "parquet"])
+def test_a_mask_is_named_and_one_that_masks_nothing_is_not(format, tmp_path):
+    for is_masked in (True, False):
+        mask = np.arange(N) == (500 if is_masked else -1)
+        path = tmp_path / f"a.{format}"
+        if format == "npz":
+            np.savez(path, force=FORCE, rail=RAIL, rate=20000.0, invalid=mask)
+        elif format == "parquet":
+            parquet.write_table(pa.table({"force": FORCE, "rail": RAIL, "invalid": mask}), path)
+        else:
+            with h5py.File(path, "w") as file:
+                file.attrs["rate"] = 20000.0
+                file["force"], file["rail"], file["invalid"] = FORCE, RAIL, mask
+        if is_masked:
+            reason, message = reason_of(tmp_path, path.name)
+            assert reason == "channel_unknown" and "'invalid'" in message
+        else:
+            assert read(path.name, tmp_path, HAMMER).errors == ()
+
+
+CLOCKS = {
+    "10:00:{:09.6f}": "time of day", "2026-05-13T10:00:{:09.6f}Z": "ISO 8601", "13.05.2026 10:00:{:09.6f}": "day first",
+    "05/13/2026 10:00:{:09.6f} AM": "AM and PM",
+}  # fmt: skip
+
+
+def write_with_clock(format, path, clock):
+    """Force, rail and a column of text, without a rate."""
+    if format == "npz":
+        np.savez(path, force=FORCE, rail=RAIL, timestamp=np.array(clock))
+    elif format == "h5":
+        with h5py.File(path, "w") as file:
+            file["force"], file["rail"], file["timestamp"] = FORCE, RAIL, clock
+    elif format == "parquet":
+        parquet.write_table(pa.table({"force": FORCE, "rail": RAIL, "timestamp": clock}), path)
+    else:
+        with TdmsWriter(path) as file:
+            columns = {"timestamp": clock, "force": FORCE, "rail": RAIL}
+            file.write_segment([ChannelObject("test", name, values) for name, values in columns.items()])
+
+
+@pytest.mark.parametrize("format", ["npz", "h5", "parquet", "tdms"])
+@pytest.mark.parametrize("clock", CLOCKS, ids=CLOCKS.values())
+def test_a_column_of_clock_times_is_held_against_the_rate(clock, format, tmp_path):
+    path = tmp_path / f"a.{format}"
+    for rate in (20000.0, 25600.0):
+        write_with_clock(format, path, [clock.format(k / rate) for k in range(N)])
+        if rate == 20000.0:
+            assert read(path.name, tmp_path, HAMMER).recordings[0].rate == rate
+        else:
+            reason, message = reason_of(tmp_path, path.name)
+            assert reason == "wrong_rate" and "25600" in message
+    texts = [clock.format(k / 20000) for k in range(N)]
+    write_with_clock(format, path, [*texts[:700], *texts[800:], *(clock.format((N + k) / 20000) for k in range(100))])
+    assert "samples are missing" in reason_of(tmp_path, path.name)[1]
+    write_with_clock(format, path, [*texts[:700], "no signal", *texts[701:]])
+    assert "the time of sample 700 is 'no signal'" in reason_of(tmp_path, path.name)[1]
+
+
+def value_of(number, decimal_mark="."):
+    return f"{number:.5f}".replace(".", decimal_mark)
+
+
+@pytest.mark.parametrize("mark", [".", ","])
+@pytest.mark.parametrize(
+    ("head", "row"),
+    [
+        ("force [N]|rail [m/s²]", "{}|{}"),
+        ("|force|rail|\n|N|m/s²|", "| {} | {} |"),
+        ("force rail", "{} {}"),
+        ("force [N]  rail (m/s²)", "   {}   {}  "),
+        ("# force rail", "{} {}"),
+        ("Spring campaign\nsection 7\nforce rail\nN m/s²", "{} {}"),
+    ],
+)
+def test_bars_and_blanks_separate_columns(head, row, mark, tmp_path):
+    rows = [row.format(value_of(a, mark), value_of(b, mark)) for a, b in zip(FORCE, RAIL)]
+    (tmp_path / "a.txt").write_text(text_of(rows, head), encoding="utf-8")
+    result = read("a.txt", tmp_path, HAMMER)
+    assert result.errors == ()
+    np.testing.assert_allclose(result.recordings[0].samples, [FORCE, RAIL], atol=1e-5)
+    for line, cell in enumerate(("OVER", "0.5 0.5", ""), start=2 + head.count("\n") + 700):
+        damaged = [*rows[:700], *rows[700 : line - 2 - head.count("\n")], row.format("0.5", cell), *rows[700:]]
+        (tmp_path / "a.txt").write_text(text_of(damaged, head), encoding="utf-8")
+        assert reason_of(tmp_path, "a.txt")[0] in ("unreadable", "not_finite")
+
+
+@pytest.mark.parametrize("line", ["Sample rate 25600 Hz", "dt 3.90625e-05", "Units: kN"])
+def test_what_stands_above_columns_between_blanks_counts(line, tmp_path):
+    (tmp_path / "a.txt").write_text(text_of([row.replace(";", " ") for row in rows_of()], f"{line}\nforce rail"))
+    assert reason_of(tmp_path, "a.txt")[0] in ("wrong_rate", "unit_unknown", "entry_unknown")
+
+
+@pytest.mark.parametrize("separator", [",", ";"])
+def test_names_behind_a_hash_are_names(separator, tmp_path):
+    rows = [row.replace(";", separator) for row in rows_of()]
+    (tmp_path / "a.csv").write_text(text_of(rows, f"# rate: 20000\n# force{separator}rail"))
+    assert read("a.csv", tmp_path, HAMMER).recordings[0].n_sample == N
+
+
+@pytest.mark.parametrize(
+    ("clock", "separator", "mark"),
+    [
+        ("10:00:{}", ";", "."), ("2026-05-13T10:00:{}Z", ",", "."), ("13.05.2026 10:00:{}", ";", ","),
+        ("13.05.2026;10:00:{}", ";", ","), ("05/13/2026 10:00:{} AM", "\t", "."), ("2026-05-13 10:00:{}", " ", "."),
+        ("2026-05-13 10:00:{}", "|", ","),
+    ],
+)  # fmt: skip
+def test_the_time_of_day_of_each_row_gives_the_rate(clock, separator, mark, tmp_path):
+    texts = [clock.format(value_of(10 + k / 20000, mark)) for k in range(N)]
+    is_split = len(clock.split(separator)) > 1  # date and time are two columns
+    head = separator.join(["day", "clock", "force", "rail"] if is_split else ["clock", "force", "rail"])
+
+    def write_rows(texts):
+        rows = [separator.join((x, value_of(a, mark), value_of(b, mark))) for x, a, b in zip(texts, FORCE, RAIL)]
+        (tmp_path / "a.txt").write_text(text_of(rows, head))
+
+    write_rows(texts)
+    recording = read("a.txt", tmp_path, RawDescription(CHANNELS)).recordings[0]
+    assert recording.rate == pytest.approx(20000.0, rel=1e-4)
+    np.testing.assert_allclose(recording.samples, [FORCE, RAIL], atol=1e-5)
+    write_rows([clock.format(value_of(10 + k / 12500, mark)) for k in range(N)])
+    assert reason_of(tmp_path, "a.txt")[0] == "wrong_rate"
+    write_rows([*texts[:700], *texts[800:]])
+    assert "samples are missing" in reason_of(tmp_path, "a.txt")[1]
+
+
+def packed(program):
+    data = text_of(rows_of()).encode()
+    if program in ("gzip", "bzip2", "xz"):
+        return {"gzip": gzip, "bzip2": bz2, "xz": lzma}[program].compress(data)
+    stream = io.BytesIO()
+    if program == "tar":
+        with tarfile.open(fileobj=stream, mode="w") as archive:
+            archive.addfile(member := tarfile.TarInfo("A7_1.csv"))
+            assert member.size == 0
+    else:
+        with zipfile.ZipFile(stream, "w") as archive:
+            archive.writestr("A7_1.csv", data)
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize("name", ["A7_1.csv", "A7_1.packed"])
+@pytest.mark.parametrize("program", ["gzip", "bzip2", "xz", "tar", "ZIP"])
+def test_a_packed_file_is_named_as_such(program, name, tmp_path):
+    (tmp_path / name).write_bytes(packed(program))
+    _, message = reason_of(tmp_path, name)
+    assert program in message and "Unpack it" in message
