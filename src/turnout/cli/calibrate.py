@@ -108,6 +108,9 @@ def _track_entry(section: str, values: Mapping[str, float], sd: Mapping[str, flo
     return "\n".join(lines)
 
 
+MAX_FREQUENCY = 5000.0  # Hz, above every resonance of a track that an impact excites
+
+
 def _target_modes(modes: Iterable[str]) -> dict[str, tuple[float, float]]:
     from turnout.errors import SimulationError
 
@@ -118,11 +121,12 @@ def _target_modes(modes: Iterable[str]) -> dict[str, tuple[float, float]]:
             frequency, damping = (float(v) for v in figures.split("/"))
         except ValueError:
             raise SimulationError(f"--modes {mode!r} is not of the form ballast=99.6/0.292.") from None
-        if not (0.0 < frequency < float("inf") and 0.0 < damping < 1.0):
+        if not (0.0 < frequency <= MAX_FREQUENCY and 0.0 < damping < 1.0):
             problem = (
                 f"--modes {mode!r}: no resonance has a frequency of {frequency:g} Hz and a damping ratio of {damping:g}"
             )
-            raise SimulationError(f"{problem}. Write a frequency above 0 Hz and a damping ratio between 0 and 1.")
+            remedy = f"Write a frequency above 0 Hz, up to {MAX_FREQUENCY:g} Hz, and a damping ratio between 0 and 1"
+            raise SimulationError(f"{problem}. {remedy}.")
         targets[band] = (frequency, damping)
     if {"ballast", "railpad"} <= targets.keys() and targets["ballast"][0] >= targets["railpad"][0]:
         raise SimulationError("--modes: the ballast resonance lies below the railpad resonance. Exchange the two.")

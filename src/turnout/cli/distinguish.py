@@ -10,7 +10,7 @@ distinguished. A name needs 12 in the column "none" and 6 against each rival.
 
 import argparse
 
-from turnout.cli.options import above_zero, add_configuration, add_former, add_track, finite_number
+from turnout.cli.options import RAIL_TEMPERATURE, SPEED, add_configuration, add_former, add_track, finite_number
 
 GROUP = "Simulate and diagnose"
 HELP = "show which effects a planned campaign can distinguish"
@@ -34,10 +34,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_former(parser, "--blows", "--impacts", nargs="*", type=finite_number)
     parser.add_argument(
-        "--temperatures", nargs="+", type=finite_number, default=(15.0,), metavar="C", help="of the rail [°C]"
+        "--temperatures", nargs="+", type=RAIL_TEMPERATURE, default=(15.0,), metavar="C", help="of the rail [°C]"
     )
     parser.add_argument("--trains", nargs="*", default=(), help="files in config/vehicles")
-    parser.add_argument("--speeds", nargs="+", type=above_zero, default=(160.0,), metavar="KMH", help="[km/h]")
+    parser.add_argument("--speeds", nargs="+", type=SPEED, default=(160.0,), metavar="KMH", help="[km/h]")
     parser.add_argument("--effects", nargs="+", metavar="EFFECT", help="only these effects")
     add_former(parser, "--families", "--effects", nargs="+")
 

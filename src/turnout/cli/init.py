@@ -6,6 +6,7 @@ All other commands run in this folder. Existing files are not changed.
 """
 
 import argparse
+import shlex
 
 GROUP = "Set up"
 HELP = "make a project folder with configuration"
@@ -41,5 +42,6 @@ def run(args: argparse.Namespace) -> int:
 
     folder = Path(args.folder)
     written = create_project(folder)
-    print(f"{folder}: {len(written)} files. Its README.md says in seven steps how to go on; first: cd {folder}")
+    command = f"cd {shlex.quote(str(folder))}"
+    print(f"{folder}: {len(written)} files. Its README.md says in seven steps how to go on; first: {command}")
     return 0

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -59,13 +61,7 @@ def above_zero(text: str) -> float:
     >>> above_zero("160")
     160.0
     """
-    try:
-        number = float(text)
-    except ValueError:
-        number = 0.0
-    if not 0.0 < number < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number above 0")
-    return number
+    return finite_number(text, lower_limit=0.0)
 
 
 def zero_or_more(text: str) -> float:
@@ -92,13 +88,15 @@ def zero_or_more(text: str) -> float:
     return number
 
 
-def finite_number(text: str) -> float:
+def finite_number(text: str, lower_limit: float = -math.inf) -> float:
     """The finite number of ``text``; argparse.ArgumentTypeError otherwise.
 
     Parameters
     ----------
     text : str
         Value of an option.
+    lower_limit : float
+        The number has to be above it.
 
     Returns
     -------
@@ -113,10 +111,38 @@ def finite_number(text: str) -> float:
     try:
         number = float(text)
     except ValueError:
-        number = float("nan")
-    if not abs(number) < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number")
+        number = math.nan
+    if not lower_limit < number < math.inf:
+        limit = "" if lower_limit == -math.inf else f" above {lower_limit:g}"
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number{limit}")
     return number
+
+
+@dataclass(frozen=True)
+class NumberBetween:
+    """Type of an option: a number from ``lowest`` to ``highest`` in ``unit``; argparse.ArgumentTypeError otherwise.
+
+    Examples
+    --------
+    >>> NumberBetween(1.0, 500.0, "km/h")("160")
+    160.0
+    """
+
+    lowest: float
+    highest: float
+    unit: str
+
+    def __call__(self, text: str) -> float:
+        number = finite_number(text)
+        if not self.lowest <= number <= self.highest:
+            raise argparse.ArgumentTypeError(
+                f"{text!r} is not a number from {self.lowest:g} to {self.highest:g} {self.unit}"
+            )
+        return number
+
+
+SPEED = NumberBetween(1.0, 500.0, "km/h")
+RAIL_TEMPERATURE = NumberBetween(-50.0, 80.0, "°C")
 
 
 def add_configuration(

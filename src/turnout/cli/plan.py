@@ -64,12 +64,14 @@ def run(args: argparse.Namespace) -> int:
     from pathlib import Path
 
     from turnout.config import load_configuration
+    from turnout.config.settings.fleet import MAX_SHARDS
     from turnout.errors import ConfigError
 
     configuration = load_configuration(args.configuration)
     shards = configuration.settings["fleet"].shards if args.shards is None else args.shards
-    if shards < 1:
-        raise ConfigError("--shards", "number", str(shards), "Write the number of shards of the runs, 1 or more")
+    if not 1 <= shards <= MAX_SHARDS:
+        remedy = f"Write the number of shards of the runs, 1 to {MAX_SHARDS}"
+        raise ConfigError("--shards", "number", str(shards), remedy)
     if args.raw and not Path(args.raw).is_dir():
         raise ConfigError(
             args.raw, "--raw", "no such folder", "Write the folder that holds the folders of the turnouts"

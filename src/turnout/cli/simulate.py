@@ -12,7 +12,8 @@ and force of each impact, or the forces of the wheels.
 import argparse
 
 from turnout.cli.options import (
-    above_zero,
+    RAIL_TEMPERATURE,
+    SPEED,
     add_configuration,
     add_former,
     add_raw,
@@ -43,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_former(hammer, "--blows", "--impacts", type=int)
     passage = subcommands.add_parser("passage", help="one train over the turnout")
     passage.add_argument("--vehicle", default="ic3", help="file in config/vehicles, or its path (default ic3)")
-    passage.add_argument("--speed", type=above_zero, default=160.0, help="speed [km/h] (default 160)")
+    passage.add_argument("--speed", type=SPEED, default=160.0, help="speed [km/h] (default 160)")
     passage.add_argument(
         "--load",
         type=finite_number,
@@ -62,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         sub.add_argument("--out", help="file to write, instead of one below --raw")
         sub.add_argument("--format", help="format of the file (default: by the ending of --out, else hdf5)")
         sub.add_argument("--at", default="2024-05-13T09:00:00", help="UTC of the first sample, no zone (%(default)s)")
-        sub.add_argument("--temperature", type=finite_number, help="rail temperature to note [°C]")
+        sub.add_argument("--temperature", type=RAIL_TEMPERATURE, help="rail temperature to note [°C]")
         sub.add_argument(
             "--seed",
             type=int,

@@ -216,13 +216,11 @@ def _columns_of(
     table: pa.Table, source: Source, data: bytes | mmap, offset: int, separator: str, names: Sequence[str]
 ) -> list[Column]:
     """The columns of a table as arrays, whose marks are no marks for thousands."""
-    columns = [column.to_numpy(zero_copy_only=False) for column in table.columns]
-    columns = [
-        with_durations(column, f"column {name or i + 1!r}", source)
-        for i, (name, column) in enumerate(zip(names, columns))
-    ]
-    for i, column in enumerate(columns):
-        check_thousands(column, i, names[i], data, offset, separator, source)
+    columns: list[Column] = []
+    for i, column in enumerate(table.columns):
+        numbers = with_durations(column.to_numpy(zero_copy_only=False), f"column {names[i] or i + 1!r}", source)
+        check_thousands(numbers, i, names[i], data, offset, separator, source)
+        columns.append(numbers)
     return columns
 
 
@@ -400,7 +398,9 @@ def _records(
     lower = [name.strip().lower() for name in names]
     number = columns[lower.index("record")] if "record" in lower else None
     time = time if time is not None and columns[time].dtype.kind in "fiu" else None
-    clocks = {i: column.astype(float) * 1e-9 for i, column in enumerate(columns) if column.dtype.kind == "m"}
+    clocks = {
+        i: np.asarray(column[:]).astype(float) * 1e-9 for i, column in enumerate(columns) if column.dtype.kind == "m"
+    }
     selected = [i for i, name in enumerate(lower) if name != "record" and i != time and columns[i].dtype.kind in "fiu"]
     selected = [i for i in selected if names[i] or len(selected) == 1 or not _is_empty(columns[i])]
     seconds = None if time is None else np.asarray(columns[time]) * seconds_per_number(units[time], source)

@@ -277,7 +277,7 @@ N_ROWS_OF_WORDS = 5  # lines: numbers between blanks may be in a head, too, but 
 def _are_rows_of_words(data: bytes | mmap, position: int) -> bool:
     """Whether a line and those behind it are rows of as many numbers between blanks, without another separator."""
     end = position
-    rows = []
+    rows: list[list[str]] = []
     while len(rows) < N_ROWS_OF_WORDS and end < len(data):
         start, end = end, (data.find(b"\n", end) + 1) or len(data)
         line = decode_line(data[start:end])

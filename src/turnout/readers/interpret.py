@@ -158,11 +158,19 @@ def errors_without_layout(raw: RawFile, source: Source) -> Iterator[ReadError]:
 
 
 def _missing_count(column: Column, fills: Sequence[float]) -> int:
-    """Number of samples that are no finite numbers or equal a fill value."""
+    """Number of samples that are no finite numbers, equal a fill value or are a code for a missing sample."""
     if column.dtype.kind not in "fiu":
         return 0
-    blocks = (np.asarray(column[start : start + BLOCK_SIZE]) for start in range(0, len(column), BLOCK_SIZE))
-    return sum(int(np.count_nonzero(~(np.abs(block) < LARGEST_NUMBER) | np.isin(block, fills))) for block in blocks)
+    count = 0
+    extremes: list[float] = []
+    for start in range(0, len(column), BLOCK_SIZE):
+        block = np.asarray(column[start : start + BLOCK_SIZE])
+        is_measured = (np.abs(block) < LARGEST_NUMBER) & ~np.isin(block, fills)
+        count += int(np.count_nonzero(~is_measured))
+        if is_measured.any():
+            extremes += [float(block[is_measured].min()), float(block[is_measured].max())]
+    codes = {missing_code(x) for x in (min(extremes), max(extremes))} - {None} if extremes else set()
+    return count + sum(count_alone(column, code) for code in codes if code is not None)
 
 
 def _count_errors(raw: RawFile, description: RawDescription, source: Source) -> Iterator[ReadError]:

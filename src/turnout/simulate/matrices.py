@@ -121,7 +121,7 @@ class TrackMatrices:
         """
         if not self.node[0] <= x <= self.node[-1]:
             a, b = self.node[[0, -1]]
-            raise SimulationError(f"place {x:.3f} m is outside the track from {a:.3f} m to {b:.3f} m.")
+            raise SimulationError(f"position {x:.3f} m is outside the track from {a:.3f} m to {b:.3f} m.")
         e = self.element_at(x)
         h, p = self.elements[0][e], self.elements[1][e]
         i, j = self.node_index[e], self.node_index[e + 1]

@@ -88,7 +88,7 @@ class Track:
     def __post_init__(self) -> None:
         support = np.array(self.support, dtype=float)
         if support.ndim != 1 or support.size < 3 or not np.all(np.diff(support) > 0.0):
-            raise SimulationError(f"{self.name}: support needs at least 3 rising places, got {support!r}.")
+            raise SimulationError(f"{self.name}: needs at least 3 supports at rising positions, got {support!r}.")
         object.__setattr__(self, "support", support)
         self._set_support_values()
         if self.layers not in (1, 2, 3) or self.elements_per_bay < 1:

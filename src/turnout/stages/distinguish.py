@@ -57,12 +57,17 @@ def planned_matrix(
     Raises
     ------
     SimulationError
-        Nothing is planned, or one of ``effects`` is no candidate in such a plan.
+        Nothing is planned, a position is outside the track, or one of ``effects`` is no candidate in such a plan.
     """
     if not impact_positions and not trains:
         raise SimulationError("nothing is planned: give --impacts, --trains or both.")
     track_folder, vehicle_folder = (_folder(config, subfolder) for subfolder in ("tracks", "vehicles"))
     turnout = load_track(track, folder=track_folder)
+    first, last = turnout.track.start, turnout.track.end
+    for x in (*sensors, *impact_positions):
+        if not first <= x <= last:
+            problem = f"the position {x:g} m of a sensor or impact is outside the track {turnout.name!r}"
+            raise SimulationError(f"{problem}. Write positions from {first:g} to {last:g} m.")
     impacts = tuple((x, t) for x in impact_positions for t in temperatures)
     vehicles = {name: load_vehicle(name, folder=vehicle_folder) for name in trains}
     passages = tuple(Train(v, n, s / KMH, t) for n, v in vehicles.items() for s in speeds for t in temperatures)

@@ -1,6 +1,7 @@
 """What a user sees who types something wrong: one message that says where, what was found, and what to do."""
 
 import argparse
+import shlex
 import shutil
 from importlib import import_module
 
@@ -53,6 +54,10 @@ WRONG = {
     "calibrate --section A7 --track tommerup --modes ballast=-5/0.1": "'ballast=-5/0.1': no resonance has a frequency",
     "calibrate --section A7 --track tommerup --modes ballast=nan/0.1": "Write a frequency above 0 Hz",
     "calibrate --section A7 --track tommerup --modes ballast=100/1.5": "damping ratio between 0 and 1",
+    "calibrate --section A7 --track tommerup --modes ballast=1e300/0.1": "above 0 Hz, up to 5000 Hz",
+    "distinguish --track tommerup --sensors 1e9 --impacts 24.6": "the position 1e+09 m of a sensor or impact",
+    "distinguish --track tommerup --sensors 24.6 --impacts -900": "Write positions from",
+    "plan --shards 1000000000000": "Write the number of shards of the runs, 1 to 4096",
     "calibrate --section A7 --track tommerup --modes ballast=600/.1 railpad=150/.1": "the ballast resonance lies below",
 }
 
@@ -80,8 +85,11 @@ def test_a_layout_without_passages_is_named(project, capsys, command):
         ("worklist --turnout W1", "turnout worklist: error: unknown: --turnout W1. 'turnout worklist --help'"),
         (
             "simulate passage --speed -3",
-            "turnout simulate passage: error: argument --speed: '-3' is not a number above",
+            "turnout simulate passage: error: argument --speed: '-3' is not a number from 1 to 500 km/h",
         ),
+        ("simulate passage --speed 1e9", "argument --speed: '1e9' is not a number from 1 to 500 km/h"),
+        ("simulate hammer --section A7 --temperature 1e30", "--temperature: '1e30' is not a number from -50 to 80 °C"),
+        ("distinguish --sensors 24 --trains ic3 --speeds 1e-9", "--speeds: '1e-9' is not a number from 1 to 500 km/h"),
         ("diagnose --turnout W1 --budget nan", "argument --budget: 'nan' is not a number"),
         ("diagnose --turnout W1 --budget -1", "argument --budget: '-1' is not 0 or more"),
         ("paper W1 --speed -5", "argument --speed: '-5' is not a number above 0"),
@@ -112,6 +120,12 @@ def test_a_draft_that_is_not_finished_is_listed(project, capsys):
     assert main(["check"]) in (0, 1)
     line = 1 + layout.read_text().splitlines().index(next(x for x in layout.read_text().splitlines() if "DECIDE" in x))
     assert f"config/layouts/tommerup.yaml, line {line}: position [m]" in capsys.readouterr().out
+
+
+def test_the_first_command_of_a_project_can_be_pasted_into_a_shell(tmp_path, capsys):
+    folder = tmp_path / "Prüf stand's"
+    assert main(["init", str(folder)]) == 0
+    assert shlex.split(capsys.readouterr().out.split("first: ")[1]) == ["cd", str(folder)]
 
 
 def test_an_interrupted_init_is_completed_by_the_next(tmp_path, monkeypatch):

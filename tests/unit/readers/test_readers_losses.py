@@ -18,7 +18,8 @@ from nptdms import ChannelObject, TdmsWriter
 from pyarrow import parquet
 
 from turnout.errors import ReadError
-from turnout.readers import read
+from turnout.readers import read, read_unconverted
+from turnout.readers.interpret import errors_without_layout
 from turnout.records import RawChannel, RawDescription
 
 N = 3000
@@ -57,6 +58,9 @@ def test_a_code_for_a_missing_sample_is_no_measured_value(code, samples, tmp_pat
     reason, message = reason_of(tmp_path, "a.csv")
     assert reason == "not_finite"
     assert f"channel 'rail': {len(samples)} of {N} samples are {code:.7g}, a usual code for a missing one" in message
+    source, _, raw = read_unconverted("a.csv", tmp_path)
+    (problem,) = [error.problem for error in errors_without_layout(raw, source)]
+    assert problem == ("1 sample is missing" if len(samples) == 1 else f"{len(samples)} samples are missing")
     passage = read("a.csv", tmp_path, PASSAGE)
     assert [c.name for c in passage.recordings[0].channels] == ["force"]  # it costs its channel alone
 
@@ -237,7 +241,7 @@ def value_of(number, decimal_mark="."):
         ("force rail", "{} {}"),
         ("force [N]  rail (m/s²)", "   {}   {}  "),
         ("# force rail", "{} {}"),
-        ("Spring campaign\nsection 7\nforce rail\nN m/s²", "{} {}"),
+        ("Spring campaign\nhammer test\nforce rail\nN m/s²", "{} {}"),
     ],
 )
 def test_bars_and_blanks_separate_columns(head, row, mark, tmp_path):

@@ -106,7 +106,7 @@ def test_a_body_on_nothing_is_refused():
 @pytest.mark.parametrize(
     ("build", "said"),
     [
-        (lambda: Track(TRACK.rail, [0.0, 2.0, 1.0], 1e8, 0.0, layers=1), "rising places"),
+        (lambda: Track(TRACK.rail, [0.0, 2.0, 1.0], 1e8, 0.0, layers=1), "rising positions"),
         (lambda: assemble(TRACK).weights(99.0), "outside the track"),
         (lambda: assemble(TRACK).weights(("ballast", 3)), "no degree of freedom"),
         (lambda: Link(()), "acts on no degree"),

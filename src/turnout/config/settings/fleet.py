@@ -4,13 +4,18 @@ from dataclasses import dataclass
 
 from turnout.config.settings.setting import setting
 
+MAX_SHARDS = 4096  # jobs of a stage: more need longer to start than they save
+
 
 @dataclass(frozen=True)
 class FleetSettings:
     """Shards, checkpoints and the limits beyond which a run is called a failure."""
 
     shards: int = setting(
-        1, why="one job per stage up to some fifty turnouts; a network of thousands needs 64", minimum=1, maximum=4096
+        1,
+        why="one job per stage up to some fifty turnouts; a network of thousands needs 64",
+        minimum=1,
+        maximum=MAX_SHARDS,
     )
     checkpoint_units: int = setting(
         200, why="results are stored after this many units, so that an interruption loses only minutes", minimum=1
