@@ -74,6 +74,12 @@ def test_trains_inform_on_the_sum_of_value_and_offset_and_impacts_on_the_value()
     np.testing.assert_allclose(trains.matrix @ sums, trains.vector, rtol=1e-6, atol=1e-6)
 
 
+def test_an_offset_is_no_larger_where_the_file_is_unsure_of_the_value():
+    unsure = [replace(p, sd=0.35) if p.name == "pad@1.20" else p for p in PARAMETERS]
+    offsets = {p.name: p.sd for p in with_offsets(unsure, [])[0][len(PARAMETERS) :]}
+    assert {offsets[f"pad@{0.6 * k:.2f}" + END] for k in range(N)} == {0.1}
+
+
 @pytest.mark.parametrize(
     ("names", "effect", "parameter"),
     [

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from turnout.mismatch.calibrated.belief import Innovation, StateParameter
-from turnout.mismatch.calibrated.change import ChangeEffect
+from turnout.mismatch.calibrated.change import ChangeEffect, change_sd
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.file_comparison import Deviation, deviations_from_file, evidence_from_first
 from turnout.mismatch.calibrated.history import Event, History, estimate_history
@@ -70,14 +70,13 @@ def file_answer(
     order = [
         k for k in np.argsort(-gains) if gains[k] > least - margin and abs(sizes[k]) >= least_size(steps[k], by_name)
     ]
-    jump = history.steps[0].innovation if history.steps else None
     if not order or gains[order[0]] < least:
-        return _deviation_answer(parameters, history, visit, steps, jump)
+        return _deviation_answer(parameters, visits, events, history, visit, steps, margin)
     first = order[0]
     stated = LeadingEffect.of(
         steps[first], by_name, (float(sizes[first]), float(sds[first])), float(gains[first]) - price
     )
-    assert jump is not None  # without a visit nothing has evidence
+    jump = history.steps[0].innovation  # without a visit nothing has evidence
     if not _explains_first_visit(parameters, visits, events, steps[first], jump):
         return stated.unknown(visit, FILE, by_name[jump.parameter])
     names = [stated.name]
@@ -103,10 +102,12 @@ def _explains_first_visit(
 
 def _deviation_answer(
     parameters: Sequence[StateParameter],
+    visits: Sequence[VisitInformation],
+    events: Sequence[Event],
     history: History,
     visit: str,
     candidates: Sequence[ChangeEffect],
-    jump: Innovation | None,
+    margin: float,
 ) -> ModelAnswer:
     """The clearest deviation from the file; without one "unknown" if the first visit is not what the file expects."""
     by_name = {p.name: p for p in parameters}
@@ -114,6 +115,7 @@ def _deviation_answer(
     least = {g: size for g, size in CALIBRATION.least_sizes if g in groups}
     deviations = deviations_from_file(history, parameters, least, intolerable=INTOLERABLE)
     if not deviations:
+        jump = history.steps[0].innovation if history.steps else None
         if jump is None or jump.is_expected:
             return ModelAnswer(visit, FILE, "none")
         at = by_name[jump.parameter]
@@ -122,8 +124,10 @@ def _deviation_answer(
     middle = None if first.positions is None else 0.5 * sum(first.positions)
     position = middle if middle is not None else position_of(first.names[0], by_name[first.names[0]])
     names: tuple[str, ...] = (NAMES[first.group],)
-    if names == ("local_ballast",) and first.size < 0.0:  # as in ``names_of_softer_ballast``
-        names = ("local_ballast", "hanging_sleeper")
+    if names == ("local_ballast",) and first.size < 0.0:
+        run = [by_name[name] for name in first.names]
+        effect = ChangeEffect(", ".join(first.names), dict.fromkeys(first.names, 1.0), change_sd(run[0], parameters))
+        names = tuple(names_of_softer_ballast(parameters, visits, events, effect, (first.size, first.sd), margin))
     return ModelAnswer(
         visit, FILE, "named" if len(names) == 1 else "a_or_b", names, ", ".join(first.names), first.group,
         position, first.size, first.sd, first.unit,

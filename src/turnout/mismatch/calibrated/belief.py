@@ -38,6 +38,28 @@ class StateParameter:
             raise ValueError(f"parameter {self.name!r}: sd must be above 0, walk_sd and visit_sd at least 0")
 
 
+def scatter_sd(parameter: StateParameter, parameters: Sequence[StateParameter]) -> float:
+    """Standard deviation of a value in the file where the file is sure of it.
+
+    Of a numbered component it is that of the value that is known best in its group. Supports are alike: where the file
+    is unsure, as between two sections, a value is less certain, but no larger change is more probable.
+
+    Parameters
+    ----------
+    parameter : StateParameter
+    parameters : sequence of StateParameter
+        All of the model.
+
+    Returns
+    -------
+    float
+        In the unit of the parameter.
+    """
+    if parameter.index is None:
+        return parameter.sd
+    return min([parameter.sd, *(p.sd for p in parameters if p.group == parameter.group and p.index is not None)])
+
+
 @dataclass(frozen=True)
 class Innovation:
     """How far a visit is from what the belief predicts.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from turnout.mismatch.calibrated.belief import StateParameter
+from turnout.mismatch.calibrated.belief import StateParameter, scatter_sd
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.history import History, Step
 
@@ -77,9 +77,7 @@ class OnsetEvidence:
 def change_sd(parameter: StateParameter, parameters: Sequence[StateParameter]) -> float:
     """Prior standard deviation of a change of one parameter.
 
-    ``CALIBRATION.change_sds`` standard deviations of its value in the file; of a numbered component, of the value that
-    is known best in its group. Supports are alike: where the file is unsure, as between two sections, a change is no
-    larger.
+    ``CALIBRATION.change_sds`` times ``scatter_sd``: where the file is unsure of a value, a change is no larger.
 
     Parameters
     ----------
@@ -92,8 +90,7 @@ def change_sd(parameter: StateParameter, parameters: Sequence[StateParameter]) -
     float
         In the unit of the parameter.
     """
-    alike = [p.sd for p in parameters if p.group == parameter.group and p.index is not None]
-    return CALIBRATION.change_sds * (parameter.sd if parameter.index is None else min([parameter.sd, *alike]))
+    return CALIBRATION.change_sds * scatter_sd(parameter, parameters)
 
 
 def compare_onsets(history: History, effects: Sequence[ChangeEffect]) -> list[OnsetEvidence]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from turnout.mismatch.calibrated.belief import StateParameter
+from turnout.mismatch.calibrated.belief import StateParameter, scatter_sd
 from turnout.mismatch.calibrated.change import ChangeEffect, OnsetEvidence, compare_onsets
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.file_comparison import evidence_from_first
@@ -99,7 +99,10 @@ def evidence_of_gap(
     """
     effect = leader.effect if isinstance(leader, OnsetEvidence) else leader
     springs, dampers = _supports_of(effect, parameters)
-    offsets = {p.name: replace(p, name=f"{p.name} as trains feel it", mean=0.0) for p in (*springs, *dampers)}
+    offsets = {
+        p.name: replace(p, name=f"{p.name} as trains feel it", mean=0.0, sd=scatter_sd(p, parameters))
+        for p in (*springs, *dampers)
+    }
     sd = CALIBRATION.gap_size_sds * max(effect.sd, abs(size))
 
     def change(damper_share: float, train_share: float) -> ChangeEffect:

@@ -6,7 +6,7 @@ information on the sum of its value and of an offset that impacts do not have. N
 .. math:: x_{train} = x + o, \quad \Lambda' = T^T \Lambda T, \quad T = (1, 1)
 
 A constant offset is an error of the model as well: that of all pads, or of all ballast, has the prior of an effect,
-that of one support the scatter of the file. So only what differs between visits is evidence of a change.
+that of one support the scatter of supports, also where the file is unsure of its value. So only what differs between visits is evidence of a change.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from turnout.mismatch.calibrated.belief import StateParameter
+from turnout.mismatch.calibrated.belief import StateParameter, scatter_sd
 from turnout.mismatch.calibrated.change import ChangeEffect, OnsetEvidence, change_sd, compare_onsets
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.history import Event, estimate_history
@@ -116,7 +116,7 @@ def with_offsets(
     for law, spring, damper in _springs(parameters):
         for p, share in ((spring, 1.0), (damper, DAMPER_SHARE)):
             if p is not None:
-                sd = p.sd if law.is_local else share * CALIBRATION.load_effect_sd
+                sd = scatter_sd(p, parameters) if law.is_local else share * CALIBRATION.load_effect_sd
                 offsets[p.name] = StateParameter(
                     p.name + END, 0.0, sd, 0.0, "under load", None, p.position, p.unit, 0.0, False
                 )

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.constants import KMH
-from turnout.mismatch.calibrated.belief import StateParameter
+from turnout.mismatch.calibrated.belief import StateParameter, scatter_sd
+from turnout.mismatch.calibrated.change import change_sd
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.file_comparison import model_error
 from turnout.mismatch.calibrated.history import BEFORE_ALL, Event
@@ -50,7 +52,6 @@ def calibrated_parameters(case: TrackCase, route: str = "main") -> dict[str, Sta
     sensors = {s.name: float(s.place) for s in case.campaign.sensors}
     castings = zone.castings
     waves = case.data.site.waves
-    walks = dict(CALIBRATION.walk_sds)
     parameters: dict[str, StateParameter] = {}
     used: Counter[str] = Counter()
     for nuisance in _shared_nuisances(case):
@@ -73,22 +74,30 @@ def calibrated_parameters(case: TrackCase, route: str = "main") -> dict[str, Sta
         name = name if route == "main" else f"{route} {name}"
         used[name] += 1
         name = name if used[name] == 1 else f"{name} #{used[name]}"
-        walk = walks.get(nuisance.group, CALIBRATION.default_walk_share * nuisance.sd)
         is_outer = nuisance.index is not None and nuisance.index not in zone.effect_supports
         parameters[nuisance.name] = StateParameter(
-            name, nuisance.mean, nuisance.sd, walk, group, index, position, nuisance.unit,
-            _visit_sd(nuisance, is_outer), not is_outer,
-        )  # fmt: skip
-    return parameters
+            name, nuisance.mean, nuisance.sd, 0.0, group, index, position, nuisance.unit, may_change=not is_outer
+        )
+    every = tuple(parameters.values())
+    return {
+        name: replace(p, walk_sd=_walk_sd(p, every), visit_sd=_visit_sd(name, p, every))
+        for name, p in parameters.items()
+    }
 
 
-def _visit_sd(nuisance: Nuisance, is_outer: bool) -> float:
+def _walk_sd(parameter: StateParameter, parameters: Sequence[StateParameter]) -> float:
+    """Standard deviation of the random walk of a year."""
+    share = CALIBRATION.default_walk_share
+    return dict(CALIBRATION.walk_sds).get(parameter.group, share * scatter_sd(parameter, parameters))
+
+
+def _visit_sd(nuisance: str, parameter: StateParameter, parameters: Sequence[StateParameter]) -> float:
     """What each visit adds of its own: another train of the type, the temperature of pads, what lies farther out."""
-    if nuisance.name in ("pad_stiffness", "pad_damping"):  # of all pads
+    if nuisance in ("pad_stiffness", "pad_damping"):  # of all pads
         return CALIBRATION.pad_visit_sd
-    if is_outer:
-        return CALIBRATION.change_sds * nuisance.sd
-    return nuisance.sd if nuisance.group == "wheels" else 0.0
+    if not parameter.may_change:
+        return change_sd(parameter, parameters)
+    return parameter.sd if parameter.group == "wheels" else 0.0
 
 
 def _shared_nuisances(case: TrackCase) -> list[Nuisance]:

@@ -1,0 +1,46 @@
+"""Parameters of the calibrated model: what each visit adds of its own, and the random walk, where the file is unsure."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.turnout.calibration import calibrated_parameters
+
+SUPPORTS = 0.6 * np.arange(6)
+EFFECTS_AT = range(2, 6)  # the two supports before them absorb what lies farther out
+SDS = {"pad": 0.1, "ballast": 0.1, "sleeper": 0.03}
+UNSURE = 3.0  # times the standard deviation of other supports, at the first support of a section
+
+
+def parameters(unsure_at):
+    """Parameters of six supports of which the file is unsure at one, by name."""
+    nuisances = [
+        Nuisance(f"{group}_{j}", "-", 0.0, sd * (UNSURE if j == unsure_at else 1.0), group=group, index=j)
+        for group, sd in SDS.items()
+        for j in range(len(SUPPORTS))
+    ]
+    turnout = SimpleNamespace(track=SimpleNamespace(support=SUPPORTS))
+    zone = SimpleNamespace(turnout=turnout, castings=(), effect_supports=EFFECTS_AT)
+    case = SimpleNamespace(
+        data=SimpleNamespace(site=SimpleNamespace(nominal=zone, waves=None)),
+        campaign=SimpleNamespace(turnout=turnout, sensors=()),
+        nuisances=tuple(nuisances),
+    )
+    return {p.name: p for p in calibrated_parameters(case).values()}
+
+
+@pytest.mark.parametrize("group", SDS)
+def test_what_outer_supports_absorb_at_a_visit_is_the_same_where_the_file_is_unsure(group):
+    found = parameters(unsure_at=1)
+    assert found[f"{group}@0.60"].sd == pytest.approx(UNSURE * SDS[group])
+    own = [found[f"{group}@{x:.2f}"].visit_sd for x in SUPPORTS]
+    assert own == pytest.approx([5.0 * SDS[group]] * 2 + [0.0] * 4)
+
+
+@pytest.mark.parametrize("group", SDS)
+def test_values_of_which_the_file_is_unsure_walk_no_faster(group):
+    found = parameters(unsure_at=3)
+    walks = {found[f"{group}@{x:.2f}"].walk_sd for x in SUPPORTS}
+    assert len(walks) == 1 and 0.0 < walks.pop() <= 0.03
