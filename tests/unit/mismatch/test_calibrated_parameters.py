@@ -1,4 +1,4 @@
-"""Parameters of the calibrated model: what each visit adds of its own, and the random walk, where the file is unsure."""
+"""Parameters of the calibrated model: what visits add of their own, and random walks, where the file is unsure."""
 
 from types import SimpleNamespace
 

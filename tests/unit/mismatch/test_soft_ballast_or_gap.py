@@ -24,7 +24,9 @@ NAMES = tuple(p.name for p in PARAMETERS)
 SOFT, GAP, EITHER = ("local_ballast",), ("hanging_sleeper",), ("local_ballast", "hanging_sleeper")
 
 
-def names_of(question, damper_share, trains_feel=1.0, damper_weight=1.0, size=-1.8, seed=0, sd=SD, repeats=False, unsure=1.0):
+def names_of(
+    question, damper_share, trains_feel=1.0, damper_weight=1.0, size=-1.8, seed=0, sd=SD, repeats=False, unsure=1.0
+):
     """Names after four visits, of which two have the change, or all of them against the file.
 
     Data are mixtures of neighbouring springs and dampers, dampers by ``damper_weight``. With ``repeats`` their error is

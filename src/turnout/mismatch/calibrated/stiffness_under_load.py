@@ -6,7 +6,8 @@ information on the sum of its value and of an offset that impacts do not have. N
 .. math:: x_{train} = x + o, \quad \Lambda' = T^T \Lambda T, \quad T = (1, 1)
 
 A constant offset is an error of the model as well: that of all pads, or of all ballast, has the prior of an effect,
-that of one support the scatter of supports, also where the file is unsure of its value. So only what differs between visits is evidence of a change.
+that of one support the scatter of supports, also where the file is unsure of its value.
+So only what differs between visits is evidence of a change.
 """
 
 from __future__ import annotations
