@@ -9,18 +9,13 @@ from scipy.stats import f
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.decision import calibrate, judge
-from turnout.mismatch.engine.localization import (
-    AMPLITUDES,
-    NOISE_FACTORS,
-    Location,
-    locate,
-    subspace_evidence,
-    weigh_spaces,
-)
+from turnout.mismatch.engine.localization import Location, locate
 from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.reserved_data import is_significantly_worse
 from turnout.mismatch.engine.residual_space import ResidualSpace
+from turnout.mismatch.engine.space_evidence import AMPLITUDES, NOISE_FACTORS, subspace_evidence, weigh_spaces
 from turnout.mismatch.turnout import disturbances
 from turnout.mismatch.turnout.priors import DISTURBANCE
 
@@ -84,6 +79,86 @@ def test_a_force_is_told_from_a_channel(mix, frame, level):
     found = locate(case, fit)
     assert (found.frame, found.place) == (frame, level if frame == "place" else None)
     assert found.sensor == (level if frame == "sensor" else None)
+
+
+class Support(Case):
+    """Two recordings of six nuisances. In the first, an unknown cause acts along ``columns``, which the nuisances can
+    imitate."""
+
+    def __init__(self, rng, n=40, k=3):
+        self.nuisances = tuple(Nuisance(f"n{i}", "-", 0.2 * i, 0.3 + 0.2 * i) for i in range(6))
+        self.sd = np.array([x.sd for x in self.nuisances])
+        self.mean = np.array([x.mean for x in self.nuisances])
+        self.jacobian = {"a": rng.normal(size=(n, 6)), "b": rng.normal(size=(5, 6))}
+        self.columns = 2.0 * self.jacobian["a"][:, :k] + 0.3 * rng.normal(size=(n, k))
+        truth = self.mean + self.sd * rng.normal(size=6)
+        data = {name: j @ truth + rng.normal(size=len(j)) for name, j in self.jacobian.items()}
+        data["a"] += self.columns @ rng.normal(size=k)
+        self.observations = tuple(Observation(name, name, y, 1.0, data_type=name) for name, y in data.items())
+
+    def predict(self, values, terms, observations):
+        return [self.jacobian[o.name] @ np.array(list(values.values())) for o in observations]
+
+    def residual_spaces(self, fit):
+        yield ResidualSpace(("a",), self.columns, {("place", 0.0): None})
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_nuisances_pay_for_imitating_a_cause_is_evidence_for_it(seed):
+    """The evidence is that of dense covariances: the data given the other recording, N(m, C), with the cause
+    N(m, C + a²BBᵀ)."""
+    case = Support(np.random.default_rng(seed))
+    fit = fit_jointly(case)
+    j, k = case.jacobian["a"], case.jacobian["b"]
+    covariance = np.linalg.inv(k.T @ k / fit.scale["b"] + np.diag(case.sd**-2))
+    estimate = case.mean + covariance @ k.T @ (case.observations[1].data - k @ case.mean) / fit.scale["b"]
+    deviation, c = case.observations[0].data - j @ estimate, np.eye(len(j)) + j @ covariance @ j.T / fit.scale["a"]
+    b = case.columns / np.sqrt(np.linalg.eigvalsh(case.columns.T @ np.linalg.solve(c, case.columns)).mean())
+
+    def log_likelihood(noise, amplitude):
+        total = noise * c + amplitude * b @ b.T
+        return -0.5 * (np.linalg.slogdet(total)[1] + deviation @ np.linalg.solve(total, deviation))
+
+    expected = np.array([[log_likelihood(noise, a) for a in AMPLITUDES] for noise in NOISE_FACTORS])
+    (evidence,) = weigh_spaces(case, fit, {"a": 1.0, "b": 1.0})
+    assert evidence.nats == pytest.approx(expected.max() - expected[:, 0].max(), rel=1e-6)
+    assert evidence.nats > 1.0
+
+
+class TrainAndImpacts(Case):
+    """A passage and two impacts. A force at 0 or 1 is seen in the passage; a change at one of them or at both in the
+    impacts, all impacts alike or not."""
+
+    def __init__(self, passage, impacts):
+        data = {"p": passage, "h1": impacts[0], "h2": impacts[1]}
+        kinds = {"p": "passage", "h1": "hammer", "h2": "hammer"}
+        self.observations = tuple(Observation(name, name, y, 1.0, data_type=kinds[name]) for name, y in data.items())
+
+    def predict(self, values, terms, observations):
+        return [np.zeros(o.data.size) for o in observations]
+
+    def residual_spaces(self, fit):
+        eye, first, second, both = np.eye(40), np.arange(10), np.arange(10, 20), np.arange(20)
+        yield ResidualSpace(("p",), eye, {("place", 0.0): first, ("place", 1.0): second})
+        levels = {("place", 0.0): first, ("place", 1.0): second, ("place", (0.0, 1.0)): both}
+        yield ResidualSpace(("h1", "h2"), np.concatenate([eye, eye]), levels, "linear")
+        yield ResidualSpace(("h1",), eye, levels, "free")
+        yield ResidualSpace(("h2",), eye, levels, "free")
+
+
+def test_a_cause_at_two_positions_that_differs_between_impacts_is_located_between_them():
+    rng, shown = np.random.default_rng(5), np.arange(40) < 20
+    y = 0.3 * rng.normal(size=(3, 40))
+    y[0, :10] += 6.0 * rng.normal(size=10)  # the train shows a force at 0 alone
+    y[1:] += 6.0 * shown * rng.normal(size=(2, 40))
+    case = TrainAndImpacts(y[0], y[1:])
+    fit = fit_jointly(case)
+    evidence = {(w.frame, w.level): w for w in weigh_spaces(case, fit, {"passage": 1.0, "hammer": 1.0})}
+    both, zero = evidence["place", (0.0, 1.0)], evidence["place", 0.0]
+    assert set(both.by_space) == {"p", "h1", "h2"}  # of the two laws, one counts
+    assert both.by_space["p"] == zero.by_space["p"] > evidence["place", 1.0].by_space["p"]
+    found = locate(case, fit)
+    assert (found.level, found.place, found.low, found.high) == ((0.0, 1.0), 0.5, 0.0, 1.0)
 
 
 def test_nothing_is_located_in_noise():

@@ -14,9 +14,13 @@ class ResidualSpace:
     """Columns on some observations, and the subspaces of them.
 
     ``names`` of the observations. ``columns`` (n, k) on them one behind the other, in the unit of the data.
-    ``combinations`` (frame, level) -> (k, m) combinations of the columns, None for all of them.
+    ``combinations`` (frame, level) -> (k, m) combinations of the columns, (m,) indices of columns, or None for all of
+    them. A level of "place" is a position [m], or the first and last position of a stretch.
+
+    ``law`` of the cause, if there are several for the same observations: of them the one with the most evidence counts.
     """
 
     names: tuple[str, ...]
     columns: np.ndarray
     combinations: Mapping[tuple[str, Any], np.ndarray | None]
+    law: str = ""

@@ -145,6 +145,10 @@ class ReceptancePriors:
         1.5e-3, "m/s", "sliding rate of a stuck joint under an impact: friction of 8 kN fits best with it", FRICTION)
     sticking_force: float = prior(
         2e3, "N", "friction force between a free and a stuck joint, for impacts of 5 kN", FRICTION)
+    change_octaves: float = prior(
+        0.5, "octaves", "correlation length of a change that varies slowly; a quarter and one octave locate alike",
+        LOCATED)
+    max_stretch: int = prior(3, "supports", "next to each other at which one unnamed cause may act", LOCATED)
     relative_step: float = prior(
         1e-3, "-", "change of a support's value, for derivatives of links that follow it", "numerical")
     seat_step: float = prior(0.01, "m", "of the derivative by the position of a sensor", "numerical")

@@ -1,19 +1,22 @@
 r"""Subspaces of the residual of a turnout: a force at a support, a fault of a channel, a wheel, one recording alone.
 
 In a passage the force at a position x is free in time: all sensors respond by the track's transfer functions. In hammer
-tests a change at x adds :math:`q(f)\,H_{bx}(f)\,H_{xs}(f)`, by reciprocity, with one free q(f) for all impacts b and
-sensors s. This holds for a change of a support, a mass or a loose fastening alike.
+tests a linear change at x adds :math:`q(f)\,H_{bx}(f)\,H_{xs}(f)`, by reciprocity, with one free q(f) for all impacts b
+and sensors s. This holds for a change of a support, a mass or a loose fastening alike. A change that is not linear has
+another :math:`q_b(f)` for each impact. Neighbouring supports may change together. Sensors on the changed sleeper itself
+are an exception: they feel the changed link as well.
 """
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.mismatch.engine.residual_space import ResidualSpace
 from turnout.mismatch.turnout import receptance_observation
-from turnout.mismatch.turnout.priors import PASSAGE, TRACK
+from turnout.mismatch.turnout.priors import PASSAGE, RECEPTANCE, TRACK
 from turnout.mismatch.turnout.pseudo_forces import green_functions
 from turnout.mismatch.turnout.rail_roughness import amplitude_sd
 from turnout.mismatch.turnout.surface_priors import WHEELS
@@ -104,29 +107,76 @@ def _wheel_space(case: TrackCase, fit: Fit, aligned: AlignedPassage) -> Residual
 
 
 def _change_spaces(case: TrackCase, fit: Fit, pairs: Sequence[tuple[Observation, FrfPair]]) -> Iterator[ResidualSpace]:
-    """A change at each support, of each channel, of all supports; in all tests or in those of one visit."""
-    names = tuple(o.name for o, _ in pairs)
-    sensitivity_of, supports = (
-        case.predictor.pair_sensitivities(fit.values, case.all_terms(fit)),
-        _extended_supports(case),
-    )
-    through = [_through_support(case, fit, pair, sensitivity_of(pair), supports) for _, pair in pairs]
-    at = {j: [h[:, k] for h in through] for k, j in enumerate(supports)}
-    track_change = [h.sum(axis=1) for h in through]
-    hypotheses: dict[tuple[str, Any], list[np.ndarray]]
-    hypotheses = {("place", _position_of(case, j)): at[j] for j in case.predictor.zone.supports}
-    hypotheses["frequency", "track"] = track_change
+    """A cause at a support or at neighbouring ones, in a channel, at all supports; in all tests or in those of one
+    visit.
+
+    A change that is linear is the same for all impacts. One that is not, as of a fastening that lifts, acts by a force
+    that is another one for each position of the impact: its law is "free". A change may vary slowly with frequency, as
+    that of a spring, or not, as that of a resonator or of a delay.
+    """
+    supports, zone = _extended_supports(case), case.predictor.zone.supports
+    sensitivity_of = case.predictor.pair_sensitivities(fit.values, case.all_terms(fit))
+    through = {o.name: _through_support(case, fit, pair, sensitivity_of(pair), supports) for o, pair in pairs}
     order = {o.name: k for k, o in enumerate(case.observations)}
+    by_impact: dict[float, list[tuple[Observation, FrfPair]]] = {}
+    for o, pair in pairs:
+        by_impact.setdefault(pair.test.place, []).append((o, pair))
+    for law, members in [("linear", pairs), *(("free", some) for some in by_impact.values())]:
+        for first in range(len(zone)):
+            stretch = zone[first : first + RECEPTANCE.max_stretch]
+            changes = [[through[o.name][:, j - supports[0]] for o, _ in members] for j in stretch]
+            levels = _stretch_levels([_position_of(case, j) for j in stretch])
+            yield from _spaces_of_changes(members, levels, changes, law)
+    whole_track = [through[o.name].sum(axis=1) for o, _ in pairs]
+    hypotheses: dict[tuple[str, Any], list[np.ndarray]] = {("frequency", "track"): whole_track}
     receptances = [_receptance(pair, fit.predictions[order[o.name]]) for o, pair in pairs]
     for channel in dict.fromkeys(pair.channel for _, pair in pairs):
         hypotheses["sensor", channel] = [h * (pair.channel == channel) for h, (_, pair) in zip(receptances, pairs)]
     visits = tuple(dict.fromkeys(pair.test.visit for _, pair in pairs))
     for visit in visits if len(visits) > 1 else ():
-        hypotheses["condition", visit] = [h * (pair.test.visit == visit) for h, (_, pair) in zip(track_change, pairs)]
-    for key, changes in hypotheses.items():
-        columns = np.concatenate([_line_columns(pair, h) for h, (_, pair) in zip(changes, pairs)])
-        size = np.sqrt(np.sum(columns**2, axis=0))
-        yield ResidualSpace(names, columns[:, size > 0.0] / size[size > 0.0], {key: None})
+        hypotheses["condition", visit] = [h * (pair.test.visit == visit) for h, (_, pair) in zip(whole_track, pairs)]
+    for key, change in hypotheses.items():
+        yield from _spaces_of_changes(pairs, [key], [change], "linear")
+
+
+def _stretch_levels(positions: Sequence[float]) -> list[tuple[str, Any]]:
+    """Levels of the first support alone, of it and the next, and so on."""
+    return [("place", positions[0]), *(("place", (positions[0], last)) for last in positions[1:])]
+
+
+def _spaces_of_changes(
+    pairs: Sequence[tuple[Observation, FrfPair]],
+    levels: Sequence[tuple[str, Any]],
+    changes: Sequence[Sequence[np.ndarray]],
+    law: str,
+) -> Iterator[ResidualSpace]:
+    """Spaces of changes, each given on all pairs. The first level is the first change, the next is that and the second,
+    and so on; free from line to line, and varying slowly.
+    """
+    names, n = tuple(o.name for o, _ in pairs), 2 * receptance_observation.LINES.size
+    blocks = [_unit_columns(pairs, change) for change in changes]
+    combinations = {level: np.arange(n * (k + 1)) for k, level in enumerate(levels)}
+    yield ResidualSpace(names, np.concatenate(blocks, axis=1), combinations, law)
+    slow = [block @ _slow_changes() for block in blocks]
+    yield ResidualSpace(names, np.concatenate(slow, axis=1), combinations, f"{law}, slow")
+
+
+def _unit_columns(pairs: Sequence[tuple[Observation, FrfPair]], changes: Sequence[np.ndarray]) -> np.ndarray:
+    """Columns of a change of each pair, of unit size; 0 on lines that no pair has."""
+    columns = np.concatenate([_line_columns(pair, h) for h, (_, pair) in zip(changes, pairs)])
+    size = np.sqrt(np.sum(columns**2, axis=0))
+    return columns / np.where(size > 0.0, size, 1.0)
+
+
+@cache
+def _slow_changes() -> np.ndarray:
+    """(2 n_line, 2 n_line) combinations of lines, real and imaginary, whose sum of squares is a normal correlation over
+    ``RECEPTANCE.change_octaves``.
+    """
+    octaves = np.log2(receptance_observation.LINES)
+    correlation = np.exp(-0.5 * ((octaves[:, None] - octaves) / RECEPTANCE.change_octaves) ** 2)
+    eigenvalues, vectors = np.linalg.eigh(correlation)
+    return np.kron(vectors * np.sqrt(np.maximum(eigenvalues, 0.0)), np.eye(2))
 
 
 def _through_support(
