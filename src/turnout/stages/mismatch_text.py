@@ -11,6 +11,7 @@ from turnout.constants import Z95_EXACT
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 MIN_SURFACE_DEVIATION = 2.0  # prior standard deviations from the track file's value that are worth a sentence
+ONE_SUPPORT = 0.31  # m to either side; an interval of a position that is larger contains several supports
 MILLI_UNITS = {"m": "mm", "s": "ms"}
 PERCENT_UNITS = {"1/K": "% per kelvin"}
 
@@ -192,7 +193,9 @@ def _rival_text(rival: str | None) -> str:
 def _location_text(finding: Mapping[str, Any], low: float, high: float) -> str:
     """Location of the effect in words, else the range of the measurements."""
     if finding["position_m"] is not None:
-        return f"at {finding['position_m']:.1f} m"
+        position, margin = finding["position_m"], 2.0 * (finding["position_se_m"] or 0.0)
+        interval = f", between {position - margin:.1f} and {position + margin:.1f} m"
+        return f"at {position:.1f} m" + interval * (margin > ONE_SUPPORT)
     if finding["train"]:
         train, axle = _train_and_axle(finding)
         return f"on axle {axle} of {train}" if axle else f"on {train}"

@@ -18,6 +18,7 @@ from turnout.mismatch.engine.residual_space import ResidualSpace
 from turnout.mismatch.engine.space_evidence import AMPLITUDES, NOISE_FACTORS, subspace_evidence, weigh_spaces
 from turnout.mismatch.turnout import disturbances
 from turnout.mismatch.turnout.priors import DISTURBANCE
+from turnout.stages.mismatch_text import title
 
 N, K = 60, 6
 
@@ -284,3 +285,11 @@ def test_passages_with_different_sensors_are_compared_by_those_they_share():
 def test_a_place_beyond_what_was_measured_is_not_said_to_a_metre(place, said):
     found = Location("place", place, 40.0, place, place - 0.6, place + 0.6, measured_range=(2.4, 8.1))
     assert str(found) == said
+
+
+@pytest.mark.parametrize(
+    ("error", "said"), [(0.3, "at 8.4 m, between 7.8 and 9.0 m, and"), (0.15, "at 8.4 m, and"), (None, "at 8.4 m, and")]
+)
+def test_what_may_be_at_several_supports_is_said_with_its_interval(error, said):
+    fields = {"verdict": "unknown", "position_m": 8.4, "position_se_m": error, "place_low_m": 1.8, "place_high_m": 8.1}
+    assert said in title({**fields, "term_json": None})

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 class Location:
     """Location of a residual.
 
-    ``frame`` and ``level`` with the largest evidence ``nats``. ``place`` with its interval ``low`` to ``high`` [m],
+    ``frame`` and ``level`` with the largest evidence ``nats``. ``place`` is the middle of ``low`` to ``high`` [m],
     ``sensor``, ``train`` and ``axle`` if it has them. ``next_best`` frame -> nats of the other frames.
     ``measured_range`` first and last position of sensors and impacts [m]: beyond them positions cannot be
     distinguished.
@@ -137,8 +137,8 @@ def _location_of_evidence(witnesses: Sequence[SpaceEvidence]) -> Location:
             for w in witnesses
             if w.frame == "place" and strongest.nats - w.nats < THRESHOLDS.position_margin
         ]
-        fields |= {"place": round(sum(_ends(strongest.level)) / 2.0, 3)}
-        fields |= {"low": min(low for low, _ in stretches), "high": max(high for _, high in stretches)}
+        low, high = min(first for first, _ in stretches), max(last for _, last in stretches)
+        fields |= {"place": round(0.5 * (low + high), 3), "low": low, "high": high}
     elif strongest.frame == "wheel":
         fields |= {"train": strongest.level[0], "axle": strongest.level[1]}
     elif strongest.frame in ("sensor", "train"):

@@ -128,13 +128,13 @@ def _combined_evidence(
     by_law = dict(by_level[key])
     by_space = dict(by_law.pop("", {}))
     if frame == "place" and isinstance(level, tuple):
-        for (other, position), laws in by_level.items():
-            if other == "place" and not isinstance(position, tuple) and level[0] <= position <= level[1]:
+        for (level_frame, position), laws in by_level.items():
+            if level_frame == "place" and not isinstance(position, tuple) and level[0] <= position <= level[1]:
                 for name, nats in laws.get("", {}).items():
                     by_space[name] = max(nats, by_space.get(name, 0.0))
     if by_law:
-        best: Mapping[str, float] = max(by_law.values(), key=_total)
-        by_space |= best
+        likeliest: Mapping[str, float] = max(by_law.values(), key=_total)
+        by_space |= likeliest
     return SpaceEvidence(frame, level, _total(by_space), by_space)
 
 
@@ -178,7 +178,7 @@ class _Marginal:
             weight = np.sqrt(o.effective / self.projector.fit.scale[o.data_type])
             residual_parts.append(self.residual[start : start + size] / weight)
             first += size
-        white, rows, residual = (np.concatenate(parts) for parts in (white_parts, row_parts, residual_parts))
+        white, rows, residual = (np.concatenate(p) for p in (white_parts, row_parts, residual_parts))
         across, pull = rows.T @ white, rows.T @ residual
         gram = white.T @ white - across.T @ (self.projector.normal @ across)
         square = residual @ residual + pull @ np.linalg.solve(self.information - rows.T @ rows, pull)
@@ -192,8 +192,8 @@ def _level_evidence(
         if combination is None:
             yield key, subspace_evidence(gram, inner, square, n, floor)
         elif combination.ndim == 1:
-            chosen = gram[np.ix_(combination, combination)]
-            yield key, subspace_evidence(chosen, inner[combination], square, n, floor)
+            block = gram[np.ix_(combination, combination)]
+            yield key, subspace_evidence(block, inner[combination], square, n, floor)
         else:
             reduced = combination.T @ gram @ combination
             yield key, subspace_evidence(reduced, combination.T @ inner, square, n, floor)

@@ -121,7 +121,7 @@ def _change_spaces(case: TrackCase, fit: Fit, pairs: Sequence[tuple[Observation,
     by_impact: dict[float, list[tuple[Observation, FrfPair]]] = {}
     for o, pair in pairs:
         by_impact.setdefault(pair.test.place, []).append((o, pair))
-    for law, members in [("linear", pairs), *(("free", some) for some in by_impact.values())]:
+    for law, members in [("linear", pairs), *(("free", of_impact) for of_impact in by_impact.values())]:
         for first in range(len(zone)):
             stretch = zone[first : first + RECEPTANCE.max_stretch]
             changes = [[through[o.name][:, j - supports[0]] for o, _ in members] for j in stretch]
