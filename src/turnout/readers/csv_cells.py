@@ -1,5 +1,6 @@
-"""Cells of a text file: marks of missing values and of thousands, and cells that are no numbers."""
+"""Lines of a text file and their cells: separators, marks of missing values and of thousands, text among numbers."""
 
+import csv
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -8,6 +9,7 @@ from mmap import mmap
 import numpy as np
 import pyarrow as pa
 
+from turnout.readers.clock_texts import is_clock_or_date
 from turnout.readers.source import COPY_AGAIN, Source
 
 # What loggers and spreadsheets write for a missing value; these become nan.
@@ -50,6 +52,122 @@ def is_unreadable_number(cell: str) -> bool:
     (True, True, False)
     """
     return bool(THOUSANDS.fullmatch(cell)) or (cell.startswith("#") and cell in MISSING_VALUES)
+
+
+def decode_line(data: bytes) -> str:
+    """One line as text: UTF-8, else Windows-1252 of older western loggers.
+
+    Parameters
+    ----------
+    data : bytes
+        The line.
+
+    Returns
+    -------
+    str
+        Its text without line break; a byte that neither encoding has becomes a replacement character.
+    """
+    try:
+        return data.decode("utf-8-sig").strip("\r\n")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", "replace").strip("\r\n")
+
+
+BLANK = " "
+SEPARATORS = ("\t", ";", "|")  # a line with one of them is not separated by commas or blanks
+# a word with a unit in brackets behind it, or a text between quotation marks
+WORD = re.compile(r'"[^"]*"(?: *[\[(][^\])]*[\])])?|[^\s"]+(?: *[\[(][^\])]*[\])])?')
+
+
+def cells_of(line: str, separator: str) -> list[str]:
+    """Cells of a line.
+
+    Parameters
+    ----------
+    line : str
+        The line.
+    separator : str
+        Separator of the cells; between blanks every word is a cell, with the unit in brackets behind it.
+
+    Returns
+    -------
+    list of str
+        Without blanks and quotation marks around them.
+
+    Examples
+    --------
+    >>> cells_of('"force [N]"; -1,5 ', ";"), cells_of("# force [N]  rail (m/s²)", " ")
+    (['force [N]', '-1,5'], ['force [N]', 'rail (m/s²)'])
+    """
+    if separator == BLANK:
+        return [word.replace('"', "") for word in WORD.findall(line.lstrip("#%").strip())]
+    if separator == "," and '"' in line:  # a comma between quotation marks is a decimal mark
+        return [cell.strip() for cell in next(csv.reader([line]), [])]
+    return [cell.strip().strip('"') for cell in line.split(separator)]
+
+
+def first_cells(data: bytes | mmap, offset: int, separator: str) -> list[str]:
+    """Cells of the first row of samples.
+
+    Parameters
+    ----------
+    data : bytes or mmap
+        Bytes of the file.
+    offset : int
+        Byte of the first number.
+    separator : str
+        Separator of the cells.
+
+    Returns
+    -------
+    list of str
+        Without blanks around them.
+    """
+    end = data.find(b"\n", offset)
+    return cells_of(decode_line(data[offset : end if end >= 0 else len(data)]), separator)
+
+
+def is_number(cell: str) -> bool:
+    """Whether a cell is a number, with a decimal mark of either kind.
+
+    Parameters
+    ----------
+    cell : str
+        Text of the cell.
+
+    Returns
+    -------
+    bool
+        True also for "nan" and "inf".
+    """
+    try:
+        float(cell.replace(",", "."))
+    except ValueError:
+        return False
+    return True
+
+
+def is_row(cells: Sequence[str]) -> bool:
+    """Whether cells are a row of samples: numbers, or marks of missing ones, beside dates and times of day.
+
+    Parameters
+    ----------
+    cells : sequence of str
+        Cells of a line.
+
+    Returns
+    -------
+    bool
+        False without any number.
+
+    Examples
+    --------
+    >>> is_row(["10:00:00.5", "-1,5", ""]), is_row(["force", "-1,5"]), is_row(["13.05.2026", "10:00:00"])
+    (True, False, False)
+    """
+    is_of_numbers = [is_number(cell) or is_unreadable_number(cell) for cell in cells]
+    filled = [cell for cell, is_of_number in zip(cells, is_of_numbers) if cell and not is_of_number]
+    return any(is_of_numbers) and all(map(is_clock_or_date, filled))
 
 
 @contextmanager

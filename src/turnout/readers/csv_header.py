@@ -1,9 +1,5 @@
-"""Head of a text file: its ``name: value`` lines, names and units of the columns, and where the numbers begin.
+"""Head of a text file: its ``name: value`` lines, and where the numbers begin."""
 
-It also finds the time column and its unit.
-"""
-
-import csv
 import re
 import unicodedata
 from collections.abc import Iterator, Sequence
@@ -15,140 +11,26 @@ from turnout.readers.array_metadata import (
     SAMPLE_COUNT_NAMES,
     START_DATE_NAMES,
     START_NAMES,
-    TIME_NAMES,
 )
-from turnout.readers.clock_texts import is_clock_or_date
-from turnout.readers.csv_cells import NO_ROW_REMEDY, THOUSANDS_MARK, is_unreadable_number
+from turnout.readers.csv_cells import (
+    BLANK,
+    NO_ROW_REMEDY,
+    SEPARATORS,
+    THOUSANDS_MARK,
+    cells_of,
+    decode_line,
+    is_number,
+    is_row,
+)
+from turnout.readers.csv_columns import NAME_WITH_UNIT, names_and_units
 from turnout.readers.entries import FREE_TEXT, Entry, entries_of_text
 from turnout.readers.other_subjects import STRONG, subject_of
 from turnout.readers.rate_units import rate_unit
 from turnout.readers.rate_words import is_rate_name
 from turnout.readers.scale_words import is_of_drawing, is_scale_name, scale_meaning, value_of_word
-from turnout.readers.source import COPY_AGAIN, MEANINGLESS_UNITS, Source
+from turnout.readers.source import COPY_AGAIN, Source
 from turnout.readers.stated_quantities import is_quantity_name
 from turnout.readers.stated_units import is_unit_name
-from turnout.units import conversion
-
-TIME_WORDS = (*TIME_NAMES, "zeit", "tid", "temps", "tempo", "tiempo", "tijd")
-SECONDS_PER_UNIT = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "µs": 1e-6, "us": 1e-6}
-
-
-def time_column(names: Sequence[str], units: Sequence[str]) -> int | None:
-    """Number of the time column: by its name, else by its unit.
-
-    No sensor measures in seconds, so a unit of time identifies the column in any language.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Names of the columns.
-    units : sequence of str
-        Unit of each column, "" if not stated.
-
-    Returns
-    -------
-    int or None
-        Number of the column, from 0; None without one.
-
-    Examples
-    --------
-    >>> time_column(["Kraft", "Zeit"], ["N", "s"]), time_column(["idő", "erő"], ["ms", "N"])
-    (1, 0)
-    >>> time_column(["force", "rail"], ["N", ""])
-    """
-    for i, name in enumerate(names):
-        if name.strip().lower() in TIME_WORDS:
-            return i
-    return next((i for i, unit in enumerate(units) if unit.strip() and _plain_unit(unit) in SECONDS_PER_UNIT), None)
-
-
-def seconds_per_number(unit: str, source: Source) -> float:
-    """Seconds per number in the time column.
-
-    Parameters
-    ----------
-    unit : str
-        Unit of the time column as it is written; "" means seconds.
-    source : Source
-        The text file.
-
-    Returns
-    -------
-    float
-        Factor that converts its numbers to seconds. [s]
-
-    Raises
-    ------
-    ReadError
-        For an unknown unit of time.
-    """
-    if _plain_unit(unit) not in SECONDS_PER_UNIT:
-        remedy = f"Export the time in one of {', '.join(SECONDS_PER_UNIT)[2:]}"
-        raise source.error("the time column", f"its unit {unit!r} is not known", remedy, reason="unit_unknown")
-    return SECONDS_PER_UNIT[_plain_unit(unit)]
-
-
-def _plain_unit(unit: str) -> str:
-    return unit.strip().replace("\u03bc", "µ")
-
-
-NAME_WITH_UNIT = re.compile(r"^(.*?)\s*[\[(]([^\[\]]*)[\])]$")
-
-
-def names_among(lines: Sequence[Sequence[str]]) -> tuple[int, int | None]:
-    """Find the line of names and the line of units among the lines above the numbers.
-
-    The names are in the line above the units. Without a line of units they are in the last line that names a time or
-    has units in brackets, because comments may follow. Else they are in the last line.
-
-    Parameters
-    ----------
-    lines : sequence of sequence of str
-        Cells of each line, one per column.
-
-    Returns
-    -------
-    tuple of (int, int or None)
-        Number of the line of names and of that of the units, from 0; None without a line of units.
-
-    Examples
-    --------
-    >>> names_among([["Messung", "Gleis 3"], ["Zeit", "Kraft"], ["s", "kN"], ["Uhr", "Hammer"]])
-    (1, 2)
-    >>> names_among([["Messung", "Gleis 3"], ["Rail", "Kraft"]])
-    (1, None)
-    """
-    last = len(lines) - 1
-    for i in range(last, 0, -1):
-        if _are_units(lines[i], 0.5 if i == last else 1.0):
-            return i - 1, i
-    return next((i for i in range(last, -1, -1) if _are_names(lines[i])), last), None
-
-
-def _are_units(cells: Sequence[str], share: float) -> bool:
-    """Whether at least this share of the filled cells are units."""
-    filled_cells = [cell for cell in cells if cell]
-    return sum(map(_is_unit, filled_cells)) >= share * len(filled_cells)
-
-
-def _is_unit(cell: str) -> bool:
-    """Whether a cell is a known unit, a meaningless one, or anything in brackets; "12 m" is a length."""
-    bare = cell.strip("[]() ")
-    if cell[0] in "[(" or bare.casefold() in MEANINGLESS_UNITS or bare.replace("\u03bc", "µ") in SECONDS_PER_UNIT:
-        return True
-    try:
-        return not bare[0].isdigit() and bool(conversion(bare))
-    except ValueError:
-        return False
-
-
-def _are_names(cells: Sequence[str]) -> bool:
-    """Whether a cell names the time or has a unit in brackets; not if any cell starts with a digit, as in "08:30"."""
-    if any(cell[:1].isdigit() for cell in cells):
-        return False
-    in_brackets = [match[2] for cell in cells if (match := NAME_WITH_UNIT.match(cell)) and match[1]]
-    return any(cell.lower() in TIME_WORDS for cell in cells) or any(unit and _is_unit(unit) for unit in in_brackets)
-
 
 HEAD_LINE = re.compile(r"^#?\s*([^\W\d][\w .'’-]*?)\s*([\[(][^\])]*[\])])?\s*[:=,;\t]\s*(.*)$")
 UNIT_SCALES = {"kHz": 1e3, "khz": 1e3, "MHz": 1e6, "ms": 1e-3, "µs": 1e-6, "\u03bcs": 1e-6, "us": 1e-6}
@@ -161,25 +43,6 @@ GROUPED_NUMBER = re.compile(rf"\d{{1,3}}(?:{THOUSANDS_MARK}\d{{3}})+(?!\d)")
 
 # notes, names and units of the columns, byte of the first number, separator, entries with their lines
 Head = tuple[dict[str, float | str], list[str], list[str], int, str, tuple[Entry, ...]]
-
-
-def decode_line(data: bytes) -> str:
-    """One line as text: UTF-8, else Windows-1252 of older western loggers.
-
-    Parameters
-    ----------
-    data : bytes
-        The line.
-
-    Returns
-    -------
-    str
-        Its text without line break; a byte that neither encoding has becomes a replacement character.
-    """
-    try:
-        return data.decode("utf-8-sig").strip("\r\n")
-    except UnicodeDecodeError:
-        return data.decode("cp1252", "replace").strip("\r\n")
 
 
 def read_head(data: bytes | mmap, source: Source) -> Head:
@@ -214,15 +77,15 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
         # a comma is the decimal mark where another separator stands
         separator = next((s for s in SEPARATORS if s in line), ",")
         cells = cells_of(line, separator)
-        if not _is_row(cells) and _are_rows_of_words(data, position):
+        if not is_row(cells) and _are_rows_of_words(data, position):
             separator, cells = BLANK, cells_of(line, BLANK)
-        if _is_row(cells):
+        if is_row(cells):
             texts = [cells_of(text, separator) for text in text_lines]
             if separator == BLANK:
                 texts = [words for words in texts if len(words) == len(cells)]
             texts += _commented_names(head_lines[-1:], texts, len(cells), separator)
             _check_row_above(texts, head_lines, cells, separator, source)
-            names, units = _names(texts, cells)
+            names, units = names_and_units(texts, cells)
             notes |= {
                 _plain(a): b
                 for a, b, *rest in (t for t in texts if len(t) > 1)
@@ -245,7 +108,7 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
         )
         is_note = (
             plain_name in HEAD_NAMES
-            or (plain_name in NUMERIC_HEAD_NAMES and _is_number(value.split()[0] if value else ""))
+            or (plain_name in NUMERIC_HEAD_NAMES and is_number(value.split()[0] if value else ""))
             or _states_scale(name_with_unit, value)
         )
         if plain_name in SAMPLE_COUNT_NAMES and (grouped := GROUPED_NUMBER.match(value)):
@@ -264,13 +127,6 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
     raise source.error("the file", *_no_numbers(text_lines[-1]))
 
 
-def _is_row(cells: Sequence[str]) -> bool:
-    """Whether cells are a row of samples: numbers, or marks of missing ones, beside dates and times of day."""
-    is_of_numbers = [_is_number(cell) or is_unreadable_number(cell) for cell in cells]
-    filled = [cell for cell, is_number in zip(cells, is_of_numbers) if cell and not is_number]
-    return any(is_of_numbers) and all(map(is_clock_or_date, filled))
-
-
 N_ROWS_OF_WORDS = 5  # lines: numbers between blanks may be in a head, too, but not in so many lines
 
 
@@ -282,7 +138,7 @@ def _are_rows_of_words(data: bytes | mmap, position: int) -> bool:
         start, end = end, (data.find(b"\n", end) + 1) or len(data)
         line = decode_line(data[start:end])
         rows.append([] if any(s in line for s in SEPARATORS) else cells_of(line, BLANK))
-    return len(rows) > 1 and len(rows[0]) > 1 and all(len(row) == len(rows[0]) and _is_row(row) for row in rows)
+    return len(rows) > 1 and len(rows[0]) > 1 and all(len(row) == len(rows[0]) and is_row(row) for row in rows)
 
 
 def _commented_names(
@@ -292,28 +148,7 @@ def _commented_names(
     names = [cells_of(line.lstrip("#%"), separator) for line in last_line if line.startswith(("#", "%"))]
     if any(len(text) >= n for text in texts):
         return []
-    return [cells for cells in names if len(cells) == n and not any(map(_is_number, cells))]
-
-
-def first_cells(data: bytes | mmap, offset: int, separator: str) -> list[str]:
-    """Cells of the first row of samples.
-
-    Parameters
-    ----------
-    data : bytes or mmap
-        Bytes of the file.
-    offset : int
-        Byte of the first number.
-    separator : str
-        Separator of the cells.
-
-    Returns
-    -------
-    list of str
-        Without blanks around them.
-    """
-    end = data.find(b"\n", offset)
-    return cells_of(decode_line(data[offset : end if end >= 0 else len(data)]), separator)
+    return [cells for cells in names if len(cells) == n and not any(map(is_number, cells))]
 
 
 def _check_row_above(
@@ -324,12 +159,12 @@ def _check_row_above(
     Such a row has numbers, and the names of the columns stand above it. A text in its first cell alone is a label.
     """
     row = texts[-1] if texts and texts[-1] == cells_of(lines[-1], separator) else []
-    numbers = [_is_number(cell) for cell in row]
+    numbers = [is_number(cell) for cell in row]
     is_label = len(row) > 1 and not numbers[0] and all(n or not cell for n, cell in zip(numbers[1:], row[1:]))
     if len(row) != len(cells) or not any(numbers) or is_label:
         return
-    if any(len(text) == len(cells) and not any(map(_is_number, text)) for text in texts[:-1]):
-        word = next(cell for cell, is_number in zip(row, numbers) if cell and not is_number)
+    if any(len(text) == len(cells) and not any(map(is_number, text)) for text in texts[:-1]):
+        word = next(cell for cell, is_of_number in zip(row, numbers) if cell and not is_of_number)
         problem = f"{word[:60]!r} is no number, in the first row of samples"
         raise source.error(f"line {len(lines)}", problem, NO_ROW_REMEDY)
 
@@ -364,7 +199,7 @@ def _plain(name: str) -> str:
 
 
 def _begins_with_number(value: str) -> bool:
-    return bool(value) and _is_number(value.split()[0])
+    return bool(value) and is_number(value.split()[0])
 
 
 def entries_of_lines(
@@ -394,14 +229,14 @@ def entries_of_lines(
         text = line.strip().lstrip("#%*/!'\" ").strip()
         if not text or _is_line_of(cells, names):
             continue
-        pairs = [(a, b) for a, b in pairwise(cells) if a and b and not _is_number(a)]
+        pairs = [(a, b) for a, b in pairwise(cells) if a and b and not is_number(a)]
         for name, second, third in zip(cells, cells[1:], cells[2:]):  # "Abtastrate;25,6;kHz", "Abtastrate;kHz;25,6"
-            if name and _is_number(second) and rate_unit(third):
+            if name and is_number(second) and rate_unit(third):
                 pairs = [(name, f"{second} {third}"), *(pair for pair in pairs if pair != (name, second))]
-            elif name and rate_unit(second) and _is_number(third):
+            elif name and rate_unit(second) and is_number(third):
                 pairs = [(name, f"{third} {second}"), *(p for p in pairs if p not in ((name, second), (second, third)))]
         if len([cell for cell in cells if cell]) > 2 and i + 1 < len(table) and len(table[i + 1]) == len(cells):
-            pairs += [(a, b) for a, b in zip(cells, table[i + 1]) if a and _is_number(b)]
+            pairs += [(a, b) for a, b in zip(cells, table[i + 1]) if a and is_number(b)]
         is_drawn = len(cells) == 2 and is_of_drawing(cells[0])  # "Plan;scale 1:500" is about the plan as a whole
         if (match := HEAD_LINE.match(text)) and len(cells) < 3 and not is_drawn:
             name = f"{match[1]} {match[2]}" if match[2] else match[1]
@@ -427,70 +262,10 @@ def _is_line_of_words(words: Sequence[str], names: Sequence[str], units: Sequenc
     return bool(words) and (_is_line_of(words, names) or [word.strip("[]() ") for word in words] == list(units))
 
 
-BLANK = " "
-SEPARATORS = ("\t", ";", "|")  # a line with one of them is not separated by commas or blanks
-# a word with a unit in brackets behind it, or a text between quotation marks
-WORD = re.compile(r'"[^"]*"(?: *[\[(][^\])]*[\])])?|[^\s"]+(?: *[\[(][^\])]*[\])])?')
-
-
-def cells_of(line: str, separator: str) -> list[str]:
-    """Cells of a line.
-
-    Parameters
-    ----------
-    line : str
-        The line.
-    separator : str
-        Separator of the cells; between blanks every word is a cell, with the unit in brackets behind it.
-
-    Returns
-    -------
-    list of str
-        Without blanks and quotation marks around them.
-
-    Examples
-    --------
-    >>> cells_of('"force [N]"; -1,5 ', ";"), cells_of("# force [N]  rail (m/s²)", " ")
-    (['force [N]', '-1,5'], ['force [N]', 'rail (m/s²)'])
-    """
-    if separator == BLANK:
-        return [word.replace('"', "") for word in WORD.findall(line.lstrip("#%").strip())]
-    if separator == "," and '"' in line:  # a comma between quotation marks is a decimal mark
-        return [cell.strip() for cell in next(csv.reader([line]), [])]
-    return [cell.strip().strip('"') for cell in line.split(separator)]
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell.replace(",", "."))
-    except ValueError:
-        return False
-    return True
-
-
 def _value(text: str) -> float | str:
     """A number in Hz or s if the text begins with one ("51200 Hz", "12,8 kHz"), else the text."""
     first, *words = text.split() or [""]
     dated = "-" in first[1:].lower().replace("e-", "")
-    if not first or not _is_number(first) or dated:
+    if not first or not is_number(first) or dated:
         return text
     return float(first.replace(",", ".")) * UNIT_SCALES.get(words[0].strip("[]()") if words else "", 1.0)
-
-
-def _names(lines: list[list[str]], cells: list[str]) -> tuple[list[str], list[str]]:
-    """(names, units) from the lines between the head and the first line of numbers, ``cells``.
-
-    A separator after the last number, as in "1;2;", makes a column without a name.
-    """
-    count, open_end = len(cells), not cells[-1]
-    lines = [(line + [""] * open_end)[:count] for line in lines if any(line) and len(line) >= count - open_end]
-    if not lines:
-        names = [str(i) for i in range(count)]
-        return [*names[:-1], ""] if open_end and count > 1 else names, [""] * count
-    name_line, unit_line = names_among(lines)
-    names = lines[name_line]
-    units = [""] * count if unit_line is None else [cell.strip("[]() ") for cell in lines[unit_line]]
-    for i, name in enumerate(names):
-        if match := NAME_WITH_UNIT.match(name):
-            names[i], units[i] = match[1], match[2]
-    return names, units

@@ -1,0 +1,157 @@
+"""Columns of a text file: their names and units above the numbers, and which of them is the time."""
+
+import re
+from collections.abc import Sequence
+
+from turnout.readers.array_metadata import TIME_NAMES
+from turnout.readers.source import MEANINGLESS_UNITS, Source
+from turnout.units import conversion
+
+TIME_WORDS = (*TIME_NAMES, "zeit", "tid", "temps", "tempo", "tiempo", "tijd")
+SECONDS_PER_UNIT = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "µs": 1e-6, "us": 1e-6}
+
+
+def time_column(names: Sequence[str], units: Sequence[str]) -> int | None:
+    """Number of the time column: by its name, else by its unit.
+
+    No sensor measures in seconds, so a unit of time identifies the column in any language.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names of the columns.
+    units : sequence of str
+        Unit of each column, "" if not stated.
+
+    Returns
+    -------
+    int or None
+        Number of the column, from 0; None without one.
+
+    Examples
+    --------
+    >>> time_column(["Kraft", "Zeit"], ["N", "s"]), time_column(["idő", "erő"], ["ms", "N"])
+    (1, 0)
+    >>> time_column(["force", "rail"], ["N", ""])
+    """
+    for i, name in enumerate(names):
+        if name.strip().lower() in TIME_WORDS:
+            return i
+    return next((i for i, unit in enumerate(units) if unit.strip() and _plain_unit(unit) in SECONDS_PER_UNIT), None)
+
+
+def seconds_per_number(unit: str, source: Source) -> float:
+    """Seconds per number in the time column.
+
+    Parameters
+    ----------
+    unit : str
+        Unit of the time column as it is written; "" means seconds.
+    source : Source
+        The text file.
+
+    Returns
+    -------
+    float
+        Factor that converts its numbers to seconds. [s]
+
+    Raises
+    ------
+    ReadError
+        For an unknown unit of time.
+    """
+    if _plain_unit(unit) not in SECONDS_PER_UNIT:
+        remedy = f"Export the time in one of {', '.join(SECONDS_PER_UNIT)[2:]}"
+        raise source.error("the time column", f"its unit {unit!r} is not known", remedy, reason="unit_unknown")
+    return SECONDS_PER_UNIT[_plain_unit(unit)]
+
+
+def _plain_unit(unit: str) -> str:
+    return unit.strip().replace("\u03bc", "µ")
+
+
+NAME_WITH_UNIT = re.compile(r"^(.*?)\s*[\[(]([^\[\]]*)[\])]$")
+
+
+def names_among(lines: Sequence[Sequence[str]]) -> tuple[int, int | None]:
+    """Find the line of names and the line of units among the lines above the numbers.
+
+    The names are in the line above the units. Without a line of units they are in the last line that names a time or
+    has units in brackets, because comments may follow. Else they are in the last line.
+
+    Parameters
+    ----------
+    lines : sequence of sequence of str
+        Cells of each line, one per column.
+
+    Returns
+    -------
+    tuple of (int, int or None)
+        Number of the line of names and of that of the units, from 0; None without a line of units.
+
+    Examples
+    --------
+    >>> names_among([["Messung", "Gleis 3"], ["Zeit", "Kraft"], ["s", "kN"], ["Uhr", "Hammer"]])
+    (1, 2)
+    >>> names_among([["Messung", "Gleis 3"], ["Rail", "Kraft"]])
+    (1, None)
+    """
+    last = len(lines) - 1
+    for i in range(last, 0, -1):
+        if _are_units(lines[i], 0.5 if i == last else 1.0):
+            return i - 1, i
+    return next((i for i in range(last, -1, -1) if _are_names(lines[i])), last), None
+
+
+def _are_units(cells: Sequence[str], share: float) -> bool:
+    """Whether at least this share of the filled cells are units."""
+    filled_cells = [cell for cell in cells if cell]
+    return sum(map(_is_unit, filled_cells)) >= share * len(filled_cells)
+
+
+def _is_unit(cell: str) -> bool:
+    """Whether a cell is a known unit, a meaningless one, or anything in brackets; "12 m" is a length."""
+    bare = cell.strip("[]() ")
+    if cell[0] in "[(" or bare.casefold() in MEANINGLESS_UNITS or bare.replace("\u03bc", "µ") in SECONDS_PER_UNIT:
+        return True
+    try:
+        return not bare[0].isdigit() and bool(conversion(bare))
+    except ValueError:
+        return False
+
+
+def _are_names(cells: Sequence[str]) -> bool:
+    """Whether a cell names the time or has a unit in brackets; not if any cell starts with a digit, as in "08:30"."""
+    if any(cell[:1].isdigit() for cell in cells):
+        return False
+    in_brackets = [match[2] for cell in cells if (match := NAME_WITH_UNIT.match(cell)) and match[1]]
+    return any(cell.lower() in TIME_WORDS for cell in cells) or any(unit and _is_unit(unit) for unit in in_brackets)
+
+
+def names_and_units(lines: list[list[str]], cells: list[str]) -> tuple[list[str], list[str]]:
+    """Names and units of the columns. A separator after the last number, as in "1;2;", makes a column without a name.
+
+    Parameters
+    ----------
+    lines : list of list of str
+        Cells of the lines above the numbers.
+    cells : list of str
+        Cells of the first row.
+
+    Returns
+    -------
+    tuple of (list of str, list of str)
+        Names, "0", "1" ... if no line has them, and units, "" if not stated.
+    """
+    count, open_end = len(cells), not cells[-1]
+    lines = [(line + [""] * open_end)[:count] for line in lines if any(line) and len(line) >= count - open_end]
+    if not lines:
+        names = [str(i) for i in range(count)]
+        return [*names[:-1], ""] if open_end and count > 1 else names, [""] * count
+    name_line, unit_line = names_among(lines)
+    names = lines[name_line]
+    units = [""] * count if unit_line is None else [cell.strip("[]() ") for cell in lines[unit_line]]
+    for i, name in enumerate(names):
+        if match := NAME_WITH_UNIT.match(name):
+            names[i], units[i] = match[1], match[2]
+    return names, units

@@ -1,0 +1,272 @@
+"""Rows of numbers of a text file: all in memory, or read in blocks when they are sliced, and what stands below them."""
+
+import io
+import re
+from collections.abc import Sequence
+from mmap import mmap
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from pyarrow import csv
+
+from turnout.readers.clock_texts import is_clock_or_date, with_durations
+from turnout.readers.csv_cells import MISSING_VALUES, cell_errors, cells_of, check_thousands, decode_line, first_cells
+from turnout.readers.csv_header import entries_of_lines
+from turnout.readers.entries import Entry
+from turnout.readers.lazy import Column, LazyColumn
+from turnout.readers.source import Source
+
+
+def columns_in_memory(
+    source: Source, data: bytes | mmap, offset: int, separator: str, names: Sequence[str], time: int | None
+) -> tuple[list[Column], tuple[Entry, ...]]:
+    """All columns as arrays.
+
+    Parameters
+    ----------
+    source : Source
+        The text file.
+    data : bytes or mmap
+        Bytes of the file.
+    offset : int
+        Byte of the first number.
+    separator : str
+        Separator of the cells.
+    names : sequence of str
+        Names of the columns.
+    time : int or None
+        Number of the time column, from 0; None without one.
+
+    Returns
+    -------
+    tuple of (list of Column, tuple of Entry)
+        Columns, and entries of the lines of text below the numbers.
+
+    Raises
+    ------
+    ReadError
+        If a cell is no number, a row has another width, or an empty line separates the rows.
+    """
+    context = source, data, offset, separator, names
+    options = _options(data, offset, separator, len(names))
+    line = line_number(data, offset)
+    end = len(data)
+    strict = options | {"parse_options": csv.ParseOptions(delimiter=separator, ignore_empty_lines=False)}
+    with source.parsed_by("pyarrow", f"the numbers after line {line}"), cell_errors(source, line, names):
+        try:
+            table = csv.read_csv(io.BytesIO(memoryview(data)[offset:]), **strict)
+            if not table.column(0).null_count:  # an empty line is a row without values
+                return _columns_of(table, *context), ()
+        except pa.ArrowInvalid:
+            pass
+        try:
+            table = csv.read_csv(io.BytesIO(memoryview(data)[offset:]), **options)
+        except pa.ArrowInvalid:
+            end = _start_of_footer(data, offset, separator)
+            if end == len(data):
+                raise
+            table = csv.read_csv(io.BytesIO(memoryview(data)[offset:end]), **options)
+    _check_one_block(data, offset, end, source)
+    below = [decode_line(text) for text in data[end:].splitlines()]
+    return _columns_of(table, *context), tuple(entries_of_lines(below, separator, names, line_number(data, end) + 1))
+
+
+def _columns_of(
+    table: pa.Table, source: Source, data: bytes | mmap, offset: int, separator: str, names: Sequence[str]
+) -> list[Column]:
+    """The columns of a table as arrays, whose marks are no marks for thousands."""
+    columns: list[Column] = []
+    for i, column in enumerate(table.columns):
+        numbers = with_durations(column.to_numpy(zero_copy_only=False), f"column {names[i] or i + 1!r}", source)
+        check_thousands(numbers, i, names[i], data, offset, separator, source)
+        columns.append(numbers)
+    return columns
+
+
+MAX_FOOTER_LINES = 20
+
+
+def _start_of_footer(data: bytes | mmap, offset: int, separator: str) -> int:
+    """Byte at which lines of words begin that end the file, as "End of data"; its length without one.
+
+    A line with a number in one of its cells is a row of samples with an error in it, never a footer.
+    """
+    end = len(data)
+    number = re.compile(rb'"?[-+]?[.,]?\d[\d.,eE+-]*"?')
+    for _ in range(MAX_FOOTER_LINES):
+        start = max(data.rfind(b"\n", offset, end - 1), offset - 1) + 1
+        line = data[start:end].strip()
+        if line and not re.match(rb'["#]*[A-Za-z\x80-\xff](?!an\b|nf)', line):
+            break
+        if any(number.fullmatch(cell.strip()) for cell in line.split(separator.encode())[1:]):
+            break
+        end = start
+        if start <= offset:
+            break
+    return end
+
+
+def _check_one_block(data: bytes | mmap, offset: int, end: int, source: Source) -> None:
+    """ReadError if an empty line separates rows from further ones: a summary of the columns, or another record.
+
+    The parser skips empty lines. They separate nothing where one follows each row.
+    """
+    empty = [i for mark in (b"\n\n", b"\n\r\n") if 0 <= (i := data.find(mark, offset, end))]
+    if not empty or not data[min(empty) : end].strip():
+        return
+    first = min(empty)
+    n_row = sum(1 for line in data[first:end].splitlines() if line.strip())
+    if b"\n" not in data[offset:first].strip(b"\r\n") and 2 * n_row <= data[first:end].count(b"\n") + 1:
+        return
+    problem = f"an empty line stands before its last {n_row} rows: they may be a summary or another record"
+    remedy = "Delete them if they are no samples; export each record to a file, or number them in a column 'record'"
+    raise source.error(f"line {line_number(data, first) + 2}", problem, remedy, reason="wrong_length")
+
+
+def lazy_columns(
+    source: Source, data: bytes | mmap, offset: int, separator: str, names: Sequence[str], time: int | None
+) -> tuple[list[Column], tuple[Entry, ...]]:
+    """Columns that read their numbers when sliced; a time column is read at once.
+
+    Parameters
+    ----------
+    source : Source
+        The text file.
+    data : bytes or mmap
+        Bytes of the file.
+    offset : int
+        Byte of the first number.
+    separator : str
+        Separator of the cells.
+    names : sequence of str
+        Names of the columns.
+    time : int or None
+        Number of the time column, from 0; None without one.
+
+    Returns
+    -------
+    tuple of (list of Column, tuple of Entry)
+        Columns, and no entries: a file with text below its numbers is rejected.
+
+    Raises
+    ------
+    ReadError
+        If a cell is no number, a row has another width, or an empty line separates the rows.
+    """
+    options = _options(data, offset, separator, len(names))
+    rows = RowReader(source.path, offset, options)
+    line = line_number(data, offset)
+    with source.parsed_by("pyarrow", f"the numbers after line {line}"), cell_errors(source, line, names):
+        times = rows.scan(time)
+    _check_one_block(data, offset, len(data), source)
+    columns: list[Column] = [rows.column(i) for i in range(len(names))]
+    if time is not None and times is not None:
+        columns[time] = times
+    return columns, ()
+
+
+def line_number(data: bytes | mmap, offset: int) -> int:
+    return data[:offset].count(b"\n")
+
+
+class RowReader:
+    """Reads the rows of a text file in order; a request for earlier rows starts again at the beginning.
+
+    Parameters
+    ----------
+    path : Path
+        The text file.
+    offset : int
+        Byte at which the numbers begin.
+    options : dict of str to any
+        Options of ``pyarrow.csv.open_csv``.
+    """
+
+    def __init__(self, path: Path, offset: int, options: dict[str, Any]):
+        self.path, self.offset, self.options = path, offset, options
+        self.n_row, self.begin = 0, 0
+        self.batches: list[pa.RecordBatch] = []
+        self.reader: csv.CSVStreamingReader | None = None
+
+    def scan(self, time: int | None) -> np.ndarray | None:
+        """Count the rows and read the time column.
+
+        Parameters
+        ----------
+        time : int or None
+            Number of the time column, from 0; None: there is none.
+
+        Returns
+        -------
+        (n_row,) array or None
+            The time as it is written; None without a time column.
+        """
+        values = []
+        for batch in self._open():
+            self.n_row += batch.num_rows
+            if time is not None:
+                values.append(batch.column(time).to_numpy(zero_copy_only=False))
+        return None if time is None else np.concatenate(values)
+
+    def column(self, i: int) -> LazyColumn:
+        """Column number ``i``.
+
+        Parameters
+        ----------
+        i : int
+            Number of the column, from 0.
+
+        Returns
+        -------
+        LazyColumn
+            Its numbers, read when it is sliced.
+        """
+        return LazyColumn(lambda start, stop: self._read_rows(i, start, stop), self.n_row, np.dtype(float))
+
+    def _open(self) -> csv.CSVStreamingReader:
+        file = self.path.open("rb")
+        file.seek(self.offset)
+        return csv.open_csv(file, **self.options)
+
+    def _read_rows(self, i: int, start: int, stop: int) -> np.ndarray:
+        if self.reader is None or start < self.begin:
+            self.reader, self.begin, self.batches = self._open(), 0, []
+        end = self.begin + sum(batch.num_rows for batch in self.batches)
+        while end < stop:
+            self.batches.append(self.reader.read_next_batch())
+            end += self.batches[-1].num_rows
+            while self.begin + self.batches[0].num_rows <= start:
+                self.begin += self.batches.pop(0).num_rows
+        table = pa.Table.from_batches(self.batches).slice(start - self.begin, stop - start)
+        return table.column(i).to_numpy()
+
+
+SIZE_OF_FIRST_ROWS = 2**13  # bytes in which a decimal comma is looked for
+
+
+def _options(data: bytes | mmap, offset: int, separator: str, width: int) -> dict[str, Any]:
+    """Options of pyarrow for the numbers from byte ``offset`` on."""
+    dot_offset = data.find(b".", offset)
+    has_decimal_comma = separator != "," and data.find(b",", offset, dot_offset if dot_offset >= 0 else len(data)) >= 0
+    if separator == ",":
+        has_decimal_comma = re.match(rb'\s*"[+-]?\d*,\d+"', data[offset : offset + 200]) is not None
+    is_text = [is_clock_or_date(cell) for cell in first_cells(data, offset, separator)]
+    if any(is_text):  # dates and times of day have marks of their own
+        end = data.find(b"\n", offset + SIZE_OF_FIRST_ROWS)
+        rows = decode_line(data[offset : end if end >= 0 else len(data)]).splitlines()
+        numbers = [
+            cell for row in rows for cell, is_of_text in zip(cells_of(row, separator), is_text) if not is_of_text
+        ]
+        has_decimal_comma = separator != "," and any("," in cell for cell in numbers)
+    decimal_mark = "," if has_decimal_comma else "."
+    converting = csv.ConvertOptions(
+        column_types={str(i): pa.string() if i < len(is_text) and is_text[i] else pa.float64() for i in range(width)},
+        decimal_point=decimal_mark,
+        null_values=list(MISSING_VALUES),
+        strings_can_be_null=True,
+    )
+    reading = csv.ReadOptions(use_threads=False, column_names=[str(i) for i in range(width)], block_size=1 << 24)
+    parsing = csv.ParseOptions(delimiter=separator)
+    return {"read_options": reading, "parse_options": parsing, "convert_options": converting}
