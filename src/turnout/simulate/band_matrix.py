@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from turnout.kernel_cache import kernel
+from turnout.kernel_cache import borrowing_kernel, kernel
 
 
 @kernel
@@ -44,7 +44,7 @@ def factorise(upper: np.ndarray, lower_rows: np.ndarray, inverse_pivot: np.ndarr
     return growth
 
 
-@kernel
+@borrowing_kernel
 def factorise4(a: np.ndarray, lower: np.ndarray, upper: np.ndarray, inverse_pivot: np.ndarray, n: int) -> float:
     """The same for half bandwidth 4 at most, unrolled: ``a`` (5, n + 4) is overwritten, ``lower`` has n + 4 rows.
 
@@ -116,7 +116,7 @@ def upper_rows(lower_rows: np.ndarray, n: int, half: int, width: int) -> np.ndar
     return out
 
 
-@kernel
+@borrowing_kernel
 def solve(
     lower_rows: np.ndarray, upper: np.ndarray, inverse_pivot: np.ndarray, x: np.ndarray, start: int, n: int
 ) -> None:
@@ -147,7 +147,7 @@ def solve(
         _solve_any(lower_rows, upper, inverse_pivot, segment, n)
 
 
-@kernel
+@borrowing_kernel
 def _solve4(low: np.ndarray, up: np.ndarray, inverse_pivot: np.ndarray, x: np.ndarray, n: int) -> None:
     a = 0.0 * x[0]
     b, c, d = a, a, a
@@ -163,7 +163,7 @@ def _solve4(low: np.ndarray, up: np.ndarray, inverse_pivot: np.ndarray, x: np.nd
         x[i] = s
 
 
-@kernel
+@borrowing_kernel
 def _solve6(low: np.ndarray, up: np.ndarray, inverse_pivot: np.ndarray, x: np.ndarray, n: int) -> None:
     a = 0.0 * x[0]
     b, c, d, e, f = a, a, a, a, a
@@ -181,7 +181,7 @@ def _solve6(low: np.ndarray, up: np.ndarray, inverse_pivot: np.ndarray, x: np.nd
         x[i] = s
 
 
-@kernel
+@borrowing_kernel
 def _solve_any(low: np.ndarray, up: np.ndarray, inverse_pivot: np.ndarray, x: np.ndarray, n: int) -> None:
     half = low.shape[1]
     for i in range(n):
@@ -199,7 +199,7 @@ def _solve_any(low: np.ndarray, up: np.ndarray, inverse_pivot: np.ndarray, x: np
 LANES = 8  # right-hand sides that ``solve_lanes`` takes at once: as long as a row of eight waits for the last
 
 
-@kernel
+@borrowing_kernel
 def solve_lanes(low: np.ndarray, up: np.ndarray, pivot: np.ndarray, x: np.ndarray, n: int) -> None:
     """Solve in place with four diagonals for ``LANES`` complex right-hand sides at once.
 
@@ -245,7 +245,7 @@ def solve_lanes(low: np.ndarray, up: np.ndarray, pivot: np.ndarray, x: np.ndarra
             w[m + r] = imag
 
 
-@kernel
+@borrowing_kernel
 def multiply(diagonals: np.ndarray, x: np.ndarray, start: int, out: np.ndarray, n: int) -> None:
     """``out[:n]`` = matrix times ``x[start:start+n]``; ``diagonals`` (2 half + 1, n) from ``all_diagonals``.
 
@@ -278,7 +278,7 @@ def multiply(diagonals: np.ndarray, x: np.ndarray, start: int, out: np.ndarray, 
             out[i] += diagonals[k, i] * near[i + k]
 
 
-@kernel
+@borrowing_kernel
 def momentum_minus_force(
     mass: np.ndarray,
     stiffness: np.ndarray,
@@ -324,7 +324,7 @@ def momentum_minus_force(
         inner[i] = by_v * m - by_u * k
 
 
-@kernel
+@borrowing_kernel
 def solve_from_both_ends(
     low: np.ndarray,
     up: np.ndarray,

@@ -5,11 +5,11 @@ Each step: free motion, the small system of all ports, their response, sensor re
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from turnout.kernel_cache import inline_kernel, kernel
+from turnout.kernel_cache import borrowing_kernel, inline_kernel, kernel
 from turnout.simulate.band_matrix import momentum_minus_force, multiply, solve, solve_from_both_ends
 from turnout.simulate.port_system import evaluate, flexibility, locate_ports, newton_update
 
@@ -20,6 +20,34 @@ MAX_ITERATIONS = 60  # Newton iterations of a step
 UNCHECKED_ITERATIONS = 12  # iterations before the residual is checked for progress
 ROUNDING_TOLERANCE = 1000.0  # tolerances; stuck friction is so steep that rounded velocities do not determine it better
 CONVERGED, NEWTON, LEFT_TRACK = range(3)
+
+
+class Workspace(NamedTuple):
+    """Arrays of one march, overwritten in each step: increments of the state, then values of ports and their stages."""
+
+    d: np.ndarray
+    e: np.ndarray
+    e_stand_in: np.ndarray
+    mass_v: np.ndarray
+    stiff_u: np.ndarray
+    element: np.ndarray
+    order: np.ndarray
+    rows: np.ndarray
+    active: np.ndarray
+    weights: np.ndarray
+    g: np.ndarray
+    matrix: np.ndarray
+    x: np.ndarray
+    local: np.ndarray
+    share: np.ndarray
+    dip: np.ndarray
+    d0: np.ndarray
+    deformed: np.ndarray
+    f: np.ndarray
+    by_d: np.ndarray
+    by_rate: np.ndarray
+    change: np.ndarray
+    right: np.ndarray
 
 
 @inline_kernel
@@ -316,6 +344,81 @@ def advance(scheme: SchemeArrays, motion: Motion, d: np.ndarray, e: np.ndarray, 
         motion.x[i] = scheme.carry * motion.x[i] + scheme.scale * (by_s * e_stand_in[i]).real
 
 
+@borrowing_kernel
+def _march_steps(
+    track: TrackArrays,
+    scheme: SchemeArrays,
+    bodies: VehicleArrays,
+    ports: PortArrays,
+    run: RunArrays,
+    motion: Motion,
+    n_step: int,
+    out: np.ndarray,
+    out_force: np.ndarray,
+    work: Workspace,
+) -> tuple[int, int, int, float, int]:
+    """``march`` in a given workspace."""
+    stages, n_port = scheme.node.size, ports.body.size
+    n = n_port * stages
+    d, e, e_stand_in, x, order = work.d, work.e, work.e_stand_in, work.x, work.order
+    rows, weights, local, share, dip = work.rows, work.weights, work.local, work.share, work.dip
+    g, d0, deformed, f, by_d, by_rate = work.g, work.d0, work.deformed, work.f, work.by_d, work.by_rate
+    force, change = motion.force, work.change
+    iterations = 0
+    for step in range(n_step):
+        free_motion(track, scheme, bodies, run, motion, step, d, e, e_stand_in, work.mass_v, work.stiff_u)
+        lost_port = locate_ports(track, scheme, ports, run, step, work.element, x, rows, weights, local, share, dip)
+        if lost_port >= 0:
+            return LEFT_TRACK, step, lost_port, x[lost_port * stages], iterations
+        free_deformation(track, scheme, ports, motion, d, e, e_stand_in, rows, weights, share, dip, d0)
+        flexibility(track, scheme, bodies, ports, rows, weights, local, share, d0, step == 0, g)
+        for k in range(1, n_port):
+            o, m = order[k], k
+            while m > 0 and x[order[m - 1] * stages] > x[o * stages]:
+                order[m] = order[m - 1]
+                m -= 1
+            order[m] = o
+        converged, previous = n == 0, np.inf
+        for trial in range(MAX_ITERATIONS):
+            if n == 0:
+                break
+            worst, worst_port = evaluate(
+                scheme, ports, n, g, d0, force, motion.deformation, deformed, f, by_d, by_rate
+            )
+            if worst < run.tolerance or (trial > UNCHECKED_ITERATIONS and worst < ROUNDING_TOLERANCE * run.tolerance):
+                converged = True
+                break
+            iterations += 1
+            if (
+                trial > UNCHECKED_ITERATIONS and worst > 0.99 * previous
+            ):  # oscillation about a kink: halve the last change
+                for i in range(n):
+                    change[i] *= 0.5
+                    force[i] -= change[i]
+                continue
+            previous = worst
+            newton_update(
+                scheme, ports, order, x, run.cut, g, force, f, by_d, by_rate, change,
+                work.matrix, work.right, work.active,
+            )  # fmt: skip
+        if not converged:
+            return NEWTON, step, worst_port, worst, iterations
+        for i in range(n_port):
+            value = scheme.carry * motion.deformation[i]
+            for a in range(stages):
+                value += scheme.end[a] * deformed[i * stages + a]
+            motion.deformation[i] = value
+            if out_force.shape[1] > step:
+                mean = 0.0
+                for a in range(stages):
+                    mean += scheme.quadrature[a] * force[i * stages + a]
+                out_force[i, step] = mean
+        add_port_forces(track, scheme, bodies, ports, force, rows, weights, share, d, e, e_stand_in)
+        record(track, scheme, run, motion, d, step, out)
+        advance(scheme, motion, d, e, e_stand_in)
+    return CONVERGED, n_step, -1, 0.0, iterations
+
+
 @kernel
 def march(
     track: TrackArrays,
@@ -357,66 +460,13 @@ def march(
         Status (``CONVERGED``, ``NEWTON`` or ``LEFT_TRACK``); step and port where the march stopped; residual [N] or
         position [m] there; Newton iterations in total.
     """
-    stages, n_port = scheme.node.size, ports.body.size
-    n = n_port * stages
+    n_port, n = ports.body.size, ports.body.size * scheme.node.size
     zero = scheme.tau[0] * 0.0
-    d = np.zeros(motion.u.size, dtype=scheme.tau.dtype)
-    e, e_stand_in = np.full(motion.z.size, zero), np.full(motion.y.size, zero)
-    mass_v, stiff_u = np.zeros(track.n), np.zeros(track.n)
-    element, order = np.zeros(n_port, dtype=np.int64), np.arange(n_port)
-    rows, active = np.zeros((n, 4), dtype=np.int64), np.zeros(n, dtype=np.int64)
-    weights, g, matrix = np.zeros((n, 4)), np.zeros((n, n)), np.zeros((n, n))
-    x, local, share, dip, d0, deformed = (np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n))
-    f, by_d, by_rate, change, right = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
-    iterations = 0
-    for step in range(n_step):
-        free_motion(track, scheme, bodies, run, motion, step, d, e, e_stand_in, mass_v, stiff_u)
-        lost_port = locate_ports(track, scheme, ports, run, step, element, x, rows, weights, local, share, dip)
-        if lost_port >= 0:
-            return LEFT_TRACK, step, lost_port, x[lost_port * stages], iterations
-        free_deformation(track, scheme, ports, motion, d, e, e_stand_in, rows, weights, share, dip, d0)
-        flexibility(track, scheme, bodies, ports, rows, weights, local, share, d0, step == 0, g)
-        for k in range(1, n_port):
-            o, m = order[k], k
-            while m > 0 and x[order[m - 1] * stages] > x[o * stages]:
-                order[m] = order[m - 1]
-                m -= 1
-            order[m] = o
-        converged, previous = n == 0, np.inf
-        for trial in range(MAX_ITERATIONS):
-            if n == 0:
-                break
-            worst, worst_port = evaluate(
-                scheme, ports, n, g, d0, motion.force, motion.deformation, deformed, f, by_d, by_rate
-            )
-            if worst < run.tolerance or (trial > UNCHECKED_ITERATIONS and worst < ROUNDING_TOLERANCE * run.tolerance):
-                converged = True
-                break
-            iterations += 1
-            if (
-                trial > UNCHECKED_ITERATIONS and worst > 0.99 * previous
-            ):  # oscillation about a kink: halve the last change
-                for i in range(n):
-                    change[i] *= 0.5
-                    motion.force[i] -= change[i]
-                continue
-            previous = worst
-            newton_update(
-                scheme, ports, order, x, run.cut, g, motion.force, f, by_d, by_rate, change, matrix, right, active
-            )
-        if not converged:
-            return NEWTON, step, worst_port, worst, iterations
-        for i in range(n_port):
-            value = scheme.carry * motion.deformation[i]
-            for a in range(stages):
-                value += scheme.end[a] * deformed[i * stages + a]
-            motion.deformation[i] = value
-            if out_force.shape[1] > step:
-                mean = 0.0
-                for a in range(stages):
-                    mean += scheme.quadrature[a] * motion.force[i * stages + a]
-                out_force[i, step] = mean
-        add_port_forces(track, scheme, bodies, ports, motion.force, rows, weights, share, d, e, e_stand_in)
-        record(track, scheme, run, motion, d, step, out)
-        advance(scheme, motion, d, e, e_stand_in)
-    return CONVERGED, n_step, -1, 0.0, iterations
+    by_stage = np.zeros((11, n))
+    work = Workspace(
+        np.zeros(motion.u.size, dtype=scheme.tau.dtype), np.full(motion.z.size, zero), np.full(motion.y.size, zero),
+        np.zeros(track.n), np.zeros(track.n), np.zeros(n_port, dtype=np.int64), np.arange(n_port),
+        np.zeros((n, 4), dtype=np.int64), np.zeros(n, dtype=np.int64), np.zeros((n, 4)), np.zeros((n, n)),
+        np.zeros((n, n)), by_stage[0], by_stage[1], by_stage[2], by_stage[3], by_stage[4], by_stage[5], by_stage[6], by_stage[7], by_stage[8], by_stage[9], by_stage[10],
+    )  # fmt: skip
+    return _march_steps(track, scheme, bodies, ports, run, motion, n_step, out, out_force, work)
