@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.kernel_cache import kernel
+from turnout.kernel_cache import borrowing_kernel, kernel
 from turnout.simulate.band_matrix import LANES, factorise, factorise4, solve, solve_lanes, upper_rows
 from turnout.simulate.matrices import link_vector
 
@@ -63,7 +63,7 @@ def _solve_lines(
     return worst
 
 
-@kernel
+@borrowing_kernel
 def _solve_rows(
     lower: np.ndarray,
     upper: np.ndarray,

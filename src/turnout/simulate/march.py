@@ -5,49 +5,23 @@ Each step: free motion, the small system of all ports, their response, sensor re
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.kernel_cache import borrowing_kernel, inline_kernel, kernel
 from turnout.simulate.band_matrix import momentum_minus_force, multiply, solve, solve_from_both_ends
 from turnout.simulate.port_system import evaluate, flexibility, locate_ports, newton_update
+from turnout.simulate.workspace import new_workspace
 
 if TYPE_CHECKING:
     from turnout.simulate.state import Motion, PortArrays, RunArrays, SchemeArrays, TrackArrays, VehicleArrays
+    from turnout.simulate.workspace import Workspace
 
 MAX_ITERATIONS = 60  # Newton iterations of a step
 UNCHECKED_ITERATIONS = 12  # iterations before the residual is checked for progress
 ROUNDING_TOLERANCE = 1000.0  # tolerances; stuck friction is so steep that rounded velocities do not determine it better
 CONVERGED, NEWTON, LEFT_TRACK = range(3)
-
-
-class Workspace(NamedTuple):
-    """Arrays of one march, overwritten in each step: increments of the state, then values of ports and their stages."""
-
-    d: np.ndarray
-    e: np.ndarray
-    e_stand_in: np.ndarray
-    mass_v: np.ndarray
-    stiff_u: np.ndarray
-    element: np.ndarray
-    order: np.ndarray
-    rows: np.ndarray
-    active: np.ndarray
-    weights: np.ndarray
-    g: np.ndarray
-    matrix: np.ndarray
-    x: np.ndarray
-    local: np.ndarray
-    share: np.ndarray
-    dip: np.ndarray
-    d0: np.ndarray
-    deformed: np.ndarray
-    f: np.ndarray
-    by_d: np.ndarray
-    by_rate: np.ndarray
-    change: np.ndarray
-    right: np.ndarray
 
 
 @inline_kernel
@@ -382,9 +356,7 @@ def _march_steps(
         for trial in range(MAX_ITERATIONS):
             if n == 0:
                 break
-            worst, worst_port = evaluate(
-                scheme, ports, n, g, d0, force, motion.deformation, deformed, f, by_d, by_rate
-            )
+            worst, worst_port = evaluate(scheme, ports, n, g, d0, force, motion.deformation, deformed, f, by_d, by_rate)
             if worst < run.tolerance or (trial > UNCHECKED_ITERATIONS and worst < ROUNDING_TOLERANCE * run.tolerance):
                 converged = True
                 break
@@ -460,13 +432,5 @@ def march(
         Status (``CONVERGED``, ``NEWTON`` or ``LEFT_TRACK``); step and port where the march stopped; residual [N] or
         position [m] there; Newton iterations in total.
     """
-    n_port, n = ports.body.size, ports.body.size * scheme.node.size
-    zero = scheme.tau[0] * 0.0
-    by_stage = np.zeros((11, n))
-    work = Workspace(
-        np.zeros(motion.u.size, dtype=scheme.tau.dtype), np.full(motion.z.size, zero), np.full(motion.y.size, zero),
-        np.zeros(track.n), np.zeros(track.n), np.zeros(n_port, dtype=np.int64), np.arange(n_port),
-        np.zeros((n, 4), dtype=np.int64), np.zeros(n, dtype=np.int64), np.zeros((n, 4)), np.zeros((n, n)),
-        np.zeros((n, n)), by_stage[0], by_stage[1], by_stage[2], by_stage[3], by_stage[4], by_stage[5], by_stage[6], by_stage[7], by_stage[8], by_stage[9], by_stage[10],
-    )  # fmt: skip
+    work = new_workspace(motion.u.size, track.n, motion.z.size, motion.y.size, ports.body.size, scheme.tau)
     return _march_steps(track, scheme, bodies, ports, run, motion, n_step, out, out_force, work)
