@@ -6,7 +6,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from numba.core.errors import TypingError
 
 from turnout import kernel_cache
 from turnout.fingerprint import closure
@@ -35,6 +37,40 @@ def test_every_kernel_that_another_one_calls_is_behind_the_name_of_the_folder():
 
 def test_no_kernel_goes_round_the_folder():
     assert {p.stem for p in PACKAGE.rglob("*.py") if "numba" in imported_by(p)} == {"kernel_cache"}
+
+
+CREATORS = {"zeros", "empty", "full", "ones", "arange", "eye", "array", "zeros_like", "empty_like", "copy"}
+
+
+def kernels_of(path):
+    for node in ast.parse(path.read_text()).body:
+        if isinstance(node, ast.FunctionDef):
+            for decorator in node.decorator_list:
+                if isinstance(decorator, ast.Name) and decorator.id.endswith("kernel"):
+                    yield node, decorator.id
+
+
+def test_only_kernels_that_create_arrays_count_references():
+    found = [k for p in (PACKAGE / "simulate").rglob("*.py") for k in kernels_of(p)]
+    called = {
+        node.name: {
+            getattr(c.func, "attr", getattr(c.func, "id", "")) for c in ast.walk(node) if isinstance(c, ast.Call)
+        }
+        for node, _ in found
+    }
+    counting = {node.name for node, decorator in found if decorator == "kernel"}
+    assert {"march", "new_workspace", "factorise"} <= counting < called.keys()
+    idle = [name for name in counting if not called[name] & (CREATORS | counting)]
+    assert not idle, f"create no arrays, and should borrow them: {idle}"
+
+
+def fresh_row(rows):
+    return np.zeros(rows.shape[1])
+
+
+def test_a_borrowing_kernel_cannot_create_an_array():
+    with pytest.raises(TypingError, match="zeros"):
+        kernel_cache.borrowing_kernel(fresh_row)(np.ones((2, 3)))
 
 
 def run(environment):
