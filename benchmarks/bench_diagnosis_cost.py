@@ -5,6 +5,7 @@ TURNOUT_COST_PANELS names the panels ("plain,crossing"), TURNOUT_COST_EFFECTS th
 TURNOUT_COST_SET is a folder of existing cases, as ``turnout blind make`` writes them; TURNOUT_COST_CASES chooses some.
 TURNOUT_COST_BEFORE is the ``src`` folder of another version: each case is diagnosed by both in turn, and the ratio of
 their CPU times is printed. The first case is diagnosed once more before, to compile; not with TURNOUT_COST_WARM=1.
+Modules are kept as byte code, as in an installation, whatever PYTHONDONTWRITEBYTECODE says.
 """
 
 import json
@@ -107,7 +108,7 @@ def _diagnose(folder, work, sources):
         with stopwatch() as watch:
             done = subprocess.run(
                 [*command, "--work", f"{copy}/work", "--json"], cwd=copy, capture_output=True, text=True, check=False,
-                env=os.environ | {"PYTHONPATH": str(sources)},
+                env=os.environ | {"PYTHONPATH": str(sources), "PYTHONDONTWRITEBYTECODE": ""},
             )  # fmt: skip
         rows = json.loads(done.stdout)["result"]
     return rows[0], watch.cpu
