@@ -53,7 +53,7 @@ def write_atomic(path: os.PathLike | str, write: Callable) -> None:
     Raises
     ------
     OSError
-        If the disk fails or is full.
+        If the disk fails or is full, or the file may not be written; ``filename`` is ``path``.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -66,6 +66,10 @@ def write_atomic(path: os.PathLike | str, write: Callable) -> None:
             stream.flush()
             os.fsync(stream.fileno())
         os.replace(temporary, path)
+    except OSError as error:
+        if error.filename == str(temporary):
+            error.filename = str(path)  # nobody knows the temporary name
+        raise
     finally:
         temporary.unlink(missing_ok=True)
 

@@ -126,8 +126,8 @@ def build_database(registry_dir: Path, generation: Generation) -> None:
     except (duckdb.IOException, duckdb.TransactionException, duckdb.OutOfMemoryException, OSError) as error:
         # DuckDB reports a full disk also as a transaction that cannot be committed
         raise RegistryError(
-            f"cannot write {DATABASE}: {str(error).splitlines()[0]}. The new rows are stored; free disk space, then "
-            "'turnout registry relocate' makes the file again."
+            f"cannot write {DATABASE}: {str(error).splitlines()[0]}. The new rows are stored; free disk space or give "
+            "write permission, then 'turnout registry relocate' makes the file again."
         ) from error
     finally:
         con.close()

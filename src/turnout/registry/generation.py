@@ -107,6 +107,9 @@ def load(registry_dir: Path) -> Generation:
         return Generation()
 
 
+REMEDY = "Put it back from a backup. Without one delete its folder: the next run makes the registry again from work/."
+
+
 def read_generation(path: Path) -> Generation:
     """A generation from its file.
 
@@ -130,7 +133,7 @@ def read_generation(path: Path) -> Generation:
     try:
         raw = json.loads(path.read_text(encoding="utf-8"))
     except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise RegistryError(f"{path}: not a generation file ({error}). Put it back from a backup.") from None
+        raise RegistryError(f"{path}: not a generation file ({error}). {REMEDY}") from None
     try:
         if raw.pop("format", None) != FORMAT_VERSION:
             raise RegistryError(f"{path}: written by another version of the program. Install that version.")
@@ -141,7 +144,7 @@ def read_generation(path: Path) -> Generation:
         return Generation(files=files, retired=retired, **raw)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         message = f"{type(error).__name__}: {error}"
-        raise RegistryError(f"{path}: not a generation file ({message}). Put it back from a backup.") from None
+        raise RegistryError(f"{path}: not a generation file ({message}). {REMEDY}") from None
 
 
 def require_usable_folder(registry_dir: Path) -> None:

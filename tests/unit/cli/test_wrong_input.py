@@ -7,6 +7,7 @@ from importlib import import_module
 
 import pytest
 
+from turnout import files as files_module
 from turnout.cli import COMMANDS
 from turnout.cli.main import main
 from turnout.workflow import project as project_module
@@ -180,3 +181,15 @@ def test_no_option_accepts_a_number_that_is_none(command):
     parser = argparse.ArgumentParser()
     import_module(f"turnout.cli.{command}").add_arguments(parser)
     assert not [action.dest for action in options_of(parser) if action.type is float]
+
+
+def test_a_file_that_may_not_be_written_has_its_own_name_in_the_message(project, capsys, monkeypatch):
+    def forbidden(file, mode="r", **options):
+        if "w" in mode:
+            raise PermissionError(13, "Permission denied", str(file))
+        return open(file, mode, **options)
+
+    monkeypatch.setattr(files_module, "open", forbidden, raising=False)
+    assert main(["add", "W2", "tommerup"]) == 2
+    message = capsys.readouterr().err
+    assert "config/turnouts.tsv: Permission denied" in message and ".tmp" not in message
