@@ -100,7 +100,7 @@ def with_durations(column: np.ndarray, where: str, source: Source) -> np.ndarray
     Returns
     -------
     (n,) array
-        Of timedelta64[ns] if its first value is a time of day.
+        Of timedelta64[ns] if its first value is a time of day and others differ from it.
 
     Raises
     ------
@@ -110,6 +110,8 @@ def with_durations(column: np.ndarray, where: str, source: Source) -> np.ndarray
     if column.ndim != 1 or len(column) < 2 or column.dtype.kind not in "OUST" or not is_clock(_text(column[0])):
         return column
     texts = [_text(value) for value in column]
+    if len(set(texts)) == 1:  # the start, repeated in every row
+        return column
     seconds = seconds_of_clock(texts)
     if not np.isfinite(seconds).all():
         k = int(np.argmin(np.isfinite(seconds)))

@@ -226,6 +226,8 @@ def test_a_column_of_clock_times_is_held_against_the_rate(clock, format, tmp_pat
     assert "samples are missing" in reason_of(tmp_path, path.name)[1]
     write_with_clock(format, path, [*texts[:700], "no signal", *texts[701:]])
     assert "the time of sample 700 is 'no signal'" in reason_of(tmp_path, path.name)[1]
+    write_with_clock(format, path, [texts[0]] * N)  # the start, repeated in every row
+    assert read(path.name, tmp_path, HAMMER).errors == ()
 
 
 def value_of(number, decimal_mark="."):
