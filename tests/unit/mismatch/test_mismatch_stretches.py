@@ -74,3 +74,15 @@ def test_pads_whose_stiffness_depends_on_the_impact_are_located(case, positions,
     assert abs(found.place - centre) < 0.61  # one bay
     assert found.low - 0.01 <= centre <= found.high + 0.01
     assert found.high - found.low < 1.9
+
+
+def test_a_late_channel_is_no_cause_at_the_supports_beside_it(case):
+    """Every impact shows the same delay. Forces at two supports, others for each impact, imitate it less well."""
+    late, observations = copy(case), []
+    for o in case.observations:
+        pair, (real, imaginary) = case.frf_pairs[o.name], np.split(o.data, 2)
+        shifted = (real + 1j * imaginary) * np.exp(-2j * np.pi * pair.frequency * 3e-4 * (pair.channel == "S3"))
+        observations.append(replace(o, data=np.concatenate([shifted.real, shifted.imag])))
+    late.observations = tuple(observations)
+    found = locate(late, fit_jointly(late, iterations=30))
+    assert (found.frame, found.sensor) == ("sensor", "S3")
