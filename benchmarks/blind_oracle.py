@@ -44,7 +44,7 @@ def oracle(folder, case, truth):
         raise TurnoutError("none of the recordings left out can be used, so no fit can be told")
     base = fit = fit_jointly(track_case, iterations=MAX_ITERATIONS)
     for effect in truth["effects"]:
-        fit = _fit_with(track_case, fit, effect) or fit
+        fit = fit_with(track_case, fit, effect) or fit
     before, after = (
         fit_percent(track_case.reserved, predict_reserved(track_case, f, track_case.reserved)) for f in (base, fit)
     )
@@ -56,7 +56,7 @@ def oracle(folder, case, truth):
     }  # fmt: skip
 
 
-def _fit_with(case, fit, effect):
+def fit_with(case, fit, effect):
     """Best fit with this effect at its true position, from the truth and from the likeliest starts.
 
     Nuisance parameters that can mask the effect start also at their prior.

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from benchmarks.blind_bridge import rows_of
 from benchmarks.blind_oracle import _candidates, _true_start, clear_singles
+from benchmarks.blind_visit_efficiency import best_rival, has_enough
 
+from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch import Candidate
 from turnout.physics import Parameter
 from turnout_blind.score.answers import answers_of
@@ -77,3 +79,24 @@ def test_rows_of_the_bridge_are_read_by_the_scorer():
     assert judged.matches == ("named",) and judged.located == {"lock": True, "place": True}
     assert judged.fits == (40.0, 48.0)
     assert judged.parameters == ((pytest.approx(0.02 / 0.67), True),)
+
+
+def test_a_rival_of_the_true_effect_has_another_name_and_no_negative_gain():
+    ranking = [{"family": "local_pad", "nats": 30.0}, {"family": "sensor_gain", "nats": 9.0}]
+    rows = [{"evidence_json": json.dumps({"ranking": ranking})}]
+    assert best_rival(rows, ("local_pad",)) == ("sensor_gain", 9.0)
+    assert best_rival(rows, ("local_pad", "sensor_gain")) == ("", 0.0)
+    opposed = [{"evidence_json": json.dumps({"ranking": [{"family": "rail_shear", "nats": -4.0}]})}]
+    assert best_rival(opposed, ("local_pad",)) == ("rail_shear", 0.0)
+    assert best_rival([{"evidence_json": None}], ("local_pad",)) == best_rival([], ("local_pad",)) == ("", 0.0)
+
+
+@pytest.mark.parametrize(
+    ("gain", "rival", "reportable", "expected"),
+    [(12.1, 0.0, True, True), (12.0, 0.0, True, False), (20.0, 14.0, True, True), (20.0, 14.1, True, False),
+     (50.0, 0.0, False, False)],
+)  # fmt: skip
+def test_evidence_is_enough_above_the_bars_of_a_name(gain, rival, reportable, expected):
+    settings = MismatchSettings(threshold=12.0, margin=6.0)
+    assert has_enough(SimpleNamespace(gain=gain, is_reportable=reportable), rival, settings) is expected
+    assert not has_enough(None, 0.0, settings)
