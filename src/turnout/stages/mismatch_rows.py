@@ -23,6 +23,7 @@ from turnout.stages.mismatch_curves import (
     reach_of,
 )
 from turnout.stages.mismatch_text import headline, interval, surface_sentence
+from turnout.stages.values_off_file import sentences_on_values
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
@@ -285,9 +286,9 @@ def finding_tables(
     low, high = band or (row["band_low_hz"], row["band_high_hz"])
     row |= {"band_low_hz": low, "band_high_hz": high, "wheel_within_m": reach}
     row |= _summary_columns(diagnosis, case, group, about)
-    row["sentence"] = " ".join(
-        filter(None, [headline(row), *map(surface_sentence, surface_estimates(case, diagnosis.fit))])
-    )
+    of_surface = map(surface_sentence, surface_estimates(case, diagnosis.fit))
+    of_values = sentences_on_values(case.nuisances, diagnosis.fit)
+    row["sentence"] = " ".join(filter(None, [headline(row), *of_surface, *of_values]))
     if case.reservation:
         row = as_unproven(row, case.reservation)
     key = {"finding_id": row["finding_id"], "turnout_id": row["turnout_id"]}

@@ -1,6 +1,7 @@
 """From the files of a turnout to findings: what is found, what is accepted, what is said where little can be said."""
 
 import json
+import re
 from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 import small_turnout as small
 
+from turnout import physics
 from turnout.cli.main import main
 from turnout.config import load_configuration
 from turnout.errors import SimulationError
@@ -51,6 +53,18 @@ def said(tables):
     """All that was said of what was not used."""
     notes = [n for f in tables["mismatch_findings"] for n in (f["notes"] or "").splitlines()]
     return "\n".join([*notes, *(q["found"] for q in tables["quarantine"])])
+
+
+def test_a_rail_far_softer_than_its_file_is_stated_though_no_name_is_given(folder):
+    """Half the shear stiffness: its tolerance absorbs it, and no effect of these families explains it."""
+
+    def soft_in_shear(track):
+        return (physics.RailShear(1e9 / track.rail.shear_stiffness),)
+
+    small.strike(folder, soft_in_shear)
+    (row,) = diagnose_turnout("t1")["mismatch_findings"]
+    stated = re.search(r"The shear stiffness of the rail is ([\d.]+) times that of the file", row["sentence"])
+    assert row["term"] is None and float(stated[1]) == pytest.approx(0.5, abs=0.05)
 
 
 def test_blows_alone_name_the_soft_pad_at_its_sleeper(soft):

@@ -1,0 +1,60 @@
+"""Values of the whole track that a fit has moved beyond their tolerance are stated with their factor on the file."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.turnout.planned_case import PlannedCase, small_plan
+from turnout.stages.values_off_file import sentences_on_values
+
+SHEAR = Nuisance("rail_shear", "-", 0.0, 0.12, meaning="ln rail_shear of the rail", group="rail")
+
+
+def sentences_of(*values_and_errors):
+    """Sentences on (nuisance, value, standard error), ..."""
+    values = {n.name: v for n, v, _ in values_and_errors}
+    covariance = np.diag([error**2 for *_, error in values_and_errors])
+    fit = SimpleNamespace(values=values, covariance=covariance)
+    return sentences_on_values([n for n, *_ in values_and_errors], fit)
+
+
+def test_a_rail_softer_than_its_tolerance_is_stated_with_factor_and_interval():
+    """exp(-0.631) = 0.532, exp(-0.631 ± 1.96 * 0.03) = 0.502 and 0.564; 0.631 / 0.12 = 5.26."""
+    (sentence,) = sentences_of((SHEAR, -0.631, 0.03))
+    assert sentence == (
+        "The shear stiffness of the rail is 0.53 times that of the file (0.50 to 0.56): 5.3 times its tolerance."
+    )
+
+
+@pytest.mark.parametrize(("value", "stated"), [(0.359, False), (0.361, True), (-0.359, False), (-0.361, True)])
+def test_three_tolerances_are_the_bar_in_both_directions(value, stated):
+    assert bool(sentences_of((SHEAR, value, 0.01))) is stated
+
+
+def test_the_farthest_is_first_and_a_wheelset_has_its_train():
+    wheels = Nuisance("wheels_railcar", "-", 0.0, 0.06, meaning="ln unsprung mass", group="wheels")
+    first, second = sentences_of((SHEAR, -0.5, 0.02), (wheels, 0.4, 0.02))
+    assert "The unsprung mass of railcar is 1.49 times that of the file" in first  # 6.7 tolerances, the rail has 4.2
+    assert "The shear stiffness of the rail is 0.61 times" in second
+
+
+def test_what_is_no_value_of_the_whole_track_in_a_file_is_not_stated():
+    """A wave, the speed of one passage, one support among many; the running surface has a sentence of its own."""
+    wave = Nuisance("wave_3", "m", 0.0, 1e-5, group="wave")
+    speed = Nuisance("v@p1", "-", 0.0, 0.01, "p1", meaning="ln speed")
+    pad = Nuisance("pad_37", "-", 0.0, 0.1, meaning="ln pad_stiffness of 37", group="pad", index=37)
+    depth = Nuisance("nose", "-", 0.0, 0.1, meaning="ln depth of the kink", group="surface")
+    assert sentences_of((wave, 1e-3, 1e-6), (speed, 0.2, 0.001), (pad, 1.0, 0.01), (depth, 1.0, 0.01)) == []
+
+
+def test_all_values_of_the_whole_track_of_a_case_can_be_stated():
+    """Those of pads, ballast and sleepers, of the rail and of the wheelsets, each moved by four tolerances."""
+    case = PlannedCase(small_plan(), families=("sensor_gain",))
+    ours = [n for n in case.nuisances if n.group in ("track", "rail", "wheels")]
+    assert {n.group for n in ours} == {"track", "rail", "wheels"}
+    for nuisance in ours:
+        (sentence,) = sentences_of((nuisance, 4.0 * nuisance.sd, 0.01))
+        assert sentence.endswith(": 4.0 times its tolerance.")
+        assert "_" not in sentence.removesuffix(nuisance.name.removeprefix("wheels_"))
