@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from turnout.mismatch.turnout.predictions import Values
     from turnout.mismatch.turnout.running_surface import RunningSurface
 
-GRADIENT_STEP = 1.0  # prior sd, of the difference quotient by a number of a top: positions are to 3 mm
-
 
 def level_position(surface: RunningSurface, route: str, values: Values) -> float | None:
     """Where both tops of a route are level.
@@ -79,7 +77,7 @@ def change_estimate(
         return None
     gradient, columns, sds = [], [], []
     for name, (k, nuisance) in nuisances.items():
-        beside = np.clip(values[name] + GRADIENT_STEP * nuisance.sd * np.array([-1.0, 1.0]), *nuisance.bounds)
+        beside = np.clip(values[name] + SURFACE.gradient_step * nuisance.sd * np.array([-1.0, 1.0]), *nuisance.bounds)
         ends = [level_position(surface, route, {**values, name: float(v)}) for v in beside]
         span = float(np.ptp(beside))
         gradient.append((ends[1] - ends[0]) / span if span and ends[0] is not None and ends[1] is not None else 0.0)

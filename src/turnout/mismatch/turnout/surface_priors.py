@@ -33,6 +33,8 @@ class SurfacePriors:
     min_data_share: float = prior(
         0.5, "share of the information", "on a number that is attributed to the recordings, at least", RUNNING_SURFACE)
     grid_step: float = prior(0.02, "m", "at which components are looked at near the sensors", "numerical")
+    gradient_step: float = prior(
+        1.0, "prior sd", "of the difference quotient by a number of a top: positions are to 3 mm", "numerical")
 
 
 @dataclass(frozen=True)
