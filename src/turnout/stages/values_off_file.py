@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.nuisance import Nuisance
 
 LOGARITHM = "ln "  # with it begins the meaning of a value whose logarithm is fitted, relative to the file
-RAIL_WORDS = {"rail_bending": "bending stiffness of the rail", "rail_shear": "shear stiffness of the rail"}
 
 
 def sentences_on_values(nuisances: Iterable[Nuisance], fit: Fit) -> list[str]:
@@ -55,7 +54,7 @@ def sentences_on_values(nuisances: Iterable[Nuisance], fit: Fit) -> list[str]:
 
 def _sentence(nuisance: Nuisance, value: float, error: float, distance: float) -> str:
     """One sentence."""
-    words = RAIL_WORDS.get(nuisance.name, nuisance.meaning.removeprefix(LOGARITHM).replace("_", " "))
+    words = nuisance.meaning.removeprefix(LOGARITHM).replace("_", " ")
     if nuisance.group == "wheels":
         words = f"{words} of {nuisance.name.removeprefix('wheels_')}"
     factor, low, high = np.exp([value, value - Z95_EXACT * error, value + Z95_EXACT * error])

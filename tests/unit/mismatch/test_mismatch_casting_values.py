@@ -48,6 +48,13 @@ def test_each_piece_has_its_own_bending_stiffness_and_mass_and_ends_are_less_sur
     assert spreads["cast_mass_0"] == dict((n, e) for n, _, e in CASTING_SDS)["cast_mass"] > spreads["cast_mass_3"]
 
 
+def test_a_piece_is_told_by_its_position(zone):
+    meanings = {n.name: n.meaning for n in track_nuisances(zone, ())}
+    assert meanings["cast_mass_0"] == "ln mass of the rail from 22.7 to 23.0 m"
+    assert meanings["cast_bending_3"] == "ln bending stiffness of the rail from 24.2 to 25.2 m"
+    assert meanings["rail_shear"] == "ln shear stiffness of the rail"
+
+
 def test_a_piece_changes_its_own_rail_and_no_other(zone):
     """Half as heavy again and a fifth stiffer in the fourth piece, all rails a tenth stiffer: there, beside it, on the
     other route, and nothing of what lies far away but what all rails share."""

@@ -9,7 +9,7 @@ from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.turnout.planned_case import PlannedCase, small_plan
 from turnout.stages.values_off_file import sentences_on_values
 
-SHEAR = Nuisance("rail_shear", "-", 0.0, 0.12, meaning="ln rail_shear of the rail", group="rail")
+SHEAR = Nuisance("rail_shear", "-", 0.0, 0.12, meaning="ln shear stiffness of the rail", group="rail")
 
 
 def sentences_of(*values_and_errors):

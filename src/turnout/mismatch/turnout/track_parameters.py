@@ -192,6 +192,15 @@ def rail_sds(zone: Zone) -> dict[str, float]:
     return dict([*RAIL_SDS, *cast])
 
 
+def _rail_words(zone: Zone) -> dict[str, str]:
+    """What each of ``rail_sds`` is, in words."""
+    words = {"rail_bending": "bending stiffness of the rail", "rail_shear": "shear stiffness of the rail"}
+    for k, c in enumerate(zone.castings):
+        where = f"of the rail from {c.piece.start:.1f} to {c.piece.end:.1f} m"
+        words |= {f"cast_bending_{k}": f"bending stiffness {where}", f"cast_mass_{k}": f"mass {where}"}
+    return words
+
+
 def casting_elements(zone: Zone, node: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
     """Elements that each casting covers.
 
@@ -300,18 +309,10 @@ def track_nuisances(zone: Zone, trains: Iterable[str]) -> list[Nuisance]:
             meaning, most = f"ln {parameter.field} of {j}", TRACK.bound_sds * sd
             name = f"{parameter.tag}_{j}"
             nuisances.append(Nuisance(name, "-", 0.0, sd, None, (-most, most), meaning, group=parameter.tag, index=j))
+    words = _rail_words(zone)
     for name, sd in rail_sds(zone).items():
-        nuisances.append(
-            Nuisance(
-                name,
-                "-",
-                0.0,
-                sd,
-                bounds=(-TRACK.bound_sds * sd, TRACK.bound_sds * sd),
-                meaning=f"ln {name} of the rail",
-                group="rail",
-            )
-        )
+        bounds = (-TRACK.bound_sds * sd, TRACK.bound_sds * sd)
+        nuisances.append(Nuisance(name, "-", 0.0, sd, None, bounds, f"ln {words[name]}", group="rail"))
     nuisances += chair_nuisances((zone.turnout.track, *zone.turnout.tracks.values()))
     for train in trains:
         nuisances.append(
