@@ -50,6 +50,13 @@ def test_an_end_at_the_outermost_support_is_open(first, last, open_ends):
     assert (ends.first[0] is None, ends.last[1] is None) == open_ends
 
 
+def test_an_end_that_may_be_the_outermost_support_is_open():
+    beside = stretch_ends([evidence(10, 10, 20.0), evidence(10, 11, 20.0)], BY_NAME)
+    assert beside.first == pytest.approx((6.0, 6.0)) and beside.last == (pytest.approx(6.0), None)
+    beside = stretch_ends([evidence(1, 1, 20.0), evidence(0, 1, 20.0)], BY_NAME)
+    assert beside.first == (None, pytest.approx(0.6)) and beside.last == pytest.approx((0.6, 0.6))
+
+
 def test_a_change_as_long_as_the_longest_stretch_is_open_at_both_ends():
     ends = stretch_ends([evidence(2, 1 + CALIBRATION.max_stretch, 20.0)], BY_NAME)
     assert ends.first == (None, pytest.approx(1.2)) and ends.last[1] is None

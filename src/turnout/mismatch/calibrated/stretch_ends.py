@@ -43,9 +43,10 @@ def stretch_ends(
     asked = CALIBRATION.interval_probability if probability is None else probability
     low, high = (_shortest(np.array([at(run) for run in runs]), weights, asked) for at in (min, max))
     longest = max((len(run) for run, w in zip(runs, weights) if w > (1.0 - asked) * weights.sum()), default=1)
-    along = sorted(_position(p) for p in by_name.values() if p.may_change and p.group == _group(alike[0], by_name))
+    group = _group(alike[0], by_name)
+    positions = [p.position for p in by_name.values() if p.may_change and p.group == group and p.position is not None]
     goes_on = longest >= CALIBRATION.max_stretch
-    is_first_open, is_last_open = goes_on or low[0] <= along[0], goes_on or high[1] >= along[-1]
+    is_first_open, is_last_open = goes_on or low[0] <= min(positions), goes_on or high[1] >= max(positions)
     return StretchEnds((None if is_first_open else low[0], low[1]), (high[0], None if is_last_open else high[1]))
 
 
@@ -73,10 +74,6 @@ def changes_alike(
 
 def _group(evidence: OnsetEvidence, by_name: Mapping[str, StateParameter]) -> str:
     return by_name[next(iter(evidence.effect.direction))].group
-
-
-def _position(parameter: StateParameter) -> float:
-    return -np.inf if parameter.position is None else parameter.position
 
 
 def _run(evidence: OnsetEvidence, by_name: Mapping[str, StateParameter]) -> list[float]:
