@@ -86,7 +86,11 @@ def _from_text(values: Sequence[str | None], is_valid: np.ndarray | None) -> pa.
 
 def _validity(is_valid: np.ndarray | None) -> pa.Buffer | None:
     """Bits of an array, 0 for NULL."""
-    return None if is_valid is None else pa.py_buffer(np.packbits(is_valid, bitorder="little").tobytes())
+    return None if is_valid is None else _bits(is_valid)
+
+
+def _bits(flags: np.ndarray) -> pa.Buffer:
+    return pa.py_buffer(np.packbits(flags, bitorder="little").tobytes())
 
 
 def _are_exact(values: Sequence, kinds: set[type]) -> bool:
@@ -94,7 +98,7 @@ def _are_exact(values: Sequence, kinds: set[type]) -> bool:
 
 
 def from_numpy(data: np.ndarray, is_valid: np.ndarray | None = None) -> pa.Array:
-    """Array of numbers, or of times in microseconds.
+    """Array of numbers, of truth values, or of times in microseconds.
 
     Parameters
     ----------
@@ -107,6 +111,17 @@ def from_numpy(data: np.ndarray, is_valid: np.ndarray | None = None) -> pa.Array
     -------
     Array
         The array.
+
+    Examples
+    --------
+    Arrow stores eight truth values in a byte.
+
+    >>> from_numpy(np.array([True, True, False])).to_pylist()
+    [True, True, False]
     """
     type_ = pa.timestamp("us") if data.dtype.kind == "M" else pa.from_numpy_dtype(data.dtype)
-    return pa.Array.from_buffers(type_, len(data), [_validity(is_valid), pa.py_buffer(np.ascontiguousarray(data))])
+    if data.dtype.kind == "b":
+        buffer = _bits(data)
+    else:
+        buffer = pa.py_buffer(np.ascontiguousarray(data))
+    return pa.Array.from_buffers(type_, len(data), [_validity(is_valid), buffer])

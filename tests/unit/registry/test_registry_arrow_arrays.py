@@ -59,6 +59,16 @@ def test_lists_of_numbers_and_missing_ones():
     assert to_arrow(column("models", "a_matrix"), [])[0].to_pylist() == []
 
 
+@pytest.mark.parametrize("name", ["passed", "coherence"])
+def test_lists_of_every_type_are_read_back_as_written(name):
+    """Arrow packs eight truth values into a byte: bytes taken as bits would leave one of eight lines passed."""
+    rng = np.random.default_rng(4)
+    values = [rng.random(n) > 0.3 if name == "passed" else rng.random(n).astype(np.float32) for n in (19, 1, 0, 64)]
+    array, wrong = to_arrow(column("receptances", name), [*values, None])
+    array.validate(full=True)
+    assert wrong == [] and array.to_pylist() == [*(v.tolist() for v in values), None]
+
+
 def test_registration_of_results_imports_no_pandas(tmp_path):
     code = (
         "import sys; from pathlib import Path; from turnout.registry.job import register\n"
