@@ -11,6 +11,8 @@ from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.diagnose import diagnose
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
+from turnout.mismatch.turnout import case as track_case
+from turnout.mismatch.turnout.accepted_effects import NO_EFFECTS
 from turnout.mismatch.turnout.planned_case import small_plan
 from turnout.mismatch.turnout.rail_roughness import Waves
 from turnout.mismatch.turnout.running_surface import RunningSurface
@@ -48,6 +50,19 @@ class Nose(Case):
             return ()
         more = {"nuisances": {"depth": 1.0}, "masking_parameter": "depth"}
         return (Candidate.of("dip", DEPTH, lambda p: p["depth"], ((2.0,),), {"place": 3.0}, **more),)
+
+
+def test_a_worn_nose_is_no_candidate_of_a_library_without_dips(monkeypatch):
+    dip = Candidate.of("surface_dip", DEPTH, dict, ((2.0,),), {"place": 3.0})
+    monkeypatch.setattr(track_case, "worn_noses", lambda surface, estimates, fit: [dip])
+    surface = SimpleNamespace(parameters=("depth",), estimate=lambda case, fit: ())
+    case = SimpleNamespace(
+        predictor=SimpleNamespace(site=SimpleNamespace(surface=surface)), fitted_passages=lambda: ["passage"],
+        accepted=NO_EFFECTS,
+    )  # fmt: skip
+    for families, expected in ((None, (dip,)), ({"surface_dip"}, (dip,)), ({"local_pad"}, ())):
+        case.families = families
+        assert track_case.TrackCase.tolerated_effects(case, None) == expected
 
 
 @pytest.mark.parametrize(("depth", "answer"), [(1.0, "none"), (1.8, "none"), (4.0, "named")])

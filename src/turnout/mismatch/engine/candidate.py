@@ -6,8 +6,8 @@ A ``Candidate`` consists of four records. ``Effect``: what the effect is. ``Effe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -56,6 +56,24 @@ class Effect:
     limit_form: str = ""
     simpler_form: tuple[str, int] | tuple[()] = ()
     unbounded_form: str = ""
+
+    def within(self, families: Collection[str]) -> Effect:
+        """The effect in a library of some families alone: what is not in it is no form of the effect.
+
+        Parameters
+        ----------
+        families : collection of str
+
+        Returns
+        -------
+        Effect
+        """
+        return replace(
+            self,
+            limit_form=self.limit_form if self.limit_form in families else "",
+            simpler_form=self.simpler_form if self.simpler_form and self.simpler_form[0] in families else (),
+            unbounded_form=self.unbounded_form if self.unbounded_form in families else "",
+        )
 
 
 @dataclass(frozen=True)

@@ -281,7 +281,8 @@ class TrackCase(PredictedCase):
         surface = self.predictor.site.surface
         if not surface or not surface.parameters or not self.fitted_passages():
             return ()
-        return self.accepted.without(worn_noses(surface, surface.estimate(self, fit), fit))
+        noses = worn_noses(surface, surface.estimate(self, fit), fit)
+        return self.accepted.without(c for c in noses if self.families is None or c.family in self.families)
 
     def distant_starts(self, fit: Fit) -> list[tuple[Candidate, tuple[float, ...]]]:
         """Wheelsets of other masses, for trains whose residual exceeds the control level.

@@ -51,7 +51,10 @@ def list_candidates(data: CaseData, families: Collection[str] | None = None) -> 
         By site, and at each site in the order of ``physics.TERMS``.
     """
     effects = [effect for effect in physics.TERMS if families is None or effect.name in families]
-    return tuple(candidate for site in sites_of(data) for candidate in _candidates_at(site, effects))
+    candidates = (candidate for site in sites_of(data) for candidate in _candidates_at(site, effects))
+    if families is None:
+        return tuple(candidates)
+    return tuple(replace(candidate, effect=candidate.effect.within(families)) for candidate in candidates)
 
 
 def _candidates_at(site: Site, effects: Iterable[type[physics.PhysicsTerm]]) -> Iterator[Candidate]:
