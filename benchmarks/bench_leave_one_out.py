@@ -3,7 +3,7 @@
 The answer must be "unknown" at its position, or a declared relative there (``left_out_library``). Another name is
 wrong. There are two questions. "change": the calibrated model says what has changed, after two visits. "visit": the
 recordings of one visit are compared with the owner's file. Sites are those of the generator of the blind proof, with an
-effect from the upper half of its ladder: the first rung from there on at which it is clear.
+effect from the upper half of its ladder, which must be clear.
 
 TURNOUT_LEFT_OUT_QUESTIONS chooses questions ("change,visit"), TURNOUT_LEFT_OUT_EFFECTS effects of the library (all).
 TURNOUT_LEFT_OUT_SITES sets the sites of each effect (2), TURNOUT_LEFT_OUT_FIRST the number of the first one (0).
@@ -54,9 +54,9 @@ class Site:
     panel: str
 
     def rungs(self):
-        """Rungs of the ladder of the kind, from the upper half on."""
+        """Rungs of the ladder of the kind: the highest one, the next site one less, and from there on upwards."""
         n = len(kinds_of_effects()[self.kind].ladder)
-        return range(n // 2 + 1 + self.k % (n // 2), n) if n > 2 else range(n)
+        return range(n - 1 - self.k % max(1, n // 2), n)
 
 
 @dataclass(frozen=True)
