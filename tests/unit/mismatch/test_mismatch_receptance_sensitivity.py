@@ -8,8 +8,9 @@ import pytest
 
 from turnout import physics
 from turnout.mismatch.turnout import TrackCase, receptance_observation
+from turnout.mismatch.turnout.added_links import AddedLinks
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
-from turnout.mismatch.turnout.receptance_model import AddedLinks, changed_links
+from turnout.mismatch.turnout.receptance_changes import changed_links
 from turnout.mismatch.turnout.screening import _pair_channel_changes
 from turnout.simulate import uniform_track
 from turnout.simulate.turnout_track import TurnoutTrack

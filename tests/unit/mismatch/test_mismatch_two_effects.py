@@ -9,7 +9,7 @@ import pytest
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch import diagnose
 from turnout.mismatch.engine.candidate import Candidate, EffectSite, NamingRules
-from turnout.mismatch.engine.candidate_search import Entry, Projector, is_same_site, required_promise
+from turnout.mismatch.engine.candidate_search import Entry, is_same_site, required_promise
 from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.decision import grade_name, judge
 from turnout.mismatch.engine.diagnose import grade_names
@@ -18,6 +18,7 @@ from turnout.mismatch.engine.hammer_prescreen import informed_values
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation, Whitened
+from turnout.mismatch.engine.projector import Projector
 from turnout.mismatch.engine.residual_space import ResidualSpace
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.search import Search

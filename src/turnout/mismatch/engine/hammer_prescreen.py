@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.engine.candidate_search import Projector, scaled_start
+from turnout.mismatch.engine.candidate_search import scaled_start
 from turnout.mismatch.engine.map_fit import cost_after, fit_jointly
+from turnout.mismatch.engine.projector import Projector
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:

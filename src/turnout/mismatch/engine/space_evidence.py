@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from turnout.mismatch.engine.candidate_search import Projector
+from turnout.mismatch.engine.projector import Projector
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:

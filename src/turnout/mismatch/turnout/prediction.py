@@ -9,7 +9,7 @@ import numpy as np
 
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
-from turnout.mismatch.turnout import receptance_model, sensitivity
+from turnout.mismatch.turnout import receptance_changes, sensitivity
 from turnout.mismatch.turnout.lifting_chairs import LiftingChairs
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.passage_observation import AlignedPassage
@@ -121,7 +121,7 @@ class Predictor(ReceptancePredictor, PassagePredictor, Predictions):
         predictions: Sequence[np.ndarray],
     ) -> list[np.ndarray]:
         """Predictions a small step away: receptances follow without solving the track again."""
-        return receptance_model.predict_near(self, values, terms, new, observations, predictions)
+        return receptance_changes.predict_near(self, values, terms, new, observations, predictions)
 
     def nuisance_jacobian(
         self,

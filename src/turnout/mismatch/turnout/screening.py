@@ -13,9 +13,10 @@ import numpy as np
 
 from turnout.mismatch.engine.observation import Whitened
 from turnout.mismatch.turnout import passage_band, receptance_observation
+from turnout.mismatch.turnout.added_links import AddedLinks
 from turnout.mismatch.turnout.priors import PASSAGE
 from turnout.mismatch.turnout.pseudo_forces import PAD, RAIL, SLEEPER, force_responses, support_motion
-from turnout.mismatch.turnout.receptance_model import AddedLinks, tangent_links
+from turnout.mismatch.turnout.receptance_model import tangent_links
 from turnout.mismatch.turnout.wave_response import WaveTransfer
 from turnout.physics.hypothesis import SupportMotion
 from turnout.physics.term import PhysicsTerm

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout import physics
-from turnout.mismatch.engine.candidate_search import Projector
+from turnout.mismatch.engine.projector import Projector
 from turnout.mismatch.turnout.candidates.catalogue import candidate_of, parameters_with
 from turnout.mismatch.turnout.candidates.out_of_roundness import polygon_candidates, short_polygon_candidates
 from turnout.mismatch.turnout.candidates.short_corrugation import short_corrugation_candidates
