@@ -41,6 +41,7 @@ from turnout.stages.stored_visits import (
     StoredVisit,
     parameters_of,
     read_visits,
+    remove_other_visits,
     store_visit,
     version_of,
     visits_of,
@@ -138,7 +139,9 @@ def _diagnose(
     with_trains: Sequence[StoredVisit] = ()
     if set(answer.names) == set(SOFT_BALLAST_OR_GAP):
         ends = _first_and_newest_with_trains(since_renewal(turnout, visits(recorded_here)))
-        with_trains, more_notes = _fitted_visits(TRAINS_FOLDER / unit.label, labels, ends, *about, passage_tables)
+        folder = TRAINS_FOLDER / unit.label
+        with_trains, more_notes = _fitted_visits(folder, labels, ends, *about, passage_tables)
+        remove_other_visits(folder, turnout.id, ends)
         notes += more_notes
         answer, _ = change_of(stored, turnout, least, changes, with_trains)
     test = None

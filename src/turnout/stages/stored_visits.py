@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, MutableMapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, MutableMapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -166,6 +166,23 @@ def _damper_key(spring: StateParameter) -> str:
 def _path(folder: Path, turnout_id: str, visit: str, labels: Sequence[str]) -> Path:
     digest = hashlib.sha256("+".join(labels).encode()).hexdigest()[:12]
     return folder / turnout_id / f"{visit}-{digest}{SUFFIX}"
+
+
+def remove_other_visits(folder: Path, turnout_id: str, visits: Collection[str]) -> None:
+    """Remove the files of all visits of a turnout but these, so that a folder does not grow with each night.
+
+    Parameters
+    ----------
+    folder : Path
+        As ``folder_of``.
+    turnout_id : str
+    visits : collection of str
+        Visits whose files stay.
+    """
+    for path in (folder / turnout_id).glob(f"*{SUFFIX}"):
+        visit, _, _ = path.name.rpartition("-")
+        if visit not in visits:
+            path.unlink(missing_ok=True)
 
 
 def read_visits(folder: Path, turnout_id: str, versions: Mapping[str, Mapping[str, str]]) -> list[StoredVisit]:
