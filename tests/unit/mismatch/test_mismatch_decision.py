@@ -58,6 +58,7 @@ CASES = {
     "excess_without_candidate": ([score(gain=11.0)], 1.1, {}),
     "sensors_shake_without_wheel": ([], 0.9, {"disturbed": True, "mismatched_trains": ("ic3",)}),
     "train_unlike_its_file": ([], 0.9, {"mismatched_trains": ("ic3",)}),
+    "no_tolerance_explains_it": ([], 0.9, {"strained": "mass of the rail"}),
     "no_candidate_passes": ([], 0.9, {}),
     "weak_and_contradicted": ([score(gain=23.0)], 0.9, {"consistent": False}),
     "reserved_not_predicted": ([score(gain=25.0)], 0.9, {"consistent": False}),

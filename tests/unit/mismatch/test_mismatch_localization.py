@@ -82,6 +82,18 @@ def test_a_force_is_told_from_a_channel(mix, frame, level):
     assert found.sensor == (level if frame == "sensor" else None)
 
 
+@pytest.mark.parametrize("position", [0, 1, 2])
+def test_an_absorbed_cause_is_located_where_a_fit_leaves_less_than_intact_recordings(position):
+    """The whole residual is 0.3 of the control level: were that level the noise, no place would have any evidence."""
+    rng = np.random.default_rng(8)
+    rows = 0.3 * rng.normal(size=(3, 150)) + 0.7 * np.outer(Places.seen[position], rng.normal(size=150))
+    case = Places(rows)
+    fit = fit_jointly(case)
+    assert fit.level["passage"] < 0.5
+    assert all(w.nats == 0.0 for w in weigh_spaces(case, fit, {"passage": 1.0}))
+    assert locate(case, fit) is None and locate(case, fit, absorbed=True).place == position
+
+
 class Support(Case):
     """Two recordings of six nuisances. In the first, an unknown cause acts along ``columns``, which the nuisances can
     imitate."""

@@ -61,6 +61,8 @@ EFFECT_RULES: tuple[Rule[EffectEvidence], ...] = (
          "all sensors vibrate while no wheel is near", LOCATED, cause="clock"),
     Rule("train_unlike_its_file", lambda e: e.shows_nothing and e.mismatched_trains, "unknown",
          "most passages of {e.train_names} do not fit its vehicle file", LOCATED, cause="train"),
+    Rule("no_tolerance_explains_it", lambda e: e.shows_nothing and e.strained, "unknown",
+         "the recordings are explained only by a value that its file cannot have: {e.strained}", LOCATED),
     Rule("no_candidate_passes", lambda e: not e.has_leader, "none", "nothing above the thresholds", HOW),
     Rule("weak_and_contradicted", lambda e: e.shows_nothing, "none",
          "nothing above the thresholds but {e.leader.family}, which does not hold elsewhere", ENDS),

@@ -80,6 +80,8 @@ class EffectEvidence:
         Another source than a train shakes the sensors in some recordings. These are not among those fitted.
     mismatched_trains : tuple of str
         Trains, most recordings of which are not among those fitted, since they do not agree with the vehicle file.
+    strained : str
+        Value of the base model that no tolerance explains, in words; "" if there is none.
     """
 
     scores: Sequence[Score]
@@ -90,6 +92,7 @@ class EffectEvidence:
     residual_excess: float = 1.0
     disturbed: bool = False
     mismatched_trains: tuple[str, ...] = ()
+    strained: str = ""
 
     @cached_property
     def passing(self) -> list[Score]:

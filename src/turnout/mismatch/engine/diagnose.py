@@ -23,6 +23,7 @@ from turnout.mismatch.engine.localization import Location, locate
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.refit import score_candidates
 from turnout.mismatch.engine.reserved_data import Verification, verify
+from turnout.mismatch.engine.reserved_error import error_of_fitted
 from turnout.mismatch.engine.residual_attribution import Attribution, attribute, cell_energies
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.search_limit import SearchLimitError
@@ -124,6 +125,8 @@ def diagnose(
         findings = Findings(search, base, base, (unfinished_verdict(error.limit, search.settings),))
     search, base, fit, verdicts = findings.search, findings.base, findings.fit, findings.verdicts
     verification = verify(search, base, fit, _best_rival(verdicts[0]))
+    if verification.error is not None:
+        verification = replace(verification, error_of_fitted=error_of_fitted(search.case, base, fit))
     verdicts = confirm(verdicts, verification, search.settings)
     location, latent = _locate_unknown(findings, verdicts[0]), latent_force_of(search.case, base)
     return Diagnosis(verdicts, base, fit, frames, verification, latent, findings.scores, location)
@@ -255,4 +258,5 @@ def _locate_unknown(findings: Findings, verdict: Verdict) -> Location | None:
         return None
     search = findings.search
     leader = next((s for s in verdict.scores[:1] if s.gain > search.settings.threshold), None)
-    return locate(search.case, findings.base, leader, verdict.cause)
+    absorbed = "no_tolerance_explains_it" in verdict.trail
+    return locate(search.case, findings.base, leader, verdict.cause, absorbed)

@@ -5,7 +5,7 @@ candidates.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from turnout.mismatch.engine.decision_facts import is_contradicted, likeliest
 from turnout.mismatch.engine.latent_force import LatentForce, latent_law
 from turnout.mismatch.engine.reserved_data import is_significantly_worse, lost_evidence, reserved_fit
 from turnout.mismatch.engine.score import Score
+from turnout.mismatch.engine.strained_values import strained_value
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -245,7 +246,9 @@ def assess(search: Search, fit: Fit, scores: Sequence[Score]) -> tuple[Verdict, 
     """
     case, settings = search.case, search.settings
     excess = worst_excess(search, fit)
-    facts = {"disturbed": bool(case.disturbed_recordings), "mismatched_trains": case.mismatched_trains}
+    strained = "" if fit.candidates else strained_value(case, fit, settings.threshold)
+    facts: dict[str, Any] = {"disturbed": bool(case.disturbed_recordings), "strained": strained}
+    facts["mismatched_trains"] = case.mismatched_trains
     scores = tuple(s for s in scores if s.is_reportable)
     if not scores:
         return judge([], excess, settings, **facts), None

@@ -63,7 +63,9 @@ class Location:
         )
 
 
-def locate(case: Case, fit: Fit, leader: Score | None = None, cause: str = "") -> Location | None:
+def locate(
+    case: Case, fit: Fit, leader: Score | None = None, cause: str = "", absorbed: bool = False
+) -> Location | None:
     """Location of the residual of a fit.
 
     Parameters
@@ -75,18 +77,23 @@ def locate(case: Case, fit: Fit, leader: Score | None = None, cause: str = "") -
         The best candidate that got no name.
     cause : str
         "clock" or "train" if recordings that were not fitted are the cause of the verdict: they give the location then.
+    absorbed : bool
+        A value of the base model has absorbed the cause, and the residual may be that of intact recordings. Its own
+        level is then the least noise, where it is below theirs.
 
     Returns
     -------
     Location or None
-        None if the case has no residual spaces, or none of them exceeds the level of intact recordings.
+        None if the case has no residual spaces, or none of them exceeds the least noise.
     """
     if cause == "clock":
         names = ", ".join(d.name for d in case.disturbed_recordings)
         return Location("clock", names, max(d.excess for d in case.disturbed_recordings))
     if cause == "train":
         return Location("train", case.mismatched_trains[0], 0.0, train=case.mismatched_trains[0])
-    floor = {o.data_type: case.control_level.get(o.data_type, 1.0) for o in case.observations}
+    floor = {name: case.control_level.get(name, 1.0) for name in fit.level}
+    if absorbed:  # what intact recordings leave elsewhere is no noise here: the whole fit leaves less
+        floor = {name: min(level, fit.level[name]) for name, level in floor.items()}
     witnesses = sorted(_credible_evidence(case, weigh_spaces(case, fit, floor)), key=lambda w: -w.nats)
     if (
         leader is not None

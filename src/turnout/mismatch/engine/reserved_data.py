@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -186,13 +186,37 @@ def predict_reserved(case: Case, fit: Fit, observations: Sequence[Observation]) 
     SimulationError
         If the model cannot be simulated there.
     """
+    return fit_reserved(case, fit, observations)[1]
+
+
+def fit_reserved(case: Case, fit: Fit, observations: Sequence[Observation]) -> tuple[Fit, list[np.ndarray]]:
+    """The fit with the nuisances that reserved observations own fitted to them, and its predictions.
+
+    Parameters
+    ----------
+    case : Case
+    fit : Fit
+    observations : sequence of Observation
+        Reserved ones.
+
+    Returns
+    -------
+    fit : Fit
+        With these values alone changed.
+    predictions : list of (n,) array of float
+
+    Raises
+    ------
+    SimulationError
+        If the model cannot be simulated there.
+    """
     joint = JointProblem(case, fit.candidates, observations)
     theta = np.concatenate([[fit.values[n.name] for n in case.nuisances], fit.psi])
     owners = {o.name for o in observations}
     is_owned = np.array([n.owner in owners for n in case.nuisances] + [False] * fit.psi.size, dtype=bool)
     predictions = joint.predict(theta)
     if not is_owned.any():
-        return predictions
+        return fit, predictions
     residuals = joint.residuals(predictions)
     cost = joint.cost(theta, residuals)
     for _ in range(THRESHOLDS.max_reserved_steps):
@@ -205,7 +229,7 @@ def predict_reserved(case: Case, fit: Fit, observations: Sequence[Observation]) 
         theta, predictions, residuals, cost = improvement
         if gain < THRESHOLDS.min_cost_decrease:
             break
-    return predictions
+    return replace(fit, values=joint.split(theta)[0]), predictions
 
 
 def _owned_step(
@@ -305,7 +329,8 @@ class Verification:
     """Fit [%] of ``n`` reserved recordings: ``before``, ``after`` with the named term, with ``rival`` and with
     ``decoy``.
 
-    ``error`` is the standard error of ``after`` less ``before``. ``reserved_excess`` is the weighted mean square
+    ``error`` is the standard error of ``after`` less ``before`` with the two models as they are, ``error_of_fitted`` that
+    which comes from the fitted recordings (``reserved_error``). ``reserved_excess`` is the weighted mean square
     without a term over the control level. ``lost_evidence`` is the fall of the logarithm of the likelihood of these
     recordings [nats], below 0 where the named model predicts them better.
     """
@@ -318,6 +343,12 @@ class Verification:
     error: float | None = None
     reserved_excess: float = 0.0
     lost_evidence: float = 0.0
+    error_of_fitted: float = 0.0
+
+    @property
+    def total_error(self) -> float | None:
+        """Standard error of ``after`` less ``before`` among other recordings, fitted and reserved. [points of fit]"""
+        return None if self.error is None else float(np.hypot(self.error, self.error_of_fitted))
 
     @property
     def is_worse(self) -> bool:

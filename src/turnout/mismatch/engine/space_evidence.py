@@ -93,7 +93,7 @@ def weigh_spaces(case: Case, fit: Fit, floor: Mapping[str, float]) -> list[Space
     fit : Fit
         With its Jacobian.
     floor : mapping
-        Data type -> mean square of intact recordings.
+        Data type -> least mean square of the noise.
 
     Returns
     -------

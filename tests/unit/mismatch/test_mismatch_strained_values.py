@@ -1,0 +1,86 @@
+"""A model that absorbs what it lacks by a value no tolerance allows for is not intact."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from turnout.config.settings.mismatch import MismatchSettings
+from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.engine.case import Case
+from turnout.mismatch.engine.diagnose import diagnose
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.engine.observation import Observation
+from turnout.mismatch.engine.strained_values import strained_value
+from turnout.physics import Parameter
+
+TIME = np.linspace(0.0, 1.0, 400)
+TOLERANCE, THRESHOLD = 0.1, MismatchSettings().threshold
+SIZE = (Parameter("size", "-", 0.0, (-1.0, 1.0), "of a shape", "made up 2026"),)
+
+
+class Beam(Case):
+    """A response that the logarithm of a stiffness scales. One candidate has another shape and explains nothing."""
+
+    def __init__(self, shift, bound=6.0, **more):
+        stiffness = Nuisance("bending", "-", 0.0, TOLERANCE, None, (-bound * TOLERANCE, bound * TOLERANCE), "ln bending")
+        self.nuisances = (replace(stiffness, **more), Nuisance("mass", "-", 0.0, 0.1, meaning="ln mass"))
+        self.candidates = (Candidate.of("bump", SIZE, dict, ((0.1,),), {"place": 3.0}),)
+        rng = np.random.default_rng(3)
+        self.observations = tuple(
+            Observation(f"o{k}", f"day {k}", self.response(shift, 0.0) + 0.1 * rng.normal(size=TIME.size), 0.1)
+            for k in range(3)
+        )
+
+    @staticmethod
+    def response(bending, mass):
+        return np.exp(bending) * np.sin(20.0 * TIME) + mass * np.cos(31.0 * TIME)
+
+    def predict(self, values, terms, observations):
+        bump = sum(t["size"] for t in terms) * np.cos(57.0 * TIME)
+        return [self.response(values["bending"], values["mass"]) + bump for _ in observations]
+
+
+def strained(case):
+    return strained_value(case, fit_jointly(case, iterations=40), THRESHOLD)
+
+
+@pytest.mark.parametrize("sds", [5.7, -5.7])
+def test_a_value_that_has_paid_more_than_a_name_costs_is_strained(sds):
+    """5.7 standard deviations cost 16.2 nats, of which the choice among two takes 0.7."""
+    assert "bending" in strained(Beam(sds * TOLERANCE)) and "5." in strained(Beam(sds * TOLERANCE))
+
+
+@pytest.mark.parametrize("sds", [0.0, 3.0, -4.8])
+def test_a_value_within_what_chance_and_files_allow_is_not(sds):
+    """4.8 standard deviations cost 11.5 nats: less than a name."""
+    assert strained(Beam(sds * TOLERANCE)) == ""
+
+
+def test_the_number_of_values_among_which_the_farthest_was_chosen_counts():
+    """5.2 standard deviations cost 13.5 nats; the largest of a hundred values needs 4.6 more than a name."""
+    case = Beam(5.2 * TOLERANCE)
+    assert strained(case)
+    case.nuisances += tuple(Nuisance(f"v{k}", "-", 0.0, 1.0) for k in range(98))
+    assert strained(case) == ""
+
+
+@pytest.mark.parametrize("more", [{"owner": "o0"}, {"index": 4}, {"can_mask": False}])
+def test_values_of_one_recording_one_of_many_and_of_a_surface_do_not_count(more):
+    assert strained(Beam(0.57, **more)) == ""
+
+
+def test_a_value_that_an_effect_describes_is_judged_as_that_effect():
+    case = Beam(0.57)
+    site = replace(case.candidates[0].site, masking_parameter="bending")
+    case.candidates = (replace(case.candidates[0], site=site),)
+    assert strained(case) == ""
+
+
+def test_the_answer_is_unknown_and_says_why_though_the_residual_is_that_of_intact_recordings():
+    """Before, such a model was called as good as an intact one: its residual is noise."""
+    strained_case, intact = (diagnose(Beam(sds * TOLERANCE)) for sds in (5.7, 0.5))
+    assert max(strained_case.base.level.values()) < 1.2
+    assert strained_case.verdict.answer == "unknown" and "bending" in strained_case.verdict.reason
+    assert intact.verdict.answer == "none"
