@@ -43,9 +43,7 @@ class Waves(Case):
 
     def predict(self, values, terms, observations):
         size, waves = sum(t["size"] for t in terms), np.array([values[f"w{k}"] for k in range(N_VALUES)])
-        return [
-            self.response(int(o.name[1:]), waves, size, values.get(f"delay@{o.name}", 0.0)) for o in observations
-        ]
+        return [self.response(int(o.name[1:]), waves, size, values.get(f"delay@{o.name}", 0.0)) for o in observations]
 
 
 def gain_with_errors(case):

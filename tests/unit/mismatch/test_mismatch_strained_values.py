@@ -24,7 +24,9 @@ class Beam(Case):
     """A response that the logarithm of a stiffness scales. One candidate has another shape and explains nothing."""
 
     def __init__(self, shift, bound=6.0, **more):
-        stiffness = Nuisance("bending", "-", 0.0, TOLERANCE, None, (-bound * TOLERANCE, bound * TOLERANCE), "ln bending")
+        stiffness = Nuisance(
+            "bending", "-", 0.0, TOLERANCE, None, (-bound * TOLERANCE, bound * TOLERANCE), "ln bending"
+        )
         self.nuisances = (replace(stiffness, **more), Nuisance("mass", "-", 0.0, 0.1, meaning="ln mass"))
         self.candidates = (Candidate.of("bump", SIZE, dict, ((0.1,),), {"place": 3.0}),)
         rng = np.random.default_rng(3)

@@ -329,10 +329,10 @@ class Verification:
     """Fit [%] of ``n`` reserved recordings: ``before``, ``after`` with the named term, with ``rival`` and with
     ``decoy``.
 
-    ``error`` is the standard error of ``after`` less ``before`` with the two models as they are, ``error_of_fitted`` that
-    which comes from the fitted recordings (``reserved_error``). ``reserved_excess`` is the weighted mean square
-    without a term over the control level. ``lost_evidence`` is the fall of the logarithm of the likelihood of these
-    recordings [nats], below 0 where the named model predicts them better.
+    ``error`` is the standard error of ``after`` less ``before`` with the two models as they are. ``error_of_fitted`` is
+    its other part, which comes from the fitted recordings (``reserved_error``). ``reserved_excess`` is the weighted
+    mean square without a term over the control level. ``lost_evidence`` is the fall of the logarithm of the likelihood
+    of these recordings [nats], below 0 where the named model predicts them better.
     """
 
     n: int

@@ -66,14 +66,14 @@ def _percents_without_one(case: Case, fit: Fit, steps: np.ndarray) -> np.ndarray
     percents = []
     for step in steps:
         step = np.where(np.isin(np.arange(step.size), own), 0.0, step)
-        moved = _moved(case, at_optimum, step)
-        shifted = case.predict(moved.values, moved.terms, case.reserved)
+        stepped = _fit_after_step(case, at_optimum, step)
+        shifted = case.predict(stepped.values, stepped.terms, case.reserved)
         after = [_with_own_refitted(*entry) for entry in zip(case.reserved, predictions, shifted, columns)]
         percents.append(fit_percent(case.reserved, after))
     return np.array(percents)
 
 
-def _moved(case: Case, fit: Fit, step: np.ndarray) -> Fit:
+def _fit_after_step(case: Case, fit: Fit, step: np.ndarray) -> Fit:
     """The fit with ``step`` added to its nuisances and effects, within their bounds."""
     n = len(case.nuisances)
     values = {
