@@ -126,6 +126,8 @@ class Struck(Days):
         ((0.5, -1.0, 7.0, 6.0, 1.0, 0.5, 1.5), 30.0, "all impacts at 4.2 m"),  # 15.5 are most of 30
         ((0.5, -1.0, 7.0, 6.0, 1.0, 0.5, 1.5), 32.0, ""),  # and not of 32: the rest is what nuisances pay
         ((0.5, -4.0, 7.0, 6.0, 1.0, 0.5, 1.5), 32.0, "all impacts at 4.2 m"),  # yet others speak against it by 0.5
+        ((0.5, -9.0, 14.0, 13.0, 1.0, 0.5, 12.1), 34.0, ""),  # a train alone is enough, whatever other impacts lose
+        ((0.5, -9.0, 14.0, 13.0, 1.0, 0.5, 11.9), 34.0, "all impacts at 4.2 m"),  # and here it is not
     ],
 )
 def test_blows_at_one_spot_are_one_witness(gains, gain, alone):

@@ -290,6 +290,8 @@ def single_witness(
     Impacts at one position are one witness, however often they are repeated. They share the fittings, the twist of the
     rail and the mark on it. No held-out condition shows the prior penalty that nuisances pay to imitate an effect. If
     that penalty is most of the ``gain``, and all other conditions support the name, no single position is the witness.
+    Passages share none of these faults: if they are enough for a name without any impact, they are a second witness.
+    What other impacts lose by the name is a question of its own (``is_contradicted``).
 
     Parameters
     ----------
@@ -321,7 +323,7 @@ def _single_hammer_position(
 ) -> str:
     """Position, in words, whose impacts alone support a name, or half of one, while all others do not.
 
-    "" if there is none.
+    "" if there is none, or if recordings without impacts support the name.
     """
     gains: dict[float, float] = {}
     for condition, condition_gain in by_condition.items():
@@ -331,6 +333,9 @@ def _single_hammer_position(
         return ""
     strongest = max(gains, key=lambda position: gains[position])
     other_gain = sum(by_condition.values()) - gains[strongest]
+    gain_without_impacts = sum(g for condition, g in by_condition.items() if condition not in hammer_positions)
+    if gain_without_impacts >= threshold:
+        return ""
     if other_gain > 0.0 and gains[strongest] + other_gain < THRESHOLDS.min_held_out_share * gain:
         return ""
     return (

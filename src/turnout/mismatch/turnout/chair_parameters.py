@@ -97,7 +97,7 @@ def chair_values(values: Values) -> tuple[float, ...]:
 
 
 def chair_gradients(sensitivity: ReceptanceSensitivity) -> dict[str, np.ndarray]:
-    """Derivatives of all receptances by the values of the chairs.
+    """Derivatives of all receptances by the values that all chairs have in common.
 
     Parameters
     ----------
@@ -109,7 +109,23 @@ def chair_gradients(sensitivity: ReceptanceSensitivity) -> dict[str, np.ndarray]
     dict
         Name -> (n_pair, n_line) array of complex [m/N]; {} without a blade.
     """
-    model, omega, gradients = sensitivity.model, 2.0 * np.pi * SHIFTED_LINES, {}
+    return {name: np.sum(columns, axis=1) for name, columns in chair_columns(sensitivity).items()}
+
+
+def chair_columns(sensitivity: ReceptanceSensitivity) -> dict[str, np.ndarray]:
+    """Derivatives of all receptances by the values of each chair.
+
+    Parameters
+    ----------
+    sensitivity : ReceptanceSensitivity
+        Receptances of all pairs on one track.
+
+    Returns
+    -------
+    dict
+        Name -> (n_pair, n_chair, n_line) array of complex [m/N]; {} without a blade.
+    """
+    model, omega, columns = sensitivity.model, 2.0 * np.pi * SHIFTED_LINES, {}
     if model.track.blade is None:
         return {}
     for name in CHAIR_PARAMETERS:
@@ -120,8 +136,8 @@ def chair_gradients(sensitivity: ReceptanceSensitivity) -> dict[str, np.ndarray]
             csr_array((np.concatenate(weights), np.concatenate(rows), first), shape)
         )
         k, c = np.array(changes).T[:, :, None]
-        gradients[name] = -np.sum((k + 1j * omega * c) * excited * measured, axis=1)
-    return gradients
+        columns[name] = -(k + 1j * omega * c) * excited * measured
+    return columns
 
 
 def _following(model: ReceptanceModel, name: str) -> list[tuple[np.ndarray, np.ndarray, tuple[float, float]]]:

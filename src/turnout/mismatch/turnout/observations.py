@@ -13,6 +13,7 @@ from turnout.errors import SimulationError
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout import passage_observation, receptance_observation
 from turnout.mismatch.turnout.campaign import CampaignInput, HammerInput, PassageInput
+from turnout.mismatch.turnout.chair_scatter import chair_errors, with_chair_errors
 from turnout.mismatch.turnout.disturbances import Disturbance, disturbances
 from turnout.mismatch.turnout.hammer_case import HammerCase
 from turnout.mismatch.turnout.lifting_chairs import lifting_chairs, with_lifting_error
@@ -266,13 +267,14 @@ def _fit_hammer_start(
 
 
 def _with_lifting_chairs(predictor: Predictor, tests: ObservedTests, values: Values) -> tuple[Predictor, ObservedTests]:
-    """Predictor and tests with chairs that open on the track of ``values``; the same ones without slide chairs."""
+    """Predictor and tests with chairs that open and differ, on the track of ``values``; the same without chairs."""
     zone, pairs = predictor.site.nominal, list(tests.frf_pairs.values())
     lifting = lifting_chairs(track_with(with_rail(zone, values).turnout.track_of("main"), zone, values), pairs)
     if lifting is None:
         return predictor, tests
+    errors = chair_errors(predictor, values, pairs)
     observations = [
-        (name, with_lifting_error(o, pair, lifting.change(pair, ())))
+        (name, with_chair_errors(with_lifting_error(o, pair, lifting.change(pair, ())), pair, errors[pair.name]))
         for (name, o), pair in zip(tests.observations, pairs)
     ]
     return predictor.with_lifting(lifting), replace(tests, observations=tuple(observations))

@@ -16,6 +16,7 @@ from turnout.mismatch.turnout import passage_band, passage_observation, receptan
 from turnout.mismatch.turnout.campaign import CampaignInput, HammerInput, PassageInput
 from turnout.mismatch.turnout.candidates.catalogue import list_candidates
 from turnout.mismatch.turnout.case import TrackCase
+from turnout.mismatch.turnout.chair_scatter import chair_errors, with_chair_errors
 from turnout.mismatch.turnout.observations import CaseData
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.passage_observation import AlignedPassage
@@ -98,7 +99,10 @@ def planned_data(plan: Plan, settings: MismatchSettings, solver: Track1D) -> tup
         h = h[: receptance_observation.LINES.size] + 1j * h[receptance_observation.LINES.size :]
         pairs[pair.name] = scaled = receptance_observation.with_magnitude(pair, np.abs(h))
         error = NOISE_SHARE * np.abs(h)
-        observations.append(receptance_observation.observation_of(scaled, h, error, settings.pair_tolerance))
+        observation = receptance_observation.observation_of(scaled, h, error, settings.pair_tolerance)
+        for errors in chair_errors(predictor, values, [scaled]).values():
+            observation = with_chair_errors(observation, scaled, errors)
+        observations.append(observation)
     for a in aligned.values():
         data = predictor.predict_passage(values, (), a).reshape(len(a.sensors), -1)
         noise = NOISE_SHARE * np.std(data, axis=1)
