@@ -1,6 +1,7 @@
 """Second effects: what a law that is exact leaves is another effect, what another law leaves may be its own shape."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,12 +10,16 @@ from turnout.mismatch import diagnose
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.candidate_search import is_same_site
 from turnout.mismatch.engine.case import Case
+from turnout.mismatch.engine.channel_levels import is_lone_excess, worst_channel_excess
 from turnout.mismatch.engine.cross_validation import signature_overlap, single_type_estimate
 from turnout.mismatch.engine.evidence import score_of
+from turnout.mismatch.engine.findings import Findings
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.search import Search
+from turnout.mismatch.engine.two_effects import add_second
+from turnout.mismatch.engine.verdict import Verdict
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.physics import Parameter
@@ -200,3 +205,50 @@ def test_it_is_the_blows_that_a_sensor_read_that_may_speak_against_its_gain(roll
     gains = [c for c in case.candidates if c.family == "sensor_gain"]
     assert any(c.naming.must_not_oppose for c in gains)
     assert all(case.frf_pairs[name].channel == c.where["sensor"] for c in gains for name in c.naming.must_not_oppose)
+
+
+class Passages(Case):
+    """Passages with white residuals of the given mean squares over sensors A and B; level 2."""
+
+    cell_level = {"passage": 2.0}
+
+    def __init__(self, *mean_squares):
+        self.observations = tuple(
+            Observation(
+                str(k), str(k), np.repeat(np.sqrt(row), 50), np.ones(100), data_type="passage",
+                cells=np.repeat([0, 1], 50), labels={"sensor": np.array(["A", "B"])}, rows=2,
+            )
+            for k, row in enumerate(mean_squares)
+        )  # fmt: skip
+
+    def predict(self, values, terms, observations):
+        return [np.zeros(100) for _ in observations]
+
+
+@pytest.mark.parametrize(
+    ("mean_squares", "is_lone"),
+    [
+        (((2.3, 0.3), (0.5, 0.4), (1.9, 0.2)), True),
+        (((1.9, 0.3), (0.5, 0.4), (1.9, 0.2)), False),  # nothing is above the level
+        (((2.3, 0.3), (2.1, 0.4), (0.5, 0.2), (0.5, 0.2)), False),  # A shows it in two passages: of track or sensor
+        (((2.3, 2.1), (0.5, 0.4), (0.5, 0.2)), False),  # both sensors show it in one: a wheel
+        (((2.3, 0.3), (0.5, 0.4)), False),  # one other passage is no witness
+    ],
+)
+def test_an_excess_of_one_channel_in_one_recording_belongs_to_the_recording(mean_squares, is_lone):
+    case = Passages(*mean_squares)
+    white = [o.data for o in case.observations]
+    assert is_lone_excess(case, SimpleNamespace(white=white)) is is_lone
+    assert worst_channel_excess(case, SimpleNamespace(white=white)) == pytest.approx(0.5 * np.max(mean_squares))
+
+
+def test_beside_a_name_such_an_excess_is_no_second_effect():
+    case = Passages((2.3, 0.3), (0.5, 0.4), (1.9, 0.2))
+    fit = SimpleNamespace(white=[o.data for o in case.observations], level={"passage": 0.3}, candidates=())
+    score = SimpleNamespace(family="wave", gain=60.0)
+    first, second = (
+        Verdict("named", ("wave",), "B", 0.97, {}, (score,)),
+        Verdict("unknown", (), reason="the residual is above the control level", trail=("excess_without_candidate",)),
+    )
+    found, stands = add_second(Findings(Search(case), fit, fit, (first,)), second, None)
+    assert not stands and found.verdicts[0].reason == "" and found.verdicts[0].trail[-1] == "excess_of_one_recording"

@@ -84,6 +84,8 @@ EFFECT_RULES: tuple[Rule[EffectEvidence], ...] = (
 )
 
 SECOND_RULES: tuple[Rule[SecondEvidence], ...] = (
+    Rule("excess_of_one_recording", lambda e: e.first.answer == "named" and e.is_excess_of_one_recording, "first",
+         "", PAIRS),
     Rule("unnamed_beside_name", lambda e: e.first.answer == "named" and e.second.answer == "unknown", "first",
          "a second effect without a name remains{e.location}: {e.second.reason}", PAIRS),
     Rule("second_is_no_single_effect", lambda e: not e.second.is_single_effect, "first", "", PAIRS),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from turnout.mismatch.engine.channel_levels import worst_channel_excess
 from turnout.mismatch.engine.cross_validation import held_out_score, single_type_estimate, weighted_mean_square
 from turnout.mismatch.engine.decision import judge
 from turnout.mismatch.engine.decision_facts import is_contradicted, likeliest
@@ -199,32 +200,6 @@ def is_at_control_level(case: Case, fit: Fit, data_type: str) -> bool:
     """
     level = fit.level.get(data_type, 0.0)
     return level <= case.control_level.get(data_type, np.inf) and worst_channel_excess(case, fit) <= 1.0
-
-
-def worst_channel_excess(case: Case, fit: Fit) -> float:
-    """Largest mean square of one channel in one recording over that of controls.
-
-    Parameters
-    ----------
-    case : Case
-    fit : Fit
-
-    Returns
-    -------
-    float
-        0 if no data type has such a control level.
-    """
-    ratios = [0.0]
-    for o, white in zip(case.observations, fit.white):
-        if o.data_type not in case.cell_level or o.cells is None or "sensor" not in o.labels:
-            continue
-        inside = o.cells >= 0
-        level, code = np.unique(o.labels["sensor"].astype(str), return_inverse=True)
-        channel = code[o.cells[inside]]
-        count = np.maximum(np.bincount(channel, minlength=level.size), 1)
-        square = np.bincount(channel, np.asarray(white)[inside] ** 2, minlength=level.size)
-        ratios.append(float(np.max(square / count)) / case.cell_level[o.data_type])
-    return max(ratios)
 
 
 def assess(search: Search, fit: Fit, scores: Sequence[Score]) -> tuple[Verdict, Score | None]:

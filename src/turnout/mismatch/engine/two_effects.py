@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.errors import SimulationError
+from turnout.mismatch.engine.channel_levels import is_lone_excess
 from turnout.mismatch.engine.cross_validation import held_out_score, signature_overlap
 from turnout.mismatch.engine.decision import PAIR_RULES, SECOND_RULES, judge
 from turnout.mismatch.engine.evidence import (
@@ -91,6 +92,14 @@ class SecondEvidence:
             return 0.0
         overlap = signature_overlap(self.search.case, second.fit, first.candidate, second.candidate)
         return THRESHOLDS.shape_error_share * first.gain * overlap
+
+    @cached_property
+    def is_excess_of_one_recording(self) -> bool:
+        """Whether nothing but an excess in one channel of one recording speaks for a second effect."""
+        fit = self.findings.fit
+        if self.second.trail[-1:] != ("excess_without_candidate",) or excess_ratio(self.search, fit) > 1.0:
+            return False
+        return is_lone_excess(self.search.case, fit)
 
     @cached_property
     def split_first(self) -> Verdict:
