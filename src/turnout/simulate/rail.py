@@ -134,13 +134,13 @@ def shape_functions(s: float | np.ndarray, length: float | np.ndarray, shear_rat
     >>> shape_functions(0.25, 0.6, 0.0).round(4)
     array([ 0.8438,  0.0844,  0.1562, -0.0281])
     """
-    s, h, p = np.broadcast_arrays(np.asarray(s, dtype=float), length, shear_ratio)
-    n = np.empty((*s.shape, 4))
+    h, p = length, shear_ratio
+    n = np.empty((*np.broadcast(s, h, p).shape, 4))  # one position at a time is frequent: arrays of one number are slow
     n[..., 0] = 1.0 - 3.0 * s**2 + 2.0 * s**3 + p * (1.0 - s)
     n[..., 1] = h * (s - 2.0 * s**2 + s**3 + p * (s - s**2) / 2.0)
     n[..., 2] = 3.0 * s**2 - 2.0 * s**3 + p * s
     n[..., 3] = h * (-(s**2) + s**3 - p * (s - s**2) / 2.0)
-    return n / (1.0 + p)[..., None]
+    return n / np.expand_dims(1.0 + p, -1)
 
 
 def rotation_functions(

@@ -48,3 +48,17 @@ def test_a_step_that_promises_more_is_tried_with_rising_damping():
     least = 0.2
     promises = [0.25 * (1.0 + 2.0 * d) / (1.0 + d) ** 2 for d in (0.0, *(0.01 * 6.0**k for k in range(7)))]
     assert trials(50.0, least) == 1 + sum(p >= least for p in promises) == 5
+
+
+@pytest.mark.parametrize(("residual", "n_solved"), [(0.5, 1), (9.0, 5)])
+def test_the_scale_of_the_noise_is_sought_until_it_stays(monkeypatch, residual, n_solved):
+    """It is 1 for a residual within its error. Beyond, the prior lets each of five steps leave another scale."""
+    case = Wall(0.5)
+    case.nuisances = (Nuisance("x", "-", 0.0, 1.0),)
+    case.observations = (Observation("a", "a", np.array([residual]), 1.0),)
+    solved, solve = [], np.linalg.solve
+    monkeypatch.setattr(np.linalg, "solve", lambda a, b: solved.append(float(a[0, 0])) or solve(a, b))
+    steps = DampedSteps(JointProblem(case), np.zeros(1), [np.array([residual])], [np.array([[1.0]])])
+    assert len(solved) == n_solved
+    scale = 1.0 / (solved[-1] - 1.0)
+    assert steps.promise == pytest.approx((residual / scale) ** 2 / (1.0 + 1.0 / scale))

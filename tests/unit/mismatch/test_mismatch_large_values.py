@@ -10,6 +10,7 @@ from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.search import Search
+from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 N, PRIOR, NOISE, WIDE = 7, 0.1, 0.1, 5.0
 MIXING = np.tile([[0.75 ** abs(i - j) for j in range(N)] for i in range(9)], (6, 1))  # six recordings of nine sensors
@@ -73,6 +74,29 @@ def test_one_spring_with_a_fifth_or_five_times_its_stiffness_is_found_with_its_s
     others = [abs(fit.values[n]) for j, n in enumerate(NAMES) if j != where]
     sd = np.sqrt(fit.covariance[where, where])
     assert fit.values[f"k{where}"] == pytest.approx(size, abs=4.0 * sd + 0.1 * (size > 0.0)) and max(others) < PRIOR
+
+
+@pytest.mark.parametrize(("power", "size"), [(1.0, -1.6), (-2.0, 1.6), (3.0, -1.6)])
+def test_a_start_seeks_a_lower_cost_than_the_starts_before_it(monkeypatch, power, size):
+    """With the other powers one or two of the starts end in valleys of ten times the cost, in the last case the first.
+
+    The answer is the best of the starts run by themselves.
+    """
+    search, base = base_of(Springs([0.0, size, 0.0, 0.0, 0.0, 0.0, 0.0], power))
+    runs, fit_of_search = [], Search.fit
+
+    def recorded(self, candidates, psi, values, *args, sought_cost=np.inf, **options):
+        fit = fit_of_search(self, candidates, psi, values, *args, sought_cost=sought_cost, **options)
+        runs.append((self, values, sought_cost, fit.cost))
+        return fit
+
+    monkeypatch.setattr(Search, "fit", recorded)
+    best = fit_large_values(search, base, NAMES, WIDE)
+    (wide, *_), starts = runs[0], runs[: 1 + len(THRESHOLDS.large_start_sds)]
+    costs = [cost for *_, cost in starts]
+    assert [sought for *_, sought, _ in starts] == [min(costs[:k], default=np.inf) for k in range(len(starts))]
+    alone = min(fit_of_search(wide, (), np.zeros(0), values).cost for _, values, *_ in starts)
+    assert best.cost == pytest.approx(alone, abs=0.01)
 
 
 def test_two_large_values_are_found_one_after_the_other():

@@ -160,7 +160,8 @@ def _fit_with(search: Search, fit: Fit, large: tuple[str, ...], widening: float,
     """Fit with wide priors of these values: the best of several starts.
 
     One is on the way to the maximum of the linear model. In the others the last value is large, and the rest is where
-    fits of the case start: the fit without it has moved them to hide it, and may be in another valley.
+    fits of the case start: the fit without it has moved them to hide it, and may be in another valley. These end where
+    their steps do not lead below the best one so far.
     """
     wide = replace(search, case=with_wide_priors(search.case, _with_partners(large, partners), widening))
     solution = dict(zip((n.name for n in wide.case.nuisances), np.linalg.solve(*_posterior(wide.case, fit))))
@@ -180,10 +181,11 @@ def _fit_with(search: Search, fit: Fit, large: tuple[str, ...], widening: float,
     for sds in THRESHOLDS.large_start_sds:
         size = np.copysign(sds * value.sd, solution[value.name] - value.mean)
         starts.append({**kept, value.name: float(np.clip(value.mean + size, *value.bounds))})
-    fits = []
+    fits: list[Fit] = []
     for at in starts:
+        sought_cost = min((f.cost for f in fits), default=np.inf)
         try:
-            fits.append(wide.fit((), np.zeros(0), at))
+            fits.append(wide.fit((), np.zeros(0), at, sought_cost=sought_cost))
         except SimulationError:
             continue
     if not fits:

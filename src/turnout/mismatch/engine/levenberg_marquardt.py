@@ -46,8 +46,11 @@ class DampedSteps:
             sums[o.data_type] = tuple(a + b for a, b in zip(old, new))
         self.sums, self.pull = sums, (joint.mean - theta) / joint.sd
         squares = {data_type: p[2] for data_type, p in sums.items()}
+        scale: dict[str, float] = {}
         for _ in range(THRESHOLDS.n_scale_iterations):
-            scale = {data_type: max(1.0, squares[data_type] / sums[data_type][3]) for data_type in sums}
+            before, scale = scale, {k: max(1.0, squares[k] / p[3]) for k, p in sums.items()}
+            if scale == before:  # 1, where the residuals are within their errors
+                break
             self.normal = np.eye(theta.size) + sum(p[0] / scale[k] for k, p in sums.items())
             self.right = self.pull + sum(p[1] / scale[k] for k, p in sums.items())
             step = np.linalg.solve(self.normal, self.right)
