@@ -154,7 +154,7 @@ def test_a_kept_fit_is_not_computed_again():
     case.predict = lambda *a: (calls.append(1), predict(*a))[1]
     again = diagnose(case, MismatchSettings(), store=store)
     assert again.verdict == first.verdict or again.names == first.names
-    assert len(calls) < 10  # the verification alone
+    assert len(calls) < 16  # the verification alone, and its error by each of three fitted recordings
 
 
 def test_errors_of_another_generator_are_no_effect_where_they_are_integrated_out():
