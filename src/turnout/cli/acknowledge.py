@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
 
     from turnout.config import load_configuration
     from turnout.config.acknowledgements import COLUMNS, acknowledgement_row, row_problems
-    from turnout.config.turnouts_table import append_csv, one_line, restore_on_error
+    from turnout.config.table_edits import added_row, one_line
     from turnout.errors import ConfigError, ConfigErrors
 
     turnout, _, label = args.place.partition("/")
@@ -77,9 +77,8 @@ def run(args: argparse.Namespace) -> int:
     path = Path(args.configuration) / "acknowledgements.csv"
     if problems := list(row_problems(cells, configuration.ids, configuration.variants)):
         raise ConfigErrors([ConfigError(path, column, *content) for column, *content in problems])
-    with restore_on_error(path):
-        append_csv(path, cells, COLUMNS)
-        after = load_configuration(args.configuration)
+    with added_row(path, cells, COLUMNS) as tables:
+        after = load_configuration(args.configuration, tables=tables)
         if acknowledgement_row(cells) not in after.acknowledgements:
             raise ConfigErrors(after.warnings)
     print(f"{path}: {action} {args.place} {args.band or 'all bands'}. It counts from the next run on.")

@@ -45,19 +45,19 @@ def run(args: argparse.Namespace) -> int:
     from pathlib import Path
 
     from turnout.config import load_configuration
-    from turnout.config.turnouts_table import ROW, append_tsv, read_table, restore_on_error
+    from turnout.config.table_edits import added_row
+    from turnout.config.turnouts_table import ROW, read_table
     from turnout.errors import ConfigError
     from turnout.readers.formats import FORMATS
     from turnout.units import to_si
 
     path = Path(args.configuration) / "turnouts.tsv"
-    rows = read_table(path, str(path))[0]
-    if row := next((row for row in rows if row.id == args.turnout), None):
-        problem = f"there is a turnout {row.id!r} already"
-        raise ConfigError(path, f"line {row.line}", problem, "Write another id; to change the turnout, edit this line")
-    with restore_on_error(path):
-        append_tsv(path, {column: getattr(args, column) for column in ROW}, tuple(ROW))
-        turnout = load_configuration(args.configuration, FORMATS, to_si).turnout(args.turnout)
+    with added_row(path, {column: getattr(args, column) for column in ROW}, tuple(ROW)) as tables:
+        rows = read_table(path, str(path))[0]
+        if row := next((row for row in rows if row.id == args.turnout), None):
+            problem, remedy = f"there is a turnout {row.id!r} already", "to change the turnout, edit this line"
+            raise ConfigError(path, f"line {row.line}", problem, f"Write another id; {remedy}")
+        turnout = load_configuration(args.configuration, FORMATS, to_si, tables).turnout(args.turnout)
     labels = ", ".join(s.label for s in turnout.sections)
     print(f"{path}: added {turnout.id} with the sections {labels}.")
     for recordings, source in (("hammer tests", turnout.hammer), ("passages", turnout.passages)):

@@ -77,15 +77,14 @@ def _enter(args: argparse.Namespace) -> int:
 
     from turnout.config import load_configuration
     from turnout.config.events import COLUMNS, event_of, lead_problem, now, turnout_problems
-    from turnout.config.turnouts_table import append_csv, restore_on_error
+    from turnout.config.table_edits import added_row
     from turnout.errors import ConfigError, ConfigErrors
 
     path = Path(args.configuration) / "events.csv"
     turnout, _, label = args.place.partition("/")
     cells = dict(turnout=turnout, section=label, date=args.date, kind=args.kind, resets=args.resets, note=args.note)
-    with restore_on_error(path):
-        append_csv(path, cells, COLUMNS)
-        after = load_configuration(args.configuration)
+    with added_row(path, cells, COLUMNS) as tables:
+        after = load_configuration(args.configuration, tables=tables)
         if problems := list(turnout_problems(cells, after.ids, after.variants)):
             raise ConfigErrors([ConfigError(path, column, *content) for column, *content in problems])
         entered = event_of(cells)

@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
     from pathlib import Path
 
     from turnout.config.load import load_layout
-    from turnout.config.turnouts_table import ID, restore_on_error
+    from turnout.config.turnouts_table import ID
     from turnout.errors import ConfigError
     from turnout.files import write_atomic
     from turnout.readers.formats import FORMATS
@@ -68,10 +68,12 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError(path, "--name", "there is such a layout already", "Write another name, or remove the file")
     contents = [file_contents(require_file(file)) for file in args.files]
     draft = layout_draft(contents)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with restore_on_error(path):
-        write_atomic(path, lambda file: file.write(draft.encode()))
+    write_atomic(path, lambda file: file.write(draft.encode()))
+    try:
         load_layout(path, FORMATS, to_si)
+    except BaseException:
+        path.unlink()
+        raise
     print(f"{path}: written.")
     for decision in decisions(draft):
         print(f"  {decision}")

@@ -20,6 +20,7 @@ from turnout.config.turnout import TurnoutConfig
 from turnout.config.turnouts_table import Row, read_table
 from turnout.errors import ConfigError, ConfigErrors, ReadError
 
+TABLES = ("turnouts.tsv", "events.csv", "acknowledgements.csv")
 FIELD_OF_COLUMN = {"lat_deg": "latitude", "lon_deg": "longitude"}
 
 
@@ -138,7 +139,10 @@ def read_notes(turnout: TurnoutConfig, raw_root: Path) -> tuple[TurnoutConfig, l
 
 
 def load_configuration(
-    folder: Path | str = "config", formats: Collection[str] | None = None, to_si: ToSi | None = None
+    folder: Path | str = "config",
+    formats: Collection[str] | None = None,
+    to_si: ToSi | None = None,
+    tables: Mapping[str, Path] | None = None,
 ) -> Configuration:
     """Read and check config.yaml, turnouts.tsv, layouts/, overrides/, events.csv and acknowledgements.csv.
 
@@ -150,6 +154,8 @@ def load_configuration(
         Names of the readers; None: formats are not checked.
     to_si : callable or None
         Converts units, as ``turnout.units.to_si``; None: units of channels are not checked.
+    tables : mapping of str to Path or None
+        Name of a table -> file that is read in its place; errors name the table. None: those of the folder.
 
     Returns
     -------
@@ -165,21 +171,20 @@ def load_configuration(
         remedy = "Name the folder of the configuration, 'config' in a project"
         raise ConfigErrors([ConfigError(folder, "the folder", "it is a file", remedy)])
     reading = _ConfigurationReader(Path(folder), formats, to_si)
+    paths = {name: reading.folder / name for name in TABLES} | dict(tables or {})
     reading.check_extensions()
     settings = reading.document(reading.folder / "config.yaml", settings_keys())
     reading.errors += check_ranges(settings)
-    rows, errors = read_table(reading.folder / "turnouts.tsv", reading.name("turnouts.tsv"))
+    rows, errors = read_table(paths["turnouts.tsv"], reading.name("turnouts.tsv"))
     reading.errors += errors
     variants = reading.variants(rows, settings)
     turnout_ids = None if errors else {row.id for row in rows}
-    events, errors, event_warnings = read_events(
-        reading.folder / "events.csv", reading.name("events.csv"), turnout_ids, variants
-    )
+    events, errors, event_warnings = read_events(paths["events.csv"], reading.name("events.csv"), turnout_ids, variants)
     reading.errors += errors
     if reading.errors:
         raise ConfigErrors(list({str(e): e for e in reading.errors}.values()))
     name = "acknowledgements.csv"
-    acknowledgements, warnings = read_acknowledgements(reading.folder / name, reading.name(name), turnout_ids, variants)
+    acknowledgements, warnings = read_acknowledgements(paths[name], reading.name(name), turnout_ids, variants)
     by_id = {row.id: row for row in rows}
     base = merge.settings(plain_values(settings))
     return Configuration(

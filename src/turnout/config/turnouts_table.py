@@ -1,21 +1,15 @@
-"""Reader of config/turnouts.tsv (one row per turnout), and functions that add a row to a table of the configuration."""
+"""Reader of config/turnouts.tsv: one row per turnout."""
 
-import csv
-import io
 import os
-import re
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from turnout.config.csv_table import TableError, header_of
 from turnout.config.document import Place, as_config_errors
 from turnout.config.layout_schema import HAMMER_RATE, PASSAGE_RATE
 from turnout.config.schema import ID, Key, suggestion, value_problem
 from turnout.errors import ConfigError
-from turnout.files import write_atomic
 
 NO_TABLE = "Run 'turnout add ID LAYOUT' to begin one"
 NO_PROJECT = "Run the command in the folder of a project; 'turnout init FOLDER' makes one"
@@ -221,136 +215,3 @@ def leads_out(path: str) -> bool:
     (False, True, True)
     """
     return PurePosixPath(path).is_absolute() or ".." in PurePosixPath(path).parts or "\\" in path
-
-
-@contextmanager
-def restore_on_error(path: Path) -> Iterator[None]:
-    """Context that restores the content of ``path`` if an exception is raised inside it.
-
-    Parameters
-    ----------
-    path : Path
-        File that is restored; one that was absent is deleted.
-    """
-    path = Path(path)
-    before = path.read_bytes() if os.path.lexists(path) else None
-    try:
-        yield
-    except BaseException:
-        if before is None:
-            path.unlink(missing_ok=True)
-        elif path.read_bytes() != before:
-            _write(path, before)
-        raise
-
-
-def one_line(text: Any) -> str:
-    r"""Text of a cell: None becomes empty, line breaks and tabs become blanks.
-
-    Parameters
-    ----------
-    text : any
-        Any value; None is empty.
-
-    Returns
-    -------
-    str
-        Text without line breaks and tabs.
-
-    Examples
-    --------
-    >>> one_line("machine 09-3X\n at night ")
-    'machine 09-3X at night'
-    """
-    return re.sub(r"\s+", " ", "" if text is None else str(text)).strip()
-
-
-def append_csv(path: Path, values: Mapping[str, str], columns: tuple[str, ...]) -> str:
-    """Add one row to a CSV; a new table gets a header.
-
-    Parameters
-    ----------
-    path : Path
-        The table.
-    values : mapping of str to str
-        Column -> text; columns without a value stay empty.
-    columns : tuple of str
-        Header of a new table.
-
-    Returns
-    -------
-    str
-        The line that was added.
-
-    Raises
-    ------
-    ConfigError
-        If a value has no column in the header.
-    """
-    try:
-        header = header_of(path, str(path)) if path.exists() else columns
-    except TableError as fault:
-        raise fault.error from None
-    text = io.StringIO()
-    csv.writer(text, lineterminator="").writerow(_ordered_cells(path, values, header))
-    return _append(path, text.getvalue(), ",".join(columns))
-
-
-def append_tsv(path: Path, values: Mapping[str, str], columns: tuple[str, ...]) -> str:
-    """As ``append_csv``, for a table with tabs between its columns and # before comments.
-
-    Parameters
-    ----------
-    path : Path
-        The table.
-    values : mapping of str to str
-        Column -> text; columns without a value stay empty.
-    columns : tuple of str
-        Header of a new table.
-
-    Returns
-    -------
-    str
-        The line that was added.
-
-    Raises
-    ------
-    ConfigError
-        If a value has no column, or the table has no header or no tabs.
-    """
-    header = columns
-    if path.exists():
-        try:
-            lines = path.read_text(encoding="utf-8-sig").splitlines()
-        except UnicodeDecodeError as error:
-            problem = "a byte that is not UTF-8"
-            raise ConfigError(path, f"byte {error.start}", problem, "Save the file as UTF-8") from None
-        titles = next((line for line in lines if line.strip() and not line.startswith("#")), "")
-        if not titles:
-            raise Place(str(path), 1, 1).error("an empty table", "Write a header: turnout<tab>layout<tab>...")
-        header = tuple(title.strip() for title in titles.split("\t"))
-        if separator_error := separator_problem(header):
-            raise Place(str(path), 1 + lines.index(titles), 1).error(*separator_error)
-    return _append(path, "\t".join(_ordered_cells(path, values, header)), "\t".join(columns))
-
-
-def _ordered_cells(path: Path, values: Mapping[str, str], header: tuple[str, ...]) -> list[str]:
-    texts = {title: one_line(value) for title, value in values.items()}
-    for title, value in texts.items():
-        if value and title not in header:
-            remedy = "Add it to the header, or leave the value out"
-            raise Place(str(path), 1, 1).error(f"no column {title!r} for {value!r}", remedy)
-    return [texts.get(title, "") for title in header]
-
-
-def _append(path: Path, line: str, header: str) -> str:
-    before = path.read_bytes() if path.exists() else f"{header}\n".encode()
-    end = "\r\n" if b"\r\n" in before else "\n"
-    gap = b"" if before.endswith(b"\n") else end.encode()
-    _write(path, before + gap + (line + end).encode())
-    return line
-
-
-def _write(path: Path, content: bytes) -> None:
-    """Write the whole table atomically. If ``path`` is a link, the file that it points to is written."""
-    write_atomic(path.resolve(), lambda stream: stream.write(content))

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from filelock import FileLock, Timeout
-
 from turnout.errors import RegistryError
+from turnout.locks import folder_lock
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
 
 @contextmanager
@@ -30,19 +29,5 @@ def registry_lock(registry_dir: Path, patience: float = 600.0) -> Iterator[None]
     RegistryError
         If another run still holds it after ``patience``, or without permission to write.
     """
-    path = Path(registry_dir) / ".lock"
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        lock = FileLock(path, timeout=patience)
-        lock.acquire()
-    except Timeout:
-        raise RegistryError(
-            f"{registry_dir}: another run has locked the registry for more than {patience:g} s. "
-            f"Nothing was changed: wait for it to end, then run again."
-        ) from None
-    except OSError as error:
-        raise RegistryError(f"{registry_dir}: cannot write there: {error}. Give write permission.") from error
-    try:
+    with folder_lock(registry_dir, "the registry", patience, RegistryError):
         yield
-    finally:
-        lock.release()

@@ -10,10 +10,11 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from turnout.config import load_configuration
+from turnout.config import TurnoutConfig, load_configuration
 from turnout.constants import Z95
 from turnout.errors import SimulationError
 from turnout.files import write_text
+from turnout.locks import folder_lock
 from turnout.physics import TERMS, effects_by_name
 from turnout.simulate import load_track
 from turnout.simulate.turnout_track import TurnoutTrack
@@ -65,6 +66,14 @@ def accept(
         belongs to a wheelset. Of a change: it is not named, or has no position. The file is then unchanged.
     """
     turnout = load_configuration(config).turnout(turnout_id)
+    with folder_lock(Path(config), "the configuration"):  # the text of the file is read, extended and written
+        return _extend_track(finding, turnout, turnout_id, track, anyway)
+
+
+def _extend_track(
+    finding: Mapping[str, Any], turnout: TurnoutConfig, turnout_id: str, track: str | None, anyway: bool
+) -> tuple[Path, str]:
+    """File and sentence of ``accept``."""
     is_change = "onset_by_utc" in finding
     if is_change:
         check_change(finding, anyway)

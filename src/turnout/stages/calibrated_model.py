@@ -43,6 +43,7 @@ from turnout.stages.agreeing_visits import (
     agreeing_visits,
 )
 from turnout.stages.checkpoint import SUFFIX
+from turnout.stages.copied_files import without_copies
 from turnout.stages.mismatch_groups import groups, unit_of, visits
 from turnout.stages.mismatch_inputs import gather_inputs, mismatch_context, track_of
 from turnout.stages.recorded_work import events_of
@@ -209,7 +210,8 @@ def calibrate_turnout(
         The turnout has no recordings since its renewal, no track file, or no visit that can be fitted.
     """
     turnout = with_raw(load_configuration(config).turnout(turnout_id), Path(raw_root))
-    by_visit = since_renewal(turnout, visits(scan(turnout, Path(raw_root)).units))
+    units, copies = without_copies(scan(turnout, Path(raw_root)).units, raw_root)
+    by_visit = since_renewal(turnout, visits(units))
     if not by_visit:
         raise SimulationError(
             f"{turnout_id}: no hammer test and no passage below {raw_root}{renewal_note(turnout)}; "
@@ -220,7 +222,7 @@ def calibrate_turnout(
     units_of_visits = {v: unit_of(turnout_id, v, units, turnout.hashes["mismatch"]) for v, units in by_visit.items()}
     versions = {v: version_of(unit, turnout, raw_root, track, code) for v, unit in units_of_visits.items()}
     complete = {s.visit for s in read_visits(folder, turnout_id, versions)}
-    missing, notes = [label for label in by_visit if label not in complete], list[str]()
+    missing, notes = [label for label in by_visit if label not in complete], list(copies)
 
     def fit_visit(label: str) -> list[FittedGroup]:
         about = {"turnout": turnout, "visit": label, "version": versions[label], "without": without}

@@ -32,6 +32,7 @@ from turnout.mismatch.turnout.unproven_panels import reservation
 from turnout.stages.accepted_changes import changes_of, further_candidates
 from turnout.stages.change_finding import finding_of_change
 from turnout.stages.change_trains import case_of, trains_of_change
+from turnout.stages.copied_files import without_copies
 from turnout.stages.mismatch_groups import groups, members_of, neighbours_of, unit_of, visits
 from turnout.stages.mismatch_inputs import gather_inputs, track_of
 from turnout.stages.recorded_work import events_of
@@ -122,7 +123,7 @@ def _diagnose(
         track, accepted = track_of(turnout)
     except SimulationError as error:
         raise SimulationError(f"no track file ({error})") from None
-    members = members_of(unit, scan(turnout, Path(raw_root)).units)
+    members, copies = without_copies(members_of(unit, scan(turnout, Path(raw_root)).units), raw_root)
     about = turnout, raw_root, track, accepted, code
     recorded_here = [u for u in members if u.kind == "passage" or u.section in labels]
     tests = since_renewal(turnout, visits(u for u in recorded_here if u.kind == "hammer"))
@@ -153,7 +154,7 @@ def _diagnose(
         row["sentence"] += f"; accepted before: {', '.join(c.words for c in changes)}"
     if unproven := reservation(track):
         row["sentence"] += f". {unproven}"
-    return row | {"notes": "\n".join(notes) or None}
+    return row | {"notes": "\n".join([*copies, *notes]) or None}
 
 
 def _fitted_visits(

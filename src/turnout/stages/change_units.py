@@ -9,6 +9,7 @@ from pathlib import Path
 from re import search
 
 from turnout.config import Configuration
+from turnout.config.events import Event
 from turnout.config.merge import digest
 from turnout.config.turnout import TurnoutConfig
 from turnout.errors import ConfigError
@@ -83,22 +84,25 @@ def alarmed_groups(plans: Path, configuration: Configuration) -> Iterator[Planne
             except ConfigError:
                 continue
             config_hash = hashes[turnout_id].get(KIND, "")
-            yield from _units(turnout, planned[turnout_id], alarms[turnout_id], config_hash)
+            works = [event for event in configuration.events if event.turnout == turnout_id]
+            yield from _units(turnout, planned[turnout_id], alarms[turnout_id], works, config_hash)
 
 
 def _units(
-    turnout: TurnoutConfig, planned: Sequence[PlannedUnit], sections: Iterable[str], config_hash: str
+    turnout: TurnoutConfig,
+    planned: Sequence[PlannedUnit],
+    sections: Iterable[str],
+    works: Sequence[Event],
+    config_hash: str,
 ) -> Iterator[PlannedUnit]:
-    events = Path(turnout.folder) / "events.csv"
-    lines = events.read_text(encoding="utf-8").splitlines() if events.is_file() else []
-    own_events = [line for line in lines if line.startswith(f"{turnout.id},")]
+    recorded_work = [[event.at.isoformat(), event.kind, event.section, event.resets] for event in works]
     for labels in group_labels(turnout, sections):
         members = [p for p in planned if p.unit.kind == "hammer" and p.unit.section in labels]
         members += _trains_of_first_and_newest_visits(members, [p for p in planned if p.unit.kind == "passage"])
         if not members:
             continue
         files = tuple(sorted(f for p in members for f in p.unit.files))
-        note = digest([digest_of_model(turnout), own_events, *(p.note for p in members)])[:16]
+        note = digest([digest_of_model(turnout), recorded_work, *(p.note for p in members)])[:16]
         yield PlannedUnit(Unit(turnout.id, KIND, "+".join(labels), files, config_hash), note)
 
 

@@ -25,6 +25,7 @@ from turnout.simulate.parameters import base_track_file
 from turnout.stages import common
 from turnout.stages.accepted_effects import accepted_of
 from turnout.stages.common import rail_temperature
+from turnout.stages.copied_files import without_copies
 from turnout.stages.layout_checks import position_fault
 from turnout.stages.mismatch_trains import TrainUnknownError, train_of
 from turnout.stages.passage import PassageContext, passage_unit, sensors_of, trains_in
@@ -81,7 +82,7 @@ def gather_inputs(
     track: TurnoutTrack,
     passage_tables: Mapping[str, dict],
 ) -> VisitInputs:
-    """Read all units of a visit.
+    """Read all units of a visit. Copies of a file are left out with a note.
 
     ``track`` is the TurnoutTrack, ``passage_tables`` are the tables of the passage stage by unit.
 
@@ -102,8 +103,9 @@ def gather_inputs(
     -------
     VisitInputs
     """
-    inputs = VisitInputs()
-    for unit in units:
+    distinct, copies = without_copies(units, raw_root)
+    inputs = VisitInputs(notes=[Note(copy) for copy in copies])
+    for unit in distinct:
         if unit.kind == "hammer" and turnout.hammer is not None:
             _add_test(unit, turnout, raw_root, track, inputs)
         elif unit.kind == "passage" and turnout.passages is not None:

@@ -65,7 +65,9 @@ def events_of(
     for event in recorded:
         if event.turnout != turnout.id or event.kind not in OPENED:
             continue
-        at = None if event.section is None else positions.get(event.section.rpartition("/")[2])
+        if event.section is not None and event.section not in positions:  # misspelt, as ``turnout check`` reports
+            continue
+        at = None if event.section is None else positions[event.section]
         opened = {
             p.name: p.sd
             for p in parameters

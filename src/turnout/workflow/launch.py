@@ -8,10 +8,12 @@ from datetime import UTC, date, datetime
 from pathlib import Path
 from typing import Any
 
+from filelock import FileLock, Timeout
+
 from turnout.config import Configuration, load_configuration
 from turnout.config.consistency import ToSi
 from turnout.config.schema import suggestion
-from turnout.errors import ConfigError
+from turnout.errors import ConfigError, TurnoutError
 from turnout.files import write_text
 from turnout.registry.generation import require_usable_folder
 from turnout.workflow.configuration_rows import fleet_hash
@@ -34,6 +36,8 @@ PLAN_FOLDER = "work/plan"
 # Start time of the newest run that reached its jobs, UTC. It is no input of a rule, so it causes no rerun.
 REGISTRY = Path("results/registry")
 LAUNCH_FILE = "work/launched"
+RUN_LOCK = Path("work/.run.lock")
+_HELD: dict[Path, FileLock] = {}  # locks of this process
 
 
 @dataclass(frozen=True)
@@ -77,7 +81,8 @@ class Launch:
 def launch(options: Mapping, scan: bool, formats: Collection[str] | None = None, to_si: ToSi | None = None) -> Launch:
     """Read the configuration and, with ``scan``, update the plan files.
 
-    ``options`` are those of ``snakemake --config``; ConfigErrors where they or the configuration are invalid.
+    ``options`` are those of ``snakemake --config``; ConfigErrors where they or the configuration are invalid. With
+    ``scan`` no other run can begin in this folder until this process ends.
 
     Parameters
     ----------
@@ -103,6 +108,8 @@ def launch(options: Mapping, scan: bool, formats: Collection[str] | None = None,
         If DuckDB can make no database in this folder.
     ConfigError
         If an option is invalid, or so many files are missing that a disk is probably not mounted.
+    TurnoutError
+        With ``scan``, if another run works in this folder.
     """
     _quote_interpreter()
     for name in options:
@@ -118,6 +125,7 @@ def launch(options: Mapping, scan: bool, formats: Collection[str] | None = None,
         "strict": _flag(options, "strict"),
     }
     if scan:
+        _keep_other_runs_out()  # Snakemake's own lock comes too late: a refused run would have replaced the plans
         require_usable_folder(REGISTRY)  # before anything is computed for it
         started = datetime.now(UTC).replace(tzinfo=None)
         raw, accept = Path(job["raw"]), _flag(options, "accept_vanished")
@@ -136,6 +144,20 @@ def launch(options: Mapping, scan: bool, formats: Collection[str] | None = None,
     return Launch(
         names, shard_names(shards), turnouts, fleet_hash(configuration), job, diagnosis, chains, learned, day, alarms
     )
+
+
+def _keep_other_runs_out() -> None:
+    """Hold this folder for the run until this process ends, however it ends; TurnoutError if another run holds it."""
+    path = RUN_LOCK.resolve()
+    if path in _HELD:
+        return
+    path.parent.mkdir(parents=True, exist_ok=True)
+    lock = FileLock(path, timeout=0)
+    try:
+        lock.acquire()
+    except Timeout:
+        raise TurnoutError(f"{RUN_LOCK} is held: another run works in this folder. Wait for it, or end it.") from None
+    _HELD[path] = lock
 
 
 def _quote_interpreter() -> None:

@@ -2,6 +2,8 @@
 
 import resource
 import signal
+import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
 import pytest
@@ -11,7 +13,7 @@ from turnout.config import load_configuration
 from turnout.config.acknowledgements import read_acknowledgements
 from turnout.config.campaign_notes import read_campaigns, read_trains
 from turnout.config.events import read_events
-from turnout.config.turnouts_table import append_csv, append_tsv, restore_on_error
+from turnout.config.table_edits import added_row
 
 HEADER = "turnout,section,date,kind,resets,note\n"
 
@@ -190,37 +192,69 @@ def full_disk():
         signal.signal(signal.SIGXFSZ, handler)
 
 
-@pytest.mark.parametrize(("name", "append", "tab"), [("events.csv", append_csv, ","), ("t.tsv", append_tsv, "\t")])
-def test_a_table_is_as_it_was_where_there_is_no_room_for_one_more_row(tmp_path, name, append, tab):
+@pytest.mark.parametrize(("name", "tab"), [("events.csv", ","), ("t.tsv", "\t")])
+def test_a_table_is_as_it_was_where_there_is_no_room_for_one_more_row(tmp_path, name, tab):
     path, columns = tmp_path / name, ("turnout", "layout")
     rows = [tab.join(columns), *(tab.join((f"t{k:04d}", "main")) for k in range(800))]
     path.write_text("\n".join(rows) + "\n")
     before = path.read_bytes()
     assert len(before) > 8192
-    with pytest.raises(OSError, match="too large"), full_disk(), restore_on_error(path):
-        append(path, {"turnout": "t1", "layout": "main"}, columns)
+    with (
+        pytest.raises(OSError, match="too large"),
+        full_disk(),
+        added_row(path, {"turnout": "t1", "layout": "main"}, columns),
+    ):
+        pass
     assert path.read_bytes() == before
-    assert [p.name for p in tmp_path.iterdir()] == [name]
+    assert files_in(tmp_path) == [name]
 
 
-def test_a_row_that_is_taken_back_leaves_mode_link_and_bytes(tmp_path):
+def files_in(folder):
+    return sorted(p.name for p in folder.iterdir() if p.name != ".lock")
+
+
+def test_a_row_that_is_checked_is_not_in_the_table_yet_and_leaves_mode_link_and_bytes(tmp_path):
     path, link = tmp_path / "kept" / "events.csv", tmp_path / "events.csv"
     path.parent.mkdir()
     path.write_bytes(b"turnout,section\r\nt1,A7")
     path.chmod(0o640)
     link.symlink_to(path)
     before = path.read_bytes()
-    with pytest.raises(KeyError), restore_on_error(link):
-        append_csv(link, {"turnout": "t2"}, ("turnout", "section"))
-        assert path.read_bytes() == before + b"\r\nt2,\r\n"
+    with pytest.raises(KeyError), added_row(link, {"turnout": "t2"}, ("turnout", "section")) as tables:
+        assert tables["events.csv"].read_bytes() == before + b"\r\nt2,\r\n"
+        assert path.read_bytes() == before  # what a run sees that reads it now, or after this process was killed
         raise KeyError
-    assert path.read_bytes() == before and link.is_symlink() and path.stat().st_mode & 0o777 == 0o640
-    assert [p.name for p in path.parent.iterdir()] == ["events.csv"]
+    assert path.read_bytes() == before and files_in(tmp_path) == ["events.csv", "kept"]
+    with added_row(link, {"turnout": "t2"}, ("turnout", "section")):
+        pass
+    assert path.read_bytes() == before + b"\r\nt2,\r\n"
+    assert link.is_symlink() and path.stat().st_mode & 0o777 == 0o640
+    assert files_in(tmp_path) == ["events.csv", "kept"] and files_in(path.parent) == ["events.csv"]
 
 
-def test_a_new_table_that_is_taken_back_is_gone(tmp_path):
-    with pytest.raises(KeyError), restore_on_error(tmp_path / "events.csv"):
-        append_csv(tmp_path / "events.csv", {"turnout": "t2"}, ("turnout", "section"))
-        assert (tmp_path / "events.csv").read_text() == "turnout,section\nt2,\n"
+def test_a_new_table_with_a_wrong_row_is_not_made(tmp_path):
+    with pytest.raises(KeyError), added_row(tmp_path / "events.csv", {"turnout": "t2"}, ("turnout", "section")) as t:
+        assert t["events.csv"].read_text() == "turnout,section\nt2,\n"
         raise KeyError
-    assert list(tmp_path.iterdir()) == []
+    assert files_in(tmp_path) == []
+
+
+def test_rows_that_are_entered_at_once_are_all_in_the_table(tmp_path):
+    path, columns = tmp_path / "events.csv", ("turnout", "section")
+
+    def enter(k):
+        with added_row(path, {"turnout": f"t{k}"}, columns):
+            time.sleep(0.01)
+
+    with ThreadPoolExecutor(6) as pool:
+        list(pool.map(enter, range(6)))
+    assert sorted(path.read_text().split()[1:]) == [f"t{k}," for k in range(6)]
+
+
+@pytest.mark.parametrize("command", [EVENT, ["add", "t1", "tommerup"]])
+def test_a_folder_that_does_not_exist_is_named_and_not_made(tmp_path, capsys, monkeypatch, command):
+    monkeypatch.chdir(tmp_path)
+    assert main([*command[:4], "--configuration", "nowhere"]) == 2
+    err = capsys.readouterr().err
+    assert "nowhere" in err and "no such folder" in err and "turnout init" in err
+    assert not (tmp_path / "nowhere").exists()

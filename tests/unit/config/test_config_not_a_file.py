@@ -56,7 +56,7 @@ def test_a_table_that_may_not_be_written_is_one_sentence(config, capsys, monkeyp
     def refuse(path, content):
         raise PermissionError(13, "Permission denied", str(path))
 
-    monkeypatch.setattr("turnout.config.turnouts_table._write", refuse)  # we may be root
+    monkeypatch.setattr("turnout.config.table_edits.write_atomic", refuse)  # we may be root
     assert main(COMMANDS["events.csv"]) == 2
     said = "turnout events: config/events.csv: Permission denied. Correct this, or name another file or folder"
     assert capsys.readouterr().err.startswith(said)

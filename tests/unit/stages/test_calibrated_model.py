@@ -209,7 +209,7 @@ def test_the_stage_writes_the_state_after_a_visit_and_a_finding_keeps_the_visit_
 def test_work_on_the_track_opens_what_it_touches(turnout):
     (turnout / "config" / "events.csv").write_text(
         "turnout,section,date,kind,resets,note\nt1,A,2026-01-10,tamping,,\nt1,,2026-01-11,sensor_change,,\n"
-        "t2,,2026-01-12,tamping,,\nt1,,2026-01-13,other,,\n"
+        "t2,,2026-01-12,tamping,,\nt1,,2026-01-13,other,,\nt1,A99,2026-01-14,tamping,,\n"  # no such section
     )
     parameters = [
         StateParameter("ballast@18.00", 0.0, 0.1, 0.0, "ballast", 30, 18.0),
