@@ -332,7 +332,7 @@ def _csv(source: Source) -> None:
     """Columns of the first lines."""
     lines = source.head.splitlines()[:-1] or [source.head]
     with source.path.open("rb") as file:
-        lines.append(file.readline(2**22))
+        lines += file.readline(2**22).splitlines()  # also where a carriage return alone ends a line
     _check_columns(max(max(line.count(c) for c in (b",", b";", b"\t", b"|")) + 1 for line in lines), source)
 
 

@@ -125,8 +125,8 @@ def launch(options: Mapping, scan: bool, formats: Collection[str] | None = None,
         "strict": _flag(options, "strict"),
     }
     if scan:
-        _keep_other_runs_out()  # Snakemake's own lock comes too late: a refused run would have replaced the plans
         require_usable_folder(REGISTRY)  # before anything is computed for it
+        _keep_other_runs_out()  # Snakemake's own lock comes too late: a refused run would have replaced the plans
         started = datetime.now(UTC).replace(tzinfo=None)
         raw, accept = Path(job["raw"]), _flag(options, "accept_vanished")
         write_plans(configuration, raw, Path(PLAN_FOLDER), shards, turnouts, accept)

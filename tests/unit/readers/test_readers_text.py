@@ -436,3 +436,16 @@ def test_a_footer_of_another_width_is_said_with_its_line(tmp_path):
         read("a.csv", tmp_path, NAMED)
     assert caught.value.where == "line 53" and "'Mean'" in caught.value.problem
     assert "delete the lines that are no samples" in caught.value.remedy
+
+
+@pytest.mark.parametrize("end", ["\r", "\r\n", "\n"])
+@pytest.mark.parametrize("separator", [";", "\t", ","])
+def test_a_file_of_any_length_is_read_with_any_line_ends(end, separator, tmp_path):
+    """A line is never the whole file: 3,000 rows have more separators than a file may have columns."""
+    rows = [f"{a:.4f}{separator}{b:.4f}" for a, b in np.tile(X, (60, 1))]
+    path = tmp_path / "a.csv"
+    path.write_bytes(end.join(["rate: 20000", f"force{separator}acc", *rows, ""]).encode())
+    result = read(path.name, tmp_path, NAMED)
+    assert result.errors == ()
+    (recording,) = result.recordings
+    np.testing.assert_allclose(recording.samples, np.tile(X, (60, 1)).T.round(4), atol=1e-12)
