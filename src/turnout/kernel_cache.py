@@ -54,6 +54,25 @@ def inline_kernel(function: Function) -> Function:
     return _compile(function, forceinline=True, _nrt=False)
 
 
+def inner_kernel(function: Function) -> Function:
+    """Decorator: an ``inline_kernel`` that only other kernels call.
+
+    It has no entry for Python, which would take every array of its arguments apart. With tuples of tens of arrays the
+    entry takes longer to compile than the kernel.
+
+    Parameters
+    ----------
+    function : function
+        Python function in the subset that numba compiles. It creates no arrays and returns none.
+
+    Returns
+    -------
+    Function
+        A numba dispatcher, inlined into compiled callers.
+    """
+    return _compile(function, forceinline=True, _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+
+
 def borrowing_kernel(function: Function) -> Function:
     """Decorator: a kernel that does not count references to its arrays, since its caller holds them all.
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from turnout.kernel_cache import inline_kernel
+from turnout.kernel_cache import inline_kernel, inner_kernel
 from turnout.simulate.force_laws import FRICTION, GAP, LIFT, LINEAR, POWER
 
 
@@ -73,7 +73,7 @@ def law_force(
     return table[1, k] + slope * (d - table[0, k]) + viscous * rate, slope + bend * rate, viscous
 
 
-@inline_kernel
+@inner_kernel
 def path_at(path: np.ndarray, path_index: int, start: float, step: float, x: float) -> float:
     """Dip of path ``path_index`` at ``x``; constant beyond the ends of its grid.
 
@@ -134,7 +134,7 @@ def ramp_at(ramp: np.ndarray, stand_in: bool, x: float) -> tuple[float, float]:
     return np.sin(angle), np.cos(angle)
 
 
-@inline_kernel
+@inner_kernel
 def rail_weights(
     node: np.ndarray,
     first_row: np.ndarray,
@@ -198,7 +198,7 @@ def rail_weights(
     return share * share * (q * h * shear_flexible[line, e] + h * h * h * flexible[line, e] * bend)
 
 
-@inline_kernel
+@inner_kernel
 def window_product(window: np.ndarray, pad: int, rows: np.ndarray, weights: np.ndarray, a: int, b: int) -> complex:
     """b_a^T Z^-1 b_b for two port stages.
 
@@ -233,7 +233,7 @@ def window_product(window: np.ndarray, pad: int, rows: np.ndarray, weights: np.n
     return total
 
 
-@inline_kernel
+@inner_kernel
 def solve_dense(a: np.ndarray, b: np.ndarray, n: int) -> None:
     """Solve in place by elimination with partial pivoting; the matrices have at most a few dozen rows.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.kernel_cache import borrowing_kernel, inline_kernel, kernel
+from turnout.kernel_cache import borrowing_kernel, inner_kernel, kernel
 from turnout.simulate.band_matrix import momentum_minus_force, multiply, solve, solve_from_both_ends
 from turnout.simulate.port_system import evaluate, flexibility, locate_ports, newton_update
 from turnout.simulate.workspace import new_workspace
@@ -24,7 +24,7 @@ ROUNDING_TOLERANCE = 1000.0  # tolerances; stuck friction is so steep that round
 CONVERGED, NEWTON, LEFT_TRACK = range(3)
 
 
-@inline_kernel
+@inner_kernel
 def free_motion(
     track: TrackArrays,
     scheme: SchemeArrays,
@@ -99,7 +99,7 @@ def free_motion(
         e_stand_in[i] = bodies.stand_in_response[i] * scheme.weight * free_force
 
 
-@inline_kernel
+@inner_kernel
 def free_deformation(
     track: TrackArrays,
     scheme: SchemeArrays,
@@ -160,7 +160,7 @@ def free_deformation(
             d0[k] = value
 
 
-@inline_kernel
+@inner_kernel
 def add_port_forces(
     track: TrackArrays,
     scheme: SchemeArrays,
@@ -229,7 +229,7 @@ def add_port_forces(
                 e[j] -= total * response[block, j - start, body - start]
 
 
-@inline_kernel
+@inner_kernel
 def add_window(d: np.ndarray, window: np.ndarray, r: int, width: int, c: complex) -> None:
     """``d[r:r+width]`` += c times row ``r`` of the windows.
 
@@ -251,7 +251,7 @@ def add_window(d: np.ndarray, window: np.ndarray, r: int, width: int, c: complex
         near[m] += c * row[m]
 
 
-@inline_kernel
+@inner_kernel
 def record(
     track: TrackArrays, scheme: SchemeArrays, run: RunArrays, motion: Motion, d: np.ndarray, step: int, out: np.ndarray
 ) -> None:
@@ -289,7 +289,7 @@ def record(
         out[m, step] = value
 
 
-@inline_kernel
+@inner_kernel
 def advance(scheme: SchemeArrays, motion: Motion, d: np.ndarray, e: np.ndarray, e_stand_in: np.ndarray) -> None:
     """End of the step: u + scale Re(δ D) and R v + scale Re(δ s D) for track, bodies and stand-ins.
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.kernel_cache import inline_kernel
+from turnout.kernel_cache import inline_kernel, inner_kernel
 from turnout.simulate.kernels import law_force, path_at, rail_weights, ramp_at, solve_dense, window_product
 
 OPEN_GAP = 3e-3  # m; a force of 100 kN moves wheel and rail by less than 0.5 mm, in a step by less still
@@ -104,7 +104,7 @@ def locate_ports(
     return -1
 
 
-@inline_kernel
+@inner_kernel
 def flexibility(
     track: TrackArrays,
     scheme: SchemeArrays,
@@ -185,7 +185,7 @@ def flexibility(
                         g[q, p] += shared
 
 
-@inline_kernel
+@inner_kernel
 def evaluate(
     scheme: SchemeArrays,
     ports: PortArrays,
@@ -253,7 +253,7 @@ def evaluate(
     return worst, worst_port
 
 
-@inline_kernel
+@inner_kernel
 def newton_update(
     scheme: SchemeArrays,
     ports: PortArrays,

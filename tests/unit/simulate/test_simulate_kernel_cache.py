@@ -64,6 +64,23 @@ def test_only_kernels_that_create_arrays_count_references():
     assert not idle, f"create no arrays, and should borrow them: {idle}"
 
 
+def called_by_python(path):
+    """Names of functions that a file calls by their name, outside of kernels."""
+    kernels = {node.name for node, _ in kernels_of(path)}
+    for node in ast.parse(path.read_text()).body:
+        if getattr(node, "name", "") not in kernels:
+            yield from (c.func.id for c in ast.walk(node) if isinstance(c, ast.Call) and isinstance(c.func, ast.Name))
+
+
+def test_inlined_kernels_have_an_entry_for_python_if_it_calls_them_and_only_then():
+    """An entry that takes tens of arrays out of tuples takes longer to compile than the kernel behind it."""
+    found = [k for p in (PACKAGE / "simulate").rglob("*.py") for k in kernels_of(p)]
+    inlined = {node.name for node, decorator in found if decorator in ("inline_kernel", "inner_kernel")}
+    with_entry = {node.name for node, decorator in found if decorator == "inline_kernel"}
+    called = {name for p in (PACKAGE / "simulate").rglob("*.py") for name in called_by_python(p)}
+    assert with_entry == inlined & called and len(inlined) > 12
+
+
 def fresh_row(rows):
     return np.zeros(rows.shape[1])
 
