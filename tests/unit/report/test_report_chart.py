@@ -231,3 +231,19 @@ def test_one_campaign_without_an_error_has_short_numbers_at_its_axis():
     svg = history_panel("ballast", [mode], [], [])
     ticks = re.findall(r">([^<]*)</text>", svg[svg.index('class="tick y"') :].split("</g>")[0])
     assert len(ticks) >= 3 and max(map(len, ticks)) <= 5
+
+
+def test_one_uncertain_campaign_does_not_flatten_a_history():
+    """Its expected range, -200 to 400 Hz, is cut off: the axis stays within one span of the campaigns, and above 0."""
+    mode = {"frequency_se_hz": 1.0, "damping_ratio": 0.1, "n_impacts": 9, "rail_temperature_c": 15.0}
+    days = [datetime(2026, 1, 1 + 7 * k) for k in range(4)]
+    modes = [mode | {"measured_at_utc": day, "frequency_hz": 100.0 + k} for k, day in enumerate(days)]
+    ranges = [(95.0, 105.0)] * 3 + [(-200.0, 400.0)]
+    charts = [
+        {"measured_at_utc": day, "expected_low_hz": low, "expected_high_hz": high, "state": "ok"}
+        for day, (low, high) in zip(days, ranges)
+    ]
+    low, high, *_ = re.search(r'data-y="([-\d. ]+)', history_panel("ballast", modes, charts, []))[1].split()
+    span = 3.0 + 2.0 * 2.306  # of 100 to 103 Hz, each with Student's t of nine impacts
+    assert float(low) == pytest.approx(100.0 - 2.306 - span - 0.24 * span, abs=0.02)
+    assert float(high) == pytest.approx(103.0 + 2.306 + span + 0.24 * span, abs=0.02)

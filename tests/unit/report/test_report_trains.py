@@ -105,7 +105,7 @@ def test_weekly_peaks_come_before_the_scores_which_are_folded():
         for k, (value, state) in enumerate([(100.0, "ok"), (102.0, "ok"), (140.0, "alarm up"), (150.0, "alarm up")])
     ]  # fmt: skip
     svg = weekly_peaks_panel("OT", weeks)
-    assert "OT: 150 m/s² under trains, in alarm; 4 weeks" in svg
+    assert "OT: 150 ± 4 m/s² (95 %), in alarm; 4 weeks" in svg
     assert "week of 2026-01-19: 140.0 m/s² ± 3.9 (95 %)" in svg
     assert weekly_peaks_panel("OT", []) == ""
     part = {
@@ -114,6 +114,4 @@ def test_weekly_peaks_come_before_the_scores_which_are_folded():
     }  # fmt: skip
     page = page_environment().get_template("trains.html").render(part=part)
     scores = page.index("<details><summary>Scores of the sections' models: 2 of 12 predict more")
-    assert (
-        page.index("under trains, in alarm") < page.index('aria-label="Passages"') < scores < page.index("bars</svg>")
-    )
+    assert page.index("(95 %), in alarm") < page.index('aria-label="Passages"') < scores < page.index("bars</svg>")

@@ -79,7 +79,7 @@ def test_a_loss_of_the_whole_turnout_is_named_too(settings):
         rows = listed(con)
         sentences = con.execute("select sentence from worklist where state = 'confirm now'").fetchall()
     assert sorted(rows) == [("T00000", "whole turnout"), ("T00001", "whole turnout")]
-    assert all(s.startswith("whole turnout: the campaign of") and "; S0, S1, S2" in s for (s,) in sentences)
+    assert all(s.startswith("whole turnout: the campaign of") and "; likewise S0, S1, S2" in s for (s,) in sentences)
 
 
 def test_two_campaigns_are_an_alarm_and_a_normal_one_ends_it(settings):

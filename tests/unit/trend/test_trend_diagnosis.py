@@ -89,7 +89,7 @@ def test_where_alarm_and_diagnosis_differ_the_row_says_in_what(settings, rows):
     early, late = diagnosis_of(rows, settings)[1]
     after = {"onset_after_utc": late + pd.Timedelta(days=9), "onset_by_utc": late + pd.Timedelta(days=30)}
     words, _ = diagnosis_of(rows, settings, change_findings=change(newest, **after))
-    assert words.startswith("soft ballast") and f"dates the change otherwise, from {early:%Y-%m-%d}" in words
+    assert words.startswith("soft ballast") and f"dates the change differently, from {early:%Y-%m-%d}" in words
     within = {"onset_after_utc": early - pd.Timedelta(days=9), "onset_by_utc": late}
     assert "otherwise" not in diagnosis_of(rows, settings, change_findings=change(newest, **within))[0]
     other = finding(newest, "named", "words of the file").assign(term="local_pad")
@@ -145,3 +145,32 @@ def test_an_alarm_of_trains_alone_has_a_reason_and_a_next_step(settings, rows, w
     diagnosis, look_at = amplitude_row(rows, settings, change_findings=findings, sections=sections)
     assert ("only trains show it" in diagnosis and "no decision" not in diagnosis) == is_surface
     assert ("straightedge at 36.3 m: a dipped weld" in look_at) == is_surface
+
+
+SLEEPER = "voids and wet or fouled ballast under the sleeper at 21.6 m"
+SLEEPERS = "voids and wet or fouled ballast under the sleepers from 20.4 to 22.2 m"
+
+
+@pytest.mark.parametrize(
+    ("weeks_ago", "more", "expected"),
+    [
+        (0, {}, SLEEPER),
+        (0, {"first_m": 20.4, "last_m": 22.2}, SLEEPERS),
+        (0, {"verdict": "unknown"}, None),
+        (0, {"component": None}, None),
+        (0, {"first_m": 25.0, "last_m": 27.0}, None),
+        (110, {}, None),
+    ],
+    ids=["a sleeper", "a stretch", "without a name", "no support", "more than 3 m away", "older than the alarm"],
+)
+def test_what_to_look_at_are_the_sleepers_of_the_diagnosis(settings, rows, weeks_ago, more, expected):
+    """Of the alarms alone one would look at the pads of the section, and of trains at its running surface."""
+    sections = pd.DataFrame([{"section_id": SECTION, "turnout_id": "T00001", "label": "S4", "position_m": 21.6}])
+    findings = change(rows["measured_at_utc"].max() - pd.Timedelta(weeks=weeks_ago), **more)
+    tables = {"change_findings": findings, "sections": sections}
+    with viewed(rows, settings, **tables) as con:
+        query = "select look_at from worklist where section_id = ? and raised_at_utc is not null"
+        ((of_impacts,),) = con.execute(query, [SECTION]).fetchall()
+    _, of_trains = amplitude_row(rows, settings, **tables)
+    assert of_impacts == (expected or "worn, cracked or displaced pads, loose fastenings")
+    assert of_trains == (expected or "running surface, fastenings and voids; the mounting of the sensor")

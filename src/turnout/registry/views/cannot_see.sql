@@ -1,4 +1,4 @@
--- For words, where 1.53 must not be told as the 1.5 that were asked for: rounded up.
+-- For words, where 1.53 must not be told as the 1.5 of the target: rounded up.
 create or replace macro up_to_a_tenth(pct) as (ceil(10 * pct - 1e-6) / 10);
 
 -- One row per chart that cannot answer at a date, and why: too noisy for the target, learning, never warm or cold
@@ -25,14 +25,14 @@ select
             || ' with a rail temperature so far; a baseline needs a whole year and at least twelve'
         when reason = 'after_event' then n_learned || ' of ' || n_needed || ' campaigns since the event'
         when band = 'amplitude' and coalesce(detectable_pct < 50, false) then
-            printf('a change below %.1f %% of acceleration may go unseen for a year; asked for: %.1f %%',
+            printf('a change below %.1f %% of acceleration may go unseen for a year; target: %.1f %%',
                 up_to_a_tenth(detectable_pct), target_pct)
         when ends_with(band, '_damping') and detectable_pct is not null then
-            printf('a change below %.0f %% of the damping ratio may go unseen for a year; asked for: %.0f %%',
+            printf('a change below %.0f %% of the damping ratio may go unseen for a year; target: %.0f %%',
                 ceil(detectable_pct), target_pct)
         when coalesce(detectable_pct < 50, false) then
             printf('a change below %.1f %% of frequency (about %.1f %% in stiffness) may go unseen for a year; '
-                || 'asked for: %.1f %% (%.1f %%)',
+                || 'target: %.1f %% (%.1f %%)',
                 up_to_a_tenth(detectable_pct), up_to_a_tenth(100 * (1 - (1 - detectable_pct / 100) ** 2)),
                 target_pct, 100 * (1 - (1 - target_pct / 100) ** 2))
         else 'cannot see any change within a year: the values scatter too much'

@@ -1,7 +1,8 @@
 -- One row per event of a kind and chart it touches: level in the days before and after, on residuals.
 -- Raw frequencies would call every October tamping a success: the summer lies before it, the winter behind.
--- Windows are half open: [event - days, event) and [event, event + days). change_se_pct holds the scatter of the
--- campaigns with their memory, and what the error of the temperature slope makes of the difference in temperature.
+-- Windows are half open: [event - days, event) and [event, event + days). Levels are weighted means: a campaign whose
+-- error is larger than usual counts by the inverse of its variance. change_se_pct holds the scatter of the campaigns with
+-- their memory, and what the error of the temperature slope makes of the difference in temperature.
 -- Of work on a whole turnout the siblings' median is left in, for what all sections share is asked for (but not in
 -- band amplitude).
 -- needs: students_t
@@ -10,6 +11,10 @@ with values_pct as (
     select
         c.turnout_id, c.section_id, c.band, c.source, c.measured_at_utc, c.rail_temperature_c, b.n_learned, b.n_baseline,
         b.sd_alone_pct * sqrt((1 + b.phi) / (1 - b.phi)) as sd_pct, b.slope_se_pct_per_c,
+        -- z is rounded, so a small one does not give the standard deviation of its campaign
+        case when abs(c.z) > 0.05
+            then least(1, (b.guard * b.sd_pct * c.z / c.residual_pct) ** 2 * (1 + b.phi) / (1 - b.phi)) else 1
+        end as weight,
         c.residual_pct + b.level_pct as value_pct,
         100 * (c.expected_hz / b.frequency_hz - 1) + c.residual_pct
             - b.slope_pct_per_c * (c.rail_temperature_c - b.rail_temperature_c)
@@ -23,7 +28,7 @@ sides as (
         e.event_id, e.kind, e.event_at_utc, v.turnout_id, v.section_id, v.band, v.source,
         v.measured_at_utc >= e.event_at_utc as is_after,
         case when e.section_id is null then coalesce(v.alone_pct, v.value_pct) else v.value_pct end as value_pct,
-        v.rail_temperature_c, v.sd_pct, v.slope_se_pct_per_c, v.n_learned, v.n_baseline
+        v.weight, v.rail_temperature_c, v.sd_pct, v.slope_se_pct_per_c, v.n_learned, v.n_baseline
     from events e
     join values_pct v
         on e.turnout_id = v.turnout_id and coalesce(e.section_id, v.section_id) = v.section_id
@@ -36,9 +41,12 @@ counted as (
         event_id, kind, event_at_utc, turnout_id, section_id, band, source,
         count(*) filter (where not is_after) as n_before,
         count(*) filter (where is_after) as n_after,
-        avg(value_pct) filter (where not is_after) as before_pct,
-        avg(value_pct) filter (where is_after) as after_pct,
-        avg(rail_temperature_c) filter (where is_after) - avg(rail_temperature_c) filter (where not is_after) as dt_c,
+        sum(weight) filter (where not is_after) as weight_before,
+        sum(weight) filter (where is_after) as weight_after,
+        sum(weight * value_pct) filter (where not is_after) / sum(weight) filter (where not is_after) as before_pct,
+        sum(weight * value_pct) filter (where is_after) / sum(weight) filter (where is_after) as after_pct,
+        sum(weight * rail_temperature_c) filter (where is_after) / sum(weight) filter (where is_after)
+            - sum(weight * rail_temperature_c) filter (where not is_after) / sum(weight) filter (where not is_after) as dt_c,
         max(sd_pct) as sd_pct, max(slope_se_pct_per_c) as slope_se_pct_per_c,
         min(n_learned) filter (where is_after) as n_learned, min(n_baseline) as n_baseline
     from sides
@@ -47,7 +55,7 @@ counted as (
 compared as (
     select
         *, after_pct - before_pct as change_pct,
-        sqrt(sd_pct ** 2 * (1 / n_before + 1 / least(n_after, n_learned)) + (slope_se_pct_per_c * dt_c) ** 2)
+        sqrt(sd_pct ** 2 * (1 / weight_before + 1 / least(weight_after, n_learned)) + (slope_se_pct_per_c * dt_c) ** 2)
             as change_se_pct
     from counted
     where n_before > 0 and n_after > 0

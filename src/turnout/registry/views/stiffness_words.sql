@@ -24,14 +24,14 @@ create or replace macro stiffness_words(
     end
 );
 
--- What to look at where the stiffness of the ballast, or of the railpads, has changed by pct.
-create or replace macro ballast_advice(pct) as (
-    case when pct < 0 then 'voids and wet or fouled ballast under these sleepers'
+-- What to look at where the stiffness of the ballast, or of the railpads, has changed by pct, and at which sleepers.
+create or replace macro ballast_advice(pct, sleepers) as (
+    case when pct < 0 then 'voids and wet or fouled ballast under ' || coalesce(sleepers, 'these sleepers')
         else 'frost, or tamping that is not in the events' end
 );
 
-create or replace macro pad_advice(pct) as (
-    case when pct < 0 then 'worn, cracked or displaced pads, loose fastenings'
+create or replace macro pad_advice(pct, sleepers) as (
+    case when pct < 0 then 'worn, cracked or displaced pads, loose fastenings' || coalesce(' at ' || sleepers, '')
         else 'pads exchanged or hardened; an exchange that is not in the events' end
 );
 

@@ -166,7 +166,7 @@ listed as (
             else replace(split_part(min(section_id), '/', -1), '*', 'whole turnout') || ': ' end)
             || min_by(why, section_id)
             || (case when count(distinct why) = 1 then '' else
-                '; ' || array_to_string(list(split_part(section_id, '/', -1) order by section_id)[2:], ', ') || ' alike'
+                '; likewise ' || array_to_string(list(split_part(section_id, '/', -1) order by section_id)[2:], ', ')
             end) as why,
         max_by(direction, abs(change_pct)) as direction, max_by(change_pct, abs(change_pct)) as change_pct,
         max_by(low_pct, abs(change_pct)) as low_pct, max_by(high_pct, abs(change_pct)) as high_pct
@@ -202,6 +202,17 @@ changed as (
         where found_at_utc < "asof" + interval 1 day
     )
     qualify row_number() over (partition by turnout_id, label order by found_at_utc desc, sections) = 1
+),
+diagnosed_sleepers as (
+    -- where the newest diagnosis of a section names a change of ballast or pads, at most 3 m from it
+    select
+        c.turnout_id, c.label, c.found_at_utc, c.component, c.is_softer,
+        case when c.last_m - c.first_m < 0.05 then printf('the sleeper at %.1f m', c.first_m)
+            else printf('the sleepers from %.1f to %.1f m', c.first_m, c.last_m) end as sleepers
+    from changed c
+    left join sections p on p.section_id = c.turnout_id || '/' || c.label
+    where c.verdict in ('named', 'a_or_b') and c.component is not null and c.first_m is not null
+        and coalesce(greatest(c.first_m - p.position_m, p.position_m - c.last_m) <= 3, true)
 ),
 diagnosed as (
     select *
@@ -248,17 +259,18 @@ select
     end as sentence,
     case
         when h.raised_at_utc is not null then
-            'an intact chart does this once in '
-            || printf('%.0f campaigns', case when h.direction = 'up' then s.run_length_up else s.run_length_down end)
-            || coalesce(printf(' (%.0f years)', case when h.direction = 'up' then s.run_length_up else s.run_length_down end
-                / nullif(s.campaigns_per_year, 0)), '')
-            || '; '
+            'one false alarm expected in '
+            || printf('%,d campaigns', round(case when h.direction = 'up' then s.run_length_up else s.run_length_down end)::bigint)
+            || coalesce(printf(' (%,d years)', round(
+                case when h.direction = 'up' then s.run_length_up else s.run_length_down end
+                / nullif(s.campaigns_per_year, 0))::bigint), '')
+            || ' of this chart; of all ' || f.n_charts || ' charts '
             || case
-                when f.alarms_per_year >= 1.5 then printf('%.0f such alarms a year', f.alarms_per_year)
-                when f.alarms_per_year > 2 / 3 then 'one such alarm a year'
-                when f.alarms_per_year >= 0.01 then printf('one such alarm in %.0f years', 1 / f.alarms_per_year)
-                else 'less than one such alarm in 100 years'
-            end || ' expected if all ' || f.n_charts || ' charts were intact'
+                when f.alarms_per_year >= 1.5 then printf('%.0f a year', f.alarms_per_year)
+                when f.alarms_per_year > 2 / 3 then 'one a year'
+                when f.alarms_per_year >= 0.01 then printf('one in %.0f years', 1 / f.alarms_per_year)
+                else 'less than one in 100 years'
+            end
         when h.state = 'confirm now' then
             'one campaign alone is no alarm: only a second one shows whether the track has changed or the measurement was wrong'
         when h.state = 'plan' then
@@ -284,11 +296,16 @@ select
         when h.state = 'cannot tell' then 'the measurement: more impacts per campaign, rail temperature, sensor'
         when h.section_id = '*' then 'what all sections share: thermometer, hammer and method first, then drainage'
         when h.changed_component = 'both' then
-            ballast_advice(h.ballast_stiffness_pct) || '; ' || pad_advice(h.pad_stiffness_pct)
+            ballast_advice(h.ballast_stiffness_pct, case w.component when 'ballast' then w.sleepers end) || '; '
+            || pad_advice(h.pad_stiffness_pct, case w.component when 'railpad' then w.sleepers end)
+        when w.component = 'ballast' and coalesce(h.changed_component, 'either') <> 'pad' then
+            ballast_advice(case when w.is_softer then -1 else 1 end, w.sleepers)
+        when w.component = 'railpad' and coalesce(h.changed_component, 'either') <> 'ballast' then
+            pad_advice(case when w.is_softer then -1 else 1 end, w.sleepers)
         when h.component = 'ballast' then
-            ballast_advice(coalesce(h.ballast_stiffness_pct, case h.direction when 'down' then -1 else 1 end))
+            ballast_advice(coalesce(h.ballast_stiffness_pct, case h.direction when 'down' then -1 else 1 end), null)
         when h.component = 'railpad' then
-            pad_advice(coalesce(h.pad_stiffness_pct, case h.direction when 'down' then -1 else 1 end))
+            pad_advice(coalesce(h.pad_stiffness_pct, case h.direction when 'down' then -1 else 1 end), null)
         when h.band = 'ballast_damping' then 'wet, fouled or loose ballast; frost; the position of hammer and sensor'
         when h.band = 'railpad_damping' then 'aged or hardened pads, loose fastenings; the position of hammer and sensor'
         when h.band = 'amplitude' then
@@ -317,7 +334,7 @@ select
             || c.sentence
             || case
                 when c.onset_after_utc > h.since_latest_utc or c.onset_by_utc < h.since_earliest_utc then
-                    '; the alarm dates the change otherwise, from ' || strftime(h.since_earliest_utc, '%Y-%m-%d')
+                    '; the alarm dates the change differently, from ' || strftime(h.since_earliest_utc, '%Y-%m-%d')
                     || ' to ' || strftime(h.since_latest_utc, '%Y-%m-%d')
                 else ''
             end
@@ -361,6 +378,10 @@ left join maintenance m
         and m.state = h.state
 left join diagnosed g on g.turnout_id = h.turnout_id and g.label = split_part(h.section_id, '/', -1)
 left join changed c on c.turnout_id = h.turnout_id and c.label = split_part(h.sections, ', ', 1)
+left join diagnosed_sleepers w
+    on w.turnout_id = h.turnout_id and w.label = split_part(h.sections, ', ', 1)
+        and w.found_at_utc >= coalesce(h.since_at_utc, h.raised_at_utc)
+        and (h.band not in ('ballast', 'railpad') or w.is_softer = (h.direction = 'down'))
 left join sections p on p.section_id = h.section_id
 left join turnouts t on t.turnout_id = h.turnout_id
 cross join fleet f
@@ -404,7 +425,7 @@ create or replace view worklist as select * from worklist(newest_measurement());
 -- pad_stiffness_low_pct | double | % | 95 % interval, lower end
 -- pad_stiffness_high_pct | double | % | upper end
 -- sentence | varchar | | what happened, with its interval, in words
--- false_alarm_words | varchar | | how often an intact chart does this
+-- false_alarm_words | varchar | | how often charts without a change raise such an alarm
 -- last_maintenance | varchar | | newest work on the section
 -- look_at | varchar | | what to look at
 -- diagnosis | varchar | | of an alarm or a campaign to confirm: what has changed by the diagnosis, or why there is no decision; where alarm and diagnosis differ, in what; empty = no alarm
@@ -439,7 +460,7 @@ create or replace view worklist as select * from worklist(newest_measurement());
 -- pad_stiffness_low_pct | double | % | 95 % interval, lower end
 -- pad_stiffness_high_pct | double | % | upper end
 -- sentence | varchar | | what happened, with its interval, in words
--- false_alarm_words | varchar | | how often an intact chart does this
+-- false_alarm_words | varchar | | how often charts without a change raise such an alarm
 -- last_maintenance | varchar | | newest work on the section
 -- look_at | varchar | | what to look at
 -- diagnosis | varchar | | of an alarm or a campaign to confirm: what has changed by the diagnosis, or why there is no decision; where alarm and diagnosis differ, in what; empty = no alarm

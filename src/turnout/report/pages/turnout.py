@@ -124,8 +124,8 @@ def lines_of(worklist: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
     Returns
     -------
     list of dict
-        ``state``, ``badge``, ``words``, ``diagnosis`` ("" without one) and ``anchor``, the label of the section that it
-        concerns.
+        ``state``, ``badge``, ``words``, ``diagnosis`` ("" without one), ``look_at`` (what to look at) and ``anchor``,
+        the label of the section that it concerns.
     """
     return [
         {
@@ -134,6 +134,7 @@ def lines_of(worklist: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
             "words": ("" if work["change_pct"] is not None else f"{work['sections']}, {work['band']}: ")
             + work["sentence"],
             "diagnosis": diagnosis,
+            "look_at": work.get("look_at") or "",
             "anchor": (work.get("section_id") or "").split("/")[-1].replace("*", ""),
         }
         for work, diagnosis in zip(worklist, diagnoses_once(worklist))

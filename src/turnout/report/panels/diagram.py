@@ -85,8 +85,11 @@ def _section_marker(
     x, y = px(section["position_m"] or 0.0), py(section["position_m"] or 0.0, diverging)
     state = states.get(section["section_id"], "not measured")
     side = 26 + lift if diverging else -24 - lift
+    end = y + side + (0 if diverging else 14)
+    leader = f'<path class="event mild" d="M{x:.1f} {y:.1f}V{end:.1f}"/>' if lift else ""
     return (
-        f'<a href="#{escape(section["label"])}"><circle class="{STYLE.get(state, "state-unknown")}" cx="{x:.1f}" '
+        f'<a href="#{escape(section["label"])}">{leader}'
+        f'<circle class="{STYLE.get(state, "state-unknown")}" cx="{x:.1f}" '
         f'cy="{y:.1f}" r="11"><title>{escape(section["label"])}, {escape(section["panel"] or "?")} panel: '
         f"{escape(state)}</title></circle>"
         f'<text class="place" x="{x:.1f}" y="{y + side:.1f}" text-anchor="middle">{escape(section["label"])}</text>'
@@ -96,7 +99,7 @@ def _section_marker(
 
 
 def _metres(section: Mapping[str, Any]) -> str:
-    return "" if section["position_m"] is None else f"{section['position_m']:.0f} m"
+    return "" if section["position_m"] is None else f"{section['position_m']:.1f} m"
 
 
 def _lifts(

@@ -9,7 +9,7 @@ import numpy as np
 
 from turnout.counts import count_of
 from turnout.report.axis import Axis
-from turnout.report.formatting import seconds, student_quantile
+from turnout.report.formatting import seconds, student_quantile, with_half_width
 from turnout.report.svg import Chart
 
 if TYPE_CHECKING:
@@ -90,25 +90,21 @@ def history_panel(
     low, high = np.array([[i.low, i.high] for i in intervals], dtype=float).T
     low, high = np.where(np.isnan(low), value, low), np.where(np.isnan(high), value, high)
     expected = [c for c in charts if c[quantity.low] is not None and c[quantity.high] is not None]
-    lowest = min([low.min(), *(c[quantity.low] for c in expected)])
-    highest = max([high.max(), *(c[quantity.high] for c in expected)])
-    # a single value without an error still gets an axis of 2 % with short numbers at its ticks
-    pad = max(0.08 * (highest - lowest), 0.01 * highest - 0.5 * (highest - lowest))
+    lows, highs = [c[quantity.low] for c in expected], [c[quantity.high] for c in expected]
     margin = 0.03 * (time.max() - time.min()) + 86400
     chart = Chart(
         Axis(time.min() - margin, time.max() + margin, "", "time"),
-        Axis(lowest - pad, highest + pad, f"{band}{quantity.name} [{quantity.unit.strip() or '-'}]"),
-        f"{band}{quantity.name}: {value[-1]:.{quantity.decimals}f}{quantity.unit} {_words(intervals[-1])}, "
-        f"n = {modes[-1]['n_impacts']}; " + count_of(len(modes), "campaign"),
+        Axis(*_limits(low, high, lows, highs), f"{band}{quantity.name} [{quantity.unit.strip() or '-'}]"),
+        f"{band}{quantity.name}: {with_half_width(value[-1], intervals[-1].half_width, quantity.decimals)}"
+        f"{quantity.unit} (95 %), n = {modes[-1]['n_impacts']}; " + count_of(len(modes), "campaign"),
         width=width,
     )
     if expected:
         when = [seconds(c["measured_at_utc"]) for c in expected]
-        lows, highs = [c[quantity.low] for c in expected], [c[quantity.high] for c in expected]
         chart.band(when, lows, highs, "expected", "expected at this temperature")
     if recursive:
         means = [r[quantity.recursive] for r in recursive]
-        chart.line([seconds(r["measured_at_utc"]) for r in recursive], means, "curve", "estimated recursively")
+        chart.line([seconds(r["measured_at_utc"]) for r in recursive], means, "curve", "weighted mean, 180 days")
     for row, event in enumerate(events):
         style = "event" if event[f"resets_{band}"] else "event mild"
         chart.vertical(seconds(event["event_at_utc"]), style, event["kind"].replace("_", " "), row % 3)
@@ -123,6 +119,30 @@ def history_panel(
         some, series = np.flatnonzero(np.array(styles) == style), SERIES[style]
         chart.points(time[some], value[some], style, 3.0, low[some], high[some], [labels[i] for i in some], series)
     return chart.svg()
+
+
+def _limits(low: np.ndarray, high: np.ndarray, lows: Sequence[float], highs: Sequence[float]) -> tuple[float, float]:
+    """Ends of the vertical axis: all campaigns with their intervals, and the usual range that was expected.
+
+    The range that is expected of a campaign with a large error may be much wider. Beyond one span of the campaigns it
+    is cut off. No frequency and no damping ratio is below 0.
+
+    Examples
+    --------
+    >>> ends = _limits(np.array([98.0]), np.array([102.0]), [95.0, 97.0, -200.0], [105.0, 103.0, 400.0])
+    >>> [round(end, 2) for end in ends]
+    [93.04, 106.96]
+    """
+    lowest, highest = low.min(), high.max()
+    if lows:
+        span = highest - lowest
+        lowest, highest = (
+            min(lowest, max(min(lows), lowest - span), np.median(lows)),
+            max(highest, min(max(highs), highest + span), np.median(highs)),
+        )
+    # a single value without an error still gets an axis of 2 % with short numbers at its ticks
+    pad = max(0.08 * (highest - lowest), 0.01 * highest - 0.5 * (highest - lowest))
+    return float(max(lowest - pad, 0.0)), float(highest + pad)
 
 
 def _point_styles(modes: Sequence[Mapping[str, Any]], charts: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -194,7 +214,7 @@ def _words(of_campaign: Interval) -> str:
     half = of_campaign.half_width
     if half is None:
         return "± unknown"
-    return f"± {half:.2g} (95 %{f', {of_campaign.steps} steps' if of_campaign.steps else ''})"
+    return f"± {half:.2g} (95 %{f', from {of_campaign.steps} differences' if of_campaign.steps else ''})"
 
 
 def _temperature(value: float | None) -> str:

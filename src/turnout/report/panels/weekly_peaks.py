@@ -9,7 +9,7 @@ import numpy as np
 from turnout.constants import Z95
 from turnout.counts import count_of
 from turnout.report.axis import Axis
-from turnout.report.formatting import seconds
+from turnout.report.formatting import seconds, with_half_width
 from turnout.report.svg import Chart
 
 if TYPE_CHECKING:
@@ -45,11 +45,12 @@ def weekly_peaks_panel(label: str, weeks: Sequence[Mapping[str, Any]], width: in
     low, high = peak - np.nan_to_num(half), peak + np.nan_to_num(half)
     margin = 0.03 * (time.max() - time.min()) + 86400
     is_alarm = np.array([(w["state"] or "").startswith("alarm") for w in weeks])
+    last = float(half[-1]) if half[-1] > 0.0 else None
     state = "in alarm" if is_alarm[-1] else "no alarm"
     chart = Chart(
         Axis(time.min() - margin, time.max() + margin, "", "time"),
-        Axis(0.0, 1.08 * float(high.max()), "peak [m/s²]"),
-        f"{label}: {peak[-1]:.0f} m/s² under trains, {state}; {count_of(len(weeks), 'week')}",
+        Axis(0.0, 1.08 * float(high.max()), "peak acceleration [m/s²]"),
+        f"{label}: {with_half_width(peak[-1], last, 0)} m/s² (95 %), {state}; {count_of(len(weeks), 'week')}",
         width=width,
     )
     labels = [f"week of {w['week_utc']:%Y-%m-%d}: {p:.1f} m/s² ± {h:.1f} (95 %)" for w, p, h in zip(weeks, peak, half)]
