@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import scipy
 from scipy.fft import next_fast_len, rfft
-from scipy.signal import find_peaks
 
 from turnout.constants import MAD_TO_SD
 from turnout.hammer_test.impact_window import Contact
@@ -195,7 +195,7 @@ def further_contacts(cut: Cut, contact: Contact, settings: ReceptanceSettings) -
     outside = np.concatenate([force[:lower], force[upper:]])
     noise = NOISE_FACTOR * MAD_TO_SD * float(np.median(np.abs(outside))) if outside.size else 0.0
     level = max(settings.double_hit_level, noise)
-    tops, shape = find_peaks(force, height=level, prominence=max(settings.double_hit_prominence, noise))
+    tops, shape = scipy.signal.find_peaks(force, height=level, prominence=max(settings.double_hit_prominence, noise))
     contacts = []
     for k, prominence in zip(tops, shape["prominences"]):
         is_close = lower <= k < upper

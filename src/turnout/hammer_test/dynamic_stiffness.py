@@ -1,7 +1,7 @@
 """Compute the dynamic stiffness of a section at one frequency: force over displacement."""
 
 import numpy as np
-from scipy.stats import f as fisher
+import scipy
 
 
 def dynamic_stiffness(
@@ -46,7 +46,9 @@ def dynamic_stiffness(
     magnitude, gamma_squared = float(np.abs(h1[k])), float(coherence[k])
     if not (passed[k] and magnitude > 0.0 and gamma_squared > 0.0):
         return None
-    radius = float(np.sqrt(fisher.ppf(0.95, 2, 2 * n - 2) / (n - 1) * max(0.0, 1.0 - gamma_squared) / gamma_squared))
+    radius = float(
+        np.sqrt(scipy.stats.f.ppf(0.95, 2, 2 * n - 2) / (n - 1) * max(0.0, 1.0 - gamma_squared) / gamma_squared)
+    )
     return (
         1.0 / magnitude,
         1.0 / (magnitude * (1.0 + radius)),

@@ -11,7 +11,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 
 from turnout.constants import MAD_TO_SD
 from turnout.hammer_test.contact import crossing
@@ -209,14 +209,14 @@ MAX_SPLINE_SAMPLES = 128  # longest pulse whose weights are kept: a longer one h
 def _refine(pulse: np.ndarray) -> np.ndarray:
     """The cubic spline of a pulse at eighths of its sampling interval."""
     if pulse.size > MAX_SPLINE_SAMPLES:
-        return CubicSpline(np.arange(pulse.size), pulse)(np.arange(8 * (pulse.size - 1) + 1) / 8.0)
+        return scipy.interpolate.CubicSpline(np.arange(pulse.size), pulse)(np.arange(8 * (pulse.size - 1) + 1) / 8.0)
     return _spline_weights(pulse.size) @ pulse
 
 
 @lru_cache(maxsize=MAX_SPLINE_SAMPLES)
 def _spline_weights(n: int) -> np.ndarray:
     """(8 (n - 1) + 1, n) weights of the samples of a pulse in its spline, which is linear in them."""
-    return CubicSpline(np.arange(n), np.eye(n))(np.arange(8 * (n - 1) + 1) / 8.0)
+    return scipy.interpolate.CubicSpline(np.arange(n), np.eye(n))(np.arange(8 * (n - 1) + 1) / 8.0)
 
 
 def natural_top(contact: Contact) -> float:

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.stats import nct, t
+import scipy
 
 from turnout.records import ModalModel
 
@@ -100,7 +99,7 @@ def welch_test(
     freedom = sum(mean_variances) ** 2 / sum(
         p**2 / (len(s) - 1) for p, s in zip(mean_variances, (first, second), strict=True)
     )
-    probability = float(2.0 * t.sf(abs(difference) / se, freedom))
+    probability = float(2.0 * scipy.stats.t.sf(abs(difference) / se, freedom))
     return difference, se, float(freedom), probability, se * detectable_shift(freedom, level, power)
 
 
@@ -128,8 +127,10 @@ def detectable_shift(freedom: float, level: float = 0.01, power: float = 0.8) ->
     >>> print(f"{detectable_shift(1e6):.3f}")
     3.417
     """
-    limit = t.isf(level / 2.0, freedom)
-    return float(brentq(lambda shift: nct.sf(limit, freedom, shift) - power, 0.0, limit + 40.0))
+    limit = scipy.stats.t.isf(level / 2.0, freedom)
+    return float(
+        scipy.optimize.brentq(lambda shift: scipy.stats.nct.sf(limit, freedom, shift) - power, 0.0, limit + 40.0)
+    )
 
 
 def compare_tests(
@@ -170,7 +171,7 @@ def compare_tests(
     if min(len(s) for s in samples) < 2:
         return None
     difference, se, freedom, probability, detectable = welch_test(samples[0], samples[1], level, power)
-    half = t.isf(level / 2.0, freedom) * se if se > 0.0 else 0.0
+    half = scipy.stats.t.isf(level / 2.0, freedom) * se if se > 0.0 else 0.0
     return Shift(
         band=band,
         parameter=parameter,

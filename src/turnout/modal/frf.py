@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 from scipy.linalg import eigh
 from scipy.ndimage import uniform_filter1d
-from scipy.signal import find_peaks, peak_widths
 
 from turnout.modal.frf_fit import FrfFit, fit_each
 from turnout.modal.state_space import continuous_pole
@@ -156,8 +156,8 @@ def _peaks_and_widths(power: np.ndarray, prominence: float) -> tuple[np.ndarray,
             break
         averaged = uniform_filter1d(power, n_line, mode="nearest")
         level = 10.0 * np.log10(np.maximum(averaged, 1e-30 * averaged.max()))
-        peaks, _ = find_peaks(level, prominence=prominence / np.sqrt(n_line))
-        for peak, width in zip(peaks, peak_widths(averaged, peaks, rel_height=0.5)[0], strict=True):
+        peaks, _ = scipy.signal.find_peaks(level, prominence=prominence / np.sqrt(n_line))
+        for peak, width in zip(peaks, scipy.signal.peak_widths(averaged, peaks, rel_height=0.5)[0], strict=True):
             is_wide = n_line == 1 or width >= MIN_WIDTH * n_line
             if is_wide and all(abs(peak - p) > 0.5 * max(w, n_line) for p, w in found):
                 found.append((int(peak), float(width)))

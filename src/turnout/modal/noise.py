@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.signal import lfilter
+import scipy
 from scipy.special import chdtrc
 
 from turnout.modal.least_squares import drift_columns, linearise
@@ -95,7 +95,7 @@ def whiten(decays: np.ndarray, whitening: np.ndarray) -> np.ndarray:
     array([[0., 0.]])
     """
     order = len(whitening) - 1
-    return lfilter(whitening, 1.0, decays, axis=-1)[:, order:] if order else decays
+    return scipy.signal.lfilter(whitening, 1.0, decays, axis=-1)[:, order:] if order else decays
 
 
 BACKGROUND_SIGNIFICANCE = 1e-3  # significance level of a drift or a hum

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.signal import butter, sosfilt, sosfiltfilt
+import scipy
 
 from turnout.modal.bands import fit_receptance, passed_share
 from turnout.modal.era import era
@@ -60,10 +60,10 @@ def split_bands(records: ArrayLike, rate: float, settings: IdentifySettings) -> 
     """
     order, edge = settings.paper_filter_order, settings.split_frequency
     upper_edge = min(settings.paper_band_high, MAX_EDGE_SHARE * rate)
-    filters = [butter(order, min(edge, upper_edge), fs=rate, output="sos")]
+    filters = [scipy.signal.butter(order, min(edge, upper_edge), fs=rate, output="sos")]
     if upper_edge > edge:
-        filters.append(butter(order, [edge, upper_edge], btype="band", fs=rate, output="sos"))
-    apply_filter = sosfiltfilt if settings.paper_zero_phase else sosfilt
+        filters.append(scipy.signal.butter(order, [edge, upper_edge], btype="band", fs=rate, output="sos"))
+    apply_filter = scipy.signal.sosfiltfilt if settings.paper_zero_phase else scipy.signal.sosfilt
     return tuple(apply_filter(sos, np.asarray(records, dtype=float), axis=-1) for sos in filters)
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.stats import norm, t
+import scipy
 
 from turnout.modal.least_squares import Linearisation, drift_columns, linearise
 from turnout.modal.mixed_effects import between_variance
@@ -72,7 +72,7 @@ def summarise(value: np.ndarray, se: np.ndarray, confidence: float = 0.95, share
     n = len(value)
     if n == 0:
         raise ValueError("no estimates to summarise")
-    normal = norm.ppf(0.5 + confidence / 2.0)
+    normal = scipy.stats.norm.ppf(0.5 + confidence / 2.0)
     if n == 1:
         mean, spread2, repeatability, quantile = float(value[0]), 0.0, float(se[0]), normal
     else:
@@ -80,7 +80,7 @@ def summarise(value: np.ndarray, se: np.ndarray, confidence: float = 0.95, share
         weight = 1.0 / (np.maximum(se**2, 1e-300) + spread2)
         mean = float(np.sum(weight * value) / weight.sum())
         repeatability = float(np.sqrt(np.sum(weight * (value - mean) ** 2) / ((n - 1) * weight.sum())))
-        quantile = t.ppf(0.5 + confidence / 2.0, n - 1)
+        quantile = scipy.stats.t.ppf(0.5 + confidence / 2.0, n - 1)
     half = float(np.hypot(quantile * repeatability, normal * shared_se))
     error = float(np.hypot(repeatability, shared_se))
     return Summary(mean, error, mean - half, mean + half, float(np.sqrt(spread2)), n, repeatability, float(shared_se))

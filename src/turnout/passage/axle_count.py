@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from turnout.constants import KMH
 from turnout.passage.axles import AxleFinding, fit_axle_positions
@@ -160,8 +160,8 @@ def estimate_speed(
         accelerations - 0.5 * (accelerations[1] - accelerations[0]),
         accelerations[-1] + 0.5 * (accelerations[1] - accelerations[0]),
     )
-    steady = np.diff(stats.norm.cdf(edges / STEADY_ACCELERATION))
-    unsteady = np.diff(stats.norm.cdf(edges / (0.25 * settings.acceleration_limit)))
+    steady = np.diff(scipy.stats.norm.cdf(edges / STEADY_ACCELERATION))
+    unsteady = np.diff(scipy.stats.norm.cdf(edges / (0.25 * settings.acceleration_limit)))
     log_posterior = log_posterior + np.log(STEADY_SHARE * steady + (1 - STEADY_SHARE) * unsteady + 1e-12)[:, None]
     weight = np.exp(log_posterior - log_posterior.max())
     weight /= weight.sum()

@@ -7,7 +7,7 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import signal
+import scipy
 
 from turnout.passage.axles import GRID_STEP, along_train
 
@@ -84,13 +84,13 @@ def quasi_static(samples: np.ndarray, rate: float, passage: Passage, position: f
     start, stop = passage.offsets[0] - 12.0, passage.offsets[-1] + 12.0
     motion = passage.train_motion
     row = along_train((slow - np.median(slow))[None], per_bin / rate, [position], motion, start, stop)[0]
-    sections = signal.butter(3, WAVENUMBER_BAND, btype="bandpass", fs=1.0 / GRID_STEP, output="sos")
+    sections = scipy.signal.butter(3, WAVENUMBER_BAND, btype="bandpass", fs=1.0 / GRID_STEP, output="sos")
     grid = np.arange(len(row)) * GRID_STEP + start
     kx = 1.1 * np.abs(grid[:, None] - passage.offsets)
     columns = np.exp(-kx) * (np.cos(kx) - np.sin(kx))
     columns *= (motion.speed_at(motion.passing(passage.offsets, position)) / motion.speed) ** 2
-    columns = signal.sosfiltfilt(sections, columns, axis=0)
-    return np.linalg.lstsq(columns, signal.sosfiltfilt(sections, row), rcond=None)[0]
+    columns = scipy.signal.sosfiltfilt(sections, columns, axis=0)
+    return np.linalg.lstsq(columns, scipy.signal.sosfiltfilt(sections, row), rcond=None)[0]
 
 
 def train_amplitude(per_axle: np.ndarray) -> tuple[float, float]:

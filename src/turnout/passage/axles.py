@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage, signal
+import scipy
+from scipy import ndimage
 
 from turnout.passage.kinematics import Motion
 
@@ -96,7 +97,9 @@ def axle_candidates(
     list of AxleFinding
         Empty where fewer than two peaks are certain.
     """
-    peaks, properties = signal.find_peaks(profile, distance=max(int(spacing / GRID_STEP), 1), prominence=0.2 * noise)
+    peaks, properties = scipy.signal.find_peaks(
+        profile, distance=max(int(spacing / GRID_STEP), 1), prominence=0.2 * noise
+    )
     height = np.minimum(properties["prominences"], 2.0 * profile[peaks])
     ranked = np.sort(height)[::-1]
     n_sure = int(np.sum(ranked >= noise))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy import optimize, stats
+import scipy
 
 if TYPE_CHECKING:
     from turnout.config.settings.passage import PassageSettings
@@ -91,7 +91,7 @@ class Clusters:
             deviation = point[:n_dimension] - cluster.mean[:n_dimension]
             covariance = cluster.covariance[:n_dimension, :n_dimension]
             distance_squared = float(deviation @ np.linalg.solve(covariance, deviation))
-            if stats.chi2.sf(distance_squared, n_dimension) < level:
+            if scipy.stats.chi2.sf(distance_squared, n_dimension) < level:
                 continue
             log_density = np.log(cluster.weight) - 0.5 * distance_squared - 0.5 * np.linalg.slogdet(covariance)[1]
             if log_density > highest_log:
@@ -214,7 +214,7 @@ def _with_ids(
                 for _, m, _ in components
             ]
         )
-        for i, j in zip(*optimize.linear_sum_assignment(np.minimum(distance, 1e6))):
+        for i, j in zip(*scipy.optimize.linear_sum_assignment(np.minimum(distance, 1e6))):
             if distance[i, j] < 2.0:
                 ids[i] = previous_clusters[j].id
     clusters = []

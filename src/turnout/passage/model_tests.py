@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import linalg, stats
+import scipy
+from scipy import linalg
 
 from turnout.passage.impulse_fit import joint_fit, onsets
 from turnout.passage.scores import Scores, score
@@ -88,7 +89,7 @@ def direction_test(
         jump, axis = (linalg.solve_triangular(root, v, lower=True) for v in (fit.amplitudes[j], along))
         statistic[j] = jump @ jump - (axis @ jump) ** 2 / (axis @ axis)
         total += jump @ jump
-    p_value = stats.chi2.sf(statistic, p - 1)
+    p_value = scipy.stats.chi2.sf(statistic, p - 1)
     along = 1.0 - float(statistic.sum() / total) if total > 0 else float("nan")
     return DirectionTest(statistic, p - 1, p_value, float(np.mean(p_value < level)), fit.amplitudes, covariance, along)
 

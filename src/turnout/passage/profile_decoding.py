@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage, signal
+import scipy
+from scipy import ndimage
 
 from turnout.passage.axle_patterns import Pattern
 from turnout.passage.axles import GRID_STEP, AxleFinding
@@ -55,7 +56,7 @@ def decode_profile(
         return None
     # a wheel is a peak of height 1; noise beside it must not be collected
     highest = ndimage.maximum_filter1d(profile, 2 * int(POSITION_SLACK / GRID_STEP) + 1)
-    peaks, _ = signal.find_peaks(profile, height=MIN_HEIGHT, distance=int(0.6 / GRID_STEP))
+    peaks, _ = scipy.signal.find_peaks(profile, height=MIN_HEIGHT, distance=int(0.6 / GRID_STEP))
     if peaks.size < 4:
         return None
     first = np.repeat(peaks[:N_STARTS] * GRID_STEP, SCALES.size)

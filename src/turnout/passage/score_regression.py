@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+import scipy
 
 REQUIRED_COLUMNS = ("train_type", "speed_kmh", "axle_load_t")
 
@@ -93,7 +93,7 @@ def _column_effects(
     leverage = np.clip(np.einsum("ij,jk,ik->i", design, inverse, design), 0, 0.999)
     weight = ((y - design @ solution) / (1 - leverage)) ** 2
     covariance = inverse @ (design * weight[:, None]).T @ design @ inverse
-    t = stats.t.ppf(0.975, n - p)
+    t = scipy.stats.t.ppf(0.975, n - p)
     for column, name in zip(columns, names):
         if _is_determined(design, column):
             continue

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import signal
+import scipy
 
 if TYPE_CHECKING:
     from turnout.config.settings.passage import PassageSettings
@@ -112,12 +112,12 @@ class _PassageCutter:
     def feed(self, block: np.ndarray) -> Iterator[Excerpt]:
         """Excerpts that end in this block."""
         if self.n_fed == 0:
-            self.filter_sections = signal.butter(2, BAND, btype="bandpass", fs=self.rate, output="sos")
+            self.filter_sections = scipy.signal.butter(2, BAND, btype="bandpass", fs=self.rate, output="sos")
             # as if the channels had always had their first value: an offset is no impact
             offset = np.median(block, axis=1)[None, :, None]
-            self.filter_state = signal.sosfilt_zi(self.filter_sections)[:, None, :] * offset
+            self.filter_state = scipy.signal.sosfilt_zi(self.filter_sections)[:, None, :] * offset
             self.remainder = np.zeros((block.shape[0], 0))
-        filtered, self.filter_state = signal.sosfilt(self.filter_sections, block, axis=1, zi=self.filter_state)
+        filtered, self.filter_state = scipy.signal.sosfilt(self.filter_sections, block, axis=1, zi=self.filter_state)
         self.blocks.append(block.astype(np.float32))
         self.n_fed += block.shape[1]
         per_bin = int(BIN_LENGTH * self.rate)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from turnout.constants import KMH
 from turnout.passage.axle_patterns import Vehicle, offsets
@@ -217,7 +217,7 @@ def unknown_evidence(spacing: np.ndarray) -> float:
     short = np.asarray(spacing) < MIN_LONG_SPACING
     density = np.where(
         short,
-        0.95 * stats.norm.pdf(spacing, BOGIE_WHEELBASE, BOGIE_WHEELBASE_SD) + 0.01,
+        0.95 * scipy.stats.norm.pdf(spacing, BOGIE_WHEELBASE, BOGIE_WHEELBASE_SD) + 0.01,
         1 / (MAX_SPACING - MIN_LONG_SPACING),
     )
     density = np.where(np.asarray(spacing) > 1.5 * MAX_SPACING, 1e-4, density)
@@ -309,7 +309,7 @@ def _candidate(
     covariance = covariance * min(1.0, max((rms / sigma) ** 2 * len(times) / freedom, 0.1))
     # errors of neighbours are correlated, most in a heavy vehicle: fewer of them are independent
     covariance = covariance * _variance_inflation(v * elapsed + 0.5 * a * elapsed**2 - positions)
-    p_value = float(stats.chi2.sf(chi_squared, freedom))
+    p_value = float(scipy.stats.chi2.sf(chi_squared, freedom))
     return _Candidate(type_, evidence, p_value, vehicles, positions, rms, ((v, a), covariance))
 
 

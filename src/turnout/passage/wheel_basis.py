@@ -7,7 +7,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import fft, signal
+import scipy
+from scipy import fft
 
 from turnout.records import ModalModel
 
@@ -279,7 +280,7 @@ def band_pass(low: float, high: float, order: int, rate: float) -> np.ndarray:
     high = min(high, 0.45 * rate)
     if not 0 < low < high:
         raise ValueError(f"no band between {low} Hz and {high} Hz at {rate} samples per second")
-    return signal.butter(order, [low, high], btype="bandpass", fs=rate, output="sos")
+    return scipy.signal.butter(order, [low, high], btype="bandpass", fs=rate, output="sos")
 
 
 def apply_filter(samples: np.ndarray, filter_: np.ndarray | None) -> np.ndarray:
@@ -300,8 +301,8 @@ def apply_filter(samples: np.ndarray, filter_: np.ndarray | None) -> np.ndarray:
     if filter_ is None:
         return np.asarray(samples, dtype=float)
     if np.ndim(filter_) == 2:
-        return signal.sosfilt(filter_, samples, axis=-1)
-    return signal.lfilter(filter_, [1.0], samples, axis=-1)
+        return scipy.signal.sosfilt(filter_, samples, axis=-1)
+    return scipy.signal.lfilter(filter_, [1.0], samples, axis=-1)
 
 
 def settling_length(poles: np.ndarray, filter_: np.ndarray | None, tolerance: float, longest: int) -> int:
@@ -323,7 +324,7 @@ def settling_length(poles: np.ndarray, filter_: np.ndarray | None, tolerance: fl
     int
         Number of samples, at least 8 unless ``longest`` is less.
     """
-    inner = signal.sos2zpk(filter_)[1] if filter_ is not None and np.ndim(filter_) == 2 else np.zeros(0)
+    inner = scipy.signal.sos2zpk(filter_)[1] if filter_ is not None and np.ndim(filter_) == 2 else np.zeros(0)
     radii = np.concatenate([np.abs(poles), np.abs(inner), [0.0]])
     slowest = min(radii.max(), 1 - 1e-6)
     return int(min(longest, max(8, np.ceil(np.log(tolerance) / np.log(slowest)))))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import signal
+import scipy
 
 from turnout.report.axis import Axis
 from turnout.report.site import page_environment, shared_by_pages
@@ -157,7 +157,7 @@ def spectrogram(sensor: SensorPassage) -> tuple[np.ndarray, np.ndarray, np.ndarr
     excerpt = sensor.samples[start:stop]
     length = min(max(16, round(sensor.rate * N_FREQUENCY / (2.0 * MAX_FREQUENCY)) * 2), excerpt.size)
     hop = max(1, (excerpt.size - length) // N_TIME)
-    frequency, time, density = signal.spectrogram(
+    frequency, time, density = scipy.signal.spectrogram(
         excerpt, sensor.rate, window="hann", nperseg=length, noverlap=length - min(hop, length), mode="psd"
     )
     in_range = frequency <= MAX_FREQUENCY

@@ -1,10 +1,12 @@
 """Compute the sampling distribution of a coherence estimate and the confidence limits that follow from it."""
 
+from __future__ import annotations
+
 from functools import lru_cache
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicSpline
 
 # Tables over u = -ln(1 - coherence) from 0 (none) to 30 (1 - 1e-13), finer near 0 where u(v) has most curvature.
 TABLE_NODES = 30.0 * np.linspace(0.0, 1.0, 201) ** 3
@@ -73,7 +75,7 @@ def _sum_of_logs(b: np.ndarray, a: np.ndarray, n: int) -> np.ndarray:
 
 
 @lru_cache(maxsize=256)
-def _quantile_table(n: int, probability: float) -> CubicSpline:
+def _quantile_table(n: int, probability: float) -> scipy.interpolate.CubicSpline:
     """Spline from v = -ln(1 - quantile) to u = -ln(1 - true), both free of cancellation and nearly parallel."""
     u = TABLE_NODES
     low, high = np.zeros_like(u), u + 40.0
@@ -81,7 +83,7 @@ def _quantile_table(n: int, probability: float) -> CubicSpline:
         v = 0.5 * (low + high)
         below = _distribution_of_complements(np.exp(-v), np.exp(-u), n) < probability
         low, high = np.where(below, v, low), np.where(below, high, v)
-    return CubicSpline(0.5 * (low + high), u)
+    return scipy.interpolate.CubicSpline(0.5 * (low + high), u)
 
 
 def true_coherence_with_quantile(estimate: ArrayLike, n: int, probability: float) -> np.ndarray:

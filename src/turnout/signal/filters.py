@@ -9,7 +9,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import signal
+import scipy
 
 if TYPE_CHECKING:
     pass
@@ -50,7 +50,7 @@ def butterworth_sections(low: float | None, high: float | None, rate: float, ord
     if not edges or any(not 0.0 < edge < rate / 2 for edge in edges) or sorted(set(edges)) != edges:
         raise ValueError(f"cannot pass {low} ... {high} Hz at a rate of {rate} Hz")
     band_type = "bandpass" if len(edges) == 2 else ("highpass" if high is None else "lowpass")
-    sections = signal.butter(order, edges if len(edges) == 2 else edges[0], band_type, fs=rate, output="sos")
+    sections = scipy.signal.butter(order, edges if len(edges) == 2 else edges[0], band_type, fs=rate, output="sos")
     sections.flags.writeable = False
     return sections
 
@@ -94,7 +94,7 @@ def band_pass(
     0.000
     """
     sections = np.array(butterworth_sections(low, high, float(rate), order))
-    apply_sections = signal.sosfiltfilt if zero_phase else signal.sosfilt
+    apply_sections = scipy.signal.sosfiltfilt if zero_phase else scipy.signal.sosfilt
     return apply_sections(sections, np.asarray(x, dtype=float), axis=-1)
 
 
@@ -126,7 +126,7 @@ def reduce_rate(x: np.ndarray, factor: int) -> np.ndarray:
     x = np.asarray(x, dtype=float)
     if int(factor) != factor or factor < 1:
         raise ValueError(f"need a whole factor of 1 or more, got {factor}")
-    return x if factor == 1 else signal.resample_poly(x, 1, int(factor), axis=-1, padtype="line")
+    return x if factor == 1 else scipy.signal.resample_poly(x, 1, int(factor), axis=-1, padtype="line")
 
 
 # Skewed pulse x^p e^(p (1-x)): it rises fast and decays slowly; above 2 % of its peak until x = SKEW_END.

@@ -4,8 +4,8 @@ The module also has the windows of an impact test and the correction of poles fo
 """
 
 import numpy as np
+import scipy
 from scipy.fft import next_fast_len, rfft, rfftfreq
-from scipy.stats import chi2
 
 
 def cross_spectra(
@@ -144,7 +144,7 @@ def density_interval(n: int, level: float = 0.95) -> tuple[float, float]:
     -1.4 +1.7 dB
     """
     nu = 2 * n
-    return float(nu / chi2.ppf(0.5 + level / 2, nu)), float(nu / chi2.ppf(0.5 - level / 2, nu))
+    return float(nu / scipy.stats.chi2.ppf(0.5 + level / 2, nu)), float(nu / scipy.stats.chi2.ppf(0.5 - level / 2, nu))
 
 
 def force_window(n_sample: int, contact_end: int, taper: int) -> np.ndarray:

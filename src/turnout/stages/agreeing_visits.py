@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from turnout.errors import SimulationError
 from turnout.mismatch.calibrated import (
@@ -202,7 +202,7 @@ def _information_given(
         information += visit_groups(group.case, given.fit, group.sections, group.route)
     again = [*visits[:-1], replace(visits[-1], groups=tuple(information))]
     innovation = estimate_history(parameters, again, events, repeats_between_visits=False, accepted=None).steps[-1]
-    chance = float(stats.chi2.sf(excess, max(innovation.innovation.n_directions, 1)))
+    chance = float(scipy.stats.chi2.sf(excess, max(innovation.innovation.n_directions, 1)))
     is_linear_enough = 0.5 * (linear_excess - excess) <= threshold
     agrees = innovation.innovation.is_expected and chance >= 0.5 * CALIBRATION.max_chance and not is_linear_enough
     return tuple(information) if agrees else ()

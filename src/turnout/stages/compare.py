@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
-from scipy import signal
+import scipy
 
 from turnout.config import load_configuration, with_raw
 from turnout.constants import KMH
@@ -268,7 +268,7 @@ def _compare_sensor(
             at = at + _delay(time, ours, at, theirs)
         theirs = np.interp(time, at, theirs)
         n = min(ours.size, round(rate))
-        frequency, density = signal.welch(np.array([ours, theirs]), rate, "boxcar", nperseg=n, detrend=False)
+        frequency, density = scipy.signal.welch(np.array([ours, theirs]), rate, "boxcar", nperseg=n, detrend=False)
         inside = (frequency >= low) & (frequency <= high)
         comparisons.append(
             BandComparison(
@@ -288,4 +288,4 @@ def _delay(time: np.ndarray, recorded: np.ndarray, at: np.ndarray, simulated: np
 def _in_band(samples: np.ndarray, low: float, high: float, rate: float) -> np.ndarray:
     """Samples in a band, without delay."""
     edges, kind = (high, "lowpass") if low == 0.0 else ((low, high), "bandpass")
-    return signal.sosfiltfilt(signal.butter(FILTER_ORDER, edges, kind, fs=rate, output="sos"), samples)
+    return scipy.signal.sosfiltfilt(scipy.signal.butter(FILTER_ORDER, edges, kind, fs=rate, output="sos"), samples)

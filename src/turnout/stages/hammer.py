@@ -11,6 +11,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
+import scipy.signal  # noqa: F401 - it is loaded at its first use otherwise, in each of the forked processes anew
 
 from turnout.config.filename_pattern import compile_pattern
 from turnout.config.settings.identify import IdentifySettings

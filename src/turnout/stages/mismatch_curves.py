@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.signal import welch
+import scipy
 
 from turnout.constants import Z95
 from turnout.mismatch.engine.reserved_data import reserved_fit
@@ -169,7 +169,7 @@ def spectra(comparison: ChannelComparison) -> tuple[np.ndarray, ...]:
     rate = 1.0 / float(np.mean(np.diff(comparison.time)))
     size = min(comparison.time.size, round(WELCH_SEGMENT * rate))
     signals = (comparison.measured, comparison.before, comparison.after, comparison.rival)
-    densities = [welch(s, rate, nperseg=size) for s in signals]
+    densities = [scipy.signal.welch(s, rate, nperseg=size) for s in signals]
     return densities[0][0], *(d[1] for d in densities)
 
 
@@ -192,9 +192,11 @@ def band_of(comparison: ChannelComparison | None, changed: bool) -> tuple[float,
         return None
     rate = 1.0 / float(np.mean(np.diff(comparison.time)))
     size = min(comparison.time.size, round(WELCH_SEGMENT * rate))
-    f, density = welch(comparison.measured - comparison.before, rate, nperseg=size)
+    f, density = scipy.signal.welch(comparison.measured - comparison.before, rate, nperseg=size)
     if changed:
-        density = np.maximum(density - welch(comparison.measured - comparison.after, rate, nperseg=size)[1], 0.0)
+        density = np.maximum(
+            density - scipy.signal.welch(comparison.measured - comparison.after, rate, nperseg=size)[1], 0.0
+        )
     return _core_range(f, density)
 
 

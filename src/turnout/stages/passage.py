@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any, cast
 from zlib import crc32
 
+import scipy.signal  # noqa: F401 - it is loaded at its first use otherwise, in each of the forked processes anew
+
 from turnout.config.settings.passage import PassageSettings
 from turnout.config.turnout import TurnoutConfig
 from turnout.errors import PartlyComputed, ReadError

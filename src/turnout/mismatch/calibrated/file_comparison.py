@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from turnout.mismatch.calibrated.belief import Belief, StateParameter
 from turnout.mismatch.calibrated.change import ChangeEffect, direction_of, information_and_score
@@ -132,7 +132,7 @@ def deviations_from_file(
         means = np.zeros((len(runs), len(parameters)))  # each row takes the mean over a run
         for row, run in zip(means, runs):
             row[run] = 1.0 / len(run)
-        limit = float(stats.norm.isf(stats.norm.sf(sds) / max(len(runs), 1)))
+        limit = float(scipy.stats.norm.isf(scipy.stats.norm.sf(sds) / max(len(runs), 1)))
         size = means @ difference
         sd = _sds(means, belief.covariance + error)
         floor = np.sqrt(CALIBRATION.min_prior_share) * _sds(means, prior.covariance)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.stats import t as student
+import scipy
 
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
@@ -143,7 +143,7 @@ def outlier_p_value(means: np.ndarray) -> float:
         return 1.0
     remaining = np.delete(means, int(np.argmax(means)))
     spread = max(float(np.std(remaining, ddof=1)), 1e-12) * np.sqrt(1.0 + 1.0 / remaining.size)
-    return min(1.0, means.size * float(student.sf((means.max() - remaining.mean()) / spread, remaining.size - 1)))
+    return min(1.0, means.size * float(scipy.stats.t.sf((means.max() - remaining.mean()) / spread, remaining.size - 1)))
 
 
 def _without_other_frames(e: np.ndarray, name: str, codes: Mapping[str, np.ndarray]) -> np.ndarray:

@@ -15,7 +15,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import binom, f
+import scipy
 
 from turnout.mismatch.turnout.priors import DISTURBANCE
 
@@ -211,5 +211,7 @@ def excess_over(level: tuple[np.ndarray, float], reference: Sequence[tuple[np.nd
     ratio = np.sort(power / np.maximum(usual, 1e-300))
     rank = (ratio.size - 1) // 2
     middle = float(ratio[rank])
-    tail = float(f.sf(middle, freedom, np.median([n for _, n in reference])))
-    return 10.0 * float(np.log10(max(middle, 1e-300))), float(binom.sf(ratio.size - rank - 1, ratio.size, tail))
+    tail = float(scipy.stats.f.sf(middle, freedom, np.median([n for _, n in reference])))
+    return 10.0 * float(np.log10(max(middle, 1e-300))), float(
+        scipy.stats.binom.sf(ratio.size - rank - 1, ratio.size, tail)
+    )

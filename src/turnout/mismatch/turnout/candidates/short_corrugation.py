@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.signal.windows import tukey
+import scipy
 
 from turnout import physics
 from turnout.mismatch.turnout.candidates.catalogue import candidate_of
@@ -108,7 +108,7 @@ def band_power(case: TrackCase, aligned: AlignedPassage, wavelengths: np.ndarray
     samples = recording.samples[rows][:, max(first, 0) : last]
     edge = 2.0 * SIMULATION.edge_time * recording.rate / samples.shape[1]
     n = 1 << int(np.ceil(np.log2(4 * samples.shape[1])))  # finer lines than bins
-    power = np.abs(np.fft.rfft(samples * tukey(samples.shape[1], min(edge, 1.0)), n)) ** 2
+    power = np.abs(np.fft.rfft(samples * scipy.signal.windows.tukey(samples.shape[1], min(edge, 1.0)), n)) ** 2
     frequency = np.arange(power.shape[1]) * recording.rate / n
     edges = np.searchsorted(
         frequency,
