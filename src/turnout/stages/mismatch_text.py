@@ -226,7 +226,8 @@ def _wheel_text(train: str, axle: int | None) -> str:
 
 def _sentence(term: Mapping[str, Any], finding: Mapping[str, Any]) -> str:
     fixed = term["fixed"]
-    train, axle = _train_and_axle(finding) if finding["train"] else (fixed.get("train") or "a train", None)
+    of_term = fixed.get("train") or "a train", fixed["wheel"] + 1 if "wheel" in fixed else None
+    train, axle = _train_and_axle(finding) if finding["train"] else of_term
     positions = [fixed[k] for k in ("sleeper", "support", "first", "last", "place") if k in fixed]
     shift = term["parameters"].get("shift", {"value": 0.0})["value"] if "place" in fixed else 0.0
     words = {name: number_in_words(p["value"], p["unit"]) for name, p in term["parameters"].items()}

@@ -10,6 +10,7 @@ from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.observations import with_errors
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.mismatch.turnout.priors import TRACK
+from turnout.mismatch.turnout.rail_roughness import amplitude_sd, wave_columns
 from turnout.simulate.roughness import level
 
 
@@ -49,3 +50,44 @@ def test_no_law_is_asked_more_than_a_bay_beyond_what_was_measured(lightly_damped
     assert min(asked) >= min(measured) - TRACK.effect_reach and max(asked) <= max(measured) + TRACK.effect_reach
     assert free.min() < min(asked) and free.max() > max(asked)
     assert {"local_pad", "local_ballast", "hanging_sleeper"} <= {c.family for c in case.candidates}
+
+
+@pytest.fixture(scope="module")
+def slow_train():
+    """A case with a train at 72 km/h, whose band ends at 67 Hz, and the errors of this passage."""
+    case = TrackCase(measured_campaign(small_plan((15.0,), (20.0,), hammer_positions=(24.0,)), (), 7))
+    values = {n.name: case.start_values.get(n.name, n.mean) for n in case.nuisances}
+    (seen,) = (o for o in case.observations if o.name == "heavy 1")
+    return case, values, with_errors(case.predictor, values, case.aligned_passages[seen.name], seen)
+
+
+@pytest.mark.parametrize("wavelength", [0.293, 0.286])
+def test_ordinary_waves_beyond_the_band_leave_no_evidence_for_other_effects(slow_train, wavelength):
+    """A wave of one prior standard deviation costs a joint fit its own prior penalty at most, 1 in chi-squared.
+
+    Its frequency is beyond the band. But its line is as wide as the time in which a wheel passes a sensor is short, so
+    that a part is inside. Where no free wave and no wave of a wheel is so short it costs 8: evidence for any sharp dip.
+    """
+    case, values, seen = slow_train
+    change = _whitened_change(slow_train, wavelength)
+    waves = wave_columns(case.predictor, values, (), case.aligned_passages[seen.name]) * case.predictor.waves.sd
+    columns = np.sqrt(seen.effective) * seen.whiten(waves)
+    along = columns.T @ change
+    assert change @ change - along @ np.linalg.solve(columns.T @ columns + np.eye(along.size), along) < 1.0
+
+
+def test_the_waves_next_to_the_shortest_free_one_do_not_show(slow_train):
+    """The first harmonic that is not free adds less than a tenth in chi-squared; from 0.3 m on it would add 12."""
+    waves = slow_train[0].predictor.waves
+    change = _whitened_change(slow_train, waves.length / (round(waves.length / waves.lengths.min()) + 1))
+    assert change @ change < 0.1
+
+
+def _whitened_change(passage, wavelength):
+    """(n,) what a wave of one prior standard deviation all along the free waves changes in a passage, simulated."""
+    case, values, seen = passage
+    waves = case.predictor.waves
+    size = float(amplitude_sd(np.array([wavelength]), waves.length, 0.0)[0])
+    rough = physics.RailCorrugation(waves.start, waves.end, size, 0.0, wavelength)
+    plain, with_it = (case.predict(values, terms, [seen])[0] for terms in ((), (rough,)))
+    return np.sqrt(seen.effective) * seen.whiten(with_it - plain)

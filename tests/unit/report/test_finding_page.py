@@ -318,3 +318,11 @@ def test_the_residual_is_what_was_measured_less_what_was_simulated():
     # the axis reaches 1.25 times the largest residual on both sides of the middle of 190 - 26 - 40 px
     assert np.ptp(y) == pytest.approx(124.0 / 1.25, abs=0.5)
     assert residual_panel(row, "") == "" and residual_panel(row | {"curve": "spectrum"}, "it") == ""
+
+
+def test_a_second_effect_on_a_wheel_has_its_own_axle_in_the_sentence():
+    """The columns of a finding hold the position of the first effect, which is at a place here."""
+    length = {"length": {"value": 0.04, "se": 0.008, "unit": "m"}}
+    flat = {"term": "wheel_flat", "fixed": {"wheel": 3, "train": "loaded"}, "parameters": length}
+    text = headline(finding(term="hanging_sleeper", position_m=24.6, term_json=json.dumps([GAP, flat])))
+    assert "A wheel on axle 4 of loaded has a flat of 40 mm" in text

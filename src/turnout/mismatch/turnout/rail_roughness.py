@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.mismatch.engine.nuisance import Nuisance
-from turnout.mismatch.turnout.priors import PASSAGE
 from turnout.mismatch.turnout.surface_priors import ROUGHNESS
 from turnout.mismatch.turnout.wave_response import WaveTransfer
 from turnout.simulate.roughness import level
@@ -33,7 +32,7 @@ class Waves:
         self.start, self.end = min(positions) - ROUGHNESS.rolling_reach, max(positions) + ROUGHNESS.rolling_reach
         self.length = ROUGHNESS.period_ratio * (self.end - self.start)
         orders = np.arange(
-            int(np.ceil(self.length / ROUGHNESS.longest_wave)), int(self.length / PASSAGE.shortest_wave) + 1
+            int(np.ceil(self.length / ROUGHNESS.longest_wave)), int(self.length / ROUGHNESS.shortest_wave) + 1
         )
         self.lengths = self.length / orders
         self.wavelength = np.repeat(self.lengths, 2)

@@ -85,6 +85,9 @@ class RoughnessPriors:
     rolling_reach: float = prior(
         3.0, "m", "before the first and behind the last sensor, from where a wheel still excites them", RAIL_ROUGHNESS)
     longest_wave: float = prior(3.0, "m", "of the free waves", RAIL_ROUGHNESS)
+    shortest_wave: float = prior(
+        0.25, "m", "of the free waves: those below 0.3 m are beyond the band, and widen into it at a passing wheel",
+        RAIL_ROUGHNESS)
     period_ratio: float = prior(
         1.1, "-", "period of the waves over the length of rail, so that both ends are independent", "numerical")
     fade_length: float = prior(0.8, "m", "over which waves fade at both ends", "numerical")
