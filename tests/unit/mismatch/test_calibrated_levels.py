@@ -48,6 +48,53 @@ def test_the_level_is_the_share_of_the_variance_that_does_not_repeat(repeated):
         assert 0.9 < np.mean(found) <= np.max(found) == 1.0  # never more certain than stated, nor less
 
 
+def test_the_level_is_the_same_where_a_visit_knows_less_than_the_file():
+    """Of each direction a visit knows 1 to 5 % of what the file does: 1 where the first visit tells no constant error.
+
+    Of n visits with the stated errors, the constant one has the variance 1 before. The mean of k visits leaves
+    1 / (k + 1) of it, so that the next innovation has the variance 0.8 / (k + 1)^2 + 0.2 (1 + k / (k + 1)^2) of the
+    1 + 1 / (k + 1) that is expected.
+    """
+    rng = np.random.default_rng(15)
+    found = [own_levels(SUPPORTS, visits_with(rng, 0.8, sd=1.0))["A: impacts at 1.20 m"] for _ in range(200)]
+    k = np.arange(1, 5)
+    innovations = (0.8 / (k + 1) ** 2 + 0.2 * (1.0 + k / (k + 1) ** 2)) / (1.0 + 1.0 / (k + 1))
+    assert np.mean(found) == pytest.approx((1.0 + innovations.sum()) / 5, abs=0.02)
+
+
+def test_the_constant_error_is_that_of_a_state_that_has_it_beside_the_values():
+    """Values x and error b of one state, of which each visit shows x + b: the same belief in the sum, to 1e-9."""
+    rng = np.random.default_rng(16)
+    visits = visits_with(rng, 0.8, 3, sd=0.3)
+    levels = {"A: impacts at 1.20 m": 0.2}
+    history = estimate_history(
+        SUPPORTS, visits, repeats_between_visits=False, accepted=None, levels=levels, constant_errors=True
+    )
+    n = len(SUPPORTS)
+    stated = visits[0].groups[0].matrix
+    covariance = np.zeros((2 * n, 2 * n))
+    covariance[:n, :n], covariance[n:, n:] = 0.01 * np.eye(n), np.linalg.inv(stated)
+    shown = np.hstack([np.eye(n), np.eye(n)])
+    precision, vector = np.linalg.inv(covariance), np.zeros(2 * n)
+    for visit in visits:
+        precision = precision + shown.T @ (stated / 0.2) @ shown
+        vector = vector + shown.T @ visit.groups[0].vector / 0.2
+    posterior = np.linalg.inv(precision)
+    assert history.belief.mean == pytest.approx(shown @ posterior @ vector, abs=1e-9)
+    assert history.belief.covariance == pytest.approx(shown @ posterior @ shown.T, abs=1e-9)
+
+
+@pytest.mark.parametrize("repeated", [0.0, 0.5, 0.9])
+def test_no_intact_turnout_of_which_visits_know_little_has_a_changed_support(repeated):
+    """The best candidate of n = 100 intact turnouts has less than 6 nats; a name needs 12 beside its price."""
+    rng = np.random.default_rng(17)
+    answers = [
+        change_answer(SUPPORTS, visits_with(rng, repeated, sd=0.5), [], change_candidates(SUPPORTS), 3.0, 6.0)
+        for _ in range(100)
+    ]
+    assert not any(a.names for a in answers)
+
+
 def test_what_first_comes_later_has_all_of_its_error():
     rng = np.random.default_rng(6)
     visits = visits_with(rng, 0.8)

@@ -174,15 +174,11 @@ def change_answer(
     jump = history.steps[1 + int(np.argmax(leader.gains))].innovation
     if is_under_load(leader.effect):
         parameters, visits = with_loads
-        history = estimate_history(
-            parameters, visits, events, repeats_between_visits=False, accepted=None, levels=levels
-        )
+        history = _history_of_changes(parameters, visits, events, levels)
     onset = onset_interval(history, leader.effect)
     stated = LeadingEffect.of(leader.effect, by_name, size, gain - price, onset)
     opened = [*events, *_events_of_change(leader, parameters, candidates)]
-    with_change = estimate_history(
-        parameters, visits, opened, repeats_between_visits=False, accepted=None, levels=levels
-    )
+    with_change = _history_of_changes(parameters, visits, opened, levels)
     explained = next(s.innovation for s in with_change.steps if s.visit == leader.onset)
     since = float(leader.times[int(np.argmax(leader.gains))])
     is_rest_expected = not is_under_load(leader.effect) or is_all_explained(parameters, visits, opened, since)
@@ -196,6 +192,19 @@ def change_answer(
     answer = stated.answer(visit, CHANGE, with_rivals(names, stated, rivals))
     ends = stretch_ends(changes_alike(evidence, leader, by_name), by_name)
     return replace(answer, changed=tuple(leader.effect.direction), total=_present_size(leader)[0], ends=ends)
+
+
+def _history_of_changes(
+    parameters: Sequence[StateParameter],
+    visits: Sequence[VisitInformation],
+    events: Sequence[Event],
+    levels: Mapping[str, float],
+) -> History:
+    """History with errors of the model that are constant, but for their ``levels``; {}: with the stated errors."""
+    return estimate_history(
+        parameters, visits, events, repeats_between_visits=False, accepted=None, levels=levels,
+        constant_errors=bool(levels),
+    )  # fmt: skip
 
 
 def _evidence_of_changes(
@@ -212,9 +221,7 @@ def _evidence_of_changes(
     ordinary = [c for c in candidates if not is_under_load(c)]
     levels = {} if is_alarmed else own_levels(parameters, visits, events)
     for is_last in (is_alarmed, True):
-        history = estimate_history(
-            parameters, visits, events, repeats_between_visits=False, accepted=None, levels=levels
-        )
+        history = _history_of_changes(parameters, visits, events, levels)
         evidence = compare_onsets(history, ordinary)
         if is_last or not evidence:
             break

@@ -159,6 +159,32 @@ class Belief:
         """
         return Belief(self.names, self.mean, self.covariance + covariance)
 
+    def with_constant_error(self, matrix: np.ndarray) -> Belief:
+        r"""The belief in the values as all visits will show them: with an error of the model that they share.
+
+        Recordings with the information :math:`\Lambda` and a constant error of their stated variance show
+        :math:`x + b`, :math:`b \sim N(0, \Lambda^{-1})`. Where they know little, b is large and the first visit
+        tells it. There the covariance added is ``1 / CALIBRATION.least_known_share`` times that of the belief.
+
+        Parameters
+        ----------
+        matrix : (n, n) array of float
+            Information matrix of the first visit, of any rank.
+
+        Returns
+        -------
+        Belief
+
+        References
+        ----------
+        Friedland 1969, Treatment of bias in recursive filtering, IEEE Transactions on Automatic Control 14.
+        """
+        factor = np.linalg.cholesky(self.covariance)
+        scaled = factor.T @ matrix @ factor
+        eigenvalues, directions = np.linalg.eigh(0.5 * (scaled + scaled.T))
+        spread = factor @ directions
+        return self.with_noise((spread / np.maximum(eigenvalues, CALIBRATION.least_known_share)) @ spread.T)
+
     def update(self, matrix: np.ndarray, vector: np.ndarray) -> Belief:
         r"""The belief after a visit with this information.
 

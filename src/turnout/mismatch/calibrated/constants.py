@@ -17,6 +17,9 @@ class CalibrationConstants:
     level_visits: float = threshold(
         1.0, "visits", "that the stated variance of errors counts as, beside what a turnout has shown of its own", PAGE
     )
+    least_known_share: float = threshold(
+        1e-3, "share of the information of the file", "below which recordings tell nothing of a direction", "numerical"
+    )
     max_chance: float = threshold(1e-4, "probability", "that an innovation of an intact visit is larger", PAGE)
     speed_step: float = threshold(10.0, "km/h", "trains of one type within it share the error of the model", PAGE)
     walk_sds: tuple[tuple[str, float], ...] = threshold(

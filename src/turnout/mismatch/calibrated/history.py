@@ -87,6 +87,7 @@ def estimate_history(
     repeats_between_visits: bool = True,
     accepted: Collection[str] | None = (),
     levels: Mapping[str, float] | None = None,
+    constant_errors: bool = False,
 ) -> History:
     """Belief after each visit, from the belief of the file.
 
@@ -109,6 +110,10 @@ def estimate_history(
     levels : mapping or None
         Group -> variance of what its errors do not repeat from visit to visit, over the variance of its errors, as
         ``own_levels``. None: 1. For changes alone.
+    constant_errors : bool
+        Whether the values before all visits have the error of the model that all visits share, see
+        ``Belief.with_constant_error``. Then the first visit tells it, and it cancels in a change. Otherwise each visit
+        has it anew in all directions of which it knows less than the file. For changes alone.
 
     Returns
     -------
@@ -129,6 +134,9 @@ def estimate_history(
     own_sds = np.array([p.visit_sd for p in parameters])
     noise, steps = _ProcessNoise(parameters, events), list[Step]()
     prior = Belief.of_file(parameters).with_noise(noise.before_all())
+    if constant_errors and ordered:
+        of_first = ordered[0].total(names, repeated_error_weights(ordered[:1], repeated_share))
+        prior = prior.with_constant_error(with_own_values(*of_first, own_sds)[0])
     belief, time = prior, ordered[0].time if ordered else 0.0
     for visit in ordered:
         predicted = belief.with_noise(noise.covariance(time, visit.time)) if steps else belief

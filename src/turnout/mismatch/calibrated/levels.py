@@ -41,6 +41,8 @@ def own_levels(
     .. math:: l = \frac{n_0 + \sum_{v > 1} s_v / n_v}{n_0 + n}
 
     where the stated variance counts as :math:`n_0` visits of the :math:`n` later ones, ``CALIBRATION.level_visits``.
+    The first visit tells the constant error, see ``Belief.with_constant_error``. Otherwise each visit would show all of
+    it in the many directions of which it knows less than the file.
     A change that ``events`` do not explain raises the level: its evidence is then understated. What first comes after
     the first visit, as another train or another hammer position, has all of its error.
 
@@ -67,7 +69,9 @@ def own_levels(
         alike = [v for v in alike if v.groups]
         if not alike:
             continue
-        history = estimate_history(parameters, alike, events, repeats_between_visits=False, accepted=None)
+        history = estimate_history(
+            parameters, alike, events, repeats_between_visits=False, accepted=None, constant_errors=True
+        )
         later = [s.innovation for s in history.steps[1:]]
         level_sum = sum(i.statistic / max(i.n_directions, 1) for i in later)
         level = (CALIBRATION.level_visits + level_sum) / (CALIBRATION.level_visits + len(later))

@@ -118,8 +118,10 @@ def evidence_of_gap(
     opened, split = _with_offsets(offsets, events, visits)
     is_change = isinstance(leader, OnsetEvidence)
     history = estimate_history(
-        all_parameters, split, opened, repeats_between_visits=not is_change, accepted=None, levels=levels
-    )
+        all_parameters, split, opened,
+        repeats_between_visits=not is_change, accepted=None, levels=levels,
+        constant_errors=is_change and bool(levels),
+    )  # fmt: skip
     evidence = {}
     for name, effects in forms.items():
         if is_change:

@@ -167,8 +167,10 @@ def with_evidence_under_load(
     if not under_load:
         return list(evidence)
     history = estimate_history(
-        *with_offsets(parameters, visits), events, repeats_between_visits=False, accepted=None, levels=levels
-    )
+        *with_offsets(parameters, visits), events,
+        repeats_between_visits=False, accepted=None, levels=levels,
+        constant_errors=bool(levels),
+    )  # fmt: skip
     return sorted([*evidence, *compare_onsets(history, under_load)], key=lambda e: -e.gain)
 
 
