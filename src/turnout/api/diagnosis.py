@@ -128,6 +128,8 @@ def diagnose(
 
     Raises
     ------
+    TypeError
+        If the case is neither a case nor an id.
     SimulationError
         If the turnout has no recordings, no track file, or no such visit or section.
     ConfigErrors
@@ -161,6 +163,8 @@ def diagnose(
     docs/mismatch.md; docs/effects.md lists the candidate effects.
     """
     if not isinstance(case, str):
+        if not hasattr(case, "candidates"):
+            raise TypeError(f"a Case or the id of a turnout is needed, got {type(case).__name__}")
         return engine.diagnose(case, settings, progress)
     if settings is not None:
         raise ValueError("a turnout is diagnosed with the settings of its configuration; give none")

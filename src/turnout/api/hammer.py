@@ -55,6 +55,8 @@ def find_impacts(
 
     Raises
     ------
+    TypeError
+        If an item is no recording.
     ValueError
         If there is no recording, or no or more than one channel of a quantity and none is named.
     KeyError
@@ -75,12 +77,25 @@ def find_impacts(
     >>> impacts, f"{impacts[0].impulse:.2f} N s"
     (Impacts(1: 1 accepted, none rejected), '0.64 N s')
     """
-    listed = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    listed = (
+        [recordings]
+        if isinstance(recordings, Recording)
+        else _items_of_type(recordings, Recording, "recordings, as turnout.read gives them")
+    )
     if not listed:
         raise ValueError("no recording is given")
     force = force or _only_channel(listed[0], "force", "force")
     response = response or _only_channel(listed[0], "acceleration", "response")
     return Impacts(hammer_test.find_impacts(listed, force, response, settings))
+
+
+def _items_of_type(items: Iterable, wanted: type, words: str) -> list:
+    """List of the items; TypeError if one is of another type than ``wanted``."""
+    listed = list(items)
+    for item in listed:
+        if not isinstance(item, wanted):
+            raise TypeError(f"{words}, are needed; got {item!r}")
+    return listed
 
 
 def _only_channel(recording: Recording, quantity: str, parameter: str) -> str:
@@ -115,6 +130,8 @@ def receptance(impacts: Iterable[Impact], settings: ReceptanceSettings | None = 
 
     Raises
     ------
+    TypeError
+        If an item is no impact.
     ValueError
         If the impacts have different sampling rates.
 
@@ -134,7 +151,9 @@ def receptance(impacts: Iterable[Impact], settings: ReceptanceSettings | None = 
     ----------
     Barkhordari et al., eqs. 1 to 3; docs/measuring.md.
     """
-    return hammer_test.receptance_of(list(impacts), settings)
+    return hammer_test.receptance_of(
+        _items_of_type(impacts, Impact, "impacts, as turnout.find_impacts gives them"), settings
+    )
 
 
 def identify_modes(
@@ -170,6 +189,8 @@ def identify_modes(
 
     Raises
     ------
+    TypeError
+        If an item is no impact.
     ValueError
         For an unknown method, or impacts of different sampling rates.
 
@@ -200,6 +221,6 @@ def identify_modes(
         if method not in ("joint", "paper"):
             raise ValueError(f"no method {method!r}; there are ['joint', 'paper']")
         chosen = replace(chosen, method=method)
-    listed = cast(Sequence[Impact], list(impacts))
+    listed = cast(Sequence[Impact], _items_of_type(impacts, Impact, "impacts, as turnout.find_impacts gives them"))
     _, measured, model = identify_accepted(listed, receptance_settings or ReceptanceSettings(), chosen)
     return replace(model, receptance=measured)

@@ -132,7 +132,7 @@ def _accept(args: argparse.Namespace, results: Results) -> int:
     path, words = accept(finding, args.configuration, args.turnout, args.track, args.anyway)
     print(f"{path}: {words}")
     if "onset_by_utc" in finding:
-        print("From now on the calibrated model contains it; what changes after it is told.")
+        print("From now on the calibrated model contains it; later changes are reported.")
     else:
         print("From now on the simulation contains it; each visit estimates it again, see mismatch_parameters.")
     return 0

@@ -27,7 +27,7 @@ class PassageSensor:
     panel: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SpeedFinding:
     """``speed`` [m/s] with ``se`` at ``time`` [s], halfway through the passage; ``acceleration`` [m/s²] with its error.
 
@@ -42,6 +42,9 @@ class SpeedFinding:
     source: str
     disagreement: float | None = None
     time: float = 0.0
+
+    def __repr__(self) -> str:
+        return f"SpeedFinding({self.speed:.2f} ± {Z95 * self.se:.2f} m/s (95 %), from {self.source})"
 
     def at(self, time: float) -> float:
         """Speed at another time. [m/s]

@@ -288,5 +288,8 @@ class ReadResult:
     def __repr__(self) -> str:
         n_error = f", {len(self.errors)} damaged" if self.errors else ""
         n_long = f", {len(self.long_recordings)} left in the file" if self.long_recordings else ""
-        first = f": {self.recordings[0]!r} ..." if self.recordings else ""
-        return f"ReadResult({len(self.recordings)} recordings{n_long}{n_error}{first})"
+        more = " ..." if len(self.recordings) > 1 else ""
+        first = f": {self.recordings[0]!r}{more}" if self.recordings else ""
+        return (
+            f"ReadResult({len(self.recordings)} recording{'s' * (len(self.recordings) != 1)}{n_long}{n_error}{first})"
+        )

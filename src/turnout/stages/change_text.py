@@ -37,11 +37,25 @@ def sentence_of(row: Mapping[str, Any], n_with_trains: int = 0) -> str:
         return (
             f"something has changed{position}{since and f', {since}'}, and no effect of a support explains it ({basis})"
         )
-    names = " or ".join(n.replace("_", " ") for n in (row["term"], row["rival_term"]) if n)
+    names = " or ".join(_effect_words(n, row["change"]) for n in (row["term"], row["rival_term"]) if n)
     words = f"{names}{position}: {_change_words(row)}{_parameter_words(row)}, {_since_words(row)}; {basis}"
     if row.get("trains_visit") is None:
-        return f"{words}; no train since then tells more"
+        return f"{words}; no train since then is recorded"
     return words + _train_words(row)
+
+
+def _effect_words(term: str, change: float | None) -> str:
+    """Name of an effect in words: what one support has less of is softer.
+
+    Examples
+    --------
+    >>> _effect_words("local_ballast", -0.2), _effect_words("local_pad", 0.1), _effect_words("hanging_sleeper", -3.0)
+    ('softer ballast', 'stiffer pad', 'hanging sleeper')
+    """
+    part = term.removeprefix("local_")
+    if part == term or change is None:
+        return term.replace("_", " ")
+    return f"{'softer' if change < 0 else 'stiffer'} {part}"
 
 
 def _position_words(row: Mapping[str, Any]) -> str:
@@ -110,7 +124,7 @@ def _train_words(row: Mapping[str, Any]) -> str:
         before, after = row["fit_before_pct"], row["fit_after_pct"]
         fit = f"; {n} held-out trains fit by {before:.1f} % without it, {after:.1f} % with it{se}"
     if row["trains_verdict"] == "named":
-        return f"; trains of {row['trains_visit']} name {row['trains_term'].replace('_', ' ')}{fit}"
+        return f"; trains of {row['trains_visit']} name {_effect_words(row['trains_term'], row['change'])}{fit}"
     if row["trains_verdict"] == "a_or_b":
-        return f"; trains of {row['trains_visit']} fit either{fit}"
+        return f"; trains of {row['trains_visit']} agree with more than one effect{fit}"
     return f"; trains of {row['trains_visit']} alone do not decide{fit}"

@@ -101,7 +101,7 @@ def draw_severity(results: Sequence[CaseResult], path: Path) -> Path:
         axis.add_patch(plt.Rectangle((x - 0.48, y - 0.45), 0.96, 0.9, facecolor=COLOURS[label], **edge))
         axis.text(x, y, LETTERS[label], ha="center", va="center", fontsize=8)
     axis.set_yticks([rows[k] for _, k in effect_types], [k.replace("_", " ") for _, k in effect_types])
-    axis.set_xticks(range(7), [f"rung {r}" for r in range(7)])
+    axis.set_xticks(range(7), [f"level {r}" for r in range(7)])
     axis.set_xlim(-0.6, 6.6)
     axis.set_ylim(-0.6, len(effect_types) - 0.4)
     handles = [plt.Rectangle((0, 0), 1, 1, facecolor=c) for c in COLOURS.values()]

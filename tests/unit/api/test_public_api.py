@@ -432,3 +432,12 @@ def test_the_package_of_the_names_is_thin():
     for path in folder.glob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             assert not (isinstance(node, ast.Import) and any(alias.name == "numpy" for alias in node.names)), path
+
+
+@pytest.mark.parametrize("call", [turnout.receptance, turnout.identify_modes, turnout.diagnose])
+def test_a_wrong_kind_of_object_is_named_with_what_is_needed(call):
+    recording = Recording(np.zeros((1, 10)), 1e3, (Channel("A7", "acceleration"),))
+    with pytest.raises(TypeError, match=r"impacts, as turnout\.find_impacts gives them|the id of a turnout"):
+        call([recording])
+    with pytest.raises(TypeError, match=r"recordings, as turnout\.read gives them"):
+        turnout.find_impacts(["OT_1.uff"])

@@ -87,13 +87,13 @@ def test_soft_ballast_of_a_stretch_is_named_with_onset_and_fit_of_held_out_train
     assert [f"{row[k]:%Y-%m-%d}" for k in ("onset_after_utc", "onset_by_utc")] == [DAYS[1], DAYS[2]]
     assert row["n_visits"] == 4 and row["n_recordings"] == 8 and row["n_held_out"] == 3
     assert row["fit_after_pct"] > row["fit_before_pct"] + 2.0 * row["fit_gain_se_pct"]
-    assert "3 held-out trains" in row["sentence"] and "trains of 2026-05-01 name local ballast" in row["sentence"]
+    assert "3 held-out trains" in row["sentence"] and "trains of 2026-05-01 name softer ballast" in row["sentence"]
 
 
 def test_impacts_tell_one_soft_support_from_a_gap_by_its_damper_and_trains_fit_either(turnout):
     row = row_of(turnout)
     assert (row["verdict"], row["term"], row["rival_term"]) == ("named", "local_ballast", None)
-    assert row["position_m"] == 18.0 and "trains of 2026-05-01 fit either" in row["sentence"]
+    assert row["position_m"] == 18.0 and "trains of 2026-05-01 agree with more than one effect" in row["sentence"]
     assert [f"{row[k]:%Y-%m-%d}" for k in ("onset_after_utc", "onset_by_utc")] == [DAYS[1], DAYS[2]]
     assert abs(row["change"] - np.log(FACTOR)) < 3.0 * row["change_se"] + 0.05  # linear in the logarithm
     assert row["fit_after_pct"] > row["fit_before_pct"] + 2.0 * row["fit_gain_se_pct"]
@@ -103,7 +103,7 @@ def test_without_trains_the_damper_tells_soft_ballast_from_a_gap(turnout):
     shutil.rmtree("raw/t1/passages")
     row = row_of(turnout)
     assert (row["verdict"], row["term"], row["rival_term"]) == ("named", "local_ballast", None)
-    assert "no train since then tells more" in row["sentence"]
+    assert "no train since then is recorded" in row["sentence"]
 
 
 def test_without_a_track_file_or_a_simulation_the_reason_is_the_answer(turnout, monkeypatch):
@@ -255,7 +255,7 @@ def test_hammer_tests_and_trains_give_one_answer(given, test, expected):
 @pytest.mark.parametrize(
     ("changed", "first", "last", "words"),
     [
-        ((18.0, 18.6), (18.0, 18.0), (18.6, 18.6), "local pad from 18.0 to 18.6 m: "),
+        ((18.0, 18.6), (18.0, 18.0), (18.6, 18.6), "softer pad from 18.0 to 18.6 m: "),
         ((18.0,), (17.4, 18.0), (18.0, 18.6), "18.0 m (first support at 17.4 to 18.0 m, last support at 18.0 to 18.6"),
         ((18.0, 18.6), (18.0, 18.0), (18.6, None), "from 18.0 to 18.6 m (last support at 18.6 m or beyond, 95 %): "),
         ((18.0, 18.6), (None, 18.0), (18.0, 18.6), "(first support at 18.0 m or before, last support at 18.0 to 18.6"),
@@ -290,7 +290,7 @@ def test_held_out_trains_may_add_the_evidence_that_a_suspicion_lacks(nats, verdi
     is_name = verdict == "named"
     assert (row["term"] == "local_ballast") == is_name
     assert row["sentence"].startswith("no effect is named; the likeliest has") != is_name
-    assert "local ballast at 18.0 m" in row["sentence"]
+    assert "softer ballast at 18.0 m" in row["sentence"]
 
 
 def test_the_list_gets_the_newest_diagnoses(tmp_path, monkeypatch):

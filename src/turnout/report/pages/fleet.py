@@ -112,7 +112,7 @@ def _work(row: Mapping[str, Any], diagnosis: str) -> dict[str, Any]:
         "turnout_id": row["turnout_id"],
         "label": row["sections"],
         "anchor": (row["section_id"] or "").split("/")[-1].replace("*", ""),
-        "component": row["component"].replace("_", " "),
+        "component": row["component"].replace("amplitude", "acceleration").replace("_", " "),
         "state": row["state"],
         "badge": badge(row["state"]),
         "what": row["sentence"],

@@ -131,7 +131,11 @@ def lines_of(worklist: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
         {
             "state": work["state"],
             "badge": badge(work["state"]),
-            "words": ("" if work["change_pct"] is not None else f"{work['sections']}, {work['band']}: ")
+            "words": (
+                ""
+                if work["change_pct"] is not None
+                else f"{work['sections']}, {work['band'].replace('amplitude', 'acceleration')}: "
+            )
             + work["sentence"],
             "diagnosis": diagnosis,
             "look_at": work.get("look_at") or "",
