@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
+from itertools import compress
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
@@ -107,20 +108,31 @@ def gather(table: str, arrivals: Iterable[Arrival]) -> tuple[pa.Table, list[Refu
         ``columns.csv``, or with a value of another type.
     """
     column_names = frozenset(names(table))
-    units, row_numbers, years, result_ids, rows, refusals = [], [], [], [], [], []
+    units, years, result_ids = list[int](), list[int](), list[str]()
+    row_numbers, rows = list[int](), list[Any]()
     for arrival in arrivals:
-        for row_number, row in enumerate(arrival.tables.get(table, ())):
-            if not isinstance(row, dict) or not column_names.issuperset(row):
-                refusals.append(_rejected_row(arrival, table, row_number, row, column_names))
-                continue
-            units.append(arrival.index)
-            row_numbers.append(row_number)
-            years.append(arrival.year)
-            result_ids.append(arrival.result_id)
-            rows.append(row)
+        unit_rows = arrival.tables.get(table, ())
+        n = len(unit_rows)
+        units += [arrival.index] * n
+        row_numbers += range(n)
+        years += [arrival.year] * n
+        result_ids += [arrival.result_id] * n
+        rows += unit_rows
+    refusals: list[Refusal] = []
+    stated = set[str]().union(*(row for row in rows if isinstance(row, dict)))
+    if not (column_names.issuperset(stated) and set(map(type, rows)) <= {dict}):
+        known = [isinstance(row, dict) and column_names.issuperset(row) for row in rows]
+        refusals = [
+            _rejected_row(unit, table, k, row, column_names)
+            for unit, k, row, is_known in zip(units, row_numbers, rows, known)
+            if not is_known
+        ]
+        units, row_numbers, years = (list(compress(numbers, known)) for numbers in (units, row_numbers, years))
+        result_ids, rows = list(compress(result_ids, known)), list(compress(rows, known))
     columns = [c for c in tables()[table] if c.name not in FILLED_BY_REGISTER]
-    arrays: dict[str, pa.Array] = {}
     bad: dict[int, Refusal] = {}
+    arrays = {c.name: pa.nulls(len(rows), arrow_type(c)) for c in columns}
+    columns = [c for c in columns if c.name in stated]
     for column, values in zip(columns, _by_column(rows, [c.name for c in columns])):
         arrays[column.name], wrong = to_arrow(column, values)
         for i in wrong:
@@ -134,11 +146,11 @@ def gather(table: str, arrivals: Iterable[Arrival]) -> tuple[pa.Table, list[Refu
     return gathered, refusals + [bad[i] for i in sorted(bad)]
 
 
-def _rejected_row(arrival: Arrival, table: str, row_number: int, row: Any, column_names: Collection[str]) -> Refusal:
+def _rejected_row(unit: int, table: str, row_number: int, row: Any, column_names: Collection[str]) -> Refusal:
     if not isinstance(row, dict):
-        return Refusal(arrival.index, table, row_number, "all", repr(row)[:200], "a row")
+        return Refusal(unit, table, row_number, "all", repr(row)[:200], "a row")
     name = min(map(str, row.keys() - column_names))
-    return Refusal(arrival.index, table, row_number, name, repr(row.get(name))[:200], "a column of columns.csv")
+    return Refusal(unit, table, row_number, name, repr(row.get(name))[:200], "a column of columns.csv")
 
 
 def _by_column(rows: list[dict], wanted: list[str]) -> list[Sequence]:

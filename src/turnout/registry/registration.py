@@ -124,8 +124,9 @@ class Registration:
         refusals = [
             _unknown_table(a, t) for a in arrivals for t in sorted(a.tables.keys() - tables().keys()) if a.tables[t]
         ]
+        arrived = set[str]().union(*(a.tables for a in arrivals))
         for table in tables():
-            if table not in INTERNAL_TABLES and any(table in a.tables for a in arrivals):
+            if table not in INTERNAL_TABLES and table in arrived:
                 gathered, untyped = gather(table, arrivals)
                 refusals += untyped + admit(self.con, table, gathered, PENDING)
         self._note_duplicates({r.table for r in refusals})

@@ -247,7 +247,7 @@ def decode(text: str) -> dict[str, list[dict]]:
     dict of str to list of dict
         Table -> rows; times remain text.
     """
-    return json.loads(text, object_hook=_unpack)
+    return _DECODER.decode(text)
 
 
 def _string_array(values: Iterable[str]) -> pa.LargeStringArray:
@@ -287,3 +287,6 @@ def _unpack(pairs: dict) -> Any:
     if "__array__" in pairs:
         return np.frombuffer(base64.b64decode(pairs["data"]), dtype=pairs["__array__"])
     return pairs
+
+
+_DECODER = json.JSONDecoder(object_hook=_unpack)  # ``json.loads`` would make one for each text
