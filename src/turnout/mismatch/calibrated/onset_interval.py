@@ -87,9 +87,9 @@ def _of_changes_at_each_visit(history: History, direction: np.ndarray) -> tuple[
     for v, step in enumerate(history.steps):
         missing = -absorbed
         missing[:, v] += direction
-        seen, nu = step.matrix @ missing, step.vector - step.matrix @ step.predicted.mean
-        gained = step.belief.covariance @ seen
-        information += missing.T @ seen - seen.T @ gained
+        missing_information, nu = step.matrix @ missing, step.vector - step.matrix @ step.predicted.mean
+        gained = step.belief.covariance @ missing_information
+        information += missing.T @ missing_information - missing_information.T @ gained
         score += missing.T @ nu - gained.T @ nu
         absorbed = absorbed + gained
     return information, score

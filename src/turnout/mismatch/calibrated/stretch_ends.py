@@ -40,9 +40,9 @@ def stretch_ends(
     if any(not run for run in runs):
         return None
     weights = np.exp(np.array([e.gain for e in alike]) - max(e.gain for e in alike))
-    asked = CALIBRATION.interval_probability if probability is None else probability
-    low, high = (_shortest(np.array([at(run) for run in runs]), weights, asked) for at in (min, max))
-    longest = max((len(run) for run, w in zip(runs, weights) if w > (1.0 - asked) * weights.sum()), default=1)
+    covered = CALIBRATION.interval_probability if probability is None else probability
+    low, high = (_shortest(np.array([at(run) for run in runs]), weights, covered) for at in (min, max))
+    longest = max((len(run) for run, w in zip(runs, weights) if w > (1.0 - covered) * weights.sum()), default=1)
     group = _group(alike[0], by_name)
     positions = [p.position for p in by_name.values() if p.may_change and p.group == group and p.position is not None]
     goes_on = longest >= CALIBRATION.max_stretch
