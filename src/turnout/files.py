@@ -10,7 +10,8 @@ import logging
 import os
 import secrets
 import stat
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -57,16 +58,58 @@ def write_atomic(path: os.PathLike | str, write: Callable) -> None:
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = temporary_path(path)
+    with _unfinished(path, temporary_path(path)) as temporary, open(temporary, "wb") as stream:
+        if path.exists():
+            os.chmod(temporary, stat.S_IMODE(path.stat().st_mode))
+        write(stream)
+        stream.flush()
+        os.fsync(stream.fileno())
+
+
+@contextmanager
+def whole_file(path: os.PathLike | str) -> Iterator[Path]:
+    """Context in which a library writes a file that appears under its name when it is complete, or not at all.
+
+    Parameters
+    ----------
+    path : path-like
+        File to write; its folder must exist. A device or a pipe, such as /dev/stdout, is written directly.
+
+    Yields
+    ------
+    Path
+        File to write in its place: in the same folder, hidden, with the same ending.
+
+    Raises
+    ------
+    OSError
+        If the disk fails or is full, or the file may not be written; ``filename`` is ``path``. An existing file then
+        keeps its content.
+    """
+    path = Path(path)
+    if (
+        path.is_relative_to("/dev")
+        or path.is_relative_to("/proc")
+        or (path.exists() and special_kind(path.stat().st_mode))
+    ):
+        yield path  # a new file would not be that which other programs have open
+        return
+    path = path.resolve() if path.is_symlink() else path
+    with _unfinished(path, path.with_name(f".{path.stem}.{secrets.token_hex(6)}{path.suffix}")) as temporary:
+        yield temporary
+        if path.exists():
+            os.chmod(temporary, stat.S_IMODE(path.stat().st_mode))
+
+
+@contextmanager
+def _unfinished(path: Path, temporary: Path) -> Iterator[Path]:
+    """Context of a temporary file that becomes ``path``, or is deleted if an exception is raised."""
     try:
-        with open(temporary, "wb") as stream:
-            if path.exists():
-                os.chmod(temporary, stat.S_IMODE(path.stat().st_mode))
-            write(stream)
-            stream.flush()
-            os.fsync(stream.fileno())
+        yield temporary
         os.replace(temporary, path)
     except OSError as error:
+        if error.filename is None and error.errno:  # of a write; libraries add texts of their own
+            raise OSError(error.errno, os.strerror(error.errno), str(path)) from error
         if error.filename == str(temporary):
             error.filename = str(path)  # nobody knows the temporary name
         raise

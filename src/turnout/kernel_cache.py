@@ -4,7 +4,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
@@ -23,7 +23,7 @@ FINGERPRINTED_MODULES = ("turnout.simulate.march", "turnout.modal.fit_kernels")
 def kernel(function: Function) -> Function:
     """Decorator: ``function`` compiled on first use, or read from the cached machine code.
 
-    If no folder can be written, every process compiles it again: some 20 s for all kernels.
+    If no folder can be written, or its disk is full, every process compiles it again: some 20 s for all kernels.
 
     Parameters
     ----------
@@ -97,10 +97,24 @@ def _compile(function: Function, **options: Any) -> Function:
     if folder is not None:
         try:
             with _numba_cache(folder):
-                return njit(cache=True, fastmath=FASTMATH_FLAGS, **options)(function)
+                return _without_write_faults(njit(cache=True, fastmath=FASTMATH_FLAGS, **options)(function))
         except RuntimeError:  # "no locator available": the folder was removed after it was tested
             pass
     return njit(fastmath=FASTMATH_FLAGS, **options)(function)
+
+
+def _without_write_faults(dispatcher: Any) -> Any:
+    """The dispatcher, for which a full disk of the cache folder is no error: the next process compiles again."""
+    machine_code = getattr(dispatcher, "_cache", None)
+    if machine_code is not None:  # none where numba is switched off
+        save = machine_code.save_overload
+
+        def save_overload(signature: Any, data: Any) -> None:
+            with suppress(OSError):
+                save(signature, data)
+
+        machine_code.save_overload = save_overload
+    return dispatcher
 
 
 @cache

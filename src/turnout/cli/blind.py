@@ -144,13 +144,14 @@ def _score(args: argparse.Namespace) -> None:
     import json
     from pathlib import Path
 
+    from turnout.files import write_text
     from turnout_blind.score.histories import history_text
     from turnout_blind.score.report import report_text
 
     if args.histories:
         text = history_text(args.out)
         if args.report:
-            Path(args.report).write_text(text, encoding="utf-8")
+            write_text(args.report, text)
         print(text)
         return
     names = json.loads(Path(args.names).read_text()) if args.names else None
@@ -160,7 +161,7 @@ def _score(args: argparse.Namespace) -> None:
 
         write_page(args.page, args.out, names, args.effects, args.stories.split(",") if args.stories else None)
     if args.report:
-        Path(args.report).write_text(text, encoding="utf-8")
+        write_text(args.report, text)
     print(text)
 
 

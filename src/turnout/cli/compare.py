@@ -57,8 +57,7 @@ def run(args: argparse.Namespace) -> int:
     int
         Exit code.
     """
-    from pathlib import Path
-
+    from turnout.files import write_text
     from turnout.report.comparison_page import comparison_page, spectra_csv
     from turnout.stages.compare import compare_passage
 
@@ -77,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
     print("\n".join(comparison_lines(comparison)))
     for path, content in ((args.out, comparison_page), (args.csv, spectra_csv)):
         if path:
-            Path(path).write_text(content(comparison), encoding="utf-8")
+            write_text(path, content(comparison))
     return 0
 
 

@@ -82,9 +82,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _write_bars(path: str, connection: duckdb.DuckDBPyConnection, turnout: str, rows: list[dict[str, Any]]) -> None:
     """Write the bar charts of a turnout; ConfigError without a scored passage."""
-    from pathlib import Path
-
     from turnout.errors import ConfigError
+    from turnout.files import write_text
     from turnout.report.site import bars_page
 
     if not rows:
@@ -92,7 +91,7 @@ def _write_bars(path: str, connection: duckdb.DuckDBPyConnection, turnout: str, 
         raise ConfigError("--bars", "passages", f"no scored passage of {turnout}", remedy)
     cursor = connection.execute("select * from sections where turnout_id = ? order by position_m, label", [turnout])
     sections = [dict(zip((d[0] for d in cursor.description), row)) for row in cursor.fetchall()]
-    Path(path).write_text(bars_page(turnout, rows, sections), encoding="utf-8")
+    write_text(path, bars_page(turnout, rows, sections))
 
 
 def _check_train_type(connection: duckdb.DuckDBPyConnection, turnout: str, wanted: str) -> None:

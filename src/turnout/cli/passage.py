@@ -186,10 +186,9 @@ def _write_page(
     path: str, recording: Recording, passage: Passage, fits: Mapping[str, ChannelFit | str], lines: list[str]
 ) -> None:
     """The page of a passage, with panels of every sensor that recorded the train."""
-    from pathlib import Path
-
     import numpy as np
 
+    from turnout.files import write_text
     from turnout.report.passage_page import SensorPassage, passage_page
 
     sensors = []
@@ -198,7 +197,7 @@ def _write_page(
         samples = recording.signal(name)
         prediction = None if fit is None or isinstance(fit, str) else fit
         sensors.append(SensorPassage(name, samples - np.median(samples), recording.rate, np.sort(times), prediction))
-    Path(path).write_text(passage_page(recording.source, lines, sensors), encoding="utf-8")
+    write_text(path, passage_page(recording.source, lines, sensors))
 
 
 def score_basis(settings: PassageSettings) -> str:

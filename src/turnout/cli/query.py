@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import csv
 import sys
+from contextlib import contextmanager
 from decimal import Decimal
 from typing import TYPE_CHECKING
 
@@ -21,8 +22,8 @@ from turnout.cli.options import add_csv, add_registry, add_result, at_least_one
 from turnout.registry.spreadsheet import without_formula
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from typing import Literal, TextIO
+    from collections.abc import Iterator, Sequence
+    from typing import TextIO
 
     import duckdb
 
@@ -97,18 +98,19 @@ def _write_csv(result: duckdb.DuckDBPyRelation, path: str) -> None:
         writer.writerows([without_formula(value) for value in row] for row in result.fetchall())
 
 
-def open_output(path: str) -> TextIO | _StandardOutput:
-    """The file at ``path`` open for writing, standard output for "-".
+@contextmanager
+def open_output(path: str) -> Iterator[TextIO]:
+    """The file at ``path`` open for writing, standard output for "-". No part of a file is left if writing fails.
 
     Parameters
     ----------
     path : str
         File to write, or "-".
 
-    Returns
-    -------
+    Yields
+    ------
     text file
-        A context manager; standard output stays open behind it.
+        Standard output stays open behind the context.
 
     Raises
     ------
@@ -116,24 +118,18 @@ def open_output(path: str) -> TextIO | _StandardOutput:
         If the file cannot be written.
     """
     from turnout.errors import RegistryError
+    from turnout.files import whole_file
 
     if path == "-":
-        return _StandardOutput()
+        yield sys.stdout
+        return
     try:
-        return open(path, "w", newline="", encoding="utf-8")
+        with whole_file(path) as unfinished, open(unfinished, "w", newline="", encoding="utf-8") as stream:
+            yield stream
     except OSError as error:
-        remedy = "Write a file in a folder that is there"
-        raise RegistryError(f"{path} cannot be written: {error.strerror}. {remedy}.") from None
-
-
-class _StandardOutput:
-    """Standard output as a context that does not close it."""
-
-    def __enter__(self) -> TextIO:
-        return sys.stdout
-
-    def __exit__(self, *_: object) -> Literal[False]:
-        return False
+        raise RegistryError(
+            f"{path} cannot be written: {error.strerror}. Correct this, or write a file in another folder."
+        ) from None
 
 
 def format_table(result: duckdb.DuckDBPyRelation, limit: int = 60) -> str:

@@ -22,6 +22,7 @@ from turnout.config.schema import suggestion
 from turnout.config.settings.simulate import SimulateSettings
 from turnout.constants import KMH
 from turnout.errors import ConfigError, SimulationError
+from turnout.files import write_text
 from turnout.readers.writing import WRITERS, write
 from turnout.records import RawChannel, RawDescription, Recording
 from turnout.simulate import Hammer, Sensor, load_track, load_vehicle, simulate_hammer, simulate_passage
@@ -470,5 +471,4 @@ def _write_truth(
         "channels": [asdict(c) for c in recording.channels],
     }
     for target in targets:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_text(json.dumps(content, indent=1, default=str) + "\n", encoding="utf-8")
+        write_text(target, json.dumps(content, indent=1, default=str) + "\n")

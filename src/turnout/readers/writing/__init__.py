@@ -10,6 +10,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from turnout.files import whole_file
 from turnout.readers.writing.encode import raw_records
 from turnout.records import RawDescription, Recording
 
@@ -59,10 +60,13 @@ def write(
     ------
     ValueError
         For an unknown format, no recordings, or recordings that one file cannot hold.
+    OSError
+        If the disk fails or is full. No part of the file is left then.
     """
     if format not in WRITERS:
         raise ValueError(f"no writer for the format {format!r}; there are {', '.join(WRITERS)}")
     module, fixed = WRITERS[format]
     records = raw_records(recordings, description, "float32" if single else "float64")
-    import_module(f"turnout.readers.writing.{module}").write_raw(records, Path(path), **fixed, **options)
+    with whole_file(path) as unfinished:
+        import_module(f"turnout.readers.writing.{module}").write_raw(records, unfinished, **fixed, **options)
     return Path(path)

@@ -3,9 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-import h5py
-
 from turnout.readers.writing.encode import RecordToWrite, attributes, fixed_text, iso_text, plain_conditions
+from turnout.readers.writing.hdf5_content import hdf5_content
 
 
 def write_raw(records: Sequence[RecordToWrite], path: Path) -> None:
@@ -18,7 +17,7 @@ def write_raw(records: Sequence[RecordToWrite], path: Path) -> None:
     path : Path
         File to write.
     """
-    with h5py.File(path, "w", libver=("v110", "latest")) as file:
+    with hdf5_content(path, libver=("v110", "latest")) as file:
         file.attrs["rate"] = records[0].rate
         file.attrs["n_records"] = len(records)
         for k, record in enumerate(records):

@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 
 from turnout.readers.writing.encode import RecordToWrite, variables
+from turnout.readers.writing.hdf5_content import hdf5_content
 
 HEADER = b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created on: Mon Jan 01 00:00:00 2024 HDF5 schema 1.00 ."
 
@@ -22,7 +23,7 @@ def write_raw(records: Sequence[RecordToWrite], path: Path) -> None:
     path : Path
         File to write.
     """
-    with h5py.File(path, "w", userblock_size=512) as file:
+    with hdf5_content(path, userblock_size=512) as file:
         for name, value in variables(records).items():
             cells = isinstance(value, list) and isinstance(value[0], str)
             (_cell if cells else _double)(file, name, value)

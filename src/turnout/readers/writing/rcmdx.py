@@ -14,6 +14,7 @@ import numpy as np
 
 from turnout.readers.rcmdx import EPOCH
 from turnout.readers.writing.encode import RecordToWrite, attributes, plain_conditions
+from turnout.readers.writing.hdf5_content import hdf5_content
 
 VERSION = {"Major": np.int16(2), "Minor": np.int16(0), "Feature": np.int16(2)}
 CHANNEL = {
@@ -49,7 +50,7 @@ def write_raw(records: Sequence[RecordToWrite], path: Path, station: str = "TURN
     starts = [(record.started_at or EPOCH + timedelta(minutes=k)).astimezone(UTC) for k, record in enumerate(records)]
     stamps = [_stamps(record, start) for record, start in zip(records, starts)]
     first = min(starts)
-    with h5py.File(path, "w") as file:
+    with hdf5_content(path) as file:
         root = file.create_group("RCMDX")
         root.attrs.update({**VERSION, "RecordCount": np.int32(len(records))})
         root.create_group("FILE").attrs.update(attributes({"Element": "File", "StructureVersion": "1"}))

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +54,8 @@ def write_raw(
     notes["units"] = record.units if full_scale == 1.0 else ["count"] * len(record.names)
     if rate != record.rate:
         notes["rate"] = record.rate
-    with soundfile.SoundFile(path, "w", rate, samples.shape[1], subtype, format="WAV") as file:
+    content = BytesIO()  # the library does not say what is wrong with a disk
+    with soundfile.SoundFile(content, "w", rate, samples.shape[1], subtype, format="WAV") as file:
         file.comment = json.dumps(notes)
         file.write(samples)
+    path.write_bytes(content.getbuffer())

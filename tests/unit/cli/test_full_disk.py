@@ -1,0 +1,89 @@
+"""A disk that is full: the command names the file, and leaves no part of it that looks like a whole one."""
+
+import os
+import resource
+import signal
+from contextlib import contextmanager
+
+import pytest
+
+from turnout import kernel_cache
+from turnout.cli.main import main
+from turnout.files import whole_file, write_text
+from turnout.readers.writing import WRITERS
+
+LIMIT = 4096  # bytes that fit on it
+
+
+@contextmanager
+def full_disk():
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (LIMIT, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        signal.signal(signal.SIGXFSZ, handler)
+
+
+def test_a_text_that_does_not_fit_is_named(tmp_path):
+    with full_disk(), pytest.raises(OSError, match="too large") as caught:
+        write_text(tmp_path / "a.html", "x" * 3 * LIMIT)
+    assert caught.value.filename == str(tmp_path / "a.html") and not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("before", [None, "what was there before"])
+def test_a_file_of_a_library_is_whole_or_as_it_was(tmp_path, before):
+    path = tmp_path / "a.csv"
+    if before:
+        path.write_text(before)
+    with full_disk(), pytest.raises(OSError, match="too large") as caught, whole_file(path) as unfinished:
+        unfinished.write_text("x" * 3 * LIMIT)
+    assert caught.value.filename == str(path)
+    assert [p.read_text() for p in tmp_path.iterdir()] == ([before] if before else [])
+    with whole_file(path) as unfinished:
+        unfinished.write_text("new")
+        assert unfinished.suffix == ".csv" and path.exists() == bool(before)
+    assert [p.name for p in tmp_path.iterdir()] == ["a.csv"] and path.read_text() == "new"
+
+
+def test_standard_output_and_pipes_are_written_directly(tmp_path, capfd):
+    with whole_file("/dev/stdout") as path:
+        path.write_text("rows\n")
+    assert capfd.readouterr().out == "rows\n"  # here a file, as behind "> file" in a shell
+    os.mkfifo(tmp_path / "pipe")
+    with whole_file(tmp_path / "pipe") as path:
+        assert path == tmp_path / "pipe"
+
+
+@pytest.mark.parametrize("ending", ["csv", "h5", "npz", "mat", "uff", "tdms", "wav", "lvm", "parquet"])
+def test_a_simulated_recording_is_whole_or_not_there(tmp_path, repository, capsys, monkeypatch, ending):
+    monkeypatch.chdir(repository)
+    out = tmp_path / f"A7_1.{ending}"
+    formats = {"h5": "hdf5", "uff": "uff58b"}
+    command = ["simulate", "hammer", "--section", "A7", "--at", "2026-05-13T09:00:00", "--impacts", "1"]
+    with full_disk():
+        code = main([*command, "--format", formats.get(ending, ending), "--out", str(out)])
+    err = capsys.readouterr().err
+    assert code == 2 and str(out) in err, err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_full_disk_of_the_cache_stops_no_computation(tmp_path, monkeypatch):
+    """Compiled functions are stored beside the program or in the home folder, which may be full while raw/ is not."""
+    monkeypatch.setattr(kernel_cache, "cache_folder", lambda: tmp_path)
+    with full_disk():
+        assert kernel_cache.kernel(twice)(2.0) == 4.0
+    assert not list(tmp_path.rglob("*.nbc"))
+    assert kernel_cache.kernel(twice)(2.0) == 4.0  # stored now
+    assert list(tmp_path.rglob("*.nbc"))
+
+
+def twice(x):
+    return 2.0 * x
+
+
+def test_every_writer_was_tried():
+    tried = {"hdf5", "uff58b", "csv", "npz", "mat", "tdms", "wav", "lvm", "parquet"}
+    assert set(WRITERS) - tried == {"uff58", "rcmdx", "mat73"}  # as uff58b and hdf5
