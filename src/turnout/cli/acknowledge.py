@@ -64,10 +64,10 @@ def run(args: argparse.Namespace) -> int:
 
     from turnout.config import load_configuration
     from turnout.config.acknowledgements import COLUMNS, acknowledgement_row, row_problems
-    from turnout.config.table_edits import added_row, one_line
+    from turnout.config.table_edits import added_row, one_line, turnout_and_section
     from turnout.errors import ConfigError, ConfigErrors
 
-    turnout, _, label = args.place.partition("/")
+    turnout, label = turnout_and_section(args.place)
     configuration = load_configuration(args.configuration)
     at = args.at or datetime.now(UTC).replace(tzinfo=None).isoformat(timespec="minutes")
     action = "suppress" if args.suppress_until else "acknowledge"

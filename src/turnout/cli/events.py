@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
 
     if args.effect:
         return _effect(args.registry)
-    if not args.place:
+    if args.place is None:
         events = load_configuration(args.configuration).events
         add_result(args, [asdict(e) for e in events])
         if not events:
@@ -77,11 +77,11 @@ def _enter(args: argparse.Namespace) -> int:
 
     from turnout.config import load_configuration
     from turnout.config.events import COLUMNS, event_of, lead_problem, now, turnout_problems
-    from turnout.config.table_edits import added_row
+    from turnout.config.table_edits import added_row, turnout_and_section
     from turnout.errors import ConfigError, ConfigErrors
 
     path = Path(args.configuration) / "events.csv"
-    turnout, _, label = args.place.partition("/")
+    turnout, label = turnout_and_section(args.place)
     cells = dict(turnout=turnout, section=label, date=args.date, kind=args.kind, resets=args.resets, note=args.note)
     with added_row(path, cells, COLUMNS) as tables:
         after = load_configuration(args.configuration, tables=tables)

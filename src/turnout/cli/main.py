@@ -142,19 +142,21 @@ def _run(args: argparse.Namespace) -> tuple[int, str]:
     except (TurnoutError, OSError) as error:
         if args.verbose:
             traceback.print_exc()
-        return NOT_FOLLOWED, _message(error, args.command)
+        return NOT_FOLLOWED, _message(error, args)
     except Exception as error:
         traceback.print_exc()
         fault = f"{type(error).__name__}: {error}"
         return PROGRAM_FAULT, f"a fault of the program, {fault}. Please report it with the lines above"
 
 
-def _message(error: TurnoutError | OSError, command: str) -> str:
+def _message(error: TurnoutError | OSError, args: argparse.Namespace) -> str:
     """What went wrong. The name of the command stands before it already, and is left out where an error begins so."""
     if isinstance(error, TurnoutError):
-        pattern = rf"^(turnout )?{re.escape(command)}, "
+        pattern = rf"^(turnout )?{re.escape(args.command)}, "
         return re.sub(pattern, "", str(error), flags=re.MULTILINE)
-    where = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error)
+    given = getattr(args, "file", None) or ()  # a fault while reading names no file
+    name = error.filename or ", ".join(map(str, [given] if isinstance(given, str) else given))
+    where = f"{name}: {error.strerror}" if name and error.strerror else str(error)
     return f"{where}. Correct this, or name another file or folder, then run again."
 
 

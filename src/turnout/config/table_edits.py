@@ -61,6 +61,36 @@ def added_row(path: Path, values: Mapping[str, str], columns: tuple[str, ...]) -
         _write(path.resolve(), content, path)
 
 
+def turnout_and_section(place: str) -> tuple[str, str]:
+    """Turnout and section of a place on the command line, such as "tommerup_s1/A7".
+
+    Parameters
+    ----------
+    place : str
+        A turnout, or turnout/section.
+
+    Returns
+    -------
+    tuple of (str, str)
+        The section is "" for the whole turnout.
+
+    Raises
+    ------
+    ConfigError
+        If the turnout is empty, or the section after a slash: what was meant for a section must not count for all.
+
+    Examples
+    --------
+    >>> turnout_and_section("tommerup_s1/A7"), turnout_and_section("tommerup_s1")
+    (('tommerup_s1', 'A7'), ('tommerup_s1', ''))
+    """
+    turnout, slash, section = place.strip().partition("/")
+    if not turnout or (slash and not section):
+        problem = f"no {'section after the slash' if turnout else 'turnout'} in {place!r}"
+        raise ConfigError("the command line", "place", problem, "Write TURNOUT or TURNOUT/SECTION")
+    return turnout, section
+
+
 def one_line(text: Any) -> str:
     r"""Text of a cell: None becomes empty, line breaks and tabs become blanks.
 

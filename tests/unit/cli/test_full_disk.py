@@ -4,6 +4,7 @@ import os
 import resource
 import signal
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 
@@ -82,6 +83,13 @@ def test_a_full_disk_of_the_cache_stops_no_computation(tmp_path, monkeypatch):
 
 def twice(x):
     return 2.0 * x
+
+
+@pytest.mark.skipif(not Path("/proc/self/mem").exists(), reason="another system")
+def test_a_fault_of_reading_is_said_with_the_file(capsys):
+    """As a bad sector: the system opens the file, and reading it fails without a name."""
+    assert main(["inspect", "/proc/self/mem"]) == 2
+    assert "/proc/self/mem: Input/output error" in capsys.readouterr().err
 
 
 def test_every_writer_was_tried():

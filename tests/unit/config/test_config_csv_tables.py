@@ -258,3 +258,13 @@ def test_a_folder_that_does_not_exist_is_named_and_not_made(tmp_path, capsys, mo
     err = capsys.readouterr().err
     assert "nowhere" in err and "no such folder" in err and "turnout init" in err
     assert not (tmp_path / "nowhere").exists()
+
+
+@pytest.mark.parametrize("place", ["", " ", "/", "/A7", "tommerup_s1/"])
+@pytest.mark.parametrize("command", [EVENT, SAID])
+def test_an_empty_turnout_or_section_does_not_count_for_all(config, capsys, command, place):
+    """As a script writes it whose variable is empty."""
+    before = {path: path.read_bytes() for path in config.glob("*.csv")}
+    assert main([command[0], place, *command[2:]]) == 2
+    assert "Write TURNOUT or TURNOUT/SECTION" in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in config.glob("*.csv")} == before
