@@ -58,7 +58,7 @@ def write_atomic(path: os.PathLike | str, write: Callable) -> None:
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    with _unfinished(path, temporary_path(path)) as temporary, open(temporary, "wb") as stream:
+    with _unfinished_file(path, temporary_path(path)) as temporary, open(temporary, "wb") as stream:
         if path.exists():
             os.chmod(temporary, stat.S_IMODE(path.stat().st_mode))
         write(stream)
@@ -95,14 +95,14 @@ def whole_file(path: os.PathLike | str) -> Iterator[Path]:
         yield path  # a new file would not be that which other programs have open
         return
     path = path.resolve() if path.is_symlink() else path
-    with _unfinished(path, path.with_name(f".{path.stem}.{secrets.token_hex(6)}{path.suffix}")) as temporary:
+    with _unfinished_file(path, path.with_name(f".{path.stem}.{secrets.token_hex(6)}{path.suffix}")) as temporary:
         yield temporary
         if path.exists():
             os.chmod(temporary, stat.S_IMODE(path.stat().st_mode))
 
 
 @contextmanager
-def _unfinished(path: Path, temporary: Path) -> Iterator[Path]:
+def _unfinished_file(path: Path, temporary: Path) -> Iterator[Path]:
     """Context of a temporary file that becomes ``path``, or is deleted if an exception is raised."""
     try:
         yield temporary

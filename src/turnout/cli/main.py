@@ -154,8 +154,8 @@ def _message(error: TurnoutError | OSError, args: argparse.Namespace) -> str:
     if isinstance(error, TurnoutError):
         pattern = rf"^(turnout )?{re.escape(args.command)}, "
         return re.sub(pattern, "", str(error), flags=re.MULTILINE)
-    given = getattr(args, "file", None) or ()  # a fault while reading names no file
-    name = error.filename or ", ".join(map(str, [given] if isinstance(given, str) else given))
+    paths = getattr(args, "file", None) or ()  # a fault while reading names no file
+    name = error.filename or ", ".join(map(str, [paths] if isinstance(paths, str) else paths))
     where = f"{name}: {error.strerror}" if name and error.strerror else str(error)
     return f"{where}. Correct this, or name another file or folder, then run again."
 

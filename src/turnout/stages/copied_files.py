@@ -42,9 +42,9 @@ def without_copies(units: Iterable[Unit], raw_root: str | Path) -> tuple[list[Un
                     copies[path] = original
     if not copies:
         return units, []
-    kept = [replace(unit, files=tuple(f for f in unit.files if f[0] not in copies)) for unit in units]
+    distinct = [replace(unit, files=tuple(f for f in unit.files if f[0] not in copies)) for unit in units]
     notes = [f"{path}: same bytes as {original}; not used" for path, original in copies.items()]
-    return [new for new, old in zip(kept, units) if new.files or not old.files], notes
+    return [new for new, old in zip(distinct, units) if new.files or not old.files], notes
 
 
 def _content(path: Path) -> str:
