@@ -10,7 +10,7 @@ from turnout.trend.panel import days, timestamps
 from turnout.trend.tables import arrow_rows
 
 NAMES = (
-    "students_t", "epochs", "resonance_drift",
+    "students_t", "campaign_weight", "epochs", "resonance_drift",
     "passage_values", "chart_values", "recursive_modes", "mode_residuals",
     "cusum", "change_since_event", "maintenance_effect",
     "chart_status_at", "unusable", "cannot_see", "was_said", "in_service", "time_to_threshold",

@@ -5,16 +5,13 @@
 -- their memory, and what the error of the temperature slope makes of the difference in temperature.
 -- Of work on a whole turnout the siblings' median is left in, for what all sections share is asked for (but not in
 -- band amplitude).
--- needs: students_t
+-- needs: campaign_weight, students_t
 create or replace macro change_since_event(kind_of_event, days) as table
 with values_pct as (
     select
         c.turnout_id, c.section_id, c.band, c.source, c.measured_at_utc, c.rail_temperature_c, b.n_learned, b.n_baseline,
         b.sd_alone_pct * sqrt((1 + b.phi) / (1 - b.phi)) as sd_pct, b.slope_se_pct_per_c,
-        -- z is rounded, so a small one does not give the standard deviation of its campaign
-        case when abs(c.z) > 0.05
-            then least(1, (b.guard * b.sd_pct * c.z / c.residual_pct) ** 2 * (1 + b.phi) / (1 - b.phi)) else 1
-        end as weight,
+        campaign_weight(c.z, c.residual_pct, b.guard * b.sd_pct * sqrt((1 + b.phi) / (1 - b.phi))) as weight,
         c.residual_pct + b.level_pct as value_pct,
         100 * (c.expected_hz / b.frequency_hz - 1) + c.residual_pct
             - b.slope_pct_per_c * (c.rail_temperature_c - b.rail_temperature_c)

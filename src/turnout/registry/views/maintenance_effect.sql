@@ -4,13 +4,15 @@
 -- campaign at which the mean of eight has lost half of a gain again; empty = it holds, until last_measured_at_utc.
 -- The siblings' median is left in, for work on a whole turnout lifts them all (but not in band amplitude). The interval
 -- holds the scatter of the campaigns with their memory, and what the error of the temperature slope makes of the
--- difference in temperature.
--- needs: students_t
+-- difference in temperature. Levels are weighted means: a campaign whose error is larger than usual counts by the inverse
+-- of its variance.
+-- needs: campaign_weight, students_t
 create or replace view maintenance_effect as
 with own as (
     select
         c.turnout_id, c.section_id, c.band, c.source, c.measured_at_utc, c.epoch, c.rail_temperature_c,
         b.epoch_start_utc, b.slope_se_pct_per_c, b.n_baseline, b.sd_alone_pct * sqrt((1 + b.phi) / (1 - b.phi)) as sd_pct,
+        campaign_weight(c.z, c.residual_pct, b.guard * b.sd_pct * sqrt((1 + b.phi) / (1 - b.phi))) as weight,
         coalesce(
             100 * (c.expected_hz / b.frequency_hz - 1) + c.residual_pct
                 - b.slope_pct_per_c * (c.rail_temperature_c - b.rail_temperature_c)
@@ -23,7 +25,8 @@ with own as (
 ),
 values_pct as (
     select
-        *, avg(value_pct) over eight as mean_of_eight, row_number() over epoch_order as place,
+        *, sum(weight * value_pct) over eight / sum(weight) over eight as mean_of_eight,
+        row_number() over epoch_order as place,
         row_number() over (
             partition by turnout_id, section_id, band, source, epoch order by measured_at_utc desc
         ) as place_from_end
@@ -39,11 +42,16 @@ levels as (
     select
         turnout_id, section_id, band, source, epoch,
         any_value(epoch_start_utc) as epoch_start_utc, max(sd_pct) as sd_pct, max(measured_at_utc) as last_at,
-        avg(value_pct) filter (where place <= 8) as first_pct, count(*) filter (where place <= 8) as n_first,
-        avg(value_pct) filter (where place_from_end <= 8) as last_pct,
+        sum(weight * value_pct) filter (where place <= 8) / sum(weight) filter (where place <= 8) as first_pct,
+        count(*) filter (where place <= 8) as n_first, sum(weight) filter (where place <= 8) as weight_first,
+        sum(weight * value_pct) filter (where place_from_end <= 8)
+            / sum(weight) filter (where place_from_end <= 8) as last_pct,
         count(*) filter (where place_from_end <= 8) as n_last,
-        avg(rail_temperature_c) filter (where place <= 8) as first_c,
-        avg(rail_temperature_c) filter (where place_from_end <= 8) as last_c,
+        sum(weight) filter (where place_from_end <= 8) as weight_last,
+        sum(weight * rail_temperature_c) filter (where place <= 8)
+            / sum(weight) filter (where place <= 8) as first_c,
+        sum(weight * rail_temperature_c) filter (where place_from_end <= 8)
+            / sum(weight) filter (where place_from_end <= 8) as last_c,
         max(slope_se_pct_per_c) as slope_se_pct_per_c, max(n_baseline) as n_baseline
     from values_pct
     group by all
@@ -54,7 +62,7 @@ pairs as (
         b.last_at as before_at, b.last_pct as before_pct, l.first_pct as after_pct,
         b.n_last as n_before, l.n_first as n_after,
         students_t(l.n_baseline - 2) * sqrt(
-            l.sd_pct ** 2 * (1 / b.n_last + 1 / l.n_first)
+            l.sd_pct ** 2 * (1 / b.weight_last + 1 / l.weight_first)
             + (l.slope_se_pct_per_c * (l.first_c - b.last_c)) ** 2
         ) as half
     from levels l
