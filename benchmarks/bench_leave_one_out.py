@@ -181,7 +181,12 @@ def _answer(question, site, without):
             return None
         names = library()[site.effect].relatives if without else right_names(site.kind, OWN_NAMES)
         outcome, words = answer(folder, truth, (site.effect,) if without else (), names)
-    return Answer(outcome, words, watch.cpu, gain_of(truth["visible"]))
+    return Answer(outcome, words, watch.cpu, largest_gain(truth["visible"]))
+
+
+def largest_gain(visible):
+    """Gain that an effect costs in a single visit, or the largest of the visits of a site [points]."""
+    return max(map(gain_of, visible if isinstance(visible, list) else [visible]))
 
 
 def make_site(folder, site):
@@ -191,7 +196,7 @@ def make_site(folder, site):
             (START, STEP)[site.k % 2], (site.kind, rung), (SEED, site.k, len(site.effect)), site.panel, N_VISITS
         )
         truth = make_history(folder, f"{site.effect}_{site.k}_{rung}", plan, kinds_of_effects())
-        if gain_of(truth["visible"]) > MIN_CLEAR_GAIN:
+        if largest_gain(truth["visible"]) > MIN_CLEAR_GAIN:
             return truth
     return None
 

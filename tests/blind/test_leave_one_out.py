@@ -8,6 +8,7 @@ from benchmarks.left_out_library import OWN_NAMES, WITHOUT_KIND, kinds_of_effect
 
 from turnout import physics
 from turnout.mismatch.turnout.planned_case import PlannedCase, small_plan
+from turnout_blind.score.matching import gain_of
 from turnout_blind.score.names import right_names
 
 
@@ -100,6 +101,16 @@ def test_answers_of_a_visit_without_the_effect(monkeypatch, effect, answers, out
     (left_out,) = right_names(effect["kind"])
     assert bench.answer_of_visit("folder", truth, (left_out,), library()[left_out].relatives)[0] == outcome
     assert families == [set(library()) - {left_out}]
+
+
+@pytest.mark.parametrize("visible", [[0.5, 20.0], [20.0, 0.5], 20.0])
+def test_an_effect_is_as_clear_as_in_the_visit_that_shows_it_best(monkeypatch, visible):
+    """A single visit has one pair of shares, a history one for each visit."""
+    shares = [{"hammer_pct": v, "passage_pct": 0.0} for v in (visible if isinstance(visible, list) else [visible])]
+    truth = {"visible": shares if isinstance(visible, list) else shares[0]}
+    monkeypatch.setattr(bench, "make_history", lambda *args: truth)
+    assert bench.largest_gain(truth["visible"]) == pytest.approx(gain_of({"hammer_pct": 20.0, "passage_pct": 0.0}))
+    assert bench.make_site(None, bench.Site("local_pad", "pad", 0, "plain")) is truth
 
 
 def test_answers_of_the_store_are_not_computed_again(monkeypatch, tmp_path):
