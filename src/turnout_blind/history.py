@@ -57,6 +57,7 @@ GROWING = {
     "void": {"gap": lambda v, s: v * s, "seated": lambda v, s: 1.0 - (1.0 - v) * s, "growth": lambda v, s: 0.0},
     "dip": {"depth": lambda v, s: v * s},
     "nose": {"depth": lambda v, s: v * s},
+    "hardening": {"rate": lambda v, s: v * s},
     "chair_gap": {"gap": lambda v, s: v * s},
     "heel": {"factor": lambda v, s: v**s},
     "toe": {"depth": lambda v, s: v * s},

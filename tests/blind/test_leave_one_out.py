@@ -8,6 +8,7 @@ from benchmarks.left_out_library import OWN_NAMES, WITHOUT_KIND, kinds_of_effect
 
 from turnout import physics
 from turnout.mismatch.turnout.planned_case import PlannedCase, small_plan
+from turnout_blind.history import GROWING
 from turnout_blind.score.matching import gain_of
 from turnout_blind.score.names import right_names
 
@@ -43,6 +44,7 @@ def test_each_question_has_sites_of_every_effect_that_it_can_name(monkeypatch):
     named_changes = {"local_ballast", "hanging_sleeper", "ballast_hardening", "local_pad"}
     assert changes == named_changes | {"sensor_gain", "sensor_position", "surface_dip"}
     assert {site.kind for site in bench.sites("visit") if site.effect == "surface_dip"} == {"dip", "nose"}
+    assert {site.kind for site in bench.sites("change")} <= set(GROWING)  # a history can conceal it
 
 
 @pytest.mark.parametrize(

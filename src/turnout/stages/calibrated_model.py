@@ -26,6 +26,7 @@ from turnout.mismatch.calibrated import (
     track_sds,
 )
 from turnout.mismatch.calibrated.answers_against_file import INTOLERABLE
+from turnout.mismatch.calibrated.answers_of_change import surface_changes
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.stiffness_under_load import candidates_under_load, with_evidence_under_load
 from turnout.mismatch.turnout import TrackCase
@@ -268,6 +269,7 @@ def calibrate_turnout(
         settings.margin,
         1 if each_visit else len(informed),
         against_file,
+        surface_changes(directions),
     )
     return CalibratedModel(
         history,

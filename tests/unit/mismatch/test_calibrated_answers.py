@@ -236,6 +236,34 @@ def test_a_dip_of_the_first_day_differs_from_the_file(depth, verdict):
         assert answers["file"].size == pytest.approx(depth, rel=0.35)
 
 
+def visits_with_a_dip(position, first, n_visit=4):
+    """Trains measure the waves with a fifth of their prior sd; from one visit on there is a dip of 0.8 mm."""
+    rng, names, sd = np.random.default_rng(12), tuple(p.name for p in SURFACE), WAVES.sd
+    x = np.arange(WAVES.start, WAVES.end, 0.02)
+    dip = 8e-4 * (0.5 + 0.5 * np.cos(2.0 * np.pi * np.clip((x - position) / 0.7, -0.5, 0.5)))
+    rows = WAVES.shapes(x).T * sd
+    change, waves = sd * np.linalg.solve(rows.T @ rows + 1e-10 * np.eye(len(sd)), rows.T @ dip), rng.normal(0.0, sd)
+    for v in range(n_visit):
+        y = waves + (v >= first) * change + 0.2 * sd * rng.normal(size=len(sd))
+        group = GroupInformation("A: locomotive", 1, names, np.diag(25.0 / sd**2), 25.0 * y / sd**2)
+        yield VisitInformation(f"v{v}", 0.5 * v, (group,))
+
+
+@pytest.mark.parametrize("is_in_library", [False, True])
+@pytest.mark.parametrize("position", [4.4, 5.5])
+def test_a_change_of_the_surface_without_a_name_has_a_position(monkeypatch, position, is_in_library):
+    """It was at a wave, which has none: where dips are not in the library, or where a dip explains too little."""
+    shapes, visits = dip_directions(SURFACE), list(visits_with_a_dip(position, 2))
+    monkeypatch.setattr(answers_of_change, "is_explained", lambda *jumps: False)
+    candidates = change_candidates(SURFACE, shapes, () if is_in_library else ("surface_dip",))
+    answers = [
+        change_answer(SURFACE, visits, [], candidates, 12.0, 6.0, surface=surface)
+        for surface in (answers_of_change.surface_changes(shapes), ())
+    ]
+    assert [(a.verdict, a.names, a.group) for a in answers] == [("unknown", (), "wave")] * 2
+    assert answers[0].position == pytest.approx(position, abs=0.15) and answers[1].position is None
+
+
 @pytest.mark.parametrize(("section", "opened"), [("", {"ballast@0.00", "ballast_stiffness"}), ("A", {"ballast@0.00"})])
 def test_work_on_the_whole_turnout_opens_what_all_supports_share(tmp_path, section, opened):
     rows = f"turnout,section,date,kind,resets,note\nt1,{section},2026-01-10,tamping,,\n"

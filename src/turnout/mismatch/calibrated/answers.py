@@ -25,6 +25,7 @@ def answers_after_visits(
     margin: float,
     first: int = 1,
     against_file: tuple[Sequence[StateParameter], Sequence[Event], Sequence[ChangeEffect]] | None = None,
+    surface: Sequence[ChangeEffect] = (),
 ) -> list[ModelAnswer]:
     """What the model says after each visit, of changes and against the file.
 
@@ -43,6 +44,8 @@ def answers_after_visits(
         Number of the first visit after which an answer is given, from 1.
     against_file : tuple or None
         Parameters, events and candidates of the comparison with the file, None: the same.
+    surface : sequence of ChangeEffect
+        As ``surface_changes``: they locate a change of the running surface that has no name.
 
     Returns
     -------
@@ -53,7 +56,7 @@ def answers_after_visits(
     answers = []
     file_parameters, file_events, file_candidates = against_file or (parameters, events, candidates)
     for n in range(first, len(ordered) + 1):
-        change = change_answer(parameters, ordered[:n], events, candidates, threshold, margin)
+        change = change_answer(parameters, ordered[:n], events, candidates, threshold, margin, surface=surface)
         before = _visits_before(ordered[:n], change)
         label = ordered[n - 1].visit
         answers += [

@@ -65,8 +65,8 @@ def change_candidates(
     local = [p for p in parameters if p.may_change and p.group in NAMES and NAMES[p.group] not in without]
     shapes = {} if shapes is None or NAMES["dip"] in without else shapes
     candidates = [(p.name, {p.name: 1.0}, change_sd(p, parameters)) for p in local]
-    candidates += [(name, dict(direction), CALIBRATION.dip_sd) for name, direction in shapes.items()]
     steps = [ChangeEffect(name, d, sd, grows) for name, d, sd in candidates for grows in (False, True)]
+    steps += surface_changes(shapes)
     springs = [p for p in local if p.group in STRETCH_GROUPS and p.position is not None]
     with_dampers = [e for p in springs for share in DAMPER_SHARES for e in _stretch(p.group, [p], share, parameters)]
     return steps + [e for e in with_dampers if len(e.direction) > 1]
@@ -129,6 +129,7 @@ def change_answer(
     margin: float,
     is_alarmed: bool = False,
     with_trains: tuple[Sequence[StateParameter], Sequence[VisitInformation]] | None = None,
+    surface: Sequence[ChangeEffect] = (),
 ) -> ModelAnswer:
     """What has changed up to the last of these visits.
 
@@ -151,6 +152,8 @@ def change_answer(
         Whether an open alarm asks: then a change of any size is told.
     with_trains : (sequence of StateParameter, sequence of VisitInformation) or None
         What tells soft ballast from a gap, None: ``parameters`` and ``visits``.
+    surface : sequence of ChangeEffect
+        As ``surface_changes``: they locate a change of the running surface that has no name.
 
     Returns
     -------
@@ -168,7 +171,7 @@ def change_answer(
     gain = _evidence_of_name(material, by_name)
     if gain < least:
         by_stated_errors = estimate_history(parameters, visits, events, repeats_between_visits=False, accepted=None)
-        return _answer_without_name(by_stated_errors, visit, by_name)
+        return _on_surface(_answer_without_name(by_stated_errors, visit, by_name), by_stated_errors, surface)
     leader = material[0]
     size = size_under_load(leader.size) if is_under_load(leader.effect) else leader.size
     jump = history.steps[1 + int(np.argmax(leader.gains))].innovation
@@ -183,7 +186,7 @@ def change_answer(
     since = float(leader.times[int(np.argmax(leader.gains))])
     is_rest_expected = not is_under_load(leader.effect) or is_all_explained(parameters, visits, opened, since)
     if not (is_explained(jump, explained) and is_rest_expected):
-        return stated.unknown(visit, CHANGE, by_name[jump.parameter])
+        return _on_surface(stated.unknown(visit, CHANGE, by_name[jump.parameter]), history, surface)
     names = [stated.name]
     if stated.name == "local_ballast" and leader.size[0] < 0.0:
         information = with_trains or (parameters, visits)
@@ -290,6 +293,28 @@ def _present_size(evidence: OnsetEvidence) -> tuple[float, float]:
     start = evidence.times[int(np.argmax(evidence.gains))]
     elapsed = float(evidence.times[-1] - start) if evidence.effect.grows else 1.0
     return elapsed * evidence.size[0], elapsed * evidence.size[1]
+
+
+def surface_changes(shapes: Mapping[str, Mapping[str, float]]) -> list[ChangeEffect]:
+    """Steps and growth of dips of the running surface.
+
+    Parameters
+    ----------
+    shapes : mapping
+        Name with its position -> direction (parameter -> change per metre of depth).
+
+    Returns
+    -------
+    list of ChangeEffect
+    """
+    sd = CALIBRATION.dip_sd
+    return [ChangeEffect(name, dict(d), sd, grows) for name, d in shapes.items() for grows in (False, True)]
+
+
+def _on_surface(answer: ModelAnswer, history: History, surface: Sequence[ChangeEffect]) -> ModelAnswer:
+    """An "unknown" at a wave, which runs along the whole surface, is where the most evident dip is."""
+    dips = compare_onsets(history, surface) if answer.group == "wave" else ()
+    return replace(answer, position=position_of(dips[0].effect.name, None)) if dips else answer
 
 
 def _answer_without_name(history: History, visit: str, by_name: Mapping[str, StateParameter]) -> ModelAnswer:
