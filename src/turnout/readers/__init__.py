@@ -69,6 +69,7 @@ def read(
     source = load(path, root)
     source = replace(source, lazy=max_duration is not None and source.size > max_whole_file_size)
     before = source.state()
+    _reject_one_byte(source)
     _reject_repeated_bytes(source)
     with _as_read_error(source):
         with _collected_warnings(source) as remarks:
@@ -108,6 +109,7 @@ def read_unconverted(
         If the file as a whole cannot be read.
     """
     source = replace(load(path, root), lazy=is_lazy)
+    _reject_one_byte(source)
     with _as_read_error(source):
         found = _format_of(source, RawDescription((), format=format))
         with _collected_warnings(source) as remarks:
@@ -156,6 +158,17 @@ def _as_read_error(source: Source) -> Iterator[None]:
         LOG.exception("%s: not foreseen by the reader", source.name)
         problem = f"it cannot be read ({type(error).__name__}: {' '.join(str(error).split())[:200]})"
         raise source.error("the file", problem) from error
+
+
+def _reject_one_byte(source: Source) -> None:
+    """ReadError if all bytes of the file are the same, as zeros where a file was created and nothing was written."""
+    value = source.head[:1]
+    if source.head != value * len(source.head):
+        return
+    data = source.memory_map if source.lazy else source.data
+    if all(data[k : k + 2**20] == value * len(data[k : k + 2**20]) for k in range(0, len(data), 2**20)):
+        problem = f"all of its {source.size} bytes are 0x{value[0]:02X}: nothing was written to it"
+        raise source.error("byte 0", problem, COPY_AGAIN, reason="empty")
 
 
 MAX_REPEATS = 4  # copies of a file in itself that are looked for

@@ -306,6 +306,22 @@ def test_a_file_appended_to_itself_is_named(tmp_path, copies):
     assert samples_of(path, layout()).shape[2] == 40 * copies
 
 
+@pytest.mark.parametrize("name", ["a.csv", "a.wav", "a.mat", "a.h5"])
+@pytest.mark.parametrize("value", [b"\0", b"\xff", b" "])
+@pytest.mark.parametrize("size", [1, 4096, 2**21 + 1])
+def test_a_file_of_one_byte_all_along_is_empty(tmp_path, name, value, size):
+    (tmp_path / name).write_bytes(value * size)
+    (error,) = errors_of(tmp_path / name, layout())
+    assert f"all of its {size} bytes are 0x{value[0]:02X}: nothing was written to it" in error
+
+
+def test_one_other_byte_is_enough(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_bytes(b" " * 2**21 + b"x")
+    (error,) = errors_of(path, layout())
+    assert "nothing was written" not in error
+
+
 def test_bytes_inserted_into_audio_are_found(tmp_path):
     path = tmp_path / "a.wav"
     soundfile.write(path, np.random.default_rng(1).uniform(-1, 1, (500, 2)), 20000, "PCM_16")
