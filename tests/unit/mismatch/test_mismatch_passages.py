@@ -281,7 +281,9 @@ def test_a_train_that_looks_like_no_such_train_is_said_and_located(plan):
     swapped = [replace(p, vehicle=other["light"]) if p.train == "heavy" else p for p in campaign.passages]
     case = TrackCase(replace(campaign, passages=tuple(swapped)))
     assert case.mismatched_trains == ("heavy",) and len([n for n in case.notes if "likeness" in n]) == 2
-    verdict, _ = assess(Search(case), SimpleNamespace(level={"passage": 0.1}, white=[]), ())
+    at_file = {n.name: n.mean for n in case.nuisances}
+    fit = SimpleNamespace(level={"passage": 0.1}, white=[], candidates=(), values=at_file)
+    verdict, _ = assess(Search(case), fit, ())
     assert verdict.answer == "unknown" and "heavy" in verdict.reason
     where = locate(case, None, cause=verdict.cause)
     assert where.frame == "train" and where.train == "heavy"
