@@ -9,6 +9,7 @@ import pytest
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine import map_fit, refit
 from turnout.mismatch.engine.candidate import EffectSite, RefitStarts
+from turnout.mismatch.engine.candidate_search import RefitTask
 from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.hammer_prescreen import _Prescreen, _Start
 from turnout.mismatch.engine.joint_problem import JointProblem
@@ -178,7 +179,7 @@ def test_a_law_of_the_whole_track_that_gains_too_little_is_begun_again_farther_o
     monkeypatch.setattr(Search, "fit", fitted)
     monkeypatch.setattr(refit, "_refit", lambda *a: first)
     monkeypatch.setattr(refit, "score_of", lambda search, fit, refit, *a: SimpleNamespace(gain=refit.gain))
-    entry = SimpleNamespace(candidate=candidate, start=(promised,), values={}, cheap_gain=0.0)
+    entry = RefitTask(candidate, np.array([promised]), {})
     score = refit._score_task(Search(case), fit, entry)
     assert starts == ([] if begun is None else [(begun, 0.7, 0.5, 0.1), (begun, 0.2, 0.5, 0.1)])
     assert score.gain == (gain if begun is None else 18.0)
@@ -302,3 +303,25 @@ def test_from_a_strong_leader_only_a_base_that_is_better_by_a_threshold_is_sough
     found = refit._base_from_leader(Search(case), base, [leader])
     assert bool(continued) == (not gives_up)
     assert (found.cost > base.cost + 0.2) == gives_up
+
+
+def test_the_limit_of_a_leader_is_refitted_from_its_nuisances_with_derivatives_there(monkeypatch):
+    """Derivatives of the fit without either effect may lead nowhere: a gap of 2.5 mm ended 260 nats too low."""
+    calls = []
+
+    def refitted(search, fit, task, is_far):
+        calls.append((task.start.tolist(), task.values, is_far))
+        return SimpleNamespace(candidates=(task.candidate,))
+
+    monkeypatch.setattr(refit, "_refit", refitted)
+    monkeypatch.setattr(refit, "score_of", lambda *a: SimpleNamespace(gain=30.0))
+    monkeypatch.setattr(Search, "stored_fit", lambda self, key, compute, candidates: compute())
+    plain, at_bound = SimpleNamespace(candidates=()), {"x0": 2.0}
+    candidate = SimpleNamespace(frame="place", key="gap", site=EffectSite(), refit=RefitStarts(((1e-3,),)))
+    limit = SimpleNamespace(gain=7.5, candidate=candidate, estimates=(np.array([1e-3]), np.array([1e-4])))
+    limit.is_limit_of = limit.is_simpler_form_of = lambda rival: rival is leader
+    unrelated = SimpleNamespace(gain=9.0, is_limit_of=lambda rival: False, is_simpler_form_of=lambda rival: False)
+    leader = SimpleNamespace(gain=40.0, fit=SimpleNamespace(values=at_bound))
+    ranked = refit._refit_equivalent_forms(Search(Bent(True)), plain, [leader, unrelated, limit])
+    assert calls == [([1e-3], at_bound, True)]
+    assert [s.gain for s in ranked] == [40.0, 30.0, 9.0]

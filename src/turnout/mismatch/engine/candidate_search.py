@@ -119,7 +119,8 @@ class RefitTask:
     """A ``candidate`` to refit from ``start`` (n_term,) and nuisance ``values``.
 
     ``cheap_gain`` is the gain from the cheap observations alone [nats]. A ``rival`` is refitted only if another effect
-    of its component gains something.
+    of its component gains something. With ``own_derivatives`` the refit of an expensive case starts with derivatives at
+    its start, otherwise with those of the fit without the candidate.
     """
 
     candidate: Candidate
@@ -127,6 +128,7 @@ class RefitTask:
     values: dict[str, float]
     cheap_gain: float = 0.0
     rival: bool = False
+    own_derivatives: bool = False
 
 
 def shortlist(search: Search, fit: Fit, promising: Collection[str] | None = ()) -> list[RefitTask]:

@@ -178,19 +178,18 @@ def _refit_equivalent_forms(search: Search, fit: Fit, ranked: list[Score]) -> li
     """The scores, with equivalent families refitted from the leader's nuisances, which suit them as well.
 
     Equivalent are families that cannot be distinguished from the leader as fitted: its ``limit_form`` and
-    ``simpler_form``. A limit form equals the leader at its largest sizes, where its own fit may never have been.
+    ``simpler_form``. A limit form equals the leader at its largest sizes, where its own fit may never have been: its
+    refit begins at the least costly of its estimate and its starts. The derivatives are those at that start. Those of
+    ``fit`` have neither effect, and from them a refit may end far above its optimum.
     """
     leader, beside = ranked[0], search.with_label(f"{search.label}:beside")
     for k, score in enumerate(ranked[1:], 1):
         is_equivalent = score.is_limit_of(leader) or score.is_simpler_form_of(leader)
         if leader.gain > search.settings.threshold and is_equivalent:
-            starts = [score.estimates[0]]
-            if score.is_limit_of(leader):
-                starts.append(np.asarray(max(score.candidate.starts, key=lambda start: start[0]), dtype=float))
-            for start in starts:
-                refitted = _score_task(beside, fit, RefitTask(score.candidate, start, leader.fit.values))
-                if refitted is not None and refitted.gain > ranked[k].gain:
-                    ranked[k] = refitted
+            task = RefitTask(score.candidate, score.estimates[0], leader.fit.values, own_derivatives=True)
+            refitted = _score_task(beside, fit, task)
+            if refitted is not None and refitted.gain > ranked[k].gain:
+                ranked[k] = refitted
     return sorted(ranked, key=lambda s: -s.gain)
 
 
@@ -251,7 +250,7 @@ def _score_task(search: Search, fit: Fit, task: RefitTask, best_gain: float = 0.
     threshold, candidate, is_channel = search.settings.threshold, task.candidate, task.candidate.frame == "sensor"
     accepted = "+".join(c.key for c in fit.candidates)
     key = f"{search.label}:{accepted}:{candidate.key}:{tuple(np.round(task.start, 12))}"
-    is_far = is_channel and task.cheap_gain > THRESHOLDS.far_start_gain * threshold
+    is_far = task.own_derivatives or (is_channel and task.cheap_gain > THRESHOLDS.far_start_gain * threshold)
     refit = search.stored_fit(key, lambda: _refit(search, fit, task, is_far), (*fit.candidates, candidate))
     if refit is None:
         return None
