@@ -179,17 +179,19 @@ def _refit_equivalent_forms(search: Search, fit: Fit, ranked: list[Score]) -> li
 
     Equivalent are families that cannot be distinguished from the leader as fitted: its ``limit_form`` and
     ``simpler_form``. A limit form equals the leader at its largest sizes, where its own fit may never have been: its
-    refit begins at the least costly of its estimate and its starts. The derivatives are those at that start. Those of
-    ``fit`` have neither effect, and from them a refit may end far above its optimum.
+    refit begins at the least costly of its estimate and its starts. It is tried with the derivatives of ``fit``, which
+    has neither effect, and with those at its start: with either of them a refit may end far above its optimum.
     """
-    leader, beside = ranked[0], search.with_label(f"{search.label}:beside")
+    leader = ranked[0]
     for k, score in enumerate(ranked[1:], 1):
         is_equivalent = score.is_limit_of(leader) or score.is_simpler_form_of(leader)
         if leader.gain > search.settings.threshold and is_equivalent:
-            task = RefitTask(score.candidate, score.estimates[0], leader.fit.values, own_derivatives=True)
-            refitted = _score_task(beside, fit, task)
-            if refitted is not None and refitted.gain > ranked[k].gain:
-                ranked[k] = refitted
+            for label, own_derivatives in (("beside", False), ("at its start", True)):
+                start = score.estimates[0]
+                task = RefitTask(score.candidate, start, leader.fit.values, own_derivatives=own_derivatives)
+                refitted = _score_task(search.with_label(f"{search.label}:{label}"), fit, task)
+                if refitted is not None and refitted.gain > ranked[k].gain:
+                    ranked[k] = refitted
     return sorted(ranked, key=lambda s: -s.gain)
 
 
