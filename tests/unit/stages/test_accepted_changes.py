@@ -210,8 +210,9 @@ def test_a_night_after_the_acceptance_names_nothing_and_after_its_withdrawal_the
     after = row_of_night()
     assert after["verdict"] == "none" and f"accepted before: {change.words}" in after["sentence"]
     accepted = calibrate_turnout("t1")
-    change_in_model, against_file = model.answers  # two visits before the change may not tell soft ballast from a gap
-    assert before["term"] in change_in_model.names and change_in_model.position == before["position_m"]
+    change_in_model, against_file = model.answers  # with two visits before it, soft ballast may as well be a gap
+    assert (change_in_model.question, change_in_model.verdict) == ("change", "a_or_b")
+    assert change_in_model.names == ("local_ballast", "hanging_sleeper") and change_in_model.position == 18.0
     assert (against_file.question, against_file.verdict) == ("file", "none")
     assert [(a.question, a.verdict) for a in accepted.answers] == [("change", "none"), ("file", "none")]
     assert len(accepted.history.used_steps) == len(DAYS) > len(model.history.used_steps)

@@ -51,10 +51,10 @@ def channel_mean_squares(observation: Observation, white: np.ndarray) -> np.ndar
     if observation.cells is None or "sensor" not in observation.labels:
         return np.zeros(0)
     inside = observation.cells >= 0
-    level, code = np.unique(observation.labels["sensor"].astype(str), return_inverse=True)
+    sensors, code = np.unique(observation.labels["sensor"].astype(str), return_inverse=True)
     channel = code[observation.cells[inside]]
-    count = np.maximum(np.bincount(channel, minlength=level.size), 1)
-    return np.bincount(channel, np.asarray(white)[inside] ** 2, minlength=level.size) / count
+    count = np.maximum(np.bincount(channel, minlength=sensors.size), 1)
+    return np.bincount(channel, np.asarray(white)[inside] ** 2, minlength=sensors.size) / count
 
 
 def is_lone_excess(case: Case, fit: Fit) -> bool:
