@@ -130,19 +130,22 @@ def test_what_the_fit_without_an_effect_had_not_come_to_is_no_evidence_for_the_e
     early, late = (fit_jointly(Bent(True), iterations=25, stall=s) for s in (stall, THRESHOLDS.fine_stall))
     owed = late.evidence - early.evidence
     assert (owed > MismatchSettings().threshold) == again
-    asked = []
+    asked, prescreens, of_the_prescreen = [], [], ["entry"]
 
-    def ranked(search, fit, *_):
+    def ranked(search, fit, prescreened):
         asked.append(fit.evidence)
+        assert prescreened is of_the_prescreen
         debt = late.evidence - fit.evidence
         return [Score(SimpleNamespace(key=k), debt + g, 0.0, 1.0, late) for k, g in (("a", 20.0), ("b", 3.0))]
 
     monkeypatch.setattr(refit, "_rank_families", ranked)
+    monkeypatch.setattr(refit, "prescreened_entries", lambda *a: prescreens.append(a) or of_the_prescreen)
     monkeypatch.setattr(refit, "correct_for_leader", lambda search, fit, found: found)
     monkeypatch.setattr(refit, "_with_condition_gains", lambda search, fit, s: s)
     found, fit = refit.score_candidates(Search(Bent(True)), early)
     assert [s.gain for s in found] == pytest.approx([20.0, 3.0], abs=0.5)
     assert len(asked) == 1 + again and fit.evidence == pytest.approx(asked[-1])
+    assert len(prescreens) == 1  # it does not depend on the fit without effects
     assert fit.evidence == pytest.approx(late.evidence, abs=0.5 if again else MismatchSettings().threshold)
 
 

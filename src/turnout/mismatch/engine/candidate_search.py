@@ -131,20 +131,19 @@ class RefitTask:
     own_derivatives: bool = False
 
 
-def shortlist(search: Search, fit: Fit, promising: Collection[str] | None = ()) -> list[RefitTask]:
+def shortlist(search: Search, fit: Fit, prescreened: Sequence[Entry] = ()) -> list[RefitTask]:
     """Candidates to refit on top of a fit.
 
-    If predictions are cheap, every family is refitted from every start. In an expensive case, ``prescreen`` fits the
-    families that show in the cheap observations. The others are scored by the columns of their starts
-    (``Case.screen``), or by a prediction if there is no column.
+    If predictions are cheap, every family is refitted from every start. In an expensive case, families that show in
+    the cheap observations are ``prescreened``. The others are scored by the columns of their starts (``Case.screen``),
+    or by a prediction if there is no column.
 
     Parameters
     ----------
     search : Search
     fit : Fit
-    promising : collection of str or None
-        Families that ``prescreen`` tries on top of a first effect, beside those of the whole track, which the common
-        parameters mask; None: all. For others the residual is small enough for columns.
+    prescreened : sequence of Entry
+        Those of ``prescreened_entries``.
 
     Returns
     -------
@@ -159,7 +158,7 @@ def shortlist(search: Search, fit: Fit, promising: Collection[str] | None = ()) 
     ]
     if not case.expensive:
         return [RefitTask(c, np.asarray(s, dtype=float), {}) for c in candidates for s in c.starts]
-    prescreened = [e for e in _prescreened_entries(search, fit, promising) if e.candidate in candidates]
+    prescreened = [e for e in prescreened if e.candidate in candidates]
     masked = [e for e in masked_candidates(case, fit) if e.candidate in candidates]
     by_family: dict[str, list[Entry]] = {}
     for entry in (*prescreened, *masked, *_screened_entries(case, fit, candidates)):
@@ -177,10 +176,28 @@ def shortlist(search: Search, fit: Fit, promising: Collection[str] | None = ()) 
     return [RefitTask(*e[1:], prescreen_gains.get(e.candidate.key, 0.0), rival) for e, rival in tasks]
 
 
-def _prescreened_entries(search: Search, fit: Fit, promising: Collection[str] | None) -> list[Entry]:
-    """Candidates fitted to the cheap observations."""
+def prescreened_entries(search: Search, fit: Fit, promising: Collection[str] | None = ()) -> list[Entry]:
+    """Candidates of an expensive case, fitted to its cheap observations beside the effects of a fit.
+
+    They are fitted from the priors, so they do not depend on the nuisances of the fit.
+
+    Parameters
+    ----------
+    search : Search
+    fit : Fit
+    promising : collection of str or None
+        Families that are tried on top of a first effect, beside those of the whole track, which the common parameters
+        mask; None: all. For others the residual is small enough for columns.
+
+    Returns
+    -------
+    list of Entry
+        The best of each family. [] for a cheap case.
+    """
     from turnout.mismatch.engine.hammer_prescreen import prescreen
 
+    if not search.case.expensive:
+        return []
     families = None
     if fit.candidates and promising is not None:
         families = {

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.engine.candidate_search import RefitTask, shortlist
+from turnout.mismatch.engine.candidate_search import Entry, RefitTask, prescreened_entries, shortlist
 from turnout.mismatch.engine.cross_validation import gain_where_unmasked, held_out_score, single_witness
 from turnout.mismatch.engine.evidence import score_of
 from turnout.mismatch.engine.joint_problem import JointProblem, cost_at
@@ -100,11 +100,12 @@ def score_candidates(search: Search, fit: Fit, promising: Collection[str] | None
     fit : Fit
         The fit on top of which they were scored.
     """
-    ranked = _rank_families(search, fit, promising)
+    prescreened = prescreened_entries(search, fit, promising)
+    ranked = _rank_families(search, fit, prescreened)
     continued = _base_from_leader(search, fit, ranked)
     if continued is not None and continued.evidence - fit.evidence > search.settings.threshold:
         fit, search = continued, search.with_label(f"{search.label}:again")
-        ranked = _rank_families(search, fit, promising)
+        ranked = _rank_families(search, fit, prescreened)
         continued = _base_from_leader(search, fit, ranked)
     if continued is not None:  # the shortfall of the base fit is no evidence
         shortfall = max(0.0, continued.evidence - fit.evidence)
@@ -114,9 +115,9 @@ def score_candidates(search: Search, fit: Fit, promising: Collection[str] | None
     return tuple(_with_condition_gains(search, fit, s) for s in ranked), fit
 
 
-def _rank_families(search: Search, fit: Fit, promising: Collection[str] | None) -> list[Score]:
+def _rank_families(search: Search, fit: Fit, prescreened: Sequence[Entry]) -> list[Score]:
     """Best score of each family on top of ``fit``, leaders fitted to convergence."""
-    tasks = shortlist(search, fit, promising)
+    tasks = shortlist(search, fit, prescreened)
     scores: dict[str, Score] = {}
     best_gain, min_gain = -np.inf, THRESHOLDS.min_component_gain * search.settings.threshold
     for index, task in enumerate(tasks):
