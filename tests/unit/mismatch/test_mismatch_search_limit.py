@@ -1,5 +1,7 @@
 """A search that costs more simulations than its case allows ends with "cannot tell" and says why."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -76,3 +78,32 @@ def test_a_search_beyond_its_bound_cannot_tell():
     whole = Counted(None)
     diagnose(whole)
     assert case.count < whole.count
+
+
+class TwoEffects(Counted):
+    """A parabola and, smaller, a wave; the first effect leaves an excess, so that a second one is sought."""
+
+    def __init__(self, most):
+        super().__init__(most)
+        wave = np.sin(4.0 * self.x)
+        self.observations = tuple(replace(o, data=o.data + 0.15 * wave) for o in self.observations)
+        self.candidates = (
+            Candidate.of("bend", SIZE, lambda psi: psi["size"] * self.x**2, ((1.0,),)),
+            Candidate.of("wave", SIZE, lambda psi: psi["size"] * wave, ((1.0,),)),
+        )
+
+    def predict(self, values, terms, observations):
+        self.count += len(observations)
+        return [values["slope"] * self.x + sum(terms) for _ in observations]
+
+
+def test_a_name_stands_where_the_search_for_a_second_effect_is_not_finished():
+    whole = TwoEffects(None)
+    assert sorted(diagnose(whole).names) == ["bend", "wave"]
+    answers = [diagnose(TwoEffects(most)) for most in range(0, whole.count, 10)]
+    trails = [a.verdict.trail[0] for a in answers]
+    kept = [a for a in answers if "further_effect_not_sought_to_the_end" in a.verdict.trail]
+    assert kept and trails == sorted(trails, key=lambda name: name != "search_too_long")
+    for answer in kept:
+        assert answer.names == ("bend",) and answer.verdict.grade == "B" and len(answer.verdicts) == 1
+        assert "whether there is a second effect was not decided within" in answer.verdict.reason

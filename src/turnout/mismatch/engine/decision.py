@@ -123,6 +123,9 @@ NAME_RULES: tuple[Rule[NameEvidence], ...] = (
 )
 
 LIMIT_RULES: tuple[Rule[SearchLimit], ...] = (
+    Rule("further_effect_not_sought_to_the_end", lambda e: e.has_verdict, "first",
+         "whether there is a second effect was not decided within {e.most} simulations of a train",
+         "decisions/switch-panels.md"),
     Rule("search_too_long", _always, "unknown",
          "the search was not finished within {e.most} simulations of a train", "decisions/switch-panels.md"),
 )
@@ -282,3 +285,25 @@ def unfinished_verdict(limit: SearchLimit, settings: MismatchSettings) -> Verdic
     return Verdict(
         rule.answer, reason=rule.reason_for(limit), probability=settings.certainty(rule.answer), trail=(rule.name,)
     )
+
+
+def keep_first(verdict: Verdict, limit: SearchLimit) -> Verdict:
+    """The verdict on the first effect where the search for a second one was not finished.
+
+    All its rivals were compared before that search began, so it stands, with a reason that says what is open.
+
+    Parameters
+    ----------
+    verdict : Verdict
+        On the first effect.
+    limit : SearchLimit
+        What the search has cost.
+
+    Returns
+    -------
+    Verdict
+    """
+    open_limit = replace(limit, has_verdict=True)
+    rule = first_applicable(LIMIT_RULES, open_limit)
+    reason = "; ".join(filter(None, [verdict.reason, rule.reason_for(open_limit)]))
+    return replace(verdict, reason=reason).after(rule)

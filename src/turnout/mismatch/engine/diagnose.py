@@ -13,6 +13,7 @@ from turnout.mismatch.engine.decision import (
     confirm,
     first_applicable,
     grade_name,
+    keep_first,
     unfinished_verdict,
 )
 from turnout.mismatch.engine.decision_facts import NumericalError
@@ -120,7 +121,7 @@ def diagnose(
         return Diagnosis((numerics,), base, base, frames, verification, latent)
     try:
         limited = replace(search, n_before=case.n_simulations)
-        findings = withhold_names(name_tolerated(grade_names(settle_pair(_seek_effects(limited, base)))))
+        findings = withhold_names(name_tolerated(grade_names(_seek_effects(limited, base))))
     except SearchLimitError as error:
         findings = Findings(search, base, base, (unfinished_verdict(error.limit, search.settings),))
     search, base, fit, verdicts = findings.search, findings.base, findings.fit, findings.verdicts
@@ -179,12 +180,25 @@ def _numerics_rule(search: Search, base: Fit) -> tuple[Rule | None, NumericalErr
 
 
 def _seek_effects(search: Search, base: Fit) -> Findings:
-    """Verdicts on effects that are sought one after the other, each on top of those before."""
-    findings = Findings(search, base, base)
-    for effect in range(search.settings.effects):
-        findings, goes_on = _seek_effect(findings, effect)
+    """Verdicts on effects that are sought one after the other, each on top of those before.
+
+    The first one stands if the search for further effects, or the comparison with them, is not finished.
+    """
+    first, goes_on = _seek_effect(Findings(search, base, base), 0)
+    try:
+        return settle_pair(_seek_further(first) if goes_on else first)
+    except SearchLimitError as error:
+        return settle_pair(replace(first, verdicts=(keep_first(first.verdicts[0], error.limit),)))
+
+
+def _seek_further(first: Findings) -> Findings:
+    """The findings after further effects were sought on top of the first."""
+    prepared = replace(first, fit=first.search.with_jacobian(first.fit))
+    findings, goes_on = _prepare_next(prepared, first.verdicts[0])
+    for effect in range(1, first.search.settings.effects):
         if not goes_on:
             break
+        findings, goes_on = _seek_effect(findings, effect)
     return findings
 
 
@@ -201,7 +215,7 @@ def _seek_effect(findings: Findings, effect: int) -> tuple[Findings, bool]:
     findings = replace(findings, verdicts=(verdict,))
     if verdict.answer == "none" or score is None or score.gain <= settings.threshold:
         return findings, False
-    return _prepare_next(replace(findings, fit=search.with_jacobian(score.fit)), verdict)
+    return replace(findings, fit=score.fit), True
 
 
 def _prepare_next(findings: Findings, verdict: Verdict) -> tuple[Findings, bool]:

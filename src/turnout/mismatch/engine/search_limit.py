@@ -13,10 +13,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SearchLimit:
-    """Number ``n`` of simulations that a search has cost, and the ``most`` that it may."""
+    """Number ``n`` of simulations that a search has cost, and the ``most`` that it may.
+
+    ``has_verdict``: the first effect had its verdict before, and a second one was sought.
+    """
 
     n: int
     most: int
+    has_verdict: bool = False
 
 
 class SearchLimitError(TurnoutError):
