@@ -16,13 +16,14 @@ from turnout.modal.state_space import continuous_pole
 from turnout.records import FittedReceptance, Rejection
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from typing import Any
 
     from numpy.typing import ArrayLike
 
     from turnout.config.settings.identify import IdentifySettings
-    from turnout.records import Receptance
+    from turnout.modal.summary import ImpactEstimates
+    from turnout.records import Mode, Receptance
 
 
 def passed_share(receptance: Receptance, frequency: float, damping: float) -> tuple[float, float]:
@@ -198,6 +199,83 @@ def _assign_across_edge(
         if pairs:
             best_pair = max(pairs, key=lambda pair: significance[list(pair)].sum())
             choice.modes[band], choice.modes[neighbour] = best_pair
+
+
+def accepted_modes(
+    estimates: Sequence[ImpactEstimates], settings: IdentifySettings
+) -> tuple[list[tuple[ImpactEstimates, Mode]], list[tuple[str, Rejection]]]:
+    """Means over the impacts, divided into those that stand for their resonance and those that do not.
+
+    Parameters
+    ----------
+    estimates : sequence of ImpactEstimates
+        Estimates of one mode of each band.
+    settings : IdentifySettings
+        Limits of :func:`failure_of_mode`, and the level of the intervals.
+
+    Returns
+    -------
+    accepted : list of (ImpactEstimates, Mode)
+    failed : list of (str, Rejection)
+        Band and reason.
+    """
+    accepted, failed = [], []
+    for e in estimates:
+        mode = e.mode(settings.confidence)
+        failure = failure_of_mode(mode, settings)
+        if failure is None:
+            accepted.append((e, mode))
+        else:
+            failed.append((e.band, failure))
+    return accepted, failed
+
+
+def failure_of_mode(mode: Mode, settings: IdentifySettings) -> Rejection | None:
+    """Why the reported mean of a mode cannot stand for the resonance of its band, None if it can.
+
+    The limits of the fit hold for the scatter between its impacts, too. The whole interval, with the error that all
+    impacts share, must lie in the band of the resonance, up to the distance that a mode may have from its edge.
+    Otherwise the test does not tell which resonance it is, even where all impacts agree.
+
+    Parameters
+    ----------
+    mode : Mode
+        Mean over the impacts, with its errors where they are known.
+    settings : IdentifySettings
+        Bands, and the largest relative standard errors from the scatter of the impacts.
+
+    Returns
+    -------
+    Rejection or None
+        Reason "not_identified".
+    """
+    words = f"{mode.band} mode at {mode.frequency:.0f} Hz: "
+    if mode.damping <= MIN_DAMPING:
+        return Rejection("not_identified", mode.damping, MIN_DAMPING, words + "damping, mean over its impacts")
+    checks = (
+        ("frequency", (mode.frequency_repeatability or 0.0) / mode.frequency, settings.frequency_se_maximum),
+        ("damping", (mode.damping_repeatability or 0.0) / mode.damping, settings.damping_se_maximum),
+    )
+    for name, relative, limit in checks:
+        if relative > limit:
+            detail = words + f"relative standard error of the {name}, from the spread between its impacts"
+            return Rejection("not_identified", relative, limit, detail)
+    return _leaves_band(mode, settings, words)
+
+
+def _leaves_band(mode: Mode, settings: IdentifySettings, words: str) -> Rejection | None:
+    """The rejection of a main mode whose interval [Hz] reaches out of the band of its resonance."""
+    if mode.band not in MAIN_BANDS or mode.frequency_low is None or mode.frequency_high is None:
+        return None
+    low, high = next((low, high) for band, low, high in settings.bands() if band == mode.band)
+    interval = f"its interval, {mode.frequency_low:.0f} to {mode.frequency_high:.0f} Hz"
+    detail = f"{words}{interval}, reaches out of the band of the resonance, {low:.0f} to {high:.0f} Hz"
+    lowest, highest = low / (1.0 + MAX_EDGE_DISTANCE), high * (1.0 + MAX_EDGE_DISTANCE)
+    if mode.frequency_high > highest:
+        return Rejection("not_identified", mode.frequency_high, highest, detail)
+    if mode.frequency_low < lowest:
+        return Rejection("not_identified", mode.frequency_low, lowest, detail)
+    return None
 
 
 def _apply_gate(

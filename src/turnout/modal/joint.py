@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from turnout.modal.bands import choose_bands, fit_receptance
-from turnout.modal.mixed_effects import MIN_DAMPING
+from turnout.modal.bands import accepted_modes, choose_bands, fit_receptance
 from turnout.modal.noise import whiten
 from turnout.modal.second_response import second_records, with_second_response
 from turnout.modal.selection import Selection, select_modes
@@ -268,33 +267,13 @@ def _band_modes(
     rate: float,
     settings: IdentifySettings,
 ) -> tuple[list[ImpactEstimates], tuple[Mode, ...]]:
-    """(estimates, modes) of the chosen bands; a mode whose mean is too uncertain or not damped leaves ``choice``."""
-    accepted = []
-    for e in _estimates(selection, choice, records, index, rate, settings) if choice.modes else ():
-        mode = e.mode(settings.confidence)
-        failure = _failure_of_mean(mode, settings)
-        if failure is None:
-            accepted.append((e, mode))
-            continue
-        del choice.modes[e.band]
-        choice.rejections.append(failure)
+    """(estimates, modes) of the chosen bands; a mode that fails ``failure_of_mode`` leaves ``choice``."""
+    estimates = _estimates(selection, choice, records, index, rate, settings) if choice.modes else []
+    accepted, failed = accepted_modes(estimates, settings)
+    for band, rejection in failed:
+        del choice.modes[band]
+        choice.rejections.append(rejection)
     return [e for e, _ in accepted], tuple(mode for _, mode in accepted)
-
-
-def _failure_of_mean(mode: Mode, settings: IdentifySettings) -> Rejection | None:
-    """Why the mean over the impacts is no mode: the limits of the fit hold for the values that are reported, too."""
-    words = f"{mode.band} mode at {mode.frequency:.0f} Hz: "
-    if mode.damping <= MIN_DAMPING:
-        return Rejection("not_identified", mode.damping, MIN_DAMPING, words + "damping, mean over its impacts")
-    checks = (
-        ("frequency", (mode.frequency_repeatability or 0.0) / mode.frequency, settings.frequency_se_maximum),
-        ("damping", (mode.damping_repeatability or 0.0) / mode.damping, settings.damping_se_maximum),
-    )
-    for name, relative, limit in checks:
-        if relative > limit:
-            detail = words + f"relative standard error of the {name}, from the spread between its impacts"
-            return Rejection("not_identified", relative, limit, detail)
-    return None
 
 
 def _estimates(

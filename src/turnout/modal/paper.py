@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy
 
-from turnout.modal.bands import fit_receptance, passed_share
+from turnout.modal.bands import accepted_modes, fit_receptance, passed_share
 from turnout.modal.era import era
 from turnout.modal.frf import pulse_response
 from turnout.modal.joint import common_length, fit_diagnostics, stabilisation_rows
@@ -266,13 +266,15 @@ def identify_paper(
         "filters_start_at": "decay" if leads is None else "record"
     }
     estimates, rejections = _estimates(band_values, records, index, settings, receptance)
+    accepted, failed = accepted_modes(estimates, settings)
+    rejections += [rejection for _, rejection in failed]
     model_fields: dict[str, Any] = {
         "rejections": tuple(rejections),
         "stabilisation": stabilisation_rows(selection, settings.pole_tolerance),
     }
-    if not estimates:
+    if not accepted:
         return no_model(rate, "paper", diagnostics=diagnostics, **model_fields)
-    modes = tuple(e.mode(settings.confidence) for e in estimates)
+    estimates, modes = [e for e, _ in accepted], tuple(mode for _, mode in accepted)
     if receptance is not None:
         values = [m.frequency for m in modes], [m.damping for m in modes]
         model_fields["fitted_receptance"] = fit_receptance(receptance, *values)

@@ -68,7 +68,7 @@ ROWS = {
         order by section_id, measured_at_utc desc, model_id""",
     "off_track": f"""
         select turnout_id, section_id, band, measured_at_utc, frequency_hz, frequency_track_hz, damping_ratio,
-            damping_track, residue_ratio, n_history, shape_mac
+            damping_track, residue_ratio, n_history, shape_mac, verdict, frequency_se_hz, damping_se
         from modes_off_track where {ID_GIVEN} and n_history >= {MIN_TRACK}
         order by section_id, measured_at_utc desc, band""",
     "receptances": f"select * from receptances_current where {ID_GIVEN} {NEWEST_MODEL}",

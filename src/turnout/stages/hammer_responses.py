@@ -16,6 +16,7 @@ import numpy as np
 from turnout.config.settings.identify import IdentifySettings
 from turnout.content import sha256_of
 from turnout.errors import ReadError
+from turnout.modal.bands import failure_of_mode
 from turnout.modal.frf import FrfMode, FrfModes, modes_of_frf
 from turnout.readers.frequency_responses import FrequencyResponses, check_evaluable, find_responses
 from turnout.records import ModalModel, Mode, Rejection
@@ -121,19 +122,27 @@ def response_model(responses: FrequencyResponses, settings: IdentifySettings) ->
         The model has no matrices. Its status is that of the two resonances.
     """
     found = modes_of_frf(responses.frequency, responses.frf)
-    modes, others = [], list(found.modes)
+    modes, others, failures = [], list(found.modes), []
     for band, low, high in settings.bands():
         inside = [m for m in found.modes if low <= m.frequency.mean < high]
         if inside:
             best = max(inside, key=lambda m: m.contrast)
             others.remove(best)
-            modes.append(_mode(band, best))
+            mode = _mode(band, best)
+            failure = failure_of_mode(mode, settings)
+            if failure is None:
+                modes.append(mode)
+            else:
+                failures.append(failure)
     n_main = sum(mode.band in ("ballast", "railpad") for mode in modes)
     status = ("rejected", "second_order_only", "accepted")[n_main]
-    rejections = () if n_main else (Rejection("not_identified", detail="no mode in the bands of the two resonances"),)
+    rejections = list(failures)
+    if not n_main:
+        rejections.append(Rejection("not_identified", detail="no mode in the bands of the two resonances"))
     empty = np.zeros(0)
-    model = ModalModel(np.zeros((0, 0)), empty, empty, float("nan"), tuple(modes), METHOD, status, rejections)
-    return model, "; ".join([NO_IMPACTS, *_single_words(model), *_other_words(others, found)])
+    model = ModalModel(np.zeros((0, 0)), empty, empty, float("nan"), tuple(modes), METHOD, status, tuple(rejections))
+    failure_words = [str(failure.detail) for failure in failures]
+    return model, "; ".join([NO_IMPACTS, *_single_words(model), *failure_words, *_other_words(others, found)])
 
 
 def _single_words(model: ModalModel) -> list[str]:

@@ -14,10 +14,11 @@ from turnout.demo.hammer import hammer_test as simulate_test
 from turnout.demo.hammer import simulated_response
 from turnout.hammer_test import find_impacts
 from turnout.modal import identification, identify
-from turnout.modal.joint import _failure_of_mean, identify_joint
+from turnout.modal.bands import accepted_modes, failure_of_mode
+from turnout.modal.joint import identify_joint
 from turnout.modal.least_squares import drift_columns
 from turnout.modal.mixed_effects import MAX_DAMPING, fit_mixed
-from turnout.modal.summary import summarise
+from turnout.modal.summary import ImpactEstimates, summarise
 from turnout.records import Mode
 from turnout.stages.hammer import identify_accepted
 
@@ -146,7 +147,32 @@ def test_two_poles_in_one_resonance_do_not_stand_for_it():
 def test_a_mean_that_is_too_uncertain_is_no_mode(damping, error, is_rejected):
     """A damping of 0.0074 ± 0.0233 was accepted; the limit of a damping is half its value."""
     mode = Mode("railpad", 611.0, damping, frequency_repeatability=0.8, damping_repeatability=error)
-    failure = _failure_of_mean(mode, SETTINGS)
+    failure = failure_of_mode(mode, SETTINGS)
     assert (failure is not None) == is_rejected
     if is_rejected:
         assert failure.reason == "not_identified" and "railpad mode at 611 Hz" in failure.detail
+
+
+def shared_error_mode(band, frequency, shared, damping=0.1, damping_shared=0.0):
+    """A mode whose ten impacts agree, with the relative error ``shared`` of the frequency common to all of them."""
+    estimate = np.column_stack([np.log(frequency) + 1e-3 * np.arange(-4.5, 5.0), np.full(10, damping)])
+    error, shared_se = np.full((10, 2), 1e-3), np.array([shared, damping_shared])
+    return ImpactEstimates(band, np.arange(10), estimate, error, np.ones(10), shared_se=shared_se)
+
+
+@pytest.mark.parametrize(("estimates", "is_rejected"), [
+    (shared_error_mode("ballast", 307.0, 0.25, 0.4, 0.34), True),  # accepted before: all of its error is shared
+    # intervals of ± 1.96 x 4 %: 288 to 337 Hz, 268 to 314 Hz, 262 to 307 Hz; edges 330 and 273 Hz
+    (shared_error_mode("ballast", 312.0, 0.04), True), (shared_error_mode("ballast", 290.0, 0.04), False),
+    (shared_error_mode("railpad", 284.0, 0.04), True), (shared_error_mode("railpad", 299.0, 0.003), False),
+    # ± 1.96 x 40 %: 68 to 329 Hz, 46 to 219 Hz, 45 to 215 Hz; the lower edge is 45.5 Hz
+    (shared_error_mode("ballast", 150.0, 0.4), False), (shared_error_mode("ballast", 98.0, 0.4), True),
+    (shared_error_mode("ballast", 102.0, 0.4), False), (shared_error_mode("railpad", 750.0, 0.1), True),
+    (shared_error_mode("other1", 284.0, 0.04), False),
+])  # fmt: skip
+def test_an_error_that_all_impacts_share_counts(estimates, is_rejected):
+    """An interval out of the band of a resonance does not tell which one it is, even where all impacts agree."""
+    accepted, failed = accepted_modes([estimates], SETTINGS)
+    assert len(accepted) == (not is_rejected)
+    reasons = [(band, rejection.reason) for band, rejection in failed]
+    assert reasons == ([(estimates.band, "not_identified")] if is_rejected else [])

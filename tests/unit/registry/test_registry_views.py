@@ -99,6 +99,30 @@ def test_resonance_drift_is_ordinary_least_squares(fleet, modes, days, asof, ver
     assert set(drift.verdict) == verdicts
 
 
+def test_a_campaign_with_a_large_error_does_not_decide_a_drift(bench, hammer):
+    """Weights 2 / (1 + (se / median se)²): against weighted least squares of statsmodels."""
+    days = pd.date_range("2025-01-05", periods=26, freq="14D")
+    warm, error = np.round(10.0 + 8.0 * np.sin(np.arange(26)), 1), np.where(np.arange(26) % 3, 0.4, 0.6)
+    frequency = 150.0 - 0.1 * np.arange(26) + 0.1 * np.cos(3.0 * np.arange(26))
+    frequency = np.round(frequency, 3)
+    frequency[20], error[20] = 307.0, 78.0
+    bench.register(*(
+        hammer(section="A1", day=f"{d:%Y-%m-%d}", frequency=f, frequency_se_hz=e, rail_temperature_c=c)
+        for d, f, e, c in zip(days, frequency, error, warm, strict=True)
+    ))  # fmt: skip
+    (row,) = bench.frame("from resonance_drift(400)").itertuples()
+    weight = 2.0 / (1.0 + (error / np.median(error)) ** 2)
+    mean = np.average(frequency, weights=weight)
+    years = (days - days[-1]).total_seconds().to_numpy() / YEAR
+    fit = sm.WLS(frequency, np.column_stack([np.ones(26), years, warm]), weight).fit()
+    np.testing.assert_allclose(
+        [row.drift_pct_per_year, row.drift_se_pct_per_year, row.frequency_hz, row.residual_sd_pct],
+        [100 * fit.params[1] / mean, 100 * fit.bse[1] / mean, mean, 100 * np.sqrt(fit.scale) / mean],
+        rtol=1e-6,
+    )
+    assert abs(row.drift_pct_per_year - 100 * (-0.1 * 365.25 / 14.0) / mean) < 3.0 * row.drift_se_pct_per_year < 3.0
+
+
 def test_drift_of_short_constant_or_cold_charts_is_said_not_to_be_known(bench, hammer):
     flat = [
         hammer(section="flat", day=f"2026-01-{d:02d}", frequency=150.0, rail_temperature_c=5.0) for d in range(1, 20)

@@ -53,10 +53,25 @@ def test_a_mode_off_its_track_has_its_shape_where_there_is_a_second_response(mac
     mode = {
         "section_id": "t/A7", "band": "ballast", "measured_at_utc": datetime(2026, 5, 1, 9), "frequency_hz": 162.0,
         "damping_ratio": 0.05, "frequency_track_hz": 150.0, "damping_track": 0.067, "residue_ratio": None,
-        "n_history": 9, "shape_mac": mac,
+        "n_history": 9, "shape_mac": mac, "verdict": "departs", "frequency_se_hz": None, "damping_se": None,
     }  # fmt: skip
     text = page(models=[REJECTED], off_track=[mode])
     assert f"(median of 9 campaigns before: 150.0 Hz, 0.0670{words})." in text
+
+
+def test_a_mode_with_a_useless_error_is_stated_as_uncertain():
+    mode = {
+        "section_id": "t/A7", "band": "ballast", "measured_at_utc": datetime(2026, 5, 1, 9), "frequency_hz": 307.37,
+        "damping_ratio": 0.417, "frequency_track_hz": 102.2, "damping_track": 0.209, "residue_ratio": None,
+        "n_history": 9, "shape_mac": None, "verdict": "uncertain", "frequency_se_hz": 77.8, "damping_se": 0.338,
+    }  # fmt: skip
+    text = page(models=[REJECTED], off_track=[mode])
+    assert (
+        "too uncertain to show whether it continues those before: 2026-05-01 ballast 307.4 (standard error 78) Hz, "
+        in text
+    )
+    assert "damping 0.4170 (standard error 0.34) (median of 9" in text
+    assert "another mode, or the track has changed" not in text
 
 
 def test_a_new_panel_is_a_function_and_one_line(monkeypatch):

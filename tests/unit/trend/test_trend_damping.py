@@ -104,7 +104,9 @@ def test_charts_of_damping_keep_their_rate_of_false_alarms(settings):
 
 def test_the_recursive_estimate_is_the_recursion(settings):
     rows = damped().assign(method="joint")
-    rows = rows[rows["section_id"].isin(["T00001/S4"])]
+    rows = rows[rows["section_id"].isin(["T00001/S4"])].reset_index(drop=True)
+    rows.loc[30, ["frequency_hz", "frequency_se_hz"]] = 3.0 * rows["frequency_hz"][30], 50.0
+    rows.loc[::7, "damping_se"] = 0.02
     events = pd.DataFrame(
         {
             "event_id": ["e"], "turnout_id": ["T00001"], "section_id": [None], "kind": ["pad_exchange"],
@@ -116,14 +118,21 @@ def test_the_recursive_estimate_is_the_recursion(settings):
     with connect_views({"modes": rows, "events": events, "sections": sections}, rows["measured_at_utc"].max()) as con:
         view = con.execute("select * from recursive_modes order by measured_at_utc").df()
     days = (rows["measured_at_utc"] - rows["measured_at_utc"].iloc[0]).dt.total_seconds().to_numpy() / 86400.0
-    for column, name in (("frequency_hz", "frequency_recursive_hz"), ("damping_ratio", "damping_recursive")):
-        values, mean, weight, expected = view[column].to_numpy(), 0.0, 0.0, []
+    for column, error, name in (
+        ("frequency_hz", "frequency_se_hz", "frequency_recursive_hz"),
+        ("damping_ratio", "damping_se", "damping_recursive"),
+    ):
+        values, errors, mean, weight, expected = view[column].to_numpy(), rows[error].to_numpy(), 0.0, 0.0, []
         for k, value in enumerate(values):
-            weight = 1.0 + (0.0 if k in (0, 60) else weight * np.exp(-(days[k] - days[k - 1]) / 180.0))
-            mean = value if k in (0, 60) else mean + (value - mean) / weight
+            start = 60 if k >= 60 else 0
+            own = 2.0 / (1.0 + (errors[k] / np.median(errors[start : k + 1])) ** 2)
+            weight = own + (0.0 if k == start else weight * np.exp(-(days[k] - days[k - 1]) / 180.0))
+            mean = value if k == start else mean + own * (value - mean) / weight
             expected.append(mean)
         assert view[name].to_numpy() == pytest.approx(np.array(expected), rel=1e-9)
+    assert abs(view["frequency_recursive_hz"][30] / view["frequency_recursive_hz"][29] - 1.0) < 1e-3
     weights = np.exp(-7.0 * np.arange(60) / 180.0)
+    weights[29] *= 2.0 / (1.0 + (50.0 / 0.1) ** 2)
     assert view["n_effective"].iloc[59] == pytest.approx(weights.sum() ** 2 / np.sum(weights**2), rel=1e-9)
     assert view["frequency_recursive_se_hz"].isna().to_numpy().nonzero()[0].tolist() == [0, 60]
 

@@ -3,3 +3,8 @@
 create or replace macro campaign_weight(z_value, residual, usual_sd) as (
     case when abs(z_value) > 0.05 then least(1, (usual_sd * z_value / residual) ** 2) else 1 end
 );
+-- Weight of a value in least squares from its standard error and the usual one: the inverse of its variance, where the
+-- values scatter by the usual error beyond their own; 1 for the usual error, or without one.
+create or replace macro error_weight(value_se, usual_se) as (
+    coalesce(2 / (1 + (value_se / nullif(usual_se, 0)) ** 2), 1)
+);

@@ -1,4 +1,6 @@
 -- One row per mode that does not continue the track of its section and band: another mode, or a sudden change.
+-- A mode whose own error is so large that no such departure would show is listed as uncertain: divided by its own error,
+-- its distance is small whatever it is. The usual error is that of the track: scatter and median error of the campaigns.
 -- needs: modes_current
 create or replace view modes_off_track as
 with points as (
@@ -13,12 +15,14 @@ history as (
         p.model_id, p.band, count(*) as n_history,
         median(h.frequency_hz) as frequency_track_hz, median(h.damping_ratio) as damping_track,
         median(h.residue) as residue_track,
+        median(h.frequency_se_hz) as usual_frequency_se_hz, median(h.damping_se) as usual_damping_se,
         (quantile_cont(h.frequency_hz, 0.75) - quantile_cont(h.frequency_hz, 0.25)) / 1.349 as frequency_sd_hz,
         (quantile_cont(h.damping_ratio, 0.75) - quantile_cont(h.damping_ratio, 0.25)) / 1.349 as damping_sd,
         count(h.shape_re) as n_shape_history,
         median(h.shape_re) as shape_track_re, median(h.shape_im) as shape_track_im,
         1.4826 * mad(h.shape_re) as shape_sd_re,
-        1.4826 * mad(h.shape_im) as shape_sd_im
+        1.4826 * mad(h.shape_im) as shape_sd_im,
+        median(h.shape_cov[1] + h.shape_cov[3]) as usual_shape_variance
     from points p join points h
         on p.section_id = h.section_id and p.band = h.band and p.method is not distinct from h.method
         and h.measured_at_utc < p.measured_at_utc
@@ -30,7 +34,15 @@ judged as (
         abs(p.frequency_hz - h.frequency_track_hz)
             / sqrt(h.frequency_sd_hz ^ 2 + coalesce(p.frequency_se_hz, 0.0) ^ 2 + 1e-12) as frequency_distance,
         abs(p.damping_ratio - h.damping_track)
-            / sqrt(h.damping_sd ^ 2 + coalesce(p.damping_se, 0.0) ^ 2 + 1e-12) as damping_distance
+            / sqrt(h.damping_sd ^ 2 + coalesce(p.damping_se, 0.0) ^ 2 + 1e-12) as damping_distance,
+        coalesce(p.frequency_se_hz, 0.0)
+            / sqrt(h.frequency_sd_hz ^ 2 + coalesce(h.usual_frequency_se_hz, 0.0) ^ 2 + 1e-12) as frequency_error,
+        coalesce(p.damping_se, 0.0)
+            / sqrt(h.damping_sd ^ 2 + coalesce(h.usual_damping_se, 0.0) ^ 2 + 1e-12) as damping_error,
+        sqrt(
+            (p.shape_cov[1] + p.shape_cov[3])
+            / (h.shape_sd_re ^ 2 + h.shape_sd_im ^ 2 + h.usual_shape_variance + 1e-12)
+        ) as shape_error
     from points p join history h on p.model_id = h.model_id and p.band = h.band
     where h.n_history >= 5
 ),
@@ -57,9 +69,13 @@ shape_distances as (
 select
     section_id, turnout_id, band, measured_at_utc, frequency_hz, frequency_track_hz, frequency_distance,
     damping_ratio, damping_track, damping_distance, residue / nullif(residue_track, 0.0) as residue_ratio, n_history,
-    model_id, shape_mac, shape_distance
+    model_id, shape_mac, shape_distance, frequency_se_hz, damping_se,
+    greatest(frequency_error, damping_error, case when n_shape_history >= 5 then shape_error end) as relative_error,
+    case
+        when frequency_distance > 5.0 or damping_distance > 5.0 or shape_distance > 5.0 then 'departs' else 'uncertain'
+    end as verdict
 from judged left join shape_distances using (model_id, band)
-where frequency_distance > 5.0 or damping_distance > 5.0 or shape_distance > 5.0
+where frequency_distance > 5.0 or damping_distance > 5.0 or shape_distance > 5.0 or relative_error > 5.0
 order by measured_at_utc, section_id, band;
 
 -- columns of modes_off_track
@@ -78,3 +94,7 @@ order by measured_at_utc, section_id, band;
 -- model_id | varchar | | model
 -- shape_mac | double | | modal assurance criterion of the shape at both responses with the median shape of the earlier campaigns: 1 for the same shape; empty without a second response in this and in five earlier campaigns
 -- shape_distance | double | | distance of shape_ratio from its median over the earlier campaigns by their median deviation and its own covariance, as that of two normal variables of the same probability (Hotelling); above 5 the mode is listed
+-- frequency_se_hz | double | Hz | standard error of frequency_hz
+-- damping_se | double | | standard error of damping_ratio
+-- relative_error | double | | own standard error over the usual one of the track (scatter and median error of the earlier campaigns), largest of frequency, damping and shape; above 5 the mode is listed, too
+-- verdict | varchar | | departs: the mode differs from the track by more than the errors allow; uncertain: its own error is so large that it cannot show whether it continues the track

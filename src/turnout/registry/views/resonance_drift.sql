@@ -1,9 +1,10 @@
 -- One row per chart: its drift over the last days before asof, by least squares on time and rail temperature.
--- Closed form of f = a + b t + c T + e. Only the present epoch counts; hammer and passage values are not mixed. Values
+-- Closed form of f = a + b t + c T + e, with the weights of error_weight: a campaign with a large error does not decide.
+-- Only the present epoch counts; hammer and passage values are not mixed. Values
 -- without temperature are counted and left out, also of the raw slope, so that the two compare. A 0 * T makes them NULL.
 -- Sums of products, not running covariances: half the time over a network, and exact to 1e-9 wherever the spread is
 -- above a thousandth of the frequency's resolution; a spread below that is taken as none.
--- needs: epochs
+-- needs: epochs, campaign_weight
 create or replace macro resonance_drift(days := 365, "asof" := null) as table
 with present as (
     select section_id, band, max(event_at_utc) as start_utc
@@ -14,28 +15,38 @@ sample as (
         m.turnout_id, m.section_id, m.band, m.source, m.measured_at_utc, m.rail_temperature_c as c,
         m.frequency_hz + 0 * m.rail_temperature_c as f,
         (epoch_us(m.measured_at_utc) - epoch_us(coalesce("asof", newest_measurement()))) / 31557600e6
-            + 0 * m.rail_temperature_c as t
+            + 0 * m.rail_temperature_c as t,
+        m.frequency_se_hz + 0 * m.rail_temperature_c as se
     from modes_current m left join present p on m.section_id = p.section_id and m.band = p.band
     where m.measured_at_utc > coalesce("asof", newest_measurement()) - to_days(days)
         and m.measured_at_utc <= coalesce("asof", newest_measurement())
         and coalesce(m.method, 'joint') = 'joint'
         and (p.start_utc is null or m.measured_at_utc >= p.start_utc)
 ),
+usual as (select section_id, band, source, median(se) as usual_se from sample group by section_id, band, source),
+weighted as (
+    select
+        s.turnout_id, s.section_id, s.band, s.source, s.measured_at_utc, s.t, s.c, s.f,
+        error_weight(s.se, u.usual_se) + 0 * s.t as w
+    from sample s join usual u
+        on s.section_id = u.section_id and s.band = u.band and s.source is not distinct from u.source
+),
 sums as (
     select
-        any_value(turnout_id) as turnout_id, section_id, band, source, count(*) as n_all, count(c) as n,
+        any_value(turnout_id) as turnout_id, section_id, band, source, count(*) as n_all, count(c) as n, sum(w) as w1,
         min(measured_at_utc) as first_at_utc, max(measured_at_utc) as last_at_utc,
-        sum(t) as t1, sum(c) as c1, sum(f) as f1,
-        sum(t * t) as tt, sum(c * c) as cc, sum(f * f) as ff, sum(t * c) as tc, sum(t * f) as tf, sum(c * f) as cf
-    from sample
+        sum(w * t) as t1, sum(w * c) as c1, sum(w * f) as f1,
+        sum(w * t * t) as tt, sum(w * c * c) as cc, sum(w * f * f) as ff,
+        sum(w * t * c) as tc, sum(w * t * f) as tf, sum(w * c * f) as cf
+    from weighted
     group by section_id, band, source
 ),
 moments as (
     select
-        *, f1 / n as mean_hz,
-        tt - t1 * t1 / n as stt, tc - t1 * c1 / n as stc, tf - t1 * f1 / n as stf, cf - c1 * f1 / n as scf,
-        case when cc - c1 * c1 / n > 1e-6 * n then cc - c1 * c1 / n else 0 end as scc,
-        case when ff - f1 * f1 / n > 1e-12 * ff then ff - f1 * f1 / n else 0 end as sff
+        *, f1 / w1 as mean_hz,
+        tt - t1 * t1 / w1 as stt, tc - t1 * c1 / w1 as stc, tf - t1 * f1 / w1 as stf, cf - c1 * f1 / w1 as scf,
+        case when cc - c1 * c1 / w1 > 1e-6 * w1 then cc - c1 * c1 / w1 else 0 end as scc,
+        case when ff - f1 * f1 / w1 > 1e-12 * ff then ff - f1 * f1 / w1 else 0 end as sff
     from sums
 ),
 solved as (
@@ -81,7 +92,7 @@ from fitted;
 -- n_without_temperature | bigint | | values without; not used
 -- first_at_utc | timestamp | UTC | oldest value used
 -- last_at_utc | timestamp | UTC | newest value used
--- frequency_hz | double | Hz | mean frequency
+-- frequency_hz | double | Hz | weighted mean frequency
 -- raw_pct_per_year | double | %/a | slope over time alone, of the mean frequency: season and all; never rank by it
 -- raw_se_pct_per_year | double | %/a | its standard error, values taken as independent
 -- drift_pct_per_year | double | %/a | slope over time with rail temperature held fixed
@@ -89,5 +100,5 @@ from fitted;
 -- t | double | | drift over its standard error, n - 3 degrees of freedom
 -- hz_per_c | double | Hz/°C | slope over rail temperature
 -- hz_per_c_se | double | Hz/°C | its standard error
--- residual_sd_pct | double | % | spread of the residuals, of the mean frequency
+-- residual_sd_pct | double | % | spread of the residuals of a campaign of usual error, of the mean frequency
 -- verdict | varchar | | ok, too few (n < 12), season not separable (less than 300 days), temperature not separable

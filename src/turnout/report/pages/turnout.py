@@ -211,7 +211,8 @@ def _section(
         "panels": _panels(rows, section, model, receptance, modes) if model and receptance else "",
         "detail": model["detail"] if model else "",
         "unused": unused,
-        "off_track": _off_track(_rows_of(rows, "off_track", section)),
+        "off_track": _off_track(_rows_of(rows, "off_track", section), "departs"),
+        "uncertain_modes": _off_track(_rows_of(rows, "off_track", section), "uncertain"),
     }
 
 
@@ -251,16 +252,22 @@ def _unused_tests(tests: Sequence[Mapping[str, Any]]) -> str:
     return ", ".join(entries) + (f" and {more} before" if more > 0 else "")
 
 
-def _off_track(modes: Sequence[Mapping[str, Any]]) -> str:
-    """Modes that do not continue the track of their section, the newest first: another mode, or a sudden change."""
+def _off_track(modes: Sequence[Mapping[str, Any]], verdict: str) -> str:
+    """Modes with a ``verdict`` of ``modes_off_track``, the newest first, with standard errors where they are known."""
+    chosen = [m for m in modes if m["verdict"] == verdict]
     entries = [
-        f"{day(m['measured_at_utc'])} {m['band']} {m['frequency_hz']:.1f} Hz, damping {m['damping_ratio']:.4f} "
+        f"{day(m['measured_at_utc'])} {m['band']} {_with_error(m['frequency_hz'], m['frequency_se_hz'], 1)} Hz, "
+        f"damping {_with_error(m['damping_ratio'], m['damping_se'], 4)} "
         f"(median of {count_of(m['n_history'], 'campaign')} before: {m['frequency_track_hz']:.1f} Hz, "
         f"{m['damping_track']:.4f}{_residue_words(m['residue_ratio'])}{_shape_words(m['shape_mac'])})"
-        for m in modes[:MAX_UNUSED_SHOWN]
+        for m in chosen[:MAX_UNUSED_SHOWN]
     ]
-    more = len(modes) - MAX_UNUSED_SHOWN
+    more = len(chosen) - MAX_UNUSED_SHOWN
     return "; ".join(entries) + (f" and {more} before" if more > 0 else "")
+
+
+def _with_error(value: float, error: float | None, decimals: int) -> str:
+    return f"{value:.{decimals}f}" if error is None else f"{value:.{decimals}f} (standard error {error:.2g})"
 
 
 def _residue_words(ratio: float | None) -> str:
