@@ -129,8 +129,7 @@ def _paragraph(row: Mapping[str, Any]) -> str:
         f"{row['rank']:>2}. {row['state'].upper()}: {where}, {row['sections']}, {row['component']}",
         f"    {row['sentence']}",
     ]
-    if row["false_alarm_words"] != "no statement":
-        lines.append(f"    How sure: {row['false_alarm_words']}.")
+    lines.append(f"    How sure: {row['false_alarm_words']}.")
     lines.append(f"    Last maintenance: {row['last_maintenance'] or 'none known'}. Look at: {row['look_at']}.")
     if row.get("diagnosis"):
         lines.append(f"    Diagnosis: {row['diagnosis']}.")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from turnout.constants import Z95_EXACT
 from turnout.counts import count_of
-from turnout.stages.mismatch_text import interval, number_in_words, parameter_in_words, title
+from turnout.stages.mismatch_text import estimate_in_words, interval, number_in_words, parameter_in_words, title
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -64,14 +64,16 @@ def accepted_parameters(rows: Iterable[Mapping[str, Any]]) -> list[dict]:
 def _parameter(
     term: str, position: float | None, name: str, value: float, low: float | None, high: float | None, unit: str
 ) -> dict[str, str]:
-    digits = 4 if unit == "m" and abs(value) >= 10.0 else 3  # position along the turnout, to a centimetre
     effect = term.replace("_", " ") + (f" at {position:.1f} m" if position is not None else "")
-    ends = [number_in_words(end, unit, digits) for end in (low, high) if end is not None]
+    if low is None or high is None:
+        text, interval_text = number_in_words(value, unit, 3), "–"
+    else:
+        text, interval_text = estimate_in_words(value, low, high, unit)
     return {
         "effect": effect,
         "name": parameter_in_words(term, name),
-        "value": number_in_words(value, unit, digits),
-        "interval": " to ".join(ends) if len(ends) == 2 else "–",
+        "value": text,
+        "interval": interval_text,
     }
 
 

@@ -1,6 +1,7 @@
 """Sentences that describe a finding to the person who inspects the track."""
 
 import json
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -37,12 +38,53 @@ def number_in_words(value: float, unit: str, digits: int = 2) -> str:
     >>> number_in_words(0.00112, "m"), number_in_words(1.31, "-"), number_in_words(0.012, "1/K")
     ('1.1 mm', '1.3', '1.2 % per kelvin')
     """
+    factor, suffix = _scale(value, unit)
+    is_rounded = factor != 1.0 or abs(value) < 100
+    return (f"{factor * value:.{digits}g}" if is_rounded else f"{value:.0f}") + suffix
+
+
+def _scale(value: float, unit: str) -> tuple[float, str]:
+    """Factor and unit, behind a space, in which a value is written."""
     if unit in PERCENT_UNITS:
-        return f"{100.0 * value:.{digits}g} {PERCENT_UNITS[unit]}"
+        return 100.0, f" {PERCENT_UNITS[unit]}"
     if unit in MILLI_UNITS and abs(value) < 0.1:
-        return f"{1e3 * value:.{digits}g} {MILLI_UNITS[unit]}"
-    text = f"{value:.{digits}g}" if abs(value) < 100 else f"{value:.0f}"
-    return text if unit in ("-", "") else f"{text} {unit}"
+        return 1e3, f" {MILLI_UNITS[unit]}"
+    return 1.0, "" if unit in ("-", "") else f" {unit}"
+
+
+def estimate_in_words(value: float, low: float, high: float, unit: str) -> tuple[str, str]:
+    """An estimate and its interval, both to the last digit that half the interval leaves significant.
+
+    Parameters
+    ----------
+    value, low, high : float
+        Estimate and limits.
+    unit : str
+        Their unit.
+
+    Returns
+    -------
+    (str, str)
+        Value, and interval with its unit.
+
+    Examples
+    --------
+    >>> estimate_in_words(0.00253, 0.0, 0.00842, "m"), estimate_in_words(27.041, 27.013, 27.079, "m")
+    (('3 mm', '0 to 8 mm'), ('27.04 m', '27.01 to 27.08 m'))
+    >>> estimate_in_words(5.1e7, 4.06e7, 6.2e7, "N/m"), estimate_in_words(0.5, 0.5, 0.5, "-")
+    (('5.1e+07 N/m', '4.1e+07 to 6.2e+07 N/m'), ('0.5', '–'))
+    """
+    if not high > low:
+        return number_in_words(value, unit, 3), "–"
+    factor, suffix = _scale(value, unit)
+    half, numbers = 0.5 * factor * (high - low), [factor * v for v in (value, low, high)]
+    exponent = math.floor(math.log10(half))
+    last = exponent - (half < 2.0 * 10.0**exponent)
+    if max(map(abs, numbers)) < 1e4:
+        texts = [f"{v:.{max(0, -last)}f}" for v in numbers]
+    else:
+        texts = [f"{v:.{max(0, math.floor(math.log10(abs(v) or 1.0)) - last)}e}" for v in numbers]
+    return texts[0] + suffix, f"{texts[1]} to {texts[2]}{suffix}"
 
 
 def interval(term: str, name: str, value: float, se: float) -> tuple[float, float]:

@@ -128,7 +128,7 @@ def test_a_named_finding_says_what_where_how_much_and_what_to_check():
     text = page(named())
     assert "<h1>The sleeper at 24.6 m hangs 1.1 mm above its ballast.</h1>" in text.replace("\n", "")
     # 1.12 mm and 0.05 mm of standard error: 1.959964 * 0.05 = 0.098
-    assert "1.02 mm to 1.22 mm" in text
+    assert "1.02 to 1.22 mm" in text
     for words in ("21 to 88 Hz", "a wheel is within 0.9 m", "ic3 120 km/h (+80 nats)", "Look under this sleeper."):
         assert words in text
     for fit in ("41 %", "78 %", "50 %", "43 %"):
@@ -241,7 +241,7 @@ def test_what_was_accepted_is_shown_over_the_visits():
             "effect": "running surface kink at 24.6 m",
             "name": "place",
             "value": "27.04 m",
-            "interval": "27.01 m to 27.08 m",
+            "interval": "27.01 to 27.08 m",
         }
     ]
     assert accepted_parameters([nose | {"accepted": False}]) == []
@@ -256,7 +256,10 @@ def test_why_nothing_can_be_said_stands_on_the_page():
 
 def test_numbers_read_as_engineers_write_them():
     (row,) = parameters(named())
-    assert row["value"] == "1.12 mm"
+    assert (row["value"], row["interval"]) == ("1.12 mm", "1.02 to 1.22 mm")
+    wide = GAP | {"parameters": {"gap": {"value": 1.12e-3, "se": 2.3e-3, "unit": "m"}}}
+    (row,) = parameters(named() | {"term_json": json.dumps([wide])})
+    assert (row["value"], row["interval"]) == ("1 mm", "0 to 6 mm")  # two digits more were meaningless
     assert dict(facts(named()))["From"] == "1 hammer test, 6 passages, 1 installed sensor"
 
 

@@ -101,6 +101,11 @@ def test_work_that_is_planned_resets_nothing_yet(registry_of_fallen, tmp_path, s
     update(tmp_path, settings)
     with open_registry(tmp_path) as con:
         assert con.execute("select state from chart_states where section_id = 'T00001/S4'").fetchall() == [(state,)]
+        words = con.execute(
+            "select state, false_alarm_words from worklist(newest_measurement(), most := 1000)"
+        ).fetchall()
+    assert all(text.startswith("not an alarm: the chart raises alarms once") for s, text in words if s == "learning")
+    assert ("learning" in dict(words)) == (state == "learning")
 
 
 def before_and_after_a_night(hours):
@@ -149,11 +154,17 @@ def test_a_drift_is_planned_though_its_chart_is_too_noisy(settings):
         most = "worklist(newest_measurement(), most := 1000)"
         listed = con.execute(f"select section_id, state from {most}").fetchall()
         blind = con.execute(f"select turnout_id, sections from {most} where state = 'cannot tell'").fetchall()
+        words = con.execute(
+            f"select distinct state, false_alarm_words from {most} where raised_at_utc is null"
+        ).fetchall()
         (why,) = con.execute(
             f"select max(sentence) from {most} where sections = 'S0, S1, S3, S4, S5, S6, S7'"
         ).fetchone()
         assert "S0: " in why and "; likewise S1, S3, S4, S5, S6, S7" in why
     assert noisy and {(section, "plan") for (section,) in noisy} <= set(listed)
+    assert {text for state, text in words if state == "cannot tell"} == {
+        "not an alarm: the data do not show whether the track has changed"
+    }
     assert not [s for (s,) in noisy if any(t == s[:6] and s[7:] in labels.split(", ") for t, labels in blind)]
 
 

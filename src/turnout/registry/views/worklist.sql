@@ -275,7 +275,8 @@ select
             'one campaign alone is no alarm: only a second one shows whether the track has changed or the measurement was wrong'
         when h.state = 'plan' then
             printf('one in ten of the drifts reported is expected to be false; this one: adjusted p = %.2g', s.drift_q)
-        else 'no statement'
+        when h.state = 'learning' then 'not an alarm: the chart raises alarms once it has learned what is normal'
+        else 'not an alarm: the data do not show whether the track has changed'
     end as false_alarm_words,
     m.last_work as last_maintenance,
     case
@@ -425,7 +426,7 @@ create or replace view worklist as select * from worklist(newest_measurement());
 -- pad_stiffness_low_pct | double | % | 95 % interval, lower end
 -- pad_stiffness_high_pct | double | % | upper end
 -- sentence | varchar | | what happened, with its interval, in words
--- false_alarm_words | varchar | | how often charts without a change raise such an alarm
+-- false_alarm_words | varchar | | how often charts without a change raise such an alarm; for a row that is no alarm, that it is none and why
 -- last_maintenance | varchar | | newest work on the section
 -- look_at | varchar | | what to look at
 -- diagnosis | varchar | | of an alarm or a campaign to confirm: what has changed by the diagnosis, or why there is no decision; where alarm and diagnosis differ, in what; empty = no alarm
@@ -460,7 +461,7 @@ create or replace view worklist as select * from worklist(newest_measurement());
 -- pad_stiffness_low_pct | double | % | 95 % interval, lower end
 -- pad_stiffness_high_pct | double | % | upper end
 -- sentence | varchar | | what happened, with its interval, in words
--- false_alarm_words | varchar | | how often charts without a change raise such an alarm
+-- false_alarm_words | varchar | | how often charts without a change raise such an alarm; for a row that is no alarm, that it is none and why
 -- last_maintenance | varchar | | newest work on the section
 -- look_at | varchar | | what to look at
 -- diagnosis | varchar | | of an alarm or a campaign to confirm: what has changed by the diagnosis, or why there is no decision; where alarm and diagnosis differ, in what; empty = no alarm
