@@ -149,13 +149,13 @@ def names_and_units(path: PathLike | str, root: PathLike | str, format: str = "a
 
 @contextmanager
 def _as_read_error(source: Source) -> Iterator[None]:
-    """Turn any unexpected exception of a reader into a ReadError of this file; the traceback goes to the log."""
+    """Turn any unexpected exception of a reader into a ReadError of this file; ``-v`` shows its traceback."""
     try:
         yield
     except (TurnoutError, MemoryError, OSError):
         raise
     except Exception as error:
-        LOG.exception("%s: not foreseen by the reader", source.name)
+        LOG.info("%s: not foreseen by the reader", source.name, exc_info=True)
         problem = f"it cannot be read ({type(error).__name__}: {' '.join(str(error).split())[:200]})"
         raise source.error("the file", problem) from error
 

@@ -33,7 +33,8 @@ class BlockReader:
             problem = f"it changed while it was read, at sample {start}"
             raise self.source.error(self.where, problem, "Start again when its copying has ended")
         samples = np.empty((len(self.mapped), stop - start))
-        with self.source.parsed_by("the format's library", f"{self.where}, samples {start} to {stop}"):
+        place = f"{self.where}, samples {start} to {stop}"
+        with self.source.parsed_by("the format's library", place), np.errstate(all="ignore"):
             for row, mapping in zip(samples, self.mapped):
                 np.multiply(self.record.samples[mapping.index][start:stop], mapping.scale, out=row)
                 if mapping.offset:

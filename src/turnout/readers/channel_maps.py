@@ -210,11 +210,8 @@ def _channel_mapping(index: int, record: RawRecord, raw: RawChannel, where: str,
         if problem := sensitivity_problem(*stated):
             remedy = f"Correct the layout; if it is right, set 'unit: {raw.unit or file_unit}!' for this channel"
             raise source.error(place, problem, remedy, reason="scale_unknown")
-    is_fraction = record.is_floating_audio and not is_overruled and FULL_SCALE_UNIT.match(raw.unit or "")
-    if is_fraction and (largest := _largest(record.samples[index])) > 1.0:
-        problem = f"its numbers reach {largest:.4g}, so they are no fractions of the full scale {raw.unit!r}"
-        remedy = "The logger wrote physical numbers: set the unit in the layout without a number, such as 'unit: V'"
-        raise source.error(place, problem, remedy, reason="out_of_scale")
+    if record.audio and not is_overruled:
+        _check_full_scale(record, index, raw.unit or "", place, source)
     sign = -1 if raw.sign < 0 else 1
     channel = Channel(
         name=raw.name,
@@ -226,6 +223,19 @@ def _channel_mapping(index: int, record: RawRecord, raw: RawChannel, where: str,
         resolution=raw.resolution,
     )
     return ChannelMapping(index, channel, sign * conversion_to_si.scale, sign * conversion_to_si.offset)
+
+
+def _check_full_scale(record: RawRecord, index: int, unit: str, place: str, source: Source) -> None:
+    """ReadError if the numbers of an audio file are fractions of a full scale that nothing states, or are none."""
+    is_stated = bool(FULL_SCALE_UNIT.match(unit))
+    if record.audio == "whole" and not is_stated and is_meaningless(record.units[index]):
+        problem = f"its whole numbers are fractions of full scale, and nothing says what full scale is in {unit!r}"
+        remedy = f"Set it in the layout, such as 'unit: 10 {unit}'; 'unit: 1 {unit}' if full scale is one"
+        raise source.error(place, problem, remedy, reason="scale_unknown")
+    if record.audio == "floating" and is_stated and (largest := _largest(record.samples[index])) > 1.0:
+        problem = f"its numbers reach {largest:.4g}, so they are no fractions of the full scale {unit!r}"
+        remedy = "The logger wrote physical numbers: set the unit in the layout without a number, such as 'unit: V'"
+        raise source.error(place, problem, remedy, reason="out_of_scale")
 
 
 def _check_stated_units(record: RawRecord, index: int, raw: RawChannel, place: str, source: Source) -> None:
@@ -397,6 +407,6 @@ class Assignments:
             If file and layout disagree about channels or units.
         """
         key = self._key(record)
-        if key not in self._mappings or record.is_floating_audio:
+        if key not in self._mappings or record.audio:
             self._mappings[key] = channel_mappings(record, self.channels, where, self.source)
         return self._mappings[key]

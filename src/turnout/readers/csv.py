@@ -184,6 +184,7 @@ def _records(
     """The records: one of all rows, or one per number in the column ``record``."""
     lower = [name.strip().lower() for name in names]
     number = columns[lower.index("record")] if "record" in lower else None
+    number = None if number is not None and _counts_rows(number) else number
     time = time if time is not None and columns[time].dtype.kind in "fiu" else None
     clocks = {
         i: np.asarray(column[:]).astype(float) * 1e-9 for i, column in enumerate(columns) if column.dtype.kind == "m"
@@ -224,6 +225,11 @@ def _records(
             clocks=tuple((f"column {names[i] or i + 1!r}", seconds[a:b]) for i, seconds in clocks.items()),
             entries=entries,
         )
+
+
+def _counts_rows(column: Column) -> bool:
+    """Whether each row has a number of its own: a logger counts the samples of one record."""
+    return len(column) > 1 and bool(np.all(np.diff(np.asarray(column[:])) != 0.0))
 
 
 def _is_empty(column: Column) -> bool:

@@ -3,7 +3,7 @@
 import csv
 import re
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from mmap import mmap
 
 import numpy as np
@@ -102,7 +102,8 @@ def cells_of(line: str, separator: str) -> list[str]:
     if separator == BLANK:
         return [word.replace('"', "") for word in WORD.findall(line.lstrip("#%").strip())]
     if separator == "," and '"' in line:  # a comma between quotation marks is a decimal mark
-        return [cell.strip() for cell in next(csv.reader([line]), [])]
+        with suppress(csv.Error):  # a byte that no text has
+            return [cell.strip() for cell in next(csv.reader([line]), [])]
     return [cell.strip().strip('"') for cell in line.split(separator)]
 
 

@@ -7,7 +7,7 @@ from turnout.readers.array_metadata import TIME_NAMES
 from turnout.readers.source import MEANINGLESS_UNITS, Source
 from turnout.units import conversion
 
-TIME_WORDS = (*TIME_NAMES, "zeit", "tid", "temps", "tempo", "tiempo", "tijd")
+TIME_WORDS = (*TIME_NAMES, "timestamp", "zeit", "zeitstempel", "tid", "temps", "horodatage", "tempo", "tiempo", "tijd")
 SECONDS_PER_UNIT = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "µs": 1e-6, "us": 1e-6}
 
 
@@ -76,7 +76,8 @@ NAME_WITH_UNIT = re.compile(r"^(.*?)\s*[\[(]([^\[\]]*)[\])]$")
 def names_among(lines: Sequence[Sequence[str]]) -> tuple[int, int | None]:
     """Find the line of names and the line of units among the lines above the numbers.
 
-    The names are in the line above the units. Without a line of units they are in the last line that names a time or
+    The names are in the line above the units. In the last line, and directly below names of which one is a time, half
+    of the cells have to be units; in others all. Without a line of units they are in the last line that names a time or
     has units in brackets, because comments may follow. Else they are in the last line.
 
     Parameters
@@ -98,7 +99,7 @@ def names_among(lines: Sequence[Sequence[str]]) -> tuple[int, int | None]:
     """
     last = len(lines) - 1
     for i in range(last, 0, -1):
-        if _are_units(lines[i], 0.5 if i == last else 1.0):
+        if _are_units(lines[i], 0.5 if i == last or _are_names(lines[i - 1]) else 1.0):
             return i - 1, i
     return next((i for i in range(last, -1, -1) if _are_names(lines[i])), last), None
 

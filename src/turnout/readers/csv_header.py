@@ -24,11 +24,12 @@ from turnout.readers.csv_cells import (
 )
 from turnout.readers.csv_columns import NAME_WITH_UNIT, names_and_units
 from turnout.readers.entries import FREE_TEXT, Entry, entries_of_text
+from turnout.readers.lost_entries import CONTROL_CHARACTER
 from turnout.readers.other_subjects import STRONG, subject_of
 from turnout.readers.rate_units import rate_unit
 from turnout.readers.rate_words import is_rate_name
 from turnout.readers.scale_words import is_of_drawing, is_scale_name, scale_meaning, value_of_word
-from turnout.readers.source import COPY_AGAIN, Source
+from turnout.readers.source import COPY_AGAIN, HEAD_SIZE, Source
 from turnout.readers.stated_quantities import is_quantity_name
 from turnout.readers.stated_units import is_unit_name
 
@@ -91,11 +92,10 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
                 for a, b, *rest in (t for t in texts if len(t) > 1)
                 if b and not any(rest) and a not in names and is_scale_name(a)
             }
-            if separator == BLANK:  # a word is no cell of a head
-                of_names = [_is_line_of_words(cells_of(text, BLANK), names, units) for text in head_lines]
-                entry_lines = ["" if is_of_names else text for text, is_of_names in zip(head_lines, of_names)]
-                return notes, names, units, position, BLANK, tuple(entries_of_lines(entry_lines, ",", names))
-            return notes, names, units, position, separator, tuple(entries_of_lines(head_lines, separator, names))
+            others = ["" if _names_columns(cells_of(t, separator), names, units) else t for t in head_lines]
+            separator_of_head = "," if separator == BLANK else separator  # a word is no cell of a head
+            entries = tuple(entries_of_lines(others, separator_of_head, names))
+            return notes, names, units, position, separator, entries
         match = HEAD_LINE.match(line.strip())
         name = match[1].strip() if match else ""
         plain_name = _plain(name)
@@ -122,11 +122,16 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
         elif line.strip():
             text_lines.append(line)
         position = end + 1
+    if is_binary := CONTROL_CHARACTER.search(data, 0, HEAD_SIZE):
+        raise source.error(f"byte {is_binary.start()}", f"{is_binary[0][0]:#04x} is no text", NO_TEXT_REMEDY)
     if len(text_lines) < 2:
         raise source.error("line 1", "no line of numbers follows", COPY_AGAIN, reason="empty")
     raise source.error("the file", *_no_numbers(text_lines[-1]))
 
 
+NO_TEXT_REMEDY = (
+    f"{COPY_AGAIN}; if the logger writes binary numbers, export them as text or in another format that is read"
+)
 N_ROWS_OF_WORDS = 5  # lines: numbers between blanks may be in a head, too, but not in so many lines
 
 
@@ -257,9 +262,9 @@ def _is_line_of(cells: Sequence[str], names: Sequence[str]) -> bool:
     return len(names) > 1 and list(bare[: len(names)]) == list(names)
 
 
-def _is_line_of_words(words: Sequence[str], names: Sequence[str], units: Sequence[str]) -> bool:
-    """Whether these words are the names of the columns, or their units."""
-    return bool(words) and (_is_line_of(words, names) or [word.strip("[]() ") for word in words] == list(units))
+def _names_columns(cells: Sequence[str], names: Sequence[str], units: Sequence[str]) -> bool:
+    """Whether these cells are the names of the columns, or their units."""
+    return any(cells) and (_is_line_of(cells, names) or [cell.strip("[]() ") for cell in cells] == list(units))
 
 
 def _value(text: str) -> float | str:

@@ -16,9 +16,10 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.array_metadata import ATTRIBUTES_MARK, TIME_NAMES, Alphabetical, Attributes, matrices
+from turnout.readers.channel_groups import STATED_SCALES
 from turnout.readers.claims import Hdf5Claims, open_hdf5
 from turnout.readers.lazy import is_large, lazy_array
-from turnout.readers.named_arrays import STATED_SCALES, raw_file
+from turnout.readers.named_arrays import raw_file
 from turnout.readers.packing import apply_packing
 from turnout.readers.scale_words import is_fill_name, is_scale_name
 from turnout.readers.source import COPY_AGAIN, RawFile, Source

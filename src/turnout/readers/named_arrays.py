@@ -10,7 +10,8 @@ What is recognised (names in any case, except ``t``):
 * samples, the first of these that fits:
 
   1. ``record_000``, ``record_001`` ... : one matrix or one group of variables each;
-  2. a structure or group that holds the other variables, or several, each a record;
+  2. a structure or group that holds the other variables, or several, each a record, or each a channel
+     (``turnout.readers.channel_groups``);
   3. one array: (record, channel, sample), (channel, sample) or (sample, channel). The channel axis is the one with
      the number of channels, the longer axis is that of the samples;
   4. vectors of equal length, each a channel with the name of its variable.
@@ -37,6 +38,7 @@ from turnout.readers.array_metadata import (
     matrices,
     vectors,
 )
+from turnout.readers.channel_groups import STATED_SCALES, with_channel_groups
 from turnout.readers.channel_maps import kind_of
 from turnout.readers.clock_texts import with_durations
 from turnout.readers.entries import MAX_ENTRIES
@@ -163,9 +165,6 @@ def match_units(names: Sequence[str], units: list[str], labels: Sequence[str], o
     return units if ordered or len(set(units)) == 1 else None
 
 
-STATED_SCALES = "(scales)"  # pairs (channel, statement about its scale) that a reader adds to the variables
-
-
 def channel_names(facts: Metadata) -> list[str]:
     """Names of the channels in the metadata; a number there counts the channels, as in "Channels: 2".
 
@@ -213,7 +212,7 @@ def raw_file(variables: Mapping, source: Source, parent: Metadata | None = None)
     ReadError
         If the variables do not say which arrays are the samples.
     """
-    variables = _with_vectors(_with_durations(_with_fields(variables), source))
+    variables = _with_vectors(_with_durations(with_channel_groups(_with_fields(variables)), source))
     facts = Metadata(variables, source, parent)
     expected = facts.count(RECORD_COUNT_NAMES)
     numbered = numbered_names(variables)

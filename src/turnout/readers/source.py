@@ -198,7 +198,8 @@ class RawRecord:
     of the channels.
     ``undecided`` are statements about the scale of channels, by index, of which nothing says whether it is applied.
     ``not_numbers`` are variables without real numbers, name -> what they hold, for messages about missing channels.
-    ``is_floating_audio`` is True for an audio file of floating-point numbers, which may be no fractions of full scale.
+    ``audio`` is "whole" for an audio file of whole numbers, which are fractions of full scale, "floating" for one of
+    floating-point numbers, which may be none, and "" for any other file.
     """
 
     names: tuple[str, ...]
@@ -213,7 +214,7 @@ class RawRecord:
     clocks: tuple[tuple[str, np.ndarray], ...] = ()
     aliases: tuple[tuple[str, ...], ...] = ()
     undecided: Mapping[int, str] = field(default_factory=lambda: EMPTY_MAPPING)
-    is_floating_audio: bool = False
+    audio: str = ""
     not_numbers: Mapping[str, str] = field(default_factory=lambda: EMPTY_MAPPING)
 
     def __post_init__(self) -> None:

@@ -2,8 +2,8 @@
 
 libsndfile reads a truncated file without an error. Therefore the file size is compared with the chunk sizes in the
 header. Integers (16, 24 bit) are read as fractions of full scale, -1 to 1: set ``unit: 10 V`` in the layout if full
-scale is 10 V. Floating-point numbers above 1 are no fractions: a layout with such a unit rejects them. Metadata in a
-JSON comment are used (``channels``, ``units``, ``started_at``, conditions).
+scale is 10 V; a unit without a number is an error. Floating-point numbers above 1 are no fractions: a layout with such
+a unit rejects them. Metadata in a JSON comment are used (``channels``, ``units``, ``started_at``, conditions).
 """
 
 import json
@@ -79,7 +79,7 @@ def read_raw(source: Source) -> RawFile:
         conditions=facts.conditions(0, 1),
         aliases=tuple((str(i),) for i in range(n)),
         undecided=entry_statements(entries, names if len(names) == n else [str(i) for i in range(n)]),
-        is_floating_audio=is_float,
+        audio="floating" if is_float else "whole",
     )
     remarks = []
     if comment.lstrip().startswith("{") and not _is_json(comment):

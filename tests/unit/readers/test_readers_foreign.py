@@ -347,9 +347,10 @@ def test_parquet_of_a_data_frame_with_time_stamps(by_name, tmp_path):
 def test_wav_of_16_bit_and_flac(by_index, tmp_path):
     rng = np.random.default_rng(3)
     samples = rng.uniform(-0.9, 0.9, size=(300, 2))
+    of_one_volt = replace(by_index, channels=tuple(replace(c, unit="1 V") for c in by_index.channels))
     for name, subtype in (("a.wav", "PCM_16"), ("a.flac", "PCM_16"), ("b.wav", "FLOAT")):
         soundfile.write(tmp_path / name, samples, int(RATE), subtype)
-        (recording,) = read(name, tmp_path, by_index).recordings
+        (recording,) = read(name, tmp_path, of_one_volt).recordings
         half_step = 1.01 / 2**15 if subtype == "PCM_16" else 2**-24
         assert np.abs(recording.signal("force") * 0.23e-3 - samples[:, 0]).max() <= half_step
         assert np.abs(recording.signal("rail") * 87.9e-3 / 9.80665 - samples[:, 1]).max() <= half_step
