@@ -264,6 +264,18 @@ def test_a_change_of_the_surface_without_a_name_has_a_position(monkeypatch, posi
     assert answers[0].position == pytest.approx(position, abs=0.15) and answers[1].position is None
 
 
+@pytest.mark.parametrize("position", [4.4, 5.5])
+def test_a_surface_unlike_its_file_has_a_position_without_a_name(position):
+    """A dip of the first day, and no dips in the library."""
+    parameters, visits = (*SURFACE, GAINS[0]), list(visits_with_a_dip(position, 0, 3))
+    candidates = change_candidates(parameters, {}, ("surface_dip",))
+    surface = answers_of_change.surface_changes(dip_directions(SURFACE))
+    answers = answers_after_visits(parameters, visits, [], candidates, 12.0, 6.0, 3, surface=surface)
+    (answer,) = (a for a in answers if a.question == "file")
+    assert (answer.verdict, answer.names, answer.group) == ("unknown", (), "wave")
+    assert answer.position == pytest.approx(position, abs=0.15)
+
+
 @pytest.mark.parametrize(("section", "opened"), [("", {"ballast@0.00", "ballast_stiffness"}), ("A", {"ballast@0.00"})])
 def test_work_on_the_whole_turnout_opens_what_all_supports_share(tmp_path, section, opened):
     rows = f"turnout,section,date,kind,resets,note\nt1,{section},2026-01-10,tamping,,\n"

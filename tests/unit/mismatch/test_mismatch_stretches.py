@@ -86,3 +86,31 @@ def test_a_late_channel_is_no_cause_at_the_supports_beside_it(case):
     late.observations = tuple(observations)
     found = locate(late, fit_jointly(late, iterations=30))
     assert (found.frame, found.sensor) == ("sensor", "S3")
+
+
+def changes_within(case, name, size, low, high):
+    """Change of each observation by ``size`` of a logarithm, between two frequencies [Hz]."""
+    means, changes = {n.name: n.mean for n in case.nuisances}, []
+    for o in case.observations:
+        frequency = np.tile(case.frf_pairs[o.name].frequency, 2)
+        change = case.predict(means | {name: size}, (), [o])[0] - case.predict(means, (), [o])[0]
+        changes.append(change * ((frequency > low) & (frequency < high)))
+    return changes
+
+
+@pytest.mark.parametrize("name", ["pad_stiffness", "ballast_stiffness", "rail_bending", "rail_shear"])
+def test_a_small_change_of_the_whole_track_is_in_the_space_of_its_value(case, name):
+    """First order: the change is the derivative, whatever its size at each frequency."""
+    fit = replace(fit_jointly(case, iterations=0), values={n.name: n.mean for n in case.nuisances})
+    (space,) = (s for s in source_spaces(case, fit) if s.law == name and ("frequency", "track") in s.combinations)
+    changes = dict(zip((o.name for o in case.observations), changes_within(case, name, 1e-3, 300.0, 500.0)))
+    assert share_outside(np.concatenate([changes[n] for n in space.names]), space.columns) < 2e-3
+
+
+@pytest.mark.parametrize("name, size", [("rail_shear", -0.6), ("pad_stiffness", 0.4)])
+def test_a_law_of_the_whole_track_that_holds_in_one_band_is_at_no_position(case, name, size):
+    """No value of the base model does this, as with pads of several parameters or a rail soft in shear."""
+    changed = copy(case)
+    changes = changes_within(case, name, size, 400.0, 600.0)
+    changed.observations = tuple(replace(o, data=o.data + c) for o, c in zip(case.observations, changes))
+    assert locate(changed, fit_jointly(changed, iterations=30)).frame == "frequency"

@@ -61,7 +61,7 @@ def answers_after_visits(
         label = ordered[n - 1].visit
         answers += [
             change,
-            file_answer(file_parameters, before, file_events, label, file_candidates, threshold, margin),
+            file_answer(file_parameters, before, file_events, label, file_candidates, threshold, margin, surface),
         ]
     return answers
 

@@ -38,6 +38,7 @@ def file_answer(
     candidates: Sequence[ChangeEffect],
     threshold: float,
     margin: float,
+    surface: Sequence[ChangeEffect] = (),
 ) -> ModelAnswer:
     """What differs from the file: the effect of the first visit with the most evidence, else the clearest deviation.
 
@@ -55,6 +56,8 @@ def file_answer(
         Evidence that an effect needs. [nats]
     margin : float
         A rival of another name within it makes the answer "a or b". [nats]
+    surface : sequence of ChangeEffect
+        As ``surface_changes``: they locate what differs of the running surface and has no name.
 
     Returns
     -------
@@ -71,19 +74,28 @@ def file_answer(
         k for k in np.argsort(-gains) if gains[k] > least - margin and abs(sizes[k]) >= least_size(steps[k], by_name)
     ]
     if not order or gains[order[0]] < least:
-        return _deviation_answer(parameters, visits, events, history, visit, steps, margin)
+        deviation = _deviation_answer(parameters, visits, events, history, visit, steps, margin)
+        return _at_dip(deviation, history, surface)
     first = order[0]
     stated = LeadingEffect.of(
         steps[first], by_name, (float(sizes[first]), float(sds[first])), float(gains[first]) - price
     )
     jump = history.steps[0].innovation  # without a visit nothing has evidence
     if not _explains_first_visit(parameters, visits, events, steps[first], jump):
-        return stated.unknown(visit, FILE, by_name[jump.parameter])
+        return _at_dip(stated.unknown(visit, FILE, by_name[jump.parameter]), history, surface)
     names = [stated.name]
     if stated.name == "local_ballast" and sizes[first] < 0.0:
         names = names_of_softer_ballast(parameters, visits, events, steps[first], stated.size, margin)
     rivals = [name_of(steps[k], by_name) for k in order if gains[k] > gains[first] - margin]
     return stated.answer(visit, FILE, with_rivals(names, stated, rivals))
+
+
+def _at_dip(answer: ModelAnswer, history: History, surface: Sequence[ChangeEffect]) -> ModelAnswer:
+    """An "unknown" at a wave, which runs along the whole surface, is where a dip has the most evidence."""
+    if answer.verdict != "unknown" or answer.group != "wave" or not surface:
+        return answer
+    gains, _, _ = evidence_from_first(history, surface)
+    return replace(answer, position=position_of(surface[int(np.argmax(gains))].name, None))
 
 
 def _explains_first_visit(

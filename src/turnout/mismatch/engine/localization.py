@@ -105,14 +105,15 @@ def locate(
 
 
 def _credible_evidence(case: Case, witnesses: Sequence[SpaceEvidence]) -> Iterator[SpaceEvidence]:
-    """Evidence that counts: of a wheel, less that of wheels of other trains, which belongs to the rail; of a channel,
+    """Evidence that counts: of a wheel or a train, less that of other trains, which belongs to the rail; of a channel,
     only if impacts, if any, support it.
     """
     hammer_names = {o.name for o in case.observations if case.is_cheap(o)}
     for w in witnesses:
         nats = w.nats
-        if w.frame == "wheel":
-            nats -= max((v.nats for v in witnesses if v.frame == "wheel" and v.level[0] != w.level[0]), default=0.0)
+        if w.frame in ("wheel", "train"):
+            others = (v.nats for v in witnesses if v.frame == w.frame and _train_of(v) != _train_of(w))
+            nats -= max(others, default=0.0)
         if (
             w.frame == "sensor"
             and hammer_names
@@ -121,6 +122,10 @@ def _credible_evidence(case: Case, witnesses: Sequence[SpaceEvidence]) -> Iterat
             continue
         if nats > 0.0:
             yield replace(w, nats=nats)
+
+
+def _train_of(witness: SpaceEvidence) -> Any:
+    return witness.level[0] if witness.frame == "wheel" else witness.level
 
 
 def _location_of_candidate(score: Score) -> Location:

@@ -20,6 +20,7 @@ from turnout.mismatch.turnout.priors import PASSAGE, RECEPTANCE, TRACK
 from turnout.mismatch.turnout.pseudo_forces import green_functions
 from turnout.mismatch.turnout.rail_roughness import amplitude_sd
 from turnout.mismatch.turnout.surface_priors import WHEELS
+from turnout.mismatch.turnout.track_parameters import COMMON_PARAMETERS, RAIL_SDS
 from turnout.mismatch.turnout.wave_response import WaveTransfer, channel_responses
 
 if TYPE_CHECKING:
@@ -32,6 +33,10 @@ if TYPE_CHECKING:
     from turnout.mismatch.turnout.passage_observation import AlignedPassage
     from turnout.mismatch.turnout.receptance_observation import FrfPair
     from turnout.mismatch.turnout.receptance_sensitivity import ReceptanceSensitivity
+
+
+COMMON_NAMES = [name for name, *_ in COMMON_PARAMETERS]
+COMMON_VALUES, RAIL_VALUES = ("pad_stiffness", "ballast_stiffness"), tuple(name for name, _ in RAIL_SDS)
 
 
 def source_spaces(case: TrackCase, fit: Fit) -> Iterator[ResidualSpace]:
@@ -93,7 +98,10 @@ def _real_blocks(transfer: np.ndarray) -> np.ndarray:
 
 
 def _wheel_space(case: TrackCase, fit: Fit, aligned: AlignedPassage) -> ResidualSpace:
-    """Waves of each wheel, which are errors of ordinary size in the model of the passage."""
+    """Waves of each wheel, which are errors of ordinary size in the model of the passage, and of all wheels of a train.
+
+    Where one train alone was recorded, its wheels show what the track does to all trains.
+    """
     waves, transfer = case.predictor.waves, WaveTransfer(case.predictor, fit.values, aligned, case.all_terms(fit))
     sd = np.repeat(amplitude_sd(waves.lengths, waves.length, WHEELS.level), 2)
     spectra = transfer.spectra(waves.lengths, np.ones(transfer.node.size))
@@ -103,6 +111,8 @@ def _wheel_space(case: TrackCase, fit: Fit, aligned: AlignedPassage) -> Residual
     for w, block in enumerate(blocks):
         subspaces["wheel", (train, w + 1)] = identity[:, first : first + block.shape[1]]
         first += block.shape[1]
+    if len({a.train for a in case.aligned_passages.values()}) > 1:
+        subspaces["train", train] = identity
     return ResidualSpace((aligned.name,), np.concatenate(blocks, axis=1), subspaces)
 
 
@@ -127,16 +137,36 @@ def _change_spaces(case: TrackCase, fit: Fit, pairs: Sequence[tuple[Observation,
             changes = [[through[o.name][:, j - supports[0]] for o, _ in members] for j in stretch]
             levels = _stretch_levels([_position_of(case, j) for j in stretch])
             yield from _spaces_of_changes(members, levels, changes, law)
-    whole_track = [through[o.name].sum(axis=1) for o, _ in pairs]
-    hypotheses: dict[tuple[str, Any], list[np.ndarray]] = {("frequency", "track"): whole_track}
     receptances = [_receptance(pair, fit.predictions[order[o.name]]) for o, pair in pairs]
     for channel in dict.fromkeys(pair.channel for _, pair in pairs):
-        hypotheses["sensor", channel] = [h * (pair.channel == channel) for h, (_, pair) in zip(receptances, pairs)]
+        change = [h * (pair.channel == channel) for h, (_, pair) in zip(receptances, pairs)]
+        yield from _spaces_of_changes(pairs, [("sensor", channel)], [change], "linear")
     visits = tuple(dict.fromkeys(pair.test.visit for _, pair in pairs))
-    for visit in visits if len(visits) > 1 else ():
-        hypotheses["condition", visit] = [h * (pair.test.visit == visit) for h, (_, pair) in zip(whole_track, pairs)]
-    for key, change in hypotheses.items():
-        yield from _spaces_of_changes(pairs, [key], [change], "linear")
+    for name, whole_track in _whole_track_changes(case, fit, pairs).items():
+        yield from _spaces_of_changes(pairs, [("frequency", "track")], [whole_track], name)
+        for visit in visits if len(visits) > 1 else ():
+            change = [h * (pair.test.visit == visit) for h, (_, pair) in zip(whole_track, pairs)]
+            yield from _spaces_of_changes(pairs, [("condition", visit)], [change], name)
+
+
+def _whole_track_changes(
+    case: TrackCase, fit: Fit, pairs: Sequence[tuple[Observation, FrfPair]]
+) -> dict[str, list[np.ndarray]]:
+    """Change of each pair's receptance by one value of all supports or of the whole rail, by the name of the value.
+
+    A law that has another value at each frequency acts by the same products of strains: pads of three parameters by
+    the compression of the pads, a rail soft in shear by its shear strain. Values without influence are left out.
+    """
+    sensitivity_of, terms = case.predictor.pair_sensitivities(fit.values, case.all_terms(fit)), case.all_terms(fit)
+    by_value: dict[str, list[np.ndarray]] = {name: [] for name in (*COMMON_VALUES, *RAIL_VALUES)}
+    for _, pair in pairs:
+        sensitivity, channel = sensitivity_of(pair), case.predictor.channel_response(fit.values, terms, pair)
+        common, rail = sensitivity.gradient(pair), sensitivity.rail_gradient(pair)
+        for name in COMMON_VALUES:
+            by_value[name].append(common[:, COMMON_NAMES.index(name)] * channel)
+        for k, name in enumerate(RAIL_VALUES):
+            by_value[name].append(rail[:, k] * channel)
+    return {name: changes for name, changes in by_value.items() if any(np.any(h) for h in changes)}
 
 
 def _stretch_levels(positions: Sequence[float]) -> list[tuple[str, Any]]:
