@@ -9,13 +9,20 @@ from scipy.stats import f
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.decision import calibrate, judge
-from turnout.mismatch.engine.localization import Location, locate
+from turnout.mismatch.engine.localization import Location, _credible_evidence, locate
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.reserved_data import is_significantly_worse
 from turnout.mismatch.engine.residual_space import ResidualSpace
-from turnout.mismatch.engine.space_evidence import AMPLITUDES, NOISE_FACTORS, subspace_evidence, weigh_spaces
+from turnout.mismatch.engine.space_evidence import (
+    AMPLITUDES,
+    NOISE_FACTORS,
+    SpaceEvidence,
+    subspace_evidence,
+    weigh_spaces,
+)
+from turnout.mismatch.engine.strained_values import StrainedValue
 from turnout.mismatch.turnout import disturbances
 from turnout.mismatch.turnout.priors import DISTURBANCE
 from turnout.stages.mismatch_text import title
@@ -91,7 +98,35 @@ def test_an_absorbed_cause_is_located_where_a_fit_leaves_less_than_intact_record
     fit = fit_jointly(case)
     assert fit.level["passage"] < 0.5
     assert all(w.nats == 0.0 for w in weigh_spaces(case, fit, {"passage": 1.0}))
-    assert locate(case, fit) is None and locate(case, fit, absorbed=True).place == position
+    absorbed = StrainedValue(Nuisance("mass", "-", 0.0, 0.1), 6.0, 15.0)
+    assert locate(case, fit) is None and locate(case, fit, absorbed=absorbed).place == position
+
+
+@pytest.mark.parametrize(
+    "at, told", [(("train", "railcar"), "on railcar"), (("frequency", "track"), "along the whole track"),
+                 (("sensor", "S1"), "in channel S1"), (("place", (1.0, 2.0)), "at 1.5 m, between 1.0 and 2.0 m")],
+)  # fmt: skip
+def test_a_value_that_has_absorbed_all_is_the_location(at, told):
+    """The residual is noise, at no place more than at others."""
+    rows = np.random.default_rng(8).normal(size=(3, 150))
+    case = Places(0.3 * rows)
+    absorbed = StrainedValue(Nuisance("value", "-", 0.0, 0.1, at=at), 6.0, 15.0)
+    assert str(locate(case, fit_jointly(case), absorbed=absorbed)) == told
+
+
+@pytest.mark.parametrize("nats, frame", [(15.0, "place"), (1e4, "train")])
+def test_what_a_value_leaves_at_one_place_outweighs_it_by_evidence_over_all_other_places(nats, frame):
+    rng = np.random.default_rng(8)
+    case = Places(0.3 * rng.normal(size=(3, 150)) + 0.7 * np.outer(Places.seen[2], rng.normal(size=150)))
+    absorbed = StrainedValue(Nuisance("value", "-", 0.0, 0.1, at=("train", "railcar")), 6.0, nats)
+    assert locate(case, fit_jointly(case), absorbed=absorbed).frame == frame
+
+
+def test_what_all_trains_show_is_no_train():
+    """Wheels of a train count for what those of other trains do not show."""
+    of_trains = [SpaceEvidence("train", "A", 30.0), SpaceEvidence("train", "B", 26.0), SpaceEvidence("clock", "p1", 7.0)]
+    credible = {(w.frame, w.level): w.nats for w in _credible_evidence(Places(np.zeros((3, 9))), of_trains)}
+    assert credible == {("train", "A"): 4.0, ("clock", "p1"): 7.0}
 
 
 class Support(Case):

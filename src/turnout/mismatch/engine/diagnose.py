@@ -28,6 +28,7 @@ from turnout.mismatch.engine.reserved_error import error_of_fitted
 from turnout.mismatch.engine.residual_attribution import Attribution, attribute, cell_energies
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.search_limit import SearchLimitError
+from turnout.mismatch.engine.strained_values import strained_value
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.mismatch.engine.tolerated_effects import name_tolerated
 from turnout.mismatch.engine.two_effects import add_second, settle_pair
@@ -272,5 +273,5 @@ def _locate_unknown(findings: Findings, verdict: Verdict) -> Location | None:
         return None
     search = findings.search
     leader = next((s for s in verdict.scores[:1] if s.gain > search.settings.threshold), None)
-    absorbed = "no_tolerance_explains_it" in verdict.trail
+    absorbed = strained_value(search.case, findings.base, search.settings.threshold)
     return locate(search.case, findings.base, leader, verdict.cause, absorbed)

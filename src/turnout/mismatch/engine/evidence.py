@@ -221,8 +221,8 @@ def assess(search: Search, fit: Fit, scores: Sequence[Score]) -> tuple[Verdict, 
     """
     case, settings = search.case, search.settings
     excess = worst_excess(search, fit)
-    strained = "" if fit.candidates else strained_value(case, fit, settings.threshold)
-    facts: dict[str, Any] = {"disturbed": bool(case.disturbed_recordings), "strained": strained}
+    strained = None if fit.candidates else strained_value(case, fit, settings.threshold)
+    facts: dict[str, Any] = {"disturbed": bool(case.disturbed_recordings), "strained": str(strained or "")}
     facts["mismatched_trains"] = case.mismatched_trains
     scores = tuple(s for s in scores if s.is_reportable)
     if not scores:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.case import Case
     from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.engine.score import Score
+    from turnout.mismatch.engine.strained_values import StrainedValue
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ class Location:
 
 
 def locate(
-    case: Case, fit: Fit, leader: Score | None = None, cause: str = "", absorbed: bool = False
+    case: Case, fit: Fit, leader: Score | None = None, cause: str = "", absorbed: StrainedValue | None = None
 ) -> Location | None:
     """Location of the residual of a fit.
 
@@ -77,9 +78,10 @@ def locate(
         The best candidate that got no name.
     cause : str
         "clock" or "train" if recordings that were not fitted are the cause of the verdict: they give the location then.
-    absorbed : bool
-        A value of the base model has absorbed the cause, and the residual may be that of intact recordings. Its own
-        level is then the least noise, where it is below theirs.
+    absorbed : StrainedValue or None
+        The value of the base model that has absorbed the cause. The residual may be that of intact recordings then: its
+        own level is the least noise, where it is below theirs. What the value is fixed to is the location, unless the
+        residual has more evidence for one location over all others than the value has paid.
 
     Returns
     -------
@@ -95,6 +97,8 @@ def locate(
     if absorbed:  # what intact recordings leave elsewhere is no noise here: the whole fit leaves less
         floor = {name: min(level, fit.level[name]) for name, level in floor.items()}
     witnesses = sorted(_credible_evidence(case, weigh_spaces(case, fit, floor)), key=lambda w: -w.nats)
+    if absorbed is not None and absorbed.nuisance.at is not None and _lead(witnesses) < absorbed.nats:
+        witnesses = [SpaceEvidence(*absorbed.nuisance.at, absorbed.nats)]
     if (
         leader is not None
         and leader.explained >= THRESHOLDS.min_explained_share
@@ -102,6 +106,17 @@ def locate(
     ):
         return replace(_location_of_candidate(leader), measured_range=case.measured_range)
     return replace(_location_of_evidence(witnesses), measured_range=case.measured_range) if witnesses else None
+
+
+def _lead(witnesses: Sequence[SpaceEvidence]) -> float:
+    """Evidence for the first location over the best of the others, which do not overlap it. [nats]"""
+    if not witnesses:
+        return 0.0
+    first, others = witnesses[0], witnesses[1:]
+    if first.frame == "place":
+        low, high = _ends(first.level)
+        others = [w for w in others if w.frame != "place" or _ends(w.level)[0] > high or _ends(w.level)[1] < low]
+    return first.nats - max((w.nats for w in others), default=0.0)
 
 
 def _credible_evidence(case: Case, witnesses: Sequence[SpaceEvidence]) -> Iterator[SpaceEvidence]:

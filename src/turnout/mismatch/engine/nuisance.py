@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,8 @@ class Nuisance:
     ``mean`` and ``sd`` of the prior in ``unit``. ``owner`` is the observation that it belongs to, None if shared.
     ``max_step_sd`` is the largest step of a fit in prior standard deviations. ``can_mask``: the base fit may have
     changed it to hide an effect. ``group`` is the property that it describes, for example the stiffness of single
-    railpads. ``index`` is the number of its component among those of the group that are alike, else None.
+    railpads. ``index`` is the number of its component among those of the group that are alike, else None. ``at`` is
+    what it is fixed to, as (frame, level) of ``ResidualSpace.combinations``; None if that is not known.
     """
 
     name: str
@@ -28,3 +30,4 @@ class Nuisance:
     can_mask: bool = True
     group: str = ""
     index: int | None = None
+    at: tuple[str, Any] | None = None

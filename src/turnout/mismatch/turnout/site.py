@@ -80,6 +80,7 @@ def _sensor_nuisances(sensors: Iterable[Sensor]) -> Iterator[Nuisance]:
             meaning="gain of a sensor less one",
             can_mask=False,
             group="gain",
+            at=("sensor", sensor.name),
         )
         if not sensor.mounting.startswith("sleeper"):
             yield Nuisance(
@@ -89,6 +90,7 @@ def _sensor_nuisances(sensors: Iterable[Sensor]) -> Iterator[Nuisance]:
                 TRACK.seat_sd,
                 meaning="place of a sensor less its file's",
                 group="seat",
+                at=("sensor", sensor.name),
             )
 
 

@@ -50,6 +50,7 @@ class SupportParameter:
     sd: float
 
 
+WHOLE_TRACK = ("frequency", "track")  # what a value of all supports or of the whole rail is fixed to
 # Scatter from support to support: Oscarsson 2002. Dampers were never measured singly; sleepers are cast alike.
 SUPPORT_PARAMETERS = (
     SupportParameter("pad_stiffness", "pad", "pad", "stiffness", TRACK.support_stiffness_sd),
@@ -192,6 +193,15 @@ def rail_sds(zone: Zone) -> dict[str, float]:
     return dict([*RAIL_SDS, *cast])
 
 
+def _casting_positions(zone: Zone) -> dict[str, tuple[str, tuple[float, float]]]:
+    """What the values of each casting are fixed to: the stretch from its start to its end [m]."""
+    return {
+        f"{name}_{k}": ("place", (c.piece.start, c.piece.end))
+        for k, c in enumerate(zone.castings)
+        for name, *_ in CASTING_SDS
+    }
+
+
 def _rail_words(zone: Zone) -> dict[str, str]:
     """What each of ``rail_sds`` is, in words."""
     words = {"rail_bending": "bending stiffness of the rail", "rail_shear": "shear stiffness of the rail"}
@@ -298,8 +308,9 @@ def track_nuisances(zone: Zone, trains: Iterable[str]) -> list[Nuisance]:
     """
     nuisances = [
         Nuisance(
-            name, "-", 0.0, sd, bounds=(-TRACK.common_bound, TRACK.common_bound), meaning=f"ln {name}", group="track"
-        )
+            name, "-", 0.0, sd, bounds=(-TRACK.common_bound, TRACK.common_bound), meaning=f"ln {name}", group="track",
+            at=WHOLE_TRACK,
+        )  # fmt: skip
         for name, _, _, sd in COMMON_PARAMETERS
     ]
     for parameter in SUPPORT_PARAMETERS:
@@ -309,10 +320,11 @@ def track_nuisances(zone: Zone, trains: Iterable[str]) -> list[Nuisance]:
             meaning, most = f"ln {parameter.field} of {j}", TRACK.bound_sds * sd
             name = f"{parameter.tag}_{j}"
             nuisances.append(Nuisance(name, "-", 0.0, sd, None, (-most, most), meaning, group=parameter.tag, index=j))
-    words = _rail_words(zone)
+    words, pieces = _rail_words(zone), _casting_positions(zone)
     for name, sd in rail_sds(zone).items():
         bounds = (-TRACK.bound_sds * sd, TRACK.bound_sds * sd)
-        nuisances.append(Nuisance(name, "-", 0.0, sd, None, bounds, f"ln {words[name]}", group="rail"))
+        at = pieces.get(name, WHOLE_TRACK)
+        nuisances.append(Nuisance(name, "-", 0.0, sd, None, bounds, f"ln {words[name]}", group="rail", at=at))
     nuisances += chair_nuisances((zone.turnout.track, *zone.turnout.tracks.values()))
     for train in trains:
         nuisances.append(
@@ -324,6 +336,7 @@ def track_nuisances(zone: Zone, trains: Iterable[str]) -> list[Nuisance]:
                 bounds=(-TRACK.wheels_bound, TRACK.wheels_bound),
                 meaning="ln unsprung mass",
                 group="wheels",
+                at=("train", train),
             )
         )
     return nuisances
