@@ -94,18 +94,19 @@ def test_the_reason_holds_the_figures_of_the_case():
 
 
 @pytest.mark.parametrize(
-    "name, excess, more",
+    "name, excess, more, strained",
     [
-        ("size_known_from_below", 0.9, {"error": 0.6, "flags": {"unbounded_form": "gap"}}),
-        ("reaches_control_level", 1.0, {"flags": {"must_reach_control_level": True}}),
-        ("must_reach_control_level", 1.1, {"flags": {"must_reach_control_level": True}}),
-        ("leaves_some_residual", 1.1, {}),
+        ("strained_value_remains", 0.9, {}, "mass of the rail"),
+        ("size_known_from_below", 0.9, {"error": 0.6, "flags": {"unbounded_form": "gap"}}, ""),
+        ("reaches_control_level", 1.0, {"flags": {"must_reach_control_level": True}}, ""),
+        ("must_reach_control_level", 1.1, {"flags": {"must_reach_control_level": True}}, ""),
+        ("leaves_some_residual", 1.1, {}, ""),
     ],
 )
-def test_each_rule_on_a_name_applies_to_a_case_of_its_own(name, excess, more):
+def test_each_rule_on_a_name_applies_to_a_case_of_its_own(name, excess, more, strained):
     settings = MismatchSettings()
     named = judge([score(**more)], 2.0, settings)
-    verdict, rule, reason = grade_name(named, named.scores[0].fit, excess, settings)
+    verdict, rule, reason = grade_name(named, named.scores[0].fit, excess, settings, strained=strained)
     assert rule.name == name == verdict.trail[-1] and rule in NAME_RULES
     assert verdict.answer == ("a_or_b" if name == "size_known_from_below" else "named")
     assert verdict.grade == {"size_known_from_below": "", "reaches_control_level": "A"}.get(name, "B")

@@ -104,7 +104,7 @@ def test_an_absorbed_cause_is_located_where_a_fit_leaves_less_than_intact_record
 
 @pytest.mark.parametrize(
     "at, told", [(("train", "railcar"), "on railcar"), (("frequency", "track"), "along the whole track"),
-                 (("sensor", "S1"), "in channel S1"), (("place", (1.0, 2.0)), "at 1.5 m, between 1.0 and 2.0 m")],
+                 (("sensor", "S1"), "in channel S1")],
 )  # fmt: skip
 def test_a_value_that_has_absorbed_all_is_the_location(at, told):
     """The residual is noise, at no place more than at others."""
@@ -117,7 +117,7 @@ def test_a_value_that_has_absorbed_all_is_the_location(at, told):
 @pytest.mark.parametrize("nats, frame", [(15.0, "place"), (1e4, "train")])
 def test_what_a_value_leaves_at_one_place_outweighs_it_by_evidence_over_all_other_places(nats, frame):
     rng = np.random.default_rng(8)
-    case = Places(0.3 * rng.normal(size=(3, 150)) + 0.7 * np.outer(Places.seen[2], rng.normal(size=150)))
+    case = Places(rng.normal(size=(3, 150)) + 3.0 * np.outer(Places.seen[2], rng.normal(size=150)))
     absorbed = StrainedValue(Nuisance("value", "-", 0.0, 0.1, at=("train", "railcar")), 6.0, nats)
     assert locate(case, fit_jointly(case), absorbed=absorbed).frame == frame
 

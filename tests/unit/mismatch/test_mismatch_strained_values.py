@@ -17,13 +17,14 @@ from turnout.physics import Parameter
 
 TIME = np.linspace(0.0, 1.0, 400)
 TOLERANCE, THRESHOLD = 0.1, MismatchSettings().threshold
+BUMP = np.cos(57.0 * TIME)
 SIZE = (Parameter("size", "-", 0.0, (-1.0, 1.0), "of a shape", "made up 2026"),)
 
 
 class Beam(Case):
     """A response that the logarithm of a stiffness scales. One candidate has another shape and explains nothing."""
 
-    def __init__(self, shift, bound=6.0, **more):
+    def __init__(self, shift, bound=6.0, bump=0.0, **more):
         stiffness = Nuisance(
             "bending", "-", 0.0, TOLERANCE, None, (-bound * TOLERANCE, bound * TOLERANCE), "ln bending"
         )
@@ -31,7 +32,7 @@ class Beam(Case):
         self.candidates = (Candidate.of("bump", SIZE, dict, ((0.1,),), {"place": 3.0}),)
         rng = np.random.default_rng(3)
         self.observations = tuple(
-            Observation(f"o{k}", f"day {k}", self.response(shift, 0.0) + 0.1 * rng.normal(size=TIME.size), 0.1)
+            Observation(f"o{k}", f"day {k}", self.response(shift, 0.0) + bump * BUMP + 0.1 * rng.normal(size=TIME.size), 0.1)
             for k in range(3)
         )
 
@@ -40,7 +41,7 @@ class Beam(Case):
         return np.exp(bending) * np.sin(20.0 * TIME) + mass * np.cos(31.0 * TIME)
 
     def predict(self, values, terms, observations):
-        bump = sum(t["size"] for t in terms) * np.cos(57.0 * TIME)
+        bump = sum(t["size"] for t in terms) * BUMP
         return [self.response(values["bending"], values["mass"]) + bump for _ in observations]
 
 
@@ -92,3 +93,12 @@ def test_the_answer_is_unknown_and_says_why_though_the_residual_is_that_of_intac
     assert max(strained_case.base.level.values()) < 1.2
     assert strained_case.verdict.answer == "unknown" and "bending" in strained_case.verdict.reason
     assert intact.verdict.answer == "none"
+
+
+def test_a_name_beside_which_such_a_value_remains_is_withdrawn_and_the_value_tells_where():
+    """Wheelsets beyond their tolerance leave a little to other names, such as another contact stiffness."""
+    at = ("train", "railcar")
+    named, withdrawn = (diagnose(Beam(sds * TOLERANCE, bump=0.1, at=at)) for sds in (0.5, 5.7))
+    assert named.verdict.names == ("bump",)
+    assert withdrawn.verdict.answer == "unknown" and "bending" in withdrawn.verdict.reason
+    assert withdrawn.where.train == "railcar" and withdrawn.where.place is None

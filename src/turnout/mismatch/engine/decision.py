@@ -112,6 +112,8 @@ PAIR_RULES: tuple[Rule[PairEvidence], ...] = (
 )
 
 NAME_RULES: tuple[Rule[NameEvidence], ...] = (
+    Rule("strained_value_remains", lambda e: e.strained, "unknown",
+         "beside {e.score.family} a value remains that its file cannot have: {e.strained}", LOCATED),
     Rule("size_known_from_below", lambda e: e.score.is_unbounded, "a_or_b",
          "the size of {e.score.family} is known from below alone", PAIRS),
     Rule("free_law_predicts_better", lambda e: e.free_share > THRESHOLDS.max_free_law_share, "unknown",
@@ -200,7 +202,7 @@ def judge(scores: Sequence[Score], excess: float, settings: MismatchSettings, **
 
 
 def grade_name(
-    verdict: Verdict, fit: Fit, excess: float, settings: MismatchSettings, free_share: float = 0.0
+    verdict: Verdict, fit: Fit, excess: float, settings: MismatchSettings, free_share: float = 0.0, strained: str = ""
 ) -> tuple[Verdict, Rule[NameEvidence], str]:
     """A name with its grade by the last fit, by the first of ``NAME_RULES`` that applies.
 
@@ -218,6 +220,8 @@ def grade_name(
     settings : MismatchSettings
     free_share : float
         Share of the gain on held-out recordings that the names miss, see ``free_law_share``.
+    strained : str
+        Value that no tolerance explains in that fit, in words; "" if there is none.
 
     Returns
     -------
@@ -229,7 +233,7 @@ def grade_name(
         Reason of the rule in words.
     """
     score = replace(verdict.scores[0], fit=fit)
-    evidence = NameEvidence(score, excess, free_share)
+    evidence = NameEvidence(score, excess, free_share, strained)
     rule = first_applicable(NAME_RULES, evidence)
     reason = rule.reason_for(evidence)
     graded = replace(verdict, grade="A" if rule.answer == "A" else "B", scores=(score, *verdict.scores[1:]))

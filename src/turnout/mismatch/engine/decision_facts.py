@@ -229,11 +229,13 @@ class NameEvidence:
     """What the grade of a name rests on: its ``score`` in the last fit, and the largest excess ratio of that fit.
 
     ``free_share`` is the share of the gain on held-out recordings that all names miss, and free laws reach.
+    ``strained`` is the value that no tolerance explains in that fit, in words; "" if there is none.
     """
 
     score: Score
     excess: float
     free_share: float = 0.0
+    strained: str = ""
 
     @property
     def leaves_nothing(self) -> bool:

@@ -247,11 +247,12 @@ def grade_names(findings: Findings) -> Findings:
     search, fit = findings.search, findings.fit
     verdicts, failing = [], None
     free_share = free_law_share(search, findings.base, fit)
+    strained = str(strained_value(search.case, fit, search.settings.threshold) or "")
     for verdict in findings.verdicts:
-        is_refuted = verdict.answer == "a_or_b" and free_share > THRESHOLDS.max_free_law_share
+        is_refuted = verdict.answer == "a_or_b" and (strained or free_share > THRESHOLDS.max_free_law_share)
         if verdict.answer == "named" or is_refuted:
             excess = worst_excess(search, fit)
-            verdict, rule, reason = grade_name(verdict, fit, excess, search.settings, free_share)
+            verdict, rule, reason = grade_name(verdict, fit, excess, search.settings, free_share, strained)
             failing = failing or ((rule, reason) if rule.answer == "unknown" else None)
         verdicts.append(verdict)
     if failing is None:
@@ -273,5 +274,6 @@ def _locate_unknown(findings: Findings, verdict: Verdict) -> Location | None:
         return None
     search = findings.search
     leader = next((s for s in verdict.scores[:1] if s.gain > search.settings.threshold), None)
+    leader = None if "strained_value_remains" in verdict.trail else leader
     absorbed = strained_value(search.case, findings.base, search.settings.threshold)
     return locate(search.case, findings.base, leader, verdict.cause, absorbed)

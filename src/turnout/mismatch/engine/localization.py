@@ -79,9 +79,10 @@ def locate(
     cause : str
         "clock" or "train" if recordings that were not fitted are the cause of the verdict: they give the location then.
     absorbed : StrainedValue or None
-        The value of the base model that has absorbed the cause. The residual may be that of intact recordings then: its
-        own level is the least noise, where it is below theirs. What the value is fixed to is the location, unless the
-        residual has more evidence for one location over all others than the value has paid.
+        The value of the base model that has absorbed the cause. What it is fixed to is the location, unless the residual
+        has more evidence for one location over all others than the value has paid. A value that is fixed to nothing may
+        stand for a cause anywhere, and the residual may be that of intact recordings: its own level is then the least
+        noise, where it is below theirs.
 
     Returns
     -------
@@ -94,7 +95,8 @@ def locate(
     if cause == "train":
         return Location("train", case.mismatched_trains[0], 0.0, train=case.mismatched_trains[0])
     floor = {name: case.control_level.get(name, 1.0) for name in fit.level}
-    if absorbed:  # what intact recordings leave elsewhere is no noise here: the whole fit leaves less
+    if absorbed is not None and absorbed.nuisance.at is None:
+        # what intact recordings leave elsewhere is no noise here: the whole fit leaves less
         floor = {name: min(level, fit.level[name]) for name, level in floor.items()}
     witnesses = sorted(_credible_evidence(case, weigh_spaces(case, fit, floor)), key=lambda w: -w.nats)
     if absorbed is not None and absorbed.nuisance.at is not None and _lead(witnesses) < absorbed.nats:

@@ -45,7 +45,6 @@ def strained_value(case: Case, fit: Fit, threshold: float) -> StrainedValue | No
     ----------
     case : Case
     fit : Fit
-        Without effects.
     threshold : float
         Evidence that a name needs. [nats]
 

@@ -193,15 +193,6 @@ def rail_sds(zone: Zone) -> dict[str, float]:
     return dict([*RAIL_SDS, *cast])
 
 
-def _casting_positions(zone: Zone) -> dict[str, tuple[str, tuple[float, float]]]:
-    """What the values of each casting are fixed to: the stretch from its start to its end [m]."""
-    return {
-        f"{name}_{k}": ("place", (c.piece.start, c.piece.end))
-        for k, c in enumerate(zone.castings)
-        for name, *_ in CASTING_SDS
-    }
-
-
 def _rail_words(zone: Zone) -> dict[str, str]:
     """What each of ``rail_sds`` is, in words."""
     words = {"rail_bending": "bending stiffness of the rail", "rail_shear": "shear stiffness of the rail"}
@@ -320,10 +311,10 @@ def track_nuisances(zone: Zone, trains: Iterable[str]) -> list[Nuisance]:
             meaning, most = f"ln {parameter.field} of {j}", TRACK.bound_sds * sd
             name = f"{parameter.tag}_{j}"
             nuisances.append(Nuisance(name, "-", 0.0, sd, None, (-most, most), meaning, group=parameter.tag, index=j))
-    words, pieces = _rail_words(zone), _casting_positions(zone)
+    words = _rail_words(zone)
     for name, sd in rail_sds(zone).items():
         bounds = (-TRACK.bound_sds * sd, TRACK.bound_sds * sd)
-        at = pieces.get(name, WHOLE_TRACK)
+        at = WHOLE_TRACK if (name, sd) in RAIL_SDS else None  # a casting's value may stand for a cause beside it
         nuisances.append(Nuisance(name, "-", 0.0, sd, None, bounds, f"ln {words[name]}", group="rail", at=at))
     nuisances += chair_nuisances((zone.turnout.track, *zone.turnout.tracks.values()))
     for train in trains:
