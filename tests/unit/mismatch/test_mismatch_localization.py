@@ -124,7 +124,11 @@ def test_what_a_value_leaves_at_one_place_outweighs_it_by_evidence_over_all_othe
 
 def test_what_all_trains_show_is_no_train():
     """Wheels of a train count for what those of other trains do not show."""
-    of_trains = [SpaceEvidence("train", "A", 30.0), SpaceEvidence("train", "B", 26.0), SpaceEvidence("clock", "p1", 7.0)]
+    of_trains = [
+        SpaceEvidence("train", "A", 30.0),
+        SpaceEvidence("train", "B", 26.0),
+        SpaceEvidence("clock", "p1", 7.0),
+    ]
     credible = {(w.frame, w.level): w.nats for w in _credible_evidence(Places(np.zeros((3, 9))), of_trains)}
     assert credible == {("train", "A"): 4.0, ("clock", "p1"): 7.0}
 

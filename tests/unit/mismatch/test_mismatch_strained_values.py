@@ -32,7 +32,9 @@ class Beam(Case):
         self.candidates = (Candidate.of("bump", SIZE, dict, ((0.1,),), {"place": 3.0}),)
         rng = np.random.default_rng(3)
         self.observations = tuple(
-            Observation(f"o{k}", f"day {k}", self.response(shift, 0.0) + bump * BUMP + 0.1 * rng.normal(size=TIME.size), 0.1)
+            Observation(
+                f"o{k}", f"day {k}", self.response(shift, 0.0) + bump * BUMP + 0.1 * rng.normal(size=TIME.size), 0.1
+            )
             for k in range(3)
         )
 

@@ -289,7 +289,9 @@ def test_a_second_gap_that_no_train_closes_may_be_no_ballast_either(error, answe
         psi=np.array([0.3, 2.5e-3, 0.04]), psi_se=np.array([0.02, error, 0.01]), part=lambda _: slice(1, 3),
         level={"passage": 0.8}, white=[],
     )  # fmt: skip
-    case = SimpleNamespace(control_level={"passage": 0.7}, cell_level={}, observations=(), free_laws=())
+    case = SimpleNamespace(
+        control_level={"passage": 0.7}, cell_level={}, observations=(), free_laws=(), candidates=(), nuisances=()
+    )
     (stated,) = grade_names(Findings(Search(case), both, both, (second,))).verdicts
     assert (stated.answer, stated.grade) == (answer, "B" if answer == "named" else "")
 
@@ -407,7 +409,9 @@ def test_what_would_leave_nothing_is_no_name_where_something_is_left(last, grade
     rules = {name: NamingRules(must_reach_control_level=name == last) for name in ("bowl", "ramp")}
     pair = [replace(c, naming=rules[c.family]) for c in Shapes(("bowl", "ramp")).candidates]
     posterior = {"bowl": 0.9, "ramp": 0.05, "unknown": 0.05}
-    case = SimpleNamespace(control_level={"passage": 0.7}, cell_level={}, observations=(), free_laws=())
+    case = SimpleNamespace(
+        control_level={"passage": 0.7}, cell_level={}, observations=(), free_laws=(), candidates=(), nuisances=()
+    )
     base, fit = (SimpleNamespace(level={"passage": 0.6 if grade == "A" else 0.8}, white=[]) for _ in range(2))
     verdicts = tuple(
         Verdict("named", (c.family,), "", 0.97, dict(posterior), (Score(c, 50.0, 0.0, 1.0, fit),)) for c in pair

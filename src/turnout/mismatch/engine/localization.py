@@ -79,10 +79,10 @@ def locate(
     cause : str
         "clock" or "train" if recordings that were not fitted are the cause of the verdict: they give the location then.
     absorbed : StrainedValue or None
-        The value of the base model that has absorbed the cause. What it is fixed to is the location, unless the residual
-        has more evidence for one location over all others than the value has paid. A value that is fixed to nothing may
-        stand for a cause anywhere, and the residual may be that of intact recordings: its own level is then the least
-        noise, where it is below theirs.
+        The value of the base model that has absorbed the cause. What it is fixed to is the location, unless the
+        residual has more evidence for one location over all others than the value has paid. A value that is fixed to
+        nothing may stand for a cause anywhere, and the residual may be that of intact recordings: its own level is then
+        the least noise, where it is below theirs.
 
     Returns
     -------

@@ -299,9 +299,15 @@ def track_nuisances(zone: Zone, trains: Iterable[str]) -> list[Nuisance]:
     """
     nuisances = [
         Nuisance(
-            name, "-", 0.0, sd, bounds=(-TRACK.common_bound, TRACK.common_bound), meaning=f"ln {name}", group="track",
+            name,
+            "-",
+            0.0,
+            sd,
+            bounds=(-TRACK.common_bound, TRACK.common_bound),
+            meaning=f"ln {name}",
+            group="track",
             at=WHOLE_TRACK,
-        )  # fmt: skip
+        )
         for name, _, _, sd in COMMON_PARAMETERS
     ]
     for parameter in SUPPORT_PARAMETERS:
