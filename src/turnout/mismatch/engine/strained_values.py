@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from turnout.mismatch.engine.thresholds import THRESHOLDS
+
 if TYPE_CHECKING:
     from turnout.mismatch.engine.case import Case
     from turnout.mismatch.engine.fit import Fit
@@ -21,7 +23,7 @@ LOGARITHM = "ln "  # with it begins the meaning of a value whose logarithm is fi
 
 @dataclass(frozen=True)
 class StrainedValue:
-    """A value of the base model that is ``deviation`` prior standard deviations from its file, which costs ``nats``."""
+    """A value of the base model that is ``deviation`` prior standard deviations from its file. It has paid ``nats``."""
 
     nuisance: Nuisance
     deviation: float
@@ -35,8 +37,13 @@ class StrainedValue:
 def strained_value(case: Case, fit: Fit, threshold: float) -> StrainedValue | None:
     r"""The value that has paid more than a name costs.
 
-    A value at :math:`\eta` has lost :math:`(\eta - \mu)^2 / 2 \sigma^2` of the logarithm of its prior
-    :math:`N(\mu, \sigma^2)`. The largest of n counts if that exceeds the threshold by :math:`\ln n`. Values of a single
+    A value with the prior :math:`N(\mu, \sigma^2)` is fitted at :math:`\eta` with the standard error s. Before, this
+    estimate has the variance :math:`\sigma^2 - s^2`, as a prior holds back what the data do not determine fully, and
+
+    .. math:: z^2 / 2, \quad z = (\eta - \mu) / \sqrt{\sigma^2 - s^2}
+
+    nats are paid (a conflict of prior and data: Evans and Moshonas 2006, Bayesian Analysis 1, 893). The largest of n
+    counts if that exceeds the threshold by :math:`\ln n`. Values that the data say nothing of, values of a single
     recording, those with many alike, such as the stiffness of each railpad, those of waves and of the running surface,
     and those that an effect of the library describes as well are left out: the first are no property of the track, one
     of many is often far from its mean, and the last are judged as effects.
@@ -45,6 +52,7 @@ def strained_value(case: Case, fit: Fit, threshold: float) -> StrainedValue | No
     ----------
     case : Case
     fit : Fit
+        Its covariance begins with the nuisances, in their order.
     threshold : float
         Evidence that a name needs. [nats]
 
@@ -54,13 +62,17 @@ def strained_value(case: Case, fit: Fit, threshold: float) -> StrainedValue | No
     """
     described = {c.site.masking_parameter for c in case.candidates}
     shared = [
-        n
-        for n in case.nuisances
+        (n, k)
+        for k, n in enumerate(case.nuisances)
         if n.owner is None and n.index is None and (n.can_mask or n.at) and n.name not in described
     ]
-    if not shared:
-        return None
-    distances = [abs(fit.values[n.name] - n.mean) / n.sd for n in shared]
-    k = int(np.argmax(distances))
-    nats = float(0.5 * distances[k] ** 2 - np.log(len(shared)))
-    return StrainedValue(shared[k], float(distances[k]), nats) if nats > threshold else None
+    strained, variances = None, np.diag(fit.covariance)
+    for nuisance, k in shared:
+        left = variances[k] / nuisance.sd**2  # of the prior variance
+        if left >= THRESHOLDS.uninformed_sd_share**2:
+            continue
+        deviation = abs(fit.values[nuisance.name] - nuisance.mean) / nuisance.sd
+        nats = float(0.5 * deviation**2 / (1.0 - left) - np.log(len(shared)))
+        if nats > (threshold if strained is None else strained.nats):
+            strained = StrainedValue(nuisance, float(deviation), nats)
+    return strained
