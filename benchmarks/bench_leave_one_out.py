@@ -138,6 +138,9 @@ def table(missing, present, cpu):
         lines.append(f"| {' | '.join(cells)} | {answer.words} ({OUTCOMES[answer.outcome]}) |")
     lines += ["", _share_in_words("Another name", missing, ("other",), "bar 3 %")]
     lines += [_share_in_words("Located", missing, ("unknown", "right"), "bar 80 %")]
+    if present:
+        seen = [(site, a) for site, a in missing if dict(present)[site].outcome != "none"]
+        lines += [_share_in_words("Located, of those that are seen with it", seen, ("unknown", "right"), "bar 80 %")]
     return "\n".join([*lines, f"{cpu:.0f} CPU s for all sites."])
 
 

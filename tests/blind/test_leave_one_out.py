@@ -139,3 +139,11 @@ def test_the_table_states_every_failure_and_the_interval():
     assert "| pad (plain), 4 points | `local_pad` | answer 1 (not seen) |" in text
     assert "Another name: 1 of 3 (95 %: 1 to 91 %; bar 3 %)." in text
     assert "Located: 1 of 3 (95 %: 1 to 91 %; bar 80 %)." in text
+
+
+def test_what_the_whole_library_does_not_see_is_counted_apart():
+    sites = [bench.Site("local_pad", "pad", k, "plain") for k in range(3)]
+    missing = [(s, bench.Answer(o, o)) for s, o in zip(sites, ("unknown", "none", "none"))]
+    present = [(s, bench.Answer(o, o)) for s, o in zip(sites, ("right", "right", "none"))]
+    text = bench.table(missing, present, 3.0)
+    assert "Located: 1 of 3 " in text and "Located, of those that are seen with it: 1 of 2 " in text

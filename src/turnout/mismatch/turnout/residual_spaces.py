@@ -106,7 +106,8 @@ def _wheel_space(case: TrackCase, fit: Fit, aligned: AlignedPassage) -> Residual
     sd = np.repeat(amplitude_sd(waves.lengths, waves.length, WHEELS.level), 2)
     spectra = transfer.spectra(waves.lengths, np.ones(transfer.node.size))
     blocks = [transfer.signals_from(spectra, transfer.wheel(w)) * sd for w in range(transfer.wheel_delays.size)]
-    train, subspaces, first = aligned.train, {}, 0
+    train, first = aligned.train, 0
+    subspaces: dict[tuple[str, Any], np.ndarray | None] = {}
     identity = np.eye(sum(b.shape[1] for b in blocks))
     for w, block in enumerate(blocks):
         subspaces["wheel", (train, w + 1)] = identity[:, first : first + block.shape[1]]
