@@ -68,11 +68,11 @@ def strained_value(case: Case, fit: Fit, threshold: float) -> StrainedValue | No
     ]
     strained, variances = None, np.diag(fit.covariance)
     for nuisance, k in shared:
-        left = variances[k] / nuisance.sd**2  # of the prior variance
-        if left >= THRESHOLDS.uninformed_sd_share**2:
+        variance_share = variances[k] / nuisance.sd**2  # of the prior
+        if variance_share >= THRESHOLDS.uninformed_sd_share**2:
             continue
         deviation = abs(fit.values[nuisance.name] - nuisance.mean) / nuisance.sd
-        nats = float(0.5 * deviation**2 / (1.0 - left) - np.log(len(shared)))
+        nats = float(0.5 * deviation**2 / (1.0 - variance_share) - np.log(len(shared)))
         if nats > (threshold if strained is None else strained.nats):
             strained = StrainedValue(nuisance, float(deviation), nats)
     return strained
