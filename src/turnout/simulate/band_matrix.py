@@ -1,4 +1,4 @@
-"""Factorise, solve and multiply symmetric banded matrices; compiled, also the inverse near the diagonal."""
+"""Factorise and multiply symmetric banded matrices; compiled, also the inverse near the diagonal."""
 
 import numpy as np
 
@@ -117,135 +117,6 @@ def upper_rows(lower_rows: np.ndarray, n: int, half: int, width: int) -> np.ndar
 
 
 @borrowing_kernel
-def solve(
-    lower_rows: np.ndarray, upper: np.ndarray, inverse_pivot: np.ndarray, x: np.ndarray, start: int, n: int
-) -> None:
-    """Solve in place for ``x[start:start+n]``; unrolled for four or six diagonals.
-
-    Parameters
-    ----------
-    lower_rows : (n, width) array
-        Rows of L as ``factorise`` fills them: ``[i, k]`` is L[i, i - 1 - k].
-    upper : (n, width) array
-        Rows of L^T from ``upper_rows``: ``[i, k]`` is L[i + 1 + k, i].
-    inverse_pivot : (n,) array
-        Inverse of each pivot.
-    x : (n_padded,) array
-        Right-hand side; overwritten with the solution.
-    start : int
-        Index in ``x`` of the first row.
-    n : int
-        Number of rows of the matrix.
-    """
-    width = lower_rows.shape[1]
-    segment = x[start : start + n]
-    if width == 4:
-        _solve4(lower_rows, upper, inverse_pivot, segment, n)
-    elif width == 6:
-        _solve6(lower_rows, upper, inverse_pivot, segment, n)
-    else:
-        _solve_any(lower_rows, upper, inverse_pivot, segment, n)
-
-
-@borrowing_kernel
-def _solve4(low: np.ndarray, up: np.ndarray, inverse_pivot: np.ndarray, x: np.ndarray, n: int) -> None:
-    a = 0.0 * x[0]
-    b, c, d = a, a, a
-    for i in range(n):
-        s = x[i] - low[i, 3] * d - low[i, 2] * c - low[i, 1] * b - low[i, 0] * a
-        d, c, b, a = c, b, a, s
-        x[i] = s
-    a = 0.0 * x[0]
-    b, c, d = a, a, a
-    for i in range(n - 1, -1, -1):
-        s = x[i] * inverse_pivot[i] - up[i, 3] * d - up[i, 2] * c - up[i, 1] * b - up[i, 0] * a
-        d, c, b, a = c, b, a, s
-        x[i] = s
-
-
-@borrowing_kernel
-def _solve6(low: np.ndarray, up: np.ndarray, inverse_pivot: np.ndarray, x: np.ndarray, n: int) -> None:
-    a = 0.0 * x[0]
-    b, c, d, e, f = a, a, a, a, a
-    for i in range(n):
-        s = x[i] - low[i, 5] * f - low[i, 4] * e - low[i, 3] * d
-        s = s - low[i, 2] * c - low[i, 1] * b - low[i, 0] * a
-        f, e, d, c, b, a = e, d, c, b, a, s
-        x[i] = s
-    a = 0.0 * x[0]
-    b, c, d, e, f = a, a, a, a, a
-    for i in range(n - 1, -1, -1):
-        s = x[i] * inverse_pivot[i] - up[i, 5] * f - up[i, 4] * e - up[i, 3] * d
-        s = s - up[i, 2] * c - up[i, 1] * b - up[i, 0] * a
-        f, e, d, c, b, a = e, d, c, b, a, s
-        x[i] = s
-
-
-@borrowing_kernel
-def _solve_any(low: np.ndarray, up: np.ndarray, inverse_pivot: np.ndarray, x: np.ndarray, n: int) -> None:
-    half = low.shape[1]
-    for i in range(n):
-        s = x[i]
-        for k in range(min(half, i)):
-            s -= low[i, k] * x[i - 1 - k]
-        x[i] = s
-    for i in range(n - 1, -1, -1):
-        s = x[i] * inverse_pivot[i]
-        for k in range(min(half, n - 1 - i)):
-            s -= up[i, k] * x[i + 1 + k]
-        x[i] = s
-
-
-LANES = 8  # right-hand sides that ``solve_lanes`` takes at once: as long as a row of eight waits for the last
-
-
-@borrowing_kernel
-def solve_lanes(low: np.ndarray, up: np.ndarray, pivot: np.ndarray, x: np.ndarray, n: int) -> None:
-    """Solve in place with four diagonals for ``LANES`` complex right-hand sides at once.
-
-    Each row waits for the rows before it, but right-hand sides do not wait for each other. Slices with indices counted
-    from 0 let the inner loops be vectorised.
-
-    Parameters
-    ----------
-    low : (n, 4) array of complex
-        Rows of L as ``factorise4`` fills them: ``[i, k]`` is L[i, i - 1 - k].
-    up : (n, 4) array of complex
-        Rows of L^T: ``[i, k]`` is L[i + 1 + k, i].
-    pivot : (n,) array of complex
-        Inverse of each pivot.
-    x : (2 (n + 8) LANES,) array of float
-        For each row the real parts of all right-hand sides, then the imaginary parts; overwritten with the solutions.
-        Four rows of zeros come first, and four last.
-    n : int
-        Number of rows of the matrix.
-    """
-    m, row = LANES, 2 * LANES
-    for i in range(n):
-        w = x[i * row : (i + 5) * row]
-        a, b, c, d = low[i, 0], low[i, 1], low[i, 2], low[i, 3]
-        for r in range(m):
-            real = w[4 * row + r] - a.real * w[3 * row + r] - b.real * w[2 * row + r] - c.real * w[row + r]
-            imag = w[4 * row + m + r] - a.real * w[3 * row + m + r] - b.real * w[2 * row + m + r]
-            real += a.imag * w[3 * row + m + r] + b.imag * w[2 * row + m + r] + c.imag * w[row + m + r]
-            imag -= a.imag * w[3 * row + r] + b.imag * w[2 * row + r] + c.imag * w[row + r]
-            w[4 * row + r] = real - d.real * w[r] + d.imag * w[m + r]
-            w[4 * row + m + r] = imag - c.real * w[row + m + r] - d.real * w[m + r] - d.imag * w[r]
-    for i in range(n - 1, -1, -1):
-        w = x[(i + 4) * row : (i + 9) * row]
-        a, b, c, d, p = up[i, 0], up[i, 1], up[i, 2], up[i, 3], pivot[i]
-        for r in range(m):
-            real = p.real * w[r] - p.imag * w[m + r] - a.real * w[row + r] - b.real * w[2 * row + r]
-            imag = p.real * w[m + r] + p.imag * w[r] - a.real * w[row + m + r] - b.real * w[2 * row + m + r]
-            real += a.imag * w[row + m + r] + b.imag * w[2 * row + m + r] + c.imag * w[3 * row + m + r]
-            imag -= a.imag * w[row + r] + b.imag * w[2 * row + r] + c.imag * w[3 * row + r]
-            real += d.imag * w[4 * row + m + r] - c.real * w[3 * row + r] - d.real * w[4 * row + r]
-            imag -= d.imag * w[4 * row + r] + c.real * w[3 * row + m + r] + d.real * w[4 * row + m + r]
-            w[r] = real
-            w[m + r] = imag
-
-
-@borrowing_kernel
 def multiply(diagonals: np.ndarray, x: np.ndarray, start: int, out: np.ndarray, n: int) -> None:
     """``out[:n]`` = matrix times ``x[start:start+n]``; ``diagonals`` (2 half + 1, n) from ``all_diagonals``.
 
@@ -290,16 +161,16 @@ def momentum_minus_force(
     out: np.ndarray,
     n: int,
 ) -> None:
-    """``out[start:start+n]`` = by_v M v - by_u K u, with all 9 diagonals in one pass.
+    """``out[start:start+n]`` = by_v M v - by_u K u, with all 9 or 13 diagonals in one pass.
 
     Parameters
     ----------
-    mass : (9, n) array of float
+    mass : (9 or 13, n) array of float
         All diagonals of M. [kg]
-    stiffness : (9, n) array of float
+    stiffness : (9 or 13, n) array of float
         All diagonals of K. [N/m]
     v : (n_padded,) array of float
-        Velocity with 4 entries or more around the part that is used. [m/s]
+        Velocity with as many entries around the part that is used as there are diagonals above the main one. [m/s]
     u : (n_padded,) array of float
         Displacement, padded like ``v``. [m]
     by_v : complex
@@ -313,7 +184,23 @@ def momentum_minus_force(
     n : int
         Number of rows of the matrix.
     """
-    near_v, near_u, inner = v[start - 4 : start + n + 4], u[start - 4 : start + n + 4], out[start : start + n]
+    half = mass.shape[0] // 2
+    near_v, near_u = v[start - half : start + n + half], u[start - half : start + n + half]
+    inner = out[start : start + n]
+    if half == 6:
+        for i in range(n):
+            m = mass[0, i] * near_v[i] + mass[1, i] * near_v[i + 1] + mass[2, i] * near_v[i + 2]
+            m += mass[3, i] * near_v[i + 3] + mass[4, i] * near_v[i + 4] + mass[5, i] * near_v[i + 5]
+            m += mass[6, i] * near_v[i + 6] + mass[7, i] * near_v[i + 7] + mass[8, i] * near_v[i + 8]
+            m += mass[9, i] * near_v[i + 9] + mass[10, i] * near_v[i + 10]
+            m += mass[11, i] * near_v[i + 11] + mass[12, i] * near_v[i + 12]
+            k = stiffness[0, i] * near_u[i] + stiffness[1, i] * near_u[i + 1] + stiffness[2, i] * near_u[i + 2]
+            k += stiffness[3, i] * near_u[i + 3] + stiffness[4, i] * near_u[i + 4] + stiffness[5, i] * near_u[i + 5]
+            k += stiffness[6, i] * near_u[i + 6] + stiffness[7, i] * near_u[i + 7] + stiffness[8, i] * near_u[i + 8]
+            k += stiffness[9, i] * near_u[i + 9] + stiffness[10, i] * near_u[i + 10]
+            k += stiffness[11, i] * near_u[i + 11] + stiffness[12, i] * near_u[i + 12]
+            inner[i] = by_v * m - by_u * k
+        return
     for i in range(n):
         m = mass[0, i] * near_v[i] + mass[1, i] * near_v[i + 1] + mass[2, i] * near_v[i + 2]
         m += mass[3, i] * near_v[i + 3] + mass[4, i] * near_v[i + 4] + mass[5, i] * near_v[i + 5]
@@ -322,93 +209,6 @@ def momentum_minus_force(
         k += stiffness[3, i] * near_u[i + 3] + stiffness[4, i] * near_u[i + 4] + stiffness[5, i] * near_u[i + 5]
         k += stiffness[6, i] * near_u[i + 6] + stiffness[7, i] * near_u[i + 7] + stiffness[8, i] * near_u[i + 8]
         inner[i] = by_v * m - by_u * k
-
-
-@borrowing_kernel
-def solve_from_both_ends(
-    low: np.ndarray,
-    up: np.ndarray,
-    pivot: np.ndarray,
-    low_back: np.ndarray,
-    up_back: np.ndarray,
-    pivot_back: np.ndarray,
-    middle: np.ndarray,
-    x: np.ndarray,
-    start: int,
-    n: int,
-) -> None:
-    """Solve in place with four diagonals, eliminating from both ends to four rows in the middle.
-
-    Two independent recurrences run in parallel, so that neither waits for the last product of the other.
-    ``low_back`` ... are the factors of the reversed matrix, ``middle`` (4, 4) is the middle block of the inverse.
-
-    Parameters
-    ----------
-    low : (n, 4) array
-        Rows of L of the matrix.
-    up : (n, 4) array
-        Rows of L^T of the matrix.
-    pivot : (n,) array
-        Inverse pivots of the matrix.
-    low_back : (n, 4) array
-        Rows of L of the reversed matrix.
-    up_back : (n, 4) array
-        Rows of L^T of the reversed matrix.
-    pivot_back : (n,) array
-        Inverse pivots of the reversed matrix.
-    middle : (4, 4) array
-        Block of the inverse at the rows (n - 4) // 2 to (n - 4) // 2 + 3.
-    x : (n_padded,) array
-        Right-hand side; overwritten with the solution.
-    start : int
-        Index in ``x`` of the first row.
-    n : int
-        Number of rows of the matrix, at least 16.
-    """
-    segment = x[start : start + n]
-    top = (n - 4) // 2
-    bottom = n - 4 - top
-    last = n - 1
-    zero = 0.0 * segment[0]
-    a, b, c, d, e, f, g, h = zero, zero, zero, zero, zero, zero, zero, zero
-    for i in range(top):
-        s = segment[i] - low[i, 3] * d - low[i, 2] * c - low[i, 1] * b - low[i, 0] * a
-        t = segment[last - i] - low_back[i, 3] * h - low_back[i, 2] * g - low_back[i, 1] * f - low_back[i, 0] * e
-        d, c, b, a = c, b, a, s
-        h, g, f, e = g, f, e, t
-        segment[i] = s
-        segment[last - i] = t
-    for i in range(top, bottom):
-        t = segment[last - i] - low_back[i, 3] * h - low_back[i, 2] * g - low_back[i, 1] * f - low_back[i, 0] * e
-        h, g, f, e = g, f, e, t
-        segment[last - i] = t
-    r0 = segment[top] - low[top, 0] * a - low[top, 1] * b - low[top, 2] * c - low[top, 3] * d
-    r1 = segment[top + 1] - low[top + 1, 1] * a - low[top + 1, 2] * b - low[top + 1, 3] * c
-    r2 = segment[top + 2] - low[top + 2, 2] * a - low[top + 2, 3] * b
-    r3 = segment[top + 3] - low[top + 3, 3] * a
-    r3 = r3 - low_back[bottom, 0] * e - low_back[bottom, 1] * f - low_back[bottom, 2] * g - low_back[bottom, 3] * h
-    r2 = r2 - low_back[bottom + 1, 1] * e - low_back[bottom + 1, 2] * f - low_back[bottom + 1, 3] * g
-    r1 = r1 - low_back[bottom + 2, 2] * e - low_back[bottom + 2, 3] * f
-    r0 = r0 - low_back[bottom + 3, 3] * e
-    a = middle[0, 0] * r0 + middle[0, 1] * r1 + middle[0, 2] * r2 + middle[0, 3] * r3
-    b = middle[1, 0] * r0 + middle[1, 1] * r1 + middle[1, 2] * r2 + middle[1, 3] * r3
-    c = middle[2, 0] * r0 + middle[2, 1] * r1 + middle[2, 2] * r2 + middle[2, 3] * r3
-    d = middle[3, 0] * r0 + middle[3, 1] * r1 + middle[3, 2] * r2 + middle[3, 3] * r3
-    segment[top], segment[top + 1], segment[top + 2], segment[top + 3] = a, b, c, d
-    e, f, g, h = d, c, b, a
-    for i in range(bottom - 1, top - 1, -1):
-        t = segment[last - i] * pivot_back[i] - up_back[i, 3] * h - up_back[i, 2] * g
-        t = t - up_back[i, 1] * f - up_back[i, 0] * e
-        h, g, f, e = g, f, e, t
-        segment[last - i] = t
-    for i in range(top - 1, -1, -1):
-        s = segment[i] * pivot[i] - up[i, 3] * d - up[i, 2] * c - up[i, 1] * b - up[i, 0] * a
-        t = segment[last - i] * pivot_back[i] - up_back[i, 3] * h - up_back[i, 2] * g
-        t = t - up_back[i, 1] * f - up_back[i, 0] * e
-        d, c, b, a = c, b, a, s
-        h, g, f, e = g, f, e, t
-        segment[i] = s
-        segment[last - i] = t
 
 
 def all_diagonals(upper: np.ndarray, half: int) -> np.ndarray:

@@ -8,7 +8,8 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.kernel_cache import borrowing_kernel, kernel
-from turnout.simulate.band_matrix import LANES, factorise, factorise4, solve, solve_lanes, upper_rows
+from turnout.simulate.band_matrix import factorise, factorise4, upper_rows
+from turnout.simulate.band_solution import LANES, solve, solve_lanes
 from turnout.simulate.matrices import link_vector
 
 if TYPE_CHECKING:

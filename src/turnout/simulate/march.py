@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.kernel_cache import borrowing_kernel, inner_kernel, kernel
-from turnout.simulate.band_matrix import momentum_minus_force, multiply, solve, solve_from_both_ends
+from turnout.simulate.band_matrix import momentum_minus_force, multiply
+from turnout.simulate.band_solution import solve, solve6_from_both_ends, solve_from_both_ends
 from turnout.simulate.port_system import evaluate, flexibility, locate_ports, newton_update
 from turnout.simulate.workspace import new_workspace
 
@@ -67,7 +68,7 @@ def free_motion(
     """
     pad, n = track.pad, track.n
     by_v, by_u = scheme.weight * scheme.s, scheme.weight
-    if track.mass.shape[0] == 9:
+    if track.mass.shape[0] == 9 or track.mass.shape[0] == 13:
         momentum_minus_force(track.mass, track.stiffness, motion.v, motion.u, by_v, by_u, pad, d, n)
     else:
         multiply(track.mass, motion.v, pad, mass_v, n)
@@ -80,9 +81,11 @@ def free_motion(
             f = scheme.tau[a] * run.pulse_force[k, step, a]
             for i in range(4):
                 d[pad + run.pulse_rows[k, i]] += f * run.pulse_weights[k, i]
+    back = track.lower_back, track.upper_back, track.pivot_back
     if track.middle.shape[0] == 4:
-        back = track.lower_back, track.upper_back, track.pivot_back
         solve_from_both_ends(track.lower, track.upper, track.inverse_pivot, *back, track.middle, d, pad, n)
+    elif track.middle.shape[0] == 6:
+        solve6_from_both_ends(track.lower, track.upper, track.inverse_pivot, *back, track.middle, d, pad, n)
     else:
         solve(track.lower, track.upper, track.inverse_pivot, d, pad, n)
     for block in range(bodies.block_start.size - 1):
@@ -345,7 +348,7 @@ def _march_steps(
         if lost_port >= 0:
             return LEFT_TRACK, step, lost_port, x[lost_port * stages], iterations
         free_deformation(track, scheme, ports, motion, d, e, e_stand_in, rows, weights, share, dip, d0)
-        flexibility(track, scheme, bodies, ports, rows, weights, local, share, d0, step == 0, g)
+        flexibility(track, scheme, bodies, ports, rows, weights, local, share, d0, step == 0, work.fixed_response, g)
         for k in range(1, n_port):
             o, m = order[k], k
             while m > 0 and x[order[m - 1] * stages] > x[o * stages]:

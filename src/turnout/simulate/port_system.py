@@ -116,12 +116,13 @@ def flexibility(
     share: np.ndarray,
     d0: np.ndarray,
     is_first: bool,
+    fixed_response: np.ndarray,
     g: np.ndarray,
 ) -> None:
     """Fill ``g``: by how much a unit force at port stage b reduces the deformation of port stage a.
 
-    That between ports at fixed points is that of the first step. It is 0 for wheels more than ``OPEN_GAP`` above a
-    surface, which no force of one step can close.
+    That between ports at fixed points, and the response of the track to them, are those of the first step. It is 0 for
+    wheels more than ``OPEN_GAP`` above a surface, which no force of one step can close.
 
     Parameters
     ----------
@@ -145,6 +146,8 @@ def flexibility(
         Deformation of each port stage without port forces. [m]
     is_first : bool
         Whether this is the first step.
+    fixed_response : (n_port, n) array
+        Displacement of the track per force at each port at a fixed point; filled in the first step. [m/N]
     g : (n_stage, n_stage) array of float
         Overwritten. [m/N]
     """
@@ -152,6 +155,10 @@ def flexibility(
     body, wheel, window, t, tau = ports.body, ports.wheel, track.window, scheme.t, scheme.tau
     block_of, block_start, response = bodies.block_of, bodies.block_start, bodies.response
     stand_in_response = bodies.stand_in_response
+    if is_first:
+        for j in range(n_port):
+            if body[j] < 0:
+                fill_response(window, pad, rows[j * stages], weights[j * stages], fixed_response[j])
     for i in range(n_port):
         i_open = wheel[i] >= 0 and d0[i * stages] < -OPEN_GAP and d0[(i + 1) * stages - 1] < -OPEN_GAP
         for j in range(i, n_port):
@@ -167,11 +174,22 @@ def flexibility(
                 block = block_of[body[i]]
                 body_response += response[block, body[i] - block_start[block], body[j] - block_start[block]]
             same_wheel = wheel[i] >= 0 and wheel[i] == wheel[j]
+            to_fixed = body[i] >= 0 and body[j] < 0
             for a in range(stages):
+                p = i * stages + a
+                p_is_away = weights[p, 0] == 0.0 and weights[p, 2] == 0.0
+                at_fixed = 0.0 * tau[0]
+                if to_fixed:
+                    for k in range(4):
+                        at_fixed += weights[p, k] * fixed_response[j, rows[p, k]]
                 for b in range(stages):
-                    p, q = i * stages + a, j * stages + b
+                    q = j * stages + b
                     value = body_response
-                    if abs(rows[p, 0] - rows[q, 0]) <= pad + 8:
+                    if to_fixed:
+                        value += at_fixed
+                    elif abs(rows[p, 0] - rows[q, 0]) <= pad + 8 and not (
+                        p_is_away or (weights[q, 0] == 0.0 and weights[q, 2] == 0.0)
+                    ):
                         value += window_product(window, pad, rows, weights, p, q)
                     if same_wheel:
                         value += share[p] * share[q] * stand_in_response[wheel[i]]
@@ -183,6 +201,31 @@ def flexibility(
                         shared = np.sqrt(local[p] * local[q])
                         g[p, q] += shared
                         g[q, p] += shared
+
+
+@inner_kernel
+def fill_response(window: np.ndarray, pad: int, rows: np.ndarray, weights: np.ndarray, response: np.ndarray) -> None:
+    """Response of the track to a unit force at a fixed point.
+
+    Parameters
+    ----------
+    window : (n, 2 pad + 1) array
+        Windows of the inverse.
+    pad : int
+        Half width of the windows.
+    rows : (4,) array of int
+        Rows of the point.
+    weights : (4,) array of float
+        Weights of these rows.
+    response : (n,) array
+        Overwritten; 0 beyond the windows. [m/N]
+    """
+    for r in range(response.size):
+        response[r] = 0.0
+        for j in range(4):
+            column = pad - r + rows[j]
+            if 0 <= column <= 2 * pad:
+                response[r] += weights[j] * window[r, column]
 
 
 @inner_kernel
@@ -325,6 +368,8 @@ def newton_update(
             for o in range(first, last):
                 for b in range(stages):
                     m = order[o] * stages + b
+                    if by_d[m] == 0.0 and by_rate[m] == 0.0 and change[m] == 0.0:
+                        continue
                     value = by_d[k] * g[k, m]
                     if by_rate[k] != 0.0:
                         for c in range(stages):

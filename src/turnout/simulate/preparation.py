@@ -61,7 +61,7 @@ class Prepared:
         lower, upper, inverse_pivot = self.static
         x = np.zeros(self.matrices.n)
         np.add.at(x, rows, weights)
-        from turnout.simulate.band_matrix import solve
+        from turnout.simulate.band_solution import solve
 
         solve(lower, upper, inverse_pivot, x, 0, x.size)
         return x
@@ -174,16 +174,17 @@ def _factors(system: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def _two_sided_factors(
     system: np.ndarray, window: np.ndarray, reach: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Factors of the reversed matrix and the middle block of the inverse, for half bandwidth 4 at most."""
+    """Factors of the reversed matrix and the middle block of the inverse, for half bandwidth 6 at most."""
     half, n = system.shape[0] - 1, system.shape[1]
-    if half > 4 or n < 16 or reach < 4:
+    size = 4 if half <= 4 else 6
+    if half > 6 or n < 4 * size or reach < size:
         empty = np.zeros((0, 4), dtype=system.dtype)
         return empty, empty, np.zeros(0, dtype=system.dtype), np.zeros((0, 0), dtype=system.dtype)
     reversed_system = np.zeros_like(system)
     for k in range(half + 1):
         reversed_system[k, : n - k] = system[k, : n - k][::-1]
-    top = (n - 4) // 2
-    middle = np.array([[window[top + i, reach + j - i] for j in range(4)] for i in range(4)])
+    top = (n - size) // 2
+    middle = np.array([[window[top + i, reach + j - i] for j in range(size)] for i in range(size)])
     return *_factors(reversed_system), np.ascontiguousarray(middle)
 
 

@@ -14,7 +14,8 @@ class Workspace(NamedTuple):
     ``stiff_u`` products of the track's matrices. Of each port: its ``element`` and its place in the ``order`` along the
     track. Of each port stage: position ``x``, ``rows``, ``weights``, ``local`` compliance, ``share`` of the stand-in
     track, ``dip``, deformation without forces ``d0`` and with forces ``deformed``, law force ``f``, its derivatives.
-    ``g`` is their flexibility; ``matrix``, ``right``, ``active`` and ``change`` belong to a Newton step.
+    ``g`` is their flexibility, ``fixed_response`` that of the track to ports at fixed points; ``matrix``, ``right``,
+    ``active`` and ``change`` belong to a Newton step.
     """
 
     d: np.ndarray
@@ -22,6 +23,7 @@ class Workspace(NamedTuple):
     e_stand_in: np.ndarray
     mass_v: np.ndarray
     stiff_u: np.ndarray
+    fixed_response: np.ndarray
     element: np.ndarray
     order: np.ndarray
     rows: np.ndarray
@@ -73,6 +75,7 @@ def new_workspace(n_padded: int, n: int, n_body_row: int, n_wheel: int, n_port: 
         np.full(n_wheel, zero),
         np.zeros(n),
         np.zeros(n),
+        np.full((n_port, n), zero),
         np.zeros(n_port, dtype=np.int64),
         np.arange(n_port),
         np.zeros((n_stage, 4), dtype=np.int64),
