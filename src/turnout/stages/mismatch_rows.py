@@ -22,7 +22,7 @@ from turnout.stages.mismatch_curves import (
     curve_rows,
     reach_of,
 )
-from turnout.stages.mismatch_text import headline, interval, surface_sentence
+from turnout.stages.mismatch_text import UNFINISHED, headline, interval, surface_sentence
 from turnout.stages.values_off_file import sentences_on_values
 
 if TYPE_CHECKING:
@@ -60,6 +60,8 @@ def sentence(diagnosis: Diagnosis) -> str:
     if verdict.answer == "numerics":
         return f"The simulation is not fine enough to be compared: {verdict.reason}."
     if verdict.answer == "unknown":
+        if not verdict.is_finished:
+            return f"{UNFINISHED}: {verdict.reason}. The simulation differs most {location_text(diagnosis)}."
         return f"Something is missing {location_text(diagnosis)}: {verdict.reason}."
     sentences = []
     for term, term_verdict in zip(diagnosis.fit.terms, diagnosis.verdicts):
@@ -387,6 +389,7 @@ def _verdict_evidence(verdict: Verdict) -> dict:
         "term": verdict.names[0] if verdict.names else None,
         "probability": _plain(verdict.probability),
         "reason": verdict.reason,
+        "is_finished": verdict.is_finished,
         "posterior": {k: _plain(v) for k, v in _largest(verdict.posterior)},
         "ranking": [{"family": s.family, "nats": _plain(s.gain), "explained": _plain(s.explained)} for s in top_scores],
         "by_condition": {k: _plain(v) for k, v in top_scores[0].by_condition.items()} if top_scores else {},

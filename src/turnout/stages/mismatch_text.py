@@ -14,6 +14,7 @@ from turnout.mismatch.engine.thresholds import THRESHOLDS
 MIN_SURFACE_DEVIATION = 2.0  # prior standard deviations from the track file's value that are worth a sentence
 ONE_SUPPORT = 0.31  # m to either side; an interval of a position that is larger contains several supports
 MILLI_UNITS = {"m": "mm", "s": "ms"}
+UNFINISHED = "Whether something is missing is open"
 PERCENT_UNITS = {"1/K": "% per kelvin"}
 
 
@@ -189,7 +190,10 @@ def title(finding: Mapping[str, Any]) -> str:
         )
     low, high = finding["place_low_m"], finding["place_high_m"]
     if finding["verdict"] == "unknown":
-        return f"Something is missing {_location_text(finding, low, high)}, and no known effect explains it."
+        where = _location_text(finding, low, high)
+        if not json.loads(finding.get("evidence_json") or "{}").get("is_finished", True):
+            return f"{UNFINISHED}, as the search was not finished. The simulation differs most {where}."
+        return f"Something is missing {where}, and no known effect explains it."
     return finding["sentence"] or ""
 
 

@@ -83,7 +83,7 @@ def test_a_bay_or_a_wheel_twice_as_loud_as_the_others_stands_out(frame, level):
 def diagnosed(answer, candidates, frames):
     fit = SimpleNamespace(candidates=candidates, psi=np.array([5e-3]), psi_se=np.array([1e-4]), terms=())
     verdict = SimpleNamespace(
-        answer=answer, names=tuple(c.family for c in candidates), grade="", probability=0.9, reason=""
+        answer=answer, names=tuple(c.family for c in candidates), grade="", probability=0.9, reason="", is_finished=True
     )
     check = Verification(1, 1.0)
     return SimpleNamespace(

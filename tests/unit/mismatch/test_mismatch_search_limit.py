@@ -14,6 +14,7 @@ from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.search_limit import SearchLimit, SearchLimitError, check_limit
 from turnout.physics.term import Parameter
+from turnout.stages.mismatch_rows import sentence
 
 SIZE = (Parameter("size", "-", 0.0, (0.0, 9.0), "of the parabola", "made up 2026"),)
 
@@ -74,6 +75,7 @@ def test_a_search_beyond_its_bound_cannot_tell():
     found = diagnose(case)
     assert found.verdict.answer == "unknown" and found.verdict.trail[0] == "search_too_long"
     assert found.verdict.reason == "the search was not finished within 3 simulations of a train"
+    assert sentence(found).startswith("Whether something is missing is open: the search was not finished within 3 ")
     assert found.fit is found.base and found.names == () and 0.0 < found.probability < 1.0
     whole = Counted(None)
     diagnose(whole)

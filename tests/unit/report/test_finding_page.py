@@ -203,6 +203,13 @@ def test_unknown_is_located_and_offers_nothing_to_accept():
     assert "place 24.6 (+6.1 dB, q = 0.002, n = 80)" in text and "--accept" not in text
 
 
+def test_an_unfinished_search_does_not_say_that_something_is_missing():
+    row = ROWS["unknown"] | {"evidence_json": json.dumps(EVIDENCE | {"is_finished": False})}
+    text = page(row)
+    assert "Whether something is missing is open, as the search was not finished." in text
+    assert "The simulation differs most about 24.6 m." in text and "Something is missing" not in text
+
+
 def test_none_and_numerics_send_nobody_out():
     assert check(ROWS["none"]) == "Nothing to check."
     assert "refine" in check(ROWS["numerics"]) and answer(ROWS["numerics"]) == "numerics"

@@ -51,6 +51,11 @@ class Verdict:
         """Whether it states one effect: by a name, or by two forms of it that cannot be distinguished."""
         return self.answer == "named" or (self.answer == "a_or_b" and self.independent_rival is None)
 
+    @property
+    def is_finished(self) -> bool:
+        """Whether the search for the first effect came to its end, so that "unknown" says that something is missing."""
+        return "search_too_long" not in self.trail
+
     def after(self, rule: Rule) -> Verdict:
         """The verdict with a rule at the end of its trail.
 
