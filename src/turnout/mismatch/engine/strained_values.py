@@ -66,6 +66,8 @@ def strained_value(case: Case, fit: Fit, threshold: float) -> StrainedValue | No
         for k, n in enumerate(case.nuisances)
         if n.owner is None and n.index is None and (n.can_mask or n.at) and n.name not in described
     ]
+    if not shared:
+        return None
     strained, variances = None, np.diag(fit.covariance)
     for nuisance, k in shared:
         variance_share = variances[k] / nuisance.sd**2  # of the prior
