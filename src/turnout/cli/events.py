@@ -76,7 +76,7 @@ def _enter(args: argparse.Namespace) -> int:
     from pathlib import Path
 
     from turnout.config import load_configuration
-    from turnout.config.events import COLUMNS, event_of, lead_problem, now, turnout_problems
+    from turnout.config.events import COLUMNS, date_problem, event_of, now, read_events, turnout_problems
     from turnout.config.table_edits import added_row, turnout_and_section
     from turnout.errors import ConfigError, ConfigErrors
 
@@ -88,8 +88,11 @@ def _enter(args: argparse.Namespace) -> int:
         if problems := list(turnout_problems(cells, after.ids, after.variants)):
             raise ConfigErrors([ConfigError(path, column, *content) for column, *content in problems])
         entered = event_of(cells)
-        if problem := lead_problem(entered):
+        if problem := date_problem(entered):
             raise ConfigError(path, "date", *problem)
+        if entered.work in (event.work for event in read_events(path, str(path), None, {})[0]):
+            found = f"{args.kind} at {args.place}, {args.date}, is there already"
+            raise ConfigError(path, "the work", found, "To change its row, edit the file")
     begin = "from its day" if entered.at > now() else "from the next run"
     print(f"{path}: {args.kind} at {args.place}, {args.date}. It counts {begin} on.")
     return 0

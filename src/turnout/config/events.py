@@ -30,6 +30,7 @@ RESETS = {
     "method_change": ("ballast", "railpad"),
     "other": (),
 }
+FIRST_YEAR = 1900  # an earlier date of work is taken for a mistake
 MAX_LEAD_TIME = timedelta(days=366)  # how far ahead work may be planned; a later date is taken for a mistake
 COLUMNS = ("turnout", "section", "date", "kind", "resets", "note")
 
@@ -44,6 +45,11 @@ class Event:
     kind: str
     resets: tuple[str, ...]
     note: str = ""
+
+    @property
+    def work(self) -> tuple[str, str | None, datetime, str]:
+        """What identifies the work: turnout, section, time and kind."""
+        return self.turnout, self.section, self.at, self.kind
 
 
 def read_events(
@@ -68,8 +74,8 @@ def read_events(
     Returns
     -------
     tuple of (list of Event, list of ConfigError, list of ConfigError)
-        Events in order of time; errors of rows that cannot be used; warnings about unknown turnouts or sections and
-        about dates more than a year ahead.
+        Events in order of time; errors of rows that cannot be used, or that contradict another row about the same work;
+        warnings about unknown turnouts or sections, dates that cannot be right and rows that repeat another.
     """
     if not os.path.lexists(path):
         return [], [], []
@@ -78,22 +84,30 @@ def read_events(
         table = read_csv(path, name, COLUMNS, n_required=4)
     except TableError as fault:
         return [], [fault.error], []
-    errors, warnings = [fault.error for fault in table.faults], []
+    errors = [fault.error for fault in table.faults]
+    warnings: list[ConfigError] = []
+    first_rows: dict[tuple, tuple[int, Event]] = {}
     for line, cells in table.rows:
         problems = list(_row_problems(cells))
         errors += [cells.place(name, line, column).error(*problem) for column, *problem in problems]
         if problems:
             continue
-        events.append(event_of(cells))
+        event = event_of(cells)
+        first_line, first = first_rows.setdefault(event.work, (line, event))
+        if first is not event:
+            faults = warnings if first.resets == event.resets else errors
+            faults.append(cells.place(name, line, "resets").error(*_repetition(first_line, first, event)))
+            continue
+        events.append(event)
         unknown_turnouts = turnout_problems(cells, turnout_ids, variants)
         warnings += [cells.place(name, line, column).error(*problem) for column, *problem in unknown_turnouts]
-        if problem := lead_problem(events[-1]):
+        if problem := date_problem(event):
             warnings.append(cells.place(name, line, "date").error(*problem))
     return sorted(events, key=lambda e: (e.at, e.turnout, e.section or "", e.kind)), errors, warnings
 
 
-def lead_problem(event: Event) -> tuple[str, str] | None:
-    """Problem and remedy of an event that is planned more than a year ahead.
+def date_problem(event: Event) -> tuple[str, str] | None:
+    """Problem and remedy of an event that is planned more than a year ahead, or lies before 1900.
 
     Parameters
     ----------
@@ -105,9 +119,20 @@ def lead_problem(event: Event) -> tuple[str, str] | None:
     tuple of (str, str) or None
         None for an event of the past or of the coming year.
     """
+    if event.at.year < FIRST_YEAR:
+        return f"date {event.at.date()} is before {FIRST_YEAR}", "Correct its year"
     if event.at <= now() + MAX_LEAD_TIME:
         return None
     return f"date {event.at:%Y-%m-%d} is more than a year ahead", "Correct it, or enter it nearer to its day"
+
+
+def _repetition(line: int, first: Event, second: Event) -> tuple[str, str]:
+    """Problem and remedy of a row about the same work as the row in ``line``."""
+    if first.resets == second.resets:
+        return f"the same work as in line {line}", "Remove one of the rows"
+    bands = (" and ".join(event.resets) or "nothing" for event in (first, second))
+    problem = "line {} says that the same work resets {}, this line {}".format(line, *bands)
+    return problem, "Correct one of the rows, and remove the other"
 
 
 def _row_problems(cells: Mapping[str, str]) -> Iterator[tuple[str, str, str]]:
@@ -121,6 +146,8 @@ def _row_problems(cells: Mapping[str, str]) -> Iterator[tuple[str, str, str]]:
         yield "date", f"date is {cells['date']!r}{problem[0]}", problem[1]
     if cells["kind"] not in RESETS:
         yield "kind", f"kind is {cells['kind']!r}", suggestion(cells["kind"], RESETS)
+    if cells.get("resets", "").split() != ["none"] and "none" in cells.get("resets", "").replace("+", " ").split():
+        yield "resets", f"resets is {cells['resets']!r}", "Write the resonances, or 'none' alone"
     if unknown := set(_reset_bands(cells)) - {"ballast", "railpad"}:
         yield "resets", f"resets is {cells['resets']!r}", suggestion(min(unknown), ("ballast", "railpad", "none"))
 

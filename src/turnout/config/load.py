@@ -17,7 +17,7 @@ from turnout.config.merge import ROW_KEYS, SECTION_ROW_KEYS, Variant, with_row
 from turnout.config.schema import NO_TURNOUT, check, suggestion
 from turnout.config.settings_schema import check_ranges, settings_keys
 from turnout.config.turnout import TurnoutConfig
-from turnout.config.turnouts_table import Row, read_table
+from turnout.config.turnouts_table import NO_PROJECT, Row, read_table
 from turnout.errors import ConfigError, ConfigErrors, ReadError
 
 TABLES = ("turnouts.tsv", "events.csv", "acknowledgements.csv")
@@ -170,6 +170,8 @@ def load_configuration(
     if Path(folder).is_file():
         remedy = "Name the folder of the configuration, 'config' in a project"
         raise ConfigErrors([ConfigError(folder, "the folder", "it is a file", remedy)])
+    if not Path(folder).is_dir():
+        raise ConfigErrors([ConfigError(folder, "the folder", "there is no such folder", NO_PROJECT)])
     reading = _ConfigurationReader(Path(folder), formats, to_si)
     paths = {name: reading.folder / name for name in TABLES} | dict(tables or {})
     reading.check_extensions()

@@ -42,7 +42,8 @@ WRONG = {
     "check --turnout W9": "config/turnouts.tsv, line 1, column 1: no turnout 'W9'. Allowed: W1.",
     "check --raw README.md": "README.md, --raw: it is a file.",
     "check --config config/config.yaml": "config/config.yaml, the folder: it is a file. Name the folder",
-    "check --config nowhere": "no such file. Run the command in the folder of a project; 'turnout init FOLDER' makes",
+    "check --config /nowhere/config": "/nowhere/config, the folder: there is no such folder. Run the command in the",
+    "plan --config nowhere": "nowhere, the folder: there is no such folder. Run the command in the folder of a project",
     "add W1 tommerup": "config/turnouts.tsv, line 2: there is a turnout 'W1' already. Write another id",
     "add W:1 tommerup": "turnout is 'W:1'. Write 1 to 64 letters, digits, _ and -, the first a letter or digit.",
     "worklist": "results/registry: there is no registry here. 'turnout nightly' makes one",
@@ -51,6 +52,7 @@ WRONG = {
     "query from_worklist --registry README.md": "not a valid DuckDB database file. Name the folder that holds registry",
     "simulate hammer --section X": "no section 'X' in the track file. Write one of OT, SP",
     "diagnose --turnout W1 --sections X": "W1 has no section X. Write some of OT, SP",
+    "events W1 tamping 0202-05-01": "config/events.csv, date: date 0202-05-01 is before 1900. Correct its year.",
     "events W1 tamping 3024-05-01": "config/events.csv, date: date 3024-05-01 is more than a year ahead. Correct it",
     "calibrate --section A7 --track tommerup --modes ballast=-5/0.1": "'ballast=-5/0.1': no resonance has a frequency",
     "calibrate --section A7 --track tommerup --modes ballast=nan/0.1": "Write a frequency above 0 Hz",
@@ -193,3 +195,12 @@ def test_a_file_that_may_not_be_written_has_its_own_name_in_the_message(project,
     assert main(["add", "W2", "tommerup"]) == 2
     message = capsys.readouterr().err
     assert "config/turnouts.tsv: Permission denied" in message and ".tmp" not in message
+
+
+def test_work_that_is_there_already_is_not_entered_twice(project, capsys):
+    line = ["events", "W1", "tamping", "2026-04-02"]
+    assert main(line) == 0
+    before = (project / "config/events.csv").read_bytes()
+    assert main([*line, "--resets", "none"]) == main(line) == 2
+    assert (project / "config/events.csv").read_bytes() == before
+    assert "config/events.csv, the work: tamping at W1, 2026-04-02, is there already." in capsys.readouterr().err

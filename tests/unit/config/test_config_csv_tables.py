@@ -268,3 +268,49 @@ def test_an_empty_turnout_or_section_does_not_count_for_all(config, capsys, comm
     assert main([command[0], place, *command[2:]]) == 2
     assert "Write TURNOUT or TURNOUT/SECTION" in capsys.readouterr().err
     assert {path: path.read_bytes() for path in config.glob("*.csv")} == before
+
+
+SAME_WORK = "t1,A7,2025-11-05,tamping"
+
+
+@pytest.mark.parametrize(
+    ("resets", "other", "said"),
+    [
+        ("", "", "the same work as in line 2. Remove one of the rows."),
+        ("", "ballast", "the same work as in line 2. Remove one of the rows."),  # what tamping resets without a word
+        ("none", "none", "the same work as in line 2. Remove one of the rows."),
+        (
+            "ballast",
+            "none",
+            "line 2 says that the same work resets ballast, this line nothing. Correct one of the rows",
+        ),
+        ("", "ballast railpad", "the same work resets ballast, this line ballast and railpad. Correct one"),
+    ],
+)
+def test_two_rows_about_the_same_work_are_named(tmp_path, resets, other, said):
+    (tmp_path / "events.csv").write_text(f"{HEADER}{SAME_WORK},{resets},\n{SAME_WORK},{other},again\n")
+    found, errors, warnings = read_events(tmp_path / "events.csv", "events.csv", None, {})
+    assert len(found) == 1
+    (fault,) = errors if "this line" in said else warnings
+    assert str(fault).startswith("events.csv, line 3, column 26: ") and said in str(fault)
+    assert len(errors) + len(warnings) == 1
+
+
+@pytest.mark.parametrize("row", ["t1,A8,2025-11-05,tamping", "t1,,2025-11-05,tamping", "t1,A7,2025-11-05,grinding",
+                                 "t1,A7,2025-11-06,tamping", "t2,A7,2025-11-05,tamping"])  # fmt: skip
+def test_other_work_is_no_repetition(tmp_path, row):
+    (tmp_path / "events.csv").write_text(f"{HEADER}{SAME_WORK},,\n{row},,\n")
+    found, errors, warnings = read_events(tmp_path / "events.csv", "events.csv", None, {})
+    assert len(found) == 2 and not errors and not warnings
+
+
+def test_a_year_that_lacks_a_digit_is_said(tmp_path):
+    (tmp_path / "events.csv").write_text(f"{HEADER}t1,A7,0225-11-05,tamping,,\n")
+    _, errors, (warning,) = read_events(tmp_path / "events.csv", "events.csv", None, {})
+    assert not errors and "column 7: date 0225-11-05 is before 1900. Correct its year." in str(warning)
+
+
+def test_none_beside_a_resonance_contradicts_it(tmp_path):
+    (tmp_path / "events.csv").write_text(f"{HEADER}{SAME_WORK},none ballast,\n")
+    found, (error,), _ = read_events(tmp_path / "events.csv", "events.csv", None, {})
+    assert not found and "resets is 'none ballast'. Write the resonances, or 'none' alone." in str(error)
