@@ -1,6 +1,6 @@
-"""Check the response of a hammer test on a track: scale, saturation behind a filter, and lag behind the force.
+"""Check the response of a hammer test on a track: quantity, scale, saturation behind a filter, lag behind the force.
 
-The force alone is judged by ``find_impacts``, the scale by ``response_scale``.
+The force alone is judged by ``find_impacts``, the quantity by ``response_order``, the scale by ``response_scale``.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 from turnout.hammer_test.best_subset import select_best
 from turnout.hammer_test.impacts import find_impacts
 from turnout.hammer_test.limited_response import judge_limited_impacts
+from turnout.hammer_test.response_order import judge_response_order
 from turnout.hammer_test.response_scale import judge_response_scale
 from turnout.records import Rejection
 
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 def find_track_impacts(
     recordings: Sequence[Recording], force: str, response: str, settings: ReceptanceSettings
 ) -> tuple[Impact, ...]:
-    """``find_impacts`` of a hammer test on a track, with the scale of the response judged too.
+    """``find_impacts`` of a hammer test on a track, with quantity and scale of the response judged too.
 
     Parameters
     ----------
@@ -51,7 +52,9 @@ def find_track_impacts(
     impacts = judge_causality(impacts, response)
     impacts = judge_saturation(impacts, response)
     impacts = judge_limited_impacts(impacts, response)
-    impacts = judge_response_scale(impacts, response) if settings.softest_blow > 0.0 else impacts
+    if settings.softest_blow > 0.0:
+        impacts = judge_response_order(impacts, response)
+        impacts = judge_response_scale(impacts, response)
     return select_best(impacts, settings)  # among those that no other test has rejected
 
 
