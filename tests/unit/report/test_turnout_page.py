@@ -67,10 +67,10 @@ def test_a_mode_with_a_useless_error_is_stated_as_uncertain():
     }  # fmt: skip
     text = page(models=[REJECTED], off_track=[mode])
     assert (
-        "too uncertain to show whether it continues those before: 2026-05-01 ballast 307.4 (standard error 78) Hz, "
+        "too uncertain to show whether it continues those before: 2026-05-01 ballast 307 Hz (standard error 78 Hz), "
         in text
     )
-    assert "damping 0.4170 (standard error 0.34) (median of 9" in text
+    assert "damping 0.4 (standard error 0.3) (median of 9" in text
     assert "another mode, or the track has changed" not in text
 
 

@@ -6,6 +6,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from turnout.counts import count_of
+from turnout.records.modal import value_with_error
 from turnout.report import panels
 from turnout.report.formatting import badge, day, diagnoses_once, number_ranges, with_half_width
 from turnout.report.panels.calibrated_model import calibrated_panels, visits_in_words
@@ -256,7 +257,7 @@ def _off_track(modes: Sequence[Mapping[str, Any]], verdict: str) -> str:
     """Modes with a ``verdict`` of ``modes_off_track``, the newest first, with standard errors where they are known."""
     chosen = [m for m in modes if m["verdict"] == verdict]
     entries = [
-        f"{day(m['measured_at_utc'])} {m['band']} {_with_error(m['frequency_hz'], m['frequency_se_hz'], 1)} Hz, "
+        f"{day(m['measured_at_utc'])} {m['band']} {_with_error(m['frequency_hz'], m['frequency_se_hz'], 1, ' Hz')}, "
         f"damping {_with_error(m['damping_ratio'], m['damping_se'], 4)} "
         f"(median of {count_of(m['n_history'], 'campaign')} before: {m['frequency_track_hz']:.1f} Hz, "
         f"{m['damping_track']:.4f}{_residue_words(m['residue_ratio'])}{_shape_words(m['shape_mac'])})"
@@ -266,8 +267,12 @@ def _off_track(modes: Sequence[Mapping[str, Any]], verdict: str) -> str:
     return "; ".join(entries) + (f" and {more} before" if more > 0 else "")
 
 
-def _with_error(value: float, error: float | None, decimals: int) -> str:
-    return f"{value:.{decimals}f}" if error is None else f"{value:.{decimals}f} (standard error {error:.2g})"
+def _with_error(value: float, error: float | None, decimals: int, unit: str = "") -> str:
+    """A value with its standard error, both to the last digit that the error leaves; without one to ``decimals``."""
+    if error is None:
+        return f"{value:.{decimals}f}{unit}"
+    number, _, error_text = value_with_error(value, error).partition(" ± ")
+    return f"{number}{unit} (standard error {error_text}{unit})" if error_text else f"{number}{unit}"
 
 
 def _residue_words(ratio: float | None) -> str:
