@@ -91,8 +91,8 @@ def _enter(args: argparse.Namespace) -> int:
         if problem := date_problem(entered):
             raise ConfigError(path, "date", *problem)
         if entered.work in (event.work for event in read_events(path, str(path), None, {})[0]):
-            found = f"{args.kind} at {args.place}, {args.date}, is there already"
-            raise ConfigError(path, "the work", found, "To change its row, edit the file")
+            repetition = f"{args.kind} at {args.place}, {args.date}, is there already"
+            raise ConfigError(path, "the work", repetition, "To change its row, edit the file")
     begin = "from its day" if entered.at > now() else "from the next run"
     print(f"{path}: {args.kind} at {args.place}, {args.date}. It counts {begin} on.")
     return 0

@@ -92,9 +92,9 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
                 for a, b, *rest in (t for t in texts if len(t) > 1)
                 if b and not any(rest) and a not in names and is_scale_name(a)
             }
-            others = ["" if _names_columns(cells_of(t, separator), names, units) else t for t in head_lines]
+            lines_of_entries = ["" if _names_columns(cells_of(t, separator), names, units) else t for t in head_lines]
             separator_of_head = "," if separator == BLANK else separator  # a word is no cell of a head
-            entries = tuple(entries_of_lines(others, separator_of_head, names))
+            entries = tuple(entries_of_lines(lines_of_entries, separator_of_head, names))
             return notes, names, units, position, separator, entries
         match = HEAD_LINE.match(line.strip())
         name = match[1].strip() if match else ""
