@@ -54,11 +54,11 @@ def responses_of(
     rows = []
     for path, size in files:
         try:
-            found = find_responses(path, raw_root)
-            if found is None:
+            responses = find_responses(path, raw_root)
+            if responses is None:
                 continue
-            check_evaluable(found, path)
-            if joint is not None and not _has_axis(found, joint.frequency):
+            check_evaluable(responses, path)
+            if joint is not None and not _has_axis(responses, joint.frequency):
                 problem = "its frequencies are not those of the other files of this test"
                 raise ReadError(
                     path, "the frequency responses", problem, "Export all with the same lines", "wrong_rate"
@@ -68,8 +68,8 @@ def responses_of(
             quarantine.append(quarantine_row(error, base, "hammer", "read"))
             continue
         quarantine[:] = [row for row in quarantine if row["path"] != path]
-        rows.append(_recording_row(found, path, size, Path(raw_root), base))
-        joint = found if joint is None else _with_responses(joint, found)
+        rows.append(_recording_row(responses, path, size, Path(raw_root), base))
+        joint = responses if joint is None else _with_responses(joint, responses)
     return joint, rows
 
 
@@ -121,14 +121,14 @@ def response_model(responses: FrequencyResponses, settings: IdentifySettings) ->
     tuple of (ModalModel, str)
         The model has no matrices. Its status is that of the two resonances.
     """
-    found = modes_of_frf(responses.frequency, responses.frf)
-    modes, others, failures = [], list(found.modes), []
+    identified = modes_of_frf(responses.frequency, responses.frf)
+    modes, further, failures = [], list(identified.modes), []
     for band, low, high in settings.bands():
-        inside = [m for m in found.modes if low <= m.frequency.mean < high]
+        inside = [m for m in identified.modes if low <= m.frequency.mean < high]
         if inside:
-            best = max(inside, key=lambda m: m.contrast)
-            others.remove(best)
-            mode = _mode(band, best)
+            strongest = max(inside, key=lambda m: m.contrast)
+            further.remove(strongest)
+            mode = _mode(band, strongest)
             failure = failure_of_mode(mode, settings)
             if failure is None:
                 modes.append(mode)
@@ -142,7 +142,7 @@ def response_model(responses: FrequencyResponses, settings: IdentifySettings) ->
     empty = np.zeros(0)
     model = ModalModel(np.zeros((0, 0)), empty, empty, float("nan"), tuple(modes), METHOD, status, tuple(rejections))
     failure_words = [str(failure.detail) for failure in failures]
-    return model, "; ".join([NO_IMPACTS, *_single_words(model), *failure_words, *_other_words(others, found)])
+    return model, "; ".join([NO_IMPACTS, *_single_words(model), *failure_words, *_other_words(further, identified)])
 
 
 def _single_words(model: ModalModel) -> list[str]:
@@ -161,12 +161,12 @@ def _mode(band: str, mode: FrfMode) -> Mode:
     )
 
 
-def _other_words(others: Sequence[FrfMode], found: FrfModes) -> list[str]:
+def _other_words(further: Sequence[FrfMode], identified: FrfModes) -> list[str]:
     """Further modes and rejected peaks in words."""
     listed = [
         f"{value_with_error(m.frequency.mean, 0.5 * (m.frequency.high - m.frequency.low))} Hz "
         f"({100.0 * m.damping.mean:.3g} %)"
-        for m in others
+        for m in further
     ]
     words = [f"further modes {', '.join(listed)}"] if listed else []
-    return words + [f"{peak['frequency']:.0f} Hz not used: {peak['reason']}" for peak in found.rejected]
+    return words + [f"{peak['frequency']:.0f} Hz not used: {peak['reason']}" for peak in identified.rejected]
