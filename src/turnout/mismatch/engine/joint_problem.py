@@ -100,53 +100,6 @@ class JointProblem:
         except SimulationError:
             return None
 
-    def evaluate_below(
-        self, theta: np.ndarray, max_cost: float = np.inf
-    ) -> tuple[list[np.ndarray], list[np.ndarray], float] | None:
-        """Predictions, whitened residuals and cost at these parameters, if the cost is below a limit.
-
-        In an expensive case cheap observations are predicted first, then the others one by one. Each adds to the cost,
-        so that the rest need not be predicted once the limit is reached.
-
-        Parameters
-        ----------
-        theta : (n,) array of float
-            Nuisances, then parameters of the effects.
-        max_cost : float
-
-        Returns
-        -------
-        predictions : list of (n,) array of float
-            By observation.
-        residuals : list of (n,) array of float
-            By observation.
-        cost : float
-            None instead of the three if the cost is not below ``max_cost``.
-
-        Raises
-        ------
-        SimulationError
-            If the model cannot be simulated there.
-        """
-        values, psi = self.split(theta)
-        terms, observations = terms_of(self.candidates, psi), self.observations
-        self.evaluations += 1
-        predictions, residuals = ([np.zeros(1)] * len(observations) for _ in range(2))
-        for chosen in self._predicted_together():
-            predicted = self.case.predict(values, terms, [observations[i] for i in chosen])
-            for i, p in zip(chosen, predicted):
-                predictions[i], residuals[i] = p, observations[i].whiten(observations[i].data - p)
-            if not self.cost(theta, residuals) < max_cost:
-                return None
-        return predictions, residuals, self.cost(theta, residuals)
-
-    def _predicted_together(self) -> list[list[int]]:
-        """Numbers of the observations that are predicted in one call, in turn."""
-        if not self.case.expensive:
-            return [list(range(len(self.observations)))]
-        cheap = [i for i, o in enumerate(self.observations) if self.case.is_cheap(o)]
-        return [cheap] * bool(cheap) + [[i] for i in range(len(self.observations)) if i not in cheap]
-
     def residuals(self, predictions: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Data minus prediction, whitened.
 
@@ -328,13 +281,7 @@ def _max_step(p: Parameter) -> float:
     return THRESHOLDS.max_term_step * (p.bounds[1] - p.bounds[0])
 
 
-def cost_at(
-    case: Case,
-    candidates: Iterable[Candidate],
-    psi: np.ndarray,
-    values: Mapping[str, float],
-    max_cost: float = np.inf,
-) -> float:
+def cost_at(case: Case, candidates: Iterable[Candidate], psi: np.ndarray, values: Mapping[str, float]) -> float:
     """Minus twice the log posterior at these parameters and nuisances, without a fit.
 
     Parameters
@@ -345,13 +292,10 @@ def cost_at(
         Their parameters.
     values : mapping
         Nuisance parameter -> value; others are at their prior mean.
-    max_cost : float
-        Only lower costs are of interest.
 
     Returns
     -------
     float
-        Infinite if it is not below ``max_cost``.
 
     Raises
     ------
@@ -360,5 +304,4 @@ def cost_at(
     """
     joint = JointProblem(case, candidates)
     theta = np.concatenate([[values.get(n.name, n.mean) for n in case.nuisances], psi])
-    evaluated = joint.evaluate_below(theta, max_cost)
-    return np.inf if evaluated is None else evaluated[-1]
+    return joint.cost(theta, joint.residuals(joint.predict(theta)))

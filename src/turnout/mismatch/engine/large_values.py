@@ -172,8 +172,7 @@ def _fit_with(search: Search, fit: Fit, large: tuple[str, ...], widening: float,
             for n in wide.case.nuisances
         }
         try:
-            lowest = min((cost for cost, _ in costs), default=np.inf)
-            costs.append((cost_at(wide.case, (), np.zeros(0), at, lowest), at))
+            costs.append((cost_at(wide.case, (), np.zeros(0), at), at))
         except SimulationError:
             continue
     starts = [min(costs, key=itemgetter(0))[1]] if costs else []

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from turnout.errors import SimulationError
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -155,14 +154,13 @@ class DampedSteps:
             if promise < THRESHOLDS.min_decrease_share * joint.min_decrease:
                 break
             trial = np.clip(self.theta + step, joint.low, joint.high)
-            try:
-                improvement = joint.evaluate_below(trial, cost)
-            except SimulationError:
-                pass
-            else:
-                if improvement is not None:
-                    kept_share = (cost - improvement[-1]) / self.linear_decrease(step)
-                    return FitPoint(trial, *improvement), self._next_damping(damping, kept_share)
+            predictions = joint.predict_or_none(trial)
+            if predictions is not None:
+                residuals = joint.residuals(predictions)
+                new_cost = joint.cost(trial, residuals)
+                if new_cost < cost:
+                    next_damping = self._next_damping(damping, (cost - new_cost) / self.linear_decrease(step))
+                    return FitPoint(trial, predictions, residuals, new_cost), next_damping
                 if promise < joint.min_decrease:
                     break
             damping = max(THRESHOLDS.damping_increase * damping, THRESHOLDS.first_damping)

@@ -64,16 +64,14 @@ def restart_leader(search: Search, fit: Fit, score: Score) -> Score:
 def _cheapest_psi(case: Case, score: Score, values: dict[str, float]) -> np.ndarray:
     """``psi`` with the first two parameters of the leader at those shares of their values that cost least."""
     candidate, psi_slice = score.candidate, score.fit.part(score.candidate)
-    sizes = score.fit.psi[psi_slice]
-    costs: list[tuple[float, tuple[float, ...]]] = []
+    sizes, costs = score.fit.psi[psi_slice], []
     for shares in product(THRESHOLDS.size_factors, repeat=min(2, sizes.size)):
         psi, size = np.array(score.fit.psi), np.array(sizes)
         size[0] = candidate.neutral[0] + shares[0] * (sizes[0] - candidate.neutral[0])
         size[1 : len(shares)] = sizes[1 : len(shares)] * shares[1:]
         psi[psi_slice] = [np.clip(v, *p.bounds) for v, p in zip(size, candidate.parameters)]
         try:
-            lowest = min((cost for cost, _ in costs), default=np.inf)
-            costs.append((cost_at(case, score.fit.candidates, psi, values, lowest), tuple(psi)))
+            costs.append((cost_at(case, score.fit.candidates, psi, values), tuple(psi)))
         except SimulationError:
             continue
     if not costs:
@@ -366,14 +364,12 @@ def _best_start(case: Case, candidates: tuple[Candidate, ...], psi: np.ndarray, 
     candidate = candidates[-1]
     if candidate.refit.from_base and not candidate.refit.sign_ambiguous:
         return psi
-    n = psi.size - len(candidate.parameters)
-    costs: list[tuple[float, tuple[float, ...]]] = []
+    n, costs = psi.size - len(candidate.parameters), []
     alternatives = (candidate.mirror_image(psi[n:]),) if candidate.refit.sign_ambiguous else candidate.starts
     for start in (psi[n:], *alternatives):
         trial = np.concatenate([psi[:n], np.asarray(start, dtype=float)])
         try:
-            lowest = min((cost for cost, _ in costs), default=np.inf)
-            costs.append((cost_at(case, candidates, trial, values, lowest), tuple(trial)))
+            costs.append((cost_at(case, candidates, trial, values), tuple(trial)))
         except SimulationError:
             continue
     return np.array(min(costs)[1]) if costs else psi
@@ -384,11 +380,11 @@ def _backtrack(case: Case, candidates: tuple[Candidate, ...], psi: np.ndarray, f
 
     The promise of a column need not hold at a large size.
     """
-    n, psi, limit = len(candidates[-1].parameters), np.array(psi, dtype=float), np.nextafter(fit.cost, np.inf)
+    n, psi = len(candidates[-1].parameters), np.array(psi, dtype=float)
     neutral = candidates[-1].parameters[0].neutral
     for _ in range(THRESHOLDS.max_halvings):
         try:
-            if cost_at(case, candidates, psi, fit.values, limit) < limit:
+            if cost_at(case, candidates, psi, fit.values) <= fit.cost:
                 break
         except SimulationError:
             pass
