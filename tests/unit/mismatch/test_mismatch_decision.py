@@ -31,7 +31,8 @@ SIZE = (Parameter("size", "-", 0.0, (0.0, 9.0), "of a shape", "made up 2026"),)
 
 
 def score(family="soft", gain=40.0, worst=0.0, explained=1.0, size=1.0, **more):
-    candidate = Candidate.of(family, SIZE, dict, ((1.0,),), {"place": 3.0}, **more.pop("flags", {}))
+    where = more.pop("where", {"place": 3.0})
+    candidate = Candidate.of(family, SIZE, dict, ((1.0,),), where, **more.pop("flags", {}))
     fit = SimpleNamespace(psi=np.array([size]), psi_se=np.array([more.pop("error", 0.1)]), part=lambda _: slice(0, 1))
     return Score(candidate, gain, worst, explained, fit, **more)
 
@@ -94,19 +95,22 @@ def test_the_reason_holds_the_figures_of_the_case():
 
 
 @pytest.mark.parametrize(
-    "name, excess, more, strained",
+    "name, excess, more, facts",
     [
-        ("strained_value_remains", 0.9, {}, "mass of the rail"),
-        ("size_known_from_below", 0.9, {"error": 0.6, "flags": {"unbounded_form": "gap"}}, ""),
-        ("reaches_control_level", 1.0, {"flags": {"must_reach_control_level": True}}, ""),
-        ("must_reach_control_level", 1.1, {"flags": {"must_reach_control_level": True}}, ""),
-        ("leaves_some_residual", 1.1, {}, ""),
+        ("strained_value_remains", 0.9, {}, {"strained": "mass of the rail"}),
+        ("local_change_remains", 0.9, {"where": {}}, {"local_change": 12.1}),
+        ("reaches_control_level", 0.9, {"where": {}}, {"local_change": 11.9}),
+        ("reaches_control_level", 0.9, {}, {"local_change": 90.0}),
+        ("size_known_from_below", 0.9, {"error": 0.6, "flags": {"unbounded_form": "gap"}}, {}),
+        ("reaches_control_level", 1.0, {"flags": {"must_reach_control_level": True}}, {}),
+        ("must_reach_control_level", 1.1, {"flags": {"must_reach_control_level": True}}, {}),
+        ("leaves_some_residual", 1.1, {}, {}),
     ],
 )
-def test_each_rule_on_a_name_applies_to_a_case_of_its_own(name, excess, more, strained):
+def test_each_rule_on_a_name_applies_to_a_case_of_its_own(name, excess, more, facts):
     settings = MismatchSettings()
     named = judge([score(**more)], 2.0, settings)
-    verdict, rule, reason = grade_name(named, named.scores[0].fit, excess, settings, strained=strained)
+    verdict, rule, reason = grade_name(named, named.scores[0].fit, excess, settings, **facts)
     assert rule.name == name == verdict.trail[-1] and rule in NAME_RULES
     assert verdict.answer == ("a_or_b" if name == "size_known_from_below" else "named")
     assert verdict.grade == {"size_known_from_below": "", "reaches_control_level": "A"}.get(name, "B")

@@ -114,6 +114,8 @@ PAIR_RULES: tuple[Rule[PairEvidence], ...] = (
 NAME_RULES: tuple[Rule[NameEvidence], ...] = (
     Rule("strained_value_remains", lambda e: e.strained, "unknown",
          "beside {e.score.family} a value remains that its file cannot have: {e.strained}", LOCATED),
+    Rule("local_change_remains", lambda e: e.local_change > e.threshold and not e.score.has_position, "unknown",
+         "beside {e.score.family}, which is at no position, single components differ under trains", LOCATED),
     Rule("size_known_from_below", lambda e: e.score.is_unbounded, "a_or_b",
          "the size of {e.score.family} is known from below alone", PAIRS),
     Rule("free_law_predicts_better", lambda e: e.free_share > THRESHOLDS.max_free_law_share, "unknown",
@@ -202,7 +204,13 @@ def judge(scores: Sequence[Score], excess: float, settings: MismatchSettings, **
 
 
 def grade_name(
-    verdict: Verdict, fit: Fit, excess: float, settings: MismatchSettings, free_share: float = 0.0, strained: str = ""
+    verdict: Verdict,
+    fit: Fit,
+    excess: float,
+    settings: MismatchSettings,
+    free_share: float = 0.0,
+    strained: str = "",
+    local_change: float = 0.0,
 ) -> tuple[Verdict, Rule[NameEvidence], str]:
     """A name with its grade by the last fit, by the first of ``NAME_RULES`` that applies.
 
@@ -222,6 +230,8 @@ def grade_name(
         Share of the gain on held-out recordings that the names miss, see ``free_law_share``.
     strained : str
         Value that no tolerance explains in that fit, in words; "" if there is none.
+    local_change : float
+        Evidence of ``local_change_evidence`` in that fit. [nats]
 
     Returns
     -------
@@ -233,7 +243,7 @@ def grade_name(
         Reason of the rule in words.
     """
     score = replace(verdict.scores[0], fit=fit)
-    evidence = NameEvidence(score, excess, free_share, strained)
+    evidence = NameEvidence(score, excess, free_share, strained, local_change, settings.threshold)
     rule = first_applicable(NAME_RULES, evidence)
     reason = rule.reason_for(evidence)
     graded = replace(verdict, grade="A" if rule.answer == "A" else "B", scores=(score, *verdict.scores[1:]))

@@ -229,13 +229,17 @@ class NameEvidence:
     """What the grade of a name rests on: its ``score`` in the last fit, and the largest excess ratio of that fit.
 
     ``free_share`` is the share of the gain on held-out recordings that all names miss, and free laws reach.
-    ``strained`` is the value that no tolerance explains in that fit, in words; "" if there is none.
+    ``strained`` is the value that no tolerance explains in that fit, in words; "" if there is none. ``local_change`` is
+    the evidence that single components differ between kinds of recordings beside the name, which counts beyond the
+    ``threshold`` of a name. [nats]
     """
 
     score: Score
     excess: float
     free_share: float = 0.0
     strained: str = ""
+    local_change: float = 0.0
+    threshold: float = 0.0
 
     @property
     def leaves_nothing(self) -> bool:

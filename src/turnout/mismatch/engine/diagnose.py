@@ -20,6 +20,7 @@ from turnout.mismatch.engine.decision_facts import NumericalError
 from turnout.mismatch.engine.evidence import assess, excess_ratio, latent_force_of, worst_excess
 from turnout.mismatch.engine.findings import Findings
 from turnout.mismatch.engine.free_laws import free_law_share
+from turnout.mismatch.engine.local_changes import local_change_evidence
 from turnout.mismatch.engine.localization import Location, locate
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.refit import score_candidates
@@ -248,11 +249,15 @@ def grade_names(findings: Findings) -> Findings:
     verdicts, failing = [], None
     free_share = free_law_share(search, findings.base, fit)
     strained = str(strained_value(search.case, fit, search.settings.threshold) or "")
+    is_alone = len(findings.verdicts) == 1  # beside two names it may be an error in the shape of one of them
+    local_change = local_change_evidence(search.case, fit) if is_alone else 0.0
     for verdict in findings.verdicts:
         is_refuted = verdict.answer == "a_or_b" and (strained or free_share > THRESHOLDS.max_free_law_share)
         if verdict.answer == "named" or is_refuted:
             excess = worst_excess(search, fit)
-            verdict, rule, reason = grade_name(verdict, fit, excess, search.settings, free_share, strained)
+            verdict, rule, reason = grade_name(
+                verdict, fit, excess, search.settings, free_share, strained, local_change
+            )
             failing = failing or ((rule, reason) if rule.answer == "unknown" else None)
         verdicts.append(verdict)
     if failing is None:
@@ -274,6 +279,6 @@ def _locate_unknown(findings: Findings, verdict: Verdict) -> Location | None:
         return None
     search = findings.search
     leader = next((s for s in verdict.scores[:1] if s.gain > search.settings.threshold), None)
-    leader = None if "strained_value_remains" in verdict.trail else leader
+    leader = None if {"strained_value_remains", "local_change_remains"} & set(verdict.trail) else leader
     absorbed = strained_value(search.case, findings.base, search.settings.threshold)
     return locate(search.case, findings.base, leader, verdict.cause, absorbed)

@@ -48,6 +48,11 @@ class Score:
         return self.candidate.family
 
     @property
+    def has_position(self) -> bool:
+        """Whether it is at one position, not of the whole track, a train, a wheel or a sensor."""
+        return isinstance(self.candidate.where.get("place"), (int, float))
+
+    @property
     def is_reportable(self) -> bool:
         """Whether it is so large that somebody would act."""
         if self.is_ordinary:

@@ -1,0 +1,54 @@
+r"""Changes of single components that only expensive recordings show: a generic law at one place, of any cause.
+
+Whatever depends on load, motion or preload acts on trains and not on impacts, or differently. To first order it is then
+another value of a component in passages than in hammer tests. The derivatives of the fit tell its evidence.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from turnout.mismatch.engine.projector import Projector
+from turnout.mismatch.engine.thresholds import THRESHOLDS
+
+if TYPE_CHECKING:
+    from turnout.mismatch.engine.case import Case
+    from turnout.mismatch.engine.fit import Fit
+
+
+def local_change_evidence(case: Case, fit: Fit) -> float:
+    r"""Evidence that one component has another value in expensive recordings than in cheap ones.
+
+    With c the column of a value on the expensive recordings alone, in units of a wide prior of the change, C the
+    covariance of errors and nuisances, and :math:`i = c^T C^{-1} c`, a change gains
+
+    .. math:: \frac{(c^T C^{-1} y)^2}{2 (1 + i)} - \frac12 \ln(1 + i)
+
+    nats. All components are equally probable: the evidence is the mean of their likelihood ratios.
+
+    Parameters
+    ----------
+    case : Case
+    fit : Fit
+        With its Jacobian.
+
+    Returns
+    -------
+    float
+        [nats]; 0 without derivatives, alike components, or one of the two kinds of recordings.
+    """
+    numbers = [k for k, n in enumerate(case.nuisances) if n.index is not None]
+    if not numbers or not fit.jacobian:
+        return 0.0
+    is_expensive = np.concatenate([np.full(o.data.size, not case.is_cheap(o)) for o in case.observations])
+    if np.all(is_expensive) or not np.any(is_expensive):
+        return 0.0
+    projector = Projector(case, fit)
+    columns = projector.scaled[:, numbers] * (THRESHOLDS.max_ordinary_spreads * is_expensive[:, None])
+    across = projector.scaled.T @ columns
+    information = np.sum(columns**2, axis=0) - np.sum(across * (projector.normal @ across), axis=0)
+    slopes = projector.right @ columns - projector.shift @ across
+    gains = 0.5 * slopes**2 / (1.0 + information) - 0.5 * np.log1p(information)
+    return float(np.logaddexp.reduce(gains) - np.log(len(numbers)))

@@ -1,0 +1,92 @@
+"""A law at one place that only trains show: its evidence, and names of no position that it refutes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.engine.case import Case
+from turnout.mismatch.engine.diagnose import diagnose
+from turnout.mismatch.engine.local_changes import local_change_evidence
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.engine.observation import Observation
+from turnout.mismatch.engine.thresholds import THRESHOLDS
+from turnout.physics import Parameter
+
+N_SUPPORT, SD, NOISE = 6, 0.1, 0.5
+SIZE = (Parameter("size", "-", 0.0, (-9.0, 9.0), "of all supports", "made up 2026"),)
+
+
+class Supports(Case):
+    """Impacts and trains that see six supports alike; a train sees them ``changes`` stiffer.
+
+    The candidate is a change of all of them under trains: at no position, or at one.
+    """
+
+    def __init__(self, changes, where=()):
+        rng = np.random.default_rng(4)
+        self.nuisances = tuple(
+            Nuisance(f"support_{j}", "-", 0.0, SD, group="support", index=j) for j in range(N_SUPPORT)
+        )
+        self.jacobian = {name: 3.0 * rng.normal(size=(60, N_SUPPORT)) for name in ("hammer", "train")}
+        self.candidates = (Candidate.of("preload", SIZE, dict, ((0.5,),), dict(where)),)
+        truth = SD * rng.normal(size=N_SUPPORT)
+        data = {
+            name: j @ (truth + (name == "train") * np.array(changes)) + NOISE * rng.normal(size=60)
+            for name, j in self.jacobian.items()
+        }
+        self.observations = tuple(Observation(name, name, y, NOISE, data_type=name) for name, y in data.items())
+
+    def is_cheap(self, observation):
+        return observation.name == "hammer"
+
+    def predict(self, values, terms, observations):
+        size = sum(t["size"] for t in terms)
+        supports = np.array(list(values.values()))
+        return [self.jacobian[o.name] @ (supports + size * (o.name == "train")) for o in observations]
+
+
+def in_one(change):
+    return [change * (j == 2) for j in range(N_SUPPORT)]
+
+
+@pytest.mark.parametrize("changes", [in_one(0.0), in_one(0.4), [0.2] * N_SUPPORT])
+def test_the_evidence_is_that_of_dense_covariances(changes):
+    """Mean over supports of N(0, S + (3 sd)² c cᵀ) / N(0, S), with S of noise and values, c as trains see a support."""
+    case = Supports(changes)
+    fit = fit_jointly(case)
+    j, y = np.concatenate(list(case.jacobian.values())), np.concatenate([o.data for o in case.observations])
+    noise = np.repeat([NOISE**2 * fit.scale[o.data_type] / o.effective for o in case.observations], 60)
+    covariance = np.diag(noise) + SD**2 * j @ j.T
+    trains = j * (np.arange(120) >= 60)[:, None] * THRESHOLDS.max_ordinary_spreads * SD
+    gains = [
+        multivariate_normal.logpdf(y, cov=covariance + np.outer(c, c)) - multivariate_normal.logpdf(y, cov=covariance)
+        for c in trains.T
+    ]
+    expected = np.logaddexp.reduce(gains) - np.log(N_SUPPORT)
+    assert local_change_evidence(case, fit) == pytest.approx(expected, rel=1e-6, abs=1e-6)
+
+
+def test_impacts_or_trains_alone_tell_of_no_difference():
+    case = Supports(in_one(0.4))
+    for name in ("hammer", "train"):
+        case.observations = tuple(o for o in Supports(in_one(0.4)).observations if o.name == name)
+        assert local_change_evidence(case, fit_jointly(case)) == 0.0
+
+
+def test_components_that_are_not_alike_have_no_place():
+    case = Supports(in_one(0.4))
+    case.nuisances = tuple(replace(n, index=None) for n in case.nuisances)
+    assert local_change_evidence(case, fit_jointly(case)) == 0.0
+
+
+@pytest.mark.parametrize(
+    "at_one, where, answer", [(0.0, {}, "named"), (0.35, {}, "unknown"), (0.35, {"place": 3.0}, "named")]
+)
+def test_a_law_of_the_whole_track_is_no_name_where_a_change_of_one_support_remains(at_one, where, answer):
+    """All supports stiffer explain most of it. A name at a position may leave an error of its shape."""
+    verdict = diagnose(Supports([0.5 + at_one * (j == 2) for j in range(N_SUPPORT)], where)).verdict
+    assert verdict.answer == answer and ("local_change_remains" in verdict.trail) is (answer == "unknown")
