@@ -114,6 +114,34 @@ def test_a_value_that_has_absorbed_all_is_the_location(at, told):
     assert str(locate(case, fit_jointly(case), absorbed=absorbed)) == told
 
 
+class Bursts(Places):
+    """A force acts during five samples alone."""
+
+    def residual_spaces(self, fit):
+        for space in super().residual_spaces(fit):
+            short = np.eye(self.n)[:, :5]
+            parts = {("place", float(x)): np.kron(self.seen[:, x : x + 1], short) for x in range(3)}
+            yield ResidualSpace(space.names, space.columns, parts)
+
+
+@pytest.mark.parametrize("noise, frame", [(0.2, "train"), (1.2, "place")])
+def test_a_residual_like_that_of_intact_recordings_does_not_move_what_a_value_has_absorbed(noise, frame):
+    """One place has more evidence than the value in both. In the first the whole residual is below the control level:
+    the track differs from its model there, as it does in recordings without any effect."""
+    rng = np.random.default_rng(8)
+    burst = 6.0 * np.sin(1.0 + np.arange(400.0)) * (np.arange(400) < 5)
+    case = Bursts(noise * rng.normal(size=(3, 400)) + np.outer(Places.seen[2], burst))
+    case.control_level = {"passage": 1.0}
+    fit, absorbed = (
+        fit_jointly(case),
+        StrainedValue(Nuisance("value", "-", 0.0, 0.1, at=("train", "railcar")), 6.0, 3.0),
+    )
+    first, second = weigh_spaces(case, fit, {"passage": 1.0})[:2]
+    assert first.level == 2.0 and first.nats - second.nats > absorbed.nats
+    assert (fit.level["passage"] < 1.0) is (frame == "train")
+    assert locate(case, fit, absorbed=absorbed).frame == frame
+
+
 @pytest.mark.parametrize("nats, frame", [(15.0, "place"), (1e4, "train")])
 def test_what_a_value_leaves_at_one_place_outweighs_it_by_evidence_over_all_other_places(nats, frame):
     rng = np.random.default_rng(8)

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+from turnout.mismatch.engine.channel_levels import worst_channel_excess
 from turnout.mismatch.engine.space_evidence import SpaceEvidence, weigh_spaces
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
@@ -80,9 +81,9 @@ def locate(
         "clock" or "train" if recordings that were not fitted are the cause of the verdict: they give the location then.
     absorbed : StrainedValue or None
         The value of the base model that has absorbed the cause. What it is fixed to is the location, unless the
-        residual has more evidence for one location over all others than the value has paid. A value that is fixed to
-        nothing may stand for a cause anywhere, and the residual may be that of intact recordings: its own level is then
-        the least noise, where it is below theirs.
+        residual is above the control level and has more evidence for one location over all others than the value has
+        paid. A value that is fixed to nothing may stand for a cause anywhere, and the residual may be that of intact
+        recordings: its own level is then the least noise, where it is below theirs.
 
     Returns
     -------
@@ -99,8 +100,10 @@ def locate(
         # what intact recordings leave elsewhere is no noise here: the whole fit leaves less
         floor = {name: min(level, fit.level[name]) for name, level in floor.items()}
     witnesses = sorted(_credible_evidence(case, weigh_spaces(case, fit, floor)), key=lambda w: -w.nats)
-    if absorbed is not None and absorbed.nuisance.at is not None and _lead(witnesses) < absorbed.nats:
-        witnesses = [SpaceEvidence(*absorbed.nuisance.at, absorbed.nats)]
+    if absorbed is not None and absorbed.nuisance.at is not None:
+        is_intact = all(fit.level[name] <= level for name, level in floor.items())
+        if (is_intact and worst_channel_excess(case, fit) <= 1.0) or _lead(witnesses) < absorbed.nats:
+            witnesses = [SpaceEvidence(*absorbed.nuisance.at, absorbed.nats)]
     if (
         leader is not None
         and leader.explained >= THRESHOLDS.min_explained_share
