@@ -21,9 +21,10 @@ from turnout.mismatch.engine.diagnose import diagnose
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.turnout.case import TrackCase
+from turnout.stages.finding_row import location_fields
 from turnout.stages.mismatch_groups import groups
-from turnout.stages.mismatch_inputs import gather_inputs, track_of
-from turnout.stages.mismatch_rows import location_fields
+from turnout.stages.mismatch_inputs import gather_inputs
+from turnout.stages.track_files import track_of
 from turnout.workflow.scan import scan
 
 LESSER_TOOLS = {

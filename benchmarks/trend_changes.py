@@ -9,7 +9,7 @@ from benchmarks.bar import Bar
 from benchmarks.trend_fleet import START, Fleet, drift, modes, step
 from turnout.config.settings.trend import TrendSettings
 from turnout.trend import candidates, chart_status, describe_flagged, evaluate
-from turnout.trend.panel import days, timestamps
+from turnout.trend.times import days, timestamps
 
 SETTINGS = TrendSettings()
 KINDS = {"step": step, "drift": drift}

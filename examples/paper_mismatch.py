@@ -16,7 +16,7 @@ from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.planned_case import Plan, Train, measured_campaign
 from turnout.simulate import Sensor, car, load_track
-from turnout.stages.mismatch_rows import recommendation, sentence
+from turnout.stages.finding_row import recommendation, sentence
 
 SPEED = 160.0 / 3.6
 SENSORS = (Sensor("A1", 0.6, "rail web"), Sensor("A4", 9.0, "rail web"))

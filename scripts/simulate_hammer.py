@@ -1,6 +1,7 @@
 """Rule simulate_hammer: a track in, one hammer test at a location out."""
 
-from turnout.stages.simulate import hammer_request, write_hammer
+from turnout.stages.simulate import write_hammer
+from turnout.stages.simulate_request import hammer_request
 
 for path, note in write_hammer(hammer_request(snakemake.input.track, snakemake.output.recording, snakemake.wildcards)):
     print(path, note)

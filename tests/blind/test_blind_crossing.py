@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from turnout.config.load import load_configuration
-from turnout.stages.mismatch_inputs import track_of
+from turnout.stages.track_files import track_of
 from turnout_blind.crossing import Crossing
 from turnout_blind.effect import load_effects
 from turnout_blind.nominal_files import write_configuration

@@ -7,7 +7,7 @@ import pytest
 
 import turnout_blind.switch as module
 from turnout.config.load import load_configuration
-from turnout.config.parameters import read_parameters
+from turnout.config.parameter_files import read_parameters
 from turnout.mismatch.turnout.passage_band import limit_band, read_at
 from turnout.simulate.blade import Blade, transfer_position
 from turnout.simulate.preparation import prepare

@@ -13,7 +13,7 @@ from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.turnout.planned_case import PlannedCase, small_plan
 from turnout.stages.accepted_effects import AcceptedEffect
 from turnout.stages.effects_page import page
-from turnout.stages.mismatch_rows import recommendation
+from turnout.stages.finding_row import recommendation
 from turnout.stages.mismatch_text import parameter_in_words, title
 
 FILE = '''"""A box on one sleeper: drive, cabinet, heater."""

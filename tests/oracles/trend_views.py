@@ -6,8 +6,8 @@ import pyarrow as pa
 from turnout.registry.arrow_types import arrow_schema
 from turnout.registry.schema import tables
 from turnout.registry.view_texts import view_files
-from turnout.trend.panel import days, timestamps
 from turnout.trend.tables import arrow_rows
+from turnout.trend.times import days, timestamps
 
 NAMES = (
     "students_t", "campaign_weight", "epochs", "resonance_drift",

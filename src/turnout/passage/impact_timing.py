@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout.passage.impulse_fit import joint_fit, onsets
 from turnout.passage.wheel_basis import FRACTIONS, WheelBasis
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True)

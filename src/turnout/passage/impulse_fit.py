@@ -6,15 +6,11 @@ A whitening filter for a sensor's noise is estimated here too, so that sums of s
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import linalg
 
 from turnout.passage.wheel_basis import WheelBasis
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True)

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
 from scipy import fft
 
 from turnout.records import ModalModel
-
-if TYPE_CHECKING:
-    pass
 
 # Impacts are sought at the middles of 16 equal parts of the interval between two samples.
 FRACTIONS = (np.arange(16) + 0.5) / 16

@@ -6,13 +6,9 @@ The module also has the usual shapes of a hammer's contact force.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
-
-if TYPE_CHECKING:
-    pass
 
 
 @lru_cache(maxsize=64)

@@ -9,7 +9,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from turnout.config.parameters import ParameterSet, read_parameters, read_unchanged_parameters
+from turnout.config.parameter_files import read_parameters, read_unchanged_parameters
+from turnout.config.parameters import ParameterSet
 from turnout.errors import ConfigError, SimulationError
 from turnout.installation import shipped_path
 from turnout.simulate.track_file import entries_of_routes, turnout_track

@@ -63,7 +63,7 @@ TRACK_KEYS = (
 
 
 def turnout_track(parameters: ParameterSet, seed: int = 0) -> TurnoutTrack:
-    """``TurnoutTrack`` from a parameter set read by ``turnout.config.parameters.read_parameters``.
+    """``TurnoutTrack`` from a parameter set read by ``turnout.config.parameter_files.read_parameters``.
 
     ``sections`` change values of ``support`` between ``from`` and ``to`` [m], later ones over earlier ones;
     ``scatter`` gives relative standard deviations that are drawn, log-normally, with ``seed``.

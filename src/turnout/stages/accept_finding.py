@@ -20,7 +20,7 @@ from turnout.simulate import load_track
 from turnout.simulate.turnout_track import TurnoutTrack
 from turnout.stages.accepted_changes import change_text, changes_of, check_change
 from turnout.stages.accepted_effects import SINCE, SUPPORT_KEYS, accepted_of
-from turnout.stages.mismatch_inputs import track_file
+from turnout.stages.track_files import track_file
 
 # Units for values below 0.1 in SI units: SI unit -> (unit, its size in the SI unit)
 DISPLAY_UNITS = {"m": ("mm", 1e-3), "s": ("ms", 1e-3)}

@@ -22,7 +22,7 @@ from turnout.simulate.hammer import resolve_location
 from turnout.simulate.modal_calibration import ModeFit, fit_modes
 from turnout.simulate.parameters import track_path
 from turnout.stages.common import require_file
-from turnout.stages.mismatch_inputs import track_file
+from turnout.stages.track_files import track_file
 
 LOG = logging.getLogger("turnout.simulate")
 CALIBRATION_BAND = (60.0, 800.0)  # Hz: receptance lines used

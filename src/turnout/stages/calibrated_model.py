@@ -46,7 +46,7 @@ from turnout.stages.agreeing_visits import (
 from turnout.stages.checkpoint import SUFFIX
 from turnout.stages.copied_files import without_copies
 from turnout.stages.mismatch_groups import groups, unit_of, visits
-from turnout.stages.mismatch_inputs import gather_inputs, mismatch_context, track_of
+from turnout.stages.mismatch_inputs import gather_inputs, mismatch_context
 from turnout.stages.recorded_work import events_of
 from turnout.stages.renewals import renewal_note, since_renewal
 from turnout.stages.stored_visits import (
@@ -61,6 +61,7 @@ from turnout.stages.stored_visits import (
     with_information,
     without_findings,
 )
+from turnout.stages.track_files import track_of
 from turnout.stages.visit_notes import notes_in_words, summary_of_notes
 from turnout.stages.visit_time import day_of, years_of
 from turnout.workflow.scan import scan

@@ -34,7 +34,7 @@ from turnout.stages.change_finding import finding_of_change
 from turnout.stages.change_trains import case_of, trains_of_change
 from turnout.stages.copied_files import without_copies
 from turnout.stages.mismatch_groups import groups, members_of, neighbours_of, unit_of, visits
-from turnout.stages.mismatch_inputs import gather_inputs, track_of
+from turnout.stages.mismatch_inputs import gather_inputs
 from turnout.stages.recorded_work import events_of
 from turnout.stages.renewals import renewal_note, since_renewal
 from turnout.stages.stored_visits import (
@@ -47,6 +47,7 @@ from turnout.stages.stored_visits import (
     version_of,
     visits_of,
 )
+from turnout.stages.track_files import track_of
 from turnout.stages.visit_time import day_of, years_of
 from turnout.workflow.scan import scan
 

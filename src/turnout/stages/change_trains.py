@@ -19,6 +19,7 @@ from turnout.mismatch.engine.reserved_data import gain_error, reserved_fit
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.calibration import calibrated_parameters
+from turnout.stages.finding_row import finding_row
 from turnout.stages.mismatch_groups import (
     Group,
     groups,
@@ -27,7 +28,6 @@ from turnout.stages.mismatch_groups import (
     visits,
 )
 from turnout.stages.mismatch_inputs import gather_inputs
-from turnout.stages.mismatch_rows import finding_row
 from turnout.stages.visit_time import years_of
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from turnout.registry.as_of import whole_list
 from turnout.registry.database import open_registry
 from turnout.stages.change_diagnosis import ends_of, group_labels
 from turnout.stages.mismatch_groups import visits
-from turnout.stages.mismatch_inputs import digest_of_model
+from turnout.stages.track_files import digest_of_model
 from turnout.workflow.plan import PlannedUnit, is_cut_plan, read_plan
 
 REGISTRY = Path("results/registry")

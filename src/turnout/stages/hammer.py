@@ -30,15 +30,14 @@ from turnout.stages.common import (
     recording_row,
     time_contradiction,
 )
+from turnout.stages.hammer_curve_rows import density_columns, receptance_row
 from turnout.stages.hammer_responses import response_model, responses_of
 from turnout.stages.hammer_rows import (
-    density_columns,
     impact_mode_row,
     impact_row,
     mode_row,
     mode_rows,
     model_row,
-    receptance_row,
     shape_columns,
     validation_columns,
 )

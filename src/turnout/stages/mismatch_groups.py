@@ -22,7 +22,8 @@ from turnout.config.turnout import TurnoutConfig
 from turnout.mismatch.turnout import CampaignInput
 from turnout.records import Unit
 from turnout.simulate import Sensor, TurnoutTrack
-from turnout.stages.mismatch_inputs import Note, VisitInputs, digest_of_model
+from turnout.stages.mismatch_inputs import Note, VisitInputs
+from turnout.stages.track_files import digest_of_model
 from turnout.workflow.plan import PlannedUnit, read_plan
 
 if TYPE_CHECKING:

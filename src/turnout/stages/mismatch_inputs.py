@@ -12,18 +12,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from turnout.config.parameters import read_parameters
 from turnout.config.turnout import TurnoutConfig
-from turnout.content import sha256_of
-from turnout.errors import ReadError, SimulationError, TurnoutError
+from turnout.errors import ReadError
 from turnout.mismatch.turnout import HammerInput, PassageInput
 from turnout.passage.channel_checks import without_pulses
 from turnout.readers import read
 from turnout.records import LongRecording, Recording, Unit
-from turnout.simulate import load_track
-from turnout.simulate.parameters import base_track_file
 from turnout.stages import common
-from turnout.stages.accepted_effects import accepted_of
 from turnout.stages.common import rail_temperature
 from turnout.stages.copied_files import without_copies
 from turnout.stages.layout_checks import position_fault
@@ -38,7 +33,6 @@ if TYPE_CHECKING:
 
     from turnout.records import RawDescription
     from turnout.simulate import TurnoutTrack
-    from turnout.stages.accepted_effects import AcceptedEffect
 
 MID_SPAN_OFFSET = 0.3  # m: distance of a "mid-span" accelerometer from the sleeper of the impact
 MAX_CLIPPED_SHARE = 0.002  # share of clipped samples that leaves the band of the diagnosis unchanged
@@ -318,103 +312,6 @@ def _usable_channels(recording: Recording, turnout: TurnoutConfig, route: str, u
         replace(recording.channels[i], position=sensors[recording.channels[i].name].position) for i in indices
     )
     return replace(recording, samples=recording.samples[indices], channels=channels)
-
-
-def track_file(turnout: TurnoutConfig, name: str | None = None) -> Path:
-    """The turnout's own track file in the configuration, else that of its layout.
-
-    Parameters
-    ----------
-    turnout : TurnoutConfig
-        Configuration of the turnout.
-    name : str or None
-        Name or file of a track; None: the turnout's own, else that of its layout.
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    SimulationError
-        There is no such file.
-    """
-    if name and name.endswith((".yaml", ".yml")):
-        return Path(name)
-    folder = Path(turnout.folder) / "tracks"
-    for stem in (name,) if name else (turnout.id, turnout.layout):
-        if (folder / f"{stem}.yaml").is_file():
-            return folder / f"{stem}.yaml"
-    names = name or f"{turnout.id}.yaml nor {turnout.layout}"
-    raise SimulationError(
-        f"{turnout.id}: no file {folder}/{names}.yaml; without a track nothing can be simulated "
-        "(docs/simulation.md, 'A track of your own')."
-    )
-
-
-def track_of(turnout: TurnoutConfig, name: str | None = None) -> tuple[TurnoutTrack, tuple[AcceptedEffect, ...]]:
-    """Track of a turnout, and the effects that its file has accepted.
-
-    Parameters
-    ----------
-    turnout : TurnoutConfig
-        Configuration of the turnout.
-    name : str or None
-        Name or file of a track; None: the turnout's own, else that of its layout.
-
-    Returns
-    -------
-    track : TurnoutTrack
-    accepted : tuple of AcceptedEffect
-    """
-    path = track_file(turnout, name)
-    track = load_track(str(path), folder=path.parent)
-    return track, accepted_of(track.terms)
-
-
-def digest_of_model(turnout: TurnoutConfig, name: str | None = None) -> str:
-    """Digest of the track and vehicle files of the configuration, "" without a track.
-
-    For a track given by ``name``, all files in its folder count, since it may extend any of them.
-
-    Parameters
-    ----------
-    turnout : TurnoutConfig
-        Configuration of the turnout.
-    name : str or None
-        Name or file of a track; None: the turnout's own, else that of its layout.
-
-    Returns
-    -------
-    str
-    """
-    folder = Path(turnout.folder)
-    try:
-        own_file = track_file(turnout, name)
-    except SimulationError:
-        return ""
-    paths = [*_extended_files(own_file), *sorted((folder / "tracks").glob(f"{turnout.layout}.yaml"))]
-    paths += sorted((folder / "vehicles").glob("*"))
-    paths += sorted(own_file.parent.glob("*.y*ml")) if name else []
-    digests = [[path.name, sha256_of(path)] for path in dict.fromkeys(paths) if path.is_file()]
-    return hashlib.sha256(json.dumps(digests).encode()).hexdigest()[:16]
-
-
-def _extended_files(path: Path) -> list[Path]:
-    """A track's file and the files that it extends, as far as they can be read.
-
-    Errors in them are reported by the diagnosis.
-    """
-    paths = [path]
-    try:
-        while "extends" in (parameters := read_parameters(paths[-1])):
-            base = base_track_file(parameters, paths[-1], path.parent)
-            if base in paths:
-                break
-            paths.append(base)
-    except (TurnoutError, OSError):
-        pass
-    return paths
 
 
 def mismatch_context(turnout: str, settings: Any = None, work: str | Path = "work") -> tuple[str, dict[str, dict]]:

@@ -26,7 +26,7 @@ from turnout.mismatch.turnout.further_passages import with_reserved_passages
 from turnout.mismatch.turnout.nose_starts import fit_from_nose_positions
 from turnout.stages.agreeing_visits import FittedGroup, packed_groups, unpacked_groups
 from turnout.stages.checkpoint import SUFFIX, read_value, write_value
-from turnout.stages.mismatch_inputs import digest_of_model
+from turnout.stages.track_files import digest_of_model
 from turnout.stages.visit_time import years_of
 
 if TYPE_CHECKING:

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.trend.panel import days, is_true
+from turnout.trend.panel import is_true
 from turnout.trend.quantities import resonances_of
+from turnout.trend.times import days
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -14,10 +14,11 @@ from turnout.constants import DAYS_PER_YEAR
 from turnout.trend.detectability import detectable_shift
 from turnout.trend.drift import slopes, span
 from turnout.trend.epochs import by_epoch
-from turnout.trend.panel import WHOLE_TURNOUT, timestamps
+from turnout.trend.panel import WHOLE_TURNOUT
 from turnout.trend.quantities import targets
 from turnout.trend.residuals import FREQUENCY_RESOLUTION, first_epoch, slope_variance
 from turnout.trend.threshold import run_lengths
+from turnout.trend.times import timestamps
 
 if TYPE_CHECKING:
     from turnout.config.settings.trend import TrendSettings

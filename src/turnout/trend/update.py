@@ -26,11 +26,12 @@ from turnout.registry.schema import names
 from turnout.trend.alarms import PREVIOUS_ALARMS, Flag, candidates, describe_flagged, with_withdrawn
 from turnout.trend.cusum import finish
 from turnout.trend.evaluation import shared_autocorrelation
-from turnout.trend.panel import CHART_KEYS, SECONDS_PER_DAY, believable_times, days, lay_out, timestamps
+from turnout.trend.panel import CHART_KEYS, lay_out
 from turnout.trend.quantities import DAMPING_ENDING, DAMPING_SCALE, RESONANCES
 from turnout.trend.residuals import prepare
 from turnout.trend.states import chart_status
 from turnout.trend.tables import alarm_rows, arrow_rows, baseline_rows, chart_rows
+from turnout.trend.times import SECONDS_PER_DAY, believable_times, days, timestamps
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

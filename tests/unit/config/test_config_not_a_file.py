@@ -5,7 +5,7 @@ import shutil
 import pytest
 
 from turnout.cli.main import main
-from turnout.config.parameters import read_parameters
+from turnout.config.parameter_files import read_parameters
 from turnout.config.settings.passage import PassageSettings
 from turnout.errors import ConfigError
 from turnout.stages.passage_context import known_patterns

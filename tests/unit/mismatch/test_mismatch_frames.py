@@ -11,7 +11,7 @@ from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.reserved_data import Verification
 from turnout.mismatch.engine.residual_attribution import Attribution, attribute
 from turnout.report.finding_text import facts
-from turnout.stages.mismatch_rows import finding_row
+from turnout.stages.finding_row import finding_row
 
 OF_A_ROW = {"place_low_m": 2.4, "place_high_m": 8.7, "wheel_within_m": None, "evidence_json": None,
             "n_hammer_tests": 6, "n_passages": 8, "n_sensors": 4}  # fmt: skip

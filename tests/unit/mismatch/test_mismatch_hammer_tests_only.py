@@ -22,7 +22,7 @@ from turnout.simulate.hammer import Hammer, simulate_hammer
 from turnout.simulate.matrices import assemble
 from turnout.simulate.sensor import Sensor
 from turnout.simulate.turnout_track import TurnoutTrack
-from turnout.stages.mismatch_rows import finding_row
+from turnout.stages.finding_row import finding_row
 
 IDENTITY = {"finding_id": "f", "turnout_id": "t", "section_id": None, "found_at_utc": None, "result_id": "r"}
 

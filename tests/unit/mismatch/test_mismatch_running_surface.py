@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from turnout.config.parameters import read_parameters
+from turnout.config.parameter_files import read_parameters
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.turnout import TrackCase, passage_alignment
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan

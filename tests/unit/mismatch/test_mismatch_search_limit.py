@@ -14,7 +14,7 @@ from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.search_limit import SearchLimit, SearchLimitError, check_limit
 from turnout.physics.term import Parameter
-from turnout.stages.mismatch_rows import sentence
+from turnout.stages.finding_row import sentence
 
 SIZE = (Parameter("size", "-", 0.0, (0.0, 9.0), "of the parabola", "made up 2026"),)
 

@@ -15,7 +15,7 @@ from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.reserved_data import Verification, lost_evidence, reserved_excess_ratio
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.verdict import Verdict
-from turnout.stages.mismatch_rows import sentence
+from turnout.stages.finding_row import sentence
 
 POSTERIOR = {"pad_preload": 0.8, "none": 0.15, "unknown": 0.05}
 WORSE = Verification(1, 27.6, 26.0, error=0.9)

@@ -31,7 +31,7 @@ from turnout.mismatch.turnout.residual_spaces import _force_space, source_spaces
 from turnout.mismatch.turnout.saturation import raw_peak
 from turnout.physics import Parameter
 from turnout.simulate.track import uniform_track
-from turnout.stages.mismatch_rows import finding_row
+from turnout.stages.finding_row import finding_row
 
 
 class Alike(Case):

@@ -174,7 +174,7 @@ def test_whatever_stands_in_a_file_loads_or_is_refused_in_words(tmp_path, monkey
     path, parsed = tmp_path / "file.yaml", [content]
     path.write_text("", encoding="utf-8")
     # the true reader takes twenty times as long
-    monkeypatch.setattr("turnout.config.parameters.read_content", lambda path: (deepcopy(parsed[-1]), None))
+    monkeypatch.setattr("turnout.config.parameter_files.read_content", lambda path: (deepcopy(parsed[-1]), None))
     load(str(path))
     for way, wrong, other in spoilt(content):
         parsed.append(other)

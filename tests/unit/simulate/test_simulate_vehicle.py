@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from turnout.config.parameters import read_parameters
+from turnout.config.parameter_files import read_parameters
 from turnout.constants import GRAVITY
 from turnout.errors import SimulationError
 from turnout.installation import shipped_path

@@ -22,7 +22,7 @@ from turnout.stages import mismatch
 from turnout.stages.accept_finding import accept
 from turnout.stages.accepted_effects import AcceptedEffect, accepted_of, describe_term, terms_on
 from turnout.stages.mismatch_groups import Group
-from turnout.stages.mismatch_inputs import digest_of_model
+from turnout.stages.track_files import digest_of_model
 
 GAP = {"value": 1.12e-3, "se": 0.05e-3, "unit": "m"}
 HANGS = {"term": "hanging_sleeper", "fixed": {"sleeper": 18.0}, "parameters": {"gap": GAP}}

@@ -35,7 +35,7 @@ from turnout.stages.accepted_changes import (
 )
 from turnout.stages.calibrated_model import calibrate_turnout
 from turnout.stages.change_diagnosis import change_unit
-from turnout.stages.mismatch_inputs import track_of
+from turnout.stages.track_files import track_of
 from turnout.workflow.scan import scan
 
 N_SUPPORT, SD, STEP = 5, 0.05, 0.5

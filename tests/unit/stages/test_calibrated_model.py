@@ -26,10 +26,11 @@ from turnout.simulate.blade import Blade
 from turnout.stages import calibrated_model as calibrated
 from turnout.stages import mismatch, mismatch_results
 from turnout.stages.mismatch_groups import groups, visits
-from turnout.stages.mismatch_inputs import gather_inputs, track_of
+from turnout.stages.mismatch_inputs import gather_inputs
 from turnout.stages.mismatch_results import diagnose_turnout
 from turnout.stages.recorded_work import events_of
 from turnout.stages.stored_visits import read_visits
+from turnout.stages.track_files import track_of
 from turnout.stages.visit_time import years_of
 from turnout.workflow.scan import scan
 

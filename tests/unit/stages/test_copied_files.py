@@ -8,7 +8,8 @@ import small_turnout as small
 from turnout.config import load_configuration, with_raw
 from turnout.records import Unit
 from turnout.stages.copied_files import without_copies
-from turnout.stages.mismatch_inputs import gather_inputs, track_of
+from turnout.stages.mismatch_inputs import gather_inputs
+from turnout.stages.track_files import track_of
 from turnout.workflow.scan import scan
 
 

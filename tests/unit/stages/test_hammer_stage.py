@@ -18,7 +18,7 @@ from turnout.readers.writing import write
 from turnout.records import Impact
 from turnout.registry.intake import Arrival, gather
 from turnout.stages.hammer import hammer_unit
-from turnout.stages.hammer_rows import density_columns
+from turnout.stages.hammer_curve_rows import density_columns
 from turnout.workflow.guard import compute_guarded
 from turnout.workflow.scan import scan
 

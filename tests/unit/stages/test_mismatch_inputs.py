@@ -34,17 +34,10 @@ from turnout.stages.accepted_effects import AcceptedEffect
 from turnout.stages.calibrate import calibrate_to_files
 from turnout.stages.common import number, rail_temperature
 from turnout.stages.mismatch_groups import groups, neighbours_of, select_passages, unit_of
-from turnout.stages.mismatch_inputs import (
-    MAX_SIMILAR_PASSAGES,
-    Note,
-    VisitInputs,
-    _thin_out,
-    digest_of_model,
-    gather_inputs,
-    track_of,
-)
+from turnout.stages.mismatch_inputs import MAX_SIMILAR_PASSAGES, Note, VisitInputs, _thin_out, gather_inputs
 from turnout.stages.mismatch_results import Results, diagnose_turnout
 from turnout.stages.mismatch_trains import train_of
+from turnout.stages.track_files import digest_of_model, track_of
 from turnout.workflow.batches import encode
 from turnout.workflow.scan import scan, unit_id
 

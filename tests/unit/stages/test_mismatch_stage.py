@@ -18,8 +18,9 @@ from turnout.mismatch.turnout import TrackCase
 from turnout.stages import mismatch, mismatch_groups
 from turnout.stages.accept_finding import accept
 from turnout.stages.budget import BudgetSpentError
-from turnout.stages.mismatch_inputs import Note, track_of
+from turnout.stages.mismatch_inputs import Note
 from turnout.stages.mismatch_results import Results, diagnose_turnout
+from turnout.stages.track_files import track_of
 
 
 @pytest.fixture
@@ -145,7 +146,8 @@ def test_what_was_accepted_is_not_found_again_in_passages_either(soft):
 def test_the_simulated_file_holds_the_accepted_effect(soft):
     """The file that `turnout simulate` writes is the recording of the track with the term, and not the one without."""
     from turnout.readers import read
-    from turnout.stages.simulate import REQUEST_DEFAULTS, write_hammer
+    from turnout.stages.simulate import write_hammer
+    from turnout.stages.simulate_request import REQUEST_DEFAULTS
 
     turnout = load_configuration("config").turnout("t1")
     Results("work", "t1").save(diagnose_turnout("t1"))

@@ -4,7 +4,7 @@ import pandas as pd
 import pytest
 
 from turnout.trend.alarms import ALARM_KEYS, with_withdrawn
-from turnout.trend.panel import days
+from turnout.trend.times import days
 
 NEWEST = days(["2026-09-07"])[0]
 
