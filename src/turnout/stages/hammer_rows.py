@@ -1,4 +1,4 @@
-"""Impacts, receptance and model of one section and campaign as rows of the registry."""
+"""Impacts, model and modes of one section and campaign as rows of the registry."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""Gather the inputs of a diagnosis: hammer tests, passages, track file, vehicles and the passage stage's results.
+"""Gather the inputs of a diagnosis: hammer tests, passages, vehicles and the results of the passage stage.
 
 Recordings that cannot be used are noted with the reason.
 """
