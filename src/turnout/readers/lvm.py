@@ -6,6 +6,7 @@ some 2 µs per number. Layout: National Instruments, "Specification for the LabV
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import datetime
 
 import numpy as np
@@ -112,6 +113,24 @@ def _segments(data: bytes) -> list[int]:
     return offsets
 
 
+@dataclass(frozen=True)
+class _Segment:
+    """Header of a segment: cells of its lines, and of each channel its name, samples, step and offset of X.
+
+    ``n_x_columns`` is 0, 1, or 2 for one X column per channel; ``first`` is the offset of the first row in the file.
+    """
+
+    where: str
+    fields: dict[str, list[str]]
+    names: list[str]
+    samples: list[int]
+    steps: list[float]
+    offsets: list[float]
+    decimal_mark: str
+    n_x_columns: int
+    first: int
+
+
 def _records(
     source: Source, start: int, stop: int, head: Mapping[str, str], separator: str, k: int, n: int
 ) -> list[RawRecord]:
@@ -120,61 +139,27 @@ def _records(
     With one header for several writes the segment is cut into records of the number of samples in the header, unless a
     time column continues.
     """
-    where = f"record {k + 1} of {n}"
-    end = source.data.find(END_OF_HEADER, start, stop)
-    first = source.data.find(b"\n", source.data.find(b"\nX_Value", max(end, start), stop) + 1, stop) + 1
-    if end < 0 or first == 0 or b"\nX_Value" not in source.data[end:stop]:
-        raise source.error(where, "its header has no end", COPY_AGAIN, reason="truncated")
-    text = source.data[start:end].decode("utf-8", "replace").splitlines()
-    n_x_columns = {"No": 0, "One": 1}.get(head.get("X_Columns", "One"), 2)  # 2: one X column per channel
-    fields = {cells[0].strip(): [c.strip() for c in cells[1:]] for cells in (line.split(separator) for line in text)}
-    if n_x_columns == 2:
-        fields = {name: _cells_of_channels(cells) for name, cells in fields.items()}
-    decimal_mark = head.get("Decimal_Separator", ".")
-    x_line = source.data[source.data.find(b"\nX_Value", end) + 1 : first].decode("utf-8", "replace")
-    titles = x_line.rstrip("\r\n").split(separator)[1 :: max(n_x_columns, 1)]
-    names = [name for name in titles if name and name != "Comment"]
-    with source.parsed_by("the header", where):
-        count = int(fields["Channels"][0])
-        samples = [int(s) for s in fields.get("Samples", [])[:count]]
-        steps = [float(s.replace(decimal_mark, ".")) for s in fields.get("Delta_X", [])[:count] if s] or [0.0]
-        offsets = [float(x.replace(decimal_mark, ".") or 0.0) for x in _per_channel(fields, "X0", count)]
-    if len(names) != count:
-        raise source.error(where, f"it names {len(names)} of {count} channels", COPY_AGAIN, reason="truncated")
-    columns, x = _columns(source, source.data[first:stop], separator, decimal_mark, count, n_x_columns, where)
-    n_write, n_row = 1, len(columns[0]) if columns else 0
-    if samples and len(set(samples)) == 1 and samples[0] > 0 and n_row > samples[0]:
-        n_write, remainder = divmod(n_row, samples[0])
-        if x is not None and len(x) == n_row and np.all(np.diff(x) > 0):  # one write, continued
-            n_write, remainder, samples = 1, 0, [n_row] * count
-        if remainder:
-            problem = f"{n_row} rows follow its header of {samples[0]} samples: no whole number of writes"
-            remedy = "Set 'Segment headers: one header per segment' in LabVIEW, or copy the file again"
-            raise source.error(where, problem, remedy, reason="wrong_length")
-    for name, promised, column in zip(names, samples, columns):
-        if len(column) != promised * n_write:
-            place = f"{where}, channel {name!r}"
-            problem = f"ends after {len(column)} of {promised} samples"
-            raise source.error(place, problem, COPY_AGAIN, reason="truncated")
+    segment = _segment(source, start, stop, head, separator, f"record {k + 1} of {n}")
+    fields, count = segment.fields, len(segment.names)
+    columns, x = _columns(
+        source, source.data[segment.first : stop], separator, segment.decimal_mark, count, segment.n_x_columns,
+        segment.where,
+    )  # fmt: skip
+    n_row = len(columns[0]) if columns else 0
+    n_write, samples = _writes(source, segment, n_row, x)
+    _check_lengths(source, segment, samples, columns, n_write)
+    _check_starts(source, segment)
     units = fields.get("Y_Unit_Label", [])
-    stamps = [
-        _parse_date_and_time(*cells)
-        for cells in zip(_per_channel(fields, "Date", count), _per_channel(fields, "Time", count))
-    ]
-    starts = [a + b for a, b in zip(start_offsets(stamps), offsets)]
-    check_simultaneous(names, steps, starts, where, source)
     started_text = _date_and_time(
         *(_per_channel(fields, name, 1)[0] or head.get(name, "") for name in ("Date", "Time"))
     )
-    entries = (*_entries(fields, steps[0]), *entries_of(head, "the file's header"))
+    entries = (*_entries(fields, segment.steps[0]), *entries_of(head, "the file's header"))
     has_x = x is not None and len(x) == n_row and bool(np.isfinite(x).all())
     n_sample = n_row // n_write
-    listed = {name: _scales_of_channels(values, count) for name, values in fields.items() if any(values)}
-    problems = enumerate(map(scale_problem, scale_statements({**without_drawings(head), **listed}, count)))
-    undecided = {i: problem for i, problem in problems if problem}
+    undecided = _undecided_scales(fields, head, count)
     return [
         RawRecord(
-            names=tuple(names),
+            names=tuple(segment.names),
             samples=[column[i * n_sample : (i + 1) * n_sample] for column in columns],
             entries=entries,
             is_time_in_seconds=True,
@@ -186,6 +171,73 @@ def _records(
         )
         for i in range(n_write)
     ]
+
+
+def _segment(source: Source, start: int, stop: int, head: Mapping[str, str], separator: str, where: str) -> _Segment:
+    """Header of the segment between two offsets; an error if it has no end or names too few channels."""
+    end = source.data.find(END_OF_HEADER, start, stop)
+    first = source.data.find(b"\n", source.data.find(b"\nX_Value", max(end, start), stop) + 1, stop) + 1
+    if end < 0 or first == 0 or b"\nX_Value" not in source.data[end:stop]:
+        raise source.error(where, "its header has no end", COPY_AGAIN, reason="truncated")
+    text = source.data[start:end].decode("utf-8", "replace").splitlines()
+    n_x_columns = {"No": 0, "One": 1}.get(head.get("X_Columns", "One"), 2)
+    fields = {cells[0].strip(): [c.strip() for c in cells[1:]] for cells in (line.split(separator) for line in text)}
+    if n_x_columns == 2:
+        fields = {name: _cells_of_channels(cells) for name, cells in fields.items()}
+    mark = head.get("Decimal_Separator", ".")
+    x_line = source.data[source.data.find(b"\nX_Value", end) + 1 : first].decode("utf-8", "replace")
+    titles = x_line.rstrip("\r\n").split(separator)[1 :: max(n_x_columns, 1)]
+    names = [name for name in titles if name and name != "Comment"]
+    with source.parsed_by("the header", where):
+        count = int(fields["Channels"][0])
+        samples = [int(s) for s in fields.get("Samples", [])[:count]]
+        steps = [float(s.replace(mark, ".")) for s in fields.get("Delta_X", [])[:count] if s] or [0.0]
+        offsets = [float(x.replace(mark, ".") or 0.0) for x in _per_channel(fields, "X0", count)]
+    if len(names) != count:
+        raise source.error(where, f"it names {len(names)} of {count} channels", COPY_AGAIN, reason="truncated")
+    return _Segment(where, fields, names, samples, steps, offsets, mark, n_x_columns, first)
+
+
+def _writes(source: Source, segment: _Segment, n_row: int, x: np.ndarray | None) -> tuple[int, list[int]]:
+    """Number of writes under one header, and samples of each channel in one of them."""
+    samples = segment.samples
+    if not (samples and len(set(samples)) == 1 and samples[0] > 0 and n_row > samples[0]):
+        return 1, samples
+    if x is not None and len(x) == n_row and np.all(np.diff(x) > 0):  # one write, continued
+        return 1, [n_row] * len(segment.names)
+    n_write, remainder = divmod(n_row, samples[0])
+    if remainder:
+        problem = f"{n_row} rows follow its header of {samples[0]} samples: no whole number of writes"
+        remedy = "Set 'Segment headers: one header per segment' in LabVIEW, or copy the file again"
+        raise source.error(segment.where, problem, remedy, reason="wrong_length")
+    return n_write, samples
+
+
+def _check_lengths(
+    source: Source, segment: _Segment, samples: Sequence[int], columns: Sequence[np.ndarray], n_write: int
+) -> None:
+    """An error if a channel has not the samples that its header promises."""
+    for name, promised, column in zip(segment.names, samples, columns):
+        if len(column) != promised * n_write:
+            place = f"{segment.where}, channel {name!r}"
+            problem = f"ends after {len(column)} of {promised} samples"
+            raise source.error(place, problem, COPY_AGAIN, reason="truncated")
+
+
+def _check_starts(source: Source, segment: _Segment) -> None:
+    """An error if the channels were not sampled together."""
+    count = len(segment.names)
+    dates, clocks = (_per_channel(segment.fields, name, count) for name in ("Date", "Time"))
+    stamps = [_parse_date_and_time(*cells) for cells in zip(dates, clocks)]
+    starts = [a + b for a, b in zip(start_offsets(stamps), segment.offsets)]
+    check_simultaneous(segment.names, segment.steps, starts, segment.where, source)
+
+
+def _undecided_scales(fields: Mapping[str, list[str]], head: Mapping[str, str], count: int) -> dict[int, str]:
+    """Of each channel whose scale the file states, but not whether its numbers contain it, the problem."""
+    listed = {name: _scales_of_channels(values, count) for name, values in fields.items() if any(values)}
+    problems = enumerate(map(scale_problem, scale_statements({**without_drawings(head), **listed}, count)))
+    return {i: problem for i, problem in problems if problem}
 
 
 def _cells_of_channels(cells: list[str]) -> list[str]:
