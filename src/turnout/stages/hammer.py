@@ -21,7 +21,7 @@ from turnout.errors import ReadError
 from turnout.hammer_test import find_impacts, receptance_of
 from turnout.hammer_test.response_quality import find_track_impacts
 from turnout.modal import identify
-from turnout.records import Impact, ModalModel, Receptance, Recording, Rejection, Unit
+from turnout.records import Impact, ModalModel, RawDescription, Receptance, Recording, Rejection, Unit
 from turnout.registry.ids import content_id
 from turnout.stages.common import (
     quarantine_row,
@@ -78,21 +78,9 @@ def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root: str | Path, algo: 
         "campaign_id": f"{unit.turnout}/{unit.campaign}",
     }
     rows: dict[str, list[dict]] = {"recordings": [], "impacts": [], "quarantine": []}
-    description = turnout.hammer.descriptions[unit.section]
     force, response = turnout.hammer.force[unit.section], turnout.hammer.response[unit.section]
-    recordings: list = []
-    ids: dict[str, str] = {}
-    for path, size, _ in unit.files:
-        result = read_or_quarantine(path, raw_root, description, base, rows["quarantine"], "hammer", ids)
-        if result is not None:
-            ids[path] = result.sha256[:32]
-            wrong = time_contradiction(
-                path, result.recordings, campaign.started_at, MAX_CAMPAIGN_OFFSET, MISFILED_REMEDY, "start_unknown"
-            )
-            if wrong is not None:
-                rows["quarantine"].append(quarantine_row(wrong, base, "hammer", "hammer", None, ids[path]))
-            rows["recordings"].append(recording_row(result, path, size, description, base, "hammer"))
-            recordings += result.recordings
+    description = turnout.hammer.descriptions[unit.section]
+    recordings, ids = _read_recordings(unit, (campaign.started_at, description), raw_root, base, rows)
     if not rows["recordings"]:
         return _response_rows(unit, turnout, Path(raw_root), algo, base, rows)
     recordings = _with_common_rate(recordings, base, rows["quarantine"], ids)
@@ -110,21 +98,66 @@ def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root: str | Path, algo: 
     if temperature is None:
         temperature = rail_temperature(recordings)
     identity = _identity(rows, unit, base, algo, campaign.started_at, temperature)
+    # a response that took part in the identification validates nothing
+    return rows | _model_rows(
+        model, receptance, impacts, (base, identity, temperature), ids, second, turnout, validates=not is_joint
+    )
+
+
+def _read_recordings(
+    unit: Unit,
+    promised: tuple[datetime | None, RawDescription],
+    raw_root: str | Path,
+    base: dict[str, Any],
+    rows: dict[str, list[dict]],
+) -> tuple[list[Recording], dict[str, str]]:
+    """Recordings of the files of a unit, and the id of each file that was read; adds their rows to ``rows``.
+
+    ``promised`` holds the time of the campaign and the description of the files.
+    """
+    started_at, description = promised
+    recordings: list[Recording] = []
+    ids: dict[str, str] = {}
+    for path, size, _ in unit.files:
+        result = read_or_quarantine(path, raw_root, description, base, rows["quarantine"], "hammer", ids)
+        if result is not None:
+            ids[path] = result.sha256[:32]
+            wrong = time_contradiction(
+                path, result.recordings, started_at, MAX_CAMPAIGN_OFFSET, MISFILED_REMEDY, "start_unknown"
+            )
+            if wrong is not None:
+                rows["quarantine"].append(quarantine_row(wrong, base, "hammer", "hammer", None, ids[path]))
+            rows["recordings"].append(recording_row(result, path, size, description, base, "hammer"))
+            recordings += result.recordings
+    return recordings, ids
+
+
+def _model_rows(
+    model: ModalModel,
+    receptance: Receptance | None,
+    impacts: Sequence[Impact],
+    identification: tuple[dict[str, Any], dict[str, Any], float | None],
+    ids: Mapping[str, str],
+    second: Mapping[tuple[str, int], Impact],
+    turnout: TurnoutConfig,
+    validates: bool,
+) -> dict[str, list[dict]]:
+    """Rows of a model, its modes and its receptance; ``validates`` if the second response took no part in it."""
+    base, identity, temperature = identification
     used = [i for i in impacts if i.accepted]
     counts = len(used), len(impacts) - len(used)
-    names = [f"{ids[i.source]}:{i.record}" for i in used]
-    required = turnout.settings["receptance"].gate_level
     if receptance is None:
-        return rows | {"models": [model_row(model, base, identity, counts, None)], "modes": []}
-    # a response that took part in the identification validates nothing
+        return {"models": [model_row(model, base, identity, counts, None)], "modes": []}
+    settings, required = turnout.settings["identify"], turnout.settings["receptance"].gate_level
+    names = [f"{ids[i.source]}:{i.record}" for i in used]
     pairs = [(i, second[key]) for i in used if (key := (i.source, i.record)) in second]
-    validation = [] if is_joint else [pair[1] for pair in pairs]
+    validation = [pair[1] for pair in pairs] if validates else []
     model_columns = model_row(model, base, identity, counts, _lowest_gate_level(receptance, model))
     receptance_columns = receptance_row(receptance, required, model, used[0].decay, base, identity)
-    shapes = shape_columns(model, _cut_pairs(pairs, settings["identify"]))
+    shapes = shape_columns(model, _cut_pairs(pairs, settings))
     modes = mode_rows(model, receptance, base, identity, temperature)
-    return rows | {
-        "models": [model_columns | validation_columns(model, _cut(validation, settings["identify"]))],
+    return {
+        "models": [model_columns | validation_columns(model, _cut(validation, settings))],
         "modes": [mode | shape for mode, shape in zip(modes, shapes, strict=True)],
         "impact_modes": [impact_mode_row(e, base, identity, names[e["impact"]]) for e in model.per_impact],
         "receptances": [receptance_columns | density_columns(used, receptance_columns["frequency_hz"])],
