@@ -249,3 +249,27 @@ def test_times_of_campaigns_and_passages_of_single_cases_stay(tmp_path):
     assert site.passage_time(1) == datetime(2024, 7, 16, 11, 30)
     moved = replace(site, passages=[replace(site.passages[0], when=datetime(2023, 1, 1))])
     assert moved.passage_time(0) == datetime(2023, 1, 1) and len(site.campaigns) == 2
+
+
+@pytest.mark.parametrize(
+    "kind, parameters, share, row, covered",
+    [
+        ("pad", {"factor": 0.24}, 1.0, {"size": -1.40, "size_se": 0.02, "grows": False}, True),  # ln 0.24 = -1.427
+        ("pad", {"factor": 0.24}, 0.5, {"size": -1.40, "size_se": 0.02, "grows": False}, False),  # half of it
+        ("pad", {"factor": 0.24}, 0.5, {"size": -9.0, "size_se": 0.1, "total": -0.7, "total_se": 0.05}, True),
+        ("gain", {"gain": 0.81}, 0.5, {"size": -0.1, "size_se": 0.01}, True),  # 0.81 to the power of a half
+        ("position", {"shift": -0.2}, 0.5, {"size": -0.2, "size_se": 0.01}, False),
+        ("position", {"shift": -0.2}, 0.5, {"size": -0.2, "size_se": 0.01, "grows": True}, None),  # a rate alone
+        ("void", {"gap": 1e-3, "seated": 0.35, "growth": 0.0}, 1.0, {"size": -0.2, "size_se": 0.01}, None),
+        ("pad", {"factor": 0.24}, 1.0, {"size": None, "size_se": None}, None),
+    ],
+)
+def test_the_size_at_the_last_answer_is_compared_with_what_the_effect_has_reached(
+    kind, parameters, share, row, covered
+):
+    where = {"sensor": "A1", "position": 1.8, "sleeper": 42}
+    effect = {"kind": kind, "where": where, "parameters": parameters}
+    truth = {**TRUTH, "effects": [effect], "severities": [0.0, 0.0, share, share]}
+    term = {"pad": "local_pad", "gain": "sensor_gain", "position": "sensor_position", "void": "hanging_sleeper"}[kind]
+    last = {**PAD, "term": term, "channel": "A1", **row}
+    assert judge_history(truth, rows(NOTHING, NOTHING, last, last)).size_covered is covered

@@ -154,9 +154,12 @@ def _effect(answer: ModelAnswer) -> str:
         return f"unknown effect at {answer.parameter}, no name explains it alone"
     assert answer.size is not None and answer.sd is not None
     unit = "ln" if answer.unit == "-" and answer.group != "gain" else answer.unit
-    rate = f"{unit} a year" if answer.grows else unit
     names = " or ".join(answer.names).replace("_", " ")
-    return f"{names}, {answer.parameter} {answer.size:+.3g} ± {answer.sd:.2g} {rate}"
+    words = f"{names}, {answer.parameter} {answer.size:+.3g} ± {answer.sd:.2g} {unit}"
+    if not answer.grows:
+        return words
+    assert answer.total is not None and answer.total_sd is not None
+    return f"{words} a year, {answer.total:+.3g} ± {answer.total_sd:.2g} {unit} so far"
 
 
 def _strongest(model: CalibratedModel) -> Iterator[str]:

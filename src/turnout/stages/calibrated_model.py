@@ -332,8 +332,9 @@ def answer_rows(model: CalibratedModel) -> list[dict[str, Any]]:
             {
                 "visit": a.visit, "question": a.question, "verdict": a.verdict, "term": names[0],
                 "rival_term": names[1], "parameter": a.parameter or None, "position_m": a.position, "channel": channel,
-                "size": a.size, "size_se": a.sd, "unit": a.unit or None, "grows": a.grows, "onset_after": after,
-                "onset_by": by, "gain_nats": a.gain, "reservation": model.reservation or None,
+                "size": a.size, "size_se": a.sd, "unit": a.unit or None, "grows": a.grows, "total": a.total,
+                "total_se": a.total_sd, "onset_after": after, "onset_by": by, "gain_nats": a.gain,
+                "reservation": model.reservation or None,
             }
         )  # fmt: skip
     return rows

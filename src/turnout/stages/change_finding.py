@@ -53,6 +53,7 @@ def finding_of_change(
         "rival_term": names[1] if len(names) > 1 else None,
         "component": {"ballast": "ballast", "pad": "railpad"}.get(answer.group), "position_m": answer.position,
         "change": answer.size, "change_se": answer.sd, "change_unit": answer.unit or None, "grows": answer.grows,
+        "change_so_far": answer.total, "change_so_far_se": answer.total_sd,
         "gain_nats": answer.gain, "n_visits": n_visits, "n_recordings": n_recordings,
     }  # fmt: skip
     if supports := supports_of(answer):

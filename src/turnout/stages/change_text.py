@@ -88,14 +88,23 @@ def _since_words(row: Mapping[str, Any]) -> str:
 
 
 def _change_words(row: Mapping[str, Any]) -> str:
-    """Size of the change as impacts feel it, with its 95 % interval."""
-    half, per_year = Z95 * row["change_se"], " a year" if row["grows"] else ""
-    value, low, high = row["change"], row["change"] - half, row["change"] + half
+    """Size of the change as impacts feel it, with its 95 % interval; of growth also what it has reached."""
+    what = "change" if row["component"] is None else f"stiffness of the {row['component']} under impacts"
+    words = f"{what} {_size_words(row, 'change')}"
+    if not row["grows"]:
+        return words
+    so_far = "" if row.get("change_so_far") is None else f", {_size_words(row, 'change_so_far')} so far"
+    return f"{words} a year{so_far}"
+
+
+def _size_words(row: Mapping[str, Any], name: str) -> str:
+    """A size with its 95 % interval: of a stiffness in per cent, else in its unit."""
+    value, half = row[name], Z95 * row[f"{name}_se"]
+    low, high = value - half, value + half
     if row["component"] is None:
-        return f"change {value:+.3g} ({low:+.3g} to {high:+.3g}, 95 %) {row['change_unit']}{per_year}"
+        return f"{value:+.3g} ({low:+.3g} to {high:+.3g}, 95 %) {row['change_unit']}"
     value, low, high = (100.0 * float(np.expm1(end)) for end in (value, low, high))
-    what = f"stiffness of the {row['component']} under impacts"
-    return f"{what} {value:+.0f} % ({low:+.0f} to {high:+.0f}, 95 %){per_year}"
+    return f"{value:+.0f} % ({low:+.0f} to {high:+.0f}, 95 %)"
 
 
 def _parameter_words(row: Mapping[str, Any]) -> str:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
+from math import log
 from typing import TYPE_CHECKING, Any
 
+from turnout_blind.history import parameters_at
 from turnout_blind.reveal import read_revealed
 from turnout_blind.score.matching import MAX_POSITION_ERROR, MIN_CLEAR_GAIN, gain_of
 from turnout_blind.score.metrics import Rate, Share
@@ -17,6 +19,14 @@ if TYPE_CHECKING:
 
 MAX_VISITS_LATE = 2  # visits after the first at which the effect is clear, that one included
 DAYS_PER_YEAR = 365.25
+Z95 = 1.96  # standard errors on each side of a 95 % interval
+# Kind of effect -> size that the tool states of it, from its parameters; the tool has no such number of other kinds
+SIZES: dict[str, Callable[[Mapping[str, Any]], float]] = {
+    "ballast": lambda p: log(p["factor"]),
+    "pad": lambda p: log(p["factor"]),
+    "gain": lambda p: p["gain"] - 1.0,
+    "position": lambda p: p["shift"],
+}
 # Question of a row that asks for the effect: one that was there from the first visit differs from the file
 QUESTION = {"start": "file", "step": "change", "growth": "change"}
 
@@ -27,7 +37,8 @@ class HistoryResult:
 
     ``clear_visit`` is the first visit at which the effect is clear, None if it never is. ``named`` is "named", "a_or_b"
     or "" within ``MAX_VISITS_LATE`` visits, ``is_located`` whether the position or sensor of that answer is right.
-    ``onset_covered``: whether the interval of the last answer contains the onset, None without one. ``wrong_names`` are
+    ``onset_covered``: whether the interval of the last answer contains the onset, None without one. ``size_covered``:
+    whether that of the size at its visit contains the true one, None of a kind without ``SIZES``. ``wrong_names`` are
     names of answers with no right one among them. ``alarms`` are the visits at which a false alarm begins, by question;
     one that is repeated at the next visit is the same. ``n_works`` counts the visits without the effect after recorded
     work, ``maintenance_alarms`` those of them at which a false alarm of a change begins. ``years`` is the time from the
@@ -43,6 +54,7 @@ class HistoryResult:
     named: str
     is_located: bool
     onset_covered: bool | None
+    size_covered: bool | None
     wrong_names: tuple[str, ...]
     alarms: Mapping[str, tuple[str, ...]]
     n_works: int
@@ -59,8 +71,8 @@ def judge_history(truth: Mapping[str, Any], rows: Sequence[Mapping[str, Any]] | 
     truth : mapping
         Truth of the site.
     rows : sequence of mapping or None
-        "visit", "question", "verdict", "term", "rival_term", "position_m", "channel", "onset_after" and "onset_by";
-        None: the tool gave no answer.
+        "visit", "question", "verdict", "term", "rival_term", "position_m", "channel", "onset_after", "onset_by",
+        "grows", "size", "size_se", "total" and "total_se"; None: the tool gave no answer.
 
     Returns
     -------
@@ -94,10 +106,21 @@ def judge_history(truth: Mapping[str, Any], rows: Sequence[Mapping[str, Any]] | 
         best is not None and effect is not None and _is_located(effect, best),
         None if onset_row is None or truth["onset"] is None
         else onset_row["onset_after"] <= truth["onset"] <= onset_row["onset_by"],
+        None if onset_row is None else _is_size_covered(effect, dict(zip(visits, truth["severities"])), onset_row),
         tuple(dict.fromkeys(wrong)), alarms, len(works), len(set(works) & set(alarms.get("change", ()))),
         (date.fromisoformat(absent[-1]) - date.fromisoformat(visits[0])).days / DAYS_PER_YEAR if absent else 0.0,
         _words(last),
     )  # fmt: skip
+
+
+def _is_size_covered(effect: Mapping[str, Any], shares: Mapping[str, float], row: Mapping[str, Any]) -> bool | None:
+    """Whether the interval of the size at the visit of a row contains the true one; None where none is stated."""
+    number = ("size", "size_se") if row.get("total_se") is None and not row.get("grows") else ("total", "total_se")
+    value, se = (row.get(n) for n in number)
+    if value is None or se is None or effect["kind"] not in SIZES:
+        return None
+    true = SIZES[effect["kind"]](parameters_at(effect["kind"], effect["parameters"], shares[row["visit"]]))
+    return abs(value - true) <= Z95 * se
 
 
 def _episodes(false: Sequence[Mapping[str, Any]], visits: Sequence[str]) -> dict[str, tuple[str, ...]]:
@@ -183,6 +206,7 @@ def history_figures(results: Sequence[HistoryResult]) -> list[Share | Rate]:
     clear = [r for r in results if r.clear_visit]
     named = [r for r in clear if r.named]
     onsets = [r for r in results if r.onset_covered is not None]
+    sizes = [r for r in results if r.size_covered is not None]
     years = sum(r.years for r in results)
     false_alarms = sum(len(r.alarms.get("change", ())) for r in results)
     worked = [r for r in results if r.n_works]
@@ -192,6 +216,7 @@ def history_figures(results: Sequence[HistoryResult]) -> list[Share | Rate]:
         Share("... named, or half of an a or b", len(named), len(clear)),
         Share("position or sensor right where named", sum(r.is_located for r in named), len(named), 98.0),
         Share("onset inside its 95 % interval", sum(bool(r.onset_covered) for r in onsets), len(onsets), 90.0),
+        Share("present size inside its 95 % interval", sum(bool(r.size_covered) for r in sizes), len(sizes), 90.0),
         Rate("false alarms of a change, per site-year", false_alarms, years, 2.0),
         Share("sites with recorded maintenance called a defect", after_work, len(worked), 0.0, "<="),
         Share("sites with a wrong name", sum(bool(r.wrong_names) for r in results), len(results), 0.0, "<="),

@@ -16,8 +16,8 @@ from turnout.mismatch.calibrated import (
     drift_since,
     estimate_history,
 )
+from turnout.mismatch.calibrated.change_course import courses_of
 from turnout.mismatch.calibrated.file_comparison import evidence_from_first
-from turnout.mismatch.calibrated.onset_interval import onset_interval
 
 N_SUPPORT = 5
 SUPPORTS = tuple(
@@ -108,7 +108,7 @@ def test_onsets_are_inside_their_intervals_and_the_support_is_right():
         history = change_history(visits)
         best = compare_onsets(history, EFFECTS)[0]
         right += best.effect is EFFECTS[support]
-        low, high = onset_interval(history, best.effect)
+        low, high = courses_of(history, best.effect).onset_interval()
         inside += low <= STEP * (first - 0.5) <= high
         mean, sd = best.size
         size_inside += abs(mean - 0.4) < 2.0 * sd

@@ -20,6 +20,7 @@ from turnout.records import Unit
 from turnout.stages import change_diagnosis, change_units
 from turnout.stages.change_diagnosis import change_unit
 from turnout.stages.change_finding import finding_of_change
+from turnout.stages.change_text import sentence_of
 from turnout.stages.change_trains import TrainTest, evidence_of_rise
 from turnout.stages.mismatch_groups import visits
 from turnout.stages.stored_visits import StoredVisit
@@ -312,3 +313,16 @@ def test_the_list_gets_the_newest_diagnoses(tmp_path, monkeypatch):
             rows = connection.execute(query).fetchall()
             assert rows == [("t1", "A, B", "no diagnosis: no track file", None, None)]
     assert (tmp_path / "list.csv").exists()
+
+
+def test_growth_states_its_rate_and_what_it_has_reached():
+    """A rate says how urgent it is, the change so far how bad it is; of a step both are the same."""
+    row = {
+        "verdict": "named", "term": "local_ballast", "rival_term": None, "component": "ballast", "position_m": 3.6,
+        "n_visits": 6, "n_recordings": 12, "onset_after_utc": datetime(2025, 3, 1), "trains_visit": None,
+        "onset_by_utc": datetime(2025, 6, 1), "change": np.log(0.9), "change_se": 0.0, "change_unit": "-",
+        "change_so_far": np.log(0.75), "change_so_far_se": 0.0,
+    }  # fmt: skip
+    rate, so_far = "-10 % (-10 to -10, 95 %) a year", "-25 % (-25 to -25, 95 %) so far"
+    assert f"stiffness of the ballast under impacts {rate}, {so_far}, since" in sentence_of({**row, "grows": True})
+    assert "so far" not in sentence_of({**row, "grows": False})

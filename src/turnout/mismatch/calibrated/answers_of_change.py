@@ -10,6 +10,7 @@ import numpy as np
 
 from turnout.mismatch.calibrated.belief import StateParameter
 from turnout.mismatch.calibrated.change import ChangeEffect, OnsetEvidence, change_sd, compare_onsets
+from turnout.mismatch.calibrated.change_course import courses_of
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.history import Event, History, estimate_history
 from turnout.mismatch.calibrated.information import VisitInformation
@@ -26,12 +27,10 @@ from turnout.mismatch.calibrated.model_answer import (
     position_of,
     with_rivals,
 )
-from turnout.mismatch.calibrated.onset_interval import onset_interval
 from turnout.mismatch.calibrated.soft_ballast_or_gap import names_of_softer_ballast
 from turnout.mismatch.calibrated.stiffness_under_load import (
     is_all_explained,
     is_under_load,
-    size_under_load,
     with_evidence_under_load,
     with_offsets,
 )
@@ -173,13 +172,14 @@ def change_answer(
         by_stated_errors = estimate_history(parameters, visits, events, repeats_between_visits=False, accepted=None)
         return _on_surface(_answer_without_name(by_stated_errors, visit, by_name), by_stated_errors, surface)
     leader = material[0]
-    size = size_under_load(leader.size) if is_under_load(leader.effect) else leader.size
     jump = history.steps[1 + int(np.argmax(leader.gains))].innovation
     if is_under_load(leader.effect):
         parameters, visits = with_loads
         history = _history_of_changes(parameters, visits, events, levels)
-    onset = onset_interval(history, leader.effect)
-    stated = LeadingEffect.of(leader.effect, by_name, size, gain - price, onset)
+    courses = courses_of(history, leader.effect)
+    sizes = (leader.size if leader.effect.grows else courses.last_size, courses.last_size)
+    size, total = (_with_model_error(leader.effect, s) for s in sizes)
+    stated = LeadingEffect.of(leader.effect, by_name, size, gain - price, courses.onset_interval())
     opened = [*events, *_events_of_change(leader, parameters, candidates)]
     with_change = _history_of_changes(parameters, visits, opened, levels)
     explained = next(s.innovation for s in with_change.steps if s.visit == leader.onset)
@@ -194,7 +194,7 @@ def change_answer(
     rivals = [name_of(e.effect, by_name) for e in material if e.gain > leader.gain - margin]
     answer = stated.answer(visit, CHANGE, with_rivals(names, stated, rivals))
     ends = stretch_ends(changes_alike(evidence, leader, by_name), by_name)
-    return replace(answer, changed=tuple(leader.effect.direction), total=_present_size(leader)[0], ends=ends)
+    return replace(answer, changed=tuple(leader.effect.direction), total=total[0], total_sd=total[1], ends=ends)
 
 
 def _history_of_changes(
@@ -238,6 +238,16 @@ def _evidence_of_name(material: Sequence[OnsetEvidence], by_name: Mapping[str, S
     if not material:
         return -np.inf
     return float(np.logaddexp.reduce([e.gain for e in changes_alike(material, material[0], by_name)]))
+
+
+def _with_model_error(effect: ChangeEffect, size: tuple[float, float]) -> tuple[float, float]:
+    """Size and its standard deviation with the error of the model, which is a share of the size.
+
+    Under load it is larger. Visits are linear about stiffness without the effect, and a spring in series acts by its
+    compliance: of a loss that is x by derivatives, ln(1 - x) is left if compliance is what signals are linear in.
+    """
+    share = CALIBRATION.linear_error if is_under_load(effect) else CALIBRATION.size_error
+    return size[0], float(np.hypot(size[1], share * size[0]))
 
 
 def _events_of_change(

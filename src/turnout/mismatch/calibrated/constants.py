@@ -52,6 +52,9 @@ class CalibrationConstants:
         "of an effect under load, of which visits are linear: ln stiffness or compliance",
         PAGE,
     )
+    size_error: float = threshold(
+        0.1, "share of the size", "of a change: a constant error of the model cancels only where the value stays", PAGE
+    )
     change_sds: float = threshold(5.0, "prior sd", "prior standard deviation of a change of a parameter", PAGE)
     dip_sd: float = threshold(5e-4, "m", "prior standard deviation of the depth of a dip that appears", PAGE)
     least_dip: float = threshold(1e-4, "m", "depth of a dip below which nobody would act", PAGE)

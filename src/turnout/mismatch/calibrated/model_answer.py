@@ -44,7 +44,8 @@ class ModelAnswer:
     ``parameter`` has changed by ``size`` (standard error ``sd``, ``unit``), or by as much per year if it ``grows``.
     ``onset``: last time without and first time with the change [years], None against the file. ``gain`` is the evidence
     less the logarithm of the number of candidates [nats], None where the answer does not rest on one. ``changed`` are
-    all parameters that change alike, ``total`` is the change of each at the visit, ``ends`` are those of their stretch.
+    all parameters that change alike, ``total`` is the change of each at the visit with its standard error ``total_sd``,
+    whatever course the change has taken, ``ends`` are those of their stretch.
     """
 
     visit: str
@@ -62,6 +63,7 @@ class ModelAnswer:
     grows: bool = False
     changed: tuple[str, ...] = ()
     total: float | None = None
+    total_sd: float | None = None
     ends: StretchEnds | None = None
 
 

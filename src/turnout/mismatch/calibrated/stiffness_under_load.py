@@ -67,24 +67,6 @@ def is_under_load(effect: ChangeEffect) -> bool:
     return all(name.endswith(END) for name in effect.direction)
 
 
-def size_under_load(size: tuple[float, float]) -> tuple[float, float]:
-    """Size and its standard deviation with the error of a linear model.
-
-    Visits are linear about stiffness without the effect. A spring in series acts by its compliance: of a loss that is
-    x by derivatives, ln(1 - x) is left if compliance is what signals are linear in. The truth lies between.
-
-    Parameters
-    ----------
-    size : (float, float)
-        By derivatives, and its standard deviation.
-
-    Returns
-    -------
-    (float, float)
-    """
-    return size[0], float(np.hypot(size[1], CALIBRATION.linear_error * size[0]))
-
-
 def _springs(parameters: Sequence[StateParameter]) -> Iterator[tuple[Law, StateParameter, StateParameter | None]]:
     """(law, spring, damper) of everything that may differ under load."""
     by_name = {p.name: p for p in parameters}

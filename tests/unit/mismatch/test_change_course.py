@@ -1,4 +1,4 @@
-"""Intervals of onsets: steps and growth from an unknown day, on seeded linear histories of four visits."""
+"""Onset and present size of a change, a step or growth from an unknown day, on seeded histories of four visits."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from turnout.mismatch.calibrated import (
     compare_onsets,
     estimate_history,
 )
-from turnout.mismatch.calibrated.onset_interval import onset_interval
+from turnout.mismatch.calibrated.change_course import courses_of
 
 PARAMETER = StateParameter("ballast@1.20", 0.0, 0.1, 0.03, "ballast", 2, 1.2)
 EFFECT = ChangeEffect("softer", {PARAMETER.name: -1.0}, 0.5)
@@ -42,7 +42,7 @@ def test_intervals_contain_the_onset(grows):
     for _ in range(300):
         start, size = rng.uniform(0.0, TIMES[-1] - 0.5 * grows), rng.uniform(0.5, 1.5)
         change = growth(start, size) if grows else lambda time: -size * (time > start)  # noqa: B023
-        low, high = onset_interval(history(rng, change), EFFECT)
+        low, high = courses_of(history(rng, change), EFFECT).onset_interval()
         inside += low <= start <= high
     assert inside >= 275  # 285 expected, three standard errors of n
 
@@ -51,7 +51,9 @@ def test_intervals_contain_the_onset(grows):
 def test_growth_that_begins_just_before_a_visit_is_not_dated_after_it(start):
     """That visit shows next to nothing of it. A change of the later visits alone would be dated between these."""
     for seed in range(20):
-        low, high = onset_interval(history(np.random.default_rng(seed), growth(start, 1.5), sd=0.02), EFFECT)
+        low, high = courses_of(
+            history(np.random.default_rng(seed), growth(start, 1.5), sd=0.02), EFFECT
+        ).onset_interval()
         assert low <= start <= high
 
 
@@ -70,7 +72,41 @@ def test_what_only_the_last_visit_shows_is_a_step_whatever_its_size(size):
 def test_a_change_has_two_visits_and_begins_after_an_accepted_one():
     rng = np.random.default_rng(2)
     with pytest.raises(ValueError, match="two visits"):
-        onset_interval(history(rng, lambda time: 0.0, times=TIMES[:1]), EFFECT)
-    assert onset_interval(history(rng, lambda time: 0.0, times=TIMES[:2]), EFFECT) == TIMES[:2]
+        courses_of(history(rng, lambda time: 0.0, times=TIMES[:1]), EFFECT).onset_interval()
+    assert courses_of(history(rng, lambda time: 0.0, times=TIMES[:2]), EFFECT).onset_interval() == TIMES[:2]
     late = ChangeEffect("softer", EFFECT.direction, EFFECT.sd, not_before=TIMES[2])
-    assert onset_interval(history(rng, growth(0.0, 1.0)), late) == TIMES[2:]
+    assert courses_of(history(rng, growth(0.0, 1.0)), late).onset_interval() == TIMES[2:]
+
+
+@pytest.mark.parametrize("form", ["step", "growth up to the last visit", "growth that has ended"])
+def test_intervals_contain_the_size_at_the_last_visit(form):
+    """300 of each. A step fitted to growth that has ended gives the mean of all visits with the effect instead: it
+    contains the size in a third of these."""
+    rng, inside, of_step = np.random.default_rng(43), 0, 0
+    for _ in range(300):
+        size = rng.uniform(0.5, 1.5)
+        start = {"step": rng.uniform(*TIMES[::3]), "growth up to the last visit": rng.uniform(1.05, 1.3)}.get(
+            form, rng.uniform(0.0, TIMES[-1] - 1.0)
+        )
+        change = growth(start, size) if form != "step" else lambda time: -size * (time > start)  # noqa: B023
+        shown = history(rng, change)
+        present = -change(TIMES[-1])
+        mean, sd = courses_of(shown, EFFECT).last_size
+        inside += abs(mean - present) <= 1.96 * sd
+        step = compare_onsets(shown, [EFFECT])[0].size
+        of_step += abs(step[0] - present) <= 1.96 * step[1]
+    assert inside >= 275  # 285 expected, three standard errors of n
+    assert form != "growth that has ended" or of_step < 150
+
+
+def test_the_size_at_the_last_visit_is_that_of_exact_data():
+    """Growth that has ended: half of it at the third visit, all of it at the fourth, to the prior's share of 4e-8."""
+    exact = [StateParameter(PARAMETER.name, 0.0, 0.1, 0.0, "ballast", 2, 1.2)]
+    visits = []
+    for v, (time, value) in enumerate(zip(TIMES, (0.0, 0.0, -0.4, -0.8))):
+        group = GroupInformation("A", 1, (PARAMETER.name,), np.array([[1e8]]), np.array([1e8 * value]))
+        visits.append(VisitInformation(f"v{v}", time, (group,)))
+    shown = estimate_history(exact, visits, repeats_between_visits=False, accepted=None)
+    size, sd = courses_of(shown, EFFECT).last_size
+    assert size == pytest.approx(0.8, abs=0.01) and sd < 0.02
+    assert compare_onsets(shown, [EFFECT])[0].size[0] == pytest.approx(0.6, abs=0.01)
