@@ -106,7 +106,8 @@ def judge_history(truth: Mapping[str, Any], rows: Sequence[Mapping[str, Any]] | 
         best is not None and effect is not None and _is_located(effect, best),
         None if onset_row is None or truth["onset"] is None
         else onset_row["onset_after"] <= truth["onset"] <= onset_row["onset_by"],
-        None if onset_row is None else _is_size_covered(effect, dict(zip(visits, truth["severities"])), onset_row),
+        None if onset_row is None or effect is None
+        else _is_size_covered(effect, dict(zip(visits, truth["severities"])), onset_row),
         tuple(dict.fromkeys(wrong)), alarms, len(works), len(set(works) & set(alarms.get("change", ()))),
         (date.fromisoformat(absent[-1]) - date.fromisoformat(visits[0])).days / DAYS_PER_YEAR if absent else 0.0,
         _words(last),
