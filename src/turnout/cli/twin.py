@@ -113,6 +113,8 @@ def _table(model: CalibratedModel, show_all: bool) -> Iterator[str]:
     for p, value, sd in sorted(listed, key=lambda r: (r[0].group, r[0].position or 0.0, r[0].name)):
         position = "" if p.position is None else f"{p.position:.2f} m"
         yield f"{p.name:32} {position:>9} {value:11.4g} {sd:10.3g} {p.sd:10.3g} {_unit(p)}"
+    if any(_unit(p) == "ln" for p, _, _ in listed):
+        yield "ln: logarithm of the value divided by that of the track file; 0 is the file's value, -0.69 half of it"
     if waves:
         narrowed = sum(sd < MAX_SD_RATIO * p.sd for p, _, sd in waves)
         yield f"running surface: {narrowed} of {len(waves)} waves are better known than by the file (--all lists them)"
@@ -157,7 +159,7 @@ def _effect(answer: ModelAnswer) -> str:
     names = " or ".join(answer.names).replace("_", " ")
     words = f"{names}, {answer.parameter} {answer.size:+.3g} ± {answer.sd:.2g} {unit}"
     if not answer.grows:
-        return words
+        return f"{words} ({math.exp(answer.size):.2g} times)" if unit == "ln" else words
     assert answer.total is not None and answer.total_sd is not None
     return f"{words} a year, {answer.total:+.3g} ± {answer.total_sd:.2g} {unit} so far"
 

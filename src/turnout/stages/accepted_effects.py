@@ -131,6 +131,24 @@ class AcceptedEffect:
             fixed_values[name] = int(track.nearest_support(value)) if name in SUPPORT_KEYS else value
         return self._effect(**fixed_values, **chosen)
 
+    def lies_on(self, track: Track) -> bool:
+        """Whether a part of the effect is on a whole track.
+
+        Parameters
+        ----------
+        track : Track
+            The track of a route.
+
+        Returns
+        -------
+        bool
+            True for an effect without a position.
+        """
+        place = self.fixed.get("place", track.start)
+        start, end = self.fixed.get("start", place), self.fixed.get("end", place)
+        is_inside = track.start <= place <= track.end and start <= track.end and end >= track.start
+        return self._reaches(track) and is_inside
+
     def _reaches(self, track: Track) -> bool:
         """Whether at least one support of the effect is on the track."""
         low, high = float(track.support[0]) - MAX_SUPPORT_DISTANCE, float(track.support[-1]) + MAX_SUPPORT_DISTANCE
@@ -158,6 +176,51 @@ def accepted_of(entries: Iterable[ParameterSet]) -> tuple[AcceptedEffect, ...]:
         An entry has an unknown effect, field or route, or lacks a field.
     """
     return tuple(_effect_of_entry(entry) for entry in entries if SINCE not in entry)
+
+
+def effects_of(turnout: TurnoutTrack) -> tuple[AcceptedEffect, ...]:
+    """Accepted effects of a turnout, each of which lies on a route of its track and has possible values.
+
+    Parameters
+    ----------
+    turnout : TurnoutTrack
+        With the entries of its file.
+
+    Returns
+    -------
+    tuple of AcceptedEffect
+
+    Raises
+    ------
+    SimulationError
+        As ``accepted_of``; an effect lies on no route that it applies to, so it would be left out; or a value is
+        outside its bounds.
+    """
+    effects = accepted_of(turnout.terms)
+    entries = [entry for entry in turnout.terms if SINCE not in entry]
+    for entry, effect in zip(entries, effects):
+        if problem := _off_track(effect, turnout) or _out_of_bounds(effect):
+            raise SimulationError(f"{entry.place.path}, {entry.place.entry}: {problem}")
+    return effects
+
+
+def _off_track(effect: AcceptedEffect, turnout: TurnoutTrack) -> str:
+    """Why an effect lies on no route that it applies to, "" if it lies on one."""
+    tracks = [turnout.track_of(route) for route in turnout.routes if effect.is_on(route)]
+    if any(effect.lies_on(track) for track in tracks):
+        return ""
+    extent = "".join(f", which goes from {track.start:.1f} to {track.end:.1f} m" for track in tracks[:1])
+    return f"{effect.key} is on no route of the track{extent}. Correct its position or route."
+
+
+def _out_of_bounds(effect: AcceptedEffect) -> str:
+    """Which value of an effect is impossible, "" without one."""
+    for p in effect.parameters:
+        (value, _), (low, high) = effect.values[p.name], p.bounds
+        if not low <= value <= high:
+            unit = "" if p.unit == "-" else f" {p.unit}"
+            return f"{effect.key}: {p.name} is {value:g}{unit}. Write {low:g} to {high:g}{unit}."
+    return ""
 
 
 def _effect_of_entry(entry: ParameterSet) -> AcceptedEffect:
@@ -219,7 +282,7 @@ def terms_on(turnout: TurnoutTrack, track: Track, conditions: Mapping | None = N
     -------
     tuple of PhysicsTerm
     """
-    terms = (entry.term(track) for entry in accepted_of(turnout.terms) if entry.is_on(route))
+    terms = (entry.term(track) for entry in effects_of(turnout) if entry.is_on(route))
     return tuple(term.under_conditions(conditions or {}) for term in terms if term is not None)
 
 

@@ -45,7 +45,7 @@ def position_fault(label: str, x: float, track: TurnoutTrack) -> str:
 
 
 def faults_of_tracks(configuration: Configuration) -> Iterator[str]:
-    """Faults of each track file, each once: unreadable, positions off the track, and contradictions with its layout.
+    """Faults of track files, each once: unreadable, entries without effect, positions off the track or its layout.
 
     Parameters
     ----------
@@ -62,6 +62,7 @@ def faults_of_tracks(configuration: Configuration) -> Iterator[str]:
         try:
             tracks[path] = load_track(str(path), folder=path.parent)
             yield from (f"not on the track: {error}" for error in off_track_errors(path))
+            _check_entries(tracks[path])
         except ConfigError as error:
             yield f"no simulation: {error}"
         except TurnoutError as error:
@@ -76,6 +77,16 @@ def faults_of_tracks(configuration: Configuration) -> Iterator[str]:
         if file is not None:
             faults |= {f"not on the track: {error}": None for error in _position_errors(tree, tracks[file], file)}
     yield from faults
+
+
+def _check_entries(track: TurnoutTrack) -> None:
+    """SimulationError if an accepted effect or change of a track file is not possible there."""
+    if track.terms:
+        from turnout.stages.accepted_changes import changes_of  # imports all effects
+        from turnout.stages.accepted_effects import effects_of
+
+        effects_of(track)
+        changes_of(track.terms)
 
 
 def _position_errors(tree: Branch, track: TurnoutTrack, path: Path) -> Iterator[ConfigError]:

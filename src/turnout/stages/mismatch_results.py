@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -142,14 +143,15 @@ class Results:
         self.path = Path(work) / "mismatch-fits" / f"{turnout_id}.json"
 
     def save(self, tables: dict[str, list[dict]]) -> None:
-        """Write the result below ``work``.
+        """Write the result below ``work``, behind a line with its SHA-256 by which an edit is seen.
 
         Parameters
         ----------
         tables : dict[str, list[dict]]
             Rows of each table by its name.
         """
-        write_text(self.path, encode(tables))
+        rows = encode(tables)
+        write_text(self.path, f"{_hash_of(rows)}\n{rows}")
 
     def finding(self, finding_id: str | None = None) -> dict[str, Any]:
         """The finding with this id, or the only one with a term.
@@ -167,7 +169,7 @@ class Results:
         Raises
         ------
         SimulationError
-            There is none, or several.
+            There is none, or several, or the file below ``work`` is not as it was written.
         """
         changes = self._registry_rows("change_findings") if finding_id else []
         for change in changes:
@@ -196,9 +198,13 @@ class Results:
 
     def _saved_rows(self) -> list[dict[str, Any]]:
         try:
-            return decode(self.path.read_text(encoding="utf-8"))["mismatch_findings"]
+            seal, _, rows = self.path.read_bytes().decode("utf-8", "replace").partition("\n")
         except FileNotFoundError:
             return []
+        if seal != _hash_of(rows):
+            problem = "it is damaged, was edited, or is of an earlier version"
+            raise SimulationError(f"{self.path}: {problem}. Run turnout diagnose --turnout {self.turnout_id} again.")
+        return decode(rows)["mismatch_findings"]
 
     def _registry_rows(self, table: str = "findings_newest") -> list[dict[str, Any]]:
         """Newest findings of the turnout in the registry, [] without a registry."""
@@ -208,6 +214,11 @@ class Results:
             cursor = connection.execute(f"from {table} where turnout_id = ?", [self.turnout_id])
             names = [d[0] for d in cursor.description]
             return [dict(zip(names, row)) for row in cursor.fetchall()]
+
+
+def _hash_of(text: str) -> str:
+    """SHA-256 of a text in UTF-8."""
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _newest(rows: Sequence[Mapping[str, Any]]) -> str:

@@ -26,7 +26,7 @@ from turnout.simulate import Hammer, Sensor, load_track, load_vehicle, simulate_
 from turnout.simulate.hammer import ImpactTruth, hammer_sensors, resolve_location
 from turnout.simulate.turnout_track import TurnoutTrack
 from turnout.simulate.vehicle import Vehicle
-from turnout.stages.accepted_effects import accepted_of, terms_on
+from turnout.stages.accepted_effects import effects_of, terms_on
 from turnout.stages.simulate_request import (
     check_request,
     ending_of,
@@ -299,7 +299,7 @@ def _write_truth(
     targets += [Path(request["truth_file"])] if request.get("truth_file") else []
     content = {
         "track": track.name,
-        "effects": [a.as_dict for a in accepted_of(track.terms) if a.is_on(route)],
+        "effects": [a.as_dict for a in effects_of(track) if a.is_on(route)],
         "conditions": dict(recording.conditions),
         **extra,
         "channels": [asdict(c) for c in recording.channels],

@@ -13,7 +13,7 @@ from turnout.content import sha256_of
 from turnout.errors import SimulationError, TurnoutError
 from turnout.simulate import load_track
 from turnout.simulate.parameters import base_track_file
-from turnout.stages.accepted_effects import accepted_of
+from turnout.stages.accepted_effects import effects_of
 
 if TYPE_CHECKING:
     from turnout.simulate import TurnoutTrack
@@ -69,7 +69,7 @@ def track_of(turnout: TurnoutConfig, name: str | None = None) -> tuple[TurnoutTr
     """
     path = track_file(turnout, name)
     track = load_track(str(path), folder=path.parent)
-    return track, accepted_of(track.terms)
+    return track, effects_of(track)
 
 
 def digest_of_model(turnout: TurnoutConfig, name: str | None = None) -> str:

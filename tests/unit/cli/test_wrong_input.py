@@ -204,3 +204,22 @@ def test_work_that_is_there_already_is_not_entered_twice(project, capsys):
     assert main([*line, "--resets", "none"]) == main(line) == 2
     assert (project / "config/events.csv").read_bytes() == before
     assert "config/events.csv, the work: tamping at W1, 2026-04-02, is there already." in capsys.readouterr().err
+
+
+ENTRIES = {  # an entry of a track file, and what `turnout check` says about it
+    "term: local_padd\n    sleeper: 18.0": "W1.yaml, terms[0]: no effect 'local_padd'; there are",
+    "term: local_pad\n    faktor: 0.5": "W1.yaml, terms[0]: local_pad has no 'faktor'; it has factor, sleeper",
+    "term: local_pad\n    sleeper: 900\n    factor: {value: 0.5, unit: '-', source: me}": "is on no route of the track",
+    "term: local_pad\n    sleeper: 18\n    factor: {value: -3, unit: '-', source: me}": (
+        "W1.yaml, terms[0]: local_pad[18.0 m]: factor is -3. Write 0.05 to 8."
+    ),
+}
+
+
+@pytest.mark.parametrize("entry", ENTRIES)
+def test_an_entry_of_a_track_file_that_cannot_be_simulated_is_a_fault_of_the_configuration(project, capsys, entry):
+    track = project / "config/tracks/W1.yaml"
+    track.write_text(f"extends: tommerup\nterms:\n  - {entry}\n")
+    assert main(["check"]) == 1
+    printed = capsys.readouterr().out
+    assert "no simulation: " in printed and str(track.relative_to(project)) in printed and ENTRIES[entry] in printed

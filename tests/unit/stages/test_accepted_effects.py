@@ -6,8 +6,8 @@ from turnout.config.document import Place
 from turnout.config.parameters import Number, ParameterSet
 from turnout.errors import ConfigError, SimulationError
 from turnout.simulate import uniform_track
-from turnout.simulate.turnout_track import stretch_of_track
-from turnout.stages.accepted_effects import AcceptedEffect, accepted_of
+from turnout.simulate.turnout_track import TurnoutTrack, stretch_of_track
+from turnout.stages.accepted_effects import AcceptedEffect, accepted_of, effects_of, terms_on
 
 TRACK = uniform_track(60.0)
 LIFTS = AcceptedEffect("lifting_sleepers", {"first": 12.0, "last": 55.8}, {"share": (1.0, None)})
@@ -45,3 +45,29 @@ def test_a_place_that_is_none_is_refused(first, error, said):
     entry = {"term": "lifting_sleepers", "first": first, "last": 55.8, "share": share}
     with pytest.raises(error, match=said):
         accepted_of([ParameterSet(Place("t.yaml", entry="terms[0]"), entry)])
+
+
+def entry_of(**fields):
+    return ParameterSet(Place("t.yaml", entry="terms[0]"), fields)
+
+
+@pytest.mark.parametrize(
+    ("fields", "is_on"),
+    [
+        ({"term": "local_pad", "sleeper": 30.0, "factor": Number(0.5, "-", "x")}, True),
+        ({"term": "local_pad", "sleeper": 900.0, "factor": Number(0.5, "-", "x")}, False),
+        ({"term": "local_pad", "sleeper": -3.0, "factor": Number(0.5, "-", "x")}, False),
+        ({"term": "local_pad", "sleeper": 30.0, "factor": Number(0.5, "-", "x"), "route": "diverging"}, False),
+        ({"term": "lifting_sleepers", "first": 50.0, "last": 70.0, "share": Number(0.5, "-", "x")}, True),
+        ({"term": "lifting_sleepers", "first": 61.0, "last": 70.0, "share": Number(0.5, "-", "x")}, False),
+        ({"term": "rail_shear", "flexibility": Number(0.5, "-", "x")}, True),
+    ],
+)
+def test_an_effect_on_no_route_of_the_whole_track_is_named(fields, is_on):
+    turnout = TurnoutTrack(TRACK, terms=(entry_of(**fields),))
+    if is_on:
+        assert len(effects_of(turnout)) == len(terms_on(turnout, TRACK)) == 1
+        return
+    for call in (effects_of, lambda t: terms_on(t, TRACK)):
+        with pytest.raises(SimulationError, match=r"t\.yaml, terms\[0\]: .* is on no route of the track.* Correct its"):
+            call(turnout)

@@ -204,6 +204,9 @@ def test_the_stage_writes_the_state_after_a_visit_and_a_finding_keeps_the_visit_
     assert "(2 fitted now)" in printed and "against the file: nothing differs" in printed
     size, sd = map(float, re.search(r"local pad, pad@18.00 (-[\d.]+) ± ([\d.]+) ln", printed).groups())
     assert size == pytest.approx(np.log(small.SOFT), abs=3.0 * sd)
+    factor = float(re.search(r"local pad, pad@18.00 .* ln \(([\d.]+) times\)", printed)[1])
+    assert factor == pytest.approx(small.SOFT, rel=3.0 * sd)
+    assert printed.count("ln: logarithm of the value divided by that of the track file") == 1
     assert f"appeared after {DAYS[2]}, at the latest at {DAYS[3]}" in printed
 
 

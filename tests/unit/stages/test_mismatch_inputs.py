@@ -38,7 +38,6 @@ from turnout.stages.mismatch_inputs import MAX_SIMILAR_PASSAGES, Note, VisitInpu
 from turnout.stages.mismatch_results import Results, diagnose_turnout
 from turnout.stages.mismatch_trains import train_of
 from turnout.stages.track_files import digest_of_model, track_of
-from turnout.workflow.batches import encode
 from turnout.workflow.scan import scan, unit_id
 
 
@@ -197,11 +196,31 @@ def test_the_result_of_the_newer_recordings_is_accepted(tmp_path, monkeypatch):
         return {"finding_id": name, "found_at_utc": datetime(2026, day, 1), "term_json": "[]"}
 
     results = Results(tmp_path, "t1")
-    results.path.parent.mkdir(parents=True)
-    results.path.write_text(encode({"mismatch_findings": [row("july", 7)]}))
+    results.save({"mismatch_findings": [row("july", 7)]})
     for month, name in ((5, "july"), (10, "other")):
         monkeypatch.setattr(Results, "_registry_rows", lambda self, month=month: [row("other", month)])
         assert results.finding()["finding_id"] == name
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda text: text.replace('"none"', '"named"'),
+        lambda text: text.replace('"verdict"', '"verdikt"'),
+        lambda text: text[:-9],
+        lambda text: text.partition("\n")[2],  # as an earlier version wrote it
+        lambda text: "[1, 2]",
+        lambda text: "",
+    ],
+)
+def test_a_stored_result_that_was_edited_or_damaged_is_not_accepted(tmp_path, edit):
+    row = {"finding_id": "a", "found_at_utc": "2026-07-01", "term_json": "[]", "verdict": "none"}
+    results = Results(tmp_path, "t1")
+    results.save({"mismatch_findings": [row]})
+    assert results.finding()["verdict"] == "none"
+    results.path.write_text(edit(results.path.read_text()))
+    with pytest.raises(SimulationError, match=r"t1\.json: it is damaged, was edited, .* Run turnout diagnose"):
+        results.finding()
 
 
 def test_corrugation_further_on_is_another_entry():
