@@ -77,7 +77,7 @@ def test_the_number_of_values_among_which_the_farthest_was_chosen_counts():
 @pytest.mark.parametrize("error", [0.01, 0.1, 0.3])
 def test_a_prior_that_holds_a_value_back_hides_no_conflict(error):
     """Data alone give x with the standard error e; the chance of x is N(0, sd² + e²), however far the fit goes."""
-    case, at = Beam(0.0), 0.8
+    case, at = Beam(0.0, at=("sensor", "S1")), 0.8
     weight = TOLERANCE**2 / (TOLERANCE**2 + error**2)
     fit = SimpleNamespace(
         values={"bending": weight * at, "mass": 0.0}, covariance=np.diag([weight * error**2, 0.01 * TOLERANCE**2])

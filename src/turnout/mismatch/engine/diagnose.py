@@ -248,7 +248,8 @@ def grade_names(findings: Findings) -> Findings:
     search, fit = findings.search, findings.fit
     verdicts, failing = [], None
     free_share = free_law_share(search, findings.base, fit)
-    strained = str(strained_value(search.case, fit, search.settings.threshold) or "")
+    value = strained_value(search.case, fit, search.settings.threshold)
+    strained = str(value) if value is not None and value.nuisance.at is not None else ""
     is_alone = len(findings.verdicts) == 1  # beside two names it may be an error in the shape of one of them
     local_change = local_change_evidence(search.case, fit) if is_alone else 0.0
     for verdict in findings.verdicts:

@@ -74,7 +74,8 @@ def strained_value(case: Case, fit: Fit, threshold: float) -> StrainedValue | No
         if variance_share >= THRESHOLDS.uninformed_sd_share**2:
             continue
         deviation = abs(fit.values[nuisance.name] - nuisance.mean) / nuisance.sd
-        nats = float(0.5 * deviation**2 / (1.0 - variance_share) - np.log(len(shared)))
+        determined = 1.0 - variance_share if nuisance.at else 1.0  # tolerances of other systems may be rough
+        nats = float(0.5 * deviation**2 / determined - np.log(len(shared)))
         if nats > (threshold if strained is None else strained.nats):
             strained = StrainedValue(nuisance, float(deviation), nats)
     return strained
