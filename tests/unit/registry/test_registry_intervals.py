@@ -125,6 +125,8 @@ def test_the_page_names_a_mode_that_leaves_the_track_of_its_section(bench, tmp_p
     bench.register(*results[:12], tables=SECTION)
     text = page_of(bench, tmp_path)
     day = (date(2024, 1, 10) + timedelta(days=40 * 9)).isoformat()
-    mode = f"{day} ballast {1.15 * np.exp(log_f[9]):.1f} Hz, damping 0.0300 (median of"
-    words = f"it is another mode, or the track has changed. {mode}"
+    mode = (
+        f"{day} ballast {1.15 * np.exp(log_f[9]):.1f} Hz (standard error 0.3 Hz), damping 0.030 (standard error 0.002)"
+    )
+    words = f"it is another mode, or the track has changed. {mode} (median of"
     assert words in text and "(median of 9 campaigns" in text and "(median of 5 campaigns" not in text

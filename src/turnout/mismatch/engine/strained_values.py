@@ -42,9 +42,10 @@ def strained_value(case: Case, fit: Fit, threshold: float) -> StrainedValue | No
 
     .. math:: z^2 / 2, \quad z = (\eta - \mu) / \sqrt{\sigma^2 - s^2}
 
-    nats are paid (a conflict of prior and data: Evans and Moshonas 2006, Bayesian Analysis 1, 893). The largest of n
-    counts if that exceeds the threshold by :math:`\ln n`. Values that the data say nothing of, values of a single
-    recording, those with many alike, such as the stiffness of each railpad, those of waves and of the running surface,
+    nats are paid (a conflict of prior and data: Evans and Moshonas 2006, Bayesian Analysis 1, 893). Of a value that is
+    fixed to nothing known, s = 0: its tolerance may be rough. The largest of n counts if it exceeds the threshold by
+    :math:`\ln n`. Values that the data say nothing of, values of a single recording, those with many alike, such as the
+    stiffness of each railpad, those of waves and of the running surface,
     and those that an effect of the library describes as well are left out: the first are no property of the track, one
     of many is often far from its mean, and the last are judged as effects.
 
@@ -74,7 +75,7 @@ def strained_value(case: Case, fit: Fit, threshold: float) -> StrainedValue | No
         if variance_share >= THRESHOLDS.uninformed_sd_share**2:
             continue
         deviation = abs(fit.values[nuisance.name] - nuisance.mean) / nuisance.sd
-        determined = 1.0 - variance_share if nuisance.at else 1.0  # tolerances of other systems may be rough
+        determined = 1.0 - variance_share if nuisance.at else 1.0
         nats = float(0.5 * deviation**2 / determined - np.log(len(shared)))
         if nats > (threshold if strained is None else strained.nats):
             strained = StrainedValue(nuisance, float(deviation), nats)
