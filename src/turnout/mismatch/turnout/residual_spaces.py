@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     from turnout.mismatch.turnout.receptance_sensitivity import ReceptanceSensitivity
 
 
-COMMON_NAMES = [name for name, *_ in COMMON_PARAMETERS]
-COMMON_VALUES, RAIL_VALUES = ("pad_stiffness", "ballast_stiffness"), tuple(name for name, _ in RAIL_SDS)
+_COMMON_NAMES = [name for name, *_ in COMMON_PARAMETERS]
+_COMMON_VALUES, _RAIL_VALUES = ("pad_stiffness", "ballast_stiffness"), tuple(name for name, _ in RAIL_SDS)
 
 
 def source_spaces(case: TrackCase, fit: Fit) -> Iterator[ResidualSpace]:
@@ -159,13 +159,13 @@ def _whole_track_changes(
     the compression of the pads, a rail soft in shear by its shear strain. Values without influence are left out.
     """
     sensitivity_of, terms = case.predictor.pair_sensitivities(fit.values, case.all_terms(fit)), case.all_terms(fit)
-    by_value: dict[str, list[np.ndarray]] = {name: [] for name in (*COMMON_VALUES, *RAIL_VALUES)}
+    by_value: dict[str, list[np.ndarray]] = {name: [] for name in (*_COMMON_VALUES, *_RAIL_VALUES)}
     for _, pair in pairs:
         sensitivity, channel = sensitivity_of(pair), case.predictor.channel_response(fit.values, terms, pair)
         common, rail = sensitivity.gradient(pair), sensitivity.rail_gradient(pair)
-        for name in COMMON_VALUES:
-            by_value[name].append(common[:, COMMON_NAMES.index(name)] * channel)
-        for k, name in enumerate(RAIL_VALUES):
+        for name in _COMMON_VALUES:
+            by_value[name].append(common[:, _COMMON_NAMES.index(name)] * channel)
+        for k, name in enumerate(_RAIL_VALUES):
             by_value[name].append(rail[:, k] * channel)
     return {name: changes for name, changes in by_value.items() if any(np.any(h) for h in changes)}
 
