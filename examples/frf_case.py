@@ -245,14 +245,16 @@ class FrfCase(Case):
                 v, shape = t.values, [t.values[f"shape_{s}"] for s in range(self.n_place)]
                 modes.append((np.exp(v["log_frequency"]), np.exp(v["log_damping"]), shape))
         loss = sum(t.values["share"] for t in terms if t.effect_type == "structural_damping")
+        frequencies, damping = (np.array([mode[i] for mode in modes])[:, None] for i in (0, 1))
+        shapes = np.array([shape for _, _, shape in modes])
+        width = 2j * damping * loss
         predictions = []
         for o in observations:
-            k, stretch = int(o.name.split()[1]) - 1, 1.0 + values[f"stretch@{o.name}"]
-            rows = np.zeros((self.n_sensor, self.frequency.size), dtype=complex)
-            for f, zeta, shape in modes:
-                x = self.frequency / (f * stretch)
-                line = -(x**2) / (1.0 - x**2 + 2j * zeta * ((1.0 - loss) * x + loss))
-                rows += np.outer(np.asarray(shape[: self.n_sensor]) * shape[self.impact_places[k]], line)
+            place, stretch = self.impact_places[int(o.name.split()[1]) - 1], 1.0 + values[f"stretch@{o.name}"]
+            x = self.frequency / (frequencies * stretch)
+            square = x**2
+            lines = square / (square - 1.0 - 2j * damping * (1.0 - loss) * x - width)
+            rows = (shapes[:, : self.n_sensor] * shapes[:, place, None]).T @ lines
             gain = 1.0 + values[f"hammer@{o.name}"]
             gain += sum(t.values["gain"] for t in terms if t.effect_type == "impact_gain" and t.where == o.name)
             predictions.append(split_complex(gain * self._through_sensors(rows, terms)))

@@ -185,7 +185,7 @@ class Case:
             else:
                 rank = last_rank[nuisance.owner] = last_rank.get(nuisance.owner, -1) + 1
                 groups.setdefault(("own", rank), []).append(k)
-        jacobians = [np.zeros((o.data.size, len(self.nuisances))) for o in observations]
+        jacobians = [np.zeros((o.data.size, len(self.nuisances)), order="F") for o in observations]
         for members in groups.values():
             shifted = dict(values)
             for k in members:
