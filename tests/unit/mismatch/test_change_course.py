@@ -8,6 +8,8 @@ from turnout.mismatch.calibrated import (
     GroupInformation,
     StateParameter,
     VisitInformation,
+    change_answer,
+    change_candidates,
     compare_onsets,
     estimate_history,
 )
@@ -110,3 +112,21 @@ def test_the_size_at_the_last_visit_is_that_of_exact_data():
     size, sd = courses_of(shown, EFFECT).last_size
     assert size == pytest.approx(0.8, abs=0.01) and sd < 0.02
     assert compare_onsets(shown, [EFFECT])[0].size[0] == pytest.approx(0.6, abs=0.01)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_an_answer_states_what_growth_has_reached_with_the_error_of_the_model(seed):
+    """Of growth that has ended: all of it, though half of the visits with it show less. The error of the model that is
+    constant changes with the value: at least a tenth of the change is uncertain, however exact the recordings are."""
+    times = tuple(0.5 * v for v in range(8))
+    reached = dict(zip(times, (0.0, 0.0, 0.0, -0.2, -0.4, -0.6, -0.8, -0.8)))
+    rng, visits = np.random.default_rng(seed), []
+    for v, time in enumerate(times):
+        y = reached[time] + 0.01 * rng.normal()
+        group = GroupInformation("A", 1, (PARAMETER.name,), np.array([[1e4]]), np.array([1e4 * y]))
+        visits.append(VisitInformation(f"v{v}", time, (group,)))
+    answer = change_answer([PARAMETER], visits, [], change_candidates([PARAMETER]), 12.0, 6.0)
+    assert "local_ballast" in answer.names
+    assert answer.total == pytest.approx(-0.8, abs=0.1) and answer.total_sd >= 0.1 * abs(answer.total)
+    assert answer.sd >= 0.1 * abs(answer.size)
+    assert answer.grows or (answer.size, answer.sd) == (answer.total, answer.total_sd)
