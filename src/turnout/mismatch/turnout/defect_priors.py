@@ -54,7 +54,7 @@ class PolygonPriors:
     """Polygonal wheels with waves in the band of the fit."""
 
     longest_wave: float = prior(1.0, "m", "limit of the waves searched", DEFECTS)
-    n_wavelengths: int = prior(100, "trials", "over 10 m neighbours differ by a third of a period", "numerical")
+    n_wavelengths: int = prior(115, "trials", "over 10 m neighbours differ by a third of a period", "numerical")
     fine_factors: tuple[float, float, int] = prior(
         (0.985, 1.015, 13), "-", "lowest, highest and number of factors of the wavelength, for its refinement",
         "numerical")
@@ -92,10 +92,10 @@ class GeometryPriors:
         ((1e-5, 0.0), (0.0, 1e-5)), "m", "sine and cosine of trial corrugation", "numerical")
     wavelength_ratio: float = prior(1.02, "-", "shortest trial wavelength over the shortest free wave", "numerical")
     longest_wave: float = prior(0.75, "m", "longest wave of trial corrugation", DEFECTS)
-    n_wavelengths: int = prior(34, "trials", "of the wavelength of corrugation", "numerical")
+    n_wavelengths: int = prior(40, "trials", "of the wavelength of corrugation", "numerical")
     half_lengths: tuple[float, ...] = prior((1.8, 3.2, 5.0), "m", "half the length of a corrugated stretch", DEFECTS)
     amplitude_sd: float = prior(3e-5, "m", "prior of the amplitude: corrugation that is ground away", EFFECT_SIZES)
-    n_independent_waves: float = prior(12.0, "wavelengths", "that can be distinguished by sensors 6 m apart", DEFECTS)
+    n_independent_waves: float = prior(14.0, "wavelengths", "that can be distinguished by sensors 6 m apart", DEFECTS)
     worn_nose_sharpness: float = prior(
         0.5, "-", "at which the fit of a worn nose starts: between a cosine and a kink", "convention"
     )

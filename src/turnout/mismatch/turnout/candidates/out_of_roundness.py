@@ -30,6 +30,7 @@ from turnout.mismatch.turnout.candidates.catalogue import candidate_of
 from turnout.mismatch.turnout.candidates.short_corrugation import response_energy
 from turnout.mismatch.turnout.defect_priors import CORRUGATION, POLYGONS, SHORT_POLYGONS
 from turnout.mismatch.turnout.priors import PASSAGE
+from turnout.mismatch.turnout.surface_priors import ROUGHNESS
 from turnout.mismatch.turnout.wave_response import WaveTransfer
 from turnout.physics.hypothesis import Hypothesis
 from turnout.physics.out_of_round import MIN_AMPLITUDE
@@ -43,7 +44,7 @@ if TYPE_CHECKING:
 
 # (nats, train, wheel, wavelength [m], [(recording, cosine, sine)])
 WheelEvidence: TypeAlias = tuple[float, str, int, float, list[tuple[str, float, float]]]
-WAVELENGTHS = np.geomspace(PASSAGE.shortest_wave, POLYGONS.longest_wave, POLYGONS.n_wavelengths)  # m
+WAVELENGTHS = np.geomspace(ROUGHNESS.shortest_wave, POLYGONS.longest_wave, POLYGONS.n_wavelengths)  # m
 FINE_FACTORS = np.linspace(*POLYGONS.fine_factors)  # of the wavelength, for its refinement
 AMPLITUDES = np.geomspace(*POLYGONS.amplitudes)  # m, prior sd of cosine and sine
 

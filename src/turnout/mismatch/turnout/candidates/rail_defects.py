@@ -25,7 +25,7 @@ from turnout.mismatch.turnout.candidates.out_of_roundness import polygon_candida
 from turnout.mismatch.turnout.candidates.short_corrugation import short_corrugation_candidates
 from turnout.mismatch.turnout.candidates.wheel_flats import flat_candidates
 from turnout.mismatch.turnout.defect_priors import GEOMETRY
-from turnout.mismatch.turnout.priors import PASSAGE
+from turnout.mismatch.turnout.surface_priors import ROUGHNESS
 from turnout.physics.hypothesis import Hypothesis
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from turnout.mismatch.turnout.case import TrackCase
 
 WAVELENGTHS = np.geomspace(
-    GEOMETRY.wavelength_ratio * PASSAGE.shortest_wave, GEOMETRY.longest_wave, GEOMETRY.n_wavelengths
+    GEOMETRY.wavelength_ratio * ROUGHNESS.shortest_wave, GEOMETRY.longest_wave, GEOMETRY.n_wavelengths
 )  # m; shorter ones are no free waves
 
 
