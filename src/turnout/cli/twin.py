@@ -158,10 +158,12 @@ def _effect(answer: ModelAnswer) -> str:
     unit = "ln" if answer.unit == "-" and answer.group != "gain" else answer.unit
     names = " or ".join(answer.names).replace("_", " ")
     words = f"{names}, {answer.parameter} {answer.size:+.3g} ± {answer.sd:.2g} {unit}"
-    if not answer.grows:
-        return f"{words} ({math.exp(answer.size):.2g} times)" if unit == "ln" else words
-    assert answer.total is not None and answer.total_sd is not None
-    return f"{words} a year, {answer.total:+.3g} ± {answer.total_sd:.2g} {unit} so far"
+    reached = answer.size
+    if answer.grows:
+        assert answer.total is not None and answer.total_sd is not None
+        words = f"{words} a year, {answer.total:+.3g} ± {answer.total_sd:.2g} {unit} so far"
+        reached = answer.total
+    return f"{words} ({math.exp(reached):.2g} times)" if unit == "ln" else words
 
 
 def _strongest(model: CalibratedModel) -> Iterator[str]:

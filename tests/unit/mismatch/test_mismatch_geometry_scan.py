@@ -210,7 +210,7 @@ def test_corrugation_of_each_length_that_free_waves_hold_is_found(wavelength):
 
 
 def test_waves_of_the_rail_and_of_wheels_are_sought_from_the_shortest_free_wave_on():
-    """Neighbours of rail 3 % apart, of wheels 1.2 %: at 10 m a third of a period or a half at the shortest."""
+    """Neighbours of rail 3 % apart, of wheels 1.2 %: over 10 m half a period of the shortest."""
     shortest = Waves(PLACES, 0.0).lengths.min()
     for module, step in ((rail_defects, 0.03), (out_of_roundness, 0.0125)):
         lengths = module.WAVELENGTHS

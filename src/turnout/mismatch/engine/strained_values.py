@@ -45,9 +45,9 @@ def strained_value(case: Case, fit: Fit, threshold: float) -> StrainedValue | No
     nats are paid (a conflict of prior and data: Evans and Moshonas 2006, Bayesian Analysis 1, 893). Of a value that is
     fixed to nothing known, s = 0: its tolerance may be rough. The largest of n counts if it exceeds the threshold by
     :math:`\ln n`. Values that the data say nothing of, values of a single recording, those with many alike, such as the
-    stiffness of each railpad, those of waves and of the running surface,
-    and those that an effect of the library describes as well are left out: the first are no property of the track, one
-    of many is often far from its mean, and the last are judged as effects.
+    stiffness of each railpad, those of waves and of the running surface, and those that an effect of the library
+    describes as well are left out: the first are no property of the track, one of many is often far from its mean, and
+    the last are judged as effects.
 
     Parameters
     ----------

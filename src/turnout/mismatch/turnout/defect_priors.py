@@ -54,7 +54,7 @@ class PolygonPriors:
     """Polygonal wheels with waves in the band of the fit."""
 
     longest_wave: float = prior(1.0, "m", "limit of the waves searched", DEFECTS)
-    n_wavelengths: int = prior(115, "trials", "over 10 m neighbours differ by a third of a period", "numerical")
+    n_wavelengths: int = prior(115, "trials", "over 10 m neighbours differ by half a period at most", "numerical")
     fine_factors: tuple[float, float, int] = prior(
         (0.985, 1.015, 13), "-", "lowest, highest and number of factors of the wavelength, for its refinement",
         "numerical")
