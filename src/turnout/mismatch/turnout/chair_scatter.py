@@ -64,8 +64,10 @@ def chair_errors(predictor: Predictor, values: Values, pairs: Sequence[FrfPair])
     return errors
 
 
-def with_chair_errors(observation: Observation, pair: FrfPair, errors: np.ndarray) -> Observation:
-    """The observation with the errors by single chairs as modes.
+def with_chair_errors(observation: Observation, pair: FrfPair, errors: np.ndarray, n_alike: int = 1) -> Observation:
+    """The observation with the errors by single chairs as modes; several tests have them in common.
+
+    See ``lifting_chairs.with_lifting_error`` for the latter.
 
     Parameters
     ----------
@@ -75,10 +77,13 @@ def with_chair_errors(observation: Observation, pair: FrfPair, errors: np.ndarra
         Response channel of a hammer test.
     errors : (n_line, n_error) array of complex
         As of ``chair_errors``. [m/N]
+    n_alike : int
+        Tests with impacts at this position and this sensor.
 
     Returns
     -------
     Observation
     """
+    errors = np.sqrt(n_alike) * errors
     old = () if observation.modes is None else (observation.modes,)
     return replace(observation, modes=np.column_stack([*old, split_complex(scale_lines(pair, errors))]))

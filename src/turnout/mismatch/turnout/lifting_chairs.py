@@ -16,7 +16,7 @@ Chairs that press and do not pull: Bruni et al. 2009, Vehicle System Dynamics 47
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -214,8 +214,34 @@ def receptance_change(
     return np.asarray(-((press.signals - pull.signals) @ kernel.T) / (spectrum * (2.0 * np.pi * SHIFTED_LINES) ** 2))
 
 
-def with_lifting_error(observation: Observation, pair: FrfPair, change: np.ndarray) -> Observation:
-    """The observation with the error of a change as modes: a share of its size, smooth over frequency.
+def count_alike(pair: FrfPair, pairs: Iterable[FrfPair], reserved: Collection[str]) -> int:
+    """Number of tests that are fitted with impacts at the position of a pair and its sensor; the same chairs open.
+
+    Parameters
+    ----------
+    pair : FrfPair
+        Response channel of a hammer test.
+    pairs : iterable of FrfPair
+        Those of all tests, with this one.
+    reserved : collection of str
+        Tests that no fit uses.
+
+    Returns
+    -------
+    int
+        1 for a reserved test.
+    """
+    if pair.test.name in reserved:
+        return 1
+    alike = [p for p in pairs if (p.test.place, p.seat) == (pair.test.place, pair.seat)]
+    return sum(p.test.name not in reserved for p in alike)
+
+
+def with_lifting_error(observation: Observation, pair: FrfPair, change: np.ndarray, n_alike: int = 1) -> Observation:
+    r"""The observation with the error of a change as modes: a share of its size, smooth over frequency.
+
+    The same chairs open alike at each visit. So ``n_alike`` tests have one error in common, and their mean errs by it
+    as one test does. As errors of observations are independent, each has :math:`\sqrt n` times its size.
 
     Parameters
     ----------
@@ -225,6 +251,8 @@ def with_lifting_error(observation: Observation, pair: FrfPair, change: np.ndarr
         Response channel of a hammer test.
     change : (n_line,) array of complex
         Change by chairs that open. [m/N]
+    n_alike : int
+        Tests with impacts at this position and this sensor.
 
     Returns
     -------
@@ -234,7 +262,8 @@ def with_lifting_error(observation: Observation, pair: FrfPair, change: np.ndarr
     size = np.abs(receptance_observation.scale_lines(pair, change))
     if not np.any(size):
         return observation
-    size = RECEPTANCE.lifting_error * receptance_observation.local_rms(pair.frequency, size)
+    share = RECEPTANCE.lifting_error * np.sqrt(n_alike)
+    size = share * receptance_observation.local_rms(pair.frequency, size)
     errors = size[:, None] * receptance_observation.smooth_functions(pair.frequency)
     split = receptance_observation.split_complex
     old = () if observation.modes is None else (observation.modes,)

@@ -16,7 +16,7 @@ from turnout.mismatch.turnout.campaign import CampaignInput, HammerInput, Passag
 from turnout.mismatch.turnout.chair_scatter import chair_errors, with_chair_errors
 from turnout.mismatch.turnout.disturbances import Disturbance, disturbances
 from turnout.mismatch.turnout.hammer_case import HammerCase
-from turnout.mismatch.turnout.lifting_chairs import lifting_chairs, with_lifting_error
+from turnout.mismatch.turnout.lifting_chairs import count_alike, lifting_chairs, with_lifting_error
 from turnout.mismatch.turnout.passage_alignment import PassageAligner, fit_surface
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.passage_observation import AlignedPassage
@@ -257,26 +257,29 @@ def _fit_hammer_start(
     values = {n.name: n.mean for n in nuisances}
     if all(name in reserved for name, _ in tests.observations):
         return predictor, tests, {}
-    predictor, with_errors_of_chairs = _with_lifting_chairs(predictor, tests, values)
+    predictor, with_errors_of_chairs = _with_lifting_chairs(predictor, tests, values, reserved)
     for last in [False, True] if predictor.lifting else [True]:
         fitted = [o for name, o in with_errors_of_chairs.observations if name not in reserved]
         values = HammerCase(predictor, fitted, nuisances).fit_from_priors()
         if not last:
-            predictor, with_errors_of_chairs = _with_lifting_chairs(predictor, tests, values)
+            predictor, with_errors_of_chairs = _with_lifting_chairs(predictor, tests, values, reserved)
     return predictor, with_errors_of_chairs, values
 
 
-def _with_lifting_chairs(predictor: Predictor, tests: ObservedTests, values: Values) -> tuple[Predictor, ObservedTests]:
+def _with_lifting_chairs(
+    predictor: Predictor, tests: ObservedTests, values: Values, reserved: Collection[str]
+) -> tuple[Predictor, ObservedTests]:
     """Predictor and tests with chairs that open and differ, on the track of ``values``; the same without chairs."""
     zone, pairs = predictor.site.nominal, list(tests.frf_pairs.values())
     lifting = lifting_chairs(track_with(with_rail(zone, values).turnout.track_of("main"), zone, values), pairs)
     if lifting is None:
         return predictor, tests
     errors = chair_errors(predictor, values, pairs)
-    observations = [
-        (name, with_chair_errors(with_lifting_error(o, pair, lifting.change(pair, ())), pair, errors[pair.name]))
-        for (name, o), pair in zip(tests.observations, pairs)
-    ]
+    observations = []
+    for (name, o), pair in zip(tests.observations, pairs):
+        n = count_alike(pair, pairs, reserved)
+        lifted = with_lifting_error(o, pair, lifting.change(pair, ()), n)
+        observations.append((name, with_chair_errors(lifted, pair, errors[pair.name], n)))
     return predictor.with_lifting(lifting), replace(tests, observations=tuple(observations))
 
 

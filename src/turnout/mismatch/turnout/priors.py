@@ -135,7 +135,7 @@ class ReceptancePriors:
         0.1, "-", "relative error in the first, broad fit: its optimum has a wide basin", PRESCREEN)
     lifting_rate: float = prior(5e3, "Hz", "steps of an impact that opens slide chairs: five for a period", "numerical")
     lifting_error: float = prior(
-        0.5, "share of the change", "by chairs that open: the file has neither their gaps nor the section at the toe",
+        0.65, "share of the change", "by chairs that open, rms of 81 receptances of five intact panels",
         SWITCH_PANELS)
     tangent_motion: float = prior(1e-6, "m", "under an impact, for the secant of a port", FRICTION)
     free_rate: float = prior(
