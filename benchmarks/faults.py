@@ -20,6 +20,7 @@ import sys
 import tempfile
 import time
 import traceback
+from importlib import import_module
 from pathlib import Path
 
 from turnout.config import load_configuration
@@ -229,6 +230,15 @@ def in_child(function, arm=None):
     with os.fdopen(reader, "rb") as stream:
         content = stream.read()
     return status, json.loads(content) if content else {}
+
+
+def import_what_a_night_needs(fleet):
+    """Import here what a night imports, so that the process of each night has it already."""
+    fleet.make()
+    before = set(sys.modules)
+    _, answer = in_child(lambda: [fleet.calm_night(), sorted(set(sys.modules) - before)][1])
+    for name in answer["value"]:
+        import_module(name)
 
 
 class Seeds:
@@ -450,6 +460,7 @@ def main():
     """Worker: one line of JSON per seed."""
     folder, first, end, step = Path(sys.argv[1]), *map(int, sys.argv[2:5])
     use_small_schema()
+    import_what_a_night_needs(Fleet(folder / "fleet"))
     seeds = Seeds(folder)
     for seed in range(first, end, step):
         keys = ("kind", "scenario", "problem", "is_identical", "said")

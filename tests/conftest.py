@@ -1,11 +1,15 @@
-"""Shared by all tests: one BLAS thread, and the folder of other people's recordings where it exists."""
+"""Shared by all tests: one BLAS thread, byte code kept, and the folder of other people's recordings if it exists."""
 
 import gc
 import os
+import sys
 from pathlib import Path
 
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
+# As in an installation: otherwise every process that a test starts compiles the package again.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 import pytest
 

@@ -1,19 +1,24 @@
 """Compile kernels with numba and cache their machine code in a writable folder, as long as it is up to date."""
 
+from __future__ import annotations
+
+import hashlib
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from numba import config, njit
 
 from turnout.fingerprint import fingerprint
 
-Function = TypeVar("Function", bound=Callable)
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+Function = TypeVar("Function", bound="Callable")
 FASTMATH_FLAGS = {"contract", "reassoc", "nsz", "arcp"}
 # numba only checks whether the file of the function itself has changed. But a kernel contains the code of the kernels
 # it calls and the constants they import. So the cache folder has the fingerprint of all modules with kernels.
@@ -144,10 +149,60 @@ def _remove_older_caches(folder: Path) -> None:
             shutil.rmtree(older, ignore_errors=True)
 
 
+class CodeLocator:
+    """Where numba keeps the machine code of a function: by its source, not by the folder in which that lies.
+
+    So equal code is compiled once for all installations that share a cache folder. It has the methods of numba's own
+    locators, of which each names the folder of the source.
+
+    Parameters
+    ----------
+    folder : str
+        The cache folder.
+    source : bytes
+        Content of the file of the function.
+    line : int
+        First line of the function.
+    """
+
+    def __init__(self, folder: str, source: bytes, line: int) -> None:
+        self._stamp, self._line = hashlib.sha256(source).hexdigest(), line
+        self._folder = os.path.join(folder, self._stamp[:16])
+
+    @classmethod
+    def from_function(cls, function: Callable, path: str) -> CodeLocator | None:
+        """Locator of a function in a file; None if the file cannot be read or the cache folder not be written."""
+        try:
+            locator = cls(config.CACHE_DIR, Path(path).read_bytes(), function.__code__.co_firstlineno)  # type: ignore[attr-defined]
+            locator.ensure_cache_path()
+        except OSError:
+            return None
+        return locator
+
+    def ensure_cache_path(self) -> None:
+        """Make the folder, and raise an OSError if nothing can be written there."""
+        os.makedirs(self._folder, exist_ok=True)
+        tempfile.TemporaryFile(dir=self._folder).close()
+
+    def get_cache_path(self) -> str:
+        """Folder of the machine code."""
+        return self._folder
+
+    def get_source_stamp(self) -> str:
+        """Hash of the source; machine code with another one is compiled again."""
+        return self._stamp
+
+    def get_disambiguator(self) -> str:
+        """Difference between functions of the same name in one file."""
+        return str(self._line)
+
+
 @contextmanager
 def _numba_cache(folder: Path) -> Iterator[None]:
-    before, config.CACHE_DIR = config.CACHE_DIR, str(folder)  # type: ignore[attr-defined]
+    settings = {"CACHE_DIR": str(folder), "CACHE_LOCATOR_CLASSES": f"{__name__}.{CodeLocator.__name__}"}
+    before = {name: getattr(config, name, "") for name in settings}
+    vars(config).update(settings)
     try:
         yield
     finally:
-        config.CACHE_DIR = before  # type: ignore[attr-defined]
+        vars(config).update(before)

@@ -13,6 +13,7 @@ import zipfile
 import pytest
 
 import turnout
+from turnout.kernel_cache import cache_folder
 
 NOT_SOURCE = shutil.ignore_patterns(
     ".?*", "build", "dist", "results", "work", "raw", "truth", "demo", "real", "logs", "__pycache__", "*.egg-info"
@@ -74,6 +75,8 @@ def installed(archives, tmp_path_factory):
     (site / "dependencies.pth").write_text("\n".join(p for p in sys.path if p.endswith("-packages")) + "\n")
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     environment |= {"PATH": f"{python.parent}{os.pathsep}{os.environ['PATH']}"}
+    if kernels := cache_folder():  # the code is the same, and it takes a minute to compile
+        environment |= {"NUMBA_CACHE_DIR": str(kernels.parent)}
 
     def call(program, *options, cwd=".", check=True):
         done = subprocess.run(

@@ -90,8 +90,8 @@ def test_a_borrowing_kernel_cannot_create_an_array():
         kernel_cache.borrowing_kernel(fresh_row)(np.ones((2, 3)))
 
 
-def run(environment):
-    done = subprocess.run([sys.executable, "-c", RUN], env=os.environ | environment, capture_output=True, text=True)
+def run(environment, code=RUN):
+    done = subprocess.run([sys.executable, "-c", code], env=os.environ | environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -102,6 +102,19 @@ def test_the_users_own_setting_comes_first_and_is_used_again(tmp_path):
     assert len(kept) == 1 and next(p.name for p in tmp_path.iterdir()).startswith("kernels-")
     assert run({"NUMBA_CACHE_DIR": str(tmp_path)}) == first
     assert {p: p.stat().st_mtime_ns for p in tmp_path.rglob("*.nbc")} == kept
+
+
+def test_equal_code_in_another_folder_is_not_compiled_again(tmp_path):
+    """Two installations of one version, and a changed one, with a common cache folder."""
+    text = "from turnout.kernel_cache import kernel\n\n\n@kernel\ndef twice(x):\n    return 2 * x\n"
+    n_compiled = []
+    for name, source in (("a", text), ("b ü", text), ("c", text.replace("2 *", "3 *"))):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "some_kernel.py").write_text(source)
+        code = f"import sys; sys.path.append({str(tmp_path / name)!r}); import some_kernel as k; print(k.twice(4))"
+        assert run({"NUMBA_CACHE_DIR": str(tmp_path / "cache")}, code) == f"{12 if name == 'c' else 8}\n"
+        n_compiled.append(len(list((tmp_path / "cache").rglob("*.nbc"))))
+    assert n_compiled == [1, 1, 2]
 
 
 @pytest.fixture
