@@ -150,14 +150,18 @@ def test_what_the_fit_without_an_effect_had_not_come_to_is_no_evidence_for_the_e
 
 
 @pytest.mark.parametrize(
-    ("scanned", "promised", "gain", "begun"),
-    [(1, 3.0, 5.0, 6.0), (1, 7.0, 5.0, 9.0), (1, 3.0, 13.0, None), (30, 3.0, 5.0, None)],
-)
+    ("scanned", "promised", "gain", "begun", "cheap_gain"),
+    [
+        (1, 3.0, 5.0, 6.0, None), (1, 7.0, 5.0, 9.0, None), (1, 3.0, 13.0, None, None), (30, 3.0, 5.0, None, None),
+        (1, 3.0, 5.0, None, 5.1), (1, 3.0, 5.0, 6.0, 10.1), (1, 3.0, 5.0, 6.0, -1.0),
+    ],
+)  # fmt: skip
 def test_a_law_of_the_whole_track_that_gains_too_little_is_begun_again_farther_out(
-    monkeypatch, scanned, promised, gain, begun
+    monkeypatch, scanned, promised, gain, begun, cheap_gain
 ):
     """At twice its promise or at its bound, 9, from where the base fit is and with what that may have bent at its
-    prior; what gains most counts. What has a name or a place is left alone."""
+    prior; what gains most counts. What has a name or a place is left alone, and what a fit to the hammer tests has
+    placed, if the refit keeps half of what it gained there."""
     candidate = SimpleNamespace(
         key="a",
         site=EffectSite(n_scanned=scanned),
@@ -182,7 +186,8 @@ def test_a_law_of_the_whole_track_that_gains_too_little_is_begun_again_farther_o
     monkeypatch.setattr(Search, "fit", fitted)
     monkeypatch.setattr(refit, "_refit", lambda *a: first)
     monkeypatch.setattr(refit, "score_of", lambda search, fit, refit, *a: SimpleNamespace(gain=refit.gain))
-    entry = RefitTask(candidate, np.array([promised]), {})
+    placed = {} if cheap_gain is None else {"pads": 0.7}
+    entry = RefitTask(candidate, np.array([promised]), placed, cheap_gain or 0.0)
     score = refit._score_task(Search(case), fit, entry)
     assert starts == ([] if begun is None else [(begun, 0.7, 0.5, 0.1), (begun, 0.2, 0.5, 0.1)])
     assert score.gain == (gain if begun is None else 18.0)

@@ -261,12 +261,17 @@ def _score_task(search: Search, fit: Fit, task: RefitTask, best_gain: float = 0.
     if not search.case.expensive:
         return score
     whole_track = candidate.site.n_scanned == 1 and candidate.refit.from_base
-    if whole_track and score.gain < threshold:
+    if whole_track and score.gain < threshold and not _keeps_cheap_gain(task, score):
         score = max(score, _score_from_farther(search, fit, task, score, key), key=lambda s: s.gain)
     min_cheap_gain = max(threshold, THRESHOLDS.min_held_share * best_gain if is_channel else 0.0)
     if score.gain < THRESHOLDS.min_held_share * task.cheap_gain and task.cheap_gain > min_cheap_gain:
         return _polish(search, fit, score)
     return score
+
+
+def _keeps_cheap_gain(task: RefitTask, score: Score) -> bool:
+    """Whether a refit from a fit to the cheap observations, which begins at the priors, keeps half of its gain."""
+    return bool(task.values) and 0.0 < THRESHOLDS.min_held_share * task.cheap_gain <= score.gain
 
 
 def _score_from_farther(search: Search, fit: Fit, task: RefitTask, score: Score, key: str) -> Score:
