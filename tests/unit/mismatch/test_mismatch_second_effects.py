@@ -12,7 +12,7 @@ from turnout.mismatch.engine.candidate_search import is_same_site
 from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.channel_levels import is_lone_excess, worst_channel_excess
 from turnout.mismatch.engine.cross_validation import signature_overlap, single_type_estimate
-from turnout.mismatch.engine.evidence import score_of
+from turnout.mismatch.engine.evidence import explained_share, score_of
 from turnout.mismatch.engine.findings import Findings
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
@@ -240,6 +240,26 @@ def test_an_excess_of_one_channel_in_one_recording_belongs_to_the_recording(mean
     white = [o.data for o in case.observations]
     assert is_lone_excess(case, SimpleNamespace(white=white)) is is_lone
     assert worst_channel_excess(case, SimpleNamespace(white=white)) == pytest.approx(0.5 * np.max(mean_squares))
+
+
+@pytest.mark.parametrize(
+    ("mean_squares", "gained_there", "share"),
+    [
+        (((9.2, 2.3), (0.5, 0.4), (1.9, 0.2)), 0.0, 1.0),  # one recording alone: no name has to explain it
+        (((9.2, 2.3), (0.5, 0.4), (1.9, 0.2)), 9.0, 0.04),  # most of the evidence is in that recording
+        (((9.2, 0.3), (2.4, 0.4), (1.9, 0.2)), 0.0, 0.0),  # two recordings show it
+        (((9.2, 0.3), (0.5, 0.4)), 0.0, 0.0),  # one other passage is no witness
+    ],
+)
+def test_a_name_need_not_explain_what_one_recording_has_alone(mean_squares, gained_there, share):
+    """Wheels that leave a nose make one fast passage loud. Heavy wheelsets with 39 nats lost their name to that."""
+    case = Passages(*mean_squares)
+    white = [o.data for o in case.observations]
+    rest = [white[0] * np.sqrt(1.0 - 2.0 * gained_there / np.sum(white[0] ** 2)), *white[1:]]
+    common = {"level": {"passage": 0.3}, "scale": {"passage": 1.0}, "candidates": ()}
+    fit = SimpleNamespace(white=white, evidence=0.0, **common)
+    refit = SimpleNamespace(white=rest, evidence=20.0, **common)
+    assert explained_share(Search(case), fit, refit) == pytest.approx(share, abs=0.01)
 
 
 def test_beside_a_name_such_an_excess_is_no_second_effect():

@@ -27,11 +27,35 @@ def worst_channel_excess(case: Case, fit: Fit) -> float:
     float
         0 if no data type has such a control level.
     """
-    ratios = [0.0]
-    for o, white in zip(case.observations, fit.white):
-        if o.data_type in case.cell_level:
-            ratios += list(channel_mean_squares(o, white) / case.cell_level[o.data_type])
-    return float(max(ratios))
+    return max(_recording_excesses(case, fit).values(), default=0.0)
+
+
+def loud_recording(case: Case, fit: Fit) -> int | None:
+    """The recording that alone has a channel above the level of controls.
+
+    Parameters
+    ----------
+    case : Case
+    fit : Fit
+
+    Returns
+    -------
+    int or None
+        Its number. None if no recording is above the level, or several are, or fewer than ``min_witnesses`` others
+        could show it.
+    """
+    excesses = _recording_excesses(case, fit)
+    above = [k for k, excess in excesses.items() if excess > 1.0]
+    return above[0] if len(above) == 1 and len(excesses) > THRESHOLDS.min_witnesses else None
+
+
+def _recording_excesses(case: Case, fit: Fit) -> dict[int, float]:
+    """Largest mean square of a channel over that of controls, by the number of each recording with such a level."""
+    return {
+        k: float(np.max(channel_mean_squares(o, white), initial=0.0)) / case.cell_level[o.data_type]
+        for k, (o, white) in enumerate(zip(case.observations, fit.white))
+        if o.data_type in case.cell_level
+    }
 
 
 def channel_mean_squares(observation: Observation, white: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from turnout.mismatch.engine.channel_levels import worst_channel_excess
+from turnout.mismatch.engine.channel_levels import loud_recording, worst_channel_excess
 from turnout.mismatch.engine.cross_validation import held_out_score, single_type_estimate, weighted_mean_square
 from turnout.mismatch.engine.decision import judge
 from turnout.mismatch.engine.decision_facts import is_contradicted, likeliest
@@ -30,8 +30,9 @@ if TYPE_CHECKING:
 def explained_share(search: Search, fit: Fit, refit: Fit) -> float:
     """Share of the excess over the control level that ``refit`` removes, 1 if there is none.
 
-    For a first effect without excess in any data type, the excess of the worst channel counts. Beside a name that
-    excess may be the residual of the name, which a second effect need not explain.
+    For a first effect without excess in any data type, the excess of the worst channel counts, unless one recording has
+    it alone and the evidence of the others suffices. Beside a name that excess may be the residual of the name, which a
+    second effect need not explain.
 
     Parameters
     ----------
@@ -46,8 +47,23 @@ def explained_share(search: Search, fit: Fit, refit: Fit) -> float:
     control = _control_levels(search, fit)
     before, after = _total_excess(fit.level, control), _total_excess(refit.level, control)
     if before == 0.0 and not fit.candidates:
+        if _stands_without_loud_recording(search, fit, refit):
+            return 1.0
         before, after = (max(0.0, worst_channel_excess(search.case, f) - 1.0) for f in (fit, refit))
     return 1.0 - after / before if before > 0.0 else 1.0
+
+
+def _stands_without_loud_recording(search: Search, fit: Fit, refit: Fit) -> bool:
+    """Whether one recording alone has an excess, and the others have enough evidence for a name.
+
+    An effect of track or sensor shows in others too. What ``refit`` gains in that recording does not count.
+    """
+    k = loud_recording(search.case, fit)
+    if k is None:
+        return False
+    o = search.case.observations[k]
+    gained = 0.5 * o.effective * float(np.sum(fit.white[k] ** 2) - np.sum(refit.white[k] ** 2)) / fit.scale[o.data_type]
+    return refit.evidence - fit.evidence - max(0.0, gained) > search.settings.threshold
 
 
 def _control_levels(search: Search, fit: Fit) -> dict[str, float]:
