@@ -48,6 +48,7 @@ ALLOWED = {
 ALLOWED["report"] = set(ALLOWED) | {"report"}
 ALLOWED["demo"] = set(ALLOWED) | {"demo"}
 ALLOWED["cli"] = set(ALLOWED) | {"cli"}
+ALLOWED["__main__"] = {"cli"}
 ALLOWED["api"] = set(ALLOWED) | {"api"}
 OPENS_FILES = LOWEST | {
     "former_names",

@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Fit and print.
+    """Fit and print; exit code 1 if the fit does not meet the tests or resonances.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
         missing = sorted(fit.targets.keys() - fit.fitted.keys())
         missed = f"has no resonance in the band {', '.join(missing)}" if missing else ""
         print(_track_entry(args.section, fit.values, {}, missed))
-        return 0
+        return 1 if missed else 0
     calibration = calibrate_to_files(track, args.section, args.files, args.turnout, args.configuration)
     print(calibration)
     missed = (
@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
     )
     values = {name: value for name, value in calibration.values.items() if missed or calibration.is_determined(name)}
     print(_track_entry(args.section, values, calibration.sd, missed))
-    return 0
+    return 1 if missed else 0
 
 
 def _track_entry(section: str, values: Mapping[str, float], sd: Mapping[str, float], missed: str) -> str:
@@ -113,6 +113,7 @@ MAX_FREQUENCY = 5000.0  # Hz, above every resonance of a track that an impact ex
 
 def _target_modes(modes: Iterable[str]) -> dict[str, tuple[float, float]]:
     from turnout.errors import SimulationError
+    from turnout.modal.bands import MAIN_BANDS
 
     targets = {}
     for mode in modes:
@@ -127,6 +128,10 @@ def _target_modes(modes: Iterable[str]) -> dict[str, tuple[float, float]]:
             )
             remedy = f"Write a frequency above 0 Hz, up to {MAX_FREQUENCY:g} Hz, and a damping ratio between 0 and 1"
             raise SimulationError(f"{problem}. {remedy}.")
+        if band not in MAIN_BANDS:
+            raise SimulationError(f"--modes {mode!r}: no resonance {band!r}. Write {' or '.join(MAIN_BANDS)}.")
+        if band in targets:
+            raise SimulationError(f"--modes {mode!r}: {band} for the second time. Give each resonance once.")
         targets[band] = (frequency, damping)
     if {"ballast", "railpad"} <= targets.keys() and targets["ballast"][0] >= targets["railpad"][0]:
         raise SimulationError("--modes: the ballast resonance lies below the railpad resonance. Exchange the two.")

@@ -57,10 +57,16 @@ def run(args: argparse.Namespace) -> int:
     int
         Exit code.
     """
+    from pathlib import Path
+
+    from turnout.errors import ConfigError
     from turnout.files import write_text
     from turnout.report.comparison_page import comparison_page, spectra_csv
     from turnout.stages.compare import compare_passage
 
+    for option in ("out", "csv"):
+        if (name := getattr(args, option)) and Path(name).is_dir():
+            raise ConfigError(name, f"--{option}", "it is a folder", "Write the name of a file")
     comparison = compare_passage(
         args.file,
         args.turnout,

@@ -86,8 +86,12 @@ def run(args: argparse.Namespace) -> int:
     int
         Exit code.
     """
+    from turnout.errors import ConfigError
     from turnout.stages.mismatch_results import Results
 
+    for option in () if args.accept else ("finding", "anyway"):
+        if getattr(args, option):
+            raise ConfigError(f"--{option}", "option", "it acts with --accept only", "Add --accept, or leave it out")
     results = Results(args.work, args.turnout, args.registry)
     if args.accept:
         return _accept(args, results)

@@ -42,6 +42,7 @@ def run(args: argparse.Namespace) -> int:
 
     folder = Path(args.folder)
     written = create_project(folder)
-    command = f"cd {shlex.quote(str(folder))}"
+    path = f"./{folder}" if str(folder).startswith("-") else str(folder)  # "cd -x" would be an option of cd
+    command = f"cd {shlex.quote(path)}"
     print(f"{folder}: {len(written)} files. Its README.md says in seven steps how to go on; first: {command}")
     return 0

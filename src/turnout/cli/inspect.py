@@ -6,7 +6,8 @@
 
 For each file it shows the format, records, times, the sampling rate with every line that states it, the channels with
 units and extremes, which channel may be force or response, and impacts or trains. A folder gives one line per file.
---plot draws every channel into <name of the file>.svg in the present folder. Nothing else is written.
+--plot draws every channel into <name of the file>.svg in the present folder, for files of the same name with that of
+their folders before it. Nothing else is written.
 
 Exit code 1 if a file cannot be read or has a problem.
 """
@@ -19,7 +20,7 @@ from typing import TYPE_CHECKING
 from turnout.cli.options import add_result
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator
     from pathlib import Path
 
 GROUP = "Look at recordings"
@@ -51,7 +52,6 @@ def run(args: argparse.Namespace) -> int:
     int
         Exit code.
     """
-    from pathlib import Path
 
     from turnout.errors import ReadError
     from turnout.report.contents_figure import contents_figure
@@ -60,6 +60,7 @@ def run(args: argparse.Namespace) -> int:
     from turnout.stages.file_contents import file_contents
 
     is_sound, values = True, []
+    drawings: set[Path] = set()
     for path, is_in_folder in _files(args.file):
         try:
             contents = file_contents(path)
@@ -72,15 +73,29 @@ def run(args: argparse.Namespace) -> int:
         values.append(contents_values(contents))
         print(contents_summary(contents) if is_in_folder else "\n".join(contents_lines(contents)))
         if args.plot:
-            drawing = Path(f"{path.name}.svg")
+            drawing = _drawing_name(path, drawings)
+            drawings.add(drawing)
             replace_page(drawing, contents_figure(contents))
             print(f"  figure     {drawing}")
     add_result(args, values)
     return 0 if is_sound else 1
 
 
+def _drawing_name(path: Path, taken: Collection[Path]) -> Path:
+    """Name of the drawing of a file, with as many of its folders before it as tell it from those ``taken``."""
+    from pathlib import Path
+
+    parts = [part for part in path.absolute().parts if part != path.anchor]
+    names = (Path("_".join(parts[-n:]) + ".svg") for n in range(1, len(parts) + 1))
+    return next((name for name in names if name not in taken), Path(f"{path.name}.svg"))
+
+
 def _files(names: list[str]) -> Iterator[tuple[Path, bool]]:
-    """(file, whether it was found in a folder), those of a folder in the order of their names."""
+    """(file, whether it was found in a folder), those of a folder in the order of their names.
+
+    Links that lead to nothing and folders that cannot be listed are among them: reading them gives the reason.
+    """
+    import os
     from pathlib import Path
 
     from turnout.errors import ReadError
@@ -90,7 +105,11 @@ def _files(names: list[str]) -> Iterator[tuple[Path, bool]]:
         if not path.is_dir():
             yield path, False
             continue
-        inside = sorted(p for p in path.rglob("*") if p.is_file() and not p.name.startswith("."))
-        if not inside:
+        closed: list[OSError] = []
+        walk = os.walk(path, onerror=closed.append)
+        inside = sorted(Path(folder, file) for folder, _, files in walk for file in files if not file.startswith("."))
+        if not inside and not closed:
             raise ReadError(path, "the path", "the folder holds no file", "Name another one", "empty")
         yield from ((file, True) for file in inside)
+        for error in closed:
+            raise error

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import json
 import logging
 import os
 import re
+import signal
 import sys
+import threading
 import time
 import traceback
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager, redirect_stdout, suppress
 from difflib import get_close_matches
 from importlib import import_module
 from io import StringIO
@@ -24,6 +27,7 @@ from turnout.threads import use_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
+    from types import FrameType
 
 # Exit codes. `turnout nightly` also ends with that of Snakemake, and with 124 at its limit of time.
 DONE, PROBLEM_FOUND, NOT_FOLLOWED, PROGRAM_FAULT, INTERRUPTED = 0, 1, 2, 3, 130
@@ -97,22 +101,39 @@ def main(argv: Sequence[str] | None = None) -> int:
     int
         Exit code, see ``EXIT_CODES``.
     """
+    _prepare_output()
+    try:
+        return _main(sys.argv[1:] if argv is None else argv)
+    except KeyboardInterrupt:  # outside the command itself, as while its modules are loaded
+        print("turnout: interrupted", file=sys.stderr)
+        return INTERRUPTED
+
+
+def _main(words: Sequence[str]) -> int:
     use_one_thread()
-    args = _parse(sys.argv[1:] if argv is None else argv)
+    args = _parse(words)
     started = time.monotonic()
     if args.quiet:
         os.environ["TQDM_DISABLE"] = "1"
     logging.basicConfig(
         level="ERROR" if args.quiet else "INFO" if args.verbose else "WARNING", format="%(levelname)s %(message)s"
     )
-    if args.json:
-        return _run_for_json(args)
-    code, message = _run(args)
+    code, message = _run_for_json(args) if args.json else _run(args)
     if message:
         print(f"turnout {args.command}: {message}", file=sys.stderr)
     if args.verbose:
         print(f"turnout {args.command}: exit code {code} after {time.monotonic() - started:.1f} s", file=sys.stderr)
     return code
+
+
+def _prepare_output() -> None:
+    """Write characters that the encoding of the terminal lacks as escapes; output to a closed stream goes nowhere."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))
+        elif hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
 
 
 def _parse(words: Sequence[str]) -> argparse.Namespace:
@@ -121,6 +142,11 @@ def _parse(words: Sequence[str]) -> argparse.Namespace:
     if not words:
         parser.print_help(sys.stderr)
         parser.exit(NOT_FOLLOWED)
+    if "" in words:  # an empty path would be the present folder, an empty option its default
+        place = words.index("")
+        behind = f", behind {words[place - 1]!r}," if place else ""
+        problem = f"turnout: argument {place + 1}{behind} is empty. Give it a value, or leave it out"
+        parser.exit(NOT_FOLLOWED, f"{problem}; if it is a variable of the shell, that has no value.\n")
     first = words[0]
     if not first.startswith("-") and first not in (commands := [name.replace("_", "-") for name in COMMANDS]):
         close = "".join(f" Did you mean {name!r}?" for name in get_close_matches(first, commands, n=1))
@@ -133,20 +159,69 @@ def _parse(words: Sequence[str]) -> argparse.Namespace:
 
 def _run(args: argparse.Namespace) -> tuple[int, str]:
     """Exit code of a command and the message of its error, "" without one."""
+    interrupts: list[int] = []
     try:
-        return args.run(args) or DONE, ""
+        with _noted_interrupts(interrupts):
+            code = args.run(args) or DONE
+            _flush_output()
+        return code, ""
     except BrokenPipeError:
+        _discard_output()
         return DONE, ""
     except KeyboardInterrupt:
         return INTERRUPTED, "interrupted"
     except (TurnoutError, OSError) as error:
         if args.verbose:
             traceback.print_exc()
-        return NOT_FOLLOWED, _message(error, args)
+        message = _message(error, args)
+        try:
+            _flush_output()
+        except OSError:  # as at the error itself: what is left cannot be written either
+            _discard_output()
+        return NOT_FOLLOWED, message
     except Exception as error:
+        if interrupts:  # a library that turned the interrupt into an exception of its own
+            return INTERRUPTED, "interrupted"
+        if isinstance(error.__context__, OSError) and error.__context__.errno == errno.ELOOP:  # of Path.resolve
+            return NOT_FOLLOWED, _message(error.__context__, args)
         traceback.print_exc()
         fault = f"{type(error).__name__}: {error}"
         return PROGRAM_FAULT, f"a fault of the program, {fault}. Please report it with the lines above"
+
+
+@contextmanager
+def _noted_interrupts(numbers: list[int]) -> Iterator[None]:
+    """Add each SIGINT to ``numbers`` and raise KeyboardInterrupt, as without this context."""
+
+    def note(number: int, frame: FrameType | None) -> None:
+        numbers.append(number)
+        raise KeyboardInterrupt
+
+    before = signal.getsignal(signal.SIGINT)
+    is_ours = before is signal.default_int_handler and threading.current_thread() is threading.main_thread()
+    if is_ours:
+        signal.signal(signal.SIGINT, note)
+    try:
+        yield
+    finally:
+        if is_ours:
+            signal.signal(signal.SIGINT, before)
+
+
+def _flush_output() -> None:
+    """Write what is buffered; the OSError of a full disk names standard output."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, "standard output") from error
+
+
+def _discard_output() -> None:
+    """Let what is still buffered go nowhere, so that the end of the process reports no second fault."""
+    with suppress(OSError, ValueError, AttributeError), open(os.devnull, "wb") as nowhere:
+        os.dup2(nowhere.fileno(), sys.stdout.fileno())
 
 
 def _message(error: TurnoutError | OSError, args: argparse.Namespace) -> str:
@@ -156,12 +231,16 @@ def _message(error: TurnoutError | OSError, args: argparse.Namespace) -> str:
         return re.sub(pattern, "", str(error), flags=re.MULTILINE)
     paths = getattr(args, "file", None) or ()  # a fault while reading names no file
     name = error.filename or ", ".join(map(str, [paths] if isinstance(paths, str) else paths))
-    where = f"{name}: {error.strerror}" if name and error.strerror else str(error)
+    name = name or "standard output, or a file without a name"
+    where = f"{name}: {error.strerror}" if error.strerror else str(error)
     return f"{where}. Correct this, or name another file or folder, then run again."
 
 
-def _run_for_json(args: argparse.Namespace) -> int:
-    """Run a command and print one JSON object. Output of its subprocesses goes to standard error."""
+def _run_for_json(args: argparse.Namespace) -> tuple[int, str]:
+    """Run a command and print one JSON object. Output of its subprocesses goes to standard error.
+
+    The message of the command is part of the object; one is returned only if the object cannot be written.
+    """
     text = StringIO()
     with _standard_output_to_error(), redirect_stdout(text):
         code, message = _run(args)
@@ -172,8 +251,14 @@ def _run_for_json(args: argparse.Namespace) -> int:
         "result": args.result,
         "error": message or None,
     }
-    print(json.dumps(document, default=str, ensure_ascii=False, indent=1))
-    return code
+    is_utf8 = (sys.stdout.encoding or "").lower().replace("-", "") == "utf8"
+    printed = json.dumps(document, default=str, ensure_ascii=not is_utf8, indent=1)
+
+    def print_document(_: argparse.Namespace) -> int:
+        print(printed)
+        return code
+
+    return _run(argparse.Namespace(**{**vars(args), "run": print_document}))
 
 
 @contextmanager

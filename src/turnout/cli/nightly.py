@@ -63,8 +63,7 @@ def run(args: argparse.Namespace) -> int:
         _require_project(_configuration_folder(args.options))
     limit = None if args.limit_hours is None else 3600.0 * args.limit_hours
     try:
-        options = [*args.options, *(["--quiet", "all"] if args.quiet else [])]
-        night = nightly(options, args.profile, limit)
+        night = nightly(args.options, args.profile, limit, quiet=args.quiet)
     except KeyboardInterrupt:
         return INTERRUPTED
     add_result(args, asdict(night))

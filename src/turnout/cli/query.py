@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import os
 import sys
 from contextlib import contextmanager
 from decimal import Decimal
@@ -73,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
     if args.list or not args.sql:
         print(listing())
         return 0
-    sql = sys.stdin.read() if args.sql == "-" else args.sql
+    sql = _text_of_query(args.sql)
     with open_confined(args.registry, args.as_of) as connection:
         try:
             require_reading(sql)
@@ -89,6 +90,17 @@ def run(args: argparse.Namespace) -> int:
         except duckdb.Error as error:
             raise RegistryError(f"{error}\n'turnout query --list' names the tables, views and macros") from None
     return 0
+
+
+def _text_of_query(word: str) -> str:
+    """The query of the command line, or that of standard input for "-"; RegistryError if it is no text in UTF-8."""
+    from turnout.errors import RegistryError
+
+    try:
+        return (sys.stdin.buffer.read() if word == "-" else os.fsencode(word)).decode("utf-8-sig")
+    except UnicodeError:
+        problem = "the query contains a byte that is not UTF-8"
+        raise RegistryError(f"{problem}. Type it in a terminal with UTF-8, or save its file as UTF-8.") from None
 
 
 def _write_csv(result: duckdb.DuckDBPyRelation, path: str) -> None:

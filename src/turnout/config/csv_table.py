@@ -171,7 +171,7 @@ def _numbered_lines(path: Path, name: str) -> list[tuple[int, str]]:
     try:
         data = read_regular(path)
     except OSError as error:
-        if not os.path.lexists(path):
+        if isinstance(error, (FileNotFoundError, NotADirectoryError)) and not os.path.lexists(path):
             raise
         raise TableError(Place(name, 1, 1), str(error.strerror), "Put a readable file there") from None
     try:

@@ -58,16 +58,20 @@ def require_reading(sql: str) -> None:
     Parameters
     ----------
     sql : str
-        Statements, separated by semicolons.
+        One statement.
 
     Raises
     ------
     RegistryError
-        If one is no SELECT, FROM, DESCRIBE, SUMMARIZE, SHOW, PIVOT, or EXPLAIN of such.
+        If there is none or several, or it is no SELECT, FROM, DESCRIBE, SUMMARIZE, SHOW, PIVOT, or EXPLAIN of such.
     duckdb.Error
         If the text is no SQL.
     """
-    for statement in duckdb.extract_statements(sql):
+    statements = duckdb.extract_statements(sql)
+    if len(statements) != 1:
+        count = f"{len(statements)} queries, and only the last would be shown" if statements else "no query"
+        raise RegistryError(f"{' '.join(sql.split())[:60]!r}: {count}. Give one query.")
+    for statement in statements:
         if statement.type == duckdb.StatementType.EXPLAIN and (match := _EXPLAIN.match(statement.query)):
             require_reading(statement.query[match.end() :])
         elif statement.type not in READING:

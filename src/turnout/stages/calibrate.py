@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from turnout.config.load import load_configuration
+from turnout.config.schema import suggestion
 from turnout.config.settings.identify import IdentifySettings
 from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.errors import ConfigError, ReadError, SimulationError
@@ -22,6 +23,7 @@ from turnout.simulate.hammer import resolve_location
 from turnout.simulate.modal_calibration import ModeFit, fit_modes
 from turnout.simulate.parameters import track_path
 from turnout.stages.common import require_file
+from turnout.stages.hammer_adhoc import section_of
 from turnout.stages.track_files import track_file
 
 LOG = logging.getLogger("turnout.simulate")
@@ -102,12 +104,13 @@ def calibrate_to_files(
     ReadError
         There is no such file, or it is a folder.
     ConfigError
-        The turnout has no hammer tests in its layout.
+        The turnout has no hammer tests in its layout, or no such section, or the name of a file states another one.
     """
     track = load_track(str(track_name), seed=seed)
     position, _ = resolve_location(track, section)
-    description, force, responses, settings = _channels(section, turnout_id, config)
-    recordings, rejected = _recordings(files, description)
+    paths = [Path(file) for file in files]
+    description, force, responses, settings = _channels(section, turnout_id, config, paths)
+    recordings, rejected = _recordings(paths, description)
     if not recordings:
         raise SimulationError(f"calibration of {section}: no record can be used. {' '.join(rejected)}")
     if rejected:
@@ -197,7 +200,7 @@ def identified_modes(
 
 
 def _channels(
-    section: str, turnout_id: str | None, config: str | Path
+    section: str, turnout_id: str | None, config: str | Path, files: Iterable[Path]
 ) -> tuple[RawDescription, str, tuple[str, ...], ReceptanceSettings]:
     if turnout_id is None:
         return DEFAULT_CHANNELS, "hammer", ("acc_1", "acc_2"), ReceptanceSettings()
@@ -205,6 +208,11 @@ def _channels(
     hammer = turnout.hammer
     if hammer is None:
         raise ConfigError(turnout.layout, "hammer", "the layout describes no hammer tests", "Add the part hammer")
+    if section not in hammer.descriptions:
+        problem = f"{section!r} is no section of {turnout_id}"
+        raise ConfigError("calibrate", "--section", problem, suggestion(section, hammer.descriptions))
+    for file in files:
+        section_of(file, turnout, section, None)  # ConfigError if the name of a file states another one
     names = tuple(n for n in (hammer.response[section], hammer.validation[section]) if n)
     return hammer.descriptions[section], hammer.force[section], names, turnout.settings["receptance"]
 

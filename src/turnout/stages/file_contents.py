@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
@@ -120,7 +121,7 @@ def file_contents(path: Path | str) -> FileContents:
         If the file as a whole cannot be read.
     """
     path = Path(path)
-    real_path = path.resolve()
+    real_path = Path(os.path.realpath(path))  # a link that leads back to itself is reported by the reader
     try:
         responses = find_responses(real_path.name, real_path.parent)
         if responses is not None:

@@ -86,7 +86,7 @@ def check_agreement(
     pairs = (("--section", section, section_in_name, "section"), ("--campaign", campaign, day_in_name, "campaign"))
     for option, option_value, name_value, quantity in pairs:
         if option_value is not None and name_value is not None and option_value != name_value:
-            remedy = f"Leave out {option}, or rename the file after the {quantity} at which it was recorded"
+            remedy = f"Write {option} {name_value}, or rename the file after the {quantity} at which it was recorded"
             raise ConfigError(path, option, f"is {option_value!r}, and the file's name says {name_value!r}", remedy)
 
 

@@ -13,7 +13,8 @@ from turnout.errors import ConfigError
 from turnout.readers.writing import WRITERS
 
 ENDINGS = {"uff58": "uff", "uff58b": "uff", "hdf5": "h5", "mat73": "mat", "rcmdx": "rcmdx"}
-MIN_COUNTS = {"tests": 1, "impacts": 1, "units": 1, "seed": 0}
+# Least and largest number of an option; one that is larger takes hours or fills the disk.
+COUNT_LIMITS = {"tests": (1, 100), "impacts": (1, 1000), "units": (1, 50), "seed": (0, 2**63 - 1)}
 
 
 def check_request(request: Mapping[str, Any]) -> None:
@@ -35,9 +36,9 @@ def check_request(request: Mapping[str, Any]) -> None:
     Traceback (most recent call last):
     turnout.errors.ConfigError: simulate, --out: one file for 2 tests. Write --tests 1, or leave out --out.
     """
-    for option, minimum in MIN_COUNTS.items():
-        if option in request and request[option] < minimum:
-            raise option_error(option, repr(request[option]), f"Write a whole number of at least {minimum}")
+    for option, (lowest, highest) in COUNT_LIMITS.items():
+        if option in request and not lowest <= request[option] <= highest:
+            raise option_error(option, repr(request[option]), f"Write a whole number from {lowest} to {highest}")
     if request["format"] not in WRITERS:
         raise option_error("format", repr(request["format"]), suggestion(request["format"], WRITERS))
     if request.get("out") and request.get("tests", 1) > 1:

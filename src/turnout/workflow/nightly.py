@@ -77,7 +77,9 @@ class NightReport:
         return ", ".join(self.unused[:MAX_TURNOUTS_SHOWN]) + (f" and {more} more" if more > 0 else "")
 
 
-def nightly(options: Sequence[str], profile: str, limit: float | None = None, work: Path = Path("work")) -> NightReport:
+def nightly(
+    options: Sequence[str], profile: str, limit: float | None = None, work: Path = Path("work"), quiet: bool = False
+) -> NightReport:
     """Run the workflow once.
 
     If jobs die or are ended, the finished results are published without the rest. A signal that ends this process ends
@@ -93,6 +95,8 @@ def nightly(options: Sequence[str], profile: str, limit: float | None = None, wo
         Time after which a run is ended that hangs or takes longer than the night; None: no limit. [s]
     work : Path
         Folder ``work`` of the workflow.
+    quiet : bool
+        Show nothing of Snakemake; its log keeps what it says.
 
     Returns
     -------
@@ -113,7 +117,7 @@ def nightly(options: Sequence[str], profile: str, limit: float | None = None, wo
             _require_no_other_run()
             _clear(options, Path(profile).name)
             before, planned, started = _batches(work), _planned_units(work), time.time_ns()
-            code = _run([*options, "--workflow-profile", profile, "--rerun-incomplete"], limit, work)
+            code = _run([*options, "--workflow-profile", profile, "--rerun-incomplete"], limit, work, quiet)
             return _report(
                 code, before, planned, failure_reason(started) if code not in (0, EXIT_TIME_LIMIT) else "", work
             )
@@ -180,25 +184,26 @@ def _clear(options: Sequence[str], profile: str) -> None:
             subprocess.run(["scancel", *job_ids], check=False)
 
 
-def _run(options: Sequence[str], limit: float | None, work: Path) -> int:
+def _run(options: Sequence[str], limit: float | None, work: Path, quiet: bool = False) -> int:
     """Exit code of Snakemake; if jobs died or were ended before registry and list were published, publish them."""
     started, launched, generation = time.monotonic(), changed_at(work / "launched"), changed_at(GENERATION)
-    code = _snakemake(options, None if limit is None else (1.0 - PUBLISHING_SHARE) * limit)
+    code = _snakemake(options, None if limit is None else (1.0 - PUBLISHING_SHARE) * limit, quiet)
     had_jobs, registered = changed_at(work / "launched") != launched, changed_at(GENERATION) != generation
     is_listed = changed_at(WORKLIST) >= changed_at(work / "trend.json")  # the list waits for the diagnoses of alarms
     if code != 0 and had_jobs and not (registered and is_listed):
         remaining = None if limit is None else max(0.0, started + limit - time.monotonic())
         _unlock()
-        _snakemake([*options, "--allowed-rules", *PUBLISHING_RULES], remaining)
+        _snakemake([*options, "--allowed-rules", *PUBLISHING_RULES], remaining, quiet)
     return code
 
 
-def _snakemake(options: Sequence[str], limit: float | None) -> int:
+def _snakemake(options: Sequence[str], limit: float | None, quiet: bool = False) -> int:
     """Exit code of Snakemake, run in its own process group so that the limit or a signal ends its jobs, too."""
     process = subprocess.Popen(
         [sys.executable, "-m", "snakemake", *snakefile_options(Path()), *options],
         start_new_session=True,
         env=snakemake_environment(),
+        stderr=subprocess.DEVNULL if quiet else None,
     )
     try:
         return process.wait(limit)

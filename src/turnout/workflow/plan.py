@@ -165,7 +165,9 @@ class MissingFiles:
         ConfigError or None
             The error; None if few files are missing.
         """
-        if len(self.files) <= max(settings.vanished_files, settings.vanished_share * self.n_known):
+        limit = max(settings.vanished_files, settings.vanished_share * self.n_known)
+        is_one_absent_disk = bool(self.files) and not _holds_anything(raw_root)
+        if len(self.files) <= limit and not is_one_absent_disk:
             return None
         remedy = (
             "Nothing was changed. Mount the disk again, or allow reading it; if they are meant to be gone, run once: "
@@ -175,6 +177,14 @@ class MissingFiles:
 
     def __str__(self) -> str:
         return f"{len(self.files)} known file{'s are' if len(self.files) != 1 else ' is'} gone"
+
+
+def _holds_anything(folder: Path) -> bool:
+    """Whether a folder can be listed and is not empty, as the mount point of a disk that is not mounted."""
+    try:
+        return next(Path(folder).iterdir(), None) is not None
+    except OSError:
+        return False
 
 
 def missing_files(

@@ -149,3 +149,23 @@ def test_other_shells_get_every_command(capsys, shell):
     assert main(["completion", shell]) == 0
     script = capsys.readouterr().out
     assert all(name in script for name in COMMANDS)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "raise KeyboardInterrupt",
+        "try: os.kill(os.getpid(), 2); time.sleep(5)\n    except KeyboardInterrupt: raise RuntimeError('ended')",
+    ],
+)
+def test_an_interrupt_is_none_of_the_program_also_behind_a_library(body):
+    """DuckDB raises a RuntimeError of its own."""
+    code = f"import os, sys, time, turnout.cli.plan as command\ndef run(args):\n    {body}\ncommand.run = run\n"
+    code += "from turnout.cli.main import main; sys.exit(main(['plan']))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (130, "turnout plan: interrupted\n")
+
+
+def test_an_interrupt_before_the_command_begins_is_none_of_the_program(monkeypatch, capsys):
+    monkeypatch.setattr("turnout.cli.main.build_parser", lambda: raising(KeyboardInterrupt())(None))
+    assert main(["plan"]) == 130 and capsys.readouterr().err == "turnout: interrupted\n"

@@ -1,6 +1,7 @@
 """What a user sees who types something wrong: one message that says where, what was found, and what to do."""
 
 import argparse
+import os
 import shlex
 import shutil
 from importlib import import_module
@@ -10,6 +11,7 @@ import pytest
 from turnout import files as files_module
 from turnout.cli import COMMANDS
 from turnout.cli.main import main
+from turnout.registry.job import register
 from turnout.workflow import project as project_module
 from turnout.workflow.project import create_project
 
@@ -62,6 +64,14 @@ WRONG = {
     "distinguish --track tommerup --sensors 24.6 --impacts -900": "Write positions from",
     "plan --shards 1000000000000": "Write the number of shards of the runs, 1 to 4096",
     "calibrate --section A7 --track tommerup --modes ballast=600/.1 railpad=150/.1": "the ballast resonance lies below",
+    "calibrate --section A7 --track tommerup --modes balast=100/.1": "no resonance 'balast'. Write ballast or railpad",
+    "calibrate --section A7 --track tommerup --modes ballast=99/.1 ballast=100/.1": "ballast for the second time",
+    "calibrate raw/W1/hammer/A7_1.csv --turnout W1 --section A8": "is 'A8', and the file's name says 'A7'",
+    "diagnose --turnout W1 --finding x": "--finding, option: it acts with --accept only",
+    "diagnose --turnout W1 --anyway": "--anyway, option: it acts with --accept only",
+    "compare raw/W1/hammer/A7_1.csv --turnout W1 --out config": "config, --out: it is a folder",
+    "simulate hammer --section A7 --impacts 100000000": "--impacts: 100000000. Write a whole number from 1 to 1000",
+    "simulate passage --units 100000": "--units: 100000. Write a whole number from 1 to 50",
 }
 
 
@@ -105,6 +115,58 @@ def test_a_wrong_command_line_ends_with_2(capsys, line, message):
     assert end.value.code == 2 and message in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("line", ["inspect ''", "hammer '' --turnout W1", "report --pages ''", "query ''", "init ''"])
+def test_an_empty_argument_is_no_path(project, capsys, line):
+    """As "$FILE" of a shell without a value; the path would be the present folder."""
+    with pytest.raises(SystemExit) as end:
+        main(shlex.split(line))
+    assert end.value.code == 2 and "is empty. Give it a value, or leave it out" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("sql", ["select 1; select 2", ";", "-- nothing"])
+def test_only_one_query_is_answered(tmp_path, capsys, sql):
+    register([], tmp_path, read=iter)
+    assert main(["query", sql, "--registry", str(tmp_path)]) == 2
+    assert "Give one query." in capsys.readouterr().err
+
+
+def test_a_section_of_the_track_that_the_layout_lacks_is_named(project, capsys):
+    layout = project / "config/layouts/tommerup.yaml"
+    lines = layout.read_text().splitlines(keepends=True)
+    layout.write_text("".join(line for line in lines if not line.lstrip().startswith("SP:")))
+    (project / "a.csv").write_text("no numbers\n")
+    assert main(["calibrate", "a.csv", "--turnout", "W1", "--section", "SP"]) == 2
+    assert "'SP' is no section of W1" in capsys.readouterr().err
+
+
+def test_inspect_leaves_out_no_entry_of_a_folder_without_a_word(tmp_path, capsys, monkeypatch):
+    (tmp_path / "raw/closed").mkdir(parents=True)
+    (tmp_path / "raw/a.csv").symlink_to("nowhere.csv")
+    (tmp_path / "raw/b.csv").symlink_to("b.csv")
+    walk = os.walk
+
+    def walk_of_another_user(top, onerror):
+        onerror(PermissionError(13, "Permission denied", str(tmp_path / "raw/closed")))
+        yield from walk(top)
+
+    monkeypatch.setattr(os, "walk", walk_of_another_user)
+    assert main(["inspect", str(tmp_path / "raw")]) == 2
+    printed, message = capsys.readouterr()
+    assert "raw/a.csv: not read" in printed and "raw/b.csv: not read" in printed
+    assert f"{tmp_path}/raw/closed: Permission denied" in message
+
+
+def test_drawings_of_files_of_one_name_do_not_replace_each_other(tmp_path, repository, monkeypatch, capsys):
+    monkeypatch.chdir(repository)
+    file = tmp_path / "a/A7_1.csv"
+    assert main(["simulate", "hammer", "--section", "A7", "--impacts", "1", "--out", str(file)]) == 0
+    (tmp_path / "b").mkdir()
+    shutil.copy(file, tmp_path / "b")
+    monkeypatch.chdir(tmp_path)
+    main(["inspect", "a/A7_1.csv", "b", "--plot"])
+    assert {p.name for p in tmp_path.glob("*.svg")} == {"A7_1.csv.svg", "b_A7_1.csv.svg"}
+
+
 def test_a_tab_in_yaml_is_named(project, capsys):
     (project / "config/config.yaml").write_text("fleet:\n\tshards: 2\n")
     assert main(["check"]) == 2
@@ -129,6 +191,12 @@ def test_the_first_command_of_a_project_can_be_pasted_into_a_shell(tmp_path, cap
     folder = tmp_path / "Prüf stand's"
     assert main(["init", str(folder)]) == 0
     assert shlex.split(capsys.readouterr().out.split("first: ")[1]) == ["cd", str(folder)]
+
+
+def test_the_first_command_of_a_project_with_a_leading_dash_is_no_option(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", "--", "-a b"]) == 0
+    assert shlex.split(capsys.readouterr().out.split("first: ")[1]) == ["cd", "./-a b"]
 
 
 def test_an_interrupted_init_is_completed_by_the_next(tmp_path, monkeypatch):

@@ -220,6 +220,20 @@ def test_a_lost_disk_is_not_taken_for_tidying_up(fleet):
     assert (fleet / "work/plan/00of01.json").read_text() != text
 
 
+@pytest.mark.parametrize("mount", ["nothing", "an empty folder", "a link to nothing", "a link to itself"])
+def test_a_disk_that_is_not_mounted_stops_the_run_of_a_small_fleet_too(fleet, mount):
+    plans(fleet)
+    text = (fleet / "work/plan/00of01.json").read_text()
+    (fleet / "raw").rename(fleet / "away")
+    if mount == "an empty folder":
+        (fleet / "raw").mkdir()
+    elif mount != "nothing":
+        (fleet / "raw").symlink_to("nowhere" if mount == "a link to nothing" else "raw")
+    with pytest.raises(ConfigError, match=r"6 known files are gone, first t1/hammer.* Mount the disk again"):
+        plans(fleet)
+    assert (fleet / "work/plan/00of01.json").read_text() == text
+
+
 def test_files_of_a_turnout_that_is_taken_out_are_not_lost(fleet):
     """Its row was taken out on purpose; its raw folder may be there or not."""
     for k in range(20):

@@ -1,0 +1,69 @@
+"""Standard output that lacks characters, is closed, is full, or whose reader has gone: never a fault of the program."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from turnout.registry.job import register
+
+QUERY = "select 'm/s² → 日' as unit"
+RUN = [sys.executable, "-m", "turnout"]
+
+
+@pytest.fixture(scope="module")
+def registry(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("registry")
+    register([], folder, read=iter)
+    return folder
+
+
+def run(words, registry=None, encoding="utf-8", **options):
+    environment = os.environ | {"PYTHONIOENCODING": encoding}
+    words = [*RUN, *words, *(["--registry", str(registry)] if registry else [])]
+    return subprocess.run(words, env=environment, stderr=subprocess.PIPE, check=False, **options)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "ascii", "latin-1", "cp1252"])
+@pytest.mark.parametrize("form", [[], ["--csv", "-"], ["--json"]])
+def test_a_character_that_the_terminal_lacks_is_an_escape(registry, encoding, form):
+    done = run(["query", QUERY, *form], registry, encoding, stdout=subprocess.PIPE)
+    printed = done.stdout.decode(encoding)
+    assert done.returncode == 0 and not done.stderr
+    if form == ["--json"]:
+        assert json.loads(printed)["result"] == [{"unit": "m/s² → 日"}]
+    else:
+        assert "m/s² → 日".encode(encoding, "backslashreplace").decode(encoding) in printed
+
+
+@pytest.mark.parametrize("words", [["query", "--list"], ["query", QUERY, "--json"], ["query", "from range(9999)"]])
+def test_a_reader_that_has_gone_is_no_fault(registry, words):
+    reading, writing = os.pipe()
+    os.close(reading)
+    try:
+        done = run(words, registry, stdout=writing)
+    finally:
+        os.close(writing)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="another system")
+@pytest.mark.parametrize("form", [[], ["--json"]])
+def test_a_full_disk_behind_standard_output_is_a_message(registry, form):
+    with open("/dev/full", "wb") as full:
+        done = run(["query", QUERY, *form], registry, stdout=full)
+    assert done.returncode == 2 and b"Traceback" not in done.stderr
+    assert b"standard output" in done.stderr and b"No space left on device" in done.stderr
+
+
+def test_a_closed_standard_output_is_no_fault(registry):
+    command = f"{sys.executable} -m turnout query --list --json --registry '{registry}' >&-"
+    done = subprocess.run(["sh", "-c", command], stderr=subprocess.PIPE, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+def test_a_query_of_another_encoding_is_named(registry):
+    done = run(["query", b"select '\xfc' as x"], registry, stdout=subprocess.PIPE)
+    assert done.returncode == 2 and b"contains a byte that is not UTF-8" in done.stderr
