@@ -56,10 +56,11 @@ def explained_share(search: Search, fit: Fit, refit: Fit) -> float:
 def _stands_without_loud_recording(search: Search, fit: Fit, refit: Fit) -> bool:
     """Whether one recording alone has an excess, and the others have enough evidence for a name.
 
-    An effect of track or sensor shows in others too. What ``refit`` gains in that recording does not count.
+    An effect of track or sensor shows in others too. What ``refit`` gains in that recording does not count. One of a
+    train may be in that recording alone: it has to explain the excess.
     """
     k = loud_recording(search.case, fit)
-    if k is None:
+    if k is None or any("train" in c.where for c in refit.candidates):
         return False
     o = search.case.observations[k]
     gained = 0.5 * o.effective * float(np.sum(fit.white[k] ** 2) - np.sum(refit.white[k] ** 2)) / fit.scale[o.data_type]
