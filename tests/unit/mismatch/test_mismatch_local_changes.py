@@ -8,12 +8,16 @@ from scipy.stats import multivariate_normal
 
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case
-from turnout.mismatch.engine.diagnose import diagnose
+from turnout.mismatch.engine.diagnose import diagnose, grade_names
+from turnout.mismatch.engine.findings import Findings
 from turnout.mismatch.engine.local_changes import local_change_evidence
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
+from turnout.mismatch.engine.score import Score
+from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.thresholds import THRESHOLDS
+from turnout.mismatch.engine.verdict import Verdict
 from turnout.physics import Parameter
 
 N_SUPPORT, SD, NOISE = 6, 0.1, 0.5
@@ -44,9 +48,11 @@ class Supports(Case):
         return observation.name == "hammer"
 
     def predict(self, values, terms, observations):
-        size = sum(t["size"] for t in terms)
+        under_trains = np.zeros(N_SUPPORT)
+        for term in terms:
+            under_trains[term.get("support", slice(None))] += term["size"]
         supports = np.array(list(values.values()))
-        return [self.jacobian[o.name] @ (supports + size * (o.name == "train")) for o in observations]
+        return [self.jacobian[o.name] @ (supports + under_trains * (o.name == "train")) for o in observations]
 
 
 def in_one(change):
@@ -90,3 +96,17 @@ def test_a_law_of_the_whole_track_is_no_name_where_a_change_of_one_support_remai
     """All supports stiffer explain most of it. A name at a position may leave an error of its shape."""
     verdict = diagnose(Supports([0.5 + at_one * (j == 2) for j in range(N_SUPPORT)], where)).verdict
     assert verdict.answer == answer and ("local_change_remains" in verdict.trail) is (answer == "unknown")
+
+
+@pytest.mark.parametrize("place, gain, answer", [(2, 50.0, "named"), (5, 50.0, "unknown"), (5, 1e4, "named")])
+def test_beside_a_name_at_a_position_its_errors_of_shape_count(place, gain, answer):
+    """One support is stiffer than all. The law at ``place`` explains it, or not; strong evidence leaves as much."""
+    case = Supports([0.5 + 0.45 * (j == 2) for j in range(N_SUPPORT)])
+    local = Candidate.of("local", SIZE, lambda values: values | {"support": place}, ((0.5,),), {"place": 3.0})
+    case.candidates = (*case.candidates, local)
+    fit = fit_jointly(case, case.candidates, np.array([0.5, 0.1]))
+    scores = (Score(c, g, 0.0, 1.0, fit) for c, g in zip(case.candidates, (50.0, gain)))
+    verdicts = tuple(Verdict("named", (s.family,), "", 0.9, {s.family: 0.9, "unknown": 0.1}, (s,)) for s in scores)
+    graded = grade_names(Findings(Search(case), fit_jointly(case), fit, verdicts)).verdicts
+    assert graded[0].answer == answer and len(graded) == (2 if answer == "named" else 1)
+    assert ("local_change_remains" in graded[0].trail) is (answer == "unknown")
