@@ -7,7 +7,8 @@ What is recognised:
   ``n_records``, ``n_samples``, conditions, and the words of other languages listed in ``named_arrays``;
 * units in brackets after the names ("force [N]", "force (N)") or in a line of their own;
 * a column of time in numbers or as the time of day, "13.05.2026 10:00:00.00005"; a column ``record`` that numbers the
-  records.
+  records;
+* the start, where the head states none, in the first row: a date with a time of day, or a time column since 1970.
 
 Without names channels are called "0", "1" ... All lines of the head are entries in which ``turnout.readers.statements``
 finds the sampling rate.
@@ -20,8 +21,10 @@ many decimals as all others.
 import codecs
 import re
 from collections.abc import Iterator, Sequence
+from datetime import datetime
 from itertools import pairwise
 from mmap import mmap
+from typing import Any
 
 import numpy as np
 
@@ -42,8 +45,10 @@ from turnout.readers.entries import Entry
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.lost_entries import control_character_errors
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, RawFile, RawRecord, Source
+from turnout.readers.start_columns import start_in_cells, start_of_epoch
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import entry_statements, scale_problem, scale_statements, without_drawings
+from turnout.readers.stated_starts import is_other_start
 
 
 def read_raw(source: Source) -> RawFile:
@@ -83,7 +88,8 @@ def read_raw(source: Source) -> RawFile:
     entries = (*entries, *footer)
     remarks += control_character_errors(data[:offset], source)
     facts = Metadata(head, source)
-    records = tuple(_records(columns, names, units, time, facts, source, entries))
+    first = start_in_cells(first_cells(data, offset, separator), names)
+    records = tuple(_records(columns, names, units, time, facts, source, entries, first))
     return RawFile(records, facts.count(RECORD_COUNT_NAMES), remarks)
 
 
@@ -180,6 +186,7 @@ def _records(
     facts: Metadata,
     source: Source,
     entries: tuple[Entry, ...],
+    first: tuple[datetime | None, str],
 ) -> Iterator[RawRecord | ReadError]:
     """The records: one of all rows, or one per number in the column ``record``."""
     lower = [name.strip().lower() for name in names]
@@ -217,7 +224,12 @@ def _records(
             names=tuple(names[i] for i in selected),
             samples=[columns[i] if isinstance(columns[i], LazyColumn) else columns[i][a:b] for i in selected],
             units=tuple(units[i] for i in selected),
-            **start_fields(date if start is None else start, f"{date} {start}" if date and start else None),
+            **_start_of(
+                start_fields(date if start is None else start, f"{date} {start}" if date and start else None),
+                first if k == 0 else (None, ""),
+                None if seconds is None or b - a < 2 else seconds[a : a + 2],
+                time is not None and bool(units[time].strip()),
+            ),
             conditions=facts.conditions(k, n),
             time=None if seconds is None else seconds[a:b],
             undecided=undecided,
@@ -225,6 +237,20 @@ def _records(
             clocks=tuple((f"column {names[i] or i + 1!r}", seconds[a:b]) for i, seconds in clocks.items()),
             entries=entries,
         )
+
+
+def _start_of(
+    stated: dict[str, Any], first: tuple[datetime | None, str], seconds: np.ndarray | None, has_unit: bool
+) -> dict[str, Any]:
+    """Fields of the start that the head states; else of that in the first row, else in the time column."""
+    start, text = first
+    if start is None and not text and seconds is not None:
+        start = start_of_epoch(float(seconds[0]), float(seconds[1] - seconds[0]), has_unit)
+    if stated["unread_start"] or (start is None and not text):
+        return stated
+    if stated["started_at"] is None:
+        return {"started_at": start, "unread_start": text}
+    return stated | {"unread_start": str(start)} if is_other_start(start, stated["started_at"]) else stated
 
 
 def _counts_rows(column: Column) -> bool:

@@ -63,7 +63,7 @@ def with_stated_start(record: RawRecord) -> RawRecord:
     if not texts or record.unread_start:
         return record
     if record.started_at is not None:
-        other_texts = [text for text in texts if _is_other(parse_time(text), record.started_at)]
+        other_texts = [text for text in texts if is_other_start(parse_time(text), record.started_at)]
         return replace(record, unread_start=other_texts[0][:60]) if other_texts else record
     times = {_naive(stamp) for text in texts if (stamp := parse_time(text))}
     if len(times) != 1:
@@ -75,6 +75,19 @@ def _naive(stamp: datetime) -> datetime:
     return stamp.replace(tzinfo=None)
 
 
-def _is_other(stamp: datetime | None, started_at: datetime) -> bool:
-    """Whether a stamp is of another day than the start, in any time zones."""
+def is_other_start(stamp: datetime | None, started_at: datetime) -> bool:
+    """Whether a stamp is of another day than the start, in any time zones.
+
+    Parameters
+    ----------
+    stamp : datetime or None
+        Another time stamp of the file.
+    started_at : datetime
+        Start of the record.
+
+    Returns
+    -------
+    bool
+        False without a stamp.
+    """
     return stamp is not None and abs(_naive(stamp) - _naive(started_at)) > MAX_ZONE_DIFFERENCE
