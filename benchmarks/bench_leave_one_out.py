@@ -130,7 +130,7 @@ def replace_block(page, block, text):
 def table(missing, present, cpu):
     """Sites by effect as a table: the answer without the effect in the library and, where asked, with it."""
     with_it = {site: answer.words for site, answer in present}
-    head = ["concealed, its rung costs", "left out", *(["answer with it"] if present else []), "answer without it"]
+    head = ["concealed, cost of the effect", "left out", *(["answer with it"] if present else []), "answer without it"]
     lines = [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
     for site, answer in missing:
         cells = [f"{site.kind} ({site.panel}), {answer.gain:.0f} points", f"`{site.effect}`"]

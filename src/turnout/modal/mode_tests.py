@@ -219,7 +219,7 @@ def filter_reappearing(
         if c.presence >= settings.presence_minimum:
             accepted.append(c)
         elif c.presence > MIN_LISTED_PRESENCE and c.frequency < max_listed_frequency:
-            rejected.append(rejection(c, "does not reappear over orders", c.presence, settings.presence_minimum))
+            rejected.append(rejection(c, "found in too few model orders", c.presence, settings.presence_minimum))
     accepted.sort(key=lambda c: -c.energy)
     max_modes = settings.order_maximum // 2 + 2
     for c in accepted[max_modes:]:
