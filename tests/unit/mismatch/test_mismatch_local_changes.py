@@ -10,7 +10,7 @@ from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.diagnose import diagnose, grade_names
 from turnout.mismatch.engine.findings import Findings
-from turnout.mismatch.engine.local_changes import local_change_evidence
+from turnout.mismatch.engine.local_changes import changed_positions, local_change_evidence, local_changes
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
@@ -33,7 +33,8 @@ class Supports(Case):
     def __init__(self, changes, where=()):
         rng = np.random.default_rng(4)
         self.nuisances = tuple(
-            Nuisance(f"support_{j}", "-", 0.0, SD, group="support", index=j) for j in range(N_SUPPORT)
+            Nuisance(f"support_{j}", "-", 0.0, SD, group="support", index=j, at=("place", 0.6 * j))
+            for j in range(N_SUPPORT)
         )
         self.jacobian = {name: 3.0 * rng.normal(size=(60, N_SUPPORT)) for name in ("hammer", "train")}
         self.candidates = (Candidate.of("preload", SIZE, dict, ((0.5,),), dict(where)),)
@@ -110,3 +111,25 @@ def test_beside_a_name_at_a_position_its_errors_of_shape_count(place, gain, answ
     graded = grade_names(Findings(Search(case), fit_jointly(case), fit, verdicts)).verdicts
     assert graded[0].answer == answer and len(graded) == (2 if answer == "named" else 1)
     assert ("local_change_remains" in graded[0].trail) is (answer == "unknown")
+
+
+@pytest.mark.parametrize("changes, answer", [([0.0] * N_SUPPORT, "none"), (in_one(0.3), "unknown")])
+def test_what_differs_in_one_support_alone_is_located_there_without_any_name(changes, answer):
+    """The other supports absorb it: the residual is that of intact recordings, and no candidate explains it."""
+    case = Supports(changes)
+    case.candidates, case.control_level = (), {"hammer": 2.0, "train": 2.0}
+    diagnosis = diagnose(case)
+    assert diagnosis.verdict.answer == answer and max(diagnosis.base.level.values()) < 2.0
+    assert ("component_differs_under_trains" in diagnosis.verdict.trail) is (answer == "unknown")
+    if answer == "unknown":
+        assert diagnosis.where.frame == "place" and diagnosis.where.place == pytest.approx(1.2)
+
+
+def test_components_of_one_position_count_together():
+    case = Supports(in_one(0.35))
+    case.nuisances = tuple(replace(n, at=("place", 0.6 * (n.index // 2))) for n in case.nuisances)
+    fit = fit_jointly(case)
+    gains = {n.index: nats for n, nats in local_changes(case, fit)}
+    first = changed_positions(case, fit)[0]
+    assert (first.frame, first.level) == ("place", 0.6)
+    assert first.nats == pytest.approx(np.logaddexp(gains[2], gains[3]) - np.log(N_SUPPORT))

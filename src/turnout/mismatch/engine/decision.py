@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.two_effects import PairEvidence, SecondEvidence
 
 HOW, PAIRS, SURFACES = "mismatch.md", "decisions/two-effects.md", "decisions/running-surface-priors.md"
+COMPONENT_DIFFERS = "component_differs_under_trains"
 LOCATED, ENDS = "decisions/residual-localization.md", "decisions/joint-fit-convergence.md"
 
 
@@ -63,6 +64,8 @@ EFFECT_RULES: tuple[Rule[EffectEvidence], ...] = (
          "most passages of {e.train_names} do not fit its vehicle file", LOCATED, cause="train"),
     Rule("no_tolerance_explains_it", lambda e: e.shows_nothing and e.strained, "unknown",
          "the recordings are explained only by a value that its file cannot have: {e.strained}", LOCATED),
+    Rule(COMPONENT_DIFFERS, lambda e: e.shows_nothing and e.local_change > e.settings.threshold, "unknown",
+         "a component there is another one under trains than under impacts, by {e.local_change:.0f} nats", LOCATED),
     Rule("no_candidate_passes", lambda e: not e.has_leader, "none", "nothing above the thresholds", HOW),
     Rule("weak_and_contradicted", lambda e: e.shows_nothing, "none",
          "nothing above the thresholds but {e.leader.family}, which does not hold elsewhere", ENDS),

@@ -82,6 +82,8 @@ class EffectEvidence:
         Trains, most recordings of which are not among those fitted, since they do not agree with the vehicle file.
     strained : str
         Value of the base model that no tolerance explains, in words; "" if there is none.
+    local_change : float
+        Evidence that a single component differs under trains from what impacts show. [nats]
     """
 
     scores: Sequence[Score]
@@ -93,6 +95,7 @@ class EffectEvidence:
     disturbed: bool = False
     mismatched_trains: tuple[str, ...] = ()
     strained: str = ""
+    local_change: float = 0.0
 
     @cached_property
     def passing(self) -> list[Score]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from turnout.mismatch.engine.decision import (
+    COMPONENT_DIFFERS,
     NUMERICS_RULES,
     confirm,
     first_applicable,
@@ -21,7 +22,7 @@ from turnout.mismatch.engine.evidence import assess, excess_ratio, latent_force_
 from turnout.mismatch.engine.findings import Findings
 from turnout.mismatch.engine.free_laws import free_law_share
 from turnout.mismatch.engine.local_changes import local_change_evidence
-from turnout.mismatch.engine.localization import Location, locate
+from turnout.mismatch.engine.localization import Location, locate, locate_change
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.refit import score_candidates
 from turnout.mismatch.engine.reserved_data import Verification, verify
@@ -280,6 +281,8 @@ def _locate_unknown(findings: Findings, verdict: Verdict) -> Location | None:
     if verdict.answer != "unknown" or verdict.trail[-1] == "reserved_not_explained":
         return None
     search = findings.search
+    if COMPONENT_DIFFERS in verdict.trail:
+        return locate_change(search.case, findings.base)
     leader = next((s for s in verdict.scores[:1] if s.gain > search.settings.threshold), None)
     leader = None if {"strained_value_remains", "local_change_remains"} & set(verdict.trail) else leader
     absorbed = strained_value(search.case, findings.base, search.settings.threshold)

@@ -14,6 +14,7 @@ from turnout.mismatch.engine.cross_validation import held_out_score, single_type
 from turnout.mismatch.engine.decision import judge
 from turnout.mismatch.engine.decision_facts import is_contradicted, likeliest
 from turnout.mismatch.engine.latent_force import LatentForce, latent_law
+from turnout.mismatch.engine.local_changes import local_change_evidence
 from turnout.mismatch.engine.reserved_data import is_significantly_worse, lost_evidence, reserved_fit
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.strained_values import strained_value
@@ -241,6 +242,7 @@ def assess(search: Search, fit: Fit, scores: Sequence[Score]) -> tuple[Verdict, 
     strained = None if fit.candidates else strained_value(case, fit, settings.threshold)
     facts: dict[str, Any] = {"disturbed": bool(case.disturbed_recordings), "strained": str(strained or "")}
     facts["mismatched_trains"] = case.mismatched_trains
+    facts["local_change"] = 0.0 if fit.candidates else local_change_evidence(case, fit)
     scores = tuple(s for s in scores if s.is_reportable)
     if not scores:
         return judge([], excess, settings, **facts), None

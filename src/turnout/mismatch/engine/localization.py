@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from turnout.mismatch.engine.channel_levels import worst_channel_excess
+from turnout.mismatch.engine.local_changes import changed_positions
 from turnout.mismatch.engine.space_evidence import SpaceEvidence, weigh_spaces
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
@@ -111,6 +112,24 @@ def locate(
     ):
         return replace(_location_of_candidate(leader), measured_range=case.measured_range)
     return replace(_location_of_evidence(witnesses), measured_range=case.measured_range) if witnesses else None
+
+
+def locate_change(case: Case, fit: Fit) -> Location | None:
+    """Location of a component that is another one in expensive recordings than in cheap ones.
+
+    Parameters
+    ----------
+    case : Case
+    fit : Fit
+        With its Jacobian.
+
+    Returns
+    -------
+    Location or None
+        None if no position of such a component is known.
+    """
+    positions = changed_positions(case, fit)
+    return replace(_location_of_evidence(positions), measured_range=case.measured_range) if positions else None
 
 
 def _lead(witnesses: Sequence[SpaceEvidence]) -> float:

@@ -316,7 +316,9 @@ def track_nuisances(zone: Zone, trains: Iterable[str]) -> list[Nuisance]:
             sd = float(np.hypot(parameter.sd, steps[j]))
             meaning, most = f"ln {parameter.field} of {j}", TRACK.bound_sds * sd
             name = f"{parameter.tag}_{j}"
-            nuisances.append(Nuisance(name, "-", 0.0, sd, None, (-most, most), meaning, group=parameter.tag, index=j))
+            limits, support = (-most, most), ("place", round(float(zone.turnout.track.support[j]), 3))
+            group = parameter.tag
+            nuisances.append(Nuisance(name, "-", 0.0, sd, None, limits, meaning, group=group, index=j, at=support))
     words = _rail_words(zone)
     for name, sd in rail_sds(zone).items():
         bounds = (-TRACK.bound_sds * sd, TRACK.bound_sds * sd)
