@@ -160,7 +160,8 @@ def test_other_shells_get_every_command(capsys, shell):
 )
 def test_an_interrupt_is_none_of_the_program_also_behind_a_library(body):
     """DuckDB raises a RuntimeError of its own."""
-    code = f"import os, sys, time, turnout.cli.plan as command\ndef run(args):\n    {body}\ncommand.run = run\n"
+    code = f"import os, signal, sys, time, turnout.cli.plan as command\ndef run(args):\n    {body}\ncommand.run = run\n"
+    code += "signal.signal(2, signal.default_int_handler)\n"  # a process in the background ignores interrupts
     code += "from turnout.cli.main import main; sys.exit(main(['plan']))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (130, "turnout plan: interrupted\n")

@@ -260,7 +260,16 @@ def test_a_folder_that_does_not_exist_is_named_and_not_made(tmp_path, capsys, mo
     assert not (tmp_path / "nowhere").exists()
 
 
-@pytest.mark.parametrize("place", ["", " ", "/", "/A7", "tommerup_s1/"])
+@pytest.mark.parametrize("command", [EVENT, SAID])
+def test_an_empty_argument_ends_the_command_before_it_writes(config, capsys, command):
+    before = {path: path.read_bytes() for path in config.glob("*.csv")}
+    with pytest.raises(SystemExit) as ended:
+        main([command[0], "", *command[2:]])
+    assert ended.value.code == 2 and "argument 2, behind" in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in config.glob("*.csv")} == before
+
+
+@pytest.mark.parametrize("place", [" ", "/", "/A7", "tommerup_s1/"])
 @pytest.mark.parametrize("command", [EVENT, SAID])
 def test_an_empty_turnout_or_section_does_not_count_for_all(config, capsys, command, place):
     """As a script writes it whose variable is empty."""
