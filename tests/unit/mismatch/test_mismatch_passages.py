@@ -283,7 +283,8 @@ def test_a_train_that_looks_like_no_such_train_is_said_and_located(plan):
     assert case.mismatched_trains == ("heavy",) and len([n for n in case.notes if "likeness" in n]) == 2
     at_file = {n.name: n.mean for n in case.nuisances}
     tolerances = np.diag([n.sd**2 for n in case.nuisances])
-    fit = SimpleNamespace(level={"passage": 0.1}, white=[], candidates=(), values=at_file, covariance=tolerances)
+    common = {"values": at_file, "covariance": tolerances, "jacobian": {}}  # no derivatives: no local change
+    fit = SimpleNamespace(level={"passage": 0.1}, white=[], candidates=(), **common)
     verdict, _ = assess(Search(case), fit, ())
     assert verdict.answer == "unknown" and "heavy" in verdict.reason
     where = locate(case, None, cause=verdict.cause)
