@@ -38,7 +38,7 @@ def reveal(out: str | Path, truth: str | Path) -> dict[str, Any]:
     truths = verify(out, truth)
     record = out / "diagnosis.json"
     if not record.exists():
-        raise BlindError(record, "line 1", "nothing has been diagnosed yet", "Run turnout blind diagnose first")
+        raise BlindError(record, "the path", "nothing has been diagnosed yet", "Run turnout blind diagnose first")
     diagnosis = json.loads(record.read_text())
     if diagnosis["commit_sha256"] != digest((out / "commit.json").read_bytes()):
         raise BlindError(record, "commit_sha256", "diagnosed under another commit", "This set proves nothing")

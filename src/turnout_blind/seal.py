@@ -182,7 +182,7 @@ def read_commit(out: str | Path) -> dict[str, Any]:
     """
     path = Path(out) / COMMIT_FILE
     if not path.exists():
-        raise BlindError(path, "line 1", "no such file", "Make a set first: turnout blind make --out FOLDER")
+        raise BlindError(path, "the path", "there is no such file", "Make a set first: turnout blind make --out FOLDER")
     return json.loads(path.read_bytes())
 
 
@@ -226,6 +226,6 @@ def verify(out: str | Path, truth: str | Path) -> dict[str, Any]:
 
 def _check_seal(path: Path, sha: str) -> None:
     if not path.exists():
-        raise BlindError(path, "line 1", "no such truth", "Give the folder of the truth with --truth")
+        raise BlindError(path, "the path", "there is no such truth", "Give the folder of the truth with --truth")
     if digest(path.read_bytes()) != sha:
         raise BlindError(path, "line 1", "not the truth that was sealed", "This set proves nothing: make a new one")

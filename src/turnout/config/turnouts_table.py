@@ -89,7 +89,7 @@ def read_table(path: Path, name: str) -> tuple[list[Row], list[ConfigError]]:
     """
     if not os.path.lexists(path):
         remedy = NO_TABLE if Path(path).parent.is_dir() else NO_PROJECT
-        return [], [ConfigError(name, "line 1", "no such file", remedy)]
+        return [], [ConfigError(name, "the path", "there is no such file", remedy)]
     try:
         with as_config_errors(name, "line 1"):
             lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
