@@ -130,6 +130,26 @@ class Metadata:
             value = value[k if value.size == n else 0] if value.size else None
         return value.item() if isinstance(value, np.generic) and value.dtype.kind != "M" else value
 
+    def label_of(self, names: Sequence[str]) -> str:
+        """Name of the first variable of ``names``, with the unit that its attributes or a variable beside it state.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Spellings of one entry, in lower case.
+
+        Returns
+        -------
+        str
+            "start_time [s since 1904-01-01]"; "" without such a variable.
+        """
+        for name in (n for n in names if self.lower.get(n) is not None):
+            attributes = {k.lower(): v for k, v in dict(self.lower.get(name + ATTRIBUTES_MARK) or {}).items()}
+            beside = [self.lower.get(f"{name}_{word}") for word in UNIT_NAMES[:2]]
+            unit = next((v for v in (*map(attributes.get, UNIT_NAMES), *beside) if isinstance(v, str)), "")
+            return f"{name} [{unit}]" if unit.strip() else name
+        return self.parent.label_of(names) if self.parent else ""
+
     def number(self, names: Sequence[str], k: int = 0, n: int = 1) -> float | None:
         """As ``record_value``, but a float; ReadError if it is no number.
 

@@ -24,7 +24,6 @@ from collections.abc import Iterator, Sequence
 from datetime import datetime
 from itertools import pairwise
 from mmap import mmap
-from typing import Any
 
 import numpy as np
 
@@ -45,10 +44,9 @@ from turnout.readers.entries import Entry
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.lost_entries import control_character_errors
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, RawFile, RawRecord, Source
-from turnout.readers.start_columns import start_in_cells, start_of_epoch
+from turnout.readers.start_columns import start_in_cells
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import entry_statements, scale_problem, scale_statements, without_drawings
-from turnout.readers.stated_starts import is_other_start
 
 
 def read_raw(source: Source) -> RawFile:
@@ -224,33 +222,20 @@ def _records(
             names=tuple(names[i] for i in selected),
             samples=[columns[i] if isinstance(columns[i], LazyColumn) else columns[i][a:b] for i in selected],
             units=tuple(units[i] for i in selected),
-            **_start_of(
-                start_fields(date if start is None else start, f"{date} {start}" if date and start else None),
-                first if k == 0 else (None, ""),
-                None if seconds is None or b - a < 2 else seconds[a : a + 2],
-                time is not None and bool(units[time].strip()),
+            **start_fields(
+                date if start is None else start,
+                f"{date} {start}" if date and start else None,
+                declared=facts.label_of(START_NAMES),
             ),
+            axis_starts=(first,) if k == 0 else (),
             conditions=facts.conditions(k, n),
             time=None if seconds is None else seconds[a:b],
             undecided=undecided,
+            time_label="" if time is None else names[time],
             is_time_in_seconds=time is not None and bool(units[time].strip()),
             clocks=tuple((f"column {names[i] or i + 1!r}", seconds[a:b]) for i, seconds in clocks.items()),
             entries=entries,
         )
-
-
-def _start_of(
-    stated: dict[str, Any], first: tuple[datetime | None, str], seconds: np.ndarray | None, has_unit: bool
-) -> dict[str, Any]:
-    """Fields of the start that the head states; else of that in the first row, else in the time column."""
-    start, text = first
-    if start is None and not text and seconds is not None:
-        start = start_of_epoch(float(seconds[0]), float(seconds[1] - seconds[0]), has_unit)
-    if stated["unread_start"] or (start is None and not text):
-        return stated
-    if stated["started_at"] is None:
-        return {"started_at": start, "unread_start": text}
-    return stated | {"unread_start": str(start)} if is_other_start(start, stated["started_at"]) else stated
 
 
 def _counts_rows(column: Column) -> bool:

@@ -29,6 +29,7 @@ from turnout.readers.source import CONDITIONS
 from turnout.readers.stated_quantities import quantity_of_text
 from turnout.readers.stated_units import UNIT_WORD, is_unit_of_other, known_unit
 from turnout.readers.statements import USUAL_RATES, statements_of_value
+from turnout.readers.time_numbers import EPOCHS
 from turnout.readers.time_texts import looks_dated
 from turnout.units import Conversion
 
@@ -43,7 +44,6 @@ ROUND_RATE = 100.0  # Hz: people choose multiples of it
 MAX_CHANCE = 0.1  # share of all numbers of so many digits that are the inverse of a round rate by chance
 MIN_PER_SECOND = 1000.0  # a name that ends with seconds may mean a number per second from here on: "ndata_sec"
 MIN_LIMIT = 0.01  # a smaller number is no count, limit or size
-EPOCHS = (6.3e8, 2.9e9)  # s since 1970: years 1990 to 2061
 RATES_IN_TEXT = (2000.0, 1e6)  # Hz: round numbers in a text that may be a rate
 MIN_LARGEST = 127  # of a converter of 8 bits
 MAX_WORDS = 12  # of a text that says what was done to the samples

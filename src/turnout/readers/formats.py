@@ -11,8 +11,10 @@ from importlib import import_module
 
 from turnout.readers.claims import check_claims
 from turnout.readers.source import RawFile, RawRecord, Source
+from turnout.readers.start_columns import with_axis_start
 from turnout.readers.stated_starts import with_stated_start
 from turnout.readers.stated_units import with_stated_units
+from turnout.readers.stated_zones import with_stated_zone
 
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
@@ -49,6 +51,7 @@ class Format:
         records = tuple(with_stated_units(r) if isinstance(r, RawRecord) else r for r in raw.records)
         if len(records) == 1 and isinstance(records[0], RawRecord):
             records = (with_stated_start(records[0]),)
+        records = tuple(with_stated_zone(with_axis_start(r)) if isinstance(r, RawRecord) else r for r in records)
         return replace(raw, records=records)
 
 

@@ -20,7 +20,7 @@ from turnout.readers.packing import fill_values
 from turnout.readers.rate_agreement import rate_remark, resolve
 from turnout.readers.rate_words import CERTAIN
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
-from turnout.readers.start_times import check_order, is_plausible, start_errors, start_times
+from turnout.readers.start_times import check_order, is_plausible, start_errors, start_times, zone_errors
 from turnout.readers.stated_scales import remedy as scale_remedy
 from turnout.readers.time_axes import all_statements
 from turnout.readers.unexplained_entries import EntryCheck
@@ -119,6 +119,7 @@ def convert_records(
     unread = {k: r.unread_start for k, r in enumerate(raw.records) if isinstance(r, RawRecord) and r.unread_start}
     kept = [(k, stamp) for k, stamp in stamps if k not in order_errors]
     errors.extend(start_errors(kept, unread, description.time_zone, source))
+    errors.extend(zone_errors(raw.records, description.time_zone, source))
     return tuple(recordings), tuple(errors)
 
 
@@ -143,6 +144,7 @@ def errors_without_layout(raw: RawFile, source: Source) -> Iterator[ReadError]:
     records = [(k, record) for k, record in enumerate(raw.records) if isinstance(record, RawRecord)]
     unread = {k: record.unread_start for k, record in records if record.unread_start}
     yield from start_errors([(k, record.started_at) for k, record in records], unread, "UTC", source)
+    yield from zone_errors(raw.records, "UTC", source)
     reported: set[tuple[str, str]] = set()
     for k, record in records:
         fills = fill_values(record.entries, record.names)

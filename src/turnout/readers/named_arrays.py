@@ -4,7 +4,7 @@ What is recognised (names in any case, except ``t``):
 
 * sampling rate or step: every name that ``rate_words`` recognises, also in nested groups, and a vector ``time``, ``t``;
 * ``channels`` (or ``channel_names``, ``names``, ``labels``) and ``units``, one per channel;
-* ``started_at`` (or ``start_time`` ...): ISO 8601 text, seconds since 1970 UTC, or a MATLAB datenum, one per file or
+* ``started_at`` (or ``start_time`` ...): ISO 8601 text, or a number that ``time_numbers`` recognises, one per file or
   per record;
 * ``n_records``: the number of records that the file states; conditions under their names (``rail_temperature`` ...);
 * samples, the first of these that fits:
@@ -46,6 +46,7 @@ from turnout.readers.lazy import ARRAYS, Array, Column
 from turnout.readers.source import RawFile, RawRecord, Source
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import scale_problem, scale_statements, without_drawings
+from turnout.readers.time_texts import stated_time
 from turnout.readers.timing import seconds_since_first
 
 RECORD_NAME = re.compile(r"^(?:record|rec|segment|impact|hit)[_ ]?(\d+)$", re.IGNORECASE)
@@ -379,9 +380,11 @@ def _raw_record(
         clocks=tuple((f"variable {name!r}", seconds_since_first(value)) for name, value in clocks.items()),
         entries=facts.entries,
         units=tuple(units),
-        **start_fields(facts.record_value(START_NAMES, k, n)),
+        **start_fields(facts.record_value(START_NAMES, k, n), declared=facts.label_of(START_NAMES)),
+        axis_starts=tuple(stated_time(value[0]) for value in clocks.values() if value.dtype.kind == "M"),
         conditions=facts.conditions(k, n),
         time=time,
+        time_label=facts.label_of(TIME_NAMES),
         undecided=_undecided_scales(names, facts),
         not_numbers={
             name: kind_of(v.dtype) for name, v in facts.variables.items() if isinstance(v, np.ndarray) and _is_other(v)

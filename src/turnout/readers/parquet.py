@@ -6,6 +6,7 @@ metadata of its field. A truncated file lacks its footer and cannot be opened; p
 
 import json
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import entry_statements, scale_text, without_drawings
+from turnout.readers.time_texts import stated_time
 from turnout.readers.timing import seconds_since_first
 
 ROWS_REMEDY = "Write one row for each sample and one column of numbers for each channel"
@@ -68,6 +70,7 @@ def read_raw(source: Source) -> RawFile:
         raise source.error("the columns", f"none holds one number in a row; there are {kinds}", ROWS_REMEDY, "empty")
     not_numbers = {name: kind_of(x.dtype) for name, x in columns.items() if x.dtype.kind not in "fiumM"}
     clocks = [name for name, x in columns.items() if name != time and x.dtype.kind in "mM" and _varies(x)]
+    stamped = [name for name, x in columns.items() if x.dtype.kind == "M"]
     fields = {f"column {f.name!r}": _field_notes(f) for f in schema}
     common = tuple(entries_of(_metadata(schema), "metadata"))
     entries = (*common, *entries_of(fields, ""))
@@ -87,10 +90,12 @@ def read_raw(source: Source) -> RawFile:
                 samples=[columns[name] if rows else columns[name][span] for name in names],
                 entries=entries,
                 units=tuple(units[name] for name in names),
-                **start_fields(facts.record_value(START_NAMES, k, n)),
+                **start_fields(facts.record_value(START_NAMES, k, n), declared=facts.label_of(START_NAMES)),
+                axis_starts=tuple(_first_time(columns[name][span], schema.field(name)) for name in stamped),
                 conditions=facts.conditions(k, n),
                 time=None if time is None else _seconds(columns[time][span]),
                 undecided=nested | {i: stated[name] for i, name in enumerate(names) if stated[name]},
+                time_label="" if time is None else f"{time} [{units[time]}]" if units[time].strip() else time,
                 is_time_in_seconds=time is not None and columns[time].dtype.kind in "mM",
                 clocks=tuple((f"column {name!r}", _seconds(columns[name][span])) for name in clocks),
                 not_numbers=not_numbers,
@@ -210,6 +215,12 @@ def _varies(stamps: Column) -> bool:
     """Whether time stamps differ: one that is the same in every row is no time axis."""
     values = np.asarray(stamps[:])
     return len(values) > 1 and bool((values != values[0]).any())
+
+
+def _first_time(stamps: Column, field: pa.Field) -> tuple[datetime | None, str]:
+    """First time stamp of a column, in UTC if the column has a time zone, and "" as it cannot be misread."""
+    time, text = stated_time(stamps[:1][0]) if len(stamps) else (None, "")
+    return time.replace(tzinfo=UTC) if time and field.type.tz else time, text
 
 
 def _unit(field: pa.Field) -> str:

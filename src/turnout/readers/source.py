@@ -193,9 +193,10 @@ class RawRecord:
     ``samples`` holds one (n_sample,) array or ``LazyColumn`` per name, in ``units`` ("" if not stated).
     ``entries`` are all metadata of the record with their places: ``turnout.readers.statements`` finds the sampling rate
     in them. ``started_at`` has a time zone only if the format states one; ``unread_start`` is a start time that cannot
-    be read, as it is written. ``time`` is the time column of the file, in seconds unless ``is_time_in_seconds`` is
-    False: then its unit is not stated. ``clocks`` are further time axes (place, seconds). ``aliases`` are further names
-    of the channels.
+    be read, as it is written, ``unread_zone`` a time zone of it. ``time`` is the time column of the file, in seconds
+    unless ``is_time_in_seconds`` is False: then its unit is not stated; ``time_label`` is its name, with the unit as it
+    is written. ``clocks`` are further time axes (place, seconds). ``axis_starts`` are the times at which axes of time
+    stamps begin, or the text of one that cannot be read. ``aliases`` are further names of the channels.
     ``undecided`` are statements about the scale of channels, by index, of which nothing says whether it is applied.
     ``not_numbers`` are variables without real numbers, name -> what they hold, for messages about missing channels.
     ``audio`` is "whole" for an audio file of whole numbers, which are fractions of full scale, "floating" for one of
@@ -208,9 +209,12 @@ class RawRecord:
     entries: tuple[Entry, ...] = ()
     started_at: datetime | None = None
     unread_start: str = ""
+    unread_zone: str = ""
     conditions: Mapping = field(default_factory=lambda: EMPTY_MAPPING)
     time: np.ndarray | None = None
+    time_label: str = ""
     is_time_in_seconds: bool = False
+    axis_starts: tuple[tuple[datetime | None, str], ...] = ()
     clocks: tuple[tuple[str, np.ndarray], ...] = ()
     aliases: tuple[tuple[str, ...], ...] = ()
     undecided: Mapping[int, str] = field(default_factory=lambda: EMPTY_MAPPING)

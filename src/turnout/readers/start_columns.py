@@ -1,18 +1,22 @@
-"""Start of a recording in its first row: a date and a time of day, or a time column in units since 1970."""
+"""Start of a recording in its first sample: a date and a time of day, or a count from a known origin."""
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta, timezone
 
+import numpy as np
+
 from turnout.readers.clock_texts import CLOCK, DATE, DATE_ALONE, STAMP
-from turnout.readers.entry_candidates import EPOCHS
+from turnout.readers.lazy import Column
 from turnout.readers.rate_units import words_of
-from turnout.readers.stated_starts import OTHER
-from turnout.readers.statements import PLAUSIBLE_RATES
+from turnout.readers.rate_words import is_time_name
+from turnout.readers.source import RawRecord
+from turnout.readers.stated_starts import OTHER, has_date_word, is_other_start, is_start_name
+from turnout.readers.time_numbers import time_of_number
 
 DATED = re.compile(rf" *({DATE})[T ,_]+{CLOCK} *")
 ZONE = re.compile(r"(?:(Z|UTC)|([+-])(\d{2}):?(\d{2})) *$")
-EPOCH_UNITS = (1.0, 1e-3, 1e-6, 1e-9)  # s
 
 
 def start_in_cells(cells: Sequence[str], names: Sequence[str]) -> tuple[datetime | None, str]:
@@ -97,31 +101,54 @@ def _time_of(day: tuple[int, int, int], match: re.Match[str], text: str) -> date
     return start.replace(tzinfo=timezone(-offset if zone[2] == "-" else offset))
 
 
-def start_of_epoch(first: float, step: float, has_unit: bool) -> datetime | None:
-    """Start of a time column that counts from 1970, in UTC.
+def starts_of_axes(record: RawRecord) -> list[tuple[datetime | None, str]]:
+    """Start that each time axis of a record states in its first sample: a time stamp, or a count from a known origin.
 
     Parameters
     ----------
-    first : float
-        First number, in seconds by the unit of the column.
-    step : float
-        Step, in the same unit.
-    has_unit : bool
-        Whether the file states the unit; else the column may count s, ms, µs or ns.
+    record : RawRecord
+        The record as its reader returns it.
 
     Returns
     -------
-    datetime or None
-        None if the column counts from another origin, or its step is that of no recording.
-
-    Examples
-    --------
-    >>> start_of_epoch(1.7786664e12, 0.05, False)
-    datetime.datetime(2026, 5, 13, 10, 0, tzinfo=datetime.timezone.utc)
-    >>> start_of_epoch(12.5, 5e-5, True), start_of_epoch(7e8, 50.0, False)  # the latter in µs since the logger began
-    (None, None)
+    list of tuple of (datetime or None, str)
+        The start, or the text of one that cannot be read. Axes that count from the start of the recording take no
+        part.
     """
-    for unit in EPOCH_UNITS[:1] if has_unit else EPOCH_UNITS:
-        if EPOCHS[0] <= first * unit <= EPOCHS[1] and PLAUSIBLE_RATES[0] * step * unit <= 1.0:
-            return datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=round(first * unit, 6))
-    return None
+    starts = list(record.axis_starts)
+    if record.time is not None and len(record.time) > 1:
+        unit = " [s]" if record.is_time_in_seconds else ""
+        starts.append(_start_of_axis(record.time, record.time_label + unit))
+    for name, unit, column in zip(record.names, record.units, record.samples):
+        is_dated = is_time_name(name) or (is_start_name(name) and has_date_word(name))
+        if is_dated and column.dtype.kind in "fiu" and len(column) > 1:
+            starts.append(_start_of_axis(column, f"{name} [{unit}]" if unit.strip() else name))
+    return [(start, text) for start, text in starts if start or text]
+
+
+def _start_of_axis(column: Column, declared: str) -> tuple[datetime | None, str]:
+    first, second = (value.item() for value in np.asarray(column[:2]))
+    return time_of_number(first, declared, step=float(second - first))
+
+
+def with_axis_start(record: RawRecord) -> RawRecord:
+    """The record with the start of its time axes if its metadata state none; one of another day is reported.
+
+    Parameters
+    ----------
+    record : RawRecord
+        The record as its reader returns it.
+
+    Returns
+    -------
+    RawRecord
+        The same record if no axis states a start.
+    """
+    if record.unread_start or not (starts := starts_of_axes(record)):
+        return record
+    times = [start for start, _ in starts if start]
+    if record.started_at is None and not times:
+        return replace(record, unread_start=starts[0][1])
+    used = record.started_at or times[0]
+    other = next((start for start in times if is_other_start(start, used)), None)
+    return replace(record, started_at=used, unread_start=str(other) if other else "")

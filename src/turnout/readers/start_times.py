@@ -7,8 +7,9 @@ from typing import Any
 from zoneinfo import ZoneInfo
 
 from turnout.errors import ReadError
-from turnout.readers.source import Source
-from turnout.readers.time_texts import parse_time
+from turnout.readers.source import RawRecord, Source
+from turnout.readers.stated_zones import zone_problem
+from turnout.readers.time_texts import stated_time
 
 TIME_FORMAT = "%Y-%m-%d %H:%M:%S.%f"
 
@@ -134,16 +135,23 @@ def _longest_ordered(starts: Sequence[Any]) -> list[int]:
 
 PLAUSIBLE_YEARS = (1990, 2060)  # of a digital logger; other years are epochs of counters (1904, 1970, 1980)
 CLOCK_REMEDY = "Check the logger's clock; give the campaign or the time in the file's name"
+COUNT_REMEDY = (
+    "State its origin in the name or the unit, such as 'days since 1899-12-30', or give the campaign or the time in "
+    "the file's name"
+)
+ZONE_REMEDY = "Compare it with 'time_zone' in the layout; let the logger write UTC, or an offset such as +02:00"
 NO_START = {"", "-", "none", "n/a", "?", "unknown", "nan", "nat", "null", "0", "0.0"}
 
 
-def start_fields(*values: Any) -> dict[str, Any]:
+def start_fields(*values: Any, declared: str = "") -> dict[str, Any]:
     """Fields ``started_at`` and ``unread_start`` of a RawRecord.
 
     Parameters
     ----------
     *values : any
         Time stamps as a library returns them, the preferred one first.
+    declared : str
+        Name and unit of a number, which may say how it counts.
 
     Returns
     -------
@@ -154,11 +162,15 @@ def start_fields(*values: Any) -> dict[str, Any]:
     --------
     >>> start_fields(None, "2024-02-30 10:00")
     {'started_at': None, 'unread_start': '2024-02-30 10:00'}
+    >>> start_fields(46155.5)["unread_start"]
+    '46155.5: days since 1899-12-30 or days since 1904-01-01?'
     """
     stated = [value for value in values if _text_of(value).casefold() not in NO_START]
-    started_at = next((stamp for value in stated if (stamp := parse_time(value)) is not None), None)
-    is_unread = started_at is None and bool(stated)
-    return {"started_at": started_at, "unread_start": _text_of(stated[0])[:60] if is_unread else ""}
+    times = [stated_time(value, declared) for value in stated]
+    started_at = next((time for time, _ in times if time is not None), None)
+    if started_at is not None or not stated:
+        return {"started_at": started_at, "unread_start": ""}
+    return {"started_at": None, "unread_start": times[0][1] or _text_of(stated[0])[:60]}
 
 
 def _text_of(value: Any) -> str:
@@ -243,7 +255,8 @@ def start_errors(
         yield _start_error([k for k, _ in other], problem, source)
     if no_time := [(k, text) for k, text in unread.items() if stated.get(k) is None]:
         problem = f"the start time {no_time[0][1]!r} cannot be read"
-        yield _start_error([k for k, _ in no_time], problem, source)
+        is_number = no_time[0][1].endswith("?")
+        yield _start_error([k for k, _ in no_time], problem, source, COUNT_REMEDY if is_number else CLOCK_REMEDY)
     timed = [(k, stamp) for k, stamp in stamps if stamp is not None]
     if strange := [(k, stamp) for k, stamp in timed if not is_plausible(stamp)]:
         problem = (
@@ -263,7 +276,33 @@ def start_errors(
         yield _start_error([k for k, _ in twice], problem, source)
 
 
-def _start_error(records: Sequence[int], problem: str, source: Source) -> ReadError:
+def zone_errors(records: Sequence[RawRecord | ReadError], time_zone: str, source: Source) -> Iterator[ReadError]:
+    """One error about time zones in the file that cannot be read and may differ from that of the layout.
+
+    Parameters
+    ----------
+    records : sequence of RawRecord or ReadError
+        The records of the file.
+    time_zone : str
+        IANA name of the layout's zone.
+    source : Source
+        The raw file.
+
+    Yields
+    ------
+    ReadError
+        With the reason ``start_unknown``, a remark.
+    """
+    problems = {
+        k: problem
+        for k, record in enumerate(records)
+        if isinstance(record, RawRecord) and (problem := zone_problem(record, time_zone))
+    }
+    if problems:
+        yield _start_error(list(problems), next(iter(problems.values())), source, ZONE_REMEDY)
+
+
+def _start_error(records: Sequence[int], problem: str, source: Source, remedy: str = CLOCK_REMEDY) -> ReadError:
     numbers = [k + 1 for k in records]
     where = f"record {numbers[0]}" if len(numbers) == 1 else f"records {numbers[0]} to {numbers[-1]}"
-    return source.error(where, problem, CLOCK_REMEDY, reason="start_unknown")
+    return source.error(where, problem, remedy, reason="start_unknown")

@@ -1,13 +1,20 @@
 """Start time under a name that no format defines: "Recorded on", "Aufnahmezeitpunkt", "Date/Time"."""
 
 import re
+from collections.abc import Iterator
 from dataclasses import replace
 from datetime import datetime, timedelta
 from functools import lru_cache
+from typing import Any
 
+import numpy as np
+
+from turnout.readers.entries import Entry
 from turnout.readers.rate_units import words_of
 from turnout.readers.source import RawRecord
-from turnout.readers.time_texts import looks_dated, parse_time
+from turnout.readers.statements import MIN_EPOCH
+from turnout.readers.time_numbers import is_declared
+from turnout.readers.time_texts import NUMBER_TEXT, looks_dated, parse_time, stated_time
 
 START = re.compile(
     r"start|begin|debut|inici|inizi|zacat|trigg|record|aufnahm|aufzeich|mess|mesur|medic|misur|enregistr|registr|grab"
@@ -18,6 +25,9 @@ OTHER = re.compile(
     r"end|stop|fin$|slut|calib|kalib|etalonn|tarat|export|creat|erstell|modif|chang|saved|print|servic|install|version"
     r"|due|valid|last|letzt|next|file|datei|software|firmware|config|import|convert|upload"
 )
+DATE_WORD = re.compile(r"date|datum|dato$|stamp|stempel|horodat|fecha|datenum|epoch")
+TIME_WORD = re.compile(r"time|zeit|heure|temps|tid|tijd|hora$|ora$|cas$|clock|uhr|started|begun|recorded")
+MAX_UNREAD = 120  # characters of a start that cannot be read
 MAX_ZONE_DIFFERENCE = timedelta(hours=26)  # two zones on both sides of the date line
 
 
@@ -44,6 +54,22 @@ def is_start_name(name: str) -> bool:
     return any(START.search(word) for word in words) and not any(OTHER.search(word) for word in words)
 
 
+def has_date_word(name: str) -> bool:
+    """Whether a name speaks of a date or of a way to count dates; "time" alone may be a duration.
+
+    Parameters
+    ----------
+    name : str
+        Name of an entry or a column.
+
+    Returns
+    -------
+    bool
+        True for "Startdatum" and "recorded (unix)".
+    """
+    return any(DATE_WORD.search(word) for word in words_of(name)) or is_declared(name)
+
+
 def with_stated_start(record: RawRecord) -> RawRecord:
     """The only record of a file with the start time of its metadata if its format states none.
 
@@ -58,17 +84,37 @@ def with_stated_start(record: RawRecord) -> RawRecord:
         With a start time if all entries under such a name agree; a text that is no time is its unread start, and one
         that contradicts the start time of the format.
     """
-    texts = [e.value.strip() for e in record.entries if isinstance(e.value, str) and is_start_name(e.name)]
-    texts = list(dict.fromkeys(text for text in texts if looks_dated(text)))
-    if not texts or record.unread_start:
+    if record.unread_start:
+        return record
+    stated = dict(item for entry in record.entries if is_start_name(entry.name) for item in _times_of_entry(entry))
+    times = [time for time in stated.values() if time]
+    if not stated:
         return record
     if record.started_at is not None:
-        other_texts = [text for text in texts if is_other_start(parse_time(text), record.started_at)]
-        return replace(record, unread_start=other_texts[0][:60]) if other_texts else record
-    times = {_naive(stamp) for text in texts if (stamp := parse_time(text))}
-    if len(times) != 1:
-        return replace(record, unread_start=" or ".join(texts)[:60])
-    return replace(record, started_at=next(stamp for text in texts if (stamp := parse_time(text))))
+        others = [text for text, time in stated.items() if is_other_start(time, record.started_at)]
+        return replace(record, unread_start=others[0][:60]) if others else record
+    if len({_naive(time) for time in times}) != 1:
+        return replace(record, unread_start=" or ".join(stated)[:MAX_UNREAD])
+    return replace(record, started_at=times[0])
+
+
+def _times_of_entry(entry: Entry) -> Iterator[tuple[str, datetime | None]]:
+    """Text and time of an entry under the name of a start, if its value looks like a time."""
+    value, declared = entry.value, entry.name
+    if isinstance(value, (datetime, np.datetime64)):
+        yield str(value), parse_time(value)
+    elif isinstance(value, str) and not NUMBER_TEXT.fullmatch(value.strip()):
+        if looks_dated(value.strip()):
+            yield value.strip(), parse_time(value.strip())
+    elif isinstance(value, (str, int, float, np.number)) and (has_date_word(declared) or _is_long(value, declared)):
+        time, problem = stated_time(value, declared)
+        if time or problem:
+            yield problem or str(value), time
+
+
+def _is_long(value: Any, declared: str) -> bool:
+    """Whether a number under the name of a time is too large for a duration."""
+    return any(TIME_WORD.search(word) for word in words_of(declared)) and float(value) >= MIN_EPOCH
 
 
 def _naive(stamp: datetime) -> datetime:

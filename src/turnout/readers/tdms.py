@@ -7,9 +7,11 @@ and the length of each channel with ``wf_samples``.
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext
+from datetime import UTC
 from typing import Any, BinaryIO
 
 import nptdms
+import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.array_metadata import RECORD_COUNT_NAMES, START_NAMES, Metadata
@@ -62,7 +64,7 @@ def read_raw(source: Source) -> RawFile:
     damaged = _damaged_paths(tdms) if truncation else set()
     of_file = [
         Entry(f"property of the file: {entry.name}", entry.name, entry.value)
-        for entry in entries_of(tdms.properties, "")
+        for entry in entries_of({name: _in_utc(value) for name, value in tdms.properties.items()}, "")
     ]
     records = [_record(g, k, len(groups), names, damaged, tdms, of_file, source) for k, g in enumerate(groups)]
     if truncation and not any(isinstance(r, ReadError) for r in records):
@@ -108,6 +110,12 @@ def _time_axis(channel: nptdms.TdmsChannel, source: Source) -> tuple[int, float,
     """Number of samples, step [s] and start of a channel, 0 and None if not stated."""
     facts = Metadata(channel.properties, source)
     return len(channel), facts.number(("wf_increment",)) or 0.0, facts.record_value(("wf_start_time",), 0, 1)
+
+
+def _in_utc(value: Any) -> Any:
+    """A value of the file; its time stamps are in UTC, which npTDMS does not state."""
+    time = parse_time(value) if isinstance(value, np.datetime64) else None
+    return value if time is None else time.replace(tzinfo=UTC)
 
 
 def _axis_text(n_sample: int, step: float, start: Any) -> str:
@@ -196,7 +204,11 @@ def _complete_record(
         samples=samples,
         entries=(*of_file, *_entries(channels, groups)),
         units=tuple(str(c.properties.get("unit_string", "") or "") for c in channels),
-        **start_fields(facts.record_value(("wf_start_time",), 0, 1), facts.record_value(START_NAMES, 0, 1)),
+        **start_fields(
+            *map(_in_utc, (facts.record_value(("wf_start_time",), 0, 1), facts.record_value(START_NAMES, 0, 1))),
+            declared=facts.label_of(START_NAMES),
+        ),
+        axis_starts=tuple((_in_utc(c[0]), "") for c in channels if c.dtype.kind == "M" and len(c)),
         conditions=facts.conditions(0, 1),
         aliases=tuple((f"{c.group_name}/{c.name}",) for c in channels),
         undecided=undecided,
@@ -225,7 +237,7 @@ def _entries(channels: Sequence[nptdms.TdmsChannel], groups: Mapping[str, Mappin
     ]
     places += [(f"property of the channel {c.name!r}", c.properties) for c in channels]
     for place, values in places:
-        stated = {name: value for name, value in values.items() if name != "wf_increment" or value != 0}
+        stated = {name: _in_utc(value) for name, value in values.items() if name != "wf_increment" or value != 0}
         for entry in entries_of(stated, ""):
             is_step = entry.name == "wf_increment"
             yield Entry(f"{place}: {entry.name}", entry.name, entry.value, is_defined=is_step)

@@ -1,6 +1,5 @@
 """Times of day as loggers print and store them."""
 
-import math
 import re
 import unicodedata
 from datetime import UTC, datetime, timedelta
@@ -8,7 +7,10 @@ from typing import Any
 
 import numpy as np
 
-MATLAB_EPOCH = 719529  # datenum of 1970-01-01
+from turnout.readers.time_numbers import time_of_digits, time_of_number
+
+NUMBER_TEXT = re.compile(r"\d+(?:\.\d*)?(?:[eE]\+?\d+)?")
+DAY_DIGITS = 8  # of a date without marks, YYYYMMDD
 DATED = re.compile(
     r"\d{1,4}[-./]\s?\d{1,2}[-./]\s?\d{1,4}\D+\d{1,2}[:.h-]\d{2}|\d{8}[T _-]?\d{4,6}|\d{4}-?(?:W\d\d|\d{3}T)|\d{4}年"
 )
@@ -85,9 +87,9 @@ def _parse_worded(text: str) -> datetime | None:
 def parse_time(value: Any) -> datetime | None:
     """Time of a time stamp in any of the forms that files use.
 
-    These are ISO 8601 text, also with slashes, or with the month as a word, numpy datetime64 (UTC), seconds since 1970
-    (UTC) and a MATLAB datenum. With dots the day comes first, "13.05.2024 10:00"; dates with slashes that do not begin
-    with the year are ambiguous and not read.
+    These are ISO 8601 text, also with slashes, or with the month as a word, numpy datetime64 (without a zone), and
+    numbers that only one usual count explains (``time_numbers``): since 1970, a MATLAB datenum ... With dots the day
+    comes first, "13.05.2024 10:00"; dates with slashes that do not begin with the year are ambiguous and not read.
 
     Parameters
     ----------
@@ -101,34 +103,59 @@ def parse_time(value: Any) -> datetime | None:
 
     Examples
     --------
-    >>> parse_time("2024-05-13T10:00:00"), parse_time(719529.5)
-    (datetime.datetime(2024, 5, 13, 10, 0), datetime.datetime(1970, 1, 1, 12, 0))
+    >>> parse_time("2024-05-13T10:00:00"), parse_time(739385.5)
+    (datetime.datetime(2024, 5, 13, 10, 0), datetime.datetime(2024, 5, 13, 12, 0))
     """
+    return stated_time(value)[0]
+
+
+def stated_time(value: Any, declared: str = "") -> tuple[datetime | None, str]:
+    """Time of a time stamp as ``parse_time``, or what is unclear about a number.
+
+    Parameters
+    ----------
+    value : any
+        The time stamp as a library returns it.
+    declared : str
+        Its name and unit, which may say how a number counts.
+
+    Returns
+    -------
+    tuple of (datetime or None, str)
+        The time; without one, what a number may mean, "" for any other value.
+    """
+    if isinstance(value, np.generic) and not isinstance(value, np.datetime64):
+        value = value.item()
+    if isinstance(value, bytes):
+        value = value.decode("utf-8", "replace")
+    if isinstance(value, str) and NUMBER_TEXT.fullmatch(text := value.strip()) and len(text) != DAY_DIGITS:
+        written = time_of_digits(text)
+        return (written, "") if written else time_of_number(int(text) if text.isdecimal() else float(text), declared)
+    if isinstance(value, (int, float)):
+        return time_of_number(value, declared)
+    return _time_of_stamp(value), ""
+
+
+def _time_of_stamp(value: Any) -> datetime | None:
+    """Time of a time stamp that is no number."""
     if isinstance(value, datetime):
         return value
     if isinstance(value, np.datetime64):
         stamp = value.astype("datetime64[us]").item()  # a whole number outside the years 1 to 9999, None for NaT
-        return stamp.replace(tzinfo=UTC) if isinstance(stamp, datetime) else None
-    if isinstance(value, bytes):
-        value = value.decode("utf-8", "replace")
-    if isinstance(value, str):
-        if match := DOTTED_DATE.fullmatch(value.strip()):
-            value = f"{match[3]}-{match[2]:0>2}-{match[1]:0>2}T{match[4]:0>2}:{match[5]}"
-        if (zone := re.search(r"[+-]\d{2}:?(\d{2})$", value.strip())) and int(zone[1]) % 15 and ":" in value:
-            return None  # no time zone has such an offset: the text is damaged
-        text = re.sub(r"^(\d{4})/(\d{1,2})/(\d{1,2})(?=\D)", _with_dashes, value.strip())
-        if not ISO_CHARACTERS.fullmatch(text):  # Python skips other characters behind the microseconds
-            return _parse_worded(text)
-        try:
-            return datetime.fromisoformat(text)
-        except ValueError:
-            return None
-    if isinstance(value, (int, float)) and math.isfinite(value):
-        if 6e5 < value < 8e5:
-            return datetime(1970, 1, 1) + timedelta(seconds=round((value - MATLAB_EPOCH) * 86400, 6))
-        if 1e8 < value < 1e11:
-            return datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=value)
-    return None
+        return stamp if isinstance(stamp, datetime) else None
+    if not isinstance(value, str):
+        return None
+    if match := DOTTED_DATE.fullmatch(value.strip()):
+        value = f"{match[3]}-{match[2]:0>2}-{match[1]:0>2}T{match[4]:0>2}:{match[5]}"
+    if (zone := re.search(r"[+-]\d{2}:?(\d{2})$", value.strip())) and int(zone[1]) % 15 and ":" in value:
+        return None  # no time zone has such an offset: the text is damaged
+    text = re.sub(r"^(\d{4})/(\d{1,2})/(\d{1,2})(?=\D)", _with_dashes, value.strip())
+    if not ISO_CHARACTERS.fullmatch(text):  # Python skips other characters behind the microseconds
+        return _parse_worded(text)
+    try:
+        return datetime.fromisoformat(text)
+    except ValueError:
+        return None
 
 
 def _with_dashes(match: re.Match[str]) -> str:

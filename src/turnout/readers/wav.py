@@ -75,7 +75,11 @@ def read_raw(source: Source) -> RawFile:
         samples=list(samples),
         entries=(rate_entry("sample rate of the header", rate), *byte_rate, *entries),
         units=tuple(units) if len(units) == n else ("",) * n,
-        **start_fields(facts.record_value(START_NAMES, 0, 1), _broadcast_start(further.get(b"bext", b""))),
+        **start_fields(
+            facts.record_value(START_NAMES, 0, 1),
+            _broadcast_start(further.get(b"bext", b"")),
+            declared=facts.label_of(START_NAMES),
+        ),
         conditions=facts.conditions(0, 1),
         aliases=tuple((str(i),) for i in range(n)),
         undecided=entry_statements(entries, names if len(names) == n else [str(i) for i in range(n)]),
