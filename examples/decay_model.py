@@ -7,7 +7,6 @@ same beam with the lateral stiffness of rail and fastening, without torsion and 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import expm
 
 from turnout.simulate.decay_rate import DISTANCES
 
@@ -64,7 +63,7 @@ def decay_rate(beam, support, bands=BANDS, lines=LINES):
 def responses(beam, support, frequency):
     """(n_line, n_position) receptance of the infinite track at the positions of the grid; force between supports."""
     omega = 2.0 * np.pi * np.asarray(frequency)
-    quarter = expm(_bending(omega, beam, support) * (0.25 * SPACING))
+    quarter = _transfer(_bending(omega, beam, support), 0.25 * SPACING)
     half = quarter @ quarter
     jump = np.zeros((omega.size, 4, 4), dtype=complex) + np.eye(4)
     jump[:, 3, 0] = seat(omega, support)
@@ -79,11 +78,29 @@ def responses(beam, support, frequency):
     for _ in range(3):
         step = quarter @ step
         quarter_shapes.append(step[:, 0, :])
-    receptance = np.empty((omega.size, DISTANCES.size), dtype=complex)
-    for k, x in enumerate(DISTANCES):
-        bays, quarters = divmod(round(4.0 * x) + 2, 4)  # quarters of a bay behind the support before the force
-        receptance[:, k] = np.sum(quarter_shapes[quarters] * amount * multiplier[:, :2] ** bays, axis=1)
-    return receptance
+    # quarters of a bay behind the support before the force
+    bays, quarters = np.divmod(np.round(4.0 * DISTANCES).astype(int) + 2, 4)
+    factors = np.concatenate([amount[None], np.broadcast_to(multiplier[:, :2], (bays.max(), omega.size, 2))])
+    powers = np.multiply.accumulate(factors)
+    return np.sum(np.array(quarter_shapes)[quarters] * powers[bays], axis=2).T
+
+
+def _transfer(system, length):
+    r"""(n, 4, 4) matrix exponential of ``system`` times ``length`` [m].
+
+    Deflection and moment only act on rotation and shear, and the other way round. So the eigenvalues are
+    :math:`\pm\lambda_1, \pm\lambda_2`, and the exponential is a polynomial of the third degree with these at its nodes.
+    """
+    square = system @ system
+    mean = 0.5 * (square[:, 0, 0] + square[:, 2, 2])
+    distance = np.sqrt(mean**2 - square[:, 0, 0] * square[:, 2, 2] + square[:, 0, 2] * square[:, 2, 0])
+    squares = np.array([mean + distance, mean - distance])  # of the eigenvalues
+    root = np.sqrt(squares)
+    even, odd = np.cosh(root * length), np.sinh(root * length) / root
+    slopes = [(f[0] - f[1]) / (2.0 * distance) for f in (even, odd)]
+    constants = [f[0] - slope * squares[0] for f, slope in zip((even, odd), slopes)]
+    (c2, c3), (c0, c1) = (np.array(c)[:, :, None, None] for c in (slopes, constants))
+    return c0 * np.eye(4) + c2 * square + system @ (c1 * np.eye(4) + c3 * square)
 
 
 def seat(omega, support):

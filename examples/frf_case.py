@@ -15,6 +15,7 @@ MAX_STEP = 0.7  # largest step [prior sd]: a longer one jumps from one sharp res
 TOLERANCE = 0.05  # tolerated error as a share of the response, averaged over a tenth of an octave
 INDEPENDENT_SHARE = 0.25  # effective share of independent lines: errors of neighbouring lines are correlated
 SUSPENSION_FREQUENCY = 25.0  # approximate resonance of the rigid body on its suspension [Hz]
+N_STORED = 64  # lines of unit resonances kept for predictions that only differ in shapes and gains
 LAMBDA = np.array([4.73004, 7.85320, 10.99561, 14.13717, 17.27876, 20.42035, 23.56194])  # free-free beam
 
 
@@ -75,6 +76,7 @@ class FrfCase(Case):
         self.reserved = tuple(observations[k] for k in reserved)
         self.nuisances = tuple(self._nuisances(peaks))
         self.candidates = tuple(c for c in self._candidates() if c.family not in without)
+        self._stored_lines = {}
 
     def _observation(self, k):
         rows, octave = self.h[k], np.log2(self.frequency)
@@ -247,18 +249,26 @@ class FrfCase(Case):
         loss = sum(t.values["share"] for t in terms if t.effect_type == "structural_damping")
         frequencies, damping = (np.array([mode[i] for mode in modes])[:, None] for i in (0, 1))
         shapes = np.array([shape for _, _, shape in modes])
-        width = 2j * damping * loss
         predictions = []
         for o in observations:
             place, stretch = self.impact_places[int(o.name.split()[1]) - 1], 1.0 + values[f"stretch@{o.name}"]
-            x = self.frequency / (frequencies * stretch)
-            square = x**2
-            lines = square / (square - 1.0 - 2j * damping * (1.0 - loss) * x - width)
+            lines = self._resonance_lines(frequencies * stretch, damping, loss)
             rows = (shapes[:, : self.n_sensor] * shapes[:, place, None]).T @ lines
             gain = 1.0 + values[f"hammer@{o.name}"]
             gain += sum(t.values["gain"] for t in terms if t.effect_type == "impact_gain" and t.where == o.name)
             predictions.append(split_complex(gain * self._through_sensors(rows, terms)))
         return predictions
+
+    def _resonance_lines(self, frequencies, damping, loss):
+        """(n_mode, n_line) accelerance of each mode with unit shape; ``loss`` is the share of structural damping."""
+        key = frequencies.tobytes(), damping.tobytes(), loss
+        if key not in self._stored_lines:
+            if len(self._stored_lines) >= N_STORED:
+                self._stored_lines.clear()
+            x = self.frequency / frequencies
+            square = x**2
+            self._stored_lines[key] = square / (square - 1.0 - 2j * damping * (1.0 - loss) * x - 2j * damping * loss)
+        return self._stored_lines[key]
 
     def _through_sensors(self, rows, terms):
         rows, f = rows.copy(), self.frequency

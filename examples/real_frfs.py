@@ -70,9 +70,10 @@ def cases(folder):
     }  # fmt: skip
 
 
-def analyse(folder):
-    """{title: (case, left out, diagnosis)}."""
-    return {title: (case, left_out, diagnose(case, SETTINGS)) for title, (case, left_out) in cases(folder).items()}
+def analyse(folder, titles=None):
+    """{title: (case, left out, diagnosis)} of the cases in ``titles``; None: of all."""
+    chosen = {title: pair for title, pair in cases(folder).items() if titles is None or title in titles}
+    return {title: (case, left_out, diagnose(case, SETTINGS)) for title, (case, left_out) in chosen.items()}
 
 
 def rows(results):

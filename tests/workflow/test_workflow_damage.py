@@ -7,6 +7,7 @@ import duckdb
 import pytest
 import toy_fleet as toy
 
+pytestmark = pytest.mark.slow
 QUARANTINE = "select path, reason_code from {} where reason_code <> 'nothing_found'"
 
 

@@ -10,6 +10,7 @@ import toy_fleet as toy
 from turnout.registry.database import open_registry
 from turnout.workflow.plan import shard_of
 
+pytestmark = pytest.mark.slow
 SHARDS = 3
 
 

@@ -18,6 +18,7 @@ from turnout.workflow.shard import run_shard
 from turnout.workflow.state import batch_paths
 from turnout.workflow.tasks import Stage
 
+pytestmark = pytest.mark.slow
 ALGO = "toy_fleet:unit"
 
 

@@ -154,7 +154,7 @@ def linearise(theta: np.ndarray, decays: np.ndarray, rate: float, drift: np.ndar
 
 
 def contiguous(values: np.ndarray) -> np.ndarray:
-    """Values as compiled sums need them.
+    """Values as compiled sums need them. For a read-only array numba would compile each sum once more.
 
     Parameters
     ----------
@@ -164,9 +164,9 @@ def contiguous(values: np.ndarray) -> np.ndarray:
     Returns
     -------
     array of float
-        Contiguous; ``values`` itself if it is.
+        Contiguous and writeable; ``values`` itself if it is.
     """
-    return np.ascontiguousarray(values, dtype=float)
+    return np.require(values, dtype=float, requirements=("C", "W"))
 
 
 def group_decays(theta: np.ndarray, decays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from turnout.modal.least_squares import drift_columns, linearise, power_sums, powers
+from turnout.modal.least_squares import drift_columns, group_decays, linearise, power_sums, powers
 from turnout.modal.wave_kernels import WIDTH, fill_powers, geometric_sums, sum_blocks
 
 # A prime: no pair of tables fits it without a rest.
@@ -82,3 +82,12 @@ def test_a_wave_that_does_not_oscillate_is_refused(damping):
     theta = np.array([[[np.log(100.0), 0.1], [np.log(300.0), damping]]])
     with pytest.raises(ValueError, match="damping ratios below 1"):
         linearise(theta, np.ones((2, N)), 20e3, drift_columns(N, -1))
+
+
+def test_read_only_decays_are_summed_by_the_same_machine_code():
+    """numba compiles for read-only arrays separately, some 10 s for all sums."""
+    decays = np.random.default_rng(2).standard_normal((2, N))
+    decays.flags.writeable = False
+    _, group = group_decays(np.array([[[3.0, 0.01]]]), decays)
+    assert group.flags.writeable and group.flags.c_contiguous
+    assert np.array_equal(group[0], decays)
