@@ -7,7 +7,7 @@
 For each file it shows the format, records, times, the sampling rate with every line that states it, the channels with
 units and extremes, which channel may be force or response, and impacts or trains. A folder gives one line per file.
 --plot draws every channel into <name of the file>.svg in the present folder, for files of the same name with that of
-their folders before it. Nothing else is written.
+their folders before it. Nothing else is written. campaigns.csv and trains.csv of a turnout are checked row by row.
 
 Exit code 1 if a file cannot be read or has a problem.
 """
@@ -53,6 +53,7 @@ def run(args: argparse.Namespace) -> int:
         Exit code.
     """
 
+    from turnout.config.campaign_notes import NOTE_FILES
     from turnout.errors import ReadError
     from turnout.report.contents_figure import contents_figure
     from turnout.report.contents_text import contents_lines, contents_summary, contents_values
@@ -62,6 +63,13 @@ def run(args: argparse.Namespace) -> int:
     is_sound, values = True, []
     drawings: set[Path] = set()
     for path, is_in_folder in _files(args.file):
+        if path.name in NOTE_FILES and path.is_file():
+            rows, problems = _notes(path)
+            is_sound = is_sound and not problems
+            values.append({"path": str(path), "rows": rows, "problems": problems})
+            usable = f"{rows} row{'s' if rows != 1 else ''} that can be used"
+            print("\n".join([f"{path}: a table beside the recordings, {usable}", *problems]))
+            continue
         try:
             contents = file_contents(path)
         except ReadError as error:
@@ -79,6 +87,14 @@ def run(args: argparse.Namespace) -> int:
             print(f"  figure     {drawing}")
     add_result(args, values)
     return 0 if is_sound else 1
+
+
+def _notes(path: Path) -> tuple[int, list[str]]:
+    """Number of usable rows of a table of campaigns or trains, and what is wrong with the others."""
+    from turnout.config.campaign_notes import read_campaigns, read_trains
+
+    rows, errors = (read_campaigns if path.name == "campaigns.csv" else read_trains)(path, str(path))
+    return len(rows), [str(error) for error in errors]
 
 
 def _drawing_name(path: Path, taken: Collection[Path]) -> Path:

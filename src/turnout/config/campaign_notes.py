@@ -12,6 +12,7 @@ from turnout.config.events import parse_utc, time_problem
 from turnout.config.turnout import Campaign
 from turnout.errors import ReadError
 
+NOTE_FILES = ("campaigns.csv", "trains.csv")
 COLUMNS = ("campaign", "started_at_utc", "rail_temperature_c", "hammer_id", "tip", "operator")
 TRAIN_COLUMNS = ("passed_at_utc", "train_type", "speed_kmh", "axle_load_t", "track", "n_axles")
 TRAIN_RANGES = {"speed_kmh": (1, 400), "axle_load_t": (0.1, 60), "n_axles": (1, 2000)}

@@ -5,6 +5,7 @@ from typing import Any
 from zoneinfo import available_timezones
 
 from turnout.config.document import Branch, merge_branches
+from turnout.config.file_names import file_key, name_problem
 from turnout.config.filename_pattern import compile_pattern
 from turnout.config.schema import suggestion
 from turnout.config.settings_schema import settings_keys
@@ -30,6 +31,7 @@ def check_consistency(tree: Branch, to_si: ToSi | None = None) -> Iterator[Confi
         Every error, at the value to correct.
     """
     labels = tuple(tree["sections"])
+    yield from _label_errors(tree["sections"])
     if "hammer" in tree:
         yield from _pattern_errors(tree["hammer"], "hammer", labels)
         min_peak_force = _min_peak_force(tree)
@@ -44,6 +46,18 @@ def check_consistency(tree: Branch, to_si: ToSi | None = None) -> Iterator[Confi
             leaf = channel["section"]
             if leaf.value not in labels:
                 yield leaf.place.error(f"no section {leaf.value!r}", suggestion(leaf.value, labels))
+
+
+def _label_errors(sections: Branch) -> Iterator[ConfigError]:
+    """Errors of sections whose labels are no names of files, or the same name on some file systems."""
+    labels: dict[str, str] = {}
+    for label in sections:
+        place = sections.key_places.get(label, sections.place)
+        if problem := name_problem(label):
+            yield place.error(f"section {label!r}: {problem[0]}", problem[1])
+        elif (same := labels.setdefault(file_key(label), label)) != label:
+            problem_text = f"sections {same!r} and {label!r} differ only in capitals: on some file systems one file"
+            yield place.error(problem_text, "Give it another label")
 
 
 def _hammer_errors(tree: Branch, to_si: ToSi | None, min_peak_force: float) -> Iterator[ConfigError]:

@@ -12,6 +12,7 @@ from turnout.config.campaign_notes import Campaigns, read_campaigns, read_trains
 from turnout.config.consistency import ToSi, check_consistency
 from turnout.config.document import Branch, Frozen, Place, leaves, load, merge_branches, plain_values
 from turnout.config.events import Event, read_events
+from turnout.config.file_names import file_key
 from turnout.config.layout_schema import layout_keys
 from turnout.config.merge import ROW_KEYS, SECTION_ROW_KEYS, Variant, with_row
 from turnout.config.schema import NO_TURNOUT, check, suggestion
@@ -280,13 +281,17 @@ class _ConfigurationReader:
         return "/".join((self.folder.name, *parts))
 
     def check_extensions(self) -> None:
-        """Add an error for every YAML file that is not read because its name does not end in .yaml."""
-        for parts in ((), ("layouts",), ("overrides",)):
+        """Add an error for every YAML file that is not read for its name, or that is another one elsewhere."""
+        for parts in ((), ("layouts",), ("overrides",), ("tracks",), ("vehicles",)):
+            names: dict[str, str] = {}
             for path in sorted(self.folder.joinpath(*parts).glob("*")):
                 if path.suffix.lower() in (".yml", ".yaml") and path.suffix != ".yaml":
                     place = Place(self.name(*parts, path.name), 1, 1)
                     remedy = f"Rename it to {path.stem}.yaml, or remove it"
                     self.errors.append(place.error(f"it ends in {path.suffix} and would not be read", remedy))
+                elif path.suffix == ".yaml" and (same := names.setdefault(file_key(path.name), path.name)) != path.name:
+                    problem = f"{path.name!r} and {same!r} are one file on some file systems"
+                    self.errors.append(Place(self.name(*parts, path.name), 1, 1).error(problem, "Rename one of them"))
 
     def document(self, path: Path, spec: dict, whole: bool = False) -> Branch:
         """Tree of a checked YAML file; empty if the file is absent or, after adding its errors, invalid."""

@@ -7,6 +7,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from turnout.config.document import Place, as_config_errors
+from turnout.config.file_names import file_key, name_problem
 from turnout.config.layout_schema import HAMMER_RATE, PASSAGE_RATE
 from turnout.config.schema import ID, Key, suggestion, value_problem
 from turnout.errors import ConfigError
@@ -103,7 +104,8 @@ def read_table(path: Path, name: str) -> tuple[list[Row], list[ConfigError]]:
         return [], errors
     rows: list[Row] = []
     line_of_id: dict[str, int] = {}
-    folders: dict[str, str] = {}
+    folders: dict[str, Row] = {}
+    ids: dict[str, str] = {}
     for line, text in numbered[1:]:
         row, row_errors = _row(text, line, header, name)
         errors += row_errors
@@ -112,11 +114,17 @@ def read_table(path: Path, name: str) -> tuple[list[Row], list[ConfigError]]:
         if row.id in line_of_id:
             remedy = f"Give it another id, or remove one of the lines {line_of_id[row.id]} and {line}"
             errors.append(row.place("turnout").error(f"turnout {row.id!r} for the second time", remedy))
-        elif row.raw in folders:
-            problem = f"raw folder {row.raw!r} is also that of turnout {folders[row.raw]!r}"
+        elif (key := file_key(row.id)) in ids:
+            problem = f"turnout {row.id!r} and {ids[key]!r} differ only in capitals: on some file systems one folder"
+            errors.append(row.place("turnout").error(problem, "Give it another id"))
+        elif (folder := file_key(row.raw)) in folders and row.raw != folders[folder].raw:
+            problem = f"raw folders {row.raw!r} and {folders[folder].raw!r} are one folder on some file systems"
+            errors.append(row.place("raw").error(problem, "Give each turnout its own folder"))
+        elif folder in folders:
+            problem = f"raw folder {row.raw!r} is also that of turnout {folders[folder].id!r}"
             errors.append(row.place("raw").error(problem, "Give each turnout its own folder"))
         else:
-            line_of_id[row.id], folders[row.raw] = line, row.id
+            line_of_id[row.id], folders[folder], ids[key] = line, row, row.id
             rows.append(row)
     return rows, errors
 
@@ -193,6 +201,10 @@ def _row(text: str, line: int, header: tuple[str, ...], name: str) -> tuple[Row,
         errors.append(row.place("raw").error(message, "Write a folder below the raw root, without '..'"))
     elif "raw" in row.values:
         row.values["raw"] = str(PurePosixPath(row.raw))  # "t1/" and "./t1" are the folder "t1"
+        if problem := name_problem(row.raw):
+            errors.append(row.place("raw").error(f"raw is {row.raw!r}: {problem[0]}", problem[1]))
+    if "turnout" in row.values and (problem := name_problem(row.id)):
+        errors.append(row.place("turnout").error(f"turnout is {row.id!r}: {problem[0]}", problem[1]))
     return row, errors
 
 

@@ -25,7 +25,7 @@ from turnout.readers.scale_words import (
     plain_word,
     scale_meaning,
 )
-from turnout.readers.source import CONDITIONS
+from turnout.readers.source import CONDITIONS, SIMULATED_CONDITIONS
 from turnout.readers.stated_quantities import quantity_of_text
 from turnout.readers.stated_units import UNIT_WORD, is_unit_of_other, known_unit
 from turnout.readers.statements import USUAL_RATES, statements_of_value
@@ -165,6 +165,8 @@ def candidates(name: str, group: str, text: str) -> tuple[Candidate, ...]:
 
 def _of_entry(name: str, group: str, text: str) -> Iterator[Candidate]:
     """Candidates of an entry or of a named piece of a text, by what its name explains."""
+    if name in SIMULATED_CONDITIONS:
+        return
     subject = STRONG if explained_subject(group) == STRONG else explained_subject(name)
     if subject == STRONG:
         yield from _of_other_subject(text)

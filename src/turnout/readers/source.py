@@ -48,6 +48,9 @@ CONDITIONS = (
     "operator",
 )
 
+# What the simulator states beside them in the files that it writes. It says nothing about the samples.
+SIMULATED_CONDITIONS = ("axle_loads", "load_share", "n_units")
+
 
 def number_or_text(text: str) -> float | str:
     """A condition as a float if it is a number, else as text.

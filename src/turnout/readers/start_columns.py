@@ -150,5 +150,5 @@ def with_axis_start(record: RawRecord) -> RawRecord:
     if record.started_at is None and not times:
         return replace(record, unread_start=starts[0][1])
     used = record.started_at or times[0]
-    other = next((start for start in times if is_other_start(start, used)), None)
-    return replace(record, started_at=used, unread_start=str(other) if other else "")
+    second = next((start for start in times if is_other_start(start, used)), None)
+    return replace(record, started_at=used, unread_start=str(second) if second else "")

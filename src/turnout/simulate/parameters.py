@@ -164,7 +164,7 @@ def load_vehicle(name: str | Path, load: float = 0.5, folder: str | Path | None 
         vehicle = load_vehicle(entry.allow_only("vehicle", "count")["vehicle"], load, folder or path.parent)
         vehicles += [vehicle] * entry.count("count", 1)
     combined = couple(str(parameters["name"]), vehicles * units)
-    return combined.with_(conditions={"load_share": float(load), "units": int(units)})
+    return combined.with_(conditions={"load_share": float(load), "n_units": int(units)})
 
 
 def _find_file(name: str | Path, folder: str | Path | None, subfolder: str) -> Path:

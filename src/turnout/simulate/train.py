@@ -76,7 +76,7 @@ def train(parameters: ParameterSet, load: float = 0.5, units: int = 1) -> Vehicl
     bodies = [Body(b.name, b.mass, b.inertia, b.position - front) for b in bodies]
     wheel = p.mapping_at("wheel").allow_only("radius", "contact")
     contact = wheel.build(PowerLaw, wheel.number("contact", "N/m^1.5"))
-    conditions = {"load_share": float(load), "units": int(units)}
+    conditions = {"load_share": float(load), "n_units": int(units)}
     return p.build(
         Vehicle,
         str(p["name"]),

@@ -147,7 +147,7 @@ def _loaded_vehicle(
         single_unit = load_vehicle(name, 0.0, folder)
     except (SimulationError, ConfigError) as error:
         raise TrainUnknownError(f"type {name}: {error}") from None
-    n, units = len(single_unit.wheels), max(1, round(number(notes, "units") or 1.0))
+    n, units = len(single_unit.wheels), max(1, round(number(notes, "n_units") or number(notes, "units") or 1.0))
     axle_doubts: tuple[str, ...] = ()
     if n_axles_heard and n_axles_heard % n:
         axle_doubts = (

@@ -12,12 +12,12 @@ from re import Match, Pattern
 from stat import S_ISREG
 
 from turnout.config import TurnoutConfig
+from turnout.config.campaign_notes import NOTE_FILES
 from turnout.config.filename_pattern import compile_pattern
 from turnout.errors import ReadError
 from turnout.files import MIN_SPARSE_SIZE, sparse_size, special_kind
 from turnout.records import Unit
 
-NOTE_FILES = ("campaigns.csv", "trains.csv")
 # Suffixes that upload programs give to unfinished files, and names of files for people; both are ignored.
 UNFINISHED_SUFFIXES = (".tmp", ".part", ".partial", ".crdownload", ".filepart")
 IGNORED_NAMES = ("README", "README.txt", "README.md", "Thumbs.db", "desktop.ini")

@@ -156,6 +156,19 @@ def test_inspect_leaves_out_no_entry_of_a_folder_without_a_word(tmp_path, capsys
     assert f"{tmp_path}/raw/closed: Permission denied" in message
 
 
+def test_inspect_checks_the_tables_beside_the_recordings(tmp_path, capsys):
+    (tmp_path / "campaigns.csv").write_text(
+        "campaign,started_at_utc,rail_temperature_c\n2026-05-13,2026-05-13T09:00:00,12\n2026-5-14,,9\n"
+    )
+    (tmp_path / "trains.csv").write_text("passed_at_utc,train_type\n2026-05-13T10:00:00,IC3\n")
+    assert main(["inspect", str(tmp_path / "trains.csv")]) == 0
+    assert "trains.csv: a table beside the recordings, 1 row that can be used" in capsys.readouterr().out
+    assert main(["inspect", str(tmp_path)]) == 1
+    printed = capsys.readouterr().out
+    assert "campaigns.csv: a table beside the recordings, 1 row that can be used" in printed
+    assert "line 3, column 1: campaign is '2026-5-14'" in printed and "not read" not in printed
+
+
 def test_drawings_of_files_of_one_name_do_not_replace_each_other(tmp_path, repository, monkeypatch, capsys):
     monkeypatch.chdir(repository)
     file = tmp_path / "a/A7_1.csv"

@@ -6,8 +6,9 @@ from hashlib import sha256
 import numpy as np
 import pytest
 
-from turnout.readers import read
+from turnout.readers import names_and_units, read
 from turnout.readers.writing import WRITERS, write
+from turnout.simulate.parameters import load_vehicle
 
 # Numbers that go through text with fewer digits than a double has: UFF58's E20.12 keeps 13.
 PRINTED = {"uff58": 1e-12}
@@ -109,3 +110,22 @@ def test_the_writer_names_what_it_cannot_do(hammer_test, tmp_path):
         write(hammer_test, tmp_path / "a", "xls")
     with pytest.raises(ValueError, match="there is no recording to write"):
         write([], tmp_path / "a", "npz")
+
+
+@pytest.mark.parametrize("n_units", [1, 3])
+@pytest.mark.parametrize("load", [0.5, 1.0])
+@pytest.mark.parametrize("format", WRITERS)
+def test_what_the_simulator_states_of_a_train_is_read_without_a_remark(
+    format, load, n_units, hammer_test, in_si, name_of, tmp_path, repository
+):
+    vehicle = load_vehicle("ic3", load, repository / "config/vehicles", n_units)
+    loads = {"axle_loads": tuple(2.0 * x for x in vehicle.static_loads)}
+    stated = {"train_type": "ic3", "speed": 38.9, "track": "main", "direction": "facing", **vehicle.conditions}
+    assert set(vehicle.conditions) == {"load_share", "n_units"}
+    passage = replace(hammer_test[0], kind="passage", conditions=stated | loads)
+    path = write([passage], tmp_path / name_of(format), format)
+    layout = replace(in_si, kind="passage")
+    result = read(path.name, tmp_path, layout)
+    assert result.errors == () and len(result.recordings) == 1
+    if format not in ("wav", "rcmdx"):
+        assert [unit for _, unit in names_and_units(path.name, tmp_path)] == ["N", "m/s²"]
