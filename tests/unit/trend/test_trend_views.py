@@ -11,6 +11,7 @@ from benchmarks.trend_oracle import cusum_by_loop, residuals_by_pandas, slopes_b
 from scipy.stats import t
 from tests.oracles.trend_views import connect_views
 
+from turnout.cli.worklist import as_text
 from turnout.trend import (
     alarm_rows,
     baseline_rows,
@@ -232,6 +233,19 @@ def test_the_true_drift_is_first_and_the_learning_section_is_named(con):
     learning = rows[rows["state"] == "learning"]
     assert "T00005" in set(learning["turnout_id"])
     assert len(rows) <= 20
+
+
+def test_the_page_on_trends_shows_the_row_that_is_printed(con, frames, repository):
+    """The first row of this fleet, as ``turnout worklist`` prints it; lines of the page are wrapped."""
+    cursor = con.execute("select * from worklist order by rank limit 1")
+    row = dict(zip([column[0] for column in cursor.description], cursor.fetchone()))
+    page = (repository / "docs/trends.md").read_text(encoding="utf-8")
+    (sample,) = re.findall(r"```text\n( 1\. .*?)```", page, re.DOTALL)
+    n_left_out = row.pop("n_in_all")
+    n_charts = len(frames["chart_status"])
+    newest = frames["modes"]["measured_at_utc"].max()
+    printed = as_text([row | {"n_in_all": 1}], n_charts, newest=newest)
+    assert n_left_out > 1 and sample.split() == printed.split(), printed
 
 
 def test_the_list_of_an_earlier_day_knows_nothing_of_later(con, frames):
