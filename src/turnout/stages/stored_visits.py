@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from turnout.content import sha256_of
+from turnout.errors import SimulationError
 from turnout.mismatch.calibrated import GroupInformation, StateParameter, VisitInformation
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.model_answer import NAMES
@@ -21,9 +22,10 @@ from turnout.mismatch.engine.diagnose import fit_base
 from turnout.mismatch.engine.large_values import fit_large_values
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.turnout import TrackCase
-from turnout.mismatch.turnout.calibration import calibrated_parameters, visit_groups
+from turnout.mismatch.turnout.calibration import calibrated_parameters, one_of_each_group, visit_groups
 from turnout.mismatch.turnout.further_passages import with_reserved_passages
 from turnout.mismatch.turnout.nose_starts import fit_from_nose_positions
+from turnout.mismatch.turnout.relinearization import fit_again
 from turnout.stages.agreeing_visits import FittedGroup, packed_groups, unpacked_groups
 from turnout.stages.checkpoint import SUFFIX, read_value, write_value
 from turnout.stages.track_files import digest_of_model
@@ -31,6 +33,7 @@ from turnout.stages.visit_time import years_of
 
 if TYPE_CHECKING:
     from turnout.config.turnout import TurnoutConfig
+    from turnout.mismatch.engine.fit import Fit
     from turnout.records import Unit
     from turnout.stages.mismatch_groups import Group
 
@@ -145,7 +148,10 @@ def store_visit(
     partners = {n: dampers[key] for n in may_be_large if (key := _damper_key(parameters[n])) in dampers}
     fit = fit_large_values(search, fit, may_be_large, CALIBRATION.change_sds, partners)
     sections = ", ".join(group.labels)
-    fitted = FittedGroup(*with_reserved_passages(search.case, fit), parameters, sections, group.route)
+    case, fit = with_reserved_passages(search.case, fit, one_of_each_group(search.case))
+    if positions:
+        fit = _fit_again(case, fit, may_be_large, partners)
+    fitted = FittedGroup(*with_reserved_passages(case, fit), parameters, sections, group.route)
     information = visit_groups(fitted.case, fitted.fit, sections, group.route)
     value = {
         "version": dict(about["version"]), "visit": about["visit"], "sections": sections, "answer": answer,
@@ -157,6 +163,19 @@ def store_visit(
     path.parent.mkdir(parents=True, exist_ok=True)
     write_value(path, value)
     return replace(fitted, fit=fitted.fit.without_jacobian())
+
+
+def _fit_again(case: TrackCase, fit: Fit, may_be_large: Collection[str], partners: Mapping[str, str]) -> Fit:
+    """The fit at the maximum of all recordings of the case; as it is where the model cannot be simulated there."""
+    springs = [
+        n.name
+        for n in case.nuisances
+        if n.name in may_be_large and abs(fit.values[n.name] - n.mean) > CALIBRATION.finding_sds * n.sd
+    ]
+    try:
+        return fit_again(case, fit, {*springs, *(partners[n] for n in springs if n in partners)})
+    except SimulationError:
+        return fit
 
 
 def _damper_key(spring: StateParameter) -> str:

@@ -152,6 +152,25 @@ def visit_groups(case: TrackCase, fit: Fit, sections: str, route: str = "main") 
     )
 
 
+def one_of_each_group(case: TrackCase) -> tuple[str, ...]:
+    """The first reserved passage of each group, see ``visit_groups``: others of it repeat the error of the model.
+
+    Parameters
+    ----------
+    case : TrackCase
+
+    Returns
+    -------
+    tuple of str
+        Names of passages.
+    """
+    names: dict[str, str] = {}
+    for o in case.reserved:
+        if o.name in case.aligned_passages:
+            names.setdefault(_group_of(case, o)[0], o.name)
+    return tuple(names.values())
+
+
 def _group_of(case: TrackCase, observation: Observation) -> tuple[str, str]:
     """(group, recording) of an observation: a train type at one speed, or impacts at one position."""
     aligned = case.aligned_passages.get(observation.name)

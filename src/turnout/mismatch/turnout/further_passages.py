@@ -15,6 +15,8 @@ from turnout.errors import SimulationError
 from turnout.mismatch.turnout.priors import PASSAGE
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from turnout.mismatch.engine.case import Case
     from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.engine.observation import Observation
@@ -40,7 +42,7 @@ def names_beyond(campaign: CampaignInput, max_axles: int) -> tuple[str, ...]:
     return tuple(p.name for p, n in zip(by_length[1:], total[1:]) if n > max_axles)
 
 
-def with_reserved_passages(case: TrackCase, fit: Fit) -> tuple[TrackCase, Fit]:
+def with_reserved_passages(case: TrackCase, fit: Fit, names: Collection[str] | None = None) -> tuple[TrackCase, Fit]:
     r"""The case and its fit with the reserved passages among the observations, linear about the fit.
 
     Time, speed and load of each passage are fitted to it, all else stays as the fit has it. The noise scale of
@@ -54,6 +56,8 @@ def with_reserved_passages(case: TrackCase, fit: Fit) -> tuple[TrackCase, Fit]:
         The case that was fitted.
     fit : Fit
         Without effects, with its Jacobian.
+    names : collection of str or None
+        Those passages alone: the others stay reserved. None: all.
 
     Returns
     -------
@@ -65,7 +69,7 @@ def with_reserved_passages(case: TrackCase, fit: Fit) -> tuple[TrackCase, Fit]:
     values = dict(fit.values)
     added: list[tuple[Observation, np.ndarray, np.ndarray]] = []
     for o in case.reserved:
-        if o.name not in case.aligned_passages:
+        if o.name not in case.aligned_passages or (names is not None and o.name not in names):
             continue
         try:
             own_values, rows, residual = _linear_model(case, values, o)
@@ -78,6 +82,7 @@ def with_reserved_passages(case: TrackCase, fit: Fit) -> tuple[TrackCase, Fit]:
     observations, jacobian, white = zip(*added)
     extended = copy(case)
     extended.observations = (*case.observations, *observations)
+    extended.reserved = tuple(o for o in case.reserved if names is not None and o.name not in names)
     fit = replace(fit, values=values, jacobian=[*fit.jacobian, *jacobian], white=[*fit.white, *white])
     return extended, replace(fit, scale={**fit.scale, **noise_scales(extended, fit)})
 

@@ -6,7 +6,7 @@ maxima: whether a visit agrees with what is known from earlier ones, only a fit 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -14,6 +14,7 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.calibrated.constants import CALIBRATION
+from turnout.mismatch.engine.large_values import with_wide_priors
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.mismatch.turnout.further_passages import noise_scales
 
@@ -134,6 +135,35 @@ def fit_all_recordings(case: Case, fit: Fit, prior: NormalPrior, values: Mapping
         if gain < CALIBRATION.min_new_gain:
             break
     return replace(fit, values=_values(case, x), jacobian=rows, white=white), cost
+
+
+def fit_again(case: Case, fit: Fit, large: Collection[str]) -> Fit:
+    """The fit, continued to the maximum of all recordings under the prior of the file.
+
+    Where trains meet a nose, recordings that are linear about the maximum of a few others lead far from their own.
+
+    Parameters
+    ----------
+    case : Case
+        With all recordings among its observations.
+    fit : Fit
+        Where the steps begin.
+    large : collection of str
+        Nuisances that are far beyond their prior: they have a wide one, as in ``fit_large_values``.
+
+    Returns
+    -------
+    Fit
+        With the noise scale at its end.
+
+    Raises
+    ------
+    SimulationError
+        If the model cannot be simulated at the beginning, or beside an end of a step.
+    """
+    wide = with_wide_priors(case, large, CALIBRATION.change_sds)
+    again, _ = fit_all_recordings(wide, fit, NormalPrior.of_file(wide), fit.values)
+    return replace(again, scale={**again.scale, **noise_scales(wide, again)})
 
 
 def _values(case: Case, x: np.ndarray) -> dict[str, float]:
