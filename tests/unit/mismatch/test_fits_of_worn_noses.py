@@ -1,9 +1,12 @@
 """Trains at a worn nose: what all recordings say must not depend on the few that were fitted first."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy import optimize
 
+from turnout.errors import SimulationError
 from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
@@ -11,6 +14,7 @@ from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout.further_passages import with_reserved_passages
 from turnout.mismatch.turnout.relinearization import NormalPrior, fit_again
 from turnout.simulate.wheel_path import Kink
+from turnout.stages import stored_visits
 
 SDS = {"place": 0.05, "depth": 0.4, "length": 0.2, "share": 0.2, "power": 0.25}  # as the file of a nose states them
 ERROR = 1e-4  # of a sample [m]
@@ -100,3 +104,21 @@ def test_passages_that_are_not_asked_for_stay_reserved():
     same, _ = with_reserved_passages(case, fit_jointly(case), ())
     extended, _ = with_reserved_passages(case, fit_jointly(case), ("long",))
     assert [len(c.observations) for c in (same, extended)] == [1, 2] and extended.reserved == ()
+
+
+def test_a_visit_continues_its_fit_with_wide_priors_for_what_is_large(monkeypatch):
+    """A spring at four standard deviations, and its damper; the fit stays where nothing can be simulated there."""
+    pad, damper, ballast = (Nuisance(n, "-", 0.0, 0.1) for n in ("pad_3", "pad_damper_3", "ballast_3"))
+    case = SimpleNamespace(nuisances=(pad, damper, ballast))
+    fit = SimpleNamespace(values={"pad_3": 0.4, "pad_damper_3": 0.2, "ballast_3": 0.2})
+    asked = []
+    monkeypatch.setattr(stored_visits, "fit_again", lambda *given: asked.append(given) or "continued")
+    springs, partners = ["pad_3", "ballast_3"], {"pad_3": "pad_damper_3", "ballast_3": "ballast_damper_3"}
+    assert stored_visits._fit_again(case, fit, springs, partners) == "continued"
+    assert asked == [(case, fit, {"pad_3", "pad_damper_3"})]
+
+    def failing(*_):
+        raise SimulationError("no passage")
+
+    monkeypatch.setattr(stored_visits, "fit_again", failing)
+    assert stored_visits._fit_again(case, fit, springs, partners) is fit
