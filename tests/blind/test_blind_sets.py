@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,12 +13,14 @@ import pytest
 from turnout.config.load import load_configuration, with_raw
 from turnout.readers import read
 from turnout_blind.archive import read_archive, verify_archive, verify_recordings, write_archive
+from turnout_blind.campaign import stage
 from turnout_blind.diagnose import diagnose_set
 from turnout_blind.effect import load_effects
 from turnout_blind.isolation import HiddenFolders, isolation_method
 from turnout_blind.make import make_set
 from turnout_blind.record import hammer_test
 from turnout_blind.reveal import reveal
+from turnout_blind.score import case_reports
 from turnout_blind.score.case_reports import _plot_track
 from turnout_blind.score.page import BEGIN, END, write_page
 from turnout_blind.score.plots import pyplot
@@ -323,8 +326,15 @@ def scored(copy, tmp_path):
     return out
 
 
+def with_two_passages(plan, effects):
+    """As ``stage``, with two passages to choose the picture from: each costs two simulations."""
+    rng, site, world, concealed = stage(plan, effects)
+    return rng, replace(site, passages=site.passages[:2]), world, concealed
+
+
 @pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
-def test_a_page_shows_figures_pictures_stories_failures_and_ablations(scored, tmp_path):
+def test_a_page_shows_figures_pictures_stories_failures_and_ablations(scored, tmp_path, monkeypatch):
+    monkeypatch.setattr(case_reports, "stage", with_two_passages)
     page = tmp_path / "page.md"
     page.write_text(f"# Before\n\n{BEGIN}\nold\n{END}\n\nAfter\n")
     single = next(t["case"] for t in verify(scored, scored / "revealed").values() if t["effects"])

@@ -9,6 +9,7 @@ import toy_fleet as toy
 
 from turnout.workflow.plan import shard_of
 
+pytestmark = pytest.mark.slow
 SHARDS = 3
 CHAIN = '''"""The toy chain, on a machine that has a bad sector or ends a process while a file says so."""
 import errno, os

@@ -11,6 +11,7 @@ import toy_fleet as toy
 sys.path.insert(0, str(Path(__file__).parents[1] / "unit" / "stages"))
 import small_turnout as small
 
+pytestmark = pytest.mark.slow
 LIGHT = '''"""The program's own chain with two families, so that a turnout takes a second; one turnout has a fault."""
 from functools import partial
 from turnout.stages import mismatch

@@ -191,7 +191,7 @@ def run(folder, *options, check=True, **more):
 
 
 FORKS = multiprocessing.get_context("forkserver")
-FORKS.set_forkserver_preload(["snakemake.cli", "pandas"])
+FORKS.set_forkserver_preload(["snakemake.cli", "pandas", "turnout.workflow.launch", "turnout.readers.formats"])
 
 
 def snakemake(words, folder, output, variables):

@@ -2,15 +2,13 @@
 
 import logging
 import os
-import sys
-import time
 import traceback
 from collections import Counter
 from collections.abc import Callable, Collection, Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from turnout.config import Configuration
 from turnout.config.merge import digest
@@ -28,6 +26,7 @@ from turnout.workflow.guard import compute_guarded, death_rows, memory_rows, unr
 from turnout.workflow.ledger import Ledger
 from turnout.workflow.plan import PlannedUnit, read_plan
 from turnout.workflow.pool import LostTask, map_in_order, map_in_processes
+from turnout.workflow.progress import Progress
 from turnout.workflow.retries import (
     Postponed,
     clear_mark,
@@ -51,56 +50,6 @@ from turnout.workflow.tasks import (
     readable_contents,
     short_contents,
 )
-
-# Seconds between two lines of progress in a log.
-LOG_INTERVAL = 30.0
-
-
-class Progress:
-    """Shows how many units are done: a bar on a terminal, else a line every ``LOG_INTERVAL`` seconds.
-
-    Parameters
-    ----------
-    name : str
-        Name of the work, before the numbers.
-    total : int
-        Number of units.
-    stream : TextIO or None
-        Where to write; None: standard error.
-    """
-
-    def __init__(self, name: str, total: int, stream: TextIO | None = None) -> None:
-        self.name, self.total, self.n_done, self.quarantined = name, total, 0, 0
-        self.stream = stream or sys.stderr
-        self.next_line = time.monotonic() + LOG_INTERVAL
-        self.bar = None
-        if total and self.stream.isatty():
-            from tqdm import tqdm
-
-            self.bar = tqdm(total=total, desc=name, unit="unit", file=self.stream)
-
-    def step(self, quarantined: bool) -> None:
-        """One more unit is done.
-
-        Parameters
-        ----------
-        quarantined : bool
-            Whether the unit has rows in quarantine.
-        """
-        self.n_done += 1
-        self.quarantined += quarantined
-        if self.bar:
-            self.bar.update()
-            self.bar.set_postfix(quarantined=self.quarantined)
-        elif time.monotonic() >= self.next_line:
-            self.next_line = time.monotonic() + LOG_INTERVAL
-            print(f"{self.name}: {self.n_done} of {self.total} units", file=self.stream, flush=True)
-
-    def close(self) -> None:
-        """Close the bar if there is one."""
-        if self.bar:
-            self.bar.close()
-
 
 LOG = logging.getLogger("turnout.workflow")
 PROCESS_DIED = "the process died that computed it"
