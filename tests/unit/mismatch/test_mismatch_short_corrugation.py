@@ -8,12 +8,16 @@ import pytest
 
 from turnout import physics
 from turnout.mismatch.turnout import TrackCase
-from turnout.mismatch.turnout.candidates.short_corrugation import (
+from turnout.mismatch.turnout.candidates.corrugation_levels import (
     BandPower,
-    _is_repeatable,
+    bin_wavelengths,
     corrugation_evidence,
-    short_corrugation_candidates,
+    is_repeatable,
+    n_widths,
+    sensor_stretches,
+    stretch_evidence,
 )
+from turnout.mismatch.turnout.candidates.short_corrugation import line_wavelength, short_corrugation_candidates
 from turnout.mismatch.turnout.defect_priors import CORRUGATION
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.simulate.wheel_path import Corrugation
@@ -82,29 +86,125 @@ def test_corrugation_in_the_tracks_file_is_not_found_again():
     )
 
 
+POSITIONS = np.array([2.1, 4.2, 6.6, 9.0])  # m, more than 2 m apart: each measures rail of its own
+TRAINS = (("x", 20.0), ("x", 25.0), ("y", 30.0), ("y", 38.0))
+
+
+def passages_with(levels, positions=POSITIONS, trains=TRAINS):
+    """``BandPower`` of each train with ``levels`` (n_sensor, n_bin), or one such array per passage."""
+    levels = np.broadcast_to(levels, (len(trains), len(positions), np.shape(levels)[-1]))
+    return [
+        BandPower(str(k), t, v, np.exp(x), np.ones(x.shape), np.ones(len(x), bool), np.asarray(positions))
+        for k, ((t, v), x) in enumerate(zip(trains, levels))
+    ]
+
+
+def expected_nats(z, n_sensors):
+    """By quadrature over what corrugation adds to the mean level z of so many sensors, N(0, corrugation_sd²)."""
+    sd, added = CORRUGATION.sensor_sd / np.sqrt(n_sensors), np.linspace(-40.0, 40.0, 200001)
+    log_prior = -0.5 * (added / CORRUGATION.corrugation_sd) ** 2
+    density = np.exp(log_prior) / (CORRUGATION.corrugation_sd * np.sqrt(2.0 * np.pi))
+    return np.log(np.trapezoid(density * np.exp(-0.5 * ((z - added) / sd) ** 2 + 0.5 * (z / sd) ** 2), added))
+
+
 def test_what_one_half_of_the_passages_does_not_show_is_no_finding():
-    """By the line in each; where an equal wave is in all it holds."""
+    """By the line in each, where an equal wave is in all it holds; sensors beyond the stretch have no part in it."""
 
     def seen(*levels):
-        return [
-            BandPower("p", "t", 30.0, np.exp(np.full((2, 1), x)), np.ones((2, 1)), np.ones(2, bool)) for x in levels
-        ]
+        levels = [np.array([[x], [x], [0.0], [0.0]]) for x in levels]
+        return passages_with(levels)
 
-    assert _is_repeatable(seen(2.0, 1.5, 1.8, 1.2), 0)
-    assert not _is_repeatable(seen(2.0, 0.4, 1.8, 0.5), 0) and not _is_repeatable(seen(0.4, 2.0, 0.5, 1.8), 0)
+    stretch = (2.1, 4.2)
+    assert is_repeatable(seen(2.0, 1.5, 1.8, 1.2), 0, stretch)
+    assert not is_repeatable(seen(2.0, 0.4, 1.8, 0.5), 0, stretch)
+    assert not is_repeatable(seen(0.4, 2.0, 0.5, 1.8), 0, stretch)
 
 
-def test_the_evidence_is_that_of_a_loudness_integrated_out():
-    """By quadrature over what corrugation adds, N(0, LOUD²); the least of the trains counts, what is quiet does not."""
-    level = np.array([[1.9, 0.4], [1.1, -3.0], [1.5, 0.2]])
-    sound, all_ = np.ones((3, 2)), np.ones(3, dtype=bool)
-    louder = [
-        BandPower(n, n, v, np.exp(level + more), sound, all_) for n, v, more in (("x", 20.0, 0.0), ("y", 30.0, 1.0))
-    ]
-    sd, added = CORRUGATION.sensor_sd / np.sqrt(3.0), np.linspace(-40.0, 40.0, 200001)
-    prior = np.exp(-0.5 * (added / CORRUGATION.corrugation_sd) ** 2) / (
-        CORRUGATION.corrugation_sd * np.sqrt(2.0 * np.pi)
+def test_the_evidence_of_a_stretch_is_that_of_a_level_integrated_out():
+    """The least of the trains and speeds counts, what is quiet does not."""
+    levels = [np.array([[1.9, 0.4], [1.1, -3.0], [1.5, 0.2]]) + (t == "y") for t, _ in TRAINS]
+    nats = stretch_evidence(passages_with(levels, POSITIONS[:3]), POSITIONS[:3])
+    for row, (first, last) in zip(nats, sensor_stretches(POSITIONS[:3])):
+        inside = (POSITIONS[:3] >= first) & (POSITIONS[:3] <= last)
+        z = np.maximum(levels[0][inside].mean(axis=0), 0.0)
+        np.testing.assert_allclose(row, [expected_nats(v, inside.sum()) for v in z], atol=1e-6)
+
+
+@pytest.mark.parametrize("first", range(4))
+@pytest.mark.parametrize("n", [1, 2, 3, 4])
+def test_corrugation_that_ends_between_sensors_costs_no_more_than_the_number_of_stretches(first, n):
+    """Wherever it begins and ends: that of the right stretch, if known, less ln 10 at most."""
+    if first + n > 4:
+        return
+    level = np.zeros((4, 1))
+    level[first : first + n] = 4.0
+    nats = corrugation_evidence(passages_with(level), POSITIONS)[0]
+    known = expected_nats(4.0, n)
+    assert known - np.log(10.0) <= nats <= known
+
+
+def test_sensors_beyond_the_corrugation_are_no_evidence_against_it():
+    """A mean over all of them would lose all of it as their number grows."""
+    many = 2.1 * np.arange(1, 13)
+    level = np.where((many > 5.0) & (many < 9.0), 4.0, 0.0)[:, None]  # two of twelve
+    nats = corrugation_evidence(passages_with(level, many), many)[0]
+    assert nats > expected_nats(4.0, 2) - np.log(78.0) > 12.0
+
+
+def test_levels_of_intact_rail_are_rarely_evidence():
+    """The mean of the likelihood ratio is 1 at most on intact rail: above x nats with the probability exp(-x) at most.
+
+    Rail of the stated scatter under each sensor, the same in all passages. Sensors that measure the same rail agree.
+    """
+    rng = np.random.default_rng(4)
+    level = CORRUGATION.sensor_sd * rng.standard_normal((4, 20000))
+    for positions, rail in ((POSITIONS, level), (POSITIONS[0] + 1e-3 * np.arange(4), level[[0] * 4])):
+        nats = corrugation_evidence(passages_with(rail, positions), positions)
+        assert np.mean(np.exp(nats)) < 1.1
+        for x in (2.0, 4.0):
+            assert np.mean(nats > x) <= np.exp(-x) + 1e-3
+
+
+def test_the_best_of_overlapping_bins_is_rarely_evidence():
+    """Bins are means of two halves, of which the neighbour has one. The price is that of the bins side by side."""
+    rng = np.random.default_rng(6)
+    halves = CORRUGATION.sensor_sd * np.sqrt(2.0) * rng.standard_normal((4, 4000, 73))
+    rail = 0.5 * (halves[..., 1:] + halves[..., :-1])
+    nats = corrugation_evidence(passages_with(rail.reshape(4, -1)), POSITIONS).reshape(4000, 72)
+    best = nats.max(axis=1) - np.log(n_widths(np.arange(72.0)))
+    for x in (1.0, 3.0):
+        assert np.mean(best > x) <= np.exp(-x)
+
+
+def test_a_line_of_one_train_or_of_one_speed_is_no_evidence_in_any_stretch():
+    for loud in (lambda t, v: t == "x", lambda t, v: v > 26.0, lambda t, v: v < 26.0):
+        levels = [np.full((4, 1), 5.0 * loud(t, v)) for t, v in TRAINS]
+        assert corrugation_evidence(passages_with(levels), POSITIONS)[0] < 0.0
+
+
+def test_a_sensor_without_a_signal_supports_nothing():
+    """Neither its stretch nor any other."""
+    level = np.array([[0.0], [0.0], [4.0]])
+    quiet = corrugation_evidence(passages_with(level[:2], POSITIONS[:2]), POSITIONS)[0]
+    assert quiet < 0.0 < corrugation_evidence(passages_with(level, POSITIONS[:3]), POSITIONS)[0]
+
+
+def test_any_line_is_nearly_whole_in_one_of_the_bins():
+    """At least three quarters of a bin's width about it, wherever it is."""
+    train = SimpleNamespace(speed=30.0, passage=SimpleNamespace(recording=SimpleNamespace(rate=10000.0)))
+    bins = bin_wavelengths([train])
+    length = np.random.default_rng(2).uniform(0.06, 0.29, 200)
+    distance = np.abs(np.log(length[:, None] / bins)).min(axis=1)
+    assert distance.max() <= 0.25 * CORRUGATION.bin_width + 1e-9
+
+
+def test_the_centre_of_a_line_decides_whether_it_is_short_not_the_bin_of_the_largest_evidence():
+    """One of 0.292 m, with the bin of 0.3 m or its neighbours chosen; beyond the stretch there are other lines."""
+    train = SimpleNamespace(speed=30.0, passage=SimpleNamespace(recording=SimpleNamespace(rate=10000.0)))
+    bins = bin_wavelengths([train])
+    level = np.log(
+        1.0 + 60.0 * np.exp(-0.5 * (np.log(bins / np.array([[0.292], [0.292], [0.35], [0.35]])) / 0.02) ** 2)
     )
-    for z, nats in zip((1.5, 0.0), corrugation_evidence(louder, 3.0)):
-        ratio = np.exp(-0.5 * ((z - added) / sd) ** 2 + 0.5 * (z / sd) ** 2)
-        assert nats == pytest.approx(np.log(np.trapezoid(prior * ratio, added)), abs=1e-6)
+    nearest = int(np.argmin(np.abs(bins - 0.3)))
+    for k in (nearest - 1, nearest, nearest + 1):
+        assert line_wavelength(bins, k, passages_with(level), (2.1, 4.2)) == pytest.approx(0.292, rel=0.005)

@@ -111,6 +111,7 @@ class CorrugationPriors:
     min_wavelength: float = prior(0.05, "m", "limit of the waves searched", SHORT_WAVES)
     bin_width: float = prior(
         0.05, "ln", "of a bin of the wavelength: the resolution of 5 m of rail at 0.2 m", SHORT_WAVES)
+    overlap: int = prior(2, "bins", "per width of a bin: a line between two bins is whole in a third", "convention")
     line_bins: int = prior(2, "bins", "to either side over which a line spreads", SHORT_WAVES)
     background_gap: int = prior(2, "bins", "nearest of the background", SHORT_WAVES)
     background_reach: int = prior(6, "bins", "farthest of the background", SHORT_WAVES)
