@@ -163,10 +163,11 @@ def _report_readings(configuration: Configuration, raw: Path, ids: Sequence[str]
     from turnout.workflow.scan import scan
 
     n_fault = 0
+    paths_by_content: dict[str, str] = {}
     for name in ids:
         turnout = with_raw(configuration.turnout(name), raw)
         units = scan(turnout, raw).units
-        for reading in file_readings(turnout, raw, units):
+        for reading in file_readings(turnout, raw, units, paths_by_content):
             verdict = "agrees" if not reading.faults else count_of(len(reading.faults), "fault")
             print(
                 f"{reading.turnout}, {reading.section}: {reading.path}: {verdict}{reading.text and ': '}{reading.text}"

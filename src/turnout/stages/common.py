@@ -17,6 +17,15 @@ from turnout.readers import read
 from turnout.records import LongRecording, RawDescription, ReadResult, Recording
 from turnout.registry.ids import content_id
 
+# Largest time between a recording and its campaign: it may last into the night, and a clock may show local time.
+MAX_CAMPAIGN_OFFSET = timedelta(days=2)
+MISFILED_REMEDY = (
+    "It is used. Move it to its day's campaign if it is another's; a logger's clock that was wrong does no harm"
+)
+# Largest time between the file's name and its content; names in local time differ by less.
+MAX_NAME_OFFSET = timedelta(days=1)
+TIME_REMEDY = "Which is right is not known. Rename it, or export it again with the right time"
+
 
 def require_file(path: str | Path) -> Path:
     """The path of a recording that a person names, checked before anything is read.
@@ -103,6 +112,26 @@ def read_or_quarantine(
             quarantine.append(quarantine_row(duplicate, base, unit_kind, "read", None, recording_id))
             return None
     return result if result.recordings or result.long_recordings else None
+
+
+def time_of_label(label: str) -> datetime | None:
+    """Time of a unit from its file name, YYYYMMDDTHHMMSSZ.
+
+    Parameters
+    ----------
+    label : str
+        Label of the unit.
+
+    Returns
+    -------
+    datetime or None
+        Naive UTC; None without a valid time.
+    """
+    stem = label.rsplit("/", 1)[-1].split(".")[0]
+    try:
+        return datetime.strptime(stem, "%Y%m%dT%H%M%SZ")
+    except ValueError:
+        return None
 
 
 def time_contradiction(

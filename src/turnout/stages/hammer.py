@@ -6,7 +6,7 @@ import unicodedata
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from datetime import datetime, timedelta
+from datetime import datetime
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -24,6 +24,8 @@ from turnout.modal import identify
 from turnout.records import Impact, ModalModel, RawDescription, Receptance, Recording, Rejection, Unit
 from turnout.registry.ids import content_id
 from turnout.stages.common import (
+    MAX_CAMPAIGN_OFFSET,
+    MISFILED_REMEDY,
     quarantine_row,
     rail_temperature,
     read_or_quarantine,
@@ -42,13 +44,8 @@ from turnout.stages.hammer_rows import (
     validation_columns,
 )
 
-# Largest time between a recording and its campaign: it may last into the night, and a clock may show local time.
-MAX_CAMPAIGN_OFFSET = timedelta(days=2)
 # Largest value of the registry's column `test`.
 MAX_TEST_NUMBER = 2**31 - 1
-MISFILED_REMEDY = (
-    "It is used. Move it to its day's campaign if it is another's; a logger's clock that was wrong does no harm"
-)
 
 
 def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root: str | Path, algo: str = "") -> dict[str, list[dict]]:

@@ -15,11 +15,21 @@ from turnout.hammer_test import receptance_of
 from turnout.hammer_test.response_quality import find_track_impacts
 from turnout.readers import read
 from turnout.records import Impact, LongRecording, RawDescription, ReadResult, Recording, Unit
+from turnout.stages.common import (
+    MAX_CAMPAIGN_OFFSET,
+    MAX_NAME_OFFSET,
+    MISFILED_REMEDY,
+    TIME_REMEDY,
+    rail_temperature,
+    time_contradiction,
+    time_of_label,
+)
 from turnout.units import SI
 
 STIFFNESS_BAND = (80.0, 300.0)  # Hz, of the printed dynamic stiffness
 # Rejections of impacts that a wrong layout may cause.
 LAYOUT_REASONS = ("out_of_scale", "sign_reversed", "dead_channel", "no_impact", "not_simultaneous", "overload")
+MAX_TEMPERATURE_DIFFERENCE = 15.0  # °C, of one rail within the day of a campaign
 MAX_TRAIN_ACCELERATION = 5e4  # m/s²: more than any sensor on a rail withstands
 MIN_TRAIN_ACCELERATION = 0.05  # m/s²: less than the quiet trains at the farthest sensor
 SCALE_REMEDY = "Look at unit, sensitivity and sensitivity_unit of {channels}"
@@ -36,7 +46,9 @@ class FileReading:
     faults: tuple[str, ...]
 
 
-def file_readings(turnout: TurnoutConfig, raw_root: Path, units: Sequence[Unit]) -> Iterator[FileReading]:
+def file_readings(
+    turnout: TurnoutConfig, raw_root: Path, units: Sequence[Unit], paths_by_content: dict[str, str] | None = None
+) -> Iterator[FileReading]:
     """Read the newest file of every section and of the passages, and compare it with the layout.
 
     Parameters
@@ -47,6 +59,8 @@ def file_readings(turnout: TurnoutConfig, raw_root: Path, units: Sequence[Unit])
         Folder that the paths of the units start from.
     units : sequence of Unit
         Units of the turnout, from ``turnout.workflow.scan``.
+    paths_by_content : dict of str to str or None
+        Files read before, by sha256, to which these are added: the same bytes again are a fault.
 
     Yields
     ------
@@ -54,13 +68,15 @@ def file_readings(turnout: TurnoutConfig, raw_root: Path, units: Sequence[Unit])
         One per section of hammer tests with files, and one of the passages.
     """
     hammer = {u.section: u for u in sorted(units, key=lambda u: str(u.campaign)) if u.kind == "hammer"}
+    paths_by_content = {} if paths_by_content is None else paths_by_content
     for section, unit in hammer.items():
         if section is not None and turnout.hammer is not None and section in turnout.hammer.descriptions:
-            yield _read(turnout, section, unit.files[0][0], raw_root, turnout.hammer.descriptions[section])
+            description = turnout.hammer.descriptions[section]
+            yield _read(turnout, section, unit, raw_root, description, paths_by_content)
     passages = [u for u in units if u.kind == "passage" and u.files]
     if passages and turnout.passages is not None:
         newest = max(passages, key=lambda u: u.label)
-        yield _read(turnout, "passages", newest.files[0][0], raw_root, turnout.passages.description)
+        yield _read(turnout, "passages", newest, raw_root, turnout.passages.description, paths_by_content)
 
 
 def sections_without_files(turnout: TurnoutConfig, units: Sequence[Unit]) -> list[str]:
@@ -82,18 +98,47 @@ def sections_without_files(turnout: TurnoutConfig, units: Sequence[Unit]) -> lis
     return [label for label in (turnout.hammer.descriptions if turnout.hammer else ()) if label not in found]
 
 
-def _read(turnout: TurnoutConfig, section: str, path: str, raw_root: Path, description: RawDescription) -> FileReading:
+def _read(
+    turnout: TurnoutConfig,
+    section: str,
+    unit: Unit,
+    raw_root: Path,
+    description: RawDescription,
+    paths_by_content: dict[str, str],
+) -> FileReading:
+    """The reading of the first file of a unit; ``paths_by_content`` are the files that were read before."""
+    path = unit.files[0][0]
     try:
         result = read(path, raw_root, description, turnout.settings["passage"].longest)
     except ReadError as error:
         return FileReading(turnout.id, section, path, "", (str(error),))
-    faults = grouped_errors(result.errors)
+    faults = grouped_errors([*result.errors, *_filing_errors(turnout, unit, path, result)])
+    if (same := paths_by_content.setdefault(result.sha256, path)) != path:
+        faults.append(f"{path}, the file: same bytes as {same}. Put the file of each section in its place.")
     text = _contents_text(result)
     if description.kind == "hammer":
         more, found = _hammer_faults(turnout, section, path, result.recordings)
     else:
         more, found = _passage_faults(path, [*result.recordings, *result.long_recordings])
     return FileReading(turnout.id, section, path, f"{text}{found}", (*faults, *more))
+
+
+def _filing_errors(turnout: TurnoutConfig, unit: Unit, path: str, result: ReadResult) -> Iterator[ReadError]:
+    """Errors where time and temperature in a file are not those that it is filed under."""
+    records: list[Recording | LongRecording] = [*result.recordings, *result.long_recordings]
+    if unit.kind != "hammer":
+        if error := time_contradiction(path, records, time_of_label(unit.label), MAX_NAME_OFFSET, TIME_REMEDY):
+            yield error
+        return
+    campaign = turnout.campaigns[str(unit.campaign)]
+    if error := time_contradiction(path, records, campaign.started_at, MAX_CAMPAIGN_OFFSET, MISFILED_REMEDY):
+        yield error
+    temperature = rail_temperature(result.recordings)
+    if temperature is None or campaign.rail_temperature is None:
+        return
+    if abs(temperature - campaign.rail_temperature) > MAX_TEMPERATURE_DIFFERENCE:
+        problem = f"its rail temperature is {temperature:g} °C, that in campaigns.csv {campaign.rail_temperature:g} °C"
+        yield ReadError(path, "the file", problem, "The one in campaigns.csv is used: correct what is wrong")
 
 
 def grouped_errors(errors: Sequence[Exception]) -> list[str]:

@@ -25,14 +25,19 @@ from turnout.passage.segmentation import cut_passages
 from turnout.passage.timetable import listed_for, listed_trains
 from turnout.records import LongRecording, ModalModel, Recording, Unit
 from turnout.registry.ids import content_id
-from turnout.stages.common import quarantine_row, read_or_quarantine, recording_row, time_contradiction
+from turnout.stages.common import (
+    MAX_NAME_OFFSET,
+    TIME_REMEDY,
+    quarantine_row,
+    read_or_quarantine,
+    recording_row,
+    time_contradiction,
+    time_of_label,
+)
 from turnout.stages.passage_rows import finding_rows, fit_row, passage_row
 from turnout.units import IGNORED
 
 NO_MODEL = "none"  # in the place of a model's id: the section has no model
-# Largest time between the file's name and its content; names in local time differ by less.
-MAX_NAME_OFFSET = timedelta(days=1)
-TIME_REMEDY = "Which is right is not known. Rename it, or export it again with the right time"
 
 
 @dataclass(frozen=True)
@@ -97,7 +102,7 @@ def passage_unit(
         recording_id = result.sha256[:32]
         both: list[Recording | LongRecording] = [*result.recordings, *result.long_recordings]
         records = sorted(both, key=lambda r: r.record)
-        contradiction = time_contradiction(path, records, _time_of_label(unit.label), MAX_NAME_OFFSET, TIME_REMEDY)
+        contradiction = time_contradiction(path, records, time_of_label(unit.label), MAX_NAME_OFFSET, TIME_REMEDY)
         if contradiction is not None:
             rows["quarantine"].append(quarantine_row(contradiction, base, "passage", "passage", None, recording_id))
             continue
@@ -106,7 +111,7 @@ def passage_unit(
             rows["recordings"].append(recording_row(result, path, size, description, base, "passage", passage_id=None))
             continue
         for recording in records:
-            started_at = recording.started_at or _time_of_label(unit.label)
+            started_at = recording.started_at or time_of_label(unit.label)
             if started_at is None:
                 remedy = "Put the time in its name as YYYYMMDDTHHMMSSZ, or record it in the file"
                 error = ReadError(path, f"record {recording.record + 1}", "has no time", remedy, "wrong_time")
@@ -324,12 +329,3 @@ def is_scored(passed_at: datetime, share: float) -> bool:
     [0, 300, 1000]
     """
     return crc32(passed_at.isoformat(timespec="seconds").encode()) < share * 2**32
-
-
-def _time_of_label(label: str) -> datetime | None:
-    """Time of a unit from its file name, YYYYMMDDTHHMMSSZ."""
-    stem = label.rsplit("/", 1)[-1].split(".")[0]
-    try:
-        return datetime.strptime(stem, "%Y%m%dT%H%M%SZ")
-    except ValueError:
-        return None

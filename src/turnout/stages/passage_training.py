@@ -21,7 +21,8 @@ from turnout.passage.result import Passage, PassageSensor
 from turnout.passage.timetable import ListedTrain, listed_for, listed_trains
 from turnout.readers import read
 from turnout.records import LongRecording, Recording, Unit
-from turnout.stages.passage import _time_of_label, sensors_of, trains_in
+from turnout.stages.common import time_of_label
+from turnout.stages.passage import sensors_of, trains_in
 from turnout.stages.passage_context import read_clusters, read_loads
 from turnout.workflow.scan import scan
 
@@ -88,7 +89,7 @@ def weighed_trains(
     trains: list[dict] = []
     passage_units = [u for u in scan(turnout, Path(raw_root)).units if u.kind == "passage"] if listed else []
     for unit in sorted(passage_units, key=lambda u: u.label, reverse=True):
-        started = _time_of_label(unit.label)
+        started = time_of_label(unit.label)
         if started is not None and not any(abs((t.passed_at - started).total_seconds()) < 900 for t in listed):
             continue
         trains += _weighed_in_unit(unit, turnout, raw_root, patterns, settings, listed)
@@ -111,7 +112,7 @@ def _weighed_in_unit(
             result = read(path, raw_root, turnout.require_passages().description, settings.longest)
             records: list[Recording | LongRecording] = [*result.recordings, *result.long_recordings]
             for recording in records:
-                started = recording.started_at or _time_of_label(unit.label)
+                started = recording.started_at or time_of_label(unit.label)
                 if started is None:
                     continue
                 for train_recording, offset, _ in trains_in(recording, settings):

@@ -3,7 +3,7 @@
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from datetime import date, datetime, timedelta
+from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
 
 from turnout.config import TurnoutConfig
@@ -15,6 +15,8 @@ from turnout.records import Unit
 from turnout.workflow.notes import start_of
 
 CLOCK_SHIFTS = sorted((h for h in range(-14, 15) if h), key=abs)  # h, offsets of local times from UTC
+FUTURE_TOLERANCE = timedelta(days=1)
+FUTURE_REMEDY = "Correct the date, or the clock of this machine"
 MIN_SHIFTED_PASSAGES = 3  # passages that a shift must match to trains: fewer may match by chance
 
 
@@ -53,6 +55,9 @@ def _campaigns(path: Path, name: str, units: Sequence[Unit]) -> Iterator[ReadErr
     days_in_notes = set()
     for line, cells in table.rows:
         day = _day(cells["campaign"])
+        if day is not None and is_future(datetime.fromisoformat(day)):
+            where = str(cells.place(name, line, "campaign"))
+            yield ReadError(name, where, f"the campaign {day} is in the future", FUTURE_REMEDY)
         days_in_notes.add(day)
         if day is not None and day not in n_files:
             remedy = "Correct its day, put its files there, or remove the row"
@@ -68,6 +73,21 @@ def _campaigns(path: Path, name: str, units: Sequence[Unit]) -> Iterator[ReadErr
         yield ReadError(name, "line 1", finding, remedy)
 
 
+def is_future(moment: datetime) -> bool:
+    """Whether a time is more than a day after now, in any time zone.
+
+    Parameters
+    ----------
+    moment : datetime
+        Naive UTC.
+
+    Returns
+    -------
+    bool
+    """
+    return moment > datetime.now(UTC).replace(tzinfo=None) + FUTURE_TOLERANCE
+
+
 def _day(text: str) -> str | None:
     try:
         return date.fromisoformat(text).isoformat()
@@ -79,6 +99,10 @@ def _trains(
     rows: Sequence[Mapping[str, str]], name: str, units: Sequence[Unit], tolerance: timedelta
 ) -> Iterator[ReadError]:
     """An error if no train matches a passage, but many match after a shift by whole hours."""
+    for row in rows:
+        if is_future(parse_utc(row["passed_at_utc"])):
+            problem = f"a train at {row['passed_at_utc']}, in the future"
+            yield ReadError(name, "column passed_at_utc", problem, FUTURE_REMEDY)
     passages = [start for unit in units if unit.kind == "passage" and (start := start_of(unit.label))]
     trains = sorted(parse_utc(row["passed_at_utc"]) for row in rows)
 

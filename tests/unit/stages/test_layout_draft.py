@@ -57,8 +57,8 @@ def files(tmp_path, scale=1.0, labels=("A7", "A8"), rate=RATE):
     folder = tmp_path / "raw" / "t1" / "hammer" / "2026-05-13"
     folder.mkdir(parents=True, exist_ok=True)
     paths = [folder / f"{label}_1.h5" for label in labels]
-    for path in paths:
-        write(hammer_test(scale, rate), path, "hdf5")
+    for k, path in enumerate(paths):
+        write(hammer_test(scale * (1.0 + 1e-6 * k), rate), path, "hdf5")  # no copy of the first
     return paths
 
 
