@@ -14,7 +14,7 @@ from turnout.errors import ReadError
 from turnout.hammer_test import receptance_of
 from turnout.hammer_test.response_quality import find_track_impacts
 from turnout.readers import read
-from turnout.records import Impact, LongRecording, RawDescription, ReadResult, Recording, Unit
+from turnout.records import Impact, LongRecording, RawDescription, ReadResult, Recording, Rejection, Unit
 from turnout.stages.common import (
     MAX_CAMPAIGN_OFFSET,
     MAX_NAME_OFFSET,
@@ -182,15 +182,19 @@ def _hammer_faults(
     force, response = turnout.hammer.force[section], turnout.hammer.response[section]
     settings = turnout.settings["receptance"]
     impacts = find_track_impacts(list(recordings), force, response, settings)
-    details: dict[str, list[int]] = {}
+    first: dict[tuple[str, str], Rejection] = {}
+    numbers: dict[tuple[str, str], list[int]] = {}
     for k, impact in enumerate(impacts, 1):
         for rejection in impact.rejections:
             if rejection.reason in LAYOUT_REASONS:
-                details.setdefault(rejection.detail or rejection.reason, []).append(k)
-    faults = [
-        f"{path}, {_impact_numbers(numbers)}: {detail}. {_remedy(force, response)}."
-        for detail, numbers in details.items()
-    ]
+                key = rejection.reason, rejection.channel or ""
+                first.setdefault(key, rejection)
+                numbers.setdefault(key, []).append(k)
+    faults = []
+    for key, rejection in first.items():
+        detail = rejection.detail or rejection.reason
+        counted = f"{detail} (impact {numbers[key][0]})" if len(numbers[key]) > 1 else detail
+        faults.append(f"{path}, {_impact_numbers(numbers[key])}: {counted}. {_remedy(rejection, force, response)}.")
     # the scale of the response is wrong in all impacts at once: the stiffness shows by which factor
     measured = [replace(i, rejections=tuple(r for r in i.rejections if r.channel != response)) for i in impacts]
     stiffness = median_stiffness(measured)
@@ -204,7 +208,10 @@ def _impact_numbers(numbers: Sequence[int]) -> str:
     return f"impact {numbers[0]}" if len(numbers) == 1 else f"impacts {', '.join(map(str, numbers))}"
 
 
-def _remedy(force: str, response: str) -> str:
+def _remedy(rejection: Rejection, force: str, response: str) -> str:
+    """What to look at in the layout; the sign of a channel that is reversed, else the scale of both."""
+    if rejection.reason == "sign_reversed":
+        return f"Look at 'sign' of {rejection.channel or force!r}: -1 reverses it"
     return SCALE_REMEDY.format(channels=f"{force!r} and {response!r}")
 
 

@@ -75,6 +75,15 @@ def test_a_temperature_that_differs_from_that_of_the_file_is_named(project, caps
     assert (f"its rail temperature is 15 °C, that in campaigns.csv {noted} °C" in printed) == is_named
 
 
+def test_a_fault_of_all_impacts_is_one_line_that_names_the_key_to_change(project, capsys):
+    layout = project / "config/layouts/own.yaml"
+    text = layout.read_text(encoding="utf-8")
+    layout.write_text(text.replace("quantity: force", "quantity: force\n      sign: -1", 1), encoding="utf-8")
+    code, printed = check_output(capsys)
+    assert code == 1 and printed.count("A7_1.csv, impacts 1, 2: hammer reads -") == 1
+    assert printed.count("Look at 'sign' of 'hammer': -1 reverses it") == 2
+
+
 def test_a_campaign_and_a_train_of_the_future_are_named(project, capsys):
     (project / "raw/W1/campaigns.csv").write_text(f"{HEAD}{DAY},{DAY}T09:00:00,15\n2098-05-13,2098-05-13T09:00:00,15\n")
     (project / "raw/W1/trains.csv").write_text("passed_at_utc,train_type\n2098-05-13T10:00:00,IC3\n")
