@@ -249,6 +249,15 @@ def visits_with_a_dip(position, first, n_visit=4):
         yield VisitInformation(f"v{v}", 0.5 * v, (group,))
 
 
+@pytest.mark.parametrize("position", [1.4, 5.5, 9.6])
+def test_a_dip_is_sought_as_far_beyond_the_sensors_as_effects_of_supports(position):
+    """The sensors stand at 2.0 to 9.0 m, and a wheel beyond them still excites them."""
+    candidates = change_candidates(SURFACE, dip_directions(SURFACE))
+    answer = change_answer(SURFACE, list(visits_with_a_dip(position, 2)), [], candidates, 12.0, 6.0)
+    assert (answer.verdict, answer.names) == ("named", ("surface_dip",))
+    assert answer.position == pytest.approx(position, abs=0.15)
+
+
 @pytest.mark.parametrize("is_in_library", [False, True])
 @pytest.mark.parametrize("position", [4.4, 5.5])
 def test_a_change_of_the_surface_without_a_name_has_a_position(monkeypatch, position, is_in_library):

@@ -161,11 +161,8 @@ class EffectEvidence:
 
     @cached_property
     def rivals(self) -> list[Score]:
-        """Reportable candidates within the margin of the leader, less those of which it is a simpler form."""
-        leads = ((s, self.leader.gain - s.gain) for s in self.ranked[1:] if s.is_reportable)
-        close = [(s, lead) for s, lead in leads if lead < self.settings.margin]
-        min_lead = THRESHOLDS.simpler_form_lead
-        return [s for s, lead in close if not (self.leader.is_simpler_form_of(s) and lead > min_lead)]
+        """Reportable candidates within the margin of the leader."""
+        return [s for s in self.ranked[1:] if s.is_reportable and self.leader.gain - s.gain < self.settings.margin]
 
     def names(self, answer: str) -> tuple[str, ...]:
         """Families that an answer names.

@@ -33,7 +33,7 @@ def fit_large_values(
     """The fit, continued with wide priors for those nuisances whose large values have the most evidence.
 
     One value after the other is added, as long as its evidence exceeds that of the fit without it by the logarithm of
-    the number of ``names``, which are equally probable before, and ``THRESHOLDS.simpler_form_lead``.
+    the number of ``names``, which are equally probable before, and ``THRESHOLDS.large_value_lead``.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def fit_large_values(
     Fit
         Its evidence is that with the wide priors.
     """
-    price, partners = float(np.log(max(len(names), 1))) + THRESHOLDS.simpler_form_lead, partners or {}
+    price, partners = float(np.log(max(len(names), 1))) + THRESHOLDS.large_value_lead, partners or {}
     large: tuple[str, ...] = ()
     for _ in range(THRESHOLDS.max_large_values):
         gains = evidence_of_large_values(search.case, fit, names, widening, _with_partners(large, partners))

@@ -15,6 +15,7 @@ ALWAYS = "decisions/candidates-always-tested.md"
 PRESCREEN = "decisions/hammer-prescreen.md"
 LOCATED = "decisions/residual-localization.md"
 GUIDE = "mismatch.md"
+CALIBRATED = "decisions/calibrated-model.md"
 
 
 def threshold(value: Any, unit: str, reason: str, source: str) -> Any:
@@ -51,8 +52,8 @@ class Thresholds:
     max_loss_share: float = threshold(
         0.2, "share of the gain", "a held-out condition that loses more, and half a threshold, contradicts it", FITS
     )
-    simpler_form_lead: float = threshold(
-        3.0, "nats", "odds of 20 to 1 of a simpler form over one with a parameter that has no effect", PAIRS
+    large_value_lead: float = threshold(
+        3.0, "nats", "odds of 20 to 1 that a value lies far beyond its prior, beside the number of values", CALIBRATED
     )
     max_bounded_error: float = threshold(
         0.5, "share of the size", "standard error beyond which only a lower limit is known: 95 % reach twice the size",

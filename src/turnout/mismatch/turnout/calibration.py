@@ -17,6 +17,7 @@ from turnout.mismatch.calibrated.file_comparison import model_error
 from turnout.mismatch.calibrated.history import BEFORE_ALL, Event
 from turnout.mismatch.calibrated.information import GroupInformation, marginalize
 from turnout.mismatch.calibrated.model_answer import position_of
+from turnout.mismatch.turnout.priors import TRACK
 from turnout.mismatch.turnout.rail_roughness import Waves
 from turnout.mismatch.turnout.surface_priors import ROUGHNESS
 
@@ -247,9 +248,10 @@ def dip_directions(parameters: Sequence[StateParameter]) -> dict[str, dict[str, 
     r"""Dips of the running surface that may appear, as changes of the amplitudes of the waves.
 
     A dip is one period of a raised cosine, :math:`(1 + \cos 2\pi x/L)/2`, of ``CALIBRATION.dip_lengths``, at
-    positions between the outer sensors. Its waves are those that are most probable under their priors, if the surface
-    has the dip with an error of ``CALIBRATION.dip_error``. Waves overlap, so that a dip has many descriptions by waves;
-    one without the priors needs large amplitudes that cancel.
+    positions up to ``TRACK.effect_reach`` beyond the outer sensors, as effects of supports are. Its waves are those
+    that are most probable under their priors, if the surface has the dip with an error of ``CALIBRATION.dip_error``.
+    Waves overlap, so that a dip has many descriptions by waves; one without the priors needs large amplitudes that
+    cancel.
 
     Parameters
     ----------
@@ -269,14 +271,14 @@ def dip_directions(parameters: Sequence[StateParameter]) -> dict[str, dict[str, 
     directions = {}
     for (route, start, end), by_wave in stretches.items():
         ends = float(start) + ROUGHNESS.rolling_reach, float(end) - ROUGHNESS.rolling_reach
-        waves = Waves(ends, 0.0)
+        waves, last = Waves(ends, 0.0), ends[1] + TRACK.effect_reach + 1e-9
         x = np.arange(waves.start, waves.end, CALIBRATION.dip_step)
         used = [(k, by_wave[name]) for k, name in enumerate(waves.names) if name in by_wave]
         sd = np.array([p.sd for _, p in used])
         shapes = waves.shapes(x)[[k for k, _ in used]].T * sd / CALIBRATION.dip_error
         inverse = np.linalg.solve(shapes.T @ shapes + np.eye(len(used)), shapes.T) / CALIBRATION.dip_error
         for length in CALIBRATION.dip_lengths:
-            for position in np.arange(ends[0], ends[1] + 1e-9, CALIBRATION.dip_spacing):
+            for position in np.arange(ends[0] - TRACK.effect_reach, last, CALIBRATION.dip_spacing):
                 distance = np.clip((x - position) / length, -0.5, 0.5)
                 amplitudes = sd * (inverse @ (0.5 + 0.5 * np.cos(2.0 * np.pi * distance)))
                 directions[f"{route}dip of {length:g} m@{position:.2f}"] = {
