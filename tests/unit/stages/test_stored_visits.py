@@ -1,5 +1,12 @@
 """Files of visits: those that no longer serve are removed, and no others."""
 
+from types import SimpleNamespace
+
+import pytest
+
+from turnout.mismatch.calibrated import StateParameter
+from turnout.mismatch.turnout import TrackCase
+from turnout.stages import stored_visits
 from turnout.stages.stored_visits import remove_other_visits
 
 
@@ -20,3 +27,34 @@ def test_only_files_of_other_visits_of_the_same_turnout_are_removed(tmp_path):
 def test_a_folder_that_does_not_exist_yet_is_no_error(tmp_path):
     remove_other_visits(tmp_path, "T1", ())
     assert not (tmp_path / "T1").exists()
+
+
+@pytest.mark.parametrize(
+    ("parameter", "expected"), [(f"{stored_visits.NOSE_POSITION} at 7.37 m", True), ("rail", False)]
+)
+def test_a_visit_is_fitted_again_with_all_trains_where_the_file_has_a_nose(monkeypatch, tmp_path, parameter, expected):
+    """And what is stored is of that fit. The fits themselves are tested with worn noses; here they are names."""
+    case, parameters = object.__new__(TrackCase), {"n": StateParameter(parameter, 0.0, 0.1, 0.0, "surface")}
+    first, again = (SimpleNamespace(name=name, without_jacobian=lambda: None) for name in ("first", "again"))
+    written = {}
+    replaced = {
+        "fit_base": lambda search: (SimpleNamespace(case=case), first),
+        "calibrated_parameters": lambda *_: parameters,
+        "fit_from_nose_positions": lambda search, fit, positions: fit,
+        "fit_large_values": lambda search, fit, *_: fit,
+        "one_of_each_group": lambda case: (),
+        "with_reserved_passages": lambda case, fit, *_: (case, fit),
+        "_fit_again": lambda *_: again,
+        "visit_groups": lambda case, fit, *_: fit.name,
+        "packed_groups": lambda groups: groups,
+        "write_value": lambda path, value: written.update(value),
+    }
+    for name, function in replaced.items():
+        monkeypatch.setattr(stored_visits, name, function)
+    monkeypatch.setattr(stored_visits.Search, "of", lambda *_: None)
+    turnout = SimpleNamespace(id="t1", settings={"mismatch": None})
+    about = {"turnout": turnout, "visit": "2026-01-01", "version": {}}
+    group = SimpleNamespace(labels=("A",), route="main")
+    monkeypatch.setattr(stored_visits, "replace", lambda fitted, fit: fitted)
+    stored = stored_visits.store_visit(tmp_path, group, case, "", about)
+    assert written["groups"] == stored.fit.name == ("again" if expected else "first")

@@ -80,16 +80,30 @@ def bin_wavelengths(passages: Sequence[AlignedPassage]) -> np.ndarray:
     (n,) array of float
         [m]
     """
-    shortest = max(
-        [
-            CORRUGATION.min_wavelength,
-            *(m.speed / (CORRUGATION.max_frequency_share * m.passage.recording.rate) for m in passages),
-        ]
-    )
+    shortest = shortest_covered(passages, CORRUGATION.min_wavelength)
     longest = PASSAGE.shortest_wave * np.exp(
         CORRUGATION.bin_width * (CORRUGATION.background_reach + 1)
     )  # the first bins are background alone
     return longest * np.exp(-np.arange(0.0, np.log(longest / shortest), CORRUGATION.bin_width / CORRUGATION.overlap))
+
+
+def shortest_covered(passages: Sequence[AlignedPassage], least: float) -> float:
+    """Shortest wavelength that every passage covers within the band of its recording, or ``least`` if that is longer.
+
+    Parameters
+    ----------
+    passages : sequence of AlignedPassage
+        The passages.
+    least : float
+        [m]
+
+    Returns
+    -------
+    float
+        [m]
+    """
+    rates = ((m.speed, m.passage.recording.rate) for m in passages)
+    return max([least, *(speed / (CORRUGATION.max_frequency_share * rate) for speed, rate in rates)])
 
 
 def n_widths(wavelengths: np.ndarray) -> float:
@@ -262,4 +276,19 @@ def is_repeatable(band_powers: Sequence[BandPower], k: int, stretch: tuple[float
     bool
     """
     levels = [_group_level(half, stretch)[k] for half in (band_powers[::2], band_powers[1::2])]
+    return is_alike(levels)
+
+
+def is_alike(levels: Sequence[float]) -> bool:
+    """Whether either half of the passages shows at least half the level of the other.
+
+    Parameters
+    ----------
+    levels : sequence of float
+        One of each half.
+
+    Returns
+    -------
+    bool
+    """
     return bool(min(levels) > 0.5 * max(levels))

@@ -27,6 +27,7 @@ import numpy as np
 
 from turnout import physics
 from turnout.mismatch.turnout.candidates.catalogue import candidate_of
+from turnout.mismatch.turnout.candidates.corrugation_levels import is_alike, shortest_covered
 from turnout.mismatch.turnout.candidates.short_corrugation import response_energy
 from turnout.mismatch.turnout.defect_priors import CORRUGATION, POLYGONS, SHORT_POLYGONS
 from turnout.mismatch.turnout.priors import PASSAGE
@@ -219,7 +220,7 @@ def short_polygon_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, ...]
             z, n_slots = wheel_excess(spectra, bins, lengths)
             n += z.shape[0]
             w, k = np.unravel_index(int(np.argmax(z)), z.shape)
-            if n_slots and _is_repeatable(
+            if n_slots and is_alike(
                 [wheel_excess(half, bins, lengths)[0][w, k] for half in (spectra[::2], spectra[1::2]) if half]
             ):
                 wheel_fits.append((polygon_evidence(z[w, k], n_slots), train, int(w), int(bins[k]), spectra))
@@ -230,11 +231,6 @@ def short_polygon_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, ...]
     if nats < np.log(scanned):
         return ()
     return (_short_candidate(case, fit, train, wheel, lengths, chosen_bin, nats, scanned, spectra),)
-
-
-def _is_repeatable(levels: Sequence[float]) -> bool:
-    """Whether either half of a train's passages shows at least half the level of the other."""
-    return min(levels) > 0.5 * max(levels)
 
 
 def bin_wavelengths(passages: Sequence[AlignedPassage]) -> np.ndarray:
@@ -250,12 +246,7 @@ def bin_wavelengths(passages: Sequence[AlignedPassage]) -> np.ndarray:
     (n,) array of float
         [m]
     """
-    shortest = max(
-        [
-            CORRUGATION.min_wavelength * np.exp(-SHORT_POLYGONS.far_offset),
-            *(m.speed / (CORRUGATION.max_frequency_share * m.passage.recording.rate) for m in passages),
-        ]
-    )
+    shortest = shortest_covered(passages, CORRUGATION.min_wavelength * np.exp(-SHORT_POLYGONS.far_offset))
     longest = PASSAGE.shortest_wave * np.exp(SHORT_POLYGONS.far_offset)
     return longest * np.exp(-np.arange(0.0, np.log(longest / shortest), SHORT_POLYGONS.bin_width))
 
