@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.entries import MAX_ENTRIES, Entry, entries_of
+from turnout.readers.entries import MAX_ENTRIES, Entry, UnreadObject, entries_of
 from turnout.readers.lazy import ARRAYS
 from turnout.readers.rate_words import is_rate_name
 from turnout.readers.scale_words import is_scale_name
@@ -301,7 +301,7 @@ def single_value(value: Any, k: int, n: int) -> Any:
         if len(values) == n or (len(values) and all(np.array_equal(v, values[0]) for v in values[1:])):
             return single_value(values[k if len(values) == n else 0], k, 1)
         return value if len(values) else None
-    return None if isinstance(value, (Mapping, *ARRAYS)) else value
+    return None if isinstance(value, (Mapping, UnreadObject, *ARRAYS)) else value
 
 
 def _is_nested_text(value: Any) -> bool:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from turnout.errors import ReadError
 from turnout.readers.array_metadata import (
     ATTRIBUTES_MARK,
     TIME_NAMES,
@@ -38,6 +39,11 @@ def with_channel_groups(variables: Mapping[str, Any]) -> Mapping[str, Any]:
     -------
     mapping of str to any
         The same object if its groups are no channels.
+
+    Raises
+    ------
+    ReadError
+        If what a group states about its channel cannot be read.
     """
     groups = {name: v for name, v in variables.items() if isinstance(v, Mapping) and holds_samples(v)}
     vector_names = {name: _vector_name(group) for name, group in groups.items()}
@@ -46,6 +52,8 @@ def with_channel_groups(variables: Mapping[str, Any]) -> Mapping[str, Any]:
     times = [v for group in groups.values() for n, v in group.items() if n.lower() in TIME_NAMES]
     if len(times) not in (0, len(groups)) or not all(np.array_equal(t, times[0]) for t in times[1:]):
         return variables
+    if damaged := [v for group in groups.values() for v in group.values() if isinstance(v, ReadError)]:
+        raise damaged[0]
     titles = [_title(group) for group in groups.values()]
     names = titles if all(titles) and len(set(titles)) == len(titles) else list(groups)
     channels: dict[str, Any] = {name: value for name, value in variables.items() if name not in groups}

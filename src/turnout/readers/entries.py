@@ -32,6 +32,35 @@ class Entry:
     is_piece: bool = False
 
 
+@dataclass(frozen=True)
+class UnreadObject:
+    """Stands for a value whose content cannot be read: what ``kind`` of object it is, and the ``advice`` to store it.
+
+    The letter x in the advice stands for the name of the variable.
+    """
+
+    kind: str
+    advice: str
+
+    def __str__(self) -> str:
+        return self.kind
+
+    def remedy(self, name: str) -> str:
+        """What to do, for a message.
+
+        Parameters
+        ----------
+        name : str
+            Name of the variable.
+
+        Returns
+        -------
+        str
+            The advice with this name.
+        """
+        return re.sub(r"\bx\b", lambda _: name, self.advice)
+
+
 FREE_TEXT = "text"  # name of an entry that holds a whole text, beside the entries of its pieces
 
 

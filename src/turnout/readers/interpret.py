@@ -242,8 +242,8 @@ def _recording(
     }
     of_rate = rate_remark(statements, rate, where, source)
     is_rate_stated = any(s.certainty == CERTAIN and s.intervals for s in statements)
-    of_entries = entry_check.remark(record, rate, n_record, where, is_rate_stated)
-    channel_errors = [*faults.values(), *(remark for remark in (of_rate, of_entries) if remark)]
+    of_entries = entry_check.remarks(record, rate, n_record, where, is_rate_stated)
+    channel_errors = [*faults.values(), *([of_rate] if of_rate else []), *of_entries]
     if is_long:
         return LongRecording(block_reader.subset(usable), n_sample, **fields), channel_errors
     return Recording(samples=samples if not faults else samples[usable], **fields), channel_errors

@@ -18,12 +18,19 @@ from scipy.io.matlab import matfile_version
 from turnout.readers.array_metadata import TIME_NAMES, Alphabetical
 from turnout.readers.lazy import LazyColumn, LazyMatrix, is_large, lazy_array
 from turnout.readers.mat_elements import HEADER_SIZE, unpacked_file
+from turnout.readers.matlab_objects import (
+    SUBSYSTEM,
+    check_objects,
+    class_names,
+    matlab_object,
+    with_marked_objects,
+    with_marked_references,
+)
 from turnout.readers.named_arrays import raw_file
 from turnout.readers.source import RawFile, Source
 from turnout.readers.stated_units import is_unit_name
 
-VERSION_5 = 1  # as scipy numbers it
-VERSION_73 = b"MATLAB 7.3"
+VERSION_5, VERSION_73 = 1, 2  # as scipy numbers them
 
 
 def read_raw(source: Source) -> RawFile:
@@ -47,18 +54,22 @@ def read_raw(source: Source) -> RawFile:
     if source.size < HEADER_SIZE:
         raise source.error("the header", f"the file ends after {source.size} bytes", reason="truncated")
     with source.parsed_by("pymatreader"), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # objects and tables that it cannot read are no samples
-        large = _lazy_arrays(source) if source.lazy and source.head.startswith(VERSION_73) else {}
-        if matfile_version(io.BytesIO(source.head[:HEADER_SIZE]))[0] == VERSION_5:
-            unpacked = io.BytesIO(unpacked_file(source))
-            loaded = scipy.io.loadmat(unpacked, struct_as_record=True, squeeze_me=True, mat_dtype=False)
-            variables = parse_loaded_variables(loaded)
+        warnings.simplefilter("ignore")  # objects that it cannot read are reported by their names
+        version = matfile_version(io.BytesIO(source.head[:HEADER_SIZE]))[0]
+        large = _lazy_arrays(source) if source.lazy and version == VERSION_73 else {}
+        if version == VERSION_5:
+            unpacked, objects = unpacked_file(source)
+            loaded = scipy.io.loadmat(io.BytesIO(unpacked), struct_as_record=True, squeeze_me=True, mat_dtype=False)
+            marks = {name: matlab_object(class_name) for name, class_name in objects.items()}
+            variables = parse_loaded_variables(with_marked_objects(loaded)) | marks
         else:
-            variables = pymatreader.read_mat(source.path, ignore_fields=list(large)) | large
-    mapping_type = Alphabetical if source.head.startswith(VERSION_73) else dict
-    return raw_file(
-        _plain_variables({k: v for k, v in variables.items() if not k.startswith("__")}, mapping_type), source
-    )
+            variables = pymatreader.read_mat(source.path, ignore_fields=[*large, SUBSYSTEM]) | large
+            if version == VERSION_73:
+                with h5py.File(source.path, "r") as file:
+                    variables = with_marked_references(variables, class_names(file))
+    mapping_type = Alphabetical if version == VERSION_73 else dict
+    plain = _plain_variables({k: v for k, v in variables.items() if not k.startswith("__")}, mapping_type)
+    return raw_file(mapping_type(check_objects(plain, source)), source)
 
 
 def _lazy_arrays(source: Source) -> dict[str, LazyColumn | LazyMatrix]:

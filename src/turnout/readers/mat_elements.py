@@ -18,15 +18,15 @@ INT8, INT32, UINT32, UTF8 = 1, 5, 6, 16
 # Type of an element -> bytes of a number.
 NUMBER_SIZES = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8}
 TEXT_TYPES = {1, 2, 3, 4, 16, 17, 18}
-CELL, STRUCTURE, TEXT = 1, 2, 4  # classes of arrays
+CELL, STRUCTURE, TEXT, OPAQUE = 1, 2, 4, 17  # classes of arrays; the last is that of objects
 NUMERIC_CLASSES = range(6, 16)
 IS_COMPLEX = 1 << 11  # bit of the array flags
 MAX_DIMENSIONS = 32
 MAX_DEPTH = 20  # cells within cells
 
 
-def unpacked_file(source: Source) -> bytes:
-    """The file with all elements unpacked.
+def unpacked_file(source: Source) -> tuple[bytes, dict[str, str]]:
+    """The file with all elements unpacked, and the variables that are objects, which are left out of it.
 
     Parameters
     ----------
@@ -35,8 +35,8 @@ def unpacked_file(source: Source) -> bytes:
 
     Returns
     -------
-    bytes
-        A MATLAB 5 file without compression.
+    tuple of (bytes, dict of str to str)
+        A MATLAB 5 file without compression; name of each object -> name of its class.
 
     Raises
     ------
@@ -46,6 +46,7 @@ def unpacked_file(source: Source) -> bytes:
     data = source.data
     order = "<" if data[126:128] == b"IM" else ">"
     pieces, position, total = [data[:HEADER_SIZE]], HEADER_SIZE, 0
+    objects: dict[str, str] = {}
     while position < len(data):
         try:
             if position + 8 > len(data):
@@ -59,12 +60,16 @@ def unpacked_file(source: Source) -> bytes:
                 check_size(total := total + claimed, source, f"the variable at byte {position}")
                 element = _unpack(element[8:], claimed)
             _check_matrix(element, 0, len(element), order, 0)
+            name, class_name = _object_names(element, order)
         except (ValueError, struct.error, zlib.error) as error:
             problem = f"it is damaged ({error})"
             raise source.error(f"the variable at byte {position}", problem, COPY_AGAIN, reason="unreadable") from error
-        pieces.append(element)
+        if name:
+            objects[name] = class_name
+        else:
+            pieces.append(element)
         position += 8 + size
-    return b"".join(pieces)
+    return b"".join(pieces), objects
 
 
 def _claimed_size(packed: bytes, order: str) -> int:
@@ -142,6 +147,21 @@ def _check_matrix(data: bytes, position: int, stop: int, order: str, depth: int)
         elif element_type not in NUMBER_SIZES or n_byte != count * NUMBER_SIZES[element_type]:
             raise ValueError(f"{n_byte} bytes of type {element_type} for {count} numbers")
     return following
+
+
+def _object_names(element: bytes, order: str) -> tuple[str, str]:
+    """(name, name of the class) of a variable that is an object; ("", "") for any other variable."""
+    _, begin, size, _ = _element(element, 0, len(element), order)
+    if not size:
+        return "", ""
+    _, flags_at, _, position = _element(element, begin, len(element), order)
+    if struct.unpack_from(f"{order}I", element, flags_at)[0] & 0xFF != OPAQUE:
+        return "", ""
+    texts = []
+    for _ in range(3):  # name, system of types, class
+        _, at, length, position = _element(element, position, len(element), order)
+        texts.append(element[at : at + length].decode("utf-8", "replace"))
+    return texts[0], texts[2]
 
 
 def _check_parts(data: bytes, position: int, stop: int, following: int, order: str, depth: int) -> int:

@@ -139,6 +139,10 @@ COUNT_REMEDY = (
     "State its origin in the name or the unit, such as 'days since 1899-12-30', or give the campaign or the time in "
     "the file's name"
 )
+OBJECT_REMEDY = (
+    "Store it as text, in MATLAB by char(x, 'yyyy-MM-dd HH:mm:ss.SSS'), or give the campaign or the time in the file's "
+    "name"
+)
 ZONE_REMEDY = "Compare it with 'time_zone' in the layout; let the logger write UTC, or an offset such as +02:00"
 NO_START = {"", "-", "none", "n/a", "?", "unknown", "nan", "nat", "null", "0", "0.0"}
 
@@ -255,8 +259,9 @@ def start_errors(
         yield _start_error([k for k, _ in other], problem, source)
     if no_time := [(k, text) for k, text in unread.items() if stated.get(k) is None]:
         problem = f"the start time {no_time[0][1]!r} cannot be read"
-        is_number = no_time[0][1].endswith("?")
-        yield _start_error([k for k, _ in no_time], problem, source, COUNT_REMEDY if is_number else CLOCK_REMEDY)
+        is_number, is_object = no_time[0][1].endswith("?"), "MATLAB" in no_time[0][1]
+        remedy = COUNT_REMEDY if is_number else OBJECT_REMEDY if is_object else CLOCK_REMEDY
+        yield _start_error([k for k, _ in no_time], problem, source, remedy)
     timed = [(k, stamp) for k, stamp in stamps if stamp is not None]
     if strange := [(k, stamp) for k, stamp in timed if not is_plausible(stamp)]:
         problem = (

@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.entries import MAX_ENTRIES, Entry
+from turnout.readers.array_metadata import START_NAMES
+from turnout.readers.entries import MAX_ENTRIES, Entry, UnreadObject
 from turnout.readers.entry_candidates import (
     DURATION,
     MAX_TEXT,
@@ -208,9 +209,9 @@ class EntryCheck:
         entries = tuple(e for e in record.entries if e.name.strip().casefold() not in self._checked)
         return record if len(entries) == len(record.entries) else replace(record, entries=entries)
 
-    def remark(
+    def remarks(
         self, record: RawRecord, rate: float, n_record: int, where: str, is_rate_stated: bool
-    ) -> ReadError | None:
+    ) -> list[ReadError]:
         """Check the entries of one record.
 
         Parameters
@@ -228,8 +229,9 @@ class EntryCheck:
 
         Returns
         -------
-        ReadError or None
-            A remark on entries that may state a rate, scale or unit, with the reason ``entry_unknown``.
+        list of ReadError
+            Remarks on entries that may state a rate, scale or unit, and on objects that cannot be read, with the reason
+            ``entry_unknown``.
 
         Raises
         ------
@@ -239,13 +241,13 @@ class EntryCheck:
         n_sample = len(record.samples[0])
         key = (record.units, rate, n_sample)
         if self._last is not None and self._last[0] is record.entries and self._last[1] == key:
-            return None
+            return []
         if self._key != key:
             self._key, self._seen = key, set()
         new_entries = [entry for entry in record.entries if not entry.is_defined and self._is_new(entry)]
         if not new_entries:
             self._last = record.entries, key
-            return None
+            return []
         facts = RecordFacts(rate, n_sample, len(record.names), n_record, self._units + with_stated_units(record).units)
         unexplained = list(unexplained_entries(new_entries, facts, self._are_certain))
         for entry, candidate in unexplained:
@@ -254,7 +256,22 @@ class EntryCheck:
         self._last = record.entries, key
         new = [(e, c) for e, c in unexplained if (e.name, c.text) not in self._reported]
         self._reported.update((e.name, c.text) for e, c in new)
-        return self._error(where, new, "entry_unknown") if new else None
+        objects = [e for e in new_entries if isinstance(e.value, UnreadObject) and e.name.lower() not in START_NAMES]
+        return [*self._object_errors(where, objects), *([self._error(where, new, "entry_unknown")] if new else [])]
+
+    def _object_errors(self, where: str, entries: Sequence[Entry]) -> Iterator[ReadError]:
+        """Remarks on objects whose content cannot be read, each name once."""
+        for entry in entries:
+            key = entry.place, str(entry.value)
+            if key in self._reported:
+                continue
+            self._reported.add(key)
+            problem = f"{entry.place!r} is an {entry.value}, so its content is not read"
+            remedy = (
+                f"{entry.value.remedy(entry.place.replace('/', '.'))}; if it states nothing about the samples, name it "
+                f"in the layout, 'checked_entries: {entry.name}'"
+            )
+            yield self.source.error(where, problem, remedy, reason="entry_unknown")
 
     def _is_new(self, entry: Entry) -> bool:
         """Whether an equal entry has not been checked; arrays are always new."""
