@@ -74,7 +74,7 @@ def silverbox():
     path = shared / "nonlinear_silverbox" / "SNLS80mV.csv"
     if not path.is_file():
         return
-    u, y = np.genfromtxt(path, delimiter=",", skip_header=1)[:, :2].T
+    u, y = np.loadtxt(path, delimiter=",", skiprows=1, usecols=(0, 1)).T
     segments = [slice(40650 + k * 8692, 40650 + (k + 1) * 8692) for k in range(10)]
     sines = [(f"multisine {k}", f"multisine {k}", u[p], y[p]) for k, p in enumerate(segments)]
     reserved = [sines[8], sines[9], ("arrow", "arrow", u[:40000], y[:40000])]

@@ -26,7 +26,7 @@ def recordings(folder):
 
     Five multisines are fitted; another one and the arrow are reserved.
     """
-    u, y = np.genfromtxt(folder / "SNLS80mV.csv", delimiter=",", skip_header=1)[:, :2].T
+    u, y = np.loadtxt(folder / "SNLS80mV.csv", delimiter=",", skiprows=1, usecols=(0, 1)).T
     segments = [slice(START + k * LENGTH, START + (k + 1) * LENGTH) for k in range(10)]
     sines = [(f"multisine {k}", f"multisine {k}", u[p], y[p]) for k, p in enumerate(segments)]
     return [sines[k] for k in FITTED], [sines[HELD_OUT], ("arrow", "arrow", u[:ARROW], y[:ARROW])]
