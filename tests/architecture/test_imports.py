@@ -3,7 +3,10 @@
 import ast
 from functools import cache
 
+import numpy as np
 import pytest
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 LOWEST = {
     "arrow_memory",
@@ -119,6 +122,40 @@ def test_imports_for_the_type_checker_are_not_counted(tmp_path):
     path = tmp_path / "module.py"
     path.write_text("import a\nif TYPE_CHECKING:\n    import b\nelse:\n    import c\n")
     assert imports_of(path) == ["a", "c"]
+
+
+def circles(imports):
+    """Modules that import each other in a loop, one sorted list per loop.
+
+    ``imports``: module -> the modules that it imports.
+    """
+    modules = sorted(imports)
+    number = {module: k for k, module in enumerate(modules)}
+    arrows = [(number[a], number[b]) for a in modules for b in imports[a] if b in number and b != a]
+    rows, columns = zip(*arrows, strict=True)
+    graph = coo_matrix((np.ones(len(arrows)), (rows, columns)), shape=(len(modules), len(modules)))
+    _, label = connected_components(graph, directed=True, connection="strong")
+    return [
+        [m for m, same in zip(modules, label == k, strict=True) if same] for k in np.flatnonzero(np.bincount(label) > 1)
+    ]
+
+
+def test_no_modules_import_each_other(repository):
+    root = repository / "src"
+    names = {
+        ".".join(path.relative_to(root).with_suffix("").parts).removesuffix(".__init__"): path
+        for path in root.rglob("*.py")
+    }
+    # "from package import module" is also listed as an import of the package
+    imports = {
+        name: [m for m in imports_of(path) if not any(n.startswith(f"{m}.") and n in names for n in imports_of(path))]
+        for name, path in names.items()
+    }
+    assert circles(imports) == []
+
+
+def test_circles_of_imports():
+    assert circles({"a": ["b"], "b": ["c"], "c": ["a", "d"], "d": ["e"], "e": []}) == [["a", "b", "c"]]
 
 
 def test_nothing_in_the_library_imports_snakemake(repository):

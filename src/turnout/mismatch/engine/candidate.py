@@ -305,6 +305,23 @@ class Candidate:
         """(n_parameter,) values at which the term vanishes."""
         return np.array([p.neutral for p in self.parameters])
 
+    def scaled_start(self, k: int, share: float) -> np.ndarray:
+        """A start with its first parameter at a share of the distance from neutral. The others define its shape.
+
+        Parameters
+        ----------
+        k : int
+            Number of the start.
+        share : float
+
+        Returns
+        -------
+        (n_term,) array of float
+        """
+        start = np.array(self.starts[k], dtype=float)
+        start[0] = self.neutral[0] + share * (start[0] - self.neutral[0])
+        return start
+
     def mirror_image(self, values: ArrayLike) -> np.ndarray:
         """Parameter values with the first one mirrored about neutral.
 

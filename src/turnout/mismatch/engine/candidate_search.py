@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from turnout.errors import SimulationError
+from turnout.mismatch.engine.hammer_prescreen import prescreen
 from turnout.mismatch.engine.projector import Projector
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
@@ -194,8 +195,6 @@ def prescreened_entries(search: Search, fit: Fit, promising: Collection[str] | N
     list of Entry
         The best of each family. [] for a cheap case.
     """
-    from turnout.mismatch.engine.hammer_prescreen import prescreen
-
     if not search.case.expensive:
         return []
     families = None
@@ -221,7 +220,7 @@ def _screened_entries(case: Case, fit: Fit, candidates: Sequence[Candidate]) -> 
     chosen = [(c, k) for c in candidates if c.refit.promise is None for k in range(len(c.starts))]
     changes = [columns.get((c.key, k)) or _predicted_change(case, fit, c, k) for c, k in chosen]
     for (candidate, k), (gain, share) in zip(chosen, projector.scores(changes, *zip(*chosen)) if chosen else ()):
-        yield Entry(0.5 * gain - np.log(candidate.site.n_scanned), candidate, scaled_start(candidate, k, share), {})
+        yield Entry(0.5 * gain - np.log(candidate.site.n_scanned), candidate, candidate.scaled_start(k, share), {})
 
 
 def _distant_entry(case: Case, fit: Fit, projector: Projector, at_start: Candidate, candidate: Candidate) -> Entry:
@@ -330,25 +329,6 @@ def _distance(first: Any, second: Any) -> float:
     if isinstance(first, (int, float)) and isinstance(second, (int, float)):
         return abs(first - second)
     return 0.0 if first == second else np.inf
-
-
-def scaled_start(candidate: Candidate, k: int, share: float) -> np.ndarray:
-    """A start with its first parameter at a share of the distance from neutral. The others define its shape.
-
-    Parameters
-    ----------
-    candidate : Candidate
-    k : int
-        Number of the start.
-    share : float
-
-    Returns
-    -------
-    (n_term,) array of float
-    """
-    start = np.array(candidate.starts[k], dtype=float)
-    start[0] = candidate.neutral[0] + share * (start[0] - candidate.neutral[0])
-    return start
 
 
 def _predicted_change(case: Case, fit: Fit, candidate: Candidate, k: int) -> list[np.ndarray] | None:

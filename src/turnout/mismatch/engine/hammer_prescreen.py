@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.engine.candidate_search import scaled_start
 from turnout.mismatch.engine.map_fit import cost_after, fit_jointly
 from turnout.mismatch.engine.projector import Projector
 from turnout.mismatch.engine.thresholds import THRESHOLDS
@@ -260,4 +259,4 @@ def _column_starts(case: Case, cheap_case: Case, fit: Fit) -> list[_Start]:
     if not chosen:
         return []
     scores = Projector(cheap_case, fit).scores([columns[c.key, k] for c, k in chosen], *zip(*chosen))
-    return [_Start(0.5 * gain, c, scaled_start(c, k, share)) for (c, k), (gain, share) in zip(chosen, scores)]
+    return [_Start(0.5 * gain, c, c.scaled_start(k, share)) for (c, k), (gain, share) in zip(chosen, scores)]
