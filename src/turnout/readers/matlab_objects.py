@@ -143,7 +143,8 @@ def with_marked_references(value: Any, classes: Mapping[str, str], path: str = "
     if path in classes:
         return matlab_object(classes[path])
     if isinstance(value, dict):
-        return {k: with_marked_references(v, classes, f"{path}/{k}" if path else k) for k, v in value.items()}
+        inner = {name: f"{path}/{name}" if path else name for name in sorted(value)}  # pymatreader's order is random
+        return {name: with_marked_references(value[name], classes, inner[name]) for name in inner}
     if isinstance(value, list):
         return [with_marked_references(v, classes, path) for v in value]
     return matlab_object("") if _is_reference(value) else value
