@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from turnout.physics.hypothesis import Hypothesis, SupportMotion, SupportSite
+from turnout.physics.requirement import IMPACTS
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.links import Link
 
@@ -39,6 +40,7 @@ class AttachedResonator(PhysicsTerm):
     effect_type = "matrix"
     frame = "frequency"
     site_types = (SupportSite,)
+    requirements = (IMPACTS,)
     column_type = "support"
     smallest_reportable = 5.0
     min_significance = 1.0

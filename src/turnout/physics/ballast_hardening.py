@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from turnout.physics.hypothesis import Hypothesis, SupportMotion, SupportSite
+from turnout.physics.requirement import PASSAGES
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.force_laws import Port, TableLaw
 
@@ -43,6 +44,7 @@ class BallastHardening(PhysicsTerm):
     site_check = "Look for fine material or frost in this ballast; compare its settlement under a heavy train"
     effect_type = "port"
     frame = "amplitude"
+    requirements = (PASSAGES,)
     site_types = (SupportSite,)
     column_type = "support"
     smallest_reportable = 0.3

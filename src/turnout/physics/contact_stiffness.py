@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Self
 
 from turnout.physics.hypothesis import ContactSite, Hypothesis
+from turnout.physics.requirement import PASSAGES
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.vehicle import one_or_all
 
@@ -28,6 +29,7 @@ class ContactStiffness(PhysicsTerm):
     site_check = "Measure the profiles of rail and wheels"
     effect_type = "vehicle"
     frame = "train"
+    requirements = (PASSAGES,)
     site_types = (ContactSite,)
     smallest_reportable = 0.1
     parameters = (

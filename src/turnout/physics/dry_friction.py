@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from turnout.physics.hypothesis import Hypothesis, SupportMotion, SupportSite
+from turnout.physics.requirement import PASSAGES
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.force_laws import FrictionLaw, Port
 
@@ -32,6 +33,7 @@ class DryFriction(PhysicsTerm):
     site_check = "Look for a loose clip or a worn baseplate on this sleeper"
     effect_type = "port"
     frame = "amplitude"
+    requirements = (PASSAGES,)
     site_types = (SupportSite,)
     column_type = "support"
     smallest_reportable = 500.0

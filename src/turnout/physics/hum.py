@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from turnout.physics.hypothesis import ChannelSite, Hypothesis
+from turnout.physics.requirement import PASSAGES
 from turnout.physics.term import Parameter, PhysicsTerm
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ class Hum(PhysicsTerm):
     site_check = "Check shielding and grounding of this channel"
     effect_type = "channel"
     frame = "clock"
+    requirements = (PASSAGES,)
     site_types = (ChannelSite,)
     column_type = "channel"
     n_size_parameters = 2

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from turnout.physics.hypothesis import Hypothesis, Masking, SupportMotion, SupportSite
+from turnout.physics.requirement import IMPACTS
 from turnout.physics.term import Parameter, PhysicsTerm
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ class LocalPad(PhysicsTerm):
     scales_track = True
     frame = "place"
     site_types = (SupportSite,)
+    requirements = (IMPACTS,)
     column_type = "support"
     smallest_reportable = 0.15
     component = "pad"

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from turnout.physics.hypothesis import ChannelSite, Hypothesis
+from turnout.physics.requirement import IMPACTS
 from turnout.physics.term import Parameter
 from turnout.physics.transfer import TransferTerm
 
@@ -33,6 +34,7 @@ class MountResonance(TransferTerm):
     site_check = "Fasten this sensor again and repeat a hammer test on the rail beside it"
     separating_test = "a hammer test beside this sensor"
     site_types = (ChannelSite,)
+    requirements = (IMPACTS,)
     column_type = "channel"
     smallest_reportable = 1 / 2000.0
     component = "channel"

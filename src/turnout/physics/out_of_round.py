@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Self
 
+from turnout.physics.requirement import PASSAGES
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.wheel_path import OutOfRound as Wave
 
@@ -42,6 +43,7 @@ class OutOfRound(PhysicsTerm):
     site_check = "Measure the run-out of this wheelset; no work on the track"
     effect_type = "path"
     frame = "wheel"
+    requirements = (PASSAGES,)
     parameters = (
         Parameter("cosine", "m", 0.0, (-1e-3, 1e-3), "cosine amplitude of the out-of-roundness", SOURCE),
         Parameter("sine", "m", 0.0, (-1e-3, 1e-3), "sine amplitude of the out-of-roundness", SOURCE),

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Self
 
 from turnout.physics.hypothesis import Hypothesis, TrackSite
+from turnout.physics.requirement import PASSAGES
 from turnout.physics.term import Parameter, PhysicsTerm
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ class PadPreload(PhysicsTerm):
     separating_test = "a hammer test beside a standing train, or passages of another axle load"
     effect_type = "matrix"
     frame = "condition"
+    requirements = (PASSAGES,)
     site_types = (TrackSite,)
     smallest_reportable = 500.0
     parameters = (

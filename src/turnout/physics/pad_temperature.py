@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Self
 
 from turnout.physics.hypothesis import Hypothesis, TrackSite
+from turnout.physics.requirement import Requirement
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.links import Link
 
@@ -15,6 +16,10 @@ if TYPE_CHECKING:
 
 REFERENCE = 15.0  # °C, temperature of the pads of the base model
 STARTS = ((0.01,),)  # 1/K
+TWO_TEMPERATURES = Requirement(  # of 4 K: at 1 % per kelvin, 2 % of frequency
+    "rail_temperature", "range", 4.0, "rail temperatures are not known, or within 4 K",
+    "recordings at a rail temperature 15 K away",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -38,7 +43,7 @@ class PadTemperature(PhysicsTerm):
     column_type = "track"
     smallest_reportable = 1e-3
     prescreen_group = name  # common values of the base model change first to hide it
-    required_range = ("rail_temperature", 4.0)  # K; at 1 % per kelvin: 2 % of frequency
+    requirements = (TWO_TEMPERATURES,)
     parameters = (
         Parameter("coefficient", "1/K", 0.0, (-0.01, 0.04), "relative loss of stiffness per kelvin",
                   "Othman 2022, Extrica 22293: rail pads lose up to 53 % when warm", (0.005, 0.01)),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from turnout.physics.hypothesis import ContactSite, Hypothesis
+from turnout.physics.requirement import PASSAGES, Requirement
 from turnout.physics.term import Parameter, PhysicsTerm
 
 if TYPE_CHECKING:
@@ -22,6 +23,11 @@ WAVELENGTHS = (0.3, 0.6)  # m, of the starts
 N_INDEPENDENT = 4  # distinguishable wavelengths in that range
 START_AMPLITUDE, SENSOR_MARGIN = 3e-5, 3.0  # m; corrugated rail beyond the sensors
 MIN_AMPLITUDE = 1e-5  # m, smallest reported amplitude of short waves: EN 13231-3 allows it on a ground rail up to 0.3 m
+SHORT = "corrugation shorter than 0.3 m"  # found by its level, see docs/decisions/short-wave-corrugation.md
+TWO_TRAINS = Requirement(  # they distinguish the rail from wheels
+    "train", "count", 2, "all passages are of one train", "passages of another train", SHORT)  # fmt: skip
+TWO_SPEEDS = Requirement(  # they distinguish a wavelength from a frequency
+    "speed", "ratio", 1.25, "all trains had about one speed", "passages at speeds a quarter apart", SHORT)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -58,6 +64,7 @@ class RailCorrugation(PhysicsTerm):
     effect_type = "path"
     frame = "wavelength"
     site_types = (ContactSite,)
+    requirements = (PASSAGES, TWO_TRAINS, TWO_SPEEDS)
     column_type = "path"
     parameters = (
         Parameter("sine", "m", 0.0, (-3e-4, 3e-4), "amplitude in phase with the start", SOURCE, (0.0, 6e-5)),

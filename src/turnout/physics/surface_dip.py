@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from turnout.physics.hypothesis import ContactSite, Hypothesis
+from turnout.physics.requirement import PASSAGES
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.wheel_path import Cosine, Kink
 
@@ -44,6 +45,7 @@ class SurfaceDip(PhysicsTerm):
     separating_test = "passages at another speed"
     effect_type = "path"
     frame = "place"
+    requirements = (PASSAGES,)
     site_types = (ContactSite,)
     column_type = "path"
     smallest_reportable = 3e-5

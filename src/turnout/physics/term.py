@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
@@ -13,6 +14,7 @@ from turnout.simulate.effect import Effect
 
 if TYPE_CHECKING:
     from turnout.physics.hypothesis import Hypothesis, SupportMotion
+    from turnout.physics.requirement import Requirement
     from turnout.simulate.track import Track
 
 COLUMN_TYPES = ("support", "track", "path", "channel", "link", "")
@@ -119,9 +121,8 @@ class PhysicsTerm(Effect):
         The response changes its shape with the size. A start says nothing of larger or smaller sizes.
     required_data_type : str
         Data type of observations that must support it. To all others it looks like another effect.
-    required_range : tuple
-        (condition, range): the recordings must have this condition and differ in it by this range. Otherwise the effect
-        could explain any difference between them. () without such a requirement.
+    requirements : tuple of Requirement
+        What the recordings must have for it to be examined. An answer states what they lack.
     evidence_suffices : bool
         Evidence beside the observations is enough: it need not explain their residual.
     must_reach_control_level : bool
@@ -158,7 +159,7 @@ class PhysicsTerm(Effect):
     sign_ambiguous: ClassVar[bool] = False
     nonlinear_in_size: ClassVar[bool] = False
     required_data_type: ClassVar[str] = ""
-    required_range: ClassVar[tuple[str, float] | tuple[()]] = ()
+    requirements: ClassVar[tuple[Requirement, ...]] = ()
     evidence_suffices: ClassVar[bool] = False
     must_reach_control_level: ClassVar[bool] = False
     distant_starts: ClassVar[tuple[float, ...]] = ()
@@ -167,6 +168,12 @@ class PhysicsTerm(Effect):
     def example(cls) -> Self:
         """A term with ordinary values for the tests: on a track of at least 40 supports with sensors "A" and "B"."""
         raise NotImplementedError(f"{cls.__name__} needs an example for its contract tests")
+
+    @classmethod
+    def title(cls) -> str:
+        """What it is, in words: the first sentence of its module, without a full stop."""
+        lines = (sys.modules[cls.__module__].__doc__ or cls.name.replace("_", " ")).strip().splitlines()
+        return lines[0].split(": ")[0].removesuffix(".")
 
     @classmethod
     def hypotheses(cls, site: Any) -> Iterable[Hypothesis]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from turnout.physics.hypothesis import ChannelSite, Hypothesis
+from turnout.physics.requirement import IMPACTS
 from turnout.physics.term import ACCURATE, Parameter
 from turnout.physics.transfer import TransferTerm
 
@@ -38,6 +39,7 @@ class TimeOffset(TransferTerm):
     separating_test = "passages at another speed"
     frame = "clock"
     site_types = (ChannelSite,)
+    requirements = (IMPACTS,)
     column_type = "channel"
     smallest_reportable = 5e-5
     model_error_share = ACCURATE

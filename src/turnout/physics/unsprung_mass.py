@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from turnout.physics.hypothesis import Hypothesis, Masking, TrainSite
+from turnout.physics.requirement import PASSAGES
 from turnout.physics.term import Parameter, PhysicsTerm
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ class UnsprungMass(PhysicsTerm):
     site_check = "Check the vehicle file of this train"
     effect_type = "vehicle"
     frame = "train"
+    requirements = (PASSAGES,)
     site_types = (TrainSite,)
     column_type = "track"
     smallest_reportable = 0.07

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Self
 
+from turnout.physics.requirement import PASSAGES
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.wheel_path import WheelFlat as FlatPath
 
@@ -40,6 +41,7 @@ class WheelFlat(PhysicsTerm):
     separating_test = "another passage of this train"
     effect_type = "path"
     frame = "wheel"
+    requirements = (PASSAGES,)
     evidence_suffices = True  # that of the impacts in the sound level
     parameters = (
         Parameter("length", "m", 0.0, (0.0, 0.15), "length of the flat along the tread", SOURCE, (0.04, 0.04)),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from turnout.physics.hypothesis import BladeSite, Hypothesis
+from turnout.physics.requirement import PASSAGES
 from turnout.physics.term import Parameter, PhysicsTerm
 
 if TYPE_CHECKING:
@@ -52,6 +53,7 @@ class WornToe(PhysicsTerm):
     separating_test = "passages at another speed"
     effect_type = "path"
     frame = "place"
+    requirements = (PASSAGES,)
     site_types = (BladeSite,)
     smallest_reportable = 2e-4
     nonlinear_in_size = True

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from turnout.physics.hypothesis import Hypothesis, TrackSite
+from turnout.physics.requirement import IMPACTS
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.links import Link
 
@@ -41,6 +42,7 @@ class ZenerPad(PhysicsTerm):
     effect_type = "matrix"
     frame = "frequency"
     site_types = (TrackSite,)
+    requirements = (IMPACTS,)
     column_type = "track"
     smallest_reportable = 0.1
     prescreen_group = name  # common values of the base model change first to hide it

@@ -13,7 +13,17 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
     from typing import Any
 
-__all__ = ["ANSWERS", "accepted_parameters", "answer", "check", "facts", "parameters", "rivals", "title"]
+__all__ = [
+    "ANSWERS",
+    "accepted_parameters",
+    "answer",
+    "check",
+    "facts",
+    "parameters",
+    "rivals",
+    "title",
+    "unmet_requirements",
+]
 ANSWERS = {  # verdict: its word, as in docs/mismatch.md, and what it means
     "named": ("named", "the effect that the simulation lacks"),
     "a_or_b": ("a or b", "two effects explain the recordings equally well"),
@@ -230,6 +240,22 @@ def check(finding: Mapping[str, Any]) -> str:
         return "Nothing on site: refine mesh and step of the simulation."
     action = finding["next_measurement"] or "Inspect the track at this position; repeat the measurement"
     return action.rstrip(".") + "."
+
+
+def unmet_requirements(finding: Mapping[str, Any]) -> list[dict]:
+    """What the recordings cannot show, why, and the measurement that could.
+
+    Parameters
+    ----------
+    finding : mapping
+        Row of ``mismatch_findings``.
+
+    Returns
+    -------
+    list of dict
+        ``what``, ``lack`` and ``measurement`` in words.
+    """
+    return json.loads(finding["evidence_json"] or "{}").get("not_examined", [])
 
 
 def rivals(finding: Mapping[str, Any]) -> list[dict]:

@@ -6,7 +6,6 @@ Run ``python -m turnout.stages.effects_page docs`` to update it; a test compares
 from __future__ import annotations
 
 import sys
-from importlib import import_module
 from pathlib import Path
 
 from turnout import physics
@@ -33,7 +32,7 @@ def page() -> str:
     """Text of the page."""
     effects = sorted(physics.TERMS, key=lambda effect: effect.name)
     rows = "".join(_row(effect) for effect in effects if effect.asked)
-    names = [_effect_name(effect) for effect in effects if not effect.asked]
+    names = [effect.title() for effect in effects if not effect.asked]
     return PAGE_HEAD + rows + PAGE_FOOT.format(", ".join(name[0].lower() + name[1:] for name in names))
 
 
@@ -41,13 +40,8 @@ def _row(effect: type[physics.PhysicsTerm]) -> str:
     numbers = "; ".join(f"{p.meaning} [{p.unit}]" for p in effect.parameters)
     size = effect.smallest_reportable
     smallest = number_in_words(size, effect.parameters[0].unit) if size else "–"
-    cells = _effect_name(effect), f"`{effect.name}`", FRAMES[effect.frame], numbers, smallest, effect.site_check
+    cells = effect.title(), f"`{effect.name}`", FRAMES[effect.frame], numbers, smallest, effect.site_check
     return "| " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |\n"
-
-
-def _effect_name(effect: type[physics.PhysicsTerm]) -> str:
-    """First sentence of the module docstring of the effect."""
-    return (import_module(effect.__module__).__doc__ or "").strip().splitlines()[0].split(": ")[0].removesuffix(".")
 
 
 if __name__ == "__main__":

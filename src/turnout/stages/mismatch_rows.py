@@ -22,7 +22,7 @@ from turnout.stages.mismatch_curves import (
     curve_rows,
     reach_of,
 )
-from turnout.stages.mismatch_text import headline, interval, surface_sentence
+from turnout.stages.mismatch_text import headline, interval, requirements_in_words, surface_sentence
 from turnout.stages.values_off_file import sentences_on_values
 
 if TYPE_CHECKING:
@@ -70,7 +70,11 @@ def finding_tables(
     row |= _summary_columns(diagnosis, case, group, about)
     of_surface = map(surface_sentence, surface_estimates(case, diagnosis.fit))
     of_values = sentences_on_values(case.nuisances, diagnosis.fit)
-    row["sentence"] = " ".join(filter(None, [headline(row), *of_surface, *of_values]))
+    limits = requirements_in_words(case.unmet_requirements) if row["verdict"] == "none" else ""
+    row["sentence"] = " ".join(filter(None, [headline(row), *of_surface, *of_values, limits]))
+    ambiguity = case.ambiguity() if diagnosis.verdict.is_ambiguous else None
+    if ambiguity:
+        row["next_measurement"] = f"Measure {ambiguity.measurement}"
     if case.reservation:
         row = as_unproven(row, case.reservation)
     key = {"finding_id": row["finding_id"], "turnout_id": row["turnout_id"]}
@@ -121,7 +125,7 @@ def _summary_columns(diagnosis: Diagnosis, case: TrackCase, group: Group, about:
         "level_before": float(max(diagnosis.base.level.values())),
         "level_after": float(max(fit.level.values())),
         "term_json": json.dumps(terms, sort_keys=True) if terms else None,
-        "evidence_json": json.dumps(_evidence(diagnosis), sort_keys=True),
+        "evidence_json": json.dumps(_evidence(diagnosis, case), sort_keys=True),
         "notes": "\n".join(_first_notes([*dict.fromkeys([*case.notes, *_visit_notes(about, campaign)])])) or None,
     }
 
@@ -152,14 +156,18 @@ def _term_evidence(verdict: Verdict) -> dict:
     return {"probability": _plain(verdict.probability), **alternative}
 
 
-def _evidence(diagnosis: Diagnosis) -> dict:
-    """Frames, and the evidence of each verdict: of the first effect, and of further ones under ``beside``."""
+def _evidence(diagnosis: Diagnosis, case: TrackCase) -> dict:
+    """Frames, the evidence of each verdict (of further effects under ``beside``), and what was not examined."""
     frames = [
         {"frame": f.frame, "level": str(f.level), "effect_db": _plain(f.effect), "q": _plain(f.q), "n": f.n}
         for f in diagnosis.frames[:6]
     ]
     first, *further = (_verdict_evidence(v) for v in diagnosis.verdicts)
-    return {"frames": frames, **first, "beside": further}
+    unexamined = [
+        {"effect": u.effect, "what": u.words, "lack": u.lack, "measurement": u.measurement}
+        for u in case.unmet_requirements
+    ]
+    return {"frames": frames, **first, "beside": further, "not_examined": unexamined}
 
 
 def _verdict_evidence(verdict: Verdict) -> dict:
@@ -170,6 +178,7 @@ def _verdict_evidence(verdict: Verdict) -> dict:
         "probability": _plain(verdict.probability),
         "reason": verdict.reason,
         "is_finished": verdict.is_finished,
+        "is_ambiguous": verdict.is_ambiguous,
         "posterior": {k: _plain(v) for k, v in _largest(verdict.posterior)},
         "ranking": [{"family": s.family, "nats": _plain(s.gain), "explained": _plain(s.explained)} for s in top_scores],
         "by_condition": {k: _plain(v) for k, v in top_scores[0].by_condition.items()} if top_scores else {},

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ MIN_SURFACE_DEVIATION = 2.0  # prior standard deviations from the track file's v
 ONE_SUPPORT = 0.31  # m to either side; an interval of a position that is larger contains several supports
 MILLI_UNITS = {"m": "mm", "s": "ms"}
 UNFINISHED = "Whether something is missing is open"
+MAX_MEASUREMENTS, MAX_EFFECTS = 2, 2  # in the sentence on what was not examined; the page has all
 PERCENT_UNITS = {"1/K": "% per kelvin"}
 
 
@@ -191,10 +192,43 @@ def title(finding: Mapping[str, Any]) -> str:
     low, high = finding["place_low_m"], finding["place_high_m"]
     if finding["verdict"] == "unknown":
         where = _location_text(finding, low, high)
-        if not json.loads(finding.get("evidence_json") or "{}").get("is_finished", True):
+        evidence = json.loads(finding.get("evidence_json") or "{}")
+        if evidence.get("is_ambiguous"):
+            return f"Something is there {where} that these recordings cannot name: {evidence['reason']}."
+        if not evidence.get("is_finished", True):
             return f"{UNFINISHED}, as the search was not finished. The simulation differs most {where}."
         return f"Something is missing {where}, and no known effect explains it."
     return finding["sentence"] or ""
+
+
+def requirements_in_words(unexamined: Sequence[Any]) -> str:
+    """One sentence on what recordings cannot show, by the measurements that could: first that of most effects.
+
+    Parameters
+    ----------
+    unexamined : sequence
+        Each with its ``words`` and ``measurement``.
+
+    Returns
+    -------
+    str
+        "" where nothing is left out.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace as Effect
+    >>> requirements_in_words([Effect(words="a soft pad", measurement="hammer tests")])
+    'These recordings cannot show a soft pad (needs hammer tests).'
+    """
+    groups: dict[str, list[str]] = {}
+    for u in unexamined:
+        groups.setdefault(u.measurement, []).append(u.words)
+    texts = []
+    for measurement, effects in sorted(groups.items(), key=lambda item: -len(item[1]))[:MAX_MEASUREMENTS]:
+        more = len(effects) - MAX_EFFECTS
+        words = "; ".join([*effects[:MAX_EFFECTS], *([f"{more} more"] if more > 0 else [])])
+        texts.append(f"{words} (needs {measurement})")
+    return f"These recordings cannot show {'; '.join(texts)}." if texts else ""
 
 
 def surface_sentence(estimate: Mapping[str, Any]) -> str:

@@ -9,6 +9,7 @@ import pytest
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine import decision
+from turnout.mismatch.engine.ambiguity import Ambiguity
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.decision import EFFECT_RULES, NAME_RULES, RULES, grade_name, judge
 from turnout.mismatch.engine.score import Score
@@ -53,6 +54,10 @@ def test_the_last_rule_of_a_table_applies_to_all_and_no_other_does(table):
             rule.applies(None)
 
 
+def line_of(nats):
+    return Ambiguity(nats, "a level is high", "passages at another speed", "wavelength", "0.15 m", 2.0, 6.0)
+
+
 CASES = {
     "explains_too_little": ([score(explained=0.4)], 2.0, {}),
     "leaves_too_much": ([score()], 2.0, {"residual_excess": 4.1}),
@@ -61,7 +66,8 @@ CASES = {
     "train_unlike_its_file": ([], 0.9, {"mismatched_trains": ("ic3",)}),
     "no_tolerance_explains_it": ([], 0.9, {"strained": "mass of the rail"}),
     "component_differs_under_trains": ([score(gain=11.0)], 0.9, {"local_change": 12.1}),
-    "no_candidate_passes": ([], 0.9, {"local_change": 11.9}),
+    "recordings_cannot_decide": ([score(gain=11.0)], 0.9, {"ambiguity": line_of(12.1)}),
+    "no_candidate_passes": ([], 0.9, {"local_change": 11.9, "ambiguity": line_of(11.9)}),
     "weak_and_contradicted": ([score(gain=23.0)], 0.9, {"consistent": False}),
     "reserved_not_predicted": ([score(gain=25.0)], 0.9, {"consistent": False}),
     "residual_has_structure": ([score()], 2.0, {"structure": 0.5, "residual_excess": 1.5}),

@@ -1,5 +1,6 @@
 """Corrugation above the band that is simulated: found by its wavelength, sized by the track's receptance."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -17,7 +18,11 @@ from turnout.mismatch.turnout.candidates.corrugation_levels import (
     sensor_stretches,
     stretch_evidence,
 )
-from turnout.mismatch.turnout.candidates.short_corrugation import line_wavelength, short_corrugation_candidates
+from turnout.mismatch.turnout.candidates.short_corrugation import (
+    ambiguous_line,
+    line_wavelength,
+    short_corrugation_candidates,
+)
 from turnout.mismatch.turnout.defect_priors import CORRUGATION
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.simulate.wheel_path import Corrugation
@@ -48,7 +53,13 @@ def test_sound_rail_and_the_wheel_of_one_train_are_no_corrugation():
 def test_one_train_alone_cannot_tell_a_rail_from_wheels():
     plan = small_plan((15.0,), hammer_positions=())
     plan = SimpleNamespace(**{**vars(plan), "trains": tuple(t for t in plan.trains if t.name == "heavy")})
-    assert looked_at(physics.RailCorrugation(20.5, 27.0, 3e-5, 0.0, 0.16), plan=plan)[1] == ()
+    case, found = looked_at(physics.RailCorrugation(20.5, 27.0, 3e-5, 0.0, 0.16), plan=plan)
+    line = ambiguous_line(case)
+    assert found == () and line.nats > 12.0 and "waves of the wheels of this train" in line.words
+    assert ambiguous_line(looked_at(plan=plan)[0]) is None
+    assert [u.words for u in case.unmet_requirements if u.effect == "rail_corrugation"] == [
+        "corrugation shorter than 0.3 m"
+    ]
 
 
 def hummed(speeds, seed=5):
@@ -62,14 +73,27 @@ def hummed(speeds, seed=5):
         hum = np.std(p.recording.samples) * np.sin(2.0 * np.pi * 150.0 * time)
         passages.append(replace(p, recording=replace(p.recording, samples=p.recording.samples + hum)))
     case = TrackCase(replace(campaign, passages=tuple(passages)))
-    return short_corrugation_candidates(
+    found = short_corrugation_candidates(
         case, SimpleNamespace(candidates=(), values={n.name: n.mean for n in case.nuisances})
     )
+    return found, ambiguous_line(case)
 
 
 def test_a_hum_is_no_corrugation_nor_can_trains_of_one_speed_tell():
-    assert hummed((28.0, 40.0, 28.4, 39.5)) == ()
-    assert hummed((28.0, 28.4, 28.2, 28.3)) == ()
+    """At one speed the answer states the line, its frequency, what it may be, and what would decide."""
+    assert hummed((28.0, 40.0, 28.4, 39.5)) == ((), None)
+    found, line = hummed((28.0, 28.4, 28.2, 28.3))
+    assert found == () and line.nats > 12.0
+    assert (
+        re.search("1(49|50) Hz", line.words) and "a vibration of this frequency" in line.words and "0.18" in line.words
+    )
+    assert "wheels" not in line.words and line.measurement == "passages at speeds a quarter apart"
+
+
+def test_passages_of_exactly_one_speed_have_one_group_of_speeds():
+    levels = np.zeros((4, 1))
+    equal = passages_with(levels, trains=(("x", 20.0), ("x", 20.0), ("y", 20.0)))
+    assert np.isfinite(corrugation_evidence(equal, POSITIONS)).all()
 
 
 def test_corrugation_in_the_tracks_file_is_not_found_again():

@@ -13,6 +13,7 @@ from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
+    from turnout.mismatch.engine.ambiguity import Ambiguity
     from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.engine.residual_space import ResidualSpace
 
@@ -257,6 +258,10 @@ class Case:
             They are tested beside ``candidates``.
         """
         return ()
+
+    def ambiguity(self) -> Ambiguity | None:
+        """Something that the recordings show and cannot tell what it is; None by default."""
+        return None
 
     def tolerated_effects(self, fit: Fit) -> Sequence[Candidate]:
         """Effects that a wide tolerance of the base model hides, although their size is a finding.

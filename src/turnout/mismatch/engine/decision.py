@@ -26,7 +26,7 @@ from turnout.mismatch.engine.decision_facts import (
 from turnout.mismatch.engine.rule import Rule, first_applicable
 from turnout.mismatch.engine.search_limit import SearchLimit
 from turnout.mismatch.engine.thresholds import THRESHOLDS
-from turnout.mismatch.engine.verdict import Verdict, calibrate, posterior, swap_with_unknown
+from turnout.mismatch.engine.verdict import AMBIGUOUS, Verdict, calibrate, posterior, swap_with_unknown
 
 if TYPE_CHECKING:
     from turnout.config.settings.mismatch import MismatchSettings
@@ -66,6 +66,8 @@ EFFECT_RULES: tuple[Rule[EffectEvidence], ...] = (
          "the recordings are explained only by a value that its file cannot have: {e.strained}", LOCATED),
     Rule(COMPONENT_DIFFERS, lambda e: e.shows_nothing and e.local_change > e.settings.threshold, "unknown",
          "a component there is another one under trains than under impacts, by {e.local_change:.0f} nats", LOCATED),
+    Rule(AMBIGUOUS, lambda e: e.shows_nothing and e.is_ambiguous, "unknown", "{e.ambiguity.words}",
+         "decisions/short-wave-corrugation.md"),
     Rule("no_candidate_passes", lambda e: not e.has_leader, "none", "nothing above the thresholds", HOW),
     Rule("weak_and_contradicted", lambda e: e.shows_nothing, "none",
          "nothing above the thresholds but {e.leader.family}, which does not hold elsewhere", ENDS),

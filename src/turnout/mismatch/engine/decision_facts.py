@@ -16,6 +16,7 @@ from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from turnout.config.settings.mismatch import MismatchSettings
+    from turnout.mismatch.engine.ambiguity import Ambiguity
     from turnout.mismatch.engine.reserved_data import Verification
     from turnout.mismatch.engine.score import Score
     from turnout.mismatch.engine.verdict import Verdict
@@ -84,6 +85,8 @@ class EffectEvidence:
         Value of the base model that no tolerance explains, in words; "" if there is none.
     local_change : float
         Evidence that a single component differs under trains from what impacts show. [nats]
+    ambiguity : Ambiguity or None
+        Something that the recordings show and cannot tell what it is.
     """
 
     scores: Sequence[Score]
@@ -96,6 +99,7 @@ class EffectEvidence:
     mismatched_trains: tuple[str, ...] = ()
     strained: str = ""
     local_change: float = 0.0
+    ambiguity: Ambiguity | None = None
 
     @cached_property
     def passing(self) -> list[Score]:
@@ -143,6 +147,11 @@ class EffectEvidence:
             return True
         is_weak = self.leader.gain < THRESHOLDS.weak_gain * self.settings.threshold
         return (self.contradicted or not self.consistent) and is_weak and self.excess <= 1.0
+
+    @property
+    def is_ambiguous(self) -> bool:
+        """Whether the recordings show something beyond doubt that they cannot tell what it is."""
+        return self.ambiguity is not None and self.ambiguity.nats > self.settings.threshold
 
     @property
     def train_names(self) -> str:

@@ -22,7 +22,7 @@ from turnout.mismatch.engine.evidence import assess, excess_ratio, latent_force_
 from turnout.mismatch.engine.findings import Findings
 from turnout.mismatch.engine.free_laws import free_law_share
 from turnout.mismatch.engine.local_changes import local_change_evidence
-from turnout.mismatch.engine.localization import Location, locate, locate_change
+from turnout.mismatch.engine.localization import Location, locate, locate_change, location_of_ambiguity
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.refit import score_candidates
 from turnout.mismatch.engine.reserved_data import Verification, verify
@@ -35,7 +35,7 @@ from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.mismatch.engine.tolerated_effects import name_tolerated
 from turnout.mismatch.engine.two_effects import add_second, settle_pair
 from turnout.mismatch.engine.unproven_cases import withhold_names
-from turnout.mismatch.engine.verdict import Verdict
+from turnout.mismatch.engine.verdict import AMBIGUOUS, Verdict
 
 if TYPE_CHECKING:
     from turnout.config.settings.mismatch import MismatchSettings
@@ -281,6 +281,8 @@ def _locate_unknown(findings: Findings, verdict: Verdict) -> Location | None:
     if verdict.answer != "unknown" or verdict.trail[-1] == "reserved_not_explained":
         return None
     search = findings.search
+    if AMBIGUOUS in verdict.trail:
+        return location_of_ambiguity(search.case)
     if COMPONENT_DIFFERS in verdict.trail:
         return locate_change(search.case, findings.base)
     leader = next((s for s in verdict.scores[:1] if s.gain > search.settings.threshold), None)

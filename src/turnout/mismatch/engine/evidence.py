@@ -243,6 +243,7 @@ def assess(search: Search, fit: Fit, scores: Sequence[Score]) -> tuple[Verdict, 
     facts: dict[str, Any] = {"disturbed": bool(case.disturbed_recordings), "strained": str(strained or "")}
     facts["mismatched_trains"] = case.mismatched_trains
     facts["local_change"] = 0.0 if fit.candidates else local_change_evidence(case, fit)
+    facts["ambiguity"] = None if fit.candidates else case.ambiguity()
     scores = tuple(s for s in scores if s.is_reportable)
     if not scores:
         return judge([], excess, settings, **facts), None

@@ -114,6 +114,22 @@ def locate(
     return replace(_location_of_evidence(witnesses), measured_range=case.measured_range) if witnesses else None
 
 
+def location_of_ambiguity(case: Case) -> Location | None:
+    """Location of what the recordings show and cannot tell what it is.
+
+    Parameters
+    ----------
+    case : Case
+
+    Returns
+    -------
+    Location or None
+        None if there is nothing of the kind.
+    """
+    u = case.ambiguity()
+    return None if u is None else Location(u.frame, u.level, u.nats, 0.5 * (u.low + u.high), u.low, u.high)
+
+
 def locate_change(case: Case, fit: Fit) -> Location | None:
     """Location of a component that is another one in expensive recordings than in cheap ones.
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.rule import Rule
     from turnout.mismatch.engine.score import Score
 
+AMBIGUOUS = "recordings_cannot_decide"  # rule
 ANSWERS = ("none", "named", "a_or_b", "unknown", "numerics")
 
 
@@ -55,6 +56,11 @@ class Verdict:
     def is_finished(self) -> bool:
         """Whether the search for the first effect came to its end, so that "unknown" says that something is missing."""
         return "search_too_long" not in self.trail
+
+    @property
+    def is_ambiguous(self) -> bool:
+        """Whether it states something that the recordings show and cannot tell what it is."""
+        return self.answer == "unknown" and AMBIGUOUS in self.trail
 
     def after(self, rule: Rule) -> Verdict:
         """The verdict with a rule at the end of its trail.

@@ -10,6 +10,7 @@ import numpy as np
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
+from turnout.mismatch.engine.ambiguity import Ambiguity
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.fit import Fit
 from turnout.mismatch.engine.observation import Observation
@@ -17,7 +18,7 @@ from turnout.mismatch.engine.residual_space import ResidualSpace
 from turnout.mismatch.turnout import sensitivity
 from turnout.mismatch.turnout.accepted_effects import NO_EFFECTS, AcceptedEffect, AcceptedEffects, effects_on
 from turnout.mismatch.turnout.campaign import CampaignInput
-from turnout.mismatch.turnout.candidates.catalogue import distant_starts, has_required_range, list_candidates
+from turnout.mismatch.turnout.candidates.catalogue import distant_starts, is_testable, list_candidates
 from turnout.mismatch.turnout.disturbances import independent_of_trains
 from turnout.mismatch.turnout.hammer_case import HammerCase
 from turnout.mismatch.turnout.observations import CaseData, case_data, with_errors
@@ -27,9 +28,11 @@ from turnout.mismatch.turnout.predicted_case import PredictedCase
 from turnout.mismatch.turnout.prediction import Predictor
 from turnout.mismatch.turnout.predictions import Predictions, Terms, Values
 from turnout.mismatch.turnout.priors import CASE, SIMULATION
+from turnout.mismatch.turnout.unmet_requirements import UnmetRequirement, unmet_requirements
 from turnout.mismatch.turnout.unproven_panels import reservation
 from turnout.mismatch.turnout.wheel_roughness import log_mass_ratios
 from turnout.mismatch.turnout.worn_nose import worn_noses
+from turnout.physics import RailCorrugation
 
 # (predictor, whether a prediction is cheap) -> a cache around the predictor, or the predictor itself
 PredictionCache: TypeAlias = Callable[[Predictor, bool], Predictions]
@@ -88,7 +91,7 @@ class TrackCase(PredictedCase):
         cache: PredictionCache = no_cache,
     ):
         data, predictor = case_data(campaign, settings or MismatchSettings(), solver or Track1D())
-        candidates = [c for c in list_candidates(data, families) if has_required_range(data, c)]
+        candidates = [c for c in list_candidates(data, families) if is_testable(data, c)]
         self._set_up(data, predictor, candidates, families, effects_on(predictor.track(), accepted), cache)
 
     def _set_up(
@@ -136,6 +139,11 @@ class TrackCase(PredictedCase):
     def notes(self) -> tuple[str, ...]:
         """What is not used, and why."""
         return self.data.notes
+
+    @property
+    def unmet_requirements(self) -> tuple[UnmetRequirement, ...]:
+        """Effects that these recordings cannot show, and which measurement could."""
+        return unmet_requirements(self.data, self.families)
 
     @property
     def trains(self) -> tuple[str, ...]:
@@ -264,6 +272,14 @@ class TrackCase(PredictedCase):
         if not self.fitted_passages():
             return ()
         return self.accepted.without(scan_geometry(*self.with_fixed_effects(fit), self.families))
+
+    def ambiguity(self) -> Ambiguity | None:
+        """A line in the level of all passages that may be corrugation, a wheel or a vibration; None without one."""
+        from turnout.mismatch.turnout.candidates.short_corrugation import ambiguous_line
+
+        if self.families is not None and RailCorrugation.name not in self.families:
+            return None
+        return ambiguous_line(self)
 
     def tolerated_effects(self, fit: Fit) -> tuple[Candidate, ...]:
         """Worn noses: dips of the file that are certainly much deeper than it says.

@@ -119,9 +119,6 @@ class CorrugationPriors:
     sensor_sd: float = prior(
         0.8, "ln", "level of one sensor on intact rail: 0.62 and 1.0 in two simulators", SHORT_WAVES)
     corrugation_sd: float = prior(2.0, "ln", "prior of the level of corrugation", SHORT_WAVES)
-    min_trains: int = prior(2, "trains", "at least, to distinguish the rail from wheels", SHORT_WAVES)
-    min_speed_ratio: float = prior(
-        1.25, "-", "fastest over slowest passage, to distinguish a wavelength from a frequency", SHORT_WAVES)
     independent_distance: float = prior(2.0, "m", "closer sensors measure the same rail", SHORT_WAVES)
     half_lengths: tuple[float, ...] = prior((1.0, 1.8, 3.2, 5.0), "m", "half the length of the stretch", SHORT_WAVES)
     amplitudes: tuple[float, float, int] = prior(

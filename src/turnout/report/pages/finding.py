@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from turnout.report.finding_text import ANSWERS, accepted_parameters, answer, check, facts, parameters, rivals, title
+from turnout.report.finding_text import (
+    ANSWERS,
+    accepted_parameters,
+    answer,
+    check,
+    facts,
+    parameters,
+    rivals,
+    title,
+    unmet_requirements,
+)
 from turnout.report.formatting import day
 from turnout.report.panels.finding import (
     STYLES,
@@ -91,6 +101,7 @@ def _finding(
         "check": check(finding),
         "parameters": parameters(finding),
         "filed": accepted_parameters(_parameters_of(rows, finding)),
+        "not_examined": unmet_requirements(finding),
         "rivals": rivals(finding),
         "wide": "".join(svg for curve, svg in drawings if curve == "waveform") + residuals,
         "panels": "".join([*(svg for curve, svg in drawings if curve != "waveform"), fit_panel(finding)]),

@@ -202,10 +202,37 @@ def channel_sites(data: CaseData) -> Iterator[ChannelSite | SaturatedChannelSite
         yield SaturatedChannelSite(name, estimate.limit, SATURATION.limit_sd * estimate.limit, estimate.gain)
 
 
-def has_required_range(data: CaseData, candidate: Candidate) -> bool:
-    """Whether the recordings differ enough in the condition that the effect needs (``PhysicsTerm.required_range``).
+def recorded_quantities(data: CaseData) -> dict[str, list[Any]]:
+    """Quantities of the recordings of a case that effects may require (``Requirement.quantity``).
 
-    Every recording must have that condition. Otherwise the effect could explain any difference between recordings.
+    Passages in reserve suggest no effect: trains and speeds are those of the fitted ones.
+
+    Parameters
+    ----------
+    data : CaseData
+        Its recordings.
+
+    Returns
+    -------
+    dict
+        Quantity -> value of each recording, None where it is not known.
+    """
+    fitted = [data.aligned_passages[o.name] for o in data.observations if o.name in data.aligned_passages]
+    conditions = [pair.conditions for pair in data.frf_pairs.values()]
+    conditions += [aligned.conditions for aligned in data.aligned_passages.values()]
+    return {
+        "passage": list(data.aligned_passages),
+        "hammer_test": [pair.name for pair in data.frf_pairs.values()],
+        "train": [aligned.passage.train or None for aligned in fitted],
+        "speed": [aligned.speed for aligned in fitted if aligned.passage.train],
+        "rail_temperature": [c.get("rail_temperature") for c in conditions],
+    }
+
+
+def is_testable(data: CaseData, candidate: Candidate) -> bool:
+    """Whether the recordings have all that the effect strictly requires (``PhysicsTerm.requirements``).
+
+    Otherwise the effect could explain any difference between recordings.
 
     Parameters
     ----------
@@ -217,15 +244,10 @@ def has_required_range(data: CaseData, candidate: Candidate) -> bool:
     Returns
     -------
     bool
-        True for an effect without such a requirement.
     """
-    required = physics.effects_by_name()[candidate.family].required_range
-    if not required:
-        return True
-    name, least = required
-    values: list[Any] = [pair.conditions.get(name) for pair in data.frf_pairs.values()]
-    values += [aligned.conditions.get(name) for aligned in data.aligned_passages.values()]
-    return None not in values and max(values) - min(values) >= least
+    requirements = physics.effects_by_name()[candidate.family].requirements
+    recorded = recorded_quantities(data)
+    return all(r.is_met(recorded) for r in requirements if r.is_strict and not r.part)
 
 
 def distant_starts(case: TrackCase, fit: Fit) -> list[tuple[Candidate, tuple[float, ...]]]:

@@ -176,7 +176,8 @@ def passage_groups(passages: Sequence[BandPower]) -> list[list[BandPower]]:
     trains = sorted({p.train for p in passages})
     middle = np.sqrt(min(p.speed for p in passages) * max(p.speed for p in passages))
     by_train = [[p for p in passages if p.train == t] for t in trains]
-    return [*by_train, [p for p in passages if p.speed < middle], [p for p in passages if p.speed >= middle]]
+    by_speed = [p for p in passages if p.speed < middle], [p for p in passages if p.speed >= middle]
+    return [group for group in (*by_train, *by_speed) if group]
 
 
 def sensor_stretches(positions: Sequence[float]) -> list[tuple[float, float]]:

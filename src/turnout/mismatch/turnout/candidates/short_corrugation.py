@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from turnout import physics
-from turnout.mismatch.turnout.candidates.catalogue import candidate_of
+from turnout.mismatch.engine.ambiguity import Ambiguity
+from turnout.mismatch.turnout.candidates.catalogue import candidate_of, recorded_quantities
 from turnout.mismatch.turnout.candidates.corrugation_levels import (
     BandPower,
     band_power,
@@ -34,8 +35,11 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.turnout.case import TrackCase
     from turnout.mismatch.turnout.passage_observation import AlignedPassage
+    from turnout.physics.requirement import Requirement
 
 AMPLITUDES = np.geomspace(*CORRUGATION.amplitudes)  # m, tested
+# Other explanations of a line, by the quantity in which the passages do not differ.
+EXPLANATIONS = {"train": "waves of the wheels of this train", "speed": "a vibration of this frequency"}
 
 
 def short_corrugation_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, ...]:
@@ -53,34 +57,83 @@ def short_corrugation_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, 
     tuple of Candidate
         One or none.
     """
-    passages = sorted((m for m in case.fitted_passages() if m.passage.train), key=lambda m: m.speed)
-    if any(c.family == physics.RailCorrugation.name for c in fit.candidates) or not _can_distinguish(passages):
+    if any(c.family == physics.RailCorrugation.name for c in fit.candidates) or _unmet_requirements(case):
         return ()
+    line = _common_line(case)
+    if line is None:
+        return ()
+    wavelengths, length, k, nats, band_powers, _ = line
+    return (_candidate(case, fit, wavelengths, length, k, nats, band_powers),)
+
+
+# Wavelengths of the bins [m], that of the line [m], its bin, evidence [nats], the passages, and the stretch [m].
+Line: TypeAlias = tuple[np.ndarray, float, int, float, list[BandPower], tuple[float, float]]
+
+
+def _common_line(case: TrackCase) -> Line | None:
+    """The likeliest line that all fitted passages have at one wavelength; None where intact rail is likelier."""
+    passages = sorted((m for m in case.fitted_passages() if m.passage.train), key=lambda m: m.speed)
+    if len(passages) < 2:
+        return None
     wavelengths = bin_wavelengths(passages)
     if wavelengths.size <= 2 * CORRUGATION.background_reach * CORRUGATION.overlap:
-        return ()
+        return None
     band_powers = [band_power(case, m, wavelengths) for m in passages]
     if not all(len(p.power) for p in band_powers):
-        return ()
+        return None
     positions = [s.place for s in case.campaign.sensors]
     nats = corrugation_evidence(band_powers, positions)
     nats[_is_in_file(case, wavelengths)] = -np.inf
     k = int(np.argmax(nats))
     if nats[k] < np.log(n_widths(wavelengths)):
-        return ()
+        return None
     stretch = sensor_stretches(positions)[int(np.argmax(stretch_evidence(band_powers, positions)[:, k]))]
     length = line_wavelength(wavelengths, k, band_powers, stretch)
     if length >= PASSAGE.shortest_wave or not is_repeatable(band_powers, k, stretch):
-        return ()
-    return (_candidate(case, fit, wavelengths, length, k, float(nats[k]), band_powers),)
+        return None
+    return wavelengths, length, k, float(nats[k]), band_powers, stretch
 
 
-def _can_distinguish(passages: Sequence[AlignedPassage]) -> bool:
-    """Whether trains and speeds differ enough to distinguish the rail from wheels and from frequencies."""
-    speeds = [m.speed for m in passages]
-    return len({m.passage.train for m in passages}) >= CORRUGATION.min_trains and max(
-        speeds
-    ) > CORRUGATION.min_speed_ratio * min(speeds)
+def _unmet_requirements(case: TrackCase) -> list[Requirement]:
+    """What the passages lack to distinguish the rail from wheels and from frequencies."""
+    recorded = recorded_quantities(case.data)
+    return [r for r in physics.RailCorrugation.requirements if not r.is_met(recorded)]
+
+
+def ambiguous_line(case: TrackCase) -> Ambiguity | None:
+    """A line of all passages where these cannot distinguish the rail from wheels or from frequencies.
+
+    Its evidence is that of corrugation in ``short_corrugation_candidates``.
+
+    Parameters
+    ----------
+    case : TrackCase
+        The case.
+
+    Returns
+    -------
+    Ambiguity or None
+        None where they can, or where intact rail is likelier.
+    """
+    unmet = [r for r in _unmet_requirements(case) if r.part]
+    line = _common_line(case) if unmet else None
+    if line is None:
+        return None
+    wavelengths, length, k, nats, band_powers, stretch = line
+    decibels = 10.0 / np.log(10.0) * float(np.nanmean([p.level_in(stretch)[k] for p in band_powers]))
+    frequencies = [p.speed / length for p in band_powers]
+    low, high = (round(f) for f in (min(frequencies), max(frequencies)))
+    at = f"{low} Hz" if high - low <= CORRUGATION.bin_width * low else f"{low} to {high} Hz, with the speed"
+    others = [EXPLANATIONS[r.quantity] for r in unmet if r.quantity in EXPLANATIONS]
+    words = (
+        f"the level at {at}, is {decibels:.0f} dB above that around it. It may be corrugation of {length:.3f} m"
+        f" or {' or '.join(others)}, since {' and '.join(r.lack for r in unmet)}"
+    )
+    measurement = " and ".join(r.measurement for r in unmet)
+    evidence = nats - float(np.log(n_widths(wavelengths)))
+    return Ambiguity(
+        evidence, words.replace(" Hz, is", " Hz is"), measurement, "wavelength", f"{length:.3f} m", *stretch
+    )
 
 
 def _is_in_file(case: TrackCase, wavelengths: np.ndarray) -> np.ndarray:
