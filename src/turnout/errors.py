@@ -1,6 +1,8 @@
 """Exceptions of the program. Each message tells a track engineer what to do next."""
 
 import errno
+import sys
+import traceback
 from collections.abc import Iterable, Sequence
 from os import PathLike
 
@@ -103,6 +105,10 @@ class RegistryError(TurnoutError):
     """The registry rejects rows or cannot be used; the message names table, row, column and value."""
 
 
+class InstallationError(TurnoutError):
+    """A package that the program needs is missing or broken. No file is to blame, and the whole run stops."""
+
+
 # errno codes that damaged data or a name may cause (a seek to an impossible byte, a name that is no file, a link that
 # leads back to itself), whatever the machine.
 # Every other one is a fault of the machine. It concerns the file at which it occurred: the next run tries it again.
@@ -134,6 +140,72 @@ def is_infrastructure(error: BaseException) -> bool:
     if isinstance(error, OSError):
         return error.errno is not None and error.errno not in DATA_ERRNOS
     return isinstance(error, MemoryError)
+
+
+# Packages whose name for pip differs from the name that is imported.
+PIP_NAMES = {"nptdms": "npTDMS", "sklearn": "scikit-learn", "ruamel": "ruamel.yaml", "_soundfile_data": "soundfile"}
+
+
+def installation_error(error: BaseException) -> InstallationError | None:
+    """The fault of the installation that an exception stands for.
+
+    Every exception from the top level of a module is one: bytes of a recording are read inside functions. Such are an
+    absent package, an absent library of the system, and a package built for another version of numpy.
+
+    Parameters
+    ----------
+    error : BaseException
+        Any exception.
+
+    Returns
+    -------
+    InstallationError or None
+        It names the package and how to install it; None for any other exception, and for a fault of the machine.
+
+    Examples
+    --------
+    >>> absent = ModuleNotFoundError("No module named 'h5py'", name="h5py")
+    >>> print(str(installation_error(absent)).split(". ")[0])
+    the installation, package h5py: it cannot be imported (No module named 'h5py')
+    >>> installation_error(ValueError("bad header")) is None
+    True
+    """
+    link: BaseException | None = error
+    while link is not None:
+        if isinstance(link, InstallationError):
+            return link
+        if is_infrastructure(link):
+            return None
+        module = _module_of_import(link)
+        if module:
+            return InstallationError(_import_message(module, link))
+        link = link.__cause__
+    return None
+
+
+def _module_of_import(error: BaseException) -> str:
+    """Name of the module that an exception kept from being imported, "" if it arose in no import."""
+    frames = [frame for frame, _ in traceback.walk_tb(error.__traceback__)]
+    modules = [
+        frame.f_globals.get("__name__", "?")
+        for frame in frames
+        if frame.f_code.co_name == "<module>" and not frame.f_code.co_filename.startswith("<")  # no text of eval
+    ]
+    if isinstance(error, ImportError):
+        return error.name or (modules[-1] if modules else "?")
+    return modules[-1] if modules else ""
+
+
+def _import_message(module: str, error: BaseException) -> str:
+    package = module.split(".")[0]
+    name = PIP_NAMES.get(package, package)
+    reason = " ".join(str(error).split())[:200] or type(error).__name__
+    remedy = f"Install it, with 'pip install --force-reinstall {name}' in the environment of Turnout"
+    if package in ("turnout", "?"):
+        remedy = "Install Turnout again, with 'pip install --force-reinstall .' in a copy of its repository"
+    if package in sys.stdlib_module_names:
+        remedy = "Install Python again, with all modules of its standard library"
+    return f"the installation, package {name}: it cannot be imported ({reason}). {remedy}, then run again."
 
 
 # All reasons of a quarantine row or of a rejected impact, with their meaning.

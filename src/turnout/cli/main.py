@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 from turnout import __version__
 from turnout.cli import COMMANDS, GROUPS
 from turnout.cli.options import add_common, leaf_parsers
-from turnout.errors import TurnoutError
+from turnout.errors import TurnoutError, installation_error
 from turnout.threads import use_one_thread
 
 if TYPE_CHECKING:
@@ -184,6 +184,8 @@ def _run(args: argparse.Namespace) -> tuple[int, str]:
             return INTERRUPTED, "interrupted"
         if isinstance(error.__context__, OSError) and error.__context__.errno == errno.ELOOP:  # of Path.resolve
             return NOT_FOLLOWED, _message(error.__context__, args)
+        if absent := installation_error(error):
+            return NOT_FOLLOWED, str(absent)
         traceback.print_exc()
         fault = f"{type(error).__name__}: {error}"
         return PROGRAM_FAULT, f"a fault of the program, {fault}. Please report it with the lines above"

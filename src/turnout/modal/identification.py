@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.errors import is_infrastructure
+from turnout.errors import installation_error, is_infrastructure
 from turnout.modal.joint import identify_joint
 from turnout.modal.paper import identify_paper
 from turnout.modal.state_space import no_model
@@ -78,7 +78,7 @@ def identify(
     try:
         return METHODS[method](decays, rate, settings, receptance, **options)
     except Exception as error:
-        if is_infrastructure(error):
+        if is_infrastructure(error) or installation_error(error):
             raise
         LOG.warning("identification failed with all %d impacts", len(decays), exc_info=True)
         return _identify_without_one(decays, rate, settings, receptance, method, options, error)
@@ -107,7 +107,7 @@ def _identify_without_one(
         try:
             model = METHODS[method]([decays[i] for i in kept], rate, settings, receptance, **per_impact)
         except Exception as repeated:
-            if is_infrastructure(repeated):
+            if is_infrastructure(repeated) or installation_error(repeated):
                 raise
             continue
         rejection = Rejection("odd_one_out", None, None, f"the identification fails with this impact ({failure})")

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from os import PathLike
 
-from turnout.errors import ReadError, TurnoutError
+from turnout.errors import ReadError, TurnoutError, installation_error
 from turnout.readers.formats import FORMATS, Format, detect_format, reject_archive, reject_spreadsheet
 from turnout.readers.interpret import convert_records
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source, load
@@ -52,6 +52,8 @@ def read(
     ------
     ReadError
         If the file as a whole cannot be used. The message names file, place, problem and remedy.
+    InstallationError
+        If a package that reads the format is missing or broken.
 
     Examples
     --------
@@ -149,12 +151,22 @@ def names_and_units(path: PathLike | str, root: PathLike | str, format: str = "a
 
 @contextmanager
 def _as_read_error(source: Source) -> Iterator[None]:
-    """Turn any unexpected exception of a reader into a ReadError of this file; ``-v`` shows its traceback."""
+    """Turn any unexpected exception of a reader into a ReadError of this file; ``-v`` shows its traceback.
+
+    A fault of the machine or of the installation says nothing about the file: it is raised, the latter as an
+    InstallationError.
+    """
     try:
         yield
-    except (TurnoutError, MemoryError, OSError):
+    except TurnoutError:
         raise
     except Exception as error:
+        if fault := installation_error(error):
+            raise fault from error
+        if isinstance(error, MemoryError | OSError):
+            raise
+        if isinstance(error.__context__, KeyboardInterrupt):
+            raise KeyboardInterrupt from error
         LOG.info("%s: not foreseen by the reader", source.name, exc_info=True)
         problem = f"it cannot be read ({type(error).__name__}: {' '.join(str(error).split())[:200]})"
         raise source.error("the file", problem) from error

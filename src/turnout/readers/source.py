@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.content import sha256_of
-from turnout.errors import ReadError, TurnoutError, is_infrastructure
+from turnout.errors import ReadError, TurnoutError, installation_error, is_infrastructure
 from turnout.files import sparse_size, special_kind
 from turnout.records import EMPTY_MAPPING
 
@@ -140,7 +140,7 @@ class Source:
     def parsed_by(self, library: str, where: str = "the file", reason: str = "unreadable") -> Iterator[None]:
         """Context of a call of ``library``: any exception it raises on damaged bytes becomes a ReadError.
 
-        A fault of the machine is no damage and is raised unchanged.
+        A fault of the machine is no damage and is raised unchanged; one of the installation as InstallationError.
 
         Parameters
         ----------
@@ -155,12 +155,18 @@ class Source:
         ------
         ReadError
             If the call raises an exception that is no fault of the machine.
+        InstallationError
+            If a package is missing or broken.
         """
         try:
             yield
         except TurnoutError:
             raise
         except Exception as error:
+            if absent := installation_error(error):
+                raise absent from error
+            if isinstance(error.__context__, KeyboardInterrupt):  # the library made an exception of its own of it
+                raise KeyboardInterrupt from error
             message = " ".join(str(error).split())[:200] or type(error).__name__
             fault = (
                 None

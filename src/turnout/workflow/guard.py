@@ -7,7 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from turnout.config import TurnoutConfig
-from turnout.errors import REMARK_REASONS, PartlyComputed, ReadError, is_infrastructure
+from turnout.errors import (
+    REMARK_REASONS,
+    InstallationError,
+    PartlyComputed,
+    ReadError,
+    installation_error,
+    is_infrastructure,
+)
 from turnout.records import Unit
 from turnout.registry.ids import content_id
 from turnout.workflow.batches import UnitResult, encode
@@ -59,11 +66,14 @@ def compute_guarded(
     ------
     OSError
         For a fault of the machine (bad sector, disk full); MemoryError likewise.
+    InstallationError
+        If a package is missing or broken: every unit would fail, and none is to blame.
     """
     try:
         tables, faults = _compute(compute, unit, turnout, raw_root, algo=algo, **extra)
-        if strict and faults:
-            raise faults[0][2]
+        for _, _, error in faults:
+            if strict or installation_error(error):
+                raise error
         rows = [_fault_row(unit, error, path, record) for path, record, error in faults]
         tables = {**tables, "quarantine": [*tables.get("quarantine", ()), *rows]} if rows else tables
         encode(tables)
@@ -71,7 +81,11 @@ def compute_guarded(
         tables = {
             "quarantine": [quarantine_row(unit, error.path, error.reason, error.where, error.problem, error.remedy)]
         }
+    except InstallationError:
+        raise
     except Exception as error:
+        if fault := installation_error(error):
+            raise fault from error
         if strict or is_infrastructure(error):
             raise
         tables = {"quarantine": [_fault_row(unit, error)]}

@@ -5,7 +5,7 @@ import os
 import signal
 
 from turnout.config import load_configuration
-from turnout.errors import ReadError
+from turnout.errors import PartlyComputed, ReadError
 from turnout.workflow.batches import read_results
 from turnout.workflow.plan import write_plans
 from turnout.workflow.shard import run_shard
@@ -35,6 +35,10 @@ def length(unit, turnout, raw_root, algo=""):
             raise ReadError(path, "byte 0", "damage", "Copy it again", reason="unreadable")
         if text == "bug":
             raise ZeroDivisionError("in the toy")
+        if text == "no package":
+            raise ModuleNotFoundError("No module named 'h5py'", name="h5py")
+        if text == "no package for a record":
+            raise PartlyComputed(rows, [(path, 0, ModuleNotFoundError("No module named 'h5py'", name="h5py"))])
         if text == "full":
             raise OSError(errno.ENOSPC, "No space left on device")
         if text == "bad sector":

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from length_fleet import CALLS, Fleet
 
-from turnout.errors import TurnoutError
+from turnout.errors import InstallationError, TurnoutError
 from turnout.readers import read
 from turnout.workflow import tasks
 from turnout.workflow.batches import read_batch, read_column, read_results
@@ -396,3 +396,15 @@ def test_a_token_may_speak_of_each_unit(fleet):
     assert fleet.run(stage=stage).processed == 4
     newest[0] = "2024-06-13"
     assert fleet.run(stage=stage).processed == 1
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("text", ["no package", "no package for a record"])
+def test_a_missing_package_stops_the_run_and_sets_no_file_aside(text, threads, fleet):
+    fleet.put("t1/2024-05-13/A_1.txt", text)
+    with pytest.raises(InstallationError, match="package h5py"):
+        fleet.run(threads=threads)
+    assert not any(tables.get("quarantine") for tables in fleet.rows().values())
+    fleet.put("t1/2024-05-13/A_1.txt", "turnout 1")
+    fleet.run()
+    assert fleet.lengths() == {f"t{i}/hammer/A/2024-05-13": [9] for i in range(3)}
