@@ -12,9 +12,22 @@ from turnout.mismatch.engine import decision
 from turnout.mismatch.engine.ambiguity import Ambiguity
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.decision import EFFECT_RULES, NAME_RULES, RULES, grade_name, judge
+from turnout.mismatch.engine.decision_facts import (
+    EffectEvidence,
+    NameEvidence,
+    NumericalError,
+    ReservedEvidence,
+    ToleratedEvidence,
+    UnprovenEvidence,
+)
+from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.engine.reserved_data import Verification
 from turnout.mismatch.engine.score import Score
+from turnout.mismatch.engine.search_limit import SearchLimit
+from turnout.mismatch.engine.strained_values import StrainedValue
 from turnout.mismatch.engine.thresholds import THRESHOLDS, threshold_rows
-from turnout.mismatch.engine.verdict import ANSWERS
+from turnout.mismatch.engine.two_effects import PairEvidence
+from turnout.mismatch.engine.verdict import ANSWERS, Verdict
 from turnout.physics import Parameter
 
 TABLES = (
@@ -98,7 +111,7 @@ def test_the_reason_holds_the_figures_of_the_case():
     verdict = judge([score(explained=0.4)], 2.0, MismatchSettings())
     assert verdict.reason == "the best candidate explains 40% of the excess"
     verdict = judge([score(worst=-9.0)], 2.0, MismatchSettings())
-    assert verdict.reason == "soft makes one condition worse by 9 nats"
+    assert verdict.reason == "with soft at 3.0 m, one condition is predicted worse (evidence lost: 9 nats)"
 
 
 @pytest.mark.parametrize(
@@ -122,6 +135,46 @@ def test_each_rule_on_a_name_applies_to_a_case_of_its_own(name, excess, more, fa
     assert verdict.answer == ("a_or_b" if name == "size_known_from_below" else "named")
     assert verdict.grade == {"size_known_from_below": "", "reaches_control_level": "A"}.get(name, "B")
     assert ("gap" in verdict.names) is (name == "size_known_from_below") and "{" not in reason
+
+
+def evidence_with_names_of_two_words():
+    """Evidence of every table, with effects and values whose names have an underscore."""
+    soft = score("soft_pad", single_witness="day 2", flags={"external_evidence": 38.0, "evidence_suffices": True})
+    gap = score("slide_chair_gap", 38.0, where={})
+    strained = str(StrainedValue(Nuisance("rail_mass", "-", 0.0, 1.0), 5.0, 20.0))
+    settings, case = MismatchSettings(), {"strained": strained, "local_change": 20.0}
+    effect = EffectEvidence([soft, gap], 2.0, settings, mismatched_trains=("ic3",), ambiguity=line_of(12.1), **case)
+    named = Verdict("named", ("soft_pad",), scores=(soft, gap))
+    choice = Verdict("a_or_b", ("soft_pad", "slide_chair_gap"), scores=(soft, gap))
+    pair = PairEvidence(SimpleNamespace(verdicts=(named, named)))
+    pair.__dict__["second_score"] = soft
+    return {
+        "NUMERICS_RULES": NumericalError(2.0, 3.0, 1.0, 0.1),
+        "EFFECT_RULES": effect,
+        "SECOND_RULES": SimpleNamespace(location=" at 3.0 m", second=choice),
+        "PAIR_RULES": pair,
+        "NAME_RULES": NameEvidence(soft, 2.0, 0.5, **case),
+        "TOLERATED_RULES": ToleratedEvidence(soft, settings),
+        "LIMIT_RULES": SearchLimit(4, 3),
+        "UNPROVEN_RULES": UnprovenEvidence((choice, Verdict("named", ("not_scored",))), "Not proven."),
+        "RESERVED_RULES": ReservedEvidence((named,), Verification(2, 93.0, 91.0, lost_evidence=4.0), settings),
+    }
+
+
+@pytest.mark.parametrize("table", TABLES)
+def test_reasons_are_sentences_without_internal_names(table):
+    evidence = evidence_with_names_of_two_words()[table]
+    for rule in getattr(decision, table):
+        reason = rule.reason_for(evidence)
+        assert "_" not in reason and "{" not in reason, (rule.name, reason)
+
+
+def test_reason_of_a_slightly_worse_prediction_states_what_it_means():
+    """No loss of evidence is stated there: it may be 0, and would seem to contradict the sentence."""
+    (rule,) = (r for r in decision.RESERVED_RULES if r.name == "reserved_fit_falls_for_little_evidence")
+    reason = rule.reason_for(evidence_with_names_of_two_words()["RESERVED_RULES"])
+    assert reason.startswith("with soft pad at 3.0 m, held-out recordings are predicted slightly worse")
+    assert "nats" not in reason and "grade B" in reason
 
 
 def test_every_threshold_has_a_reason_and_a_source(repository):

@@ -47,7 +47,7 @@ def _always(_: Any) -> bool:
 # fmt: off
 NUMERICS_RULES: tuple[Rule[NumericalError], ...] = (
     Rule("own_error_is_material", lambda e: e.is_material and e.exceeds_limit, "numerics",
-         "own numerical error is {e.share:.0%} of the mismatch: refine mesh and step first", HOW),
+         "the numerical error of the simulation is {e.share:.0%} of the mismatch: refine mesh and step first", HOW),
     Rule("simulation_is_accurate", _always, "", "", HOW),
 )  # the answer of one effect is sought if no error is material
 
@@ -55,7 +55,7 @@ EFFECT_RULES: tuple[Rule[EffectEvidence], ...] = (
     Rule("explains_too_little", lambda e: e.has_leader and e.explains_too_little and not e.exemption, "unknown",
          "the best candidate explains {e.leader.explained:.0%} of the excess", HOW),
     Rule("leaves_too_much", lambda e: e.has_leader and e.residual_excess > e.settings.leftover, "unknown",
-         "{e.leader.family} leaves {e.residual_excess:.0f} times the control level", HOW),
+         "with {e.leader.in_words}, the residual is still {e.residual_excess:.0f} times the control level", HOW),
     Rule("excess_without_candidate", lambda e: e.shows_nothing and e.excess > 1.0, "unknown",
          "the residual is above the control level, and no candidate explains it", HOW),
     Rule("sensors_shake_without_wheel", lambda e: e.shows_nothing and e.disturbed, "unknown",
@@ -63,26 +63,30 @@ EFFECT_RULES: tuple[Rule[EffectEvidence], ...] = (
     Rule("train_unlike_its_file", lambda e: e.shows_nothing and e.mismatched_trains, "unknown",
          "most passages of {e.train_names} do not fit its vehicle file", LOCATED, cause="train"),
     Rule("no_tolerance_explains_it", lambda e: e.shows_nothing and e.strained, "unknown",
-         "the recordings are explained only by a value that its file cannot have: {e.strained}", LOCATED),
+         "the recordings are explained only with a value too far from its file: {e.strained}", LOCATED),
     Rule(COMPONENT_DIFFERS, lambda e: e.shows_nothing and e.local_change > e.settings.threshold, "unknown",
-         "a component there is another one under trains than under impacts, by {e.local_change:.0f} nats", LOCATED),
+         "a component there has another value under trains than under impacts (evidence {e.local_change:.0f} nats)",
+         LOCATED),
     Rule(AMBIGUOUS, lambda e: e.shows_nothing and e.is_ambiguous, "unknown", "{e.ambiguity.words}",
          "decisions/short-wave-corrugation.md"),
     Rule("no_candidate_passes", lambda e: not e.has_leader, "none", "nothing above the thresholds", HOW),
     Rule("weak_and_contradicted", lambda e: e.shows_nothing, "none",
-         "nothing above the thresholds but {e.leader.family}, which does not hold elsewhere", ENDS),
+         "only weak evidence for {e.leader.in_words}, and other recordings contradict it", ENDS),
     Rule("reserved_not_predicted", lambda e: not e.consistent, "unknown",
-         "{e.leader.family} does not hold on conditions it was not fitted to", HOW),
+         "with {e.leader.in_words}, recordings to which it was not fitted are predicted worse than the others", HOW),
     Rule("residual_has_structure", lambda e: e.structure > e.settings.structure_left and e.residual_excess > 1.0,
-         "unknown", "a free law still explains {e.structure:.0%} of what {e.leader.family} leaves", HOW),
+         "unknown",
+         "an unconstrained force law still explains {e.structure:.0%} of the residual beside {e.leader.in_words}", HOW),
     Rule("value_without_meaning", lambda e: not e.leader.has_meaning, "unknown",
-         "{e.leader.family} would have a value that is physically impossible", HOW),
+         "{e.leader.in_words} would have a value that is physically impossible", HOW),
     Rule("single_witness", lambda e: e.leader.single_witness, "unknown",
-         "{e.leader.family} depends on {e.leader.single_witness} alone, which others do not confirm", ENDS),
+         "only {e.leader.single_witness} shows {e.leader.in_words}, and other recordings do not confirm it", ENDS),
     Rule("condition_contradicts", lambda e: e.contradicted, "unknown",
-         "{e.leader.family} makes one condition worse by {e.largest_loss:.0f} nats", ENDS),
-    Rule("size_at_limit", lambda e: e.limit_forms, "a_or_b", "{e.leader.family} is at its limit", PAIRS),
-    Rule("rival_within_margin", lambda e: e.rivals, "a_or_b", "within the margin of each other", HOW),
+         "with {e.leader.in_words}, one condition is predicted worse (evidence lost: {e.largest_loss:.0f} nats)", ENDS),
+    Rule("size_at_limit", lambda e: e.limit_forms, "a_or_b",
+         "the size of {e.leader.in_words} is at its limit, where both look alike", PAIRS),
+    Rule("rival_within_margin", lambda e: e.rivals, "a_or_b",
+         "the evidence for one is hardly larger than for the other", HOW),
     Rule("exempt_from_explaining", lambda e: e.explains_too_little, "named",
          "{e.exemption}; it explains {e.leader.explained:.0%} of the excess", PAIRS),
     Rule("passes", _always, "named", "", HOW),
@@ -118,16 +122,16 @@ PAIR_RULES: tuple[Rule[PairEvidence], ...] = (
 
 NAME_RULES: tuple[Rule[NameEvidence], ...] = (
     Rule("strained_value_remains", lambda e: e.strained, "unknown",
-         "beside {e.score.family} a value remains that its file cannot have: {e.strained}", LOCATED),
+         "beside {e.score.in_words}, a value is still too far from its file: {e.strained}", LOCATED),
     Rule("local_change_remains", lambda e: e.local_change > e.threshold and not e.score.has_position, "unknown",
-         "beside {e.score.family}, which is at no position, single components differ under trains", LOCATED),
+         "{e.score.in_words} does not explain why single components differ between trains and impacts", LOCATED),
     Rule("size_known_from_below", lambda e: e.score.is_unbounded, "a_or_b",
-         "the size of {e.score.family} is known from below alone", PAIRS),
+         "only a lower limit is known for the size of {e.score.in_words}", PAIRS),
     Rule("free_law_predicts_better", lambda e: e.free_share > THRESHOLDS.max_free_law_share, "unknown",
-         "{e.score.family} misses {e.free_share:.0%} of what a free law explains", HOW),
+         "{e.score.in_words} misses {e.free_share:.0%} of what an unconstrained force law explains", HOW),
     Rule("reaches_control_level", lambda e: e.leaves_nothing, "A", "", HOW),
     Rule("must_reach_control_level", lambda e: e.score.candidate.naming.must_reach_control_level, "unknown",
-         "{e.score.family} would leave no excess, and more is left than in intact turnouts", LOCATED),
+         "{e.score.in_words} would leave no excess, but the residual is larger than in intact turnouts", LOCATED),
     Rule("leaves_some_residual", _always, "B", "", HOW),
 )
 
@@ -145,21 +149,24 @@ UNPROVEN_RULES: tuple[Rule[UnprovenEvidence], ...] = (
 )
 RESERVED_RULES: tuple[Rule[ReservedEvidence], ...] = (
     Rule("reserved_predicted_worse", lambda e: e.is_single_name_of_grade_b and e.verification.is_worse, "unknown",
-         "{e.verdict.names[0]} leaves more than intact turnouts do and predicts held-out recordings worse", ENDS),
+         "with {e.words}, the residual is larger than in intact turnouts, and held-out recordings are predicted worse",
+         ENDS),
     Rule("reserved_fit_falls", lambda e: e.is_single_name and e.falls_clearly, "unknown",
-         "with {e.verdict.names[0]} held-out recordings lose {e.verification.lost_evidence:.0f} nats", HOW),
+         "with {e.words}, held-out recordings are predicted clearly worse than without it (evidence lost: "
+         "{e.verification.lost_evidence:.0f} nats)", HOW),
     Rule("reserved_fit_falls_for_little_evidence", lambda e: e.is_single_name and e.has_fallen, "B",
-         "with {e.verdict.names[0]} the fit of held-out recordings falls by two standard errors, which costs "
-         "{e.verification.lost_evidence:.0f} nats", HOW),
+         "with {e.words}, held-out recordings are predicted slightly worse than without it: too little to reject the "
+         "name, enough for grade B", HOW),
     Rule("reserved_not_explained",
          lambda e: e.verdict.answer == "none" and e.verification.reserved_excess > THRESHOLDS.max_reserved_excess,
-         "unknown", "held-out recordings are not predicted as in intact turnouts", HOW),
+         "unknown", "held-out recordings are predicted worse than in intact turnouts", HOW),
     Rule("not_contradicted", _always, "", "", HOW),
 )
 TOLERATED_RULES: tuple[Rule[ToleratedEvidence], ...] = (
     Rule("tolerance_explains_better", lambda e: e.score.gain <= -e.settings.margin, "", "", SURFACES),
     Rule("size_is_not_material", lambda e: not (e.score.is_reportable and e.score.has_meaning), "", "", SURFACES),
-    Rule("beyond_tolerance", _always, "named", "a tolerance of the base model allows for it", SURFACES),
+    Rule("beyond_tolerance", _always, "named",
+         "it is reported for its size; the tolerance of a value of the base model could explain it, too", SURFACES),
 )
 # fmt: on
 

@@ -275,7 +275,7 @@ class UnprovenEvidence:
     @property
     def names(self) -> str:
         """All names in words."""
-        return " and ".join(" or ".join(v.names) for v in self.verdicts if v.names)
+        return " and ".join(" or ".join(v.names_in_words) for v in self.verdicts if v.names)
 
 
 @dataclass(frozen=True)
@@ -304,6 +304,11 @@ class ReservedEvidence:
     def verdict(self) -> Verdict:
         """Verdict on the first effect."""
         return self.verdicts[0]
+
+    @property
+    def words(self) -> str:
+        """First name as text, with its site."""
+        return self.verdict.names_in_words[0]
 
     @property
     def is_single_name(self) -> bool:

@@ -48,6 +48,11 @@ class Score:
         return self.candidate.family
 
     @property
+    def in_words(self) -> str:
+        """Effect and site as text, for reasons."""
+        return self.candidate.in_words
+
+    @property
     def has_position(self) -> bool:
         """Whether it is at one position, not of the whole track, a train, a wheel or a sensor."""
         return isinstance(self.candidate.where.get("place"), (int, float))
@@ -99,7 +104,7 @@ class Score:
             and evidence > settings.threshold
             and self.gain > evidence - settings.margin
         ):
-            return "known by its impacts"
+            return "its impacts alone show it"
         is_unmasked = self.unmasked_gain - position_cost > settings.threshold
         return "seen where the effect named before does not show" if is_unmasked else ""
 

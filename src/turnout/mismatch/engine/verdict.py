@@ -48,6 +48,12 @@ class Verdict:
         return rival if rival is not None and self.scores[0].is_independent_of(rival) else None
 
     @property
+    def names_in_words(self) -> tuple[str, ...]:
+        """The names as text, with their sites where a score has them."""
+        words = {s.family: s.in_words for s in reversed(self.scores)}
+        return tuple(words.get(name, name.replace("_", " ")) for name in self.names)
+
+    @property
     def is_single_effect(self) -> bool:
         """Whether it states one effect: by a name, or by two forms of it that cannot be distinguished."""
         return self.answer == "named" or (self.answer == "a_or_b" and self.independent_rival is None)
