@@ -1,14 +1,17 @@
 """Time axes of a record: its time column, and every column that no sensor of the layout uses and that rises evenly."""
 
 from collections.abc import Iterator, Sequence, Set
+from fractions import Fraction
 
 import numpy as np
 
 from turnout.readers.entries import Entry
+from turnout.readers.lazy import Column
 from turnout.readers.rate_units import TIME_UNITS, rate_unit, words_of
 from turnout.readers.rate_words import CERTAIN, POSSIBLY, is_time_name, name_meaning
 from turnout.readers.source import MEANINGLESS_UNITS, RawRecord, Source
 from turnout.readers.statements import Statement, statements_of, time_statement
+from turnout.readers.time_numbers import unit_of_axis
 from turnout.readers.timing import check_time, rate_of_time, seconds_since_first
 
 HEAD_SIZE = 1000  # samples from which a column is judged before all of it is read
@@ -78,7 +81,7 @@ def time_statements(record: RawRecord, measured: Set[int], where: str, source: S
     """
     statements = []
     starts: list[tuple[str, float, float, int]] = []
-    axes = [] if record.time is None else [("its time column", record.time, record.is_time_in_seconds, CERTAIN)]
+    axes = [] if record.time is None else [_time_column(record)]
     axes += [(place, time, True, CERTAIN) for place, time in record.clocks]
     axes += _columns(record, measured)
     for place, time, is_in_seconds, certainty in axes:
@@ -140,6 +143,22 @@ def is_axis_name(name: str, unit: str) -> bool:
     return (is_time_name(name) or name.startswith("__index_level_")) and not has_other_unit
 
 
+def _time_column(record: RawRecord) -> tuple[str, np.ndarray, bool, int]:
+    """(place, values, whether in seconds, certainty) of the time column of a record."""
+    time = np.asarray(record.time)
+    unit = None if record.is_time_in_seconds else _unit_of_count(time, record.time_label)
+    place = "its time column"
+    return (place, time * float(unit), True, CERTAIN) if unit else (place, time, record.is_time_in_seconds, CERTAIN)
+
+
+def _unit_of_count(column: Column, declared: str) -> Fraction | None:
+    """Unit of an axis whose first number is a time since a known origin, such as ns since 1970. [s]"""
+    if column.dtype.kind not in "fiu" or len(column) <= 2:
+        return None
+    first, second = (value.item() for value in np.asarray(column[:2]))
+    return unit_of_axis(first, declared, float(second - first))
+
+
 def _columns(record: RawRecord, measured: Set[int]) -> Iterator[tuple[str, np.ndarray, bool, int]]:
     """(place, values, whether in seconds, certainty) of the columns that are time axes."""
     for i, (name, unit, column) in enumerate(zip(record.names, record.units, record.samples)):
@@ -158,10 +177,12 @@ def _columns(record: RawRecord, measured: Set[int]) -> Iterator[tuple[str, np.nd
         by_name = is_time_name(name)
         if not by_name and not _rises_evenly(column[:HEAD_SIZE]):
             continue
-        scale = float(known.scale) if is_time_unit and known else 1.0
+        unit_of_count = _unit_of_count(column, name) if by_name and not is_time_unit else None
+        scale = known.scale if is_time_unit and known else unit_of_count or 1
+        is_in_seconds = is_time_unit or unit_of_count is not None
         certainty = CERTAIN if by_name or is_time_unit else POSSIBLY
         place = f"column {name!r}" if by_name or is_time_unit else f"column {name!r}, which rises evenly"
-        yield place, np.asarray(column[:], dtype=float) * scale, is_time_unit, certainty
+        yield place, np.asarray(column[:], dtype=float) * float(scale), is_in_seconds, certainty
 
 
 def _check_counters(record: RawRecord, measured: Set[int], where: str, source: Source) -> None:

@@ -123,10 +123,42 @@ def time_of_number(value: float, declared: str = "", step: float | None = None) 
     counts = _declared_counts(declared)
     if counts is None:
         return None, f"{value} ({declared})"
-    times = {count: time for count in counts if (time := _time(count, number, value)) and _is_axis(count, step)}
+    times = _possible_times(counts, value, step)
     if len(times) == 1:
         return next(iter(times.values())), ""
     return None, f"{value}: {' or '.join(map(str, times))}?" if times else ""
+
+
+def unit_of_axis(first: float, declared: str, step: float) -> Fraction | None:
+    """Unit of a time axis of numbers, if exactly one usual count puts its first number into the years of loggers.
+
+    Parameters
+    ----------
+    first : float or int
+        First number of the axis.
+    declared : str
+        Name and unit of the axis.
+    step : float
+        Step to the next number.
+
+    Returns
+    -------
+    Fraction or None
+        The unit; None for an axis that counts from another origin, or that fits several counts. [s]
+
+    Examples
+    --------
+    >>> unit_of_axis(1778666400000000, "timestamp", 1000), unit_of_axis(0.0, "time", 0.001)
+    (Fraction(1, 1000000), None)
+    """
+    times = _possible_times(_declared_counts(declared) or (), first, step) if math.isfinite(first) else {}
+    return next(iter(times)).unit if len(times) == 1 else None
+
+
+def _possible_times(counts: tuple[Count, ...], value: float, step: float | None) -> dict[Count, datetime]:
+    """Time of a number by each count that is possible."""
+    number = Fraction(value)
+    return {count: time for count in counts if (time := _time(count, number, value)) and _is_axis(count, step)}
 
 
 def is_declared(declared: str) -> bool:

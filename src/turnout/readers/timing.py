@@ -81,7 +81,8 @@ def check_time(time: np.ndarray, where: str, source: Source) -> None:
     backwards = (start + int(np.argmax(b)) for start, block in _blocks(time) if (b := np.diff(block) <= 0).any())
     if (k := next(backwards, None)) is not None:
         problem = (
-            f"the clock runs backwards or stands still: sample {k} at {time[k]:.9g} s, the next at {time[k + 1]:.9g} s"
+            f"the clock runs backwards or stands still: sample {k} at {time[k]:.15g} s, "
+            f"the next at {time[k + 1]:.15g} s"
         )
         remedy = "Check the logger's clock and export the record again"
         if time[k] == time[k + 1]:
@@ -91,7 +92,7 @@ def check_time(time: np.ndarray, where: str, source: Source) -> None:
     if gap is not None:
         raise source.error(
             where,
-            f"time jumps from {time[gap]:.9g} s to {time[gap + 1]:.9g} s at {rate:.6g} Hz: samples are missing",
+            f"time jumps from {time[gap]:.15g} s to {time[gap + 1]:.15g} s at {rate:.6g} Hz: samples are missing",
             "Copy the file again from the logger; if the gap is there too, the logger lost samples",
             reason="truncated",
         )
@@ -110,8 +111,8 @@ def _check_even(time: np.ndarray, rate: float, where: str, source: Source) -> No
         if (is_uneven := offsets > 1.0 + MAX_CLOCK_DRIFT * steps).any():
             k = int(np.argmax(is_uneven))
             problem = (
-                f"its time column is not even: sample {start + k}, at {block[k]:.9g} s, is {offsets[k]:.3g} steps from "
-                f"where {rate:.6g} Hz put it"
+                f"its time column is not even: sample {start + k}, at {block[k]:.15g} s, is {offsets[k]:.3g} steps "
+                f"from where {rate:.6g} Hz put it"
             )
             remedy = "Check the logger's clock, or export the record at an even rate"
             raise source.error(where, problem, remedy, reason="wrong_rate")

@@ -312,7 +312,7 @@ def test_a_time_column_in_another_unit_is_refused(tmp_path):
     (tmp_path / "a.csv").write_text("time [h];force;acc\n" + rows)
     with pytest.raises(ReadError) as caught:
         read("a.csv", tmp_path, NAMED)
-    expected = "a.csv, the time column: its unit 'h' is not known. Export the time in one of s, sec, ms, µs, us."
+    expected = "a.csv, the time column: its unit 'h' is not known. Export the time in one of s, sec, ms, µs, us, ns."
     assert str(caught.value) == expected and caught.value.reason == "unit_unknown"
 
 
