@@ -17,7 +17,9 @@ from turnout.counts import count_of
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 
-    from turnout.config import Configuration, Event
+    from turnout.config import Configuration, Event, TurnoutConfig
+    from turnout.errors import ReadError
+    from turnout.records import Unit
     from turnout.units import Conversion
 
 GROUP = "Set up"
@@ -132,20 +134,36 @@ def _report_left_out(configuration: Configuration, raw: Path, ids: Sequence[str]
     from turnout.workflow.scan import scan
 
     n_units = n_files = 0
-    problems = []
+    problems: list[ReadError] = []
+    remarks: list[str] = []
     for turnout in map(configuration.turnout, ids):
         scanned = scan(turnout, raw)
         n_units += len(scanned.units)
         n_files += sum(len(u.files) for u in scanned.units)
         noted_turnout, note_errors = read_notes(turnout, raw)
         problems += [*scanned.problems, *note_errors, *note_contradictions(noted_turnout, raw, scanned.units)]
+        remarks += _without_temperature(noted_turnout, raw, scanned.units)
     problem_count = count_of(len(problems), "problem") if problems else "no problem"
     print(f"{raw}: {count_of(n_files, 'file')} in {count_of(n_units, 'unit')}, {problem_count}.")
     for problem in problems:
         print(f"  {problem}")
+    for remark in remarks:
+        print(f"  {remark}")
     for folder in _folders_without_turnout(configuration, raw):
         print(f"  {folder}: no turnout reads this folder. `turnout add ID LAYOUT --raw {folder.name}` adds one")
     return len(problems)
+
+
+def _without_temperature(turnout: TurnoutConfig, raw: Path, units: Iterable[Unit]) -> Iterator[str]:
+    """A remark on a turnout of whose campaigns none has a noted rail temperature: no file, no column or empty cells."""
+    days = {unit.campaign for unit in units if unit.kind == "hammer" and unit.campaign}
+    if days and all(turnout.campaigns[day].rail_temperature is None for day in days):
+        path = raw / turnout.raw / "campaigns.csv"
+        lack = "no column rail_temperature_c with values" if path.is_file() else "there is no such file"
+        yield (
+            f"{path}: {lack}. Charts do not judge a campaign without a rail temperature. "
+            "Note it there, unless the recordings state it"
+        )
 
 
 def _folders_without_turnout(configuration: Configuration, raw: Path) -> list[Path]:

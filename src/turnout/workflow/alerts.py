@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import smtplib
 import ssl
 import urllib.error
+import urllib.parse
 import urllib.request
 from email.message import EmailMessage
 from pathlib import Path
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
 SENT_FILE = Path("work/alerts.json")
 STATES = ("confirm now", "inspect this week", "plan", "cannot tell")  # a chart that learns needs nobody
 MAX_NAMED = 3  # entries named in the subject
+ADDRESS = re.compile(r"[^<>;,]*<[^\s<>;,]+>|[^\s<>;,]+")  # address, or Name <address>; "root" is one of a local server
 PASSWORD, WEBHOOK = "TURNOUT_SMTP_PASSWORD", "TURNOUT_WEBHOOK"  # of the environment
 
 
@@ -87,7 +90,7 @@ def send_alerts(
         try:
             send(new, settings)
         except (OSError, smtplib.SMTPException, urllib.error.URLError, ValueError) as error:
-            errors.append(f"{channel}: {error}")
+            errors.append(f"{_address(channel, settings)}: {_reason(error)}")
             continue
         sent[channel] = sorted(known | {_key(entry) for entry in new})
         write_text(sent_file, json.dumps(sent, indent=1) + "\n")
@@ -125,6 +128,25 @@ def _channels(settings: AlertsSettings) -> dict[str, Callable[[Sequence[Mapping[
 
 def _webhook(settings: AlertsSettings) -> str:
     return os.environ.get(WEBHOOK) or settings.webhook
+
+
+def _address(channel: str, settings: AlertsSettings) -> str:
+    """A channel with its server, for messages. The address of a webhook may be a secret: only its host is named."""
+    if channel == "mail":
+        return f"mail ({settings.smtp_host}, port {settings.smtp_port})"
+    host = urllib.parse.urlsplit(_webhook(settings)).hostname
+    return f"webhook ({host})" if host else "webhook"
+
+
+def _reason(error: Exception) -> str:
+    """An error in words, without brackets and the number of the operating system."""
+    if isinstance(error, smtplib.SMTPResponseException):
+        text = error.smtp_error
+        return f"{error.smtp_code} {text.decode('utf-8', 'replace') if isinstance(text, bytes) else text}"
+    if isinstance(error, (urllib.error.HTTPError, smtplib.SMTPException)):
+        return str(error)
+    cause = error.reason if isinstance(error, urllib.error.URLError) else error
+    return str(cause.strerror if isinstance(cause, OSError) and cause.strerror else cause)
 
 
 def _key(entry: Mapping[str, Any]) -> str:
@@ -177,6 +199,9 @@ def message_text(entries: Sequence[Mapping[str, Any]]) -> str:
 
 def _send_mail(entries: Sequence[Mapping[str, Any]], settings: AlertsSettings) -> None:
     recipients = [address.strip() for address in settings.recipients.split(",") if address.strip()]
+    for address in (*recipients, *filter(None, [settings.sender])):
+        if not ADDRESS.fullmatch(address):
+            raise ValueError(f"{address!r} is no mail address. Write name@host, several with commas between")
     message = EmailMessage()
     message["Subject"], message["From"] = subject(entries), settings.sender or recipients[0]
     message["To"] = ", ".join(recipients)

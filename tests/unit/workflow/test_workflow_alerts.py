@@ -124,7 +124,7 @@ def test_an_alarm_that_is_acknowledged_is_no_new_entry(tmp_path, settings, mail)
 def test_a_channel_that_fails_is_tried_again_and_the_other_is_not_repeated(tmp_path, settings, mail, hook):
     sent = tmp_path / "alerts.json"
     hook.status = 503
-    with pytest.raises(TurnoutError, match=r"not sent by webhook: HTTP Error 503.*tried again"):
+    with pytest.raises(TurnoutError, match=r"not sent by webhook \(127.0.0.1\): HTTP Error 503.*tried again"):
         send_alerts([ALARM], settings, sent)
     hook.status = 200
     assert send_alerts([ALARM], settings, sent) == {"mail": 0, "webhook": 1}
@@ -133,8 +133,9 @@ def test_a_channel_that_fails_is_tried_again_and_the_other_is_not_repeated(tmp_p
 
 @pytest.mark.parametrize("change", [{"smtp_port": 9}, {"smtp_host": "no.such.host.invalid"}])
 def test_a_mail_server_that_is_not_there_is_said(tmp_path, settings, hook, change):
-    with pytest.raises(TurnoutError, match=r"alerts were not sent by mail: .*section alerts of config.yaml"):
+    with pytest.raises(TurnoutError, match=r"not sent by mail \(.*, port .*section alerts of config.yaml") as raised:
         send_alerts([ALARM], replace(settings, **change), tmp_path / "alerts.json")
+    assert all(str(value) in str(raised.value) for value in change.values()) and "Errno" not in str(raised.value)
     assert len(hook.bodies) == 1
 
 
@@ -148,6 +149,18 @@ def test_an_address_that_is_no_web_address_is_not_opened(tmp_path, monkeypatch):
     monkeypatch.delenv("TURNOUT_WEBHOOK", raising=False)
     with pytest.raises(TurnoutError, match="begins neither with https"):
         send_alerts([ALARM], AlertsSettings(webhook="file:///etc/hostname"), tmp_path / "alerts.json")
+
+
+@pytest.mark.parametrize("recipients", ["a@b.c; d@e.f", "a@b.c d@e.f", "a@b.c, <d@e.f"])
+def test_recipients_that_are_no_list_are_quoted(tmp_path, settings, mail, recipients):
+    with pytest.raises(TurnoutError, match=r"is no mail address. Write name@host, several with commas between"):
+        send_alerts([ALARM], replace(settings, recipients=recipients, webhook=""), tmp_path / "alerts.json")
+    assert not mail.mails
+
+
+@pytest.mark.parametrize("recipients", ["a@b.c, Track team <d@e.f>", "root"])
+def test_names_and_local_users_are_recipients(tmp_path, settings, mail, recipients):
+    assert send_alerts([ALARM], replace(settings, recipients=recipients), tmp_path / "alerts.json")["mail"] == 1
 
 
 def test_the_subject_names_three():

@@ -38,6 +38,21 @@ def test_campaigns_that_agree_with_the_files_say_nothing(raw, capsys):
     assert checked(capsys) == (0, [])
 
 
+@pytest.mark.parametrize(
+    "text", [None, "campaign,started_at_utc\n2024-05-13,2024-05-13T09:00\n2024-09-02,2024-09-02T09:00\n"]
+)
+def test_a_turnout_without_any_rail_temperature_is_remarked(raw, capsys, text):
+    """No fault, as the recordings may state it. The file may be missing, elsewhere, or lack the column."""
+    if text:
+        (raw / "campaigns.csv").write_text(text)
+    code = main(["check"])
+    (line,) = (line for line in capsys.readouterr().out.splitlines() if "rail temperature" in line)
+    assert code == 0 and line.startswith("  raw/line_7/s1/campaigns.csv: ")
+    assert ("no such file" if text is None else "no column rail_temperature_c") in line
+    (raw / "campaigns.csv").write_text(f"{HEADER}2024-05-13,2024-05-13T09:00,12\n2024-09-02,2024-09-02T09:00,\n")
+    assert main(["check"]) == 0 and "rail temperature" not in capsys.readouterr().out
+
+
 def test_a_campaign_without_files_and_files_without_a_campaign_are_said(raw, capsys):
     rows = "2024-05-13,2024-05-13T09:00,12\n\n2024-09-20,2024-09-20T09:00,14\n"
     (raw / "campaigns.csv").write_text(HEADER + rows)
