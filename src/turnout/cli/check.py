@@ -96,12 +96,13 @@ def run(args: argparse.Namespace) -> int:
 def _faults(configuration: Configuration, formats: Collection[str], to_si: Callable[..., Conversion]) -> Iterator[str]:
     """Each fault that stops no turnout, with its consequence."""
     from turnout.config.load import errors_of_unused_layouts
-    from turnout.stages.layout_checks import faults_of_tracks
+    from turnout.stages.layout_checks import faults_of_sections, faults_of_tracks
 
     for warning in configuration.warnings:
         yield f"does not count: {warning}"
     for error in errors_of_unused_layouts(configuration, formats, to_si):
         yield f"used by no turnout: {error}"
+    yield from faults_of_sections(configuration)
     yield from faults_of_tracks(configuration)
 
 

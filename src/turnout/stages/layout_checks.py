@@ -79,6 +79,32 @@ def faults_of_tracks(configuration: Configuration) -> Iterator[str]:
     yield from faults
 
 
+def faults_of_sections(configuration: Configuration) -> Iterator[str]:
+    """Pairs of sections at one position of one track, each pair once: the copy of a line that was not changed.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Configuration of the fleet.
+
+    Yields
+    ------
+    str
+        One pair, as a sentence.
+    """
+    faults: dict[str, None] = {}  # keys of one layout are in the trees of all turnouts that use it
+    for variant in configuration.variants.values():
+        labels: dict[tuple[str, float], str] = {}
+        for label, section in variant.tree["sections"].items():
+            track, x = section["track"].value, float(section["position"].value)
+            first = labels.setdefault((track, x), label)
+            if first != label:
+                problem = f"sections {first} and {label} are both at {x:g} m, track {track}"
+                remedy = "Correct the position or the track of one of them, or make them one section"
+                faults[f"two sections in one place: {section['position'].place.error(problem, remedy)}"] = None
+    yield from faults
+
+
 def _check_entries(track: TurnoutTrack) -> None:
     """SimulationError if an accepted effect or change of a track file is not possible there."""
     if track.terms:

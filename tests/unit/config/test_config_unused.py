@@ -152,3 +152,25 @@ def test_a_track_file_that_is_no_text_is_said_by_name(tmp_path, content):
     path.write_bytes(content)
     with pytest.raises(ConfigError, match=r"spare\.yaml, "):
         load_track(str(path))
+
+
+def with_position_of_a7(folder, line):
+    """The layout of the example with another line for the section A8; A7 is at 24.6 m of the main track."""
+    path = folder / "layouts" / "tommerup.yaml"
+    text = path.read_text()
+    old = "A8:   {panel: CP,  track: main, position: 26.4}"
+    assert text.count(old) == 1
+    path.write_text(text.replace(old, line))
+
+
+def test_two_sections_at_one_position_of_a_track_are_reported_once(folder, capsys):
+    with_position_of_a7(folder, "A8:   {panel: CP,  track: main, position: 24.60}")
+    code, text = checked(capsys)
+    (line,) = [line for line in text.splitlines() if "two sections in one place" in line]
+    assert code == 1 and "config/layouts/tommerup.yaml, line 13" in line
+    assert "sections A7 and A8 are both at 24.6 m, track main" in line
+
+
+def test_two_sections_at_one_position_of_two_tracks_are_no_fault(folder, capsys):
+    with_position_of_a7(folder, "A8:   {panel: CP,  track: diverging, position: 24.6}")
+    assert "two sections in one place" not in checked(capsys)[1]
