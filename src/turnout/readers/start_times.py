@@ -9,7 +9,7 @@ from zoneinfo import ZoneInfo
 from turnout.errors import ReadError
 from turnout.readers.source import RawRecord, Source
 from turnout.readers.stated_zones import zone_problem
-from turnout.readers.time_texts import stated_time
+from turnout.readers.time_texts import is_date, stated_time
 
 TIME_FORMAT = "%Y-%m-%d %H:%M:%S.%f"
 
@@ -258,7 +258,9 @@ def start_errors(
         problem = f"two start times: {stated[other[0][0]]:{TIME_FORMAT}}, which is used, and {other[0][1]!r}"
         yield _start_error([k for k, _ in other], problem, source)
     if no_time := [(k, text) for k, text in unread.items() if stated.get(k) is None]:
-        problem = f"the start time {no_time[0][1]!r} cannot be read"
+        problem = (
+            f"the start time {no_time[0][1]!r} {'has no time of day' if is_date(no_time[0][1]) else 'cannot be read'}"
+        )
         is_number, is_object = no_time[0][1].endswith("?"), "MATLAB" in no_time[0][1]
         remedy = COUNT_REMEDY if is_number else OBJECT_REMEDY if is_object else CLOCK_REMEDY
         yield _start_error([k for k, _ in no_time], problem, source, remedy)

@@ -16,6 +16,10 @@ DATED = re.compile(
 )
 ISO_CHARACTERS = re.compile(r"[\dTtWZz:+.,_ -]+")
 WORDED_DATE = re.compile(r"[^\W\d]{3,}\.?.*\d{1,2}:\d{2}")
+# A date without a time of day, in ISO 8601 also by its week. It is no start: midnight would be a guess.
+DATE_ALONE = re.compile(
+    r"\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{4}|\d{8}(?:\.0)?|\d{4}-?W\d{2}(?:-?\d)?"
+)
 CLOCK = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}(?:[.,]\d{1,9})?))?")
 DOTTED_DATE = re.compile(r"(\d{1,2})\.\s?(\d{1,2})\.\s?(\d{4})[\sT,;]+(\d{1,2}):(\d{2}(?::\d{2}(?:[.,]\d{1,9})?)?)")
 MONTHS = {m: i for i, m in enumerate("jan feb mar apr may jun jul aug sep oct nov dec".split(), start=1)}
@@ -47,6 +51,27 @@ def looks_dated(text: str) -> bool:
     [True, True, True, False]
     """
     return bool(DATED.match(text) or (WORDED_DATE.search(text) and _month_of(text) and re.search(r"\d{4}", text)))
+
+
+def is_date(text: str) -> bool:
+    """Whether a text is a date without a time of day.
+
+    Parameters
+    ----------
+    text : str
+        Value of an entry.
+
+    Returns
+    -------
+    bool
+        Also for 8 digits, YYYYMMDD.
+
+    Examples
+    --------
+    >>> [is_date(text) for text in ("2024-05-13", "13.05.2024", "20240513", "2024-05-13 10:00", "12:30")]
+    [True, True, True, False, False]
+    """
+    return bool(DATE_ALONE.fullmatch(text.strip()))
 
 
 def _month_of(text: str) -> int:
@@ -89,7 +114,8 @@ def parse_time(value: Any) -> datetime | None:
 
     These are ISO 8601 text, also with slashes, or with the month as a word, numpy datetime64 (without a zone), and
     numbers that only one usual count explains (``time_numbers``): since 1970, a MATLAB datenum ... With dots the day
-    comes first, "13.05.2024 10:00"; dates with slashes that do not begin with the year are ambiguous and not read.
+    comes first, "13.05.2024 10:00"; dates with slashes that do not begin with the year are ambiguous and not read. A
+    date without a time of day is not read either.
 
     Parameters
     ----------
@@ -105,6 +131,8 @@ def parse_time(value: Any) -> datetime | None:
     --------
     >>> parse_time("2024-05-13T10:00:00"), parse_time(739385.5)
     (datetime.datetime(2024, 5, 13, 10, 0), datetime.datetime(2024, 5, 13, 12, 0))
+    >>> parse_time("2024-05-13") is None
+    True
     """
     return stated_time(value)[0]
 
@@ -141,6 +169,8 @@ def _time_of_stamp(value: Any) -> datetime | None:
     if isinstance(value, datetime):
         return value
     if isinstance(value, np.datetime64):
+        if np.datetime_data(value.dtype)[0] in ("Y", "M", "W", "D"):
+            return None
         stamp = value.astype("datetime64[us]").item()  # a whole number outside the years 1 to 9999, None for NaT
         return stamp if isinstance(stamp, datetime) else None
     if not isinstance(value, str):
@@ -150,6 +180,8 @@ def _time_of_stamp(value: Any) -> datetime | None:
     if (zone := re.search(r"[+-]\d{2}:?(\d{2})$", value.strip())) and int(zone[1]) % 15 and ":" in value:
         return None  # no time zone has such an offset: the text is damaged
     text = re.sub(r"^(\d{4})/(\d{1,2})/(\d{1,2})(?=\D)", _with_dashes, value.strip())
+    if is_date(text):
+        return None
     if not ISO_CHARACTERS.fullmatch(text):  # Python skips other characters behind the microseconds
         return _parse_worded(text)
     try:
