@@ -124,9 +124,11 @@ def as_text(
 
 
 def _paragraph(row: Mapping[str, Any]) -> str:
+    from turnout.registry.as_of import chart_in_words
+
     where = row["turnout_id"] + (f" ({row['name']})" if row["name"] else "")
     lines = [
-        f"{row['rank']:>2}. {row['state'].upper()}: {where}, {row['sections']}, {row['component']}",
+        f"{row['rank']:>2}. {row['state'].upper()}: {where}, {row['sections']}, {chart_in_words(row['component'])}",
         f"    {row['sentence']}",
     ]
     lines.append(f"    How sure: {row['false_alarm_words']}.")

@@ -52,6 +52,27 @@ def whole_list(day: str) -> str:
     return f"worklist({day}, most := {2**62})"
 
 
+def chart_in_words(chart: str) -> str:
+    """What a chart follows, as people say it.
+
+    Parameters
+    ----------
+    chart : str
+        Column ``component`` of the worklist.
+
+    Returns
+    -------
+    str
+        In words.
+
+    Examples
+    --------
+    >>> [chart_in_words(name) for name in ("ballast", "railpad_damping", "amplitude")]
+    ['ballast', 'railpad damping', 'acceleration']
+    """
+    return chart.replace("amplitude", "acceleration").replace("_", " ")
+
+
 def counts_of(connection: duckdb.DuckDBPyConnection, day: str) -> tuple[int, int, int, datetime | None]:
     """Numbers of charts on a day.
 

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 from turnout.errors import TurnoutError
 from turnout.files import read_json, write_text
-from turnout.registry.as_of import list_day
+from turnout.registry.as_of import chart_in_words, list_day
 from turnout.registry.database import open_registry
 
 if TYPE_CHECKING:
@@ -189,7 +189,7 @@ def message_text(entries: Sequence[Mapping[str, Any]]) -> str:
     paragraphs = []
     for entry in entries:
         name = f" ({entry['name']})" if entry["name"] else ""
-        component = entry.get("component") or entry["band"]
+        component = chart_in_words(entry.get("component") or entry["band"])
         paragraphs.append(
             f"{entry['state'].upper()}: {entry['turnout_id']}{name}, {entry['sections']}, {component}\n"
             f"{entry['sentence']}\nLook first at: {entry['look_at']}."

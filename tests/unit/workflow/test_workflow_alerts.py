@@ -12,6 +12,7 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 import pytest
 
 from turnout.cli.main import main
+from turnout.cli.worklist import as_text
 from turnout.config import load_configuration
 from turnout.config.settings.alerts import AlertsSettings
 from turnout.errors import TurnoutError
@@ -161,6 +162,14 @@ def test_recipients_that_are_no_list_are_quoted(tmp_path, settings, mail, recipi
 @pytest.mark.parametrize("recipients", ["a@b.c, Track team <d@e.f>", "root"])
 def test_names_and_local_users_are_recipients(tmp_path, settings, mail, recipients):
     assert send_alerts([ALARM], replace(settings, recipients=recipients), tmp_path / "alerts.json")["mail"] == 1
+
+
+@pytest.mark.parametrize("chart, words", [("ballast_damping", "ballast damping"), ("amplitude", "acceleration")])
+def test_worklist_and_message_name_a_chart_in_words(chart, words):
+    """The page of the fleet does the same."""
+    entry = ALARM | {"band": chart, "component": chart, "rank": 1, "n_in_all": 1, "false_alarm_words": "rare"}
+    texts = message_text([entry]), as_text([entry | {"last_maintenance": None}], 1)
+    assert all(f"A8, {words}\n" in text and chart not in text for text in texts)
 
 
 def test_the_subject_names_three():

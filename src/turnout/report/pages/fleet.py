@@ -6,6 +6,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from turnout.errors import REASONS
+from turnout.registry.as_of import chart_in_words
 from turnout.report.formatting import badge, day, diagnoses_once
 from turnout.report.panels.diagram import HATCH
 from turnout.report.panels.lines import line_diagrams
@@ -112,7 +113,7 @@ def _work(row: Mapping[str, Any], diagnosis: str) -> dict[str, Any]:
         "turnout_id": row["turnout_id"],
         "label": row["sections"],
         "anchor": (row["section_id"] or "").split("/")[-1].replace("*", ""),
-        "component": row["component"].replace("amplitude", "acceleration").replace("_", " "),
+        "component": chart_in_words(row["component"]),
         "state": row["state"],
         "badge": badge(row["state"]),
         "what": row["sentence"],
