@@ -177,11 +177,15 @@ class Masking:
         Prior standard deviation of that parameter if the effect is there.
     size : callable or None
         First parameter of the effect from the value of the nuisance parameter; None: its exponential.
+    same_quantity : bool
+        Whether effect and parameter change one quantity, so that recordings show their joint change alone: their
+        product if the effect is 1 where there is none, their sum if it is 0.
     """
 
     parameter: str = ""
     sd: float = 0.7
     size: Callable[[float], float] | None = None
+    same_quantity: bool = False
 
 
 @dataclass(frozen=True)

@@ -52,7 +52,7 @@ class SensorGain(TransferTerm):
     @classmethod
     def hypotheses(cls, site: ChannelSite) -> Iterator[Hypothesis]:
         """Another gain of this channel in all its recordings, which its hammer tests must not contradict."""
-        masking = Masking(f"gain_{site.name}", MASKING_SD, lambda gain: 1.0 + gain)
+        masking = Masking(f"gain_{site.name}", MASKING_SD, lambda gain: 1.0 + gain, same_quantity=True)
         yield Hypothesis(
             STARTS,
             {"channel_name": site.name},

@@ -48,7 +48,7 @@ class SensorPosition(PhysicsTerm):
     @classmethod
     def hypotheses(cls, site: ChannelSite) -> Iterator[Hypothesis]:
         """This sensor is elsewhere on the track."""
-        masking = Masking(f"seat_{site.name}", MASKING_SD, float)
+        masking = Masking(f"seat_{site.name}", MASKING_SD, float, same_quantity=True)
         yield Hypothesis(STARTS, {"channel_name": site.name}, site.where, site.n_sites, masking=masking)
 
     def sensor(self, sensor: Sensor) -> Sensor:

@@ -51,7 +51,7 @@ class UnsprungMass(PhysicsTerm):
     @classmethod
     def hypotheses(cls, site: TrainSite) -> Iterator[Hypothesis]:
         """Heavier or lighter wheelsets of this train; the base model may have fitted them in a narrow range."""
-        masking = Masking(f"wheels_{site.train}", MASKING_SD)
+        masking = Masking(f"wheels_{site.train}", MASKING_SD, same_quantity=True)
         yield Hypothesis(STARTS, {"train": site.train}, site.where, site.n_sites, masking=masking)
 
     def sentence(self) -> str:

@@ -94,6 +94,8 @@ class EffectSite:
         Its prior standard deviation if the effect is there.
     from_masking : callable or None
         Its value -> first parameter of the effect; None: the exponential.
+    same_quantity : bool
+        Whether effect and parameter change one quantity, so that recordings show their joint change alone.
     """
 
     where: Mapping[str, Any] = field(default_factory=dict)
@@ -102,6 +104,7 @@ class EffectSite:
     masking_parameter: str = ""
     masking_sd: float = THRESHOLDS.masking_sd
     from_masking: Callable[[float], float] | None = None
+    same_quantity: bool = False
 
 
 @dataclass(frozen=True)

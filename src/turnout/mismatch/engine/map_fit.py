@@ -9,6 +9,7 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.fit import Fit
+from turnout.mismatch.engine.joint_change import with_probable_division
 from turnout.mismatch.engine.joint_problem import JointProblem
 from turnout.mismatch.engine.levenberg_marquardt import DampedSteps, FitPoint, broyden_update
 from turnout.mismatch.engine.thresholds import THRESHOLDS
@@ -80,7 +81,8 @@ def fit_jointly(
     if reused_jacobian is not None:
         jacobian = joint.with_new_cheap_columns(theta, predictions, jacobian)
     refresh_steps = THRESHOLDS.n_refresh_steps if reused_jacobian is None else 0
-    return _fit_result(joint, *_iterate(joint, point, jacobian, refresh_steps, sought_cost))
+    end = _iterate(joint, point, jacobian, refresh_steps, sought_cost)
+    return _fit_result(joint, *with_probable_division(joint, *end))
 
 
 def cost_after(

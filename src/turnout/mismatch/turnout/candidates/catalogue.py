@@ -99,7 +99,15 @@ def candidate_of(effect: type[physics.PhysicsTerm], hypothesis: Hypothesis) -> C
             sign_ambiguous=effect.sign_ambiguous,
             nonlinear_in_size=effect.nonlinear_in_size,
         ),
-        EffectSite(hypothesis.where, effect.frame, hypothesis.n_scanned, masking.parameter, masking.sd, masking.size),
+        EffectSite(
+            hypothesis.where,
+            effect.frame,
+            hypothesis.n_scanned,
+            masking.parameter,
+            masking.sd,
+            masking.size,
+            masking.same_quantity,
+        ),
         NamingRules(
             smallest_reportable=effect.smallest_reportable if size is None else size,
             n_size_parameters=effect.n_size_parameters,
