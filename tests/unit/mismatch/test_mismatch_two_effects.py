@@ -354,7 +354,10 @@ def test_a_second_effect_that_blows_alone_promise_half_of_is_refitted(promised, 
 def test_the_evidence_of_a_row_has_an_entry_for_each_verdict():
     rows = (("a", 0.97, "x"), ("b", 0.7, "y"))
     first, second = (Verdict("named", (n,), "A", p, reason=r) for n, p, r in rows)
-    said = _evidence(SimpleNamespace(verdicts=(first, second), frames=()), SimpleNamespace(unmet_requirements=()))
+    lacking = SimpleNamespace(effect="c", words="what c changes", lack="passages", measurement="passages")
+    case = SimpleNamespace(unmet_requirements=(lacking,))
+    said = _evidence(SimpleNamespace(verdicts=(first, second), frames=()), case)
+    assert [u["effect"] for u in said["not_examined"]] == ["c"]
     assert (said["term"], said["probability"], said["reason"]) == ("a", 0.97, "x")
     assert [(e["term"], e["probability"], e["reason"]) for e in said["beside"]] == [("b", 0.7, "y")]
 
