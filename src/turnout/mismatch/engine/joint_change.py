@@ -63,8 +63,8 @@ def _divide(
     psi, eta = (float(point.theta[k]) for k in at)
 
     def effect_beside(tolerance: float) -> float:
-        before, after = share_of(eta), share_of(tolerance)
-        return float(psi * before / after if is_product else psi + before - after)
+        share, new_share = share_of(eta), share_of(tolerance)
+        return float(psi * share / new_share if is_product else psi + share - new_share)
 
     def prior_cost(tolerance: float) -> float:
         theta = np.array([effect_beside(tolerance), tolerance])
@@ -72,19 +72,18 @@ def _divide(
 
     reach = max(abs(eta - joint.mean[at[1]]), joint.sd[at[1]])
     low, high = np.clip(joint.mean[at[1]] + np.array([-reach, reach]), joint.low[at[1]], joint.high[at[1]])
-    best, before = minimize_scalar(prior_cost, bounds=(low, high), method="bounded"), prior_cost(eta)
-    is_possible = joint.low[at[0]] <= effect_beside(float(best.x)) <= joint.high[at[0]]
-    if not (is_possible and best.fun < before):
+    optimum, cost = minimize_scalar(prior_cost, bounds=(low, high), method="bounded"), prior_cost(eta)
+    tolerance = float(optimum.x)
+    is_possible = joint.low[at[0]] <= effect_beside(tolerance) <= joint.high[at[0]]
+    if not (is_possible and optimum.fun < cost):
         return point, jacobian
-    tolerance = float(best.x)
     theta = np.array(point.theta)
     theta[[*at]] = effect_beside(tolerance), tolerance
     # the prediction depends on the joint change t alone: each derivative is that by t times the slope of t
-    slope_before, slope_after = _slope(share_of, eta), _slope(share_of, tolerance)
+    ratio = share_of(tolerance) / share_of(eta) if is_product else 1.0
     factors = np.ones(theta.size)
-    factors[at[0]] = share_of(tolerance) / share_of(eta) if is_product else 1.0
-    factors[at[1]] = slope_after / slope_before * (theta[at[0]] / psi if is_product else 1.0)
-    moved = point._replace(theta=theta, cost=point.cost + best.fun - before)
+    factors[[*at]] = ratio, _slope(share_of, tolerance) / _slope(share_of, eta) / ratio
+    moved = point._replace(theta=theta, cost=point.cost + optimum.fun - cost)
     return moved, [(j * factors).astype(j.dtype) for j in jacobian]
 
 
