@@ -63,7 +63,7 @@ def matlab_object(class_name: str) -> UnreadObject:
     >>> print(matlab_object("duration"))
     object of the MATLAB class duration
     >>> matlab_object("duration").remedy("t")
-    "Turn it into plain numbers or text in MATLAB before saving, t = seconds(t)"
+    'Turn it into plain numbers or text in MATLAB before saving, t = seconds(t)'
     """
     kind = f"object of the MATLAB class {class_name}" if class_name else "MATLAB object"
     statement = STATEMENTS.get(class_name, OTHER_STATEMENT)
