@@ -20,7 +20,7 @@ from turnout.readers.channel_groups import STATED_SCALES
 from turnout.readers.claims import Hdf5Claims, open_hdf5
 from turnout.readers.lazy import is_large, lazy_array
 from turnout.readers.named_arrays import raw_file
-from turnout.readers.packing import apply_packing
+from turnout.readers.packing import apply_packing, unstated_fills
 from turnout.readers.scale_words import is_fill_name, is_scale_name
 from turnout.readers.source import COPY_AGAIN, RawFile, Source
 from turnout.readers.stated_scales import scale_text, scales_in_text
@@ -181,7 +181,9 @@ def _with_packing(
 
 def _values(dataset: h5py.Dataset | PackedDataset) -> Any:
     if isinstance(dataset, PackedDataset):
-        return dataset[()]
+        packed = dataset.dataset[()]
+        fills = (*dataset.fills, *unstated_fills(packed))
+        return apply_packing(packed, dataset.factor, dataset.offset, fills)
     if h5py.check_string_dtype(dataset.dtype) is not None:
         return dataset.asstr()[()]
     return dataset[()]

@@ -6,6 +6,7 @@ import numpy as np
 
 from turnout.readers.entries import Entry
 from turnout.readers.entry_owners import owners_of
+from turnout.readers.missing_codes import count_alone, missing_code
 from turnout.readers.scale_words import is_fill_name
 from turnout.readers.stated_numbers import finite_numbers
 
@@ -73,3 +74,27 @@ def apply_packing(numbers: Sequence | np.ndarray, factor: float, offset: float, 
     for fill in fills:
         unpacked[packed == fill] = np.nan
     return unpacked
+
+
+def unstated_fills(packed: np.ndarray) -> tuple[float, ...]:
+    """Usual codes for a missing sample among packed numbers, which nothing states: unpacked, they have no such form.
+
+    Parameters
+    ----------
+    packed : array
+        Packed numbers as they are in the file.
+
+    Returns
+    -------
+    tuple of float
+        The codes to which the numbers jump.
+
+    Examples
+    --------
+    >>> unstated_fills(np.array([0, 2, -32768, 1], dtype="int16"))
+    (-32768.0,)
+    """
+    if packed.ndim != 1 or packed.size < 2:
+        return ()
+    codes = {missing_code(float(x)) for x in (np.min(packed), np.max(packed))}
+    return tuple(sorted(code for code in codes if code is not None and count_alone(packed, code)))
