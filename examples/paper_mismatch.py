@@ -182,7 +182,7 @@ unknown roughness dominates, so the upper half of the publication's band is not 
 
 With the publication's one train: {sentence_one}
 
-With a light and a heavy car at two speeds each: {sentence_more} {next_more}
+With a light and a heavy car at two speeds each: {answer_more}
 
 Leaders with the one train:
 
@@ -242,8 +242,7 @@ def main():
         excess=table(("simulation", "sensor", "5-40 Hz", "40-140 Hz"), excess_rows(excess(case, curves))),
         answers=answers,
         sentence_one=sentence(diagnosis),
-        sentence_more=sentence(more),
-        next_more=(recommendation(more) + "." if recommendation(more) else ""),
+        answer_more=f"{sentence(more)} {recommendation(more)}.".removesuffix(" ."),
         ranking_one=ranking(diagnosis),
         ranking_more=ranking(more),
         concealed=physics.PadPreload.message.lower(),
