@@ -63,7 +63,7 @@ class Requirement:
         if not values or None in values:
             return False
         low, high = min(values), max(values)
-        return (high - low if self.measure == "range" else high / low) >= self.least
+        return high - low >= self.least if self.measure == "range" else high >= self.least * low > 0
 
 
 PASSAGES = Requirement("passage", "count", 1, "no passage was used", "passages of trains")

@@ -96,5 +96,8 @@ def unstated_fills(packed: np.ndarray) -> tuple[float, ...]:
     """
     if packed.ndim != 1 or packed.size < 2:
         return ()
-    codes = {missing_code(float(x)) for x in (np.min(packed), np.max(packed))}
-    return tuple(sorted(code for code in codes if code is not None and count_alone(packed, code)))
+    finite = packed[np.isfinite(packed)]
+    if finite.size < 2:
+        return ()
+    codes = {missing_code(float(x)) for x in (np.min(finite), np.max(finite))}
+    return tuple(sorted(code for code in codes if code is not None and count_alone(finite, code)))

@@ -261,7 +261,7 @@ def start_errors(
         problem = (
             f"the start time {no_time[0][1]!r} {'has no time of day' if is_date(no_time[0][1]) else 'cannot be read'}"
         )
-        is_number, is_object = no_time[0][1].endswith("?"), "MATLAB" in no_time[0][1]
+        is_number, is_object = no_time[0][1].endswith("?"), "MATLAB class" in no_time[0][1]
         remedy = COUNT_REMEDY if is_number else OBJECT_REMEDY if is_object else CLOCK_REMEDY
         yield _start_error([k for k, _ in no_time], problem, source, remedy)
     timed = [(k, stamp) for k, stamp in stamps if stamp is not None]

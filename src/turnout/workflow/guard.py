@@ -72,7 +72,9 @@ def compute_guarded(
     try:
         tables, faults = _compute(compute, unit, turnout, raw_root, algo=algo, **extra)
         for _, _, error in faults:
-            if strict or installation_error(error):
+            if fault := installation_error(error):
+                raise fault from error
+            if strict:
                 raise error
         rows = [_fault_row(unit, error, path, record) for path, record, error in faults]
         tables = {**tables, "quarantine": [*tables.get("quarantine", ()), *rows]} if rows else tables
