@@ -56,6 +56,8 @@ class Requirement:
         >>> speeds = Requirement("speed", "ratio", 1.25, "all passages have about one speed", "passages at another")
         >>> speeds.is_met({"speed": [20.0, 26.0]}), speeds.is_met({"speed": [20.0, 24.0]}), speeds.is_met({})
         (True, False, False)
+        >>> speeds.is_met({"speed": [0.0, 20.0]})  # a train that stands has no ratio
+        False
         """
         values = recorded.get(self.quantity, ())
         if self.measure == "count":

@@ -93,6 +93,8 @@ def unstated_fills(packed: np.ndarray) -> tuple[float, ...]:
     --------
     >>> unstated_fills(np.array([0, 2, -32768, 1], dtype="int16"))
     (-32768.0,)
+    >>> unstated_fills(np.array([0.0, 2.0, np.nan, -32768.0, 1.0]))
+    (-32768.0,)
     """
     if packed.ndim != 1 or packed.size < 2:
         return ()

@@ -6,6 +6,7 @@ import pytest
 from turnout.mismatch.engine.joint_change import with_probable_division
 from turnout.mismatch.engine.joint_problem import JointProblem
 from turnout.mismatch.engine.levenberg_marquardt import FitPoint
+from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 
@@ -59,6 +60,14 @@ def test_the_division_of_a_mass_is_that_of_both_priors(case):
     # psi = t exp(-eta): the cost is least where psi (psi - mean) / sd^2 = eta / tolerance_sd^2
     assert psi * np.exp(eta) == pytest.approx(1.36 * np.exp(4.0 * tolerance_sd))
     assert eta == pytest.approx(tolerance_sd**2 * psi * (psi - mean) / sd**2, rel=1e-3)
+
+
+def test_every_fit_ends_with_the_division_of_the_priors(case):
+    candidate = of_family(case, "unsprung_mass")
+    tolerance = next(n for n in case.nuisances if n.name == candidate.site.masking_parameter)
+    fit = fit_jointly(case, (candidate,), [1.36], {tolerance.name: 4.0 * tolerance.sd}, iterations=0)
+    assert fit.psi[0] * np.exp(fit.values[tolerance.name]) == pytest.approx(1.36 * np.exp(4.0 * tolerance.sd))
+    assert fit.values[tolerance.name] < tolerance.sd
 
 
 def test_an_effect_at_its_bound_goes_no_further(case):

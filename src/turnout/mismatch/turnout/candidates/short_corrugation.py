@@ -123,17 +123,15 @@ def ambiguous_line(case: TrackCase) -> Ambiguity | None:
     decibels = 10.0 / np.log(10.0) * float(np.nanmean([p.level_in(stretch)[k] for p in band_powers]))
     frequencies = [p.speed / length for p in band_powers]
     low, high = (round(f) for f in (min(frequencies), max(frequencies)))
-    at = f"{low} Hz" if high - low <= CORRUGATION.bin_width * low else f"{low} to {high} Hz, with the speed"
+    at = f"{low} Hz" if high - low <= CORRUGATION.bin_width * low else f"{low} to {high} Hz, with the speed,"
     others = [EXPLANATIONS[r.quantity] for r in unmet if r.quantity in EXPLANATIONS]
     words = (
-        f"the level at {at}, is {decibels:.0f} dB above that around it. It may be corrugation of {length:.3f} m"
+        f"the level at {at} is {decibels:.0f} dB above that around it. It may be corrugation of {length:.3f} m"
         f" or {' or '.join(others)}, since {' and '.join(r.lack for r in unmet)}"
     )
     measurement = " and ".join(r.measurement for r in unmet)
     evidence = nats - float(np.log(n_widths(wavelengths)))
-    return Ambiguity(
-        evidence, words.replace(" Hz, is", " Hz is"), measurement, "wavelength", f"{length:.3f} m", *stretch
-    )
+    return Ambiguity(evidence, words, measurement, "wavelength", f"{length:.3f} m", *stretch)
 
 
 def _is_in_file(case: TrackCase, wavelengths: np.ndarray) -> np.ndarray:
