@@ -119,7 +119,7 @@ def draw(measured, results, path):
 
 def _draw_term(axis, x, case, diagnosis, direction):
     """Draw the factor of the leading change at the temperature of the left-out campaign; returns its name."""
-    score, o = diagnosis.verdict.scores[0], next(r for r in case.reserved if r.kind == direction)
+    score, o = diagnosis.verdict.scores[0], next(r for r in case.reserved if r.data_type == direction)
     change = Change(score.family, score.candidate.where["since"], tuple(score.fit.psi[-_n(score) :]))
     with_it, without = (case.logarithm(score.fit.values, terms, o) for terms in ((change,), ()))
     axis.plot(x, np.exp(with_it - without), color="black", lw=1, label="the change that leads")

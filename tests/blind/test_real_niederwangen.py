@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from examples import niederwangen
+from examples import niederwangen, niederwangen_page
 from examples.decay_case import CHANGES, DecayCase, MeasuredRates, whitening
 from examples.decay_model import BANDS, LATERAL, LINES, VERTICAL, Support, decay_rate
 
@@ -54,7 +54,7 @@ def folder(shared_data):
 
 
 @pytest.mark.slow
-def test_the_conclusions_come_out_again(folder):
+def test_the_conclusions_and_their_page_come_out_again(folder, tmp_path):
     """As by the method without a model, docs/niederwangen_decay_rate.md: S1, S4, S5 changed by 2013-01, S2 did not."""
     measured, answers = niederwangen.read(folder), niederwangen.analyse(folder, report=lambda line: None)
     said = {m.section: niederwangen.conclusion(answers[m.section][1]) for m in measured}
@@ -67,6 +67,9 @@ def test_the_conclusions_come_out_again(folder):
         for _, diagnosis in answers[section][1].values():
             assert diagnosis.verification.after > diagnosis.verification.before
             assert diagnosis.verification.decoy < diagnosis.verification.after
+    niederwangen_page.draw(measured, answers, tmp_path / "page.svg")
+    assert all(m.section in niederwangen_page.page(measured, answers) for m in measured)
+    assert (tmp_path / "page.svg").stat().st_size
 
 
 @pytest.mark.slow
