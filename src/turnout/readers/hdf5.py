@@ -8,7 +8,7 @@ are applied; a dataset with another gain or offset is rejected unless the layout
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import h5py
@@ -81,6 +81,8 @@ def _variables(group: h5py.Group, path: str, source: Source, claims: Hdf5Claims)
                     source.lazy and is_large(member) and member.dtype.names is None and name.lower() not in TIME_NAMES
                 )
                 numbers = _with_packing(member, attributes, source)
+                if large and isinstance(numbers, PackedDataset):
+                    numbers = replace(numbers, fills=(*numbers.fills, *unstated_fills(numbers.dataset)))
                 variables[name] = lazy_array(numbers) if large else _values(numbers)
         except ReadError as error:
             variables[name] = error
@@ -97,12 +99,15 @@ def _variables(group: h5py.Group, path: str, source: Source, claims: Hdf5Claims)
                 is_scale_name(key) or (isinstance(value, str) and scales_in_text(value))
             ):
                 stated.setdefault(name, {})[key] = value
-    for name in matrices(variables):
+    arrays = matrices(variables)
+    for name in arrays:
         variables |= stated.pop(name, {})  # of all channels of the matrix
     if texts := tuple((name, text) for name, facts in stated.items() if (text := scale_text(facts))):
         variables[STATED_SCALES] = texts
     if units and not any(key.lower() == "units" for key in variables):
-        variables["units"] = units
+        (name, unit), *others = units.items()
+        is_of_all_channels = not others and name in arrays and min(arrays[name].shape) > 1
+        variables["units"] = unit if is_of_all_channels else units
     return variables
 
 

@@ -8,7 +8,8 @@ import numpy as np
 from turnout.readers.lazy import Column
 from turnout.readers.source import BLOCK_SIZE
 
-OTHER_CODES = (999.25, 2.0**15, 2.0**31)  # nulls of well logs; lowest codes of converters with 16 and 32 bits
+# Nulls of well logs; lowest codes of converters with 16, 24 and 32 bits. The highest code is clipping.
+OTHER_CODES = (999.25, 2.0**15, 2.0**23, 2.0**31)
 MIN_NINES = 3  # before the decimal point: 99 and 99.9 are common measured values
 
 
@@ -27,8 +28,8 @@ def missing_code(value: float) -> float | None:
 
     Examples
     --------
-    >>> [missing_code(value) for value in (-9999.0000001, 99999.9, -32768.0, 9998.0, 99.0)]
-    [-9999.0, 99999.9, -32768.0, None, None]
+    >>> [missing_code(value) for value in (-9999.0000001, 99999.9, -32768.0, 65535.0, 9998.0, 99.0)]
+    [-9999.0, 99999.9, -32768.0, None, None, None]
     """
     size = abs(float(value))
     text = f"{size:.7g}"
@@ -42,7 +43,7 @@ def count_alone(column: Column, code: float) -> int:
     """Number of samples that equal a code to which the signal jumps, as that of no sensor does.
 
     The steps into and out of the code have to be larger than every other step of the channel. A measured value of this
-    form has neighbours that are near to it.
+    form has neighbours that are near to it. Samples that are not finite are passed over.
 
     Parameters
     ----------
@@ -63,12 +64,14 @@ def count_alone(column: Column, code: float) -> int:
     """
     count, smallest_jump, largest_step = 0, np.inf, 0.0
     for block in _overlapping_blocks(column):
-        is_code = block == np.asarray(code).astype(block.dtype)
+        own_code = np.asarray(code).astype(block.dtype)
+        count += int(np.count_nonzero(block[:BLOCK_SIZE] == own_code))
+        block = block[np.isfinite(block)]
+        is_code = block == own_code
         steps = np.abs(np.diff(block.astype(float)))
         into_code = is_code[:-1] ^ is_code[1:]
         largest_step = max(largest_step, steps[~into_code].max(initial=0.0))
         smallest_jump = min(smallest_jump, steps[into_code].min(initial=np.inf))
-        count += int(np.count_nonzero(is_code[:BLOCK_SIZE]))
     return count if largest_step < smallest_jump < np.inf else 0
 
 

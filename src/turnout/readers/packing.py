@@ -1,13 +1,16 @@
 """Packed numbers: values for missing samples, scale and offset by the conventions of netCDF."""
 
+import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from turnout.readers.entries import Entry
 from turnout.readers.entry_owners import owners_of
+from turnout.readers.lazy import LazyMatrix, Numbers, lazy_array
 from turnout.readers.missing_codes import count_alone, missing_code
 from turnout.readers.scale_words import is_fill_name
+from turnout.readers.source import BLOCK_SIZE, MIN_SAMPLES
 from turnout.readers.stated_numbers import finite_numbers
 
 
@@ -76,18 +79,20 @@ def apply_packing(numbers: Sequence | np.ndarray, factor: float, offset: float, 
     return unpacked
 
 
-def unstated_fills(packed: np.ndarray) -> tuple[float, ...]:
+def unstated_fills(packed: Numbers) -> tuple[float, ...]:
     """Usual codes for a missing sample among packed numbers, which nothing states: unpacked, they have no such form.
+
+    Numbers in a file are read in blocks.
 
     Parameters
     ----------
-    packed : array
-        Packed numbers as they are in the file.
+    packed : (n,) or (n, m) array, or dataset in a file
+        Packed numbers as they are in the file. The longer axis of a matrix is that of the samples.
 
     Returns
     -------
     tuple of float
-        The codes to which the numbers jump.
+        The codes to which the numbers of a channel jump.
 
     Examples
     --------
@@ -95,11 +100,25 @@ def unstated_fills(packed: np.ndarray) -> tuple[float, ...]:
     (-32768.0,)
     >>> unstated_fills(np.array([0.0, 2.0, np.nan, -32768.0, 1.0]))
     (-32768.0,)
+    >>> unstated_fills(np.array([[0, 2, -32768, 1], [3, 2, 1, 0]], dtype="int16").T)
+    (-32768.0,)
     """
-    if packed.ndim != 1 or packed.size < 2:
+    if len(packed.shape) not in (1, 2) or math.prod(packed.shape) < MIN_SAMPLES:
         return ()
-    finite = packed[np.isfinite(packed)]
-    if finite.size < 2:
-        return ()
-    codes = {missing_code(float(x)) for x in (np.min(finite), np.max(finite))}
-    return tuple(sorted(code for code in codes if code is not None and count_alone(finite, code)))
+    array = lazy_array(packed)
+    if isinstance(array, LazyMatrix) and array.shape[0] > array.shape[1]:
+        array = array.T
+    columns = list(array) if isinstance(array, LazyMatrix) else [array]
+    largest = [-np.inf] * len(columns)
+    smallest = [np.inf] * len(columns)
+    for start in range(0, len(columns[0]), BLOCK_SIZE):  # all channels of a block cost one access to the file
+        for i, column in enumerate(columns):
+            block = column[start : start + BLOCK_SIZE]
+            finite = block[np.isfinite(block)]
+            if finite.size:
+                smallest[i], largest[i] = min(smallest[i], float(finite.min())), max(largest[i], float(finite.max()))
+    found: set[float] = set()
+    for column, extremes in zip(columns, zip(smallest, largest)):
+        codes = {missing_code(x) for x in extremes if np.isfinite(x)} - {None}
+        found.update(code for code in codes if code is not None and count_alone(column, code))
+    return tuple(sorted(found))
