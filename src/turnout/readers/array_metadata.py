@@ -31,7 +31,9 @@ START_NAMES = (
 START_DATE_NAMES = ("start_date", "startdatum", "date_de_debut", "begindatum", "datum_zacatku", "startdato")
 # Unlike n_samples, which counts per record, these may count the rows of the whole file.
 SAMPLE_COUNT_NAMES = (
-    "number_of_samples", "anzahl_messwerte", "anzahl_der_messwerte", "anzahl_werte", "anzahl_abtastwerte",
+    "number_of_samples", "no_of_samples", "num_samples", "sample_count", "samples", "total_samples", "nsamples",
+    "number_of_points", "number_of_data_points", "no_of_points", "num_points", "data_points", "npts",
+    "anzahl_messwerte", "anzahl_der_messwerte", "anzahl_werte", "anzahl_abtastwerte",
     "anzahl_samples", "anzahl_datenpunkte", "nombre_d_echantillons", "nombre_de_points", "aantal_samples",
     "aantal_meetwaarden", "aantal_meetpunten", "pocet_vzorku", "antal_samples", "antal_malepunkter",
     "antal_datapunkter",

@@ -254,9 +254,9 @@ def check_thousands(
         return
     rows = data[offset:].splitlines()
     cells = [
-        rows[k].split(separator.encode())[i].decode("utf-8", "replace").strip(' "')
+        row[i].strip()
         for k in np.flatnonzero(broken)
-        if k < len(rows)
+        if k < len(rows) and len(row := cells_of(decode_line(rows[k]), separator)) > i
     ]
     if all(THOUSANDS.fullmatch(cell) for cell in cells):
         first = int(np.argmax(broken))

@@ -244,6 +244,7 @@ class RowReader:
 
 
 SIZE_OF_FIRST_ROWS = 2**13  # bytes in which a decimal comma is looked for
+QUOTED_DECIMAL_COMMA = re.compile(rb'"\s*[+-]?\d*,\d+(?:[eE][+-]?\d+)?\s*"')  # between commas
 
 
 def _options(data: bytes | mmap, offset: int, separator: str, width: int) -> dict[str, Any]:
@@ -251,7 +252,8 @@ def _options(data: bytes | mmap, offset: int, separator: str, width: int) -> dic
     dot_offset = data.find(b".", offset)
     has_decimal_comma = separator != "," and data.find(b",", offset, dot_offset if dot_offset >= 0 else len(data)) >= 0
     if separator == ",":
-        has_decimal_comma = re.match(rb'\s*"[+-]?\d*,\d+"', data[offset : offset + 200]) is not None
+        rows = data[offset : offset + SIZE_OF_FIRST_ROWS]
+        has_decimal_comma = QUOTED_DECIMAL_COMMA.search(rows) is not None and b"." not in rows
     is_text = [is_clock_or_date(cell) for cell in first_cells(data, offset, separator)]
     if any(is_text):  # dates and times of day have marks of their own
         end = data.find(b"\n", offset + SIZE_OF_FIRST_ROWS)

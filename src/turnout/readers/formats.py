@@ -1,7 +1,7 @@
 """Registry of the raw formats: module, file extensions and first bytes of each; detection of the format of a file.
 
-A new format is one file with ``read_raw(source) -> RawFile`` and one line here. Spreadsheets and packed files are
-rejected.
+A new format is one file with ``read_raw(source) -> RawFile`` and one line here. Spreadsheets, packed files and files of
+known other kinds are rejected with what to do.
 """
 
 import zipfile
@@ -107,7 +107,7 @@ def detect_format(source: Source) -> Format:
     raise source.error(
         "byte 0",
         f"neither its first bytes ({head[:8]!r}) nor its extension {extension!r} belong to a known format",
-        f"Set the format in the layout to one of {names}",
+        f"Export the recording in one of the formats {names}; if it is in one of them, set 'format' in the layout",
     )
 
 
@@ -138,6 +138,44 @@ def reject_spreadsheet(source: Source) -> None:
     if zipped or source.head.startswith(OLD_EXCEL):
         remedy = "Save it from the spreadsheet as CSV, text with separated columns"
         raise source.error("byte 0", "it is a spreadsheet's own file", remedy)
+
+
+EXPORT = "Export the recording from the program that wrote it as UFF 58, TDMS, MATLAB, HDF5, Parquet, WAV or text"
+OTHER_FILES = {  # first bytes: what the file is, what to do
+    b"MDF     ": ("a measurement file of ASAM (MDF)", EXPORT),
+    b"UnFinMF ": ("an unfinished measurement file of ASAM (MDF)", EXPORT),
+    b"|CF,": ("a file of imc FAMOS", EXPORT),
+    b"<?xml": ("an XML file, such as DIAdem's TDM or Somat's SIE", EXPORT),
+    b"ARROW1\x00\x00": ("an Arrow or Feather file", "Write its table as Parquet"),
+    b"\x93NUMPY": ("one NumPy array, without names of channels", "Save every channel under its name with numpy.savez"),
+    b"SQLite format 3\x00": ("a database of SQLite", EXPORT),
+    b"%PDF-": ("a PDF document", EXPORT),
+    b"TDSh": ("the index of a TDMS file, without samples", "Copy the file with the ending .tdms instead"),
+    b"version https://git-lfs": ("a pointer of Git LFS, without samples", "Fetch the file itself with 'git lfs pull'"),
+    b"\x00\x05\x16\x07": ("macOS's notes on a file, without samples", "Remove it; the recording has no '._' in front"),
+    b"L\x00\x00\x00\x01\x14\x02\x00": ("a shortcut of Windows, without samples", "Copy the file to which it points"),
+    b"<!doctype html": ("a web page, such as that of a login", "Log in and download the recording again"),
+    b"<html": ("a web page, such as that of a login", "Log in and download the recording again"),
+}  # fmt: skip
+
+
+def reject_other_file(source: Source) -> None:
+    """Stop if the first bytes are those of a file of another kind, whatever its name.
+
+    Parameters
+    ----------
+    source : Source
+        The raw file.
+
+    Raises
+    ------
+    ReadError
+        If they are; the remedy says how to get a file that is read.
+    """
+    head = source.head.removeprefix(b"\xef\xbb\xbf").lstrip(b" \t\r\n")
+    for start, (kind, remedy) in OTHER_FILES.items():
+        if head.startswith(start) or head[: len(start)].lower() == start:
+            raise source.error("byte 0", f"it is {kind}", remedy)
 
 
 ARCHIVES = {  # first bytes: program

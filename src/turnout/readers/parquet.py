@@ -5,6 +5,7 @@ metadata of its field. A truncated file lacks its footer and cannot be opened; p
 """
 
 import json
+from collections import Counter
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from typing import Any
@@ -51,6 +52,9 @@ def read_raw(source: Source) -> RawFile:
     with source.parsed_by("pyarrow"):
         file = pq.ParquetFile(source.path, page_checksum_verification=True)
         check_parquet(file.metadata, source)
+        if repeated := [name for name, n in Counter(file.schema_arrow.names).items() if n > 1]:
+            problem = f"several columns have the name {repeated[0]!r}"
+            raise source.error("the columns", problem, "Write the file again with a name of its own for each column")
         schema, n_row = file.schema_arrow, file.metadata.num_rows
         remarks = tuple(_differing_copies(schema.metadata, file.metadata.metadata, source))
         rows = RowGroupReader(file) if source.lazy and "record" not in schema.names else None

@@ -94,7 +94,7 @@ def test_an_unknown_format(tmp_path, in_si):
     (tmp_path / "a.xyz").write_bytes(b"hello world")
     error = refusal("a.xyz", tmp_path, in_si)
     assert "neither its first bytes (b'hello wo') nor its extension '.xyz' belong to a known format" in str(error)
-    assert "Set the format in the layout to one of uff58, " in str(error)
+    assert "Export the recording in one of the formats uff58, " in str(error)
     error = refusal("a.xyz", tmp_path, replace(in_si, format="xls"))
     assert "the layout: the format 'xls' is not known. Use one of uff58, " in str(error)
 

@@ -214,3 +214,68 @@ def test_a_column_that_rises_evenly_is_compared_with_the_rate_also_if_it_is_igno
     text = "Uhr;force [N];rail [m/s²]\n" + rows([f"{x:.8f}" for x in column], FORCE, RAIL)
     result = read_text(tmp_path, text, RawDescription(channels, rate=RATE))
     assert bool(result.errors) == is_axis, result.errors
+
+
+@pytest.mark.parametrize(
+    ("head", "said"),
+    [
+        (b"MDF     4.10    ", "a measurement file of ASAM (MDF). Export the recording from the program that wrote it"),
+        (b"|CF,2,1,1;1;|CK,1,3,1,1;", "a file of imc FAMOS. Export the recording from the program that wrote it"),
+        (b'<?xml version="1.0"?>\n<sie version="1.0">', "an XML file, such as DIAdem's TDM or Somat's SIE. Export"),
+        (b"ARROW1\x00\x00", "an Arrow or Feather file. Write its table as Parquet."),
+        (b"\x93NUMPY\x01\x00v\x00", "one NumPy array, without names of channels. Save every channel under its name"),
+        (b"TDSh\x0e\x00\x00\x00", "the index of a TDMS file, without samples. Copy the file with the ending .tdms"),
+        (b"\r\n<!DOCTYPE html>\n", "a web page, such as that of a login. Log in and download the recording again."),
+        (
+            b"version https://git-lfs.github.com/spec/v1\n",
+            "a pointer of Git LFS, without samples. Fetch the file itself",
+        ),
+    ],
+)
+@pytest.mark.parametrize("ending", ["csv", "dat", "tdms", "raw"])
+def test_a_file_of_another_kind_is_named_with_what_to_do(head, said, ending, tmp_path):
+    (tmp_path / f"A7.{ending}").write_bytes(head + bytes(range(256)) * 20)
+    with pytest.raises(ReadError) as caught:
+        read(f"A7.{ending}", tmp_path, layout())
+    assert f"A7.{ending}, byte 0: it is {said}" in str(caught.value)
+
+
+def test_two_columns_of_one_name_in_parquet_are_named(tmp_path):
+    table = pa.Table.from_arrays([pa.array(FORCE), pa.array(RAIL), pa.array(RAIL)], names=["force", "rail", "rail"])
+    pq.write_table(table, tmp_path / "a.parquet")
+    with pytest.raises(ReadError) as caught:
+        read("a.parquet", tmp_path, IN_SI)
+    assert str(caught.value).endswith(
+        "several columns have the name 'rail'. Write the file again with a name of its own for each column."
+    )
+
+
+@pytest.mark.parametrize("first", ["0", "0,00000", "0E0"])
+def test_decimal_commas_in_quotation_marks_are_read_wherever_the_first_is(first, tmp_path):
+    columns = [[f'"{t:.6f}"'.replace(".", ",") for t in TIME]]
+    columns[0][0] = f'"{first}"'
+    columns += [[f'"{x:.9g}"'.replace(".", ",") for x in signal] for signal in (FORCE, RAIL)]
+    assert_right(read_text(tmp_path, "time [s],force [N],rail [m/s²]\n" + rows(*columns, separator=",")))
+
+
+@pytest.mark.parametrize("first", ["0", '"1,234"'])
+def test_marks_for_thousands_in_quotation_marks_are_no_decimal_commas(first, tmp_path):
+    force = [f'"{x:,}"' if abs(x) >= 1000 else f"{x}" for x in np.rint(FORCE).astype(int)]
+    force[0] = first
+    rail = [f"{x}" for x in np.rint(RAIL).astype(int)]
+    with pytest.raises(ReadError, match="thousands"):
+        read_text(tmp_path, "force [N],rail [m/s²]\n" + rows(force, rail, separator=","))
+
+
+@pytest.mark.parametrize("name", ["Samples", "Sample count", "No of samples", "Number of points", "Data points"])
+def test_a_number_of_samples_under_any_usual_name_shows_that_rows_are_missing(name, tmp_path):
+    assert_right(read_text(tmp_path, f"{name};{N}\n{HEAD}{rows()}"))
+    error = only_error(read_text(tmp_path, f"{name};{N + 100}\n{HEAD}{rows()}"))
+    assert error.reason == "truncated" and f"has {N} of the {N + 100} samples" in str(error)
+
+
+@pytest.mark.parametrize("name", ["Samples", "Number of points"])
+def test_a_column_that_counts_samples_promises_none(name, tmp_path):
+    counts = [f"{k}" for k in range(5000, 5000 + N)]
+    description = RawDescription((*layout().channels, RawChannel("number", name, "ignored")), rate=RATE)
+    assert_right(read_text(tmp_path, f"{name};{HEAD}{rows(counts, FORCE, RAIL)}", description))
