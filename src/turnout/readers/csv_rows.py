@@ -252,8 +252,8 @@ def _options(data: bytes | mmap, offset: int, separator: str, width: int) -> dic
     dot_offset = data.find(b".", offset)
     has_decimal_comma = separator != "," and data.find(b",", offset, dot_offset if dot_offset >= 0 else len(data)) >= 0
     if separator == ",":
-        rows = data[offset : offset + SIZE_OF_FIRST_ROWS]
-        has_decimal_comma = QUOTED_DECIMAL_COMMA.search(rows) is not None and b"." not in rows
+        first_rows = data[offset : offset + SIZE_OF_FIRST_ROWS]
+        has_decimal_comma = QUOTED_DECIMAL_COMMA.search(first_rows) is not None and b"." not in first_rows
     is_text = [is_clock_or_date(cell) for cell in first_cells(data, offset, separator)]
     if any(is_text):  # dates and times of day have marks of their own
         end = data.find(b"\n", offset + SIZE_OF_FIRST_ROWS)

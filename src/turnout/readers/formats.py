@@ -173,9 +173,9 @@ def reject_other_file(source: Source) -> None:
         If they are; the remedy says how to get a file that is read.
     """
     head = source.head.removeprefix(b"\xef\xbb\xbf").lstrip(b" \t\r\n")
-    for start, (kind, remedy) in OTHER_FILES.items():
+    for start, (label, remedy) in OTHER_FILES.items():
         if head.startswith(start) or head[: len(start)].lower() == start:
-            raise source.error("byte 0", f"it is {kind}", remedy)
+            raise source.error("byte 0", f"it is {label}", remedy)
 
 
 ARCHIVES = {  # first bytes: program

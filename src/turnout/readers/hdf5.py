@@ -105,8 +105,8 @@ def _variables(group: h5py.Group, path: str, source: Source, claims: Hdf5Claims)
     if texts := tuple((name, text) for name, facts in stated.items() if (text := scale_text(facts))):
         variables[STATED_SCALES] = texts
     if units and not any(key.lower() == "units" for key in variables):
-        (name, unit), *others = units.items()
-        is_of_all_channels = not others and name in arrays and min(arrays[name].shape) > 1
+        (name, unit), *other_units = units.items()
+        is_of_all_channels = not other_units and name in arrays and min(arrays[name].shape) > 1
         variables["units"] = unit if is_of_all_channels else units
     return variables
 

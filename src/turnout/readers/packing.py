@@ -117,8 +117,8 @@ def unstated_fills(packed: Numbers) -> tuple[float, ...]:
             finite = block[np.isfinite(block)]
             if finite.size:
                 smallest[i], largest[i] = min(smallest[i], float(finite.min())), max(largest[i], float(finite.max()))
-    found: set[float] = set()
+    fills: set[float] = set()
     for column, extremes in zip(columns, zip(smallest, largest)):
         codes = {missing_code(x) for x in extremes if np.isfinite(x)} - {None}
-        found.update(code for code in codes if code is not None and count_alone(column, code))
-    return tuple(sorted(found))
+        fills.update(code for code in codes if code is not None and count_alone(column, code))
+    return tuple(sorted(fills))

@@ -8,6 +8,8 @@ or their rate must be explained, else it is reported by name, with the key of th
 - its name, its group or the words beside it speak of something else (``other_subjects``),
 - it agrees with the record: rate, step, number of samples, duration, units, a neutral scale, or
 - it can be none of these: a length, a temperature, a small whole number (``entry_candidates``).
+
+What may convert whole numbers of a physical unit is reported as well (``whole_numbers``).
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -36,6 +38,7 @@ from turnout.readers.rate_agreement import is_near_rate
 from turnout.readers.source import RawRecord, Source
 from turnout.readers.stated_units import same_unit, with_stated_units
 from turnout.readers.statements import PLAIN_TYPES
+from turnout.readers.whole_numbers import converting_entries
 from turnout.records import RawDescription
 from turnout.units import IGNORED
 
@@ -184,6 +187,7 @@ class EntryCheck:
         self.source = source
         self._checked = frozenset(name.strip().casefold() for name in description.checked_entries)
         units = [c.unit for c in description.channels if c.quantity != IGNORED and c.unit]
+        self._channels = [c for c in description.channels if c.quantity != IGNORED]
         self._units = tuple(unit.rstrip("!") for unit in units)
         self._are_certain = any(unit.endswith("!") for unit in units)
         self._last: tuple[Sequence[Entry], tuple] | None = None  # entries of the last record, and their key
@@ -253,11 +257,16 @@ class EntryCheck:
         for entry, candidate in unexplained:
             if not candidate.is_weak and not (is_rate_stated and candidate.statement == RATE):
                 raise self._error(where, [(entry, candidate)], REASONS_OF[candidate.statement])
+        of_converter = list(self._converter_errors(where, record))
         self._last = record.entries, key
         new = [(e, c) for e, c in unexplained if (e.name, c.text) not in self._reported]
         self._reported.update((e.name, c.text) for e, c in new)
         objects = [e for e in new_entries if isinstance(e.value, UnreadObject) and e.name.lower() not in START_NAMES]
-        return [*self._object_errors(where, objects), *([self._error(where, new, "entry_unknown")] if new else [])]
+        return [
+            *self._object_errors(where, objects),
+            *of_converter,
+            *([self._error(where, new, "entry_unknown")] if new else []),
+        ]
 
     def _object_errors(self, where: str, entries: Sequence[Entry]) -> Iterator[ReadError]:
         """Remarks on objects whose content cannot be read, each name once."""
@@ -272,6 +281,28 @@ class EntryCheck:
                 f"in the layout, 'checked_entries: {entry.name}'"
             )
             yield self.source.error(where, problem, remedy, reason="entry_unknown")
+
+    def _converter_errors(self, where: str, record: RawRecord) -> Iterator[ReadError]:
+        """Remark on each channel with whole numbers and on what may convert them; each name once."""
+        stated: dict[int, list[Entry]] = {}
+        for i, entry in converting_entries(record, self._channels):
+            if (entry.name, _text(entry.value)) not in self._reported:
+                stated.setdefault(i, []).append(entry)
+        for i, entries in stated.items():
+            self._reported.update((entry.name, _text(entry.value)) for entry in entries)
+            listed = ", ".join(dict.fromkeys(f"{entry.name}: {_text(entry.value)[:MAX_SHOWN]}" for entry in entries))
+            unit = record.units[i].strip() or "the unit of the layout"
+            problem = (
+                f"its samples are whole numbers, and {listed[:MAX_PROBLEM]!r} may convert them to {unit}; they "
+                "are taken as they are"
+            )
+            names = "; ".join(dict.fromkeys(entry.name for entry in entries[:MAX_NAMES]))
+            remedy = (
+                "Compare a value with what the logger's own program shows; if it differs, write the value of one step "
+                f"into the layout, such as unit: '0.4 N!', else 'checked_entries: {names}'"
+            )
+            channel = f"{where}, channel {record.names[i]!r}"
+            yield self.source.error(channel, problem, remedy, reason="entry_unknown")
 
     def _is_new(self, entry: Entry) -> bool:
         """Whether an equal entry has not been checked; arrays are always new."""
