@@ -51,8 +51,9 @@ def run(args: argparse.Namespace) -> int:
     import os
     from pathlib import Path
 
+    from turnout.config.turnouts_table import read_table
     from turnout.demo.fleet import make_fleet, run_pipeline
-    from turnout.demo.scenario import campaign_days
+    from turnout.demo.scenario import FLEET, campaign_days
     from turnout.demo.summary import print_summary
     from turnout.demo.train_clusters import write_clusters
     from turnout.errors import ConfigError
@@ -63,6 +64,10 @@ def run(args: argparse.Namespace) -> int:
             observation = f"{getattr(args, option)}, and the fewest are {minimum}"
             raise ConfigError(f"--{option}", "number", observation, f"Write {minimum} or more")
     use_demonstration(Path())
+    rows, _ = read_table(Path("config", "turnouts.tsv"), "config/turnouts.tsv")
+    if missing := sorted({turnout.turnout for turnout in FLEET} - {row.id for row in rows}):
+        remedy = "Run the command in an empty folder: it writes recordings into raw/"
+        raise ConfigError("config/turnouts.tsv", "the table", f"no turnout {missing[0]!r} of the demonstration", remedy)
     cores = args.cores or os.cpu_count() or 1
     print("1. Raw files of the demonstration fleet", flush=True)
     n = make_fleet("raw", "truth", seed=args.seed, n_campaign=args.campaigns, n_passage=args.passages, workers=cores)

@@ -127,6 +127,8 @@ def value_problem(key: Key, value: Any) -> tuple[str, str] | None:
     --------
     >>> value_problem(Key("number", "rate", unit="Hz", above=0), -1)
     ('-1', 'Write a number above 0 Hz')
+    >>> value_problem(Key("number", "position", unit="m", minimum=-10000, maximum=10000), 24600)
+    ('24600', 'Write a number from -10000 to 10000 m (24600 mm are 24.6 m)')
     """
     if value is None and key.nullable:
         return None
@@ -145,10 +147,41 @@ def value_problem(key: Key, value: Any) -> tuple[str, str] | None:
         return repr(value), f"Write {_expected_text(key)}"
     if not isinstance(value, (int, float)):
         return None
+    if _is_in_range(key, value):
+        return None
+    return repr(value), f"Write {_expected_text(key)}{_hint_at_other_unit(key, value)}"
+
+
+PLAIN_UNITS = ("m", "s", "N", "Hz", "V")  # which people write with a prefix
+PREFIXES = (("m", 1e-3), ("k", 1e3))
+
+
+def _is_in_range(key: Key, value: float) -> bool:
+    """Whether a number is within the limits of a key."""
     low = key.minimum is not None and value < key.minimum
-    if low or (key.maximum is not None and value > key.maximum) or (key.above is not None and value <= key.above):
-        return repr(value), f"Write {_expected_text(key)}"
-    return None
+    high = key.maximum is not None and value > key.maximum
+    return not low and not high and (key.above is None or value > key.above)
+
+
+def _hint_at_other_unit(key: Key, value: float) -> str:
+    """What a number would be if it is in percent or has a prefix before its unit, where that is allowed."""
+    if not value:
+        return ""
+    if (
+        key.unit in ("", None, "-", "1")
+        and key.maximum is not None
+        and key.maximum <= 1.0
+        and _is_in_range(key, value / 100.0)
+    ):
+        return f" ({value:g} % are {value / 100.0:g})"
+    if key.unit in PLAIN_UNITS:
+        for prefix, factor in PREFIXES:
+            if _is_in_range(key, value * factor):
+                return f" ({value:.9g} {prefix}{key.unit} are {value * factor:.9g} {key.unit})"
+    return ""
+
+
+DECIMAL_POINT = "If it belongs to the number before it, write a point in place of the comma, as in 24.6"
 
 
 def check(spec: dict, tree: Branch, whole: bool = True) -> Iterator[ConfigError]:
@@ -174,7 +207,8 @@ def check(spec: dict, tree: Branch, whole: bool = True) -> Iterator[ConfigError]
         if rule is None:
             misspelt.update(get_close_matches(name, spec, n=1))
             allowed = [allowed_name for allowed_name, rule in spec.items() if not isinstance(rule, FleetWideKey)]
-            yield tree.key_places[name].error(f"unknown key {name!r}", suggestion(name, allowed))
+            remedy = DECIMAL_POINT if name.isdecimal() else suggestion(name, allowed)
+            yield tree.key_places[name].error(f"unknown key {name!r}", remedy)
         elif isinstance(rule, FleetWideKey):
             message = f"{name!r} holds for the whole fleet and would be ignored here"
             yield tree.key_places[name].error(message, f"It belongs into {rule.file}: move it there")

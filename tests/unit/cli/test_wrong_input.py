@@ -48,6 +48,7 @@ WRONG = {
     "plan --config nowhere": "nowhere, the folder: there is no such folder. Run the command in the folder of a project",
     "add W1 tommerup": "config/turnouts.tsv, line 2: there is a turnout 'W1' already. Write another id",
     "add W:1 tommerup": "turnout is 'W:1'. Write 1 to 64 letters, digits, _ and -, the first a letter or digit.",
+    "demo": "config/turnouts.tsv, the table: no turnout 'aarup_n4' of the demonstration. Run the command in an",
     "worklist": "results/registry: there is no registry here. 'turnout nightly' makes one",
     "events W9 tamping 2026-04-02": "config/events.csv, turnout: turnout 'W9' has no row in turnouts.tsv. Allowed: W1.",
     "acknowledge W1/X --by me --reason x": "config/acknowledgements.csv, section: turnout 'W1' has no section 'X'",

@@ -375,6 +375,30 @@ def test_a_wrong_campaign_is_said_with_column_value_and_what_to_write(tmp_path, 
     assert f"t1/campaigns.csv, line 3, column {column}: " in str(errors[0]) and found in str(errors[0])
 
 
+@pytest.mark.parametrize(
+    ("written", "instead", "words"),
+    [
+        (
+            "position: 24.6",
+            "position: 24600",
+            "position is 24600. Write a number from -10000 to 10000 m (24600 mm are 24.6 m)",
+        ),
+        ("position: 24.6", "position: 24,6", "unknown key '6'. If it belongs to the number before it, write a point"),
+        ("rate: 20000", "rate: 25.6", "rate is 25.6. Write a number of at least 250 Hz (25.6 kHz are 25600 Hz)"),
+        ("rate: 20000", "rate: -5", "rate is -5. Write a number of at least 250 Hz."),
+    ],
+)
+def test_a_number_in_another_unit_is_recognised(tmp_path, written, instead, words):
+    with pytest.raises(ConfigErrors) as caught:
+        configuration(tmp_path, layout=LAYOUT.replace(written, instead, 1))
+    assert words in str(caught.value)
+
+
+def test_a_share_in_percent_is_recognised(tmp_path):
+    with pytest.raises(ConfigErrors, match=r"gate_level is 90. Write a number from 0 to 0.999 \(90 % are 0.9\)"):
+        configuration(tmp_path, settings="receptance: {gate_level: 90}")
+
+
 @pytest.mark.parametrize("kind", WRONG)
 def test_it_is_said_where_and_what_to_write(tmp_path, kind):
     changes, words = WRONG[kind]
