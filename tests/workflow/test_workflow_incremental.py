@@ -148,7 +148,7 @@ def test_work_files_that_were_cut_are_made_again_and_nothing_is_computed(fleet):
     [
         ("turnout=T00004", "unknown option 'turnout'. Did you mean 'turnouts'?"),
         ("turnouts=T0004", "no turnout 'T0004'. Did you mean 'T00004'?"),
-        ("day=tomorrow", "day: 'tomorrow'. Write YYYY-MM-DD"),
+        ("day=tomorrow", "day: 'tomorrow' is no day of the calendar. Write YYYY-MM-DD"),
         ("strict=perhaps", "strict: 'perhaps'. Write true or false"),
     ],
 )

@@ -14,7 +14,7 @@ REQUIRED_FIELDS = {"hammer": ("campaign", "section"), "passages": ("time",)}
 
 
 @lru_cache(maxsize=256)
-def compile_pattern(pattern: str, branch: str, sections: tuple[str, ...] = ()) -> re.Pattern:
+def compile_pattern(pattern: str, branch: str, sections: tuple[str, ...] = (), free_field: str = "") -> re.Pattern:
     """Regular expression of a pattern of file names: one named group per field; ``*`` is anything but a slash.
 
     Parameters
@@ -25,6 +25,8 @@ def compile_pattern(pattern: str, branch: str, sections: tuple[str, ...] = ()) -
         "hammer" or "passages".
     sections : tuple of str
         Labels that ``{section}`` stands for; none: any text.
+    free_field : str
+        Field that may be any text without a slash.
 
     Returns
     -------
@@ -45,6 +47,8 @@ def compile_pattern(pattern: str, branch: str, sections: tuple[str, ...] = ()) -
     fields = dict(FIELDS[branch])
     if branch == "hammer":
         fields["section"] = "|".join(re.escape(s) for s in sorted(sections, key=len, reverse=True)) or "[^/]+"
+    if free_field in fields:
+        fields[free_field] = "[^/]+"
     expression, names = "", set()
     for token in re.split(r"(\{\w*\}|\*)", pattern):
         if token == "*":
@@ -60,3 +64,45 @@ def compile_pattern(pattern: str, branch: str, sections: tuple[str, ...] = ()) -
     if missing := [f"{{{name}}}" for name in REQUIRED_FIELDS[branch] if name not in names]:
         raise ValueError(f"the pattern lacks {', '.join(missing)}")
     return re.compile(unicodedata.normalize("NFC", expression))
+
+
+FIELD_PROBLEMS = {
+    "campaign": "no day as YYYY-MM-DD",
+    "section": "no section of the layout",
+    "time": "no start as YYYYMMDDTHHMMSSZ",
+    "test": "not of letters and digits alone",
+    "ext": "not of letters and digits alone",
+}
+
+
+def wrong_field(name: str, pattern: str, branch: str, sections: tuple[str, ...] = ()) -> str:
+    """The part by which alone a name misses a pattern, in words.
+
+    Parameters
+    ----------
+    name : str
+        Path below the raw folder of a turnout.
+    pattern : str
+        Pattern of the layout.
+    branch : str
+        "hammer" or "passages".
+    sections : tuple of str
+        Labels that ``{section}`` stands for.
+
+    Returns
+    -------
+    str
+        "" if it misses the pattern by more than one field.
+
+    Examples
+    --------
+    >>> pattern = "hammer/{campaign}/{section}_{test}.{ext}"
+    >>> wrong_field("hammer/13-05-2026/A7_2.uff", pattern, "hammer", ("A7",))
+    "'13-05-2026' is no day as YYYY-MM-DD"
+    """
+    for field, problem in FIELD_PROBLEMS.items():
+        if f"{{{field}}}" in pattern:
+            match = compile_pattern(pattern, branch, sections, field).fullmatch(unicodedata.normalize("NFC", name))
+            if match:
+                return f"{match[field]!r} is {problem}"
+    return ""

@@ -195,7 +195,7 @@ def _day(value: Any) -> str:
     try:
         return date.fromisoformat(str(value)).isoformat()
     except ValueError:
-        raise ConfigError("--config", "day", repr(value), "Write YYYY-MM-DD") from None
+        raise ConfigError("--config", "day", f"{value!r} is no day of the calendar", "Write YYYY-MM-DD") from None
 
 
 def _diagnosis_scope(options: Mapping, configuration: Configuration) -> str:

@@ -13,7 +13,7 @@ from stat import S_ISREG
 
 from turnout.config import TurnoutConfig
 from turnout.config.campaign_notes import NOTE_FILES
-from turnout.config.filename_pattern import compile_pattern
+from turnout.config.filename_pattern import compile_pattern, wrong_field
 from turnout.errors import ReadError
 from turnout.files import MIN_SPARSE_SIZE, sparse_size, special_kind
 from turnout.records import Unit
@@ -275,9 +275,19 @@ def _unmatched_files(turnout: TurnoutConfig, unmatched: list[str], matched: set[
     for inside in unmatched:
         remedy = f"Rename it after {pattern_words}, or add its section to the layout {turnout.layout!r}"
         finding = "its name follows no pattern of the layout"
+        if detail := _wrong_field(inside, turnout):
+            finding += f": {detail}"
         yield ReadError(f"{turnout.raw}/{inside}", "file name", finding, remedy, "name_unknown")
     if not matched:
         remedy = (
             f"Put files named like {pattern_words} there, or correct 'raw' in turnouts.tsv or 'files' in the layout"
         )
         yield ReadError(turnout.raw, "folder", "no file matches a pattern of the layout", remedy, "nothing_found")
+
+
+def _wrong_field(inside: str, turnout: TurnoutConfig) -> str:
+    """The part by which alone a name misses a pattern of the layout; "" if it misses all by more."""
+    labels = tuple(section.label for section in turnout.sections)
+    patterns = (("hammer", turnout.hammer, labels), ("passages", turnout.passages, ()))
+    details = (wrong_field(inside, part.files, branch, sections) for branch, part, sections in patterns if part)
+    return next(filter(None, details), "")

@@ -106,6 +106,24 @@ def test_an_empty_folder_is_reported(fleet):
 
 
 @pytest.mark.parametrize(
+    ("name", "detail"),
+    [
+        ("t1/hammer/2024-05-13/B_1.uff", ": 'B' is no section of the layout."),
+        ("t1/hammer/2024-05-13/a_1.uff", ": 'a' is no section of the layout."),
+        ("t1/hammer/13-05-2024/A_1.uff", ": '13-05-2024' is no day as YYYY-MM-DD."),
+        ("t1/hammer/2024-05-13/A_1-2.uff", ": '1-2' is not of letters and digits alone."),
+        ("t1/passages/yesterday.tdms", ": 'yesterday' is no start as YYYYMMDDTHHMMSSZ."),
+        ("t1/hammer/13-05-2024/B_1.uff", "its name follows no pattern of the layout."),
+        ("t1/hammer/2024-05-13/notes/A_1.uff", "its name follows no pattern of the layout."),
+    ],
+)
+def test_the_part_by_which_alone_a_name_misses_the_pattern_is_named(fleet, name, detail):
+    add(fleet, name)
+    (problem,) = scan(turnout(fleet), fleet / "raw").problems
+    assert detail in str(problem)
+
+
+@pytest.mark.parametrize(
     ("name", "found"),
     [
         ("t2/hammer/2024-13-45/A_1.uff", "'2024-13-45' is no day of the calendar"),
