@@ -96,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
 def _faults(configuration: Configuration, formats: Collection[str], to_si: Callable[..., Conversion]) -> Iterator[str]:
     """Each fault that stops no turnout, with its consequence."""
     from turnout.config.load import errors_of_unused_layouts
-    from turnout.stages.layout_checks import faults_of_sections, faults_of_tracks
+    from turnout.stages.layout_checks import faults_of_sections, faults_of_tracks, faults_of_vehicles
 
     for warning in configuration.warnings:
         yield f"does not count: {warning}"
@@ -104,6 +104,7 @@ def _faults(configuration: Configuration, formats: Collection[str], to_si: Calla
         yield f"used by no turnout: {error}"
     yield from faults_of_sections(configuration)
     yield from faults_of_tracks(configuration)
+    yield from faults_of_vehicles(configuration)
 
 
 def _open_decisions(configuration: Configuration, layouts: Iterable[str]) -> Iterator[str]:

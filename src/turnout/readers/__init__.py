@@ -120,11 +120,11 @@ def read_unconverted(
     source = replace(load(path, root), lazy=is_lazy)
     _reject_one_byte(source)
     with _as_read_error(source):
-        found = _format_of(source, RawDescription((), format=format))
+        file_format = _format_of(source, RawDescription((), format=format))
         with _collected_warnings(source) as remarks:
-            raw = found.read_raw(source)
+            raw = file_format.read_raw(source)
     raw = replace(raw, remarks=(*raw.remarks, *remarks))
-    return source, next(name for name, known in FORMATS.items() if known is found), raw
+    return source, next(name for name, entry in FORMATS.items() if entry is file_format), raw
 
 
 def names_and_units(path: PathLike | str, root: PathLike | str, format: str = "auto") -> tuple[tuple[str, str], ...]:

@@ -129,7 +129,7 @@ class Track:
             k, j = np.argwhere(negative)[0]
             value, position = values[k, j], self.support[j]
             raise SimulationError(
-                f"{self.name}: {NOT_NEGATIVE[k]} of support {j} at {position:.3f} m is negative: {value!r}."
+                f"{self.name}: {NOT_NEGATIVE[k]} of support {j} at {position:.3f} m is negative: {value:g}."
             )
 
     @property

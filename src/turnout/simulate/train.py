@@ -65,6 +65,11 @@ def train(parameters: ParameterSet, load: float = 0.5, units: int = 1) -> Vehicl
     if units < 1:
         raise SimulationError(f"{p['name']}: {units!r} units.")
     length = p.number("length", "m")
+    for entry in (e for name in ("cars", "bogies", "axles") for e in p.mappings_at(name)):
+        centre = entry.number("centre", "m")
+        if not 0.0 <= centre <= length:
+            problem = f"{centre:g} m is outside the unit, whose length is {length:g} m"
+            raise entry.error("centre", problem, "Correct it, or the length; centres are counted from the front end")
     bodies: list[Body] = []
     suspensions: list[Suspension] = []
     wheels: list[int] = []

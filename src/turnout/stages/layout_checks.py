@@ -1,4 +1,4 @@
-"""Check the positions of a layout against the track that simulates it."""
+"""Check the files of tracks and vehicles, and the positions of a layout against the track that simulates it."""
 
 from __future__ import annotations
 
@@ -7,11 +7,15 @@ from pathlib import Path
 
 from turnout.config import Configuration
 from turnout.config.document import Branch
+from turnout.config.parameter_files import read_unchanged_parameters
+from turnout.config.settings.passage import PassageSettings
 from turnout.errors import ConfigError, TurnoutError
-from turnout.simulate import load_track
+from turnout.simulate import load_track, load_vehicle
 from turnout.simulate.parameters import off_track_errors
 from turnout.simulate.run import Drive
 from turnout.simulate.turnout_track import TurnoutTrack
+from turnout.stages.parameter_ranges import improbable_values
+from turnout.stages.passage_context import known_patterns
 
 MAX_POSITION_DIFFERENCE = 0.5  # m: a larger difference between layout and track file is an error
 END_MARGIN = Drive.entry + Drive.margin  # m: closer to an end of the track a train is not completely on it
@@ -61,6 +65,7 @@ def faults_of_tracks(configuration: Configuration) -> Iterator[str]:
     for path in sorted((configuration.folder / "tracks").glob("*.yaml")):
         try:
             tracks[path] = load_track(str(path), folder=path.parent)
+            yield from (f"improbable: {error}" for error in improbable_values(read_unchanged_parameters(path)))
             yield from (f"not on the track: {error}" for error in off_track_errors(path))
             _check_entries(tracks[path])
         except ConfigError as error:
@@ -77,6 +82,32 @@ def faults_of_tracks(configuration: Configuration) -> Iterator[str]:
         if file is not None:
             faults |= {f"not on the track: {error}": None for error in _position_errors(tree, tracks[file], file)}
     yield from faults
+
+
+def faults_of_vehicles(configuration: Configuration) -> Iterator[str]:
+    """Faults of vehicle files and of the axle patterns: unreadable, or values that no vehicle has.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Configuration with its folder of vehicles.
+
+    Yields
+    ------
+    str
+        One fault, as a sentence.
+    """
+    for path in sorted((configuration.folder / "vehicles").glob("*.yaml")):
+        try:
+            if path.name == Path(PassageSettings().axle_patterns).name:
+                known_patterns(str(path))
+                continue
+            load_vehicle(str(path), folder=path.parent)
+            yield from (f"improbable: {error}" for error in improbable_values(read_unchanged_parameters(path)))
+        except ConfigError as error:
+            yield f"no train: {error}"
+        except TurnoutError as error:
+            yield f"no train: {path}: {error}"
 
 
 def faults_of_sections(configuration: Configuration) -> Iterator[str]:

@@ -160,6 +160,10 @@ def _read_patterns(path: str, content: str) -> tuple[Pattern, ...]:
             return read_patterns(YAML(typ="safe").load(Path(path)))
     except (KeyError, ValueError, TypeError, AttributeError, MarkedYAMLError) as error:
         message = " ".join(str(error).split()).strip("'\"")
+        if isinstance(error, KeyError) and len(message.split()) == 1:
+            message = f"{message!r} is missing"
+        elif isinstance(error, (TypeError, AttributeError)):
+            message = f"they are not two tables of names with values ({message})"
         raise ConfigError(path, "vehicles and trains", message, "See docs/passages.md") from None
 
 

@@ -289,5 +289,5 @@ def _wrong_field(inside: str, turnout: TurnoutConfig) -> str:
     """The part by which alone a name misses a pattern of the layout; "" if it misses all by more."""
     labels = tuple(section.label for section in turnout.sections)
     patterns = (("hammer", turnout.hammer, labels), ("passages", turnout.passages, ()))
-    details = (wrong_field(inside, part.files, branch, sections) for branch, part, sections in patterns if part)
+    details = (wrong_field(inside, layout.files, branch, sections) for branch, layout, sections in patterns if layout)
     return next(filter(None, details), "")

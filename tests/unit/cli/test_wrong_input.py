@@ -305,3 +305,39 @@ def test_an_entry_of_a_track_file_that_cannot_be_simulated_is_a_fault_of_the_con
     assert main(["check"]) == 1
     printed = capsys.readouterr().out
     assert "no simulation: " in printed and str(track.relative_to(project)) in printed and ENTRIES[entry] in printed
+
+
+VALUES = {
+    "tracks/tommerup.yaml: {value: 466.3, unit: MN/m => {value: 466.3, unit: N/m": (
+        "improbable: config/tracks/tommerup.yaml, line 43, sections[0].pad_stiffness: 466.3 N/m is outside 1e+06 to"
+    ),
+    "tracks/tommerup.yaml: {value: 210, unit: GPa => {value: 210, unit: Pa": "rail.youngs_modulus: 210 Pa is outside",
+    "tracks/tommerup.yaml: prior: 0.03} => prior: 30}": "a prior of 30 is a standard deviation of 3000 %. Write it as",
+    "vehicles/ic3.yaml: {value: 24.6, unit: t => {value: 24.6, unit: kg": (
+        "improbable: config/vehicles/ic3.yaml, line 15, car_types.end_car.mass: 24.6 kg is outside 100 to 300000 kg."
+    ),
+    "vehicles/ic3.yaml: {value: 0.43, unit: m => {value: 430, unit: m": "wheel.radius: 430 m is outside 0.1 to 1 m.",
+    "vehicles/ic3.yaml: centre: {value: 54.6 => centre: {value: 154.6": (
+        "no train: config/vehicles/ic3.yaml, line 41, bogies[3].centre: 154.6 m is outside the unit, whose length is"
+    ),
+    "vehicles/ic3.yaml: type: end_bogie => type: end_bogy": "no train: config/vehicles/ic3.yaml, line 22, bogie_types:",
+    "vehicles/axle_patterns.yaml: vehicles: => vehicle:": (
+        "no train: config/vehicles/axle_patterns.yaml, vehicles and trains: 'vehicles' is missing."
+    ),
+    "vehicles/axle_patterns.yaml: trains: => trains: []\nothers:": "they are not two tables of names with values",
+}
+
+
+@pytest.mark.parametrize("change", VALUES)
+def test_files_of_tracks_and_vehicles_are_checked(project, capsys, change):
+    name, _, edit = change.partition(": ")
+    old, new = edit.split(" => ")
+    path = project / "config" / name
+    assert main(["check"]) == 1  # the example has a problem in its raw files alone
+    printed = capsys.readouterr().out
+    assert "improbable" not in printed and "no train" not in printed
+    content = path.read_text()
+    assert old in content
+    path.write_text(content.replace(old, new, 1))
+    assert main(["check"]) == 1
+    assert VALUES[change] in capsys.readouterr().out

@@ -54,9 +54,7 @@ def test_a_pattern_of_the_wrong_length_says_both_lengths():
 def test_negative_stiffness_says_support_place_and_value():
     stiffness = TRACK.ballast_stiffness.copy()
     stiffness[7] = -1e6
-    with pytest.raises(
-        SimulationError, match=r"ballast_stiffness of support 7 at 4\.200 m is negative: np\.float64\(-1000000"
-    ):
+    with pytest.raises(SimulationError, match=r"ballast_stiffness of support 7 at 4\.200 m is negative: -1e\+06\."):
         TRACK.with_(ballast_stiffness=stiffness)
 
 

@@ -1,0 +1,78 @@
+"""Values of track and vehicle files that no track or vehicle has: as a rule, a unit is wrong by a prefix."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from turnout.config.parameters import Number, ParameterSet
+from turnout.errors import ConfigError
+
+# (name, unit) -> smallest and largest value; each range is some ten times wider than what tracks and vehicles have.
+RANGES = {
+    ("pad_stiffness", "N/m"): (1e6, 1e11),
+    ("ballast_stiffness", "N/m"): (1e6, 1e11),
+    ("subgrade_stiffness", "N/m"): (1e6, 1e11),
+    ("pad_damping", "N s/m"): (1e1, 1e7),
+    ("ballast_damping", "N s/m"): (1e2, 1e8),
+    ("sleeper_mass", "kg"): (10.0, 2000.0),
+    ("ballast_mass", "kg"): (10.0, 10000.0),
+    ("youngs_modulus", "Pa"): (1e10, 1e12),
+    ("shear_modulus", "Pa"): (5e9, 5e11),
+    ("second_moment", "m⁴"): (1e-7, 1e-2),
+    ("area", "m²"): (1e-4, 1.0),
+    ("mass", "kg/m"): (10.0, 1000.0),
+    ("density", "kg/m³"): (1000.0, 20000.0),
+    ("spacing", "m"): (0.2, 2.0),
+    ("radius", "m"): (0.1, 1.0),
+    ("contact", "N/m^1.5"): (1e9, 1e13),
+    ("mass", "kg"): (100.0, 300000.0),
+    ("wheelset_mass", "kg"): (100.0, 10000.0),
+    ("primary_stiffness", "N/m"): (1e4, 1e10),
+    ("secondary_stiffness", "N/m"): (1e4, 1e10),
+    ("suspension_stiffness", "N/m"): (1e4, 1e10),
+    ("base", "m"): (0.5, 10.0),
+}
+MAX_PRIOR = 5.0  # relative standard deviation: a larger one is in percent
+
+
+def improbable_values(parameters: ParameterSet) -> Iterator[ConfigError]:
+    """An error for each number of a file that no track or vehicle has, and for each prior that is in percent.
+
+    Parameters
+    ----------
+    parameters : ParameterSet
+        A track or vehicle file.
+
+    Yields
+    ------
+    ConfigError
+        With file, line and entry. 0 is never improbable: it leaves a part out.
+    """
+    for key, value in parameters.items():
+        if isinstance(value, Number):
+            yield from _errors(parameters, str(key), value)
+        else:
+            for entry in _mappings(value):
+                yield from improbable_values(entry)
+
+
+def _mappings(value: Any) -> Iterator[ParameterSet]:
+    """The mappings of a value: itself, or those of a list."""
+    if isinstance(value, ParameterSet):
+        yield value
+    elif isinstance(value, list):
+        for item in value:
+            yield from _mappings(item)
+
+
+def _errors(parameters: ParameterSet, key: str, number: Number) -> Iterator[ConfigError]:
+    low, high = RANGES.get((key, number.unit), (None, None))
+    if low is not None and high is not None and number.value and not low <= abs(number.value) <= high:
+        problem = f"{number.value:g} {number.unit} is outside {low:g} to {high:g} {number.unit}"
+        yield parameters.error(key, problem, "Correct the number or its unit")
+    if number.prior is not None and number.prior > MAX_PRIOR:
+        problem = f"a prior of {number.prior:g} is a standard deviation of {100 * number.prior:g} %"
+        yield parameters.error(
+            key, problem, f"Write it as a share, such as {number.prior / 100:g} for {number.prior:g} %"
+        )
