@@ -65,6 +65,6 @@ def _is_number(value: object) -> bool:
     """Whether the value of an entry is a number other than 0 and 1, or several."""
     if isinstance(value, str):
         stated = number_and_unit(value)
-        return stated is not None and parts[0] not in (0.0, 1.0)
+        return stated is not None and stated[0] not in (0.0, 1.0)
     numbers = finite_numbers(value)
     return numbers is not None and any(number not in (0.0, 1.0) for number in numbers)
