@@ -223,11 +223,15 @@ def calibrate_turnout(
     code = "-".join([code, *sorted(without)])
     units_of_visits = {v: unit_of(turnout_id, v, units, turnout.hashes["mismatch"]) for v, units in by_visit.items()}
     versions = {v: version_of(unit, turnout, raw_root, track, code) for v, unit in units_of_visits.items()}
-    complete = {s.visit for s in read_visits(folder, turnout_id, versions)}
+    stored = read_visits(folder, turnout_id, versions)
+    diagnosed_alone = {s.visit for s in stored if not s.fitted}
+    complete = {s.visit for s in stored} - diagnosed_alone
     missing, notes = [label for label in by_visit if label not in complete], list(copies)
+    answers = {(s.visit, s.sections): s.answer for s in stored if s.visit in diagnosed_alone}
 
     def fit_visit(label: str) -> list[FittedGroup]:
         about = {"turnout": turnout, "visit": label, "version": versions[label], "without": without}
+        about["answers"] = {sections: answer for (visit, sections), answer in answers.items() if visit == label}
         print(f"{turnout_id}: fit of visit {label}", file=sys.stderr, flush=True)
         fitted, reasons = _fit_visit(folder, by_visit[label], raw_root, work, track, about)
         notes.extend(reasons)
@@ -292,21 +296,27 @@ def _fit_visit(
     track: str | None,
     about: Mapping[str, Any],
 ) -> tuple[list[FittedGroup], list[str]]:
-    """Fit the groups of a visit and store their information: fits, and reasons why a group could not be fitted."""
-    turnout, fitted, notes = about["turnout"], list[FittedGroup](), list[str]()
+    """Fit the groups of a visit and store their information: fits, and reasons why a group could not be fitted.
+
+    ``about["answers"]`` are those of its diagnosis, by sections. A visit with answers is fitted as it was diagnosed.
+    """
+    turnout, fitted, notes, answers = about["turnout"], list[FittedGroup](), list[str](), about["answers"]
     turnout_track, accepted = track_of(turnout, track)
     _, passage_tables = mismatch_context(turnout.id, work=work)
     inputs = gather_inputs(units, turnout, raw_root, turnout_track, passage_tables)
-    usable = list(groups(turnout, turnout_track, inputs, limits=MAX_PASSAGES_AND_AXLES))
+    limits, selections = (None, [of.split(", ") for of in answers]) if answers else (MAX_PASSAGES_AND_AXLES, [()])
+    usable = [g for labels in selections for g in groups(turnout, turnout_track, inputs, labels, limits)]
     about = {**about, "notes": notes_in_words(about["visit"], inputs.notes)}  # ``groups`` adds some
     if not usable:
         return [], summary_of_notes(about["notes"])
     for group in usable:
         try:
             on_route = tuple(a for a in accepted if a.is_on(group.route))
-            campaign = replace(group.campaign, reserved=names_beyond(group.campaign, MAX_FITTED_AXLES))
+            campaign = group.campaign
+            if not answers:
+                campaign = replace(campaign, reserved=names_beyond(campaign, MAX_FITTED_AXLES))
             case = TrackCase(campaign, turnout.settings["mismatch"], accepted=on_route)
-            fitted.append(store_visit(folder, group, case, "", about))
+            fitted.append(store_visit(folder, group, case, answers.get(", ".join(group.labels), ""), about))
         except (SimulationError, np.linalg.LinAlgError) as error:
             notes.append(f"visit {about['visit']}, sections {', '.join(group.labels)}: {error}")
     return fitted, notes

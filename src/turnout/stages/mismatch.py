@@ -195,12 +195,15 @@ def _diagnose_group(
         case = TrackCase(group.campaign, settings, accepted=(*accepted, *changed), cache=budget)
         diagnosis = diagnose(case, settings, report_progress, store)
         rows = finding_tables(diagnosis, case, group, about)
-        folder = stored_visits.folder_of(options.fits)
+        folder, answer = stored_visits.folder_of(options.fits), diagnosis.verdict.answer
         fits: Checkpoint | None = store
         if changed:  # the calibrated model has accepted changes as noise of its process, not as effects of a visit
             case, fits = TrackCase(group.campaign, settings, accepted=accepted, cache=budget), None
         stored_about = {**about, "notes": notes_in_words(about["visit"], about["notes"])}
-        stored_visits.store_visit(folder, group, case, diagnosis.verdict.answer, stored_about, fits)
+        if answer in stored_visits.USED_ANSWERS:
+            stored_visits.store_visit(folder, group, case, answer, stored_about, fits)
+        else:  # such a visit does not change the belief
+            stored_visits.store_answer(folder, group, case, answer, stored_about)
         rows["twin_states"] = calibrated_model.state_rows(
             folder, turnout, group, case, rows["mismatch_findings"][0], about
         )

@@ -47,7 +47,8 @@ NOSE_POSITION = "place of the kink"  # begin of the name of a parameter
 class StoredVisit:
     """Information of one group of sections at one visit: ``answer`` of its diagnosis, "" without one.
 
-    ``notes`` are those of ``notes_in_words`` on the recordings of the visit.
+    ``notes`` are those of ``notes_in_words`` on the recordings of the visit. Of a visit that is not ``fitted`` yet only
+    the answer is known.
     """
 
     visit: str
@@ -56,6 +57,7 @@ class StoredVisit:
     groups: tuple[GroupInformation, ...]
     parameters: tuple[StateParameter, ...]
     notes: tuple[tuple[str, str, bool], ...] = ()
+    fitted: bool = True
 
 
 def folder_of(fits: str | Path) -> Path:
@@ -153,16 +155,40 @@ def store_visit(
         fit = _fit_again(case, fit, may_be_large, partners)
     fitted = FittedGroup(*with_reserved_passages(case, fit), parameters, sections, group.route)
     information = visit_groups(fitted.case, fitted.fit, sections, group.route)
+    _write_visit(folder, group, parameters, answer, about, information)
+    return replace(fitted, fit=fitted.fit.without_jacobian())
+
+
+def store_answer(folder: Path, group: Group, case: TrackCase, answer: str, about: Mapping[str, Any]) -> None:
+    """Write the answer of a group of sections at one visit, which is fitted where its information is asked for.
+
+    Of a visit with an open finding this is only where a change is sought.
+
+    Parameters
+    ----------
+    folder, group, case, answer, about
+        As ``store_visit``.
+    """
+    _write_visit(folder, group, calibrated_parameters(case, group.route), answer, about, None)
+
+
+def _write_visit(
+    folder: Path,
+    group: Group,
+    parameters: Mapping[str, StateParameter],
+    answer: str,
+    about: Mapping[str, Any],
+    information: Iterable[GroupInformation] | None,
+) -> None:
     value = {
-        "version": dict(about["version"]), "visit": about["visit"], "sections": sections, "answer": answer,
-        "notes": [list(note) for note in about.get("notes", ())],
-        "parameters": [asdict(p) for p in parameters.values()],
-        "groups": packed_groups(information),
+        "version": dict(about["version"]), "visit": about["visit"], "sections": ", ".join(group.labels),
+        "answer": answer, "notes": [list(note) for note in about.get("notes", ())],
+        "parameters": [asdict(p) for p in parameters.values()], "fitted": information is not None,
+        "groups": packed_groups(information or ()),
     }  # fmt: skip
     path = _path(folder, about["turnout"].id, about["visit"], group.labels)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_value(path, value)
-    return replace(fitted, fit=fitted.fit.without_jacobian())
 
 
 def _fit_again(case: TrackCase, fit: Fit, may_be_large: Collection[str], partners: Mapping[str, str]) -> Fit:
@@ -232,7 +258,8 @@ def read_visits(folder: Path, turnout_id: str, versions: Mapping[str, Mapping[st
         information = unpacked_groups(value["groups"])
         parameters = tuple(StateParameter(**p) for p in value["parameters"])
         notes = tuple((visit, words, of_passage) for visit, words, of_passage in value.get("notes", ()))
-        stored.append(StoredVisit(value["visit"], value["sections"], value["answer"], information, parameters, notes))
+        about = value["visit"], value["sections"], value["answer"]
+        stored.append(StoredVisit(*about, information, parameters, notes, value.get("fitted", True)))
     return sorted(stored, key=lambda s: (s.visit, s.sections))
 
 

@@ -14,7 +14,7 @@ from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.hammer_prescreen import _Prescreen, _Start
 from turnout.mismatch.engine.joint_problem import JointProblem
 from turnout.mismatch.engine.levenberg_marquardt import DampedSteps
-from turnout.mismatch.engine.map_fit import cost_after, fit_jointly
+from turnout.mismatch.engine.map_fit import fit_jointly, steps_from
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.score import Score
@@ -221,17 +221,40 @@ def test_a_trial_costs_what_the_fit_costs_without_its_last_derivatives(monkeypat
     asked, jacobian = [], JointProblem.jacobian
     monkeypatch.setattr(JointProblem, "jacobian", lambda self, *a: asked.append(1) or jacobian(self, *a))
     case, at = Bent(False), {f"x{k}": 0.5 for k in range(12)}
-    cost = cost_after(case, (), np.zeros(0), at, 3)
+    cost, values, _ = steps_from(case, (), np.zeros(0), at, 3)
     assert len(asked) == 3  # where each of the three steps starts
     fit = fit_jointly(case, values=at, iterations=3)
-    assert cost == fit.cost and len(asked) == 3 + 4
+    assert (cost, values) == (fit.cost, fit.values) and len(asked) == 3 + 4
 
 
 def test_a_trial_ends_early_only_where_its_steps_do_not_lead_to_the_cost_that_is_sought():
     case, at = Bent(False), {f"x{k}": 0.5 for k in range(12)}
-    start, end = (cost_after(case, (), np.zeros(0), at, steps) for steps in (0, 3))
-    assert cost_after(case, (), np.zeros(0), at, 3, end + 1.0) == end < start
-    assert cost_after(case, (), np.zeros(0), at, 3, -1e6) == start
+    start, end = (steps_from(case, (), np.zeros(0), at, steps)[0] for steps in (0, 3))
+    assert steps_from(case, (), np.zeros(0), at, 3, end + 1.0)[0] == end < start
+    assert steps_from(case, (), np.zeros(0), at, 3, -1e6)[0] == start
+
+
+def test_a_fit_goes_on_from_the_end_of_its_trial():
+    """It ends where a fit from the priors does, and the steps of the trial are not made again."""
+    case, base = Bent(False), fit_jointly(Bent(False), iterations=40)
+    case.with_broad_errors = lambda: case
+    candidate = SimpleNamespace(
+        key="a", parameters=(), term=lambda psi: None, refit=SimpleNamespace(prescreen_group=""),
+        site=EffectSite(),
+    )  # fmt: skip
+    fits = []
+    for tried in (False, True):
+        step = _Prescreen(MismatchSettings(), case, case, (), base, replace(base, evidence=0.0))
+        if tried:
+            step._trial_gain(candidate, np.zeros(0), -np.inf)
+        predict, n = Bent.predict, []
+        case.predict = lambda *a: n.append(1) or predict(case, *a)
+        fits.append((step.fit(candidate, np.zeros(0)), len(n)))
+        del case.predict
+    (alone, n_alone), (after_trial, n_after) = fits
+    assert after_trial.gain == pytest.approx(alone.gain, abs=1e-6)
+    assert after_trial.values == pytest.approx(alone.values, abs=1e-6)
+    assert n_after < n_alone
 
 
 def test_sites_are_tried_until_they_do_not_lead_to_the_two_best(monkeypatch):

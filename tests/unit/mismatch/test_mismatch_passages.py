@@ -15,10 +15,11 @@ from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.turnout import TrackCase, passage_observation
 from turnout.mismatch.turnout.candidates.wheel_flats import FlatEvidence, flat_candidates
-from turnout.mismatch.turnout.passage_alignment import align, low_pass
+from turnout.mismatch.turnout.passage_alignment import _best_alignment, align, low_pass
+from turnout.mismatch.turnout.passage_band import limit_band, read_at
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
-from turnout.mismatch.turnout.priors import ALIGNMENT
+from turnout.mismatch.turnout.priors import ALIGNMENT, SIMULATION
 from turnout.mismatch.turnout.screening import _passage_channel_changes
 from turnout.physics.transfer import TransferTerm
 
@@ -171,6 +172,26 @@ def test_the_derivative_by_a_sensors_place_is_where_the_simulation_goes_when_it_
     assert np.linalg.norm(expected) > 0.0
     # signals are solved to 1e-3 of the contact force; two runs with other probes may differ by rounding alone
     assert np.linalg.norm(column[:, names.index(moved)] - expected) < 1e-6 * np.linalg.norm(expected)
+
+
+@pytest.mark.parametrize("without_worst", [False, True])
+def test_all_lags_at_once_are_as_good_as_one_by_one(without_worst):
+    """Correlations by transforms, of all sensors together, against sums of products for each sensor and lag."""
+    rng = np.random.default_rng(3)
+    low = limit_band(rng.normal(size=(3, 900)), 1800.0, high=ALIGNMENT.band_end)
+    time = np.arange(0.0, 0.5, ALIGNMENT.sample_step)
+    data = np.zeros((3, 500))
+    data[:, 37 : 37 + time.size] = read_at(low, 1800.0, time * 1.005 - 0.005 * SIMULATION.lead_time)
+    data[0] *= -1.0 if without_worst else 1.0
+    by_hand = []
+    for stretch in np.linspace(-ALIGNMENT.max_stretch, ALIGNMENT.max_stretch, ALIGNMENT.n_stretches):
+        model = read_at(low, 1800.0, SIMULATION.lead_time + (time - SIMULATION.lead_time) * (1.0 + stretch))
+        pairs = [(d / np.linalg.norm(d), m / np.linalg.norm(m)) for d, m in zip(data, model)]
+        by_sensor = np.array([np.correlate(d, m, "full") for d, m in pairs])
+        scores = (by_sensor.sum(axis=0) - without_worst * by_sensor.min(axis=0)) / (3 - without_worst)
+        by_hand.append((scores.max(), int(np.argmax(scores)) - time.size + 1, stretch))
+    found = _best_alignment(data, low, 1800.0)
+    assert found == pytest.approx(max(by_hand), abs=1e-9) and found[1:] == pytest.approx((37, 0.005))
 
 
 @pytest.mark.parametrize("wrong", [0, 1])

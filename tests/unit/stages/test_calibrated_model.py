@@ -201,13 +201,36 @@ def test_the_stage_writes_the_state_after_a_visit_and_a_finding_keeps_the_visit_
     assert main(["twin", "--turnout", "t1"]) == 0
     printed = capsys.readouterr().out
     assert f"visit {DAYS[3]} A, B is not used: its diagnosis is named, and not accepted" in printed
-    assert "(2 fitted now)" in printed and "against the file: nothing differs" in printed
+    assert "(3 fitted now)" in printed and "against the file: nothing differs" in printed
     size, sd = map(float, re.search(r"local pad, pad@18.00 (-[\d.]+) ± ([\d.]+) ln", printed).groups())
     assert size == pytest.approx(np.log(small.SOFT), abs=3.0 * sd)
     factor = float(re.search(r"local pad, pad@18.00 .* ln \(([\d.]+) times\)", printed)[1])
     assert factor == pytest.approx(small.SOFT, rel=3.0 * sd)
     assert printed.count("ln: logarithm of the value divided by that of the track file") == 1
     assert f"appeared after {DAYS[2]}, at the latest at {DAYS[3]}" in printed
+
+
+def test_a_visit_with_a_finding_is_fitted_where_a_change_is_sought_as_if_it_had_been_at_once(turnout, monkeypatch):
+    """Its answer stays: the belief does not use it."""
+
+    def stored():
+        (visit,) = read_visits(Path("work/calibrated-model"), "t1", {DAYS[3]: {}})
+        return visit
+
+    with monkeypatch.context() as at_once:
+        at_once.setattr(mismatch.stored_visits, "USED_ANSWERS", ("none", "", "named"))
+        diagnose_turnout("t1", visit=DAYS[3], work="at-once")
+    (expected,) = read_visits(Path("at-once/calibrated-model"), "t1", {DAYS[3]: {}})
+    diagnose_turnout("t1", visit=DAYS[3])
+    assert not stored().fitted and not stored().groups and stored().parameters == expected.parameters
+    model = calibrated.calibrate_turnout("t1")
+    assert DAYS[3] in model.computed and model.held == {f"{DAYS[3]} A, B": "named"}
+    assert stored().fitted and stored().answer == expected.answer == "named"
+    for group, of_expected in zip(stored().groups, expected.groups, strict=True):
+        assert (group.group, group.names) == (of_expected.group, of_expected.names)
+        np.testing.assert_allclose(group.matrix, of_expected.matrix, rtol=1e-9)
+        np.testing.assert_allclose(group.vector, of_expected.vector, rtol=1e-9)
+    assert calibrated.calibrate_turnout("t1").computed == ()
 
 
 def test_work_on_the_track_opens_what_it_touches(turnout):

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.engine.map_fit import cost_after, fit_jointly
+from turnout.mismatch.engine.map_fit import fit_jointly, steps_from
 from turnout.mismatch.engine.projector import Projector
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
@@ -54,7 +54,8 @@ class _Start(NamedTuple):
 class _Prescreen:
     """The cheap observations with broad and with actual errors, and the fits of the ``accepted`` effects to both.
 
-    ``trial_gains`` are gains of trial fits at the sites of a group of families.
+    ``trial_gains`` are gains of trial fits at the sites of a group of families, ``trial_ends`` the nuisances and
+    parameters where trials of a candidate from a start ended: its fit goes on from there.
     """
 
     settings: MismatchSettings
@@ -64,18 +65,20 @@ class _Prescreen:
     broad_fit: Fit
     base: Fit
     trial_gains: dict[tuple, float] = field(default_factory=dict)
+    trial_ends: dict[tuple, tuple[dict[str, float], np.ndarray]] = field(default_factory=dict)
 
     def fit(self, candidate: Candidate, start: np.ndarray) -> PrescreenFit | None:
-        """Fit from the priors with the broad errors, then with the actual ones.
+        """Fit from the priors, or the end of a trial from there, with the broad errors, then with the actual ones.
 
         None if the simulation fails, or if the broad fit of a family that is tried without any promise gains too
         little.
         """
         candidates = (*self.accepted, candidate)
-        psi, n = np.concatenate([self.broad_fit.psi, start]), self.broad_fit.psi.size
+        from_priors = _prior_means(self.broad_case), np.concatenate([self.broad_fit.psi, start])
+        (values, psi), n = self.trial_ends.get((candidate.key, *start), from_priors), self.broad_fit.psi.size
         max_cost = self.broad_fit.cost - 2.0 * self.settings.promise if candidate.refit.prescreen_group else np.inf
         try:
-            broad_fit = _fit_cheaply(self.broad_case, candidates, psi, _prior_means(self.broad_case))
+            broad_fit = _fit_cheaply(self.broad_case, candidates, psi, values)
             if broad_fit.cost > max_cost:
                 return None
             refit = self._fit_actual(candidates, broad_fit)
@@ -159,9 +162,10 @@ class _Prescreen:
         values, steps = _prior_means(self.broad_case), THRESHOLDS.n_trial_steps
         sought_cost = self.broad_fit.cost - 2.0 * sought_gain
         try:
-            cost = cost_after(self.broad_case, candidates, psi, values, steps, sought_cost)
+            cost, *end = steps_from(self.broad_case, candidates, psi, values, steps, sought_cost)
         except SimulationError:
             return -np.inf
+        self.trial_ends[(candidate.key, *start)] = tuple(end)
         return 0.5 * (self.broad_fit.cost - cost)
 
 

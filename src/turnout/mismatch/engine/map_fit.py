@@ -85,15 +85,15 @@ def fit_jointly(
     return _fit_result(joint, *with_probable_division(joint, *end))
 
 
-def cost_after(
+def steps_from(
     case: Case,
     candidates: Iterable[Candidate],
     start: ArrayLike,
     values: Mapping[str, float],
     iterations: int,
     sought_cost: float = np.inf,
-) -> float:
-    """Cost of a joint fit to cheap observations after a few steps, without the derivatives that a ``Fit`` needs.
+) -> tuple[float, dict[str, float], np.ndarray]:
+    """End of a few steps of a joint fit to cheap observations, without the derivatives that a ``Fit`` needs.
 
     Parameters
     ----------
@@ -112,7 +112,11 @@ def cost_after(
 
     Returns
     -------
-    float
+    cost : float
+    values : dict
+        Nuisance parameters there.
+    psi : (n_term,) array of float
+        Parameters of the effects there.
 
     Raises
     ------
@@ -121,7 +125,8 @@ def cost_after(
     """
     joint = JointProblem(case, candidates, iterations=iterations)
     point = _start_point(joint, start, values)
-    return _iterate(joint, point, joint.jacobian(point.theta, point.predictions), 0, sought_cost)[0].cost
+    end, _ = _iterate(joint, point, joint.jacobian(point.theta, point.predictions), 0, sought_cost)
+    return end.cost, *joint.split(end.theta)
 
 
 def _start_point(joint: JointProblem, start: ArrayLike | None, values: Mapping[str, float] | None) -> FitPoint:

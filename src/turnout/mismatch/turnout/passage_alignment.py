@@ -7,9 +7,10 @@ where a few passages correlate best with the simulation below 30 Hz.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
+from scipy.fft import next_fast_len
 
 from turnout.errors import SimulationError
 from turnout.mismatch.turnout.campaign import CampaignInput, PassageInput
@@ -85,29 +86,28 @@ def align(passage: PassageInput, data: np.ndarray, simulated: np.ndarray, rate: 
 def _best_alignment(data: np.ndarray, low: np.ndarray, rate: float) -> tuple[float, int, float]:
     """(correlation, lag in steps, stretch) of the best alignment of the simulation ``low`` with ``data``."""
     n_sensor, model_time = len(data), np.arange(0.0, low.shape[-1] / rate, ALIGNMENT.sample_step)
-    size = 1 << int(np.ceil(np.log2(data.shape[1] + model_time.size)))
-    spectrum = np.fft.rfft(data, size)
-    weight = 1.0 / np.maximum(np.sqrt(np.sum(data**2, axis=1)), 1e-12)
-    all_sensors, without_worst = [], []
-    for stretch in np.linspace(-ALIGNMENT.max_stretch, ALIGNMENT.max_stretch, ALIGNMENT.n_stretches):
-        model = read_at(low, rate, SIMULATION.lead_time + (model_time - SIMULATION.lead_time) * (1.0 + stretch))
-        norm = np.maximum(np.sqrt(np.sum(model**2, axis=1)), 1e-12)
-        product = np.fft.irfft(spectrum * np.fft.rfft(model, size).conj(), size)
-        correlations = (weight / norm)[:, None] * product
-        total, worst = correlations.sum(axis=0), correlations.min(axis=0)
-        all_sensors.append(_peak_alignment(total / n_sensor, stretch))
-        without_worst.append(_peak_alignment((total - worst) / max(n_sensor - 1, 1), stretch))
-    best_fit = max(all_sensors)
+    size = next_fast_len(data.shape[1] + model_time.size, real=True)
+    spectrum = np.fft.rfft(data / np.maximum(np.linalg.norm(data, axis=1, keepdims=True), 1e-12), size)
+
+    def products() -> Iterator[tuple[float, np.ndarray]]:
+        """(stretch, spectra of the correlation of each sensor)."""
+        for stretch in np.linspace(-ALIGNMENT.max_stretch, ALIGNMENT.max_stretch, ALIGNMENT.n_stretches):
+            model = read_at(low, rate, SIMULATION.lead_time + (model_time - SIMULATION.lead_time) * (1.0 + stretch))
+            model /= np.maximum(np.linalg.norm(model, axis=1, keepdims=True), 1e-12)
+            yield float(stretch), spectrum * np.fft.rfft(model, size).conj()
+
+    best_fit = max(_peak(np.fft.irfft(s.sum(axis=0), size) / n_sensor, stretch) for stretch, s in products())
     if best_fit[0] < ALIGNMENT.min_correlation and n_sensor >= 3:
-        best_fit = max(without_worst)
+        by_sensor = ((stretch, np.fft.irfft(s, size)) for stretch, s in products())
+        best_fit = max(_peak((c.sum(axis=0) - c.min(axis=0)) / (n_sensor - 1), stretch) for stretch, c in by_sensor)
     correlation, k, stretch = best_fit
     return correlation, k if k < size - model_time.size else k - size, stretch
 
 
-def _peak_alignment(score: np.ndarray, stretch: float) -> tuple[float, int, float]:
+def _peak(score: np.ndarray, stretch: float) -> tuple[float, int, float]:
     """(correlation, lag in steps, stretch) at the largest score."""
     k = int(np.argmax(score))
-    return float(score[k]), k, float(stretch)
+    return float(score[k]), k, stretch
 
 
 class PassageAligner:

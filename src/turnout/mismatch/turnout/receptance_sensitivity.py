@@ -6,7 +6,7 @@ The derivatives are sums of products of strains under two unit forces; those ove
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from turnout.mismatch.turnout.receptance_model import ReceptanceModel
     from turnout.mismatch.turnout.receptance_observation import FrfPair
     from turnout.mismatch.turnout.track_parameters import Zone
+    from turnout.simulate.rail import Rail
     from turnout.simulate.track import RailStretch
 
 
@@ -76,6 +77,12 @@ def rail_derivatives(
                 shear_imag += alone * y
             derivatives[k, line, 0], derivatives[k, line, 1] = -complex(real, imag), -complex(shear_real, shear_imag)
     return derivatives
+
+
+@lru_cache(maxsize=1024)
+def _mass_without_rotation(rail: Rail, length: float) -> np.ndarray:
+    """(4, 4) mass of a rail element without its rotary inertia [kg, kg m, kg m²]; tracks of one visit share rails."""
+    return element_mass(replace(rail, rotary_inertia=0.0), length)
 
 
 FIELDS = [o.field for o in SUPPORT_PARAMETERS]
@@ -271,27 +278,29 @@ class ReceptanceSensitivity:
         element counts by the share of the casting in its flexibility and mass.
         """
         matrices, (first, second) = self.model.matrices, self._positions[1]
-        h, p, ei, _ = matrices.elements
-        row = matrices.node_index
-        derivatives = [np.zeros((len(self.row), OMEGA.size, 0), dtype=complex)]
-        for c, (e, share) in zip(self.zone.castings, casting_elements(self.zone, matrices.node)):
-            flexibility_share, mass_share = self._casting_shares(c.piece, e, share)
-            ends = [self._displacements[..., row[e + side] + k] for side in (0, 1) for k in (0, 1)]
-            w, rotation = ends[::2], ends[1::2]
-            bent, skew = rotation[1] - rotation[0], (w[1] - w[0]) / h[e] - 0.5 * (rotation[0] + rotation[1])
-            sheared = flexibility_share * 12.0 * ei[e] / (h[e] * (1.0 + p[e]) ** 2)
-            bending = (
-                -(bent[first] * bent[second]) @ (flexibility_share * ei[e] / h[e])
-                - (skew[first] * skew[second]) @ sheared
+        if not self.zone.castings:
+            return np.zeros((len(self.row), OMEGA.size, 0), dtype=complex)
+        covered = [
+            (e, *self._casting_shares(c.piece, e, share), np.full(e.size, number))
+            for number, (c, (e, share)) in enumerate(
+                zip(self.zone.castings, casting_elements(self.zone, matrices.node))
             )
-            u = np.stack(ends, axis=-1)
-            mass = [
-                w_k * element_mass(replace(matrices.rails[k], rotary_inertia=0.0), h[k])
-                for w_k, k in zip(mass_share, e)
-            ]
-            inertia = np.einsum("pfei,eij->pfej", u, np.reshape(mass, (-1, 4, 4)))
-            derivatives += [bending[..., None], (OMEGA**2 * np.sum(u[first] * inertia[second], axis=(2, 3)))[..., None]]
-        return np.concatenate(derivatives, axis=-1)
+        ]
+        e, flexibility_share, mass_share, number = (np.concatenate(values) for values in zip(*covered))
+        h, p, ei, _ = (values[e] for values in matrices.elements)
+        row = matrices.node_index
+        w1, rotation1, w2, rotation2 = u = [
+            self._displacements[..., row[e + side] + k] for side in (0, 1) for k in (0, 1)
+        ]
+        bent, skew = rotation2 - rotation1, (w2 - w1) / h - 0.5 * (rotation1 + rotation2)
+        mass = np.array([_mass_without_rotation(matrices.rails[k], x) for k, x in zip(e, h)]).transpose(1, 2, 0)
+        inertia = [sum(u_i * m for u_i, m in zip(u, row_of_mass)) for row_of_mass in mass]
+        sheared = flexibility_share * 12.0 * ei / (h * (1.0 + p) ** 2)
+        bending = -(bent[first] * bent[second]) * (flexibility_share * ei / h) - (skew[first] * skew[second]) * sheared
+        inertial = sum(a[first] * b[second] for a, b in zip(u, inertia)) * mass_share
+        in_casting = np.eye(len(covered), dtype=complex)[number]
+        by_casting = bending @ in_casting, OMEGA[:, None] ** 2 * (inertial @ in_casting)
+        return np.stack(by_casting, axis=-1).reshape(len(self.row), OMEGA.size, -1)
 
     def _casting_shares(self, piece: RailStretch, elements: np.ndarray, shares: np.ndarray) -> np.ndarray:
         """(2, n) share of a piece in flexibility and mass of the elements, of whose length it covers ``shares``.
