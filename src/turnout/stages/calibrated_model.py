@@ -227,11 +227,11 @@ def calibrate_turnout(
     diagnosed_alone = {s.visit for s in stored if not s.fitted}
     complete = {s.visit for s in stored} - diagnosed_alone
     missing, notes = [label for label in by_visit if label not in complete], list(copies)
-    answers = {(s.visit, s.sections): s.answer for s in stored if s.visit in diagnosed_alone}
+    of_diagnosis = {(s.visit, s.sections): s.answer for s in stored if s.visit in diagnosed_alone}
 
     def fit_visit(label: str) -> list[FittedGroup]:
         about = {"turnout": turnout, "visit": label, "version": versions[label], "without": without}
-        about["answers"] = {sections: answer for (visit, sections), answer in answers.items() if visit == label}
+        about["answers"] = {sections: a for (visit, sections), a in of_diagnosis.items() if visit == label}
         print(f"{turnout_id}: fit of visit {label}", file=sys.stderr, flush=True)
         fitted, reasons = _fit_visit(folder, by_visit[label], raw_root, work, track, about)
         notes.extend(reasons)

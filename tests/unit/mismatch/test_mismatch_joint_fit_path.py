@@ -234,10 +234,10 @@ def test_a_trial_ends_early_only_where_its_steps_do_not_lead_to_the_cost_that_is
     assert steps_from(case, (), np.zeros(0), at, 3, -1e6)[0] == start
 
 
-def test_a_fit_goes_on_from_the_end_of_its_trial():
+def test_a_fit_goes_on_from_the_end_of_its_trial(monkeypatch):
     """It ends where a fit from the priors does, and the steps of the trial are not made again."""
-    case, base = Bent(False), fit_jointly(Bent(False), iterations=40)
-    case.with_broad_errors = lambda: case
+    case, base, predicted = Bent(False), fit_jointly(Bent(False), iterations=40), []
+    monkeypatch.setattr(Bent, "predict", lambda *given, predict=Bent.predict: predicted.append(1) or predict(*given))
     candidate = SimpleNamespace(
         key="a", parameters=(), term=lambda psi: None, refit=SimpleNamespace(prescreen_group=""),
         site=EffectSite(),
@@ -247,10 +247,8 @@ def test_a_fit_goes_on_from_the_end_of_its_trial():
         step = _Prescreen(MismatchSettings(), case, case, (), base, replace(base, evidence=0.0))
         if tried:
             step._trial_gain(candidate, np.zeros(0), -np.inf)
-        predict, n = Bent.predict, []
-        case.predict = lambda *a: n.append(1) or predict(case, *a)
-        fits.append((step.fit(candidate, np.zeros(0)), len(n)))
-        del case.predict
+        n_before = len(predicted)
+        fits.append((step.fit(candidate, np.zeros(0)), len(predicted) - n_before))
     (alone, n_alone), (after_trial, n_after) = fits
     assert after_trial.gain == pytest.approx(alone.gain, abs=1e-6)
     assert after_trial.values == pytest.approx(alone.values, abs=1e-6)

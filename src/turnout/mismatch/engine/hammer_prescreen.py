@@ -162,10 +162,10 @@ class _Prescreen:
         values, steps = _prior_means(self.broad_case), THRESHOLDS.n_trial_steps
         sought_cost = self.broad_fit.cost - 2.0 * sought_gain
         try:
-            cost, *end = steps_from(self.broad_case, candidates, psi, values, steps, sought_cost)
+            cost, end_values, end_psi = steps_from(self.broad_case, candidates, psi, values, steps, sought_cost)
         except SimulationError:
             return -np.inf
-        self.trial_ends[(candidate.key, *start)] = tuple(end)
+        self.trial_ends[(candidate.key, *start)] = end_values, end_psi
         return 0.5 * (self.broad_fit.cost - cost)
 
 
