@@ -30,6 +30,7 @@ from turnout.mismatch.turnout.predictions import Predictions, Terms, Values
 from turnout.mismatch.turnout.priors import CASE, SIMULATION
 from turnout.mismatch.turnout.unmet_requirements import UnmetRequirement, unmet_requirements
 from turnout.mismatch.turnout.unproven_panels import reservation
+from turnout.mismatch.turnout.wheel_impacts import impacts_at_position
 from turnout.mismatch.turnout.wheel_roughness import log_mass_ratios
 from turnout.mismatch.turnout.worn_nose import worn_noses
 from turnout.physics import RailCorrugation
@@ -274,12 +275,12 @@ class TrackCase(PredictedCase):
         return self.accepted.without(scan_geometry(*self.with_fixed_effects(fit), self.families))
 
     def ambiguity(self) -> Ambiguity | None:
-        """A line in the level of all passages that may be corrugation, a wheel or a vibration; None without one."""
+        """Impacts at one position, or a line in the level of all passages; the likelier one, None without any."""
         from turnout.mismatch.turnout.candidates.short_corrugation import ambiguous_line
 
-        if self.families is not None and RailCorrugation.name not in self.families:
-            return None
-        return ambiguous_line(self)
+        has_corrugation = self.families is None or RailCorrugation.name in self.families
+        possible = (impacts_at_position(self), ambiguous_line(self) if has_corrugation else None)
+        return max((a for a in possible if a is not None), key=lambda a: a.nats, default=None)
 
     def tolerated_effects(self, fit: Fit) -> tuple[Candidate, ...]:
         """Worn noses: dips of the file that are certainly much deeper than it says.

@@ -6,6 +6,7 @@ from turnout.mismatch.engine.thresholds import threshold as prior
 
 DEFECTS = "decisions/rail-and-wheel-defects.md"
 SHORT_WAVES = "decisions/short-wave-corrugation.md"
+LOCATED = "decisions/locating-unknown-effects.md"
 EFFECT_SIZES = "decisions/blind-effect-sizes.md"
 
 
@@ -127,9 +128,36 @@ class CorrugationPriors:
     node_stride: int = prior(2, "nodes", "every second one is used", "numerical")
 
 
+@dataclass(frozen=True)
+class ImpactPriors:
+    """Impacts at one position of the track, from the level above the rolling of wheels."""
+
+    low_frequency: float = prior(1700.0, "Hz", "lower end of the level: at 35 m/s waves of 20 mm", LOCATED)
+    high_frequency: float = prior(2300.0, "Hz", "upper end of the level, where the rate allows it", LOCATED)
+    max_frequency_share: float = prior(0.46, "share of the rate", "above, the flank meets half the rate", "numerical")
+    least_width: float = prior(1.15, "-", "upper over lower end of the level, at least", "convention")
+    bin_time: float = prior(0.005, "s", "of a bin of the level", LOCATED)
+    distances: tuple[float, ...] = prior(
+        (0.0, 0.3, 0.6, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0), "m",
+        "between which the level of rolling is constant", LOCATED)
+    n_sweeps: int = prior(5, "sweeps", "of medians over passages, sensors and distances", "numerical")
+    position_step: float = prior(0.3, "m", "between positions, half a sleeper bay", LOCATED)
+    half_window: float = prior(0.3, "m", "from a wheel to the position that it excites", LOCATED)
+    margin: float = prior(0.6, "m", "beyond the sensors that is searched, one sleeper bay", LOCATED)
+    min_wheels: int = prior(5, "wheels", "that must show it: a flat has one, and another beside it", LOCATED)
+    level: float = prior(0.4, "ln", "of the fifth loudest wheel on intact track", LOCATED)
+    level_sd: float = prior(0.5, "ln", "of that level between positions on intact track", LOCATED)
+    impact_sd: float = prior(3.0, "ln", "of that level where something rattles", LOCATED)
+    lag: float = prior(0.2, "m", "that a wheel rolls on until the part that it has moved strikes", LOCATED)
+    position_error: float = prior(0.6, "m", "of the loudest position, one sleeper bay", LOCATED)
+    before_known: float = prior(1.0, "m", "before a joint or nose of the file, where a wheel does not count", LOCATED)
+    behind_known: float = prior(2.0, "m", "behind it: wheels that have left the rail land there", LOCATED)
+
+
 # fmt: on
 FLATS = FlatPriors()
 POLYGONS = PolygonPriors()
 SHORT_POLYGONS = ShortPolygonPriors()
 GEOMETRY = GeometryPriors()
 CORRUGATION = CorrugationPriors()
+IMPACTS = ImpactPriors()

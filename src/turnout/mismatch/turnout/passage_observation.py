@@ -74,11 +74,17 @@ class AlignedPassage:
         loads = tuple(2.0 * load for load in self.passage.vehicle.static_loads)
         return {"axle_loads": loads, "train": self.train, "name": self.name, **self.passage.conditions}
 
-    def positions(self) -> np.ndarray:
-        """(n_wheel, n) position of every wheel [m]."""
+    def positions(self, time: np.ndarray | None = None) -> np.ndarray:
+        """(n_wheel, n) position of every wheel [m].
+
+        Parameters
+        ----------
+        time : (n,) array of float or None
+            Times since the start of the recording; None: those of the observation. [s]
+        """
         sign = 1.0 if self.passage.direction == "facing" else -1.0
         first = sign * min(sign * s.place for s in self.sensors)
-        distance = self.speed * (self.time - self.reference)
+        distance = self.speed * ((self.time if time is None else time) - self.reference)
         return first + sign * (distance[None, :] - self.passage.vehicle.wheel_positions[:, None])
 
 

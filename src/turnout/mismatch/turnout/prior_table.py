@@ -3,7 +3,7 @@
 from dataclasses import fields
 from typing import Any
 
-from turnout.mismatch.turnout.defect_priors import CORRUGATION, FLATS, GEOMETRY, POLYGONS, SHORT_POLYGONS
+from turnout.mismatch.turnout.defect_priors import CORRUGATION, FLATS, GEOMETRY, IMPACTS, POLYGONS, SHORT_POLYGONS
 from turnout.mismatch.turnout.priors import (
     ACCEPTED,
     ALIGNMENT,
@@ -36,6 +36,7 @@ GROUPS = (
     SHORT_POLYGONS,
     GEOMETRY,
     CORRUGATION,
+    IMPACTS,
 )
 
 

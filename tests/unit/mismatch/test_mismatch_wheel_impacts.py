@@ -1,0 +1,106 @@
+"""Impacts at one position: found above the rolling of wheels, by the wheels that pass there, whatever their cause."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from turnout.mismatch.turnout import TrackCase
+from turnout.mismatch.turnout.defect_priors import IMPACTS
+from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
+from turnout.mismatch.turnout.wheel_impacts import (
+    ImpactSignal,
+    _known_stretches,
+    impact_levels,
+    impact_signals,
+    impacts_at_position,
+)
+from turnout.simulate.wheel_path import Corrugation, Kink
+
+SENSORS, RATE = np.array([2.0, 4.1, 6.2, 8.3]), 200.0  # positions [m], bins per second
+
+
+def signal(train, speed, n_axle, rng, struck=None, direction=1.0, channel=None):
+    """A passage whose level falls with the distance of the wheels; ``struck`` (position, wheels): impacts of them."""
+    time = np.arange(0.0, 60.0 / speed, 1.0 / RATE)
+    axles = np.concatenate([[0.0, 2.7], [14.0, 16.7], [20.0, 22.7], [34.0, 36.7]])[:n_axle]
+    wheels = direction * (speed * time[:, None] - axles - 10.0) + (0.0 if direction > 0 else 10.0)
+    distance = np.min(np.abs(wheels[None] - SENSORS[:, None, None]), axis=2)
+    level = -0.4 * distance + np.log(rng.chisquare(10, distance.shape) / 10)
+    if struck is not None:
+        position, which = struck
+        near = np.any(np.abs(wheels[:, which] - position) < 0.25, axis=1)
+        heard = np.ones(SENSORS.size, bool) if channel is None else np.arange(SENSORS.size) == channel
+        level += np.where(near & heard[:, None], 5.0, 0.0)
+    names = tuple(f"A{i}" for i in range(SENSORS.size))
+    return ImpactSignal(train, level, names, SENSORS, wheels, 0.0, np.ones(time.size, dtype=bool))
+
+
+def visit(seed, struck=lambda train, k: None, **options):
+    rng = np.random.default_rng(seed)
+    trains = [("a", 25.0, 8), ("b", 31.0, 4), ("a", 38.0, 8), ("b", 22.0, 4), ("a", 29.0, 8), ("b", 35.0, 4)]
+    return [signal(t, v, n, rng, struck(t, k), **options) for k, (t, v, n) in enumerate(trains)]
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+@pytest.mark.parametrize("position", [2.9, 5.3, 7.7])
+def test_impacts_of_many_wheels_are_located(position, direction):
+    levels = impact_levels(visit(1, lambda t, k: (position, slice(None)), direction=direction))
+    assert levels.evidence() > 12.0 and abs(levels.position() - position) < 0.5
+
+
+def test_a_part_that_rattles_under_one_train_alone_is_located():
+    levels = impact_levels(visit(2, lambda t, k: (5.3, slice(None)) if k == 2 else None))
+    assert levels.evidence() > 12.0 and abs(levels.position() - 5.3) < 0.5
+
+
+def test_intact_track_a_flat_and_a_faulty_channel_are_no_impacts_at_a_position():
+    assert max(impact_levels(visit(seed)).evidence() for seed in range(8)) < 0.0
+    flat = impact_levels(visit(3, lambda t, k: (3.0 + 1.1 * k, slice(2, 3)) if t == "a" else None))
+    assert flat.evidence() < 3.0
+    channel = impact_levels(visit(4, lambda t, k: (4.1, slice(None)), channel=1))
+    assert channel.evidence() < 3.0
+
+
+def test_fewer_wheels_than_must_agree_give_no_level():
+    rng = np.random.default_rng(5)
+    assert impact_levels([signal("b", 30.0, 4, rng) for _ in range(6)]) is None and impact_levels([]) is None
+
+
+def test_bins_near_a_known_irregularity_do_not_count_at_any_position():
+    passages = visit(6, lambda t, k: (5.3, slice(None)))
+    free = [replace(s, is_free=~np.any((s.wheels > 4.3) & (s.wheels < 7.3), axis=1)) for s in passages]
+    assert impact_levels(passages).evidence() > 12.0 and impact_levels(free).evidence() < 0.0
+    parts = (Kink(5.5, 0.002, 0.4), Corrugation(2.0, 4.0, 1e-5, 0.1), SimpleNamespace(places=(1.0, 3.0)), np.sin)
+    assert list(_known_stretches(parts)) == [(5.5, 5.5), (1.0, 3.0)]
+
+
+def with_impacts(aligned, position):
+    """The passage with a short vibration of 2 kHz in all channels whenever a wheel is at ``position``."""
+    recording = aligned.passage.recording
+    samples, time = recording.samples.astype(float), np.arange(recording.samples.shape[1]) / recording.rate
+    for wheel in aligned.positions(time):
+        since = time - np.interp(position + 0.2, wheel, time)
+        pulse = np.where(since > 0.0, np.exp(-since / 0.003) * np.sin(2e3 * 2.0 * np.pi * since), 0.0)
+        samples = samples + 10.0 * np.std(samples, axis=1)[:, None] * pulse
+    return with_recording(aligned, samples=samples)
+
+
+def with_recording(aligned, **changes):
+    recording = replace(aligned.passage.recording, **changes)
+    return replace(aligned, passage=replace(aligned.passage, recording=recording))
+
+
+def test_a_case_reports_impacts_and_intact_track_has_none():
+    """Recordings of our own simulator, with its roughness; the band of a slower recorder ends too low."""
+    case = TrackCase(measured_campaign(small_plan((15.0,), hammer_positions=()), (), 7))
+    assert impacts_at_position(case) is None and case.ambiguity() is None
+    passages = case.fitted_passages()
+    position = float(np.mean([s.place for s in passages[0].sensors])) + 0.3
+    case.fitted_passages = lambda: [with_impacts(p, position) for p in passages]
+    found = case.ambiguity()
+    assert found.frame == "place" and found.nats > 12.0 and "rattles" in found.words
+    assert abs(0.5 * (found.low + found.high) - position) < 0.6
+    case.fitted_passages = lambda: [with_recording(p, rate=2000.0) for p in passages]
+    assert impact_signals(case) == [] and 2.0 * IMPACTS.low_frequency > 2000.0
