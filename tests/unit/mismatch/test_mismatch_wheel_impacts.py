@@ -21,26 +21,26 @@ from turnout.simulate.wheel_path import Corrugation, Kink
 SENSORS, RATE = np.array([2.0, 4.1, 6.2, 8.3]), 200.0  # positions [m], bins per second
 
 
-def signal(train, speed, n_axle, rng, struck=None, direction=1.0, channel=None):
-    """A passage whose level falls with the distance of the wheels; ``struck`` (position, wheels): impacts of them."""
+def signal(train, speed, n_axle, rng, impacts=None, direction=1.0, channel=None):
+    """A passage whose level falls with the distance of the wheels; ``impacts`` (position, wheels): impacts of them."""
     time = np.arange(0.0, 60.0 / speed, 1.0 / RATE)
     axles = np.concatenate([[0.0, 2.7], [14.0, 16.7], [20.0, 22.7], [34.0, 36.7]])[:n_axle]
     wheels = direction * (speed * time[:, None] - axles - 10.0) + (0.0 if direction > 0 else 10.0)
     distance = np.min(np.abs(wheels[None] - SENSORS[:, None, None]), axis=2)
     level = -0.4 * distance + np.log(rng.chisquare(10, distance.shape) / 10)
-    if struck is not None:
-        position, which = struck
+    if impacts is not None:
+        position, which = impacts
         near = np.any(np.abs(wheels[:, which] - position) < 0.25, axis=1)
-        heard = np.ones(SENSORS.size, bool) if channel is None else np.arange(SENSORS.size) == channel
-        level += np.where(near & heard[:, None], 5.0, 0.0)
+        recorded = np.ones(SENSORS.size, bool) if channel is None else np.arange(SENSORS.size) == channel
+        level += np.where(near & recorded[:, None], 5.0, 0.0)
     names = tuple(f"A{i}" for i in range(SENSORS.size))
     return ImpactSignal(train, level, names, SENSORS, wheels, 0.0, np.ones(time.size, dtype=bool))
 
 
-def visit(seed, struck=lambda train, k: None, **options):
+def visit(seed, impacts=lambda train, k: None, **options):
     rng = np.random.default_rng(seed)
     trains = [("a", 25.0, 8), ("b", 31.0, 4), ("a", 38.0, 8), ("b", 22.0, 4), ("a", 29.0, 8), ("b", 35.0, 4)]
-    return [signal(t, v, n, rng, struck(t, k), **options) for k, (t, v, n) in enumerate(trains)]
+    return [signal(t, v, n, rng, impacts(t, k), **options) for k, (t, v, n) in enumerate(trains)]
 
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])

@@ -148,7 +148,7 @@ class ImpactPriors:
     level: float = prior(0.4, "ln", "of the fifth loudest wheel on intact track", LOCATED)
     level_sd: float = prior(0.5, "ln", "of that level between positions on intact track", LOCATED)
     impact_sd: float = prior(3.0, "ln", "of that level where something rattles", LOCATED)
-    lag: float = prior(0.2, "m", "that a wheel rolls on until the part that it has moved strikes", LOCATED)
+    lag: float = prior(0.2, "m", "that a wheel rolls on until the part that it has moved collides", LOCATED)
     position_error: float = prior(0.6, "m", "of the loudest position, one sleeper bay", LOCATED)
     before_known: float = prior(1.0, "m", "before a joint or nose of the file, where a wheel does not count", LOCATED)
     behind_known: float = prior(2.0, "m", "behind it: wheels that have left the rail land there", LOCATED)

@@ -1,19 +1,20 @@
 r"""Impacts that wheels cause at one position: something there rattles, is loose, or is a short defect of the surface.
 
 Waves of the surface shorter than the contact patch do not move a wheel, so that rolling causes little above some
-1.7 kHz. Steel that strikes steel does, for a millisecond, whenever a wheel passes. No law of it is needed. With E the
-energy of a bin of time at a sensor,
+1.7 kHz. Steel that collides with steel does, for a millisecond, whenever a wheel passes. No law of it is needed. With E
+the energy of a bin of time at a sensor,
 
 .. math:: \ln E = a_{passage} + b_{sensor} + g(\text{distance of the nearest wheel}) + e
 
 by medians, so that each passage is compared with the rest of itself, and each sensor with itself. A wheel at a position
 counts with the quieter one of the two sensors next to it: a fault of a channel is in one. A flat belongs to one wheel,
-and strikes anywhere: the level of a position is what the fifth loudest wheel exceeds there, each in its loudest
+and its impacts are anywhere: the level of a position is what the fifth loudest wheel exceeds there, each in its loudest
 passage. Bins in which any wheel is near a joint, a nose or a blade of the track file do not count at any position.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -89,7 +90,7 @@ def impacts_at_position(case: TrackCase) -> Ambiguity | None:
         None without enough wheels and sensors, in the panel of a switch, or where intact track is likelier.
     """
     levels = impact_levels(impact_signals(case))
-    if levels is None or levels.evidence() <= 0.0:
+    if levels is None or not levels.evidence() > 0.0:  # nan where a channel has none
         return None
     position = levels.position()
     decibels = 10.0 / np.log(10.0) * float(np.max(levels.common))
@@ -97,7 +98,7 @@ def impacts_at_position(case: TrackCase) -> Ambiguity | None:
         f"wheels cause impacts there, {decibels:.0f} dB louder than rolling above "
         f"{1e-3 * IMPACTS.low_frequency:.1f} kHz. It may be {EXPLANATIONS}"
     )
-    measurement = "an inspection of fastenings, guard rail and running surface there"
+    measurement = "the running surface there, and look for loose parts of fastenings and guard rail"
     low, high = position - IMPACTS.position_error, position + IMPACTS.position_error
     return Ambiguity(levels.evidence(), words, measurement, "place", f"{position:.2f} m", low, high)
 
@@ -123,7 +124,7 @@ def impact_signals(case: TrackCase) -> list[ImpactSignal]:
     signals = []
     for aligned in case.fitted_passages():
         surfaces = turnout.surfaces(aligned.passage.route)
-        stretches = list(_known_stretches([*(part for parts in surfaces for part in parts), *accepted]))
+        stretches = list(_known_stretches([*itertools.chain(*surfaces), *accepted]))
         top = IMPACTS.max_frequency_share * aligned.passage.recording.rate
         if top >= IMPACTS.least_width * IMPACTS.low_frequency and len(aligned.sensors) > 1:
             signals.append(_signal(aligned, min(top, IMPACTS.high_frequency), stretches))
@@ -178,13 +179,13 @@ def _signal(aligned: AlignedPassage, top: float, stretches: Iterable[tuple[float
     return ImpactSignal(aligned.train, np.log(energy + 1e-12), names, positions, wheels, sign * IMPACTS.lag, is_free)
 
 
-def _known_stretches(parts: Iterable[Any]) -> Iterator[tuple[float, float]]:
+def _known_stretches(shapes: Iterable[Any]) -> Iterator[tuple[float, float]]:
     """(first, last) position of each joint, dip, nose or other shape that the track file or an accepted effect has."""
-    for part in parts:
-        if hasattr(part, "places"):
-            yield min(part.places), max(part.places)
-        elif isinstance(getattr(part, "place", None), (int, float)):
-            yield part.place, part.place
+    for shape in shapes:
+        if hasattr(shape, "places"):
+            yield min(shape.places), max(shape.places)
+        elif isinstance(getattr(shape, "place", None), (int, float)):
+            yield shape.place, shape.place
 
 
 def _excess_levels(signals: Sequence[ImpactSignal]) -> list[np.ndarray]:
@@ -202,13 +203,13 @@ def _excess_levels(signals: Sequence[ImpactSignal]) -> list[np.ndarray]:
     for _ in range(IMPACTS.n_sweeps):
         for k, count in enumerate(counts):
             passage[k] += _median(excess(k)[count])
-        rest = [excess(k) for k in range(len(signals))]
+        levels = [excess(k) for k in range(len(signals))]
         for name in sensor:
             rows = [(k, s.sensors.index(name)) for k, s in enumerate(signals) if name in s.sensors]
-            sensor[name] += _median(np.concatenate([rest[k][i, counts[k][i]] for k, i in rows]))
-        rest = [excess(k) for k in range(len(signals))]
+            sensor[name] += _median(np.concatenate([levels[k][i, counts[k][i]] for k, i in rows]))
+        levels = [excess(k) for k in range(len(signals))]
         for distance in range(edges.size - 1):
-            values = [r[count & (b == distance)] for r, count, b in zip(rest, counts, bins)]
+            values = [level[count & (b == distance)] for level, count, b in zip(levels, counts, bins)]
             rolling[distance] += _median(np.concatenate(values))
     return [excess(k) for k in range(len(signals))]
 
