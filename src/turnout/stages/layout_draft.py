@@ -143,8 +143,10 @@ def _branch_lines(branch: str, group: Sequence[FileContents], labels: Sequence[s
         if not responses:
             raise ConfigError(first.path, "--from", "it has a force and no vibration", "Name files with a response")
         for role, found in (("force", forces), ("response", responses)):
-            others = [names[id(c)] for c in found[1:]]
-            comment = found[0].role.why + (f"  {DECIDE} this one or {', '.join(others)}" if others else "")
+            choice = " or ".join(names[id(c)] for c in found)
+            comment = found[0].role.why + (
+                f"  {DECIDE} which channel is the {role}: {choice}" if len(found) > 1 else ""
+            )
             yield f"  {role}: {names[id(found[0])]}  # {comment}"
         yield "  validation: null  # a second response, only compared with"
     yield "  channels:"
