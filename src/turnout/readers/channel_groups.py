@@ -1,5 +1,6 @@
 """Groups that hold one channel each, as structures of MATLAB and groups of HDF5 do: ``force.data``, ``force.unit``."""
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -28,7 +29,8 @@ def with_channel_groups(variables: Mapping[str, Any]) -> Mapping[str, Any]:
     """The variables, with a channel and its attributes for each group that holds one vector of samples.
 
     Two or more such groups are the channels of one record if all vectors have a name that says nothing, as "data", and
-    their time vectors are equal. The channel has the name that its group states, else that of the group.
+    their time vectors are equal. The channel has the name that its group states, else that of the group. A vector and a
+    structure beside it, as "Channel_1_Data" and "Channel_1_Header", are such a group, too.
 
     Parameters
     ----------
@@ -45,6 +47,7 @@ def with_channel_groups(variables: Mapping[str, Any]) -> Mapping[str, Any]:
     ReadError
         If what a group states about its channel cannot be read.
     """
+    variables = _with_headers(variables)
     groups = {name: v for name, v in variables.items() if isinstance(v, Mapping) and holds_samples(v)}
     vector_names = {name: _vector_name(group) for name, group in groups.items()}
     if len(groups) < 2 or not all(vector_names.values()) or vectors(variables) or matrices(variables):
@@ -71,6 +74,39 @@ def with_channel_groups(variables: Mapping[str, Any]) -> Mapping[str, Any]:
     return Alphabetical(channels) if isinstance(variables, Alphabetical) else channels
 
 
+# Ends of the names of a channel's structure and of its vector, as in "Channel_1_Header" beside "Channel_1_Data".
+HEADER_ENDS = re.compile(r"_?(?:header|info|attributes|meta|properties)$")
+VECTOR_ENDS = re.compile(r"_?(?:data|values?|samples|signal)$")
+
+
+def _with_headers(variables: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The variables, with a group for each vector that has a structure of the same name with another end.
+
+    The same object if a vector has none, or if no structure states the name or the unit of its vector.
+    """
+    headers = {
+        stem: name
+        for name, v in variables.items()
+        if isinstance(v, Mapping)
+        and not holds_samples(v)
+        and (stem := HEADER_ENDS.sub("", name.lower())) != name.lower()
+    }
+    owners = {name: headers.get(VECTOR_ENDS.sub("", name.lower()), "") for name in vectors(variables)}
+    if not headers or len(owners) < 2 or not all(owners.values()):
+        return variables
+    if not any(_title(variables[header]) or _unit(variables[header]) for header in owners.values()):
+        return variables
+    merged = {
+        name: {**variables[owners[name]], "data": v} if name in owners else v
+        for name, v in variables.items()
+        if name not in owners.values()
+    }
+    return Alphabetical(merged) if isinstance(variables, Alphabetical) else merged
+
+
+TITLES = ("name", "channel_name", "channelname", "signal_name", "signalname", "label")
+
+
 def _vector_name(group: Mapping[str, Any]) -> str:
     """Name of the only vector of samples in a group, "" if it holds others or the name says what it is."""
     arrays = {n: v for n, v in (vectors(group) | matrices(group)).items() if n.lower() not in TIME_NAMES}
@@ -89,7 +125,7 @@ def _flat(array: Any) -> Any:
 
 def _title(group: Mapping[str, Any]) -> str:
     """The name that a group states for its channel, "" without one."""
-    titles = (v for n, v in group.items() if n.lower() in ("name", "channel_name", "label") and isinstance(v, str))
+    titles = (v for n, v in group.items() if n.lower() in TITLES and isinstance(v, str))
     return next(titles, "").strip()
 
 

@@ -288,6 +288,9 @@ def _is_structured(value: Any) -> bool:
     return isinstance(value, np.ndarray) and value.dtype.names is not None and value.ndim == 1
 
 
+VECTOR_REMEDY = "Save each channel as a vector, or as a structure with a vector 'data' beside its unit"
+
+
 def _numbered_record(value: Any, k: int, n: int, where: str, facts: Metadata, source: Source) -> RawRecord | ReadError:
     """One numbered record, or its error."""
     try:
@@ -300,8 +303,15 @@ def _numbered_record(value: Any, k: int, n: int, where: str, facts: Metadata, so
             return _record(value, facts, k, n, where, source)
         if damaged := [v for v in value.values() if isinstance(v, ReadError)]:
             raise damaged[0]
-        (record,) = _group_records(value, Metadata(value, source, facts), source, k, n)
-        return record
+        records = _group_records(value, Metadata(value, source, facts), source, k, n)
+        if len(records) != 1:
+            problem = (
+                f"it holds {len(records)} records, in groups below it" if records else "it holds no vector of samples"
+            )
+            raise source.error(
+                where, f"{problem}; in it are {', '.join(map(repr, list(value)[:MAX_LISTED]))}", VECTOR_REMEDY
+            )
+        return records[0]
     except ReadError as error:
         return error
     except ValueError as error:  # more than one record inside a numbered one

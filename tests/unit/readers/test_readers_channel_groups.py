@@ -82,3 +82,45 @@ def test_what_a_group_states_about_its_channel_is_not_lost(outcome, case):
     content, words = WRONG[case]
     result = outcome(content)
     assert result.recordings == () and words in str(result.errors[0])
+
+
+def with_headers(ends, facts):
+    """Variables of two channels as catman exports them: a structure and a vector of the same name each."""
+    signals = {"force": (np.sin(np.arange(400) / 9), "kN"), "rail": (np.cos(np.arange(400) / 7), "g")}
+    variables = {"File_Header": {"SampleFrequency": "1000", "NumberOfChannels": "2"}}
+    for k, (name, (samples, unit)) in enumerate(signals.items(), 1):
+        variables[f"Channel_{k}_{ends[0]}"] = {key: {"name": name, "unit": unit}[what] for key, what in facts.items()}
+        variables[f"Channel_{k}_{ends[1]}" if ends[1] else f"Channel_{k}"] = samples
+    return variables, signals
+
+
+@pytest.mark.parametrize("facts", [{"SignalName": "name", "Unit": "unit"}, {"Name": "name", "Units": "unit"}])
+@pytest.mark.parametrize("ends", [("Header", "Data"), ("Info", "Values"), ("header", "")])
+@pytest.mark.parametrize("is_swapped", [False, True])
+def test_a_vector_has_the_name_and_the_unit_of_the_structure_beside_it(ends, facts, is_swapped, tmp_path):
+    variables, signals = with_headers(ends, facts)
+    if is_swapped:
+        variables = dict(reversed(variables.items()))
+    scipy.io.savemat(tmp_path / "a.mat", variables)
+    channels = (RawChannel("force", "force", "force"), RawChannel("rail", "rail", "acceleration"))
+    (recording,) = read("a.mat", tmp_path, RawDescription(channels, rate=1000.0)).recordings
+    np.testing.assert_allclose(recording.signal("force"), signals["force"][0] * 1000.0)
+    np.testing.assert_allclose(recording.signal("rail"), signals["rail"][0] * 9.80665)
+
+
+def test_the_unit_of_a_structure_beside_a_vector_contradicts_the_layout(tmp_path):
+    variables, _ = with_headers(("Header", "Data"), {"Unit": "unit"})
+    scipy.io.savemat(tmp_path / "a.mat", variables)
+    channels = (
+        RawChannel("force", "Channel_2_Data", "force", unit="N"),
+        RawChannel("rail", "Channel_1_Data", "acceleration", unit="m/s²"),
+    )
+    (error,) = read("a.mat", tmp_path, RawDescription(channels, rate=1000.0)).errors
+    assert error.reason == "unit_unknown" and "the file says 'g', the layout 'N'" in str(error)
+
+
+def test_groups_without_a_vector_are_named_with_what_they_hold(tmp_path):
+    signal = {"x_values": {"increment": 0.001}, "y_values": {"values": np.arange(400.0)}}
+    scipy.io.savemat(tmp_path / "a.mat", {"force": signal, "rail": signal})
+    error, *_ = read("a.mat", tmp_path, RawDescription((RawChannel("f", "force", "force", "N"),), rate=1000.0)).errors
+    assert "group 'force': it holds no vector of samples; in it are 'x_values', 'y_values'. Save each" in str(error)
