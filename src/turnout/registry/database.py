@@ -18,7 +18,7 @@ from turnout.registry import view_texts
 from turnout.registry.catalogue import create_catalogue, use_generation
 from turnout.registry.catalogue_template import catalogue_template
 from turnout.registry.connection import OFFLINE_CONFIG, connect
-from turnout.registry.generation import Generation, load
+from turnout.registry.generation import GENERATION_FILE, Generation, load
 from turnout.registry.generation_history import find_generation
 from turnout.registry.schema import literal
 
@@ -54,8 +54,8 @@ def open_registry(
     Raises
     ------
     RegistryError
-        When there is none, when it cannot be opened, when it was moved and not relocated, or when the generation
-        ``as_of`` is not kept.
+        When there is none, when it cannot be opened, when it was moved or copied and not relocated, or when
+        the generation ``as_of`` is not kept.
     """
     path = Path(path)
     file = path / DATABASE if path.is_dir() else path
@@ -77,6 +77,10 @@ def open_registry(
         connection.close()
         remedy = f"Where it was moved, run once: turnout registry relocate --registry '{file.parent}'"
         raise RegistryError(f"{file}: was made in {folder}, which is not there. {remedy}.")
+    if (file.parent / GENERATION_FILE).is_file() and not file.parent.samefile(folder):
+        connection.close()
+        remedy = f"To read the copy, run once: turnout registry relocate --registry '{file.parent}'"
+        raise RegistryError(f"{file}: is a copy, and its views read the files of {folder}. {remedy}.")
     return connection
 
 

@@ -161,6 +161,22 @@ def test_a_moved_registry_is_relocated(five_nights):
     assert five_nights.ask(ALL_MODES) == before and check(moved) == []
 
 
+def test_a_copied_registry_does_not_answer_with_the_rows_of_the_first_one(five_nights):
+    copy = five_nights.root / "copy"
+    shutil.copytree(five_nights.registry, copy)
+    with pytest.raises(
+        RegistryError, match=r"is a copy, and its views read the files of .*registry\. To read the copy"
+    ):
+        open_registry(copy)
+    (five_nights.root / "link").symlink_to(five_nights.registry)
+    open_registry(five_nights.root / "link").close()  # another path to the same folder is no copy
+    before = five_nights.ask(ALL_MODES)
+    rebuild_database(copy)
+    shutil.rmtree(five_nights.registry)
+    five_nights.registry = copy
+    assert five_nights.ask(ALL_MODES) == before
+
+
 def test_a_column_added_later_is_null_in_old_rows_and_rebuild_writes_it(bench, hammer, monkeypatch):
     bench.register(hammer(frequency=150.0))
     file = bench.registry / load(bench.registry).of("modes")[0].path
