@@ -182,13 +182,15 @@ class Branch(dict):
         return self.key_places.get(name, self.place)
 
 
-def compose(path: Path) -> tuple[AnyNode | None, BaseConstructor]:
+def compose(path: Path, text: str | None = None) -> tuple[AnyNode | None, BaseConstructor]:
     """Parse a YAML file without conversion of its values.
 
     Parameters
     ----------
     path : Path
         The file.
+    text : str or None
+        Its content; None: it is read.
 
     Returns
     -------
@@ -205,7 +207,7 @@ def compose(path: Path) -> tuple[AnyNode | None, BaseConstructor]:
     from ruamel.yaml import YAML
 
     yaml = YAML(typ="safe", pure=True)
-    root = yaml.compose(Path(path).read_text(encoding="utf-8"))
+    root = yaml.compose(Path(path).read_text(encoding="utf-8") if text is None else text)
     if root is not None:
         _require_few_values(root, str(path))
     return root, yaml.constructor

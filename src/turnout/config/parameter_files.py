@@ -42,11 +42,11 @@ def read_parameters(path: Path | str) -> ParameterSet:
         content, node = read_content(Path(path))
     if not isinstance(content, dict):
         raise place.error("is not a mapping", "Write 'key: value' lines")
-    if not isinstance(sources := content.pop("sources", None) or {}, dict):
+    if not isinstance(sources := content.get("sources") or {}, dict):
         written, _ = _members(node, place.path).get("sources", (None, None))
         raise place.below("sources", written).error("is not a mapping", "Write 'key: source' lines below it")
     with as_config_errors(path, "the file"):
-        return _parameter_set(content, node, place, sources)
+        return _parameter_set({k: v for k, v in content.items() if k != "sources"}, node, place, sources)
 
 
 def read_unchanged_parameters(path: Path) -> ParameterSet:
@@ -76,7 +76,7 @@ def _parse_content(path: Path, content: bytes) -> ParameterSet:
 
 
 def read_content(path: Path) -> tuple[Any, AnyNode | None]:
-    """Content of a YAML file, with its nodes.
+    """Content of a YAML file, with its nodes. Each text is parsed once: nobody may change what is returned.
 
     Parameters
     ----------
@@ -93,7 +93,12 @@ def read_content(path: Path) -> tuple[Any, AnyNode | None]:
     MarkedYAMLError
         For wrong syntax or a key that comes twice.
     """
-    node, constructor = compose(path)
+    return _content_of(path, path.read_text(encoding="utf-8"))
+
+
+@lru_cache(maxsize=32)
+def _content_of(path: Path, text: str) -> tuple[Any, AnyNode | None]:
+    node, constructor = compose(path, text)
     return None if node is None else constructor.construct_document(node), node
 
 

@@ -16,9 +16,6 @@ from turnout.errors import ConfigError
 from turnout.records import Unit
 from turnout.registry.as_of import whole_list
 from turnout.registry.database import open_registry
-from turnout.stages.change_diagnosis import ends_of, group_labels
-from turnout.stages.mismatch_groups import visits
-from turnout.stages.track_files import digest_of_model
 from turnout.workflow.plan import PlannedUnit, is_cut_plan, read_plan
 
 REGISTRY = Path("results/registry")
@@ -95,6 +92,9 @@ def _units(
     works: Sequence[Event],
     config_hash: str,
 ) -> Iterator[PlannedUnit]:
+    from turnout.stages.change_diagnosis import group_labels  # late: a night without alarms needs no model
+    from turnout.stages.track_files import digest_of_model
+
     recorded_work = [[event.at.isoformat(), event.kind, event.section, event.resets] for event in works]
     for labels in group_labels(turnout, sections):
         members = [p for p in planned if p.unit.kind == "hammer" and p.unit.section in labels]
@@ -113,6 +113,9 @@ def _trains_of_first_and_newest_visits(
 
     Without hammer tests, those of the newest visit.
     """
+    from turnout.stages.change_diagnosis import ends_of
+    from turnout.stages.mismatch_groups import visits
+
     by_unit = {id(p.unit): p for p in (*tests, *trains)}
     with_trains: dict[str, list[Unit]] = {}
     for visit, units in visits(p.unit for p in (*tests, *trains)).items():

@@ -4,6 +4,9 @@ from copy import deepcopy
 
 import pytest
 
+from turnout.config import parameter_files
+from turnout.config.document import compose
+from turnout.config.parameter_files import read_parameters
 from turnout.errors import ConfigError, TurnoutError
 from turnout.installation import shipped_path
 from turnout.simulate import load_track, load_vehicle
@@ -195,3 +198,15 @@ def test_a_vehicle_file_that_was_changed_is_read_again(tmp_path):
     assert heavier != VEHICLE
     path.write_text(heavier)
     assert load_vehicle(path, 0.0) != before
+
+
+def test_a_file_is_parsed_once_for_each_text_and_every_caller_has_its_own_parameters(tmp_path, monkeypatch):
+    """A tenth of a second for each turnout of a fleet whose turnouts share a track file."""
+    parsed = []
+    monkeypatch.setattr(parameter_files, "compose", lambda *given: [parsed.append(given), compose(*given)][1])
+    path = tmp_path / "t.yaml"
+    for text, n in ((TRACK, 1), (TRACK, 1), (TRACK + "# end\n", 2)):
+        path.write_text(text, encoding="utf-8")
+        parameters = read_parameters(path)
+        assert len(parsed) == n and "sources" not in parameters
+        assert parameters.pop("rail") and parameters.pop("routes")
