@@ -13,6 +13,7 @@ from turnout.simulate.decay_rate import DISTANCES
 BANDS = np.array([100, 125, 160, 200, 250, 315, 400, 500, 630, 800, 1000, 1250, 1600, 2000, 2500, 3150, 4000, 5000.0])
 LINES = 5  # per band
 SPACING = 0.6
+MIRROR = np.array([[1.0], [-1.0], [1.0], [-1.0]])  # of deflection, rotation, moment and shear
 
 
 @dataclass(frozen=True)
@@ -65,24 +66,40 @@ def responses(beam, support, frequency):
     omega = 2.0 * np.pi * np.asarray(frequency)
     quarter = _transfer(_bending(omega, beam, support), 0.25 * SPACING)
     half = quarter @ quarter
-    jump = np.zeros((omega.size, 4, 4), dtype=complex) + np.eye(4)
-    jump[:, 3, 0] = seat(omega, support)
-    multiplier, vector = np.linalg.eig(jump @ half @ half)
-    order = np.argsort(np.abs(multiplier), axis=1)
-    multiplier = np.take_along_axis(multiplier, order, axis=1)
-    vector = np.take_along_axis(vector, order[:, None, :], axis=2)
-    here = half @ vector
-    ends = np.concatenate([here[:, :, :2], -here[:, :, 2:]], axis=2)
+    multiplier, here = _decaying_waves(half, seat(omega, support))
+    ends = np.concatenate([here, -MIRROR * here], axis=2)
     amount = np.linalg.solve(ends, np.tile([[0.0], [0.0], [0.0], [-1.0]], (omega.size, 1, 1)))[:, :2, 0]
-    quarter_shapes, step = [vector[:, 0, :2]], vector[:, :, :2]
+    step = MIRROR * (half @ (MIRROR * here))  # behind the support
+    quarter_shapes = [step[:, 0, :]]
     for _ in range(3):
         step = quarter @ step
         quarter_shapes.append(step[:, 0, :])
     # quarters of a bay behind the support before the force
     bays, quarters = np.divmod(np.round(4.0 * DISTANCES).astype(int) + 2, 4)
-    factors = np.concatenate([amount[None], np.broadcast_to(multiplier[:, :2], (bays.max(), omega.size, 2))])
+    factors = np.concatenate([amount[None], np.broadcast_to(multiplier, (bays.max(), omega.size, 2))])
     powers = np.multiply.accumulate(factors)
     return np.sum(np.array(quarter_shapes)[quarters] * powers[bays], axis=2).T
+
+
+def _decaying_waves(half, stiffness):
+    r"""(n, 2) factors per bay of the two free waves that decay with x, (n, 4, 2) their states in the middle of a bay.
+
+    Seen from there a bay is its own mirror image. So deflection and moment e, rotation and shear o have
+    :math:`T_{ee} e = \tfrac12 (\mu + 1 / \mu) e` and :math:`o = 2 T_{oe} e / (\mu - 1 / \mu)`.
+    """
+    after = half.copy()  # half a bay and the support behind it
+    after[:, 3] += stiffness[:, None] * half[:, 0]
+    bay = half @ after
+    a, b, c, d = (bay[:, i, k] for i in (0, 2) for k in (0, 2))
+    mean, distance = 0.5 * (a + d), np.sqrt(0.25 * (a - d) ** 2 + b * c)
+    cosine = np.array([mean + distance, mean - distance])
+    root = np.sqrt(cosine - 1.0) * np.sqrt(cosine + 1.0)
+    growth = np.where(np.abs(cosine + root) > np.abs(cosine - root), cosine + root, cosine - root)
+    deflection, moment = np.broadcast_to(b, cosine.shape), cosine - a
+    rotation, shear = (
+        2.0 * (bay[:, k, 0] * deflection + bay[:, k, 2] * moment) / (1.0 / growth - growth) for k in (1, 3)
+    )
+    return (1.0 / growth).T, np.array([deflection, rotation, moment, shear]).transpose(2, 0, 1)
 
 
 def _transfer(system, length):
