@@ -104,8 +104,8 @@ def _simulate(force, dt, omega, zeta, gain, law_indices, amounts, scale):
     """Displacement by the classical Runge-Kutta scheme; ``force`` has three values a step (start, middle, end)."""
     out = np.zeros(force.shape[0] + 1)
     y, v = 0.0, 0.0
+    ky, kv, strength = np.zeros(4), np.zeros(4), omega * omega * scale * amounts
     for n in range(force.shape[0]):
-        ky, kv = np.zeros(4), np.zeros(4)
         for stage in range(4):
             fraction = 0.0 if stage == 0 else 0.5 if stage < 3 else 1.0
             ys = y + (fraction * dt * ky[stage - 1] if stage else 0.0)
@@ -113,9 +113,7 @@ def _simulate(force, dt, omega, zeta, gain, law_indices, amounts, scale):
             f = force[n, 0 if stage == 0 else 1 if stage < 3 else 2]
             acceleration = gain * f - 2.0 * zeta * omega * vs - omega * omega * ys
             for k in range(law_indices.size):
-                acceleration -= (
-                    omega * omega * scale * amounts[k] * _law_force(law_indices[k], ys / scale, vs / (omega * scale))
-                )
+                acceleration -= strength[k] * _law_force(law_indices[k], ys / scale, vs / (omega * scale))
             ky[stage], kv[stage] = vs, acceleration
         y += dt / 6.0 * (ky[0] + 2.0 * ky[1] + 2.0 * ky[2] + ky[3])
         v += dt / 6.0 * (kv[0] + 2.0 * kv[1] + 2.0 * kv[2] + kv[3])
