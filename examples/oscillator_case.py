@@ -105,6 +105,7 @@ def _simulate(force, dt, omega, zeta, gain, law_indices, amounts, scale):
     out = np.zeros(force.shape[0] + 1)
     y, v = 0.0, 0.0
     ky, kv, strength = np.zeros(4), np.zeros(4), omega * omega * scale * amounts
+    inverse_scale, inverse_rate = 1.0 / scale, 1.0 / (omega * scale)
     for n in range(force.shape[0]):
         for stage in range(4):
             fraction = 0.0 if stage == 0 else 0.5 if stage < 3 else 1.0
@@ -113,7 +114,7 @@ def _simulate(force, dt, omega, zeta, gain, law_indices, amounts, scale):
             f = force[n, 0 if stage == 0 else 1 if stage < 3 else 2]
             acceleration = gain * f - 2.0 * zeta * omega * vs - omega * omega * ys
             for k in range(law_indices.size):
-                acceleration -= strength[k] * _law_force(law_indices[k], ys / scale, vs / (omega * scale))
+                acceleration -= strength[k] * _law_force(law_indices[k], ys * inverse_scale, vs * inverse_rate)
             ky[stage], kv[stage] = vs, acceleration
         y += dt / 6.0 * (ky[0] + 2.0 * ky[1] + 2.0 * ky[2] + ky[3])
         v += dt / 6.0 * (kv[0] + 2.0 * kv[1] + 2.0 * kv[2] + kv[3])

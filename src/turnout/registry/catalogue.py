@@ -86,12 +86,12 @@ def comment_catalogue(con: duckdb.DuckDBPyConnection) -> None:
 
 
 def use_generation(con: duckdb.DuckDBPyConnection, root: Path, generation: Generation, published: datetime) -> None:
-    """Give a catalogue the constants of another generation.
+    """Give the catalogue of no files the constants of a generation.
 
     Parameters
     ----------
     con : DuckDB connection
-        Connection whose present database is a catalogue, writable.
+        Connection whose present database is a copy of the template, writable.
     root : Path
         Folder of the registry, absolute.
     generation : Generation
@@ -99,7 +99,7 @@ def use_generation(con: duckdb.DuckDBPyConnection, root: Path, generation: Gener
     published : datetime
         Time of its publication. [UTC]
     """
-    _set_files(con, root, generation)
+    _set_files(con, root, generation, is_template=True)
     _set_times(con, root, generation, published)
 
 
@@ -119,12 +119,14 @@ def _files_by_source(generation: Generation) -> Iterator[tuple[str, str, list[Da
             yield f"{table}_{part}", table, files
 
 
-def _set_files(con: duckdb.DuckDBPyConnection, root: Path, generation: Generation) -> None:
+def _set_files(con: duckdb.DuckDBPyConnection, root: Path, generation: Generation, is_template: bool = False) -> None:
     statements: list[str] = []
     for source, table, files in _files_by_source(generation):
         paths, same_schema = live_paths(con, root, table, files)
         listed = ", ".join(file_literal(root / path) for path in paths)
         statements += _macro(f"{FILES}{source}", f"[{listed}]", f"Files that {source} reads.")
+        if is_template and same_schema:
+            continue  # as without files
         meaning = f"Whether files that {source} reads have other columns than now."
         statements += _macro(f"{BY_NAME}{source}", str(not same_schema).lower(), meaning)
     con.execute("; ".join(statements))

@@ -91,6 +91,7 @@ class Registration:
         self.lost_duplicates = False
         self.result_ids: list[str] = []
         self.n_refused = self.n_bad = 0
+        self.filled = {"results", "runs", "supersedes"}  # tables that may have new rows
         self.whole: set[str] = set()
         self.replaced: set[str] = set()
 
@@ -125,6 +126,7 @@ class Registration:
             _unknown_table(a, t) for a in arrivals for t in sorted(a.tables.keys() - tables().keys()) if a.tables[t]
         ]
         arrived = set[str]().union(*(a.tables for a in arrivals))
+        self.filled |= arrived | {"quarantine"}
         for table in tables():
             if table not in INTERNAL_TABLES and table in arrived:
                 gathered, untyped = gather(table, arrivals)
@@ -182,10 +184,14 @@ class Registration:
             return RegistrationResult(None, before.number, faults=faults)
         number = before.number + 1
         run_id = self._run_id(number)
-        n_superseded = supersede(self.con, number, run_id)
+        stored = {table for table in tables() if before.of(table)}
+        n_superseded = supersede(self.con, number, run_id, self.filled, stored)
         if before.incomplete:
             n_superseded += supersede_orphans(self.con, number, run_id)
-        (remove_present_rows if before.incomplete else remove_known_rows)(self.con)
+        if before.incomplete:
+            remove_present_rows(self.con)
+        else:
+            remove_known_rows(self.con, self.filled)
         self._note_run(run_id, run_info)
         now, rows = self._write(run_id, number)
         if n_superseded:
@@ -199,7 +205,7 @@ class Registration:
         """Whether rows that were taken have the same key, so that they must be taken again with an index."""
         if self.is_indexed or not self.result_ids:
             return False
-        return self.lost_duplicates or has_duplicate_keys(self.con, tables())
+        return self.lost_duplicates or has_duplicate_keys(self.con, sorted(self.filled & tables().keys()))
 
     def _note_duplicates(self, rejected: set[str]) -> None:
         """Search the tables whose rows are about to be removed with their parent, and with them a duplicate."""
@@ -280,6 +286,8 @@ class Registration:
         """(year, SELECT) of every file to be written for a table."""
         if table == "sections":
             return [(None, SECTIONS_SQL)]
+        if table not in self.filled:
+            return []
         if table in WHOLE_TABLES:
             n_new = self.con.execute(f"select count(*) from new_{table}").fetchall()[0][0]
             if table in self.replaced:

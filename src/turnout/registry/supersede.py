@@ -4,6 +4,7 @@ Each file of the large tables knows the number of its superseded rows, because l
 than most queries. Compaction separates valid and superseded rows; a file without valid rows is not read.
 """
 
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 
@@ -50,7 +51,9 @@ def latest_supersession(*relations: str) -> str:
     return f"select old_id from ({statements}) group by old_id having arg_max(reason, generation) <> 'reinstated'"
 
 
-def supersede(con: duckdb.DuckDBPyConnection, generation: int, run_id: str) -> int:
+def supersede(
+    con: duckdb.DuckDBPyConnection, generation: int, run_id: str, filled: Collection[str], stored: Collection[str]
+) -> int:
     """Fill ``new_supersedes`` by comparing new and earlier results of the same units.
 
     Parameters
@@ -61,14 +64,16 @@ def supersede(con: duckdb.DuckDBPyConnection, generation: int, run_id: str) -> i
         Number of the new generation.
     run_id : str
         Id of the run.
+    filled, stored : collection of str
+        Tables that may have new rows, and those that have earlier ones: others are not asked.
 
     Returns
     -------
     int
         Number of rows of ``supersedes``.
     """
-    _note_new_ids(con)
-    _note_prior(con)
+    _note_new_ids(con, filled)
+    _note_prior(con, stored)
     _note_causes(con)
     con.execute(
         """insert into new_supersedes by name
@@ -129,27 +134,31 @@ def supersede_orphans(con: duckdb.DuckDBPyConnection, generation: int, run_id: s
     return added[0][0]
 
 
-def remove_known_rows(con: duckdb.DuckDBPyConnection) -> None:
+def remove_known_rows(con: duckdb.DuckDBPyConnection, filled: Collection[str]) -> None:
     """Delete from the staging tables the rows that the registry already has: same id, same content.
 
     Parameters
     ----------
     con : DuckDB connection
         Connection with the staging tables.
+    filled : collection of str
+        Tables that may have new rows.
     """
     con.execute(
         "create or replace temp table known_results as "
         "select result_id from new_results semi join old_results using (result_id)"
     )
-    for table in ("recordings", "impacts"):
+    for table in {"recordings", "impacts"} & set(filled):
         con.execute(f"delete from new_{table} where result_id in (from known_results)")
     for table, id_column in (("results", "result_id"), ("models", "model_id"), ("passages", "passage_id"),
                              ("quarantine", "quarantine_id"), ("mismatch_findings", "finding_id")):  # fmt: skip
+        if table not in filled:
+            continue
         con.execute(
             f"create or replace temp table known as select {id_column} from new_{table} "
             f"semi join old_{table} using ({id_column})"
         )
-        for child in CHILDREN.get(table, ("", ()))[1]:
+        for child in set(CHILDREN.get(table, ("", ()))[1]) & set(filled):
             con.execute(f"delete from new_{child} where {_known_child_condition(child, id_column)}")
         con.execute(f"delete from new_{table} where {id_column} in (from known)")
 
@@ -176,17 +185,18 @@ def _known_child_condition(child: str, id_column: str) -> str:
     return f"({keys}) in (select ({keys}) from old_passage_fits where passage_id in (from known))"
 
 
-def _note_new_ids(con: duckdb.DuckDBPyConnection) -> None:
+def _note_new_ids(con: duckdb.DuckDBPyConnection, filled: Collection[str]) -> None:
     """Create table ``new_ids``: ids of all incoming rows, before known rows are deleted."""
     selects = [
         f"select '{row_type}' as kind, t.{id_column} as id, c.unit_id, {counterpart} as place "
         f"from new_{table} t join (select _unit, unit_id from came) c using (_unit)"
         for row_type, (table, id_column, counterpart) in KINDS.items()
+        if table in filled or table == "results"
     ]
     con.execute(f"create temp table new_ids as {' union all '.join(selects)}")
 
 
-def _note_prior(con: duckdb.DuckDBPyConnection) -> None:
+def _note_prior(con: duckdb.DuckDBPyConnection, stored: Collection[str]) -> None:
     """Create table ``prior``: ids of earlier results of the same units, and whether they are superseded."""
     con.execute(
         "create temp table prior_results as select result_id, unit_id, code_version from old_results "
@@ -197,6 +207,7 @@ def _note_prior(con: duckdb.DuckDBPyConnection) -> None:
         f"t.{id_column} in (select old_id from dead) as is_dead "
         f"from old_{table} t join (select result_id, unit_id from prior_results) p using (result_id)"
         for row_type, (table, id_column, counterpart) in KINDS.items()
+        if table in stored or table == "results"
     ]
     con.execute(f"create temp table prior as {' union all '.join(selects)}")
 
