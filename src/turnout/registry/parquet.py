@@ -121,6 +121,26 @@ def _copy(con: duckdb.DuckDBPyConnection, table: str, select: str, path: Path, s
     return con.execute(f"copy ({ordered}) to {literal(str(path))} ({options})").fetchall()[0][0]
 
 
+_EMPTY_FILES: dict[str, bytes] = {}  # of this process, by what is selected
+
+
+def select_nothing(table: str) -> str:
+    """SQL of no rows with the types of ``columns.csv``.
+
+    Parameters
+    ----------
+    table : str
+        Name of the table.
+
+    Returns
+    -------
+    str
+        A SELECT statement.
+    """
+    typed = ", ".join(f'null::{c.type} as "{c.name}"' for c in tables()[table])
+    return f"select {typed} limit 0"
+
+
 def write_empty(con: duckdb.DuckDBPyConnection, registry_dir: Path, table: str) -> str:
     """Write a file of zero rows with the types of ``columns.csv``, for an empty table.
 
@@ -147,9 +167,13 @@ def write_empty(con: duckdb.DuckDBPyConnection, registry_dir: Path, table: str) 
     if not has_present_columns(path, table):
         path.parent.mkdir(parents=True, exist_ok=True)
         unfinished = temporary_path(path)
-        typed = ", ".join(f'null::{c.type} as "{c.name}"' for c in tables()[table])
+        select = select_nothing(table)
         try:
-            con.execute(f"copy (select {typed} limit 0) to {literal(str(unfinished))} (format parquet)")
+            if select in _EMPTY_FILES:
+                unfinished.write_bytes(_EMPTY_FILES[select])
+            else:
+                con.execute(f"copy ({select}) to {literal(str(unfinished))} (format parquet)")
+                _EMPTY_FILES[select] = unfinished.read_bytes()
             publish_file(unfinished, path)
         except (duckdb.IOException, OSError) as error:
             raise RegistryError(f"cannot write {path}: {str(error).splitlines()[0]}") from error
@@ -225,10 +249,10 @@ def read_list(registry_dir: Path, table: str, paths: list[str], same_schema: boo
 
 
 def read_live(con: duckdb.DuckDBPyConnection, registry_dir: Path, table: str, files: list[DataFile]) -> str:
-    """SQL that reads all ``files`` of a table, also if there are none.
+    """SQL that reads all ``files`` of a table, also if there are none; the file that defines the types is there then.
 
-    An empty file that defines the types comes last, and only if needed: DuckDB plans joins by the number of rows that
-    it estimates from the first file.
+    Beside others that file comes last, and only if needed: DuckDB plans joins by the number of rows that it estimates
+    from the first file.
 
     Parameters
     ----------
@@ -247,7 +271,7 @@ def read_live(con: duckdb.DuckDBPyConnection, registry_dir: Path, table: str, fi
         A SELECT statement.
     """
     paths, same_schema = live_paths(con, registry_dir, table, files)
-    return read_list(registry_dir, table, paths, same_schema)
+    return read_list(registry_dir, table, paths, same_schema) if files else select_nothing(table)
 
 
 def live_paths(
