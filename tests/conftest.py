@@ -27,7 +27,7 @@ def pytest_collection_finish(session: pytest.Session) -> None:
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 # In this order two processes compile each kernel once: while one of them is busy with the two files that need none, the
-# other compiles those of the simulation, of the fit of modes, and of the code of the proof. 65 CPU s in all.
+# other compiles those of the simulation and of the fit of modes (22 CPU s each), then those of the code of the proof.
 FIRST_FILES = (
     "workflow/test_workflow_seeded_faults.py",
     "convergence/test_simulate_march.py",
