@@ -70,8 +70,12 @@ def _generate(args: argparse.Namespace) -> int:
     from pathlib import Path
 
     from turnout.config.generate import generate_files
+    from turnout.config.turnouts_table import NO_PROJECT
+    from turnout.errors import ConfigError
     from turnout.files import write_if_changed
 
+    if not Path(args.configuration).is_dir():
+        raise ConfigError(args.configuration, "the folder", "there is no such folder", NO_PROJECT)
     stale, docs = 0, Path(args.docs)
     for path, text in generate_files(Path(args.configuration), docs, args.defaults).items():
         if path.parent == docs and not docs.is_dir():

@@ -45,6 +45,7 @@ WRONG = {
     "check --raw README.md": "README.md, --raw: it is a file.",
     "check --config config/config.yaml": "config/config.yaml, the folder: it is a file. Name the folder",
     "check --config /nowhere/config": "/nowhere/config, the folder: there is no such folder. Run the command in the",
+    "config generate --config nowhere": "nowhere, the folder: there is no such folder. Run the command in the folder",
     "plan --config nowhere": "nowhere, the folder: there is no such folder. Run the command in the folder of a project",
     "add W1 tommerup": "config/turnouts.tsv, line 2: there is a turnout 'W1' already. Write another id",
     "add W:1 tommerup": "turnout is 'W:1'. Write 1 to 64 letters, digits, _ and -, the first a letter or digit.",
