@@ -33,6 +33,7 @@ from turnout.readers.entry_candidates import (
     candidates,
 )
 from turnout.readers.entry_owners import container_of
+from turnout.readers.overload_flags import overload_entries
 from turnout.readers.precision import EXACT_PRECISION, around
 from turnout.readers.rate_agreement import is_near_rate
 from turnout.readers.source import RawRecord, Source
@@ -258,6 +259,7 @@ class EntryCheck:
             if not candidate.is_weak and not (is_rate_stated and candidate.statement == RATE):
                 raise self._error(where, [(entry, candidate)], REASONS_OF[candidate.statement])
         of_converter = list(self._converter_errors(where, record))
+        overloads = list(self._overload_errors(where, new_entries))
         self._last = record.entries, key
         new = [(e, c) for e, c in unexplained if (e.name, c.text) not in self._reported]
         self._reported.update((e.name, c.text) for e, c in new)
@@ -265,6 +267,7 @@ class EntryCheck:
         return [
             *self._object_errors(where, objects),
             *of_converter,
+            *overloads,
             *([self._error(where, new, "entry_unknown")] if new else []),
         ]
 
@@ -279,6 +282,19 @@ class EntryCheck:
             remedy = (
                 f"{entry.value.remedy(entry.place.replace('/', '.'))}; if it states nothing about the samples, name it "
                 f"in the layout, 'checked_entries: {entry.name}'"
+            )
+            yield self.source.error(where, problem, remedy, reason="entry_unknown")
+
+    def _overload_errors(self, where: str, entries: Sequence[Entry]) -> Iterator[ReadError]:
+        """Remark on each entry by which the logger says that a channel left its range."""
+        for entry in overload_entries(entries):
+            if (entry.place, _text(entry.value)) in self._reported:
+                continue
+            self._reported.add((entry.place, _text(entry.value)))
+            statement = f"'{entry.name}: {_text(entry.value)[:MAX_SHOWN]}' in {entry.place}"
+            problem = f"{statement} may say that a channel left its range"
+            remedy = (
+                f"Look at its peaks; if it means something else, name it in the layout, 'checked_entries: {entry.name}'"
             )
             yield self.source.error(where, problem, remedy, reason="entry_unknown")
 
