@@ -370,13 +370,13 @@ def _add_rail(
     stiffness: np.ndarray,
 ) -> None:
     element_cache, length = {}, np.diff(node)
-    keys = [(rail, round(h, 12)) for rail, h in zip(rails, length)]
+    keys = list(zip(rails, np.round(length, 12).tolist()))
     for key, h in zip(keys, length):
         if key not in element_cache:
             element_cache[key] = element_mass(key[0], h), element_stiffness(key[0], h)
     m, k = (np.array(element_matrices) for element_matrices in zip(*(element_cache[key] for key in keys)))
     middle = 0.5 * (node[:-1] + node[1:])
-    rate = np.array([rail.damping / rail.mass + _end_rate(track, x) for rail, x in zip(rails, middle)])
+    rate = np.array([rail.damping / rail.mass for rail in rails]) + _end_rate(track, middle)
     first, last = node_index[:-1], node_index[1:]
     rows = first, first + 1, last, last + 1
     for a in range(4):
@@ -387,9 +387,10 @@ def _add_rail(
             np.add.at(damping, entries, rate * m[:, a, b])
 
 
-def _end_rate(track: Track, x: float) -> float:
+def _end_rate(track: Track, x: np.ndarray) -> np.ndarray:
     """Damping rate [1/s] of an absorbing end; it grows with the square of the distance into the end."""
     if not track.end_length:
-        return 0.0
-    depth = max(track.start + track.end_length - x, x - track.end + track.end_length, 0.0)
+        return np.zeros_like(x)
+    from_start, from_end = track.start + track.end_length - x, x - track.end + track.end_length
+    depth = np.maximum(np.maximum(from_start, from_end), 0.0)
     return track.end_damping * (depth / track.end_length) ** 2

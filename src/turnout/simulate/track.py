@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -208,12 +210,18 @@ class Track:
         Rail
             Profile.
         """
-        inside = {
-            x for s in self.stretches for x in (s.start, s.end) if start + NODE_TOLERANCE < x < end - NODE_TOLERANCE
-        }
-        cuts = [start, *sorted(inside), end]
+        ends = self._stretch_ends
+        inside = ends[bisect_right(ends, start + NODE_TOLERANCE) : bisect_left(ends, end - NODE_TOLERANCE)]
+        if not inside:
+            return self.rail_at(0.5 * (start + end))
+        cuts = [start, *inside, end]
         rails = [self.rail_at(0.5 * (a + b)) for a, b in pairwise(cuts)]
-        return in_series(rails, np.diff(cuts) / (end - start)) if inside else rails[0]
+        return in_series(rails, np.diff(cuts) / (end - start))
+
+    @cached_property
+    def _stretch_ends(self) -> list[float]:
+        """Ends of all stretches, each once, in order. [m]"""
+        return sorted({x for s in self.stretches for x in (s.start, s.end)})
 
     def links(self) -> list[Link]:
         """All springs, dampers and masses of the supports as links, and the chairs of a blade."""

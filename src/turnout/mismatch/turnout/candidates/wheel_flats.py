@@ -111,8 +111,8 @@ def _shifted_copies(rows: np.ndarray, steps: np.ndarray) -> np.ndarray:
     return np.moveaxis(rows[:, index], 1, 0)
 
 
-def log_likelihood_ratio(deviations: np.ndarray, expected: np.ndarray | float) -> np.ndarray:
-    """Log likelihood ratio of ``deviations`` for an impact of ``expected`` deviations against none. [nats]
+def log_density(deviations: np.ndarray, expected: np.ndarray | float) -> np.ndarray:
+    """Log density of ``deviations`` for an impact of ``expected`` deviations; 0 for none.
 
     Parameters
     ----------
@@ -126,14 +126,9 @@ def log_likelihood_ratio(deviations: np.ndarray, expected: np.ndarray | float) -
     array of float
         [nats]
     """
-    noise, impact = (_normal_density(deviations - m, 1.0 + FLATS.impact_scatter * m) for m in (0.0, expected))
-    return np.log((1.0 - FLATS.outlier_share) * impact + FLATS.outlier_share * FLATS.outlier_density) - np.log(
-        (1.0 - FLATS.outlier_share) * noise + FLATS.outlier_share * FLATS.outlier_density
-    )
-
-
-def _normal_density(off: np.ndarray, spread: np.ndarray | float) -> np.ndarray:
-    return np.exp(-0.5 * (off / spread) ** 2) / (np.sqrt(2.0 * np.pi) * spread)
+    spread = 1.0 + FLATS.impact_scatter * expected
+    normal = np.exp(-0.5 * ((deviations - expected) / spread) ** 2) / (np.sqrt(2.0 * np.pi) * spread)
+    return np.log((1.0 - FLATS.outlier_share) * normal + FLATS.outlier_share * FLATS.outlier_density)
 
 
 def band_excess(aligned: AlignedPassage) -> tuple[np.ndarray, np.ndarray]:
@@ -241,12 +236,13 @@ def _log_ratios(
     )
     distance = np.abs(position[..., None] - sensors)
     is_audible = ((when > time[0]) & (when < time[-1]))[..., None] & (distance < FLATS.max_sensor_distance)
-    observed = np.stack([np.interp(when, time, row) for row in excess], axis=-1)
-    ratios = []
+    observed = np.stack([np.interp(when, time, row) for row in excess], axis=-1)[is_audible]
+    without_impact, heard_from = log_density(observed, 0.0), distance[is_audible]
+    ratios, ratio = [], np.zeros(distance.shape)
     for strength in FLATS.strengths:
         for decay in FLATS.decays:
-            ratio = log_likelihood_ratio(observed, np.maximum(strength - decay * distance, 0.0))
-            ratios.append(FLATS.sensor_weight * np.sum(np.where(is_audible, ratio, 0.0), axis=(1, 2)))
+            ratio[is_audible] = log_density(observed, np.maximum(strength - decay * heard_from, 0.0)) - without_impact
+            ratios.append(FLATS.sensor_weight * np.sum(ratio, axis=(1, 2)))
     return np.array(ratios).T
 
 
