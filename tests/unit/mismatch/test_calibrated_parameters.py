@@ -10,6 +10,7 @@ from turnout.mismatch.turnout.calibration import calibrated_parameters
 
 SUPPORTS = 0.6 * np.arange(6)
 EFFECTS_AT = range(2, 6)  # the two supports before them absorb what lies farther out
+SENSORS = tuple(SimpleNamespace(name=name, place=place) for name, place in (("A1", 1.1), ("A2", 2.2)))
 SDS = {"pad": 0.1, "ballast": 0.1, "sleeper": 0.03}
 UNSURE = 3.0  # times the standard deviation of other supports, at the first support of a section
 
@@ -25,7 +26,7 @@ def parameters(unsure_at):
     zone = SimpleNamespace(turnout=turnout, castings=(), effect_supports=EFFECTS_AT)
     case = SimpleNamespace(
         data=SimpleNamespace(site=SimpleNamespace(nominal=zone, waves=None)),
-        campaign=SimpleNamespace(turnout=turnout, sensors=()),
+        campaign=SimpleNamespace(turnout=turnout, sensors=SENSORS, hammer=()),
         nuisances=tuple(nuisances),
     )
     return {p.name: p for p in calibrated_parameters(case).values()}
@@ -44,3 +45,9 @@ def test_values_of_which_the_file_is_unsure_walk_no_faster(group):
     found = parameters(unsure_at=3)
     walks = {found[f"{group}@{x:.2f}"].walk_sd for x in SUPPORTS}
     assert len(walks) == 1 and 0.0 < walks.pop() <= 0.03
+
+
+def test_supports_beside_a_sensor_are_not_beyond_the_sensors():
+    """Sensors at 1.1 and 2.2 m: the sleepers at 1.2 and 2.4 m are beside them, those at 0.6 and 3.0 m beyond."""
+    pads = [p for p in parameters(unsure_at=3).values() if p.group == "pad"]
+    assert [p.position for p in pads if p.is_beyond_sensors] == pytest.approx([0.0, 0.6, 3.0])

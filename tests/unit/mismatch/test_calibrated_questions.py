@@ -17,7 +17,8 @@ from turnout.mismatch.calibrated import (
     estimate_history,
 )
 from turnout.mismatch.calibrated.change_course import courses_of
-from turnout.mismatch.calibrated.file_comparison import evidence_from_first
+from turnout.mismatch.calibrated.constants import CALIBRATION
+from turnout.mismatch.calibrated.file_comparison import evidence_from_first, model_error
 
 N_SUPPORT = 5
 SUPPORTS = tuple(
@@ -230,6 +231,28 @@ def test_what_recorded_tamping_moves_is_no_deviation_from_the_file(is_recorded):
         history = estimate_history(SUPPORTS, visits, [event] if is_recorded else [], accepted=None)
         alarms += bool(deviations_from_file(history, SUPPORTS, {"ballast": 0.2}))
     assert alarms <= 4 if is_recorded else alarms > 20  # 0.3 % of 200 sites are 0.5
+
+
+@pytest.mark.parametrize("is_known", [True, False])
+def test_pads_beyond_the_sensors_may_absorb_what_lies_farther_out(is_known):
+    """300 sites of four pads whose fitted values have errors of 0.1 beside their scatter of 0.1; many differ if the
+    error is not known. A pad that is there with a third of its stiffness differs in both cases."""
+    pads = [
+        StateParameter(f"pad@{k}", 0.0, 0.1, 0.0, "pad", k, 0.6 * k, is_beyond_sensors=is_known) for k in (0, 1, 18, 19)
+    ]
+    error, rng = dict(CALIBRATION.model_errors_beyond_sensors)["pad"], np.random.default_rng(13)
+    names, information = tuple(p.name for p in pads), np.eye(len(pads)) / 0.03**2
+
+    def differences(x):
+        group = GroupInformation("A", 1, names, information, information @ x)
+        history = estimate_history(pads, [VisitInformation("v", 0.0, (group,))], [model_error(pads)], accepted=None)
+        return deviations_from_file(history, pads, {"pad": 0.35})
+
+    sites = [rng.normal(0.0, np.hypot(0.1, error), len(pads)) for _ in range(300)]
+    alarms = sum(bool(differences(x)) for x in sites)
+    assert alarms <= 3 if is_known else alarms > 8  # 0.3 % of 300 sites are 0.8
+    (soft,) = differences(np.array([0.0, np.log(0.33), 0.0, 0.0]))
+    assert soft.names == ("pad@1",)
 
 
 def test_what_is_not_known_or_too_small_is_no_finding():

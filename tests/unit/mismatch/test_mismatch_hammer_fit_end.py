@@ -14,6 +14,7 @@ from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.mismatch.turnout import TrackCase
+from turnout.mismatch.turnout.hammer_case import HammerCase
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.simulate import uniform_track
 from turnout.simulate.turnout_track import TurnoutTrack
@@ -86,3 +87,28 @@ def test_a_step_to_the_other_side_of_a_valley_is_no_end_of_a_fit(start):
     """2 x / (1 + x²) = arctan x has its root at 1.39175. Just below it a full step gains less than half a nat."""
     options = {"iterations": THRESHOLDS.max_cheap_steps, "min_gain": THRESHOLDS.min_cheap_step_gain}
     assert abs(fit_jointly(Arctangent(), values={"x": start}, **options).values["x"]) < 0.02
+
+
+class Vibration(HammerCase):
+    """Four seconds of a vibration of 5 + x rad/s: beside the true x, about 1.5 rad/s apart, lie other minima."""
+
+    def __init__(self, x):
+        self.t = np.linspace(0.0, 4.0, 81)
+        nuisance = Nuisance("x", "-", 0.0, 2.0, bounds=(-8.0, 8.0))
+        observation = Observation("a", "a", np.sin((5.0 + x) * self.t), np.full(self.t.size, 0.1))
+        super().__init__(None, (observation,), (nuisance,))
+
+    def predict(self, values, terms, observations):
+        return [np.sin((5.0 + values["x"]) * self.t)]
+
+    def nuisance_jacobian(self, values, terms, observations, base):
+        return [(self.t * np.cos((5.0 + values["x"]) * self.t))[:, None]]
+
+
+@pytest.mark.parametrize("x", [0.4, 3.3])
+def test_a_fit_to_all_tests_ends_in_the_deepest_minimum(x):
+    """From the mean of the prior a fit ends beside an x of 1.6 standard deviations, with broad errors as well."""
+    case = Vibration(x)
+    from_mean = fit_jointly(case, values=fit_jointly(case.with_broad_errors(), iterations=30).values, iterations=30)
+    assert (abs(from_mean.values["x"] - x) < 0.01) == (x == 0.4)
+    assert case.fit_from_priors()["x"] == pytest.approx(x, abs=0.01)

@@ -20,6 +20,7 @@ class StateParameter:
     after one year, ``visit_sd`` that of what each visit adds of its own: another train of the type comes, for example.
     Parameters of one ``group`` are alike, at different ``position`` [m] along the track; ``index`` numbers adjacent
     ones. ``may_change``: whether a change of it may be told; not of supports that absorb what lies beyond them.
+    ``is_beyond_sensors``: a support beyond the outer sensors and impacts, where the error of the model is larger.
     """
 
     name: str
@@ -32,6 +33,7 @@ class StateParameter:
     unit: str = "-"
     visit_sd: float = 0.0
     may_change: bool = True
+    is_beyond_sensors: bool = False
 
     def __post_init__(self) -> None:
         if not (self.sd > 0.0 and self.walk_sd >= 0.0 and self.visit_sd >= 0.0 and np.isfinite(self.mean)):

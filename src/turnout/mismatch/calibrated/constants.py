@@ -40,6 +40,14 @@ class CalibrationConstants:
         "unit of the group", "of a value, the same in all recordings: the wheels of all trains meet a nose of one "
         "shape; supports of 10 intact crossing sites have errors beyond their standard deviations", PAGE,
     )  # fmt: skip
+    model_errors_beyond_sensors: tuple[tuple[str, float], ...] = threshold(
+        (("pad", 0.1),),
+        "unit of the group", "of a value beyond the outer sensors: pads there absorb what lies farther out; of 60 "
+        "intact sites of plain track", PAGE,
+    )  # fmt: skip
+    sensor_reach: float = threshold(
+        0.3, "m", "beyond a sensor or impact, within which a support is beside it: half a bay", PAGE
+    )
     pad_visit_sd: float = threshold(
         0.1, "ln", "change of all pads between visits by their temperature: 30 K at 0.3 % per kelvin", PAGE
     )

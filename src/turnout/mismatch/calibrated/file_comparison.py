@@ -50,7 +50,8 @@ def model_error_sds(parameters: Sequence[StateParameter]) -> np.ndarray:
         In the units of the parameters, 0 where no error is known.
     """
     errors = dict(CALIBRATION.model_errors)
-    return np.array([errors.get(p.group, 0.0) for p in parameters])
+    beyond = errors | dict(CALIBRATION.model_errors_beyond_sensors)
+    return np.array([(beyond if p.is_beyond_sensors else errors).get(p.group, 0.0) for p in parameters])
 
 
 def model_error(parameters: Sequence[StateParameter]) -> Event:

@@ -51,6 +51,8 @@ def calibrated_parameters(case: TrackCase, route: str = "main") -> dict[str, Sta
     support = zone.turnout.track.support
     whole = case.campaign.turnout.track.support
     sensors = {s.name: float(s.place) for s in case.campaign.sensors}
+    measured_at = (*sensors.values(), *(t.place for t in case.campaign.hammer))
+    low, high = min(measured_at) - CALIBRATION.sensor_reach, max(measured_at) + CALIBRATION.sensor_reach
     castings = zone.castings
     waves = case.data.site.waves
     parameters: dict[str, StateParameter] = {}
@@ -76,9 +78,11 @@ def calibrated_parameters(case: TrackCase, route: str = "main") -> dict[str, Sta
         used[name] += 1
         name = name if used[name] == 1 else f"{name} #{used[name]}"
         is_outer = nuisance.index is not None and nuisance.index not in zone.effect_supports
+        is_beyond = index is not None and position is not None and not low <= position <= high
         parameters[nuisance.name] = StateParameter(
-            name, nuisance.mean, nuisance.sd, 0.0, group, index, position, nuisance.unit, may_change=not is_outer
-        )
+            name, nuisance.mean, nuisance.sd, 0.0, group, index, position, nuisance.unit,
+            may_change=not is_outer, is_beyond_sensors=is_beyond,
+        )  # fmt: skip
     every = tuple(parameters.values())
     return {
         name: replace(p, walk_sd=_walk_sd(p, every), visit_sd=_visit_sd(name, p, every))

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import suppress
 from copy import copy
 from dataclasses import replace
 
 import numpy as np
 
+from turnout.errors import SimulationError
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.mismatch.turnout.predicted_case import PredictedCase
@@ -28,7 +31,23 @@ class HammerCase(PredictedCase):
         return broad
 
     def fit_from_priors(self) -> dict[str, float]:
-        """Values of the nuisances from a fit with broad errors, continued with the actual ones."""
+        """Values of the nuisances in the deepest of several minima.
+
+        A fit with broad errors leads to the first, and is continued with the actual ones. The cost has further minima,
+        in which neighbouring pads share out what they explain together in another way. So fits begin at draws of the
+        priors as well: ``RECEPTANCE.n_drawn_starts``, always the same.
+        """
         steps = THRESHOLDS.max_cheap_steps
         rough_fit = fit_jointly(self.with_broad_errors(), iterations=steps)
-        return fit_jointly(self, values=rough_fit.values, iterations=steps).values
+        fits = [fit_jointly(self, values=rough_fit.values, iterations=steps)]
+        for start in self._drawn_starts():
+            with suppress(SimulationError):  # it cannot be simulated there
+                fits.append(fit_jointly(self, values=start, iterations=steps))
+        return min(fits, key=lambda f: f.cost).values
+
+    def _drawn_starts(self) -> Iterator[dict[str, float]]:
+        """Draws of the priors of all nuisances, within their bounds."""
+        rng = np.random.default_rng(RECEPTANCE.n_drawn_starts)
+        for _ in range(RECEPTANCE.n_drawn_starts):
+            drawn = [n.mean + n.sd * float(rng.normal()) for n in self.nuisances]
+            yield {n.name: float(np.clip(v, *n.bounds)) for n, v in zip(self.nuisances, drawn)}

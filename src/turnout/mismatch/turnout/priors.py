@@ -25,6 +25,7 @@ RADAU_SCHEME = "decisions/radau-scheme.md"
 SATURATED = "decisions/saturation-from-impacts.md"
 LOCATED = "decisions/residual-localization.md"
 PRESCREEN = "decisions/hammer-prescreen.md"
+MINIMA = "decisions/minima-of-hammer-fits.md"
 GUIDE = "mismatch.md"
 SWITCH_PANELS = "decisions/switch-panels.md"
 KNOTHE, OSCARSSON = "Knothe and Grassie 1993", "Oscarsson 2002"
@@ -133,6 +134,7 @@ class ReceptancePriors:
     lowest_band: float = prior(31.25, "Hz", "start of the octave bands of a residual", "convention")
     broad_error: float = prior(
         0.1, "-", "relative error in the first, broad fit: its optimum has a wide basin", PRESCREEN)
+    n_drawn_starts: int = prior(4, "starts", "drawn from the priors, of the fit to all tests together", MINIMA)
     lifting_rate: float = prior(5e3, "Hz", "steps of an impact that opens slide chairs: five for a period", "numerical")
     lifting_error: float = prior(
         0.65, "share of the change", "by chairs that open, rms of 81 receptances of five intact panels",
