@@ -1,6 +1,7 @@
 """Public functions document their parameters."""
 
 import ast
+import re
 
 MIN_SHARE = 0.95  # of the public functions with parameters
 HEADINGS = ("Parameters\n", "Attributes\n")
@@ -62,3 +63,22 @@ def test_public_functions_document_their_parameters(repository):
     ]
     share = 1 - len(missing) / len(functions)
     assert share >= MIN_SHARE, f"{share:.1%} of {len(functions)}; without:\n" + "\n".join(missing)
+
+
+def test_what_is_returned_is_not_said_twice(repository):
+    """A summary that says what is returned needs no second copy below "Returns"."""
+    repeated = []
+    for path in sorted((repository / "src").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            text = (ast.get_docstring(node) or "") if isinstance(node, ast.FunctionDef) else ""
+            if "Returns\n-------\n" not in text:
+                continue
+            summary, returned = text.split("\n\n")[0], text.split("Returns\n-------\n")[1].split("\n\n")[0]
+            if words(summary) == words(" ".join(returned.splitlines()[1:])):
+                repeated.append(f"{path.relative_to(repository)}:{node.lineno} {node.name}")
+    assert not repeated, "\n".join(repeated)
+
+
+def words(text):
+    """The words of a text, without blanks and signs between them."""
+    return re.findall(r"\w+", text)

@@ -44,7 +44,6 @@ class TurnoutFindings:
         Returns
         -------
         pandas.DataFrame
-            One of the ``tables`` as a data frame, one row per finding, parameter, curve or problem.
         """
         import pandas
 

@@ -117,7 +117,6 @@ class Metadata:
         Returns
         -------
         any
-            As ``get``, but entry ``k`` if there is one entry per record.
 
         Raises
         ------
@@ -195,7 +194,6 @@ class Metadata:
         Returns
         -------
         int or None
-            As ``number``, but a whole number above 0.
 
         Raises
         ------

@@ -81,7 +81,6 @@ class AcceptedEffect:
         Returns
         -------
         bool
-            Whether the effect applies to ``route``.
         """
         return self.route in ("", route)
 
@@ -98,7 +97,6 @@ class AcceptedEffect:
         Returns
         -------
         bool
-            Whether it is the effect ``family`` at the position, sensor or train in ``where``.
         """
         if family != self.family:
             return False
@@ -121,7 +119,6 @@ class AcceptedEffect:
         Returns
         -------
         Any
-            The physics term on a track of ``turnout.simulate``; None if no part of it lies on that track.
         """
         chosen = {name: value for name, (value, _) in self.values.items()} | dict(values or {})
         fixed_values: dict[str, Any] = {}

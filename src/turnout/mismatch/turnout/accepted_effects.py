@@ -48,7 +48,6 @@ class AcceptedEffect(Protocol):
         Returns
         -------
         Any
-            The term on a track at these values, None if no part of it lies on that track.
         """
 
     def is_of(self, family: str, where: Mapping[str, Any]) -> bool:
@@ -64,7 +63,6 @@ class AcceptedEffect(Protocol):
         Returns
         -------
         bool
-            Whether it is the effect ``family`` at the position, sensor or train in ``where``.
         """
 
 
@@ -96,7 +94,6 @@ class AcceptedEffects:
         Returns
         -------
         AcceptedEffects
-            The same effects with their parameters fixed at ``values``.
         """
         return replace(self, fixed=values) if self.effects else self
 
@@ -111,7 +108,6 @@ class AcceptedEffects:
         Returns
         -------
         tuple[PhysicsTerm, ...]
-            Terms of the effects at these values of their nuisances.
         """
         if not self.effects:
             return ()
@@ -133,7 +129,6 @@ class AcceptedEffects:
         Returns
         -------
         tuple[Candidate, ...]
-            Candidates that are not accepted already.
         """
         return tuple(c for c in candidates if not any(effect.is_of(c.family, c.where) for effect in self.effects))
 
@@ -174,7 +169,6 @@ class AcceptedEffects:
         Returns
         -------
         list[dict[str, Any]]
-            Estimates of all parameters in a fit: dicts with accepted, name, value, se and unit.
         """
         index = {n.name: k for k, n in enumerate(nuisances)}
         estimates = []

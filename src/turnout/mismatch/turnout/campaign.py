@@ -95,7 +95,6 @@ class CampaignInput:
         Returns
         -------
         tuple[Sensor, ...]
-            The sensors that recorded a passage.
         """
         names = {c.name for c in passage.recording.channels}
         return tuple(s for s in self.sensors if s.name in names)

@@ -176,7 +176,6 @@ class TrackCase(PredictedCase):
         Returns
         -------
         bool
-            Hammer tests are cheap to predict; passages have to be simulated.
         """
         return observation.name in self.frf_pairs
 
@@ -225,7 +224,6 @@ class TrackCase(PredictedCase):
         Returns
         -------
         TrackCase
-            The case with the rail under the passages and the roughness errors of the wheels as ``fit`` has them.
         """
         if not self.aligned_passages:
             return self
@@ -266,7 +264,6 @@ class TrackCase(PredictedCase):
         Returns
         -------
         tuple[Candidate, ...]
-            Dips, corrugation and wheel defects, as the residual and the sound level of passages suggest them.
         """
         from turnout.mismatch.turnout.candidates.rail_defects import scan_geometry
 
@@ -293,7 +290,6 @@ class TrackCase(PredictedCase):
         Returns
         -------
         tuple[Candidate, ...]
-            Worn noses: dips of the file that are certainly much deeper than it says.
         """
         surface = self.predictor.site.surface
         if not surface or not surface.parameters or not self.fitted_passages():
@@ -312,7 +308,6 @@ class TrackCase(PredictedCase):
         Returns
         -------
         list[tuple[Candidate, tuple[float, ...]]]
-            Wheelsets of other masses, for trains whose residual exceeds the control level.
         """
         return distant_starts(self, fit)
 
@@ -344,7 +339,6 @@ class TrackCase(PredictedCase):
         Returns
         -------
         dict[str, Any] or None
-            Missing force at the support that explains most of the residual.
         """
         from turnout.mismatch.turnout.force_reconstruction import latent_force
 
@@ -364,7 +358,6 @@ class TrackCase(PredictedCase):
         Returns
         -------
         list[array] or None
-            Difference of each prediction to one with half the step and half the mesh; None without passages.
         """
         if not self.aligned_passages:
             return None

@@ -92,7 +92,6 @@ class FixedLinks(PhysicsTerm):
         Returns
         -------
         sequence of Link
-            The links, for any track.
         """
         return self._links
 
@@ -151,7 +150,6 @@ class MatrixTemplate:
         Returns
         -------
         TrackMatrices
-            TrackMatrices with the values of ``track`` and of additional links.
         """
         base = self._base_with_rail(track)
         matrices = {what: getattr(base, what).copy() for what in ("stiffness", "damping", "mass")}

@@ -107,7 +107,6 @@ class CaseData:
         Returns
         -------
         float
-            Largest value of a channel in the fitted passages, within their band; 0 where it has none. [m/s²]
         """
         peaks = [0.0]
         for o in self.observations:
@@ -130,7 +129,6 @@ class CaseData:
         Returns
         -------
         float
-            Largest value of a channel at its full sampling rate, reserved recordings included. [m/s²]
         """
         return raw_peak(self.campaign, channel) or self.band_peak(channel)
 

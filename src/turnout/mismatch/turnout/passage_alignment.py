@@ -130,7 +130,6 @@ class PassageAligner:
         Returns
         -------
         tuple[float, float, float]
-            ``align`` of a passage with its simulation at ``values``; SimulationError if it cannot be simulated.
         """
         sensors = self.campaign.sensors_of(passage)
         surfaces = self.predictor.surface.surfaces(passage.route, values)
@@ -153,7 +152,6 @@ class PassageAligner:
         Returns
         -------
         float
-            Correlation of a passage with its simulation, 0 if it cannot be simulated.
         """
         try:
             return self.align(values, passage)[2]

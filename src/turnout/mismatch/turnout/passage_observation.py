@@ -59,7 +59,6 @@ class AlignedPassage:
         Returns
         -------
         array
-            Rows of ``samples`` within the band of the passage.
         """
         return limit_band(samples, rate, high=self.high)
 

@@ -85,7 +85,6 @@ class PassagePredictor(SiteModel):
         Returns
         -------
         array
-            Output of the channel of a sensor for the simulated signal ``signal``, at the times of the recording.
         """
         signal = self.through_channel(values, terms, aligned, sensor, signal)
         return self.at_recorded_times(values, aligned, sensor, aligned.limit_band(signal, 4.0 * self.solver.rate))
@@ -162,7 +161,6 @@ class PassagePredictor(SiteModel):
         Returns
         -------
         array
-            Simulated signals of the sensors before their channels, at four times the rate of the simulation; cached.
         """
         passage_terms, key = self._terms_and_key(values, terms, aligned)
         if key not in self._signals:
@@ -184,7 +182,6 @@ class PassagePredictor(SiteModel):
         Returns
         -------
         array
-            Simulated signals of the sensors and of ``probes`` at the rate of the simulation; the latest are cached.
         """
         passage_terms, key = self._terms_and_key(values, terms, aligned)
         if key not in self._signals_with_probes:
@@ -313,7 +310,6 @@ class PassagePredictor(SiteModel):
         Returns
         -------
         PassageSimulator
-            ``PassageSimulator`` of a passage's route with these terms, cached.
         """
         key = passage.route, track_value_key(self.zone, values), repr(terms)
         if key not in self._simulators:

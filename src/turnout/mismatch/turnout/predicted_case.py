@@ -79,7 +79,6 @@ class PredictedCase(Case):
         Returns
         -------
         tuple
-            Terms of the accepted effects and of the candidates in a fit.
         """
         return (*self.accepted.terms(fit.values), *fit.terms)
 
@@ -123,7 +122,6 @@ class PredictedCase(Case):
         Returns
         -------
         tuple[Self, Fit]
-            The case with its accepted effects fixed as ``fit`` has them, and the fit without their columns.
         """
         n, n_accepted = len(self._site_nuisances), len(self.accepted.nuisances)
         fixed = copy(self)
@@ -145,6 +143,5 @@ class PredictedCase(Case):
         Returns
         -------
         dict
-            Columns of all candidates that have one, (key, start) -> list of (n,) per observation.
         """
         return screen_columns(*self.with_fixed_effects(fit), self.observations)

@@ -40,7 +40,6 @@ class Predictor(ReceptancePredictor, PassagePredictor, Predictions):
         Returns
         -------
         Predictor
-            The predictor of these recordings; it shares its caches with this one.
         """
         changed = copy(self)
         changed.frf_pairs, changed.aligned_passages = dict(frf_pairs), dict(aligned_passages)
@@ -76,7 +75,6 @@ class Predictor(ReceptancePredictor, PassagePredictor, Predictions):
         Returns
         -------
         Predictor
-            The predictor with the track of passages about the rail that ``values`` give.
         """
         changed = Predictor(self.site, self.solver, values)
         changed.frf_pairs, changed.aligned_passages = self.frf_pairs, self.aligned_passages
@@ -95,7 +93,6 @@ class Predictor(ReceptancePredictor, PassagePredictor, Predictions):
         Returns
         -------
         Predictor
-            The predictor with another simulation of passages, with empty caches.
         """
         changed = Predictor(self.site, solver, self.rail)
         changed.frf_pairs, changed.aligned_passages = self.frf_pairs, self.aligned_passages

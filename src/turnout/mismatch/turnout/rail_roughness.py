@@ -105,7 +105,6 @@ class Waves:
         Returns
         -------
         tuple[Sampled, ...]
-            The waves as a component of a wheel's path; () where all are 0.
         """
         amplitude = self.amplitudes(values)
         if not amplitude.any():

@@ -193,7 +193,6 @@ class ReceptanceModel:
         Returns
         -------
         float or tuple
-            Position of a sensor on the model.
         """
         return sensor.probe(self.track).place
 
@@ -257,7 +256,6 @@ class ReceptanceModel:
         Returns
         -------
         list[Link]
-            Links of ``terms`` on this track or another, followed by the tangents of their ports.
         """
         track = track or self.track
         return [*links_of(terms, track), *tangent_links(terms, track)]

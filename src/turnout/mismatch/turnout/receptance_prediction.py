@@ -45,7 +45,6 @@ class ReceptancePredictor(SiteModel):
         Returns
         -------
         Callable[[FrfPair], ReceptanceSensitivity]
-            Function that gives ``pair_sensitivity`` of a pair at these values, sought once per conditions.
         """
         by_conditions: dict[Hashable, ReceptanceSensitivity] = {}
         by_terms: dict[str, ReceptanceSensitivity] = {}
@@ -114,7 +113,6 @@ class ReceptancePredictor(SiteModel):
         Returns
         -------
         ReceptanceSensitivity
-            ``ReceptanceSensitivity`` of all pairs that have the same track as ``pair``, cached.
         """
         track_terms = receptance_observation.track_terms(terms, pair.conditions)
         rail = rail_on_grid(values, self.rail)

@@ -186,7 +186,6 @@ class ReceptanceSensitivity:
         Returns
         -------
         array
-            Derivatives by the logarithms of the uncertain rail values (``rail_sds``), (n_line, n).
         """
         return self.rail_gradients[self.row_of(pair)]
 
@@ -201,7 +200,6 @@ class ReceptanceSensitivity:
         Returns
         -------
         array
-            Derivatives by the logarithms of common and support values, (n_line, n) in order of ``track_value_names``.
         """
         return self._by_supports[self.row_of(pair)]
 

@@ -88,7 +88,6 @@ class SurfaceParameter:
         Returns
         -------
         float or tuple[float, ...]
-            Its value with deviation ``by``; of a profile all values.
         """
         value = getattr(self.component, self.field)
         if self.field in POSITION_FIELDS:
@@ -109,7 +108,6 @@ class SurfaceParameter:
         Returns
         -------
         dict[str, Any]
-            Dict with its value for a deviation ``by`` with standard ``error``; of a profile its factor.
         """
         profile = isinstance(getattr(self.component, self.field), tuple)
         file_value: Any = 1.0 if profile else getattr(self.component, self.field)
@@ -177,7 +175,6 @@ class RunningSurface:
         Returns
         -------
         Surfaces
-            Surfaces of ``route``, each a tuple of components, with the numbers of ``values``.
         """
         changes: dict = {}
         for u in self.parameters:

@@ -58,7 +58,6 @@ class Site:
         Returns
         -------
         tuple[Nuisance, ...]
-            All nuisances: the shared ones, then rail roughness, running surface and each of the ``passages``.
         """
         geometry: list[Nuisance] = []
         if self.waves is not None:

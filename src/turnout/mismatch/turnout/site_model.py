@@ -67,7 +67,6 @@ class SiteModel:
         Returns
         -------
         Track
-            Base track of a route, cut to the zone.
         """
         file_names = tuple(sorted({t.name for t in terms} & set(self.rail)))
         if file_names and file_names not in self._zones_with_file_values:
@@ -92,7 +91,6 @@ class SiteModel:
         Returns
         -------
         Sensor
-            The sensor at the position that ``values`` and ``terms`` give.
         """
         offset = values.get(f"seat_{sensor.name}", 0.0)
         return passage_model.place_sensor(replace(sensor, place=sensor.place + offset) if offset else sensor, terms)

@@ -67,7 +67,6 @@ class RailScan:
         Returns
         -------
         tuple[array, array]
-            (slope (m,), size (m, m)) of shapes (m, n) at ``x``, with the waves free.
         """
         c = shapes @ self.basis
         across = self.gram[:, self.wave_slice] @ c.T
@@ -84,7 +83,6 @@ class RailScan:
         Returns
         -------
         dict[str, float]
-            Wave amplitudes without ``shape`` (n,), which is an effect of its own: start of a joint fit.
         """
         c = shape @ self.basis
         released = self.shift - (self.normal @ (self.gram[:, self.wave_slice] @ c))[self.wave_slice]
