@@ -15,7 +15,6 @@ from turnout.simulate.parameters import off_track_errors
 from turnout.simulate.run import Drive
 from turnout.simulate.turnout_track import TurnoutTrack
 from turnout.stages.parameter_ranges import improbable_values
-from turnout.stages.passage_context import known_patterns
 
 MAX_POSITION_DIFFERENCE = 0.5  # m: a larger difference between layout and track file is an error
 END_MARGIN = Drive.entry + Drive.margin  # m: closer to an end of the track a train is not completely on it
@@ -97,6 +96,8 @@ def faults_of_vehicles(configuration: Configuration) -> Iterator[str]:
     str
         One fault, as a sentence.
     """
+    from turnout.stages.passage_context import known_patterns  # it loads parts of scipy
+
     for path in sorted((configuration.folder / "vehicles").glob("*.yaml")):
         try:
             if path.name == Path(PassageSettings().axle_patterns).name:

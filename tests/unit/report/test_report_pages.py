@@ -13,7 +13,7 @@ from benchmarks.published.response import paper_response
 from turnout.config import load_configuration, with_raw
 from turnout.demo.hammer import hammer_test
 from turnout.readers.writing import write
-from turnout.registry.database import open_registry
+from turnout.registry.database import open_registry, rebuild_database
 from turnout.registry.job import register
 from turnout.report.job import report_job
 from turnout.report.pages.turnout import lines_of
@@ -193,6 +193,7 @@ def copied(pages, tmp_path):
     """(folder of pages, folder of the registry) of one's own."""
     for name in ("pages", "registry"):
         shutil.copytree(pages[0].parent / name, tmp_path / name, ignore=shutil.ignore_patterns(".spill"))
+    rebuild_database(tmp_path / "registry")
     return tmp_path / "pages", tmp_path / "registry"
 
 
