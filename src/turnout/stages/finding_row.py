@@ -42,7 +42,8 @@ def sentence(diagnosis: Diagnosis) -> str:
         if not verdict.is_finished:
             return f"{UNFINISHED}: {verdict.reason}. The simulation differs most {location_text(diagnosis)}."
         if verdict.is_ambiguous:
-            return f"Something is there {location_text(diagnosis)} that these recordings cannot name: {verdict.reason}."
+            where = location_text(diagnosis)
+            return f"Something is there {where}, and these recordings cannot name it: {verdict.reason}."
         return f"Something is missing {location_text(diagnosis)}: {verdict.reason}."
     sentences = []
     for term, term_verdict in zip(diagnosis.fit.terms, diagnosis.verdicts):

@@ -194,7 +194,7 @@ def title(finding: Mapping[str, Any]) -> str:
         where = _location_text(finding, low, high)
         evidence = json.loads(finding.get("evidence_json") or "{}")
         if evidence.get("is_ambiguous"):
-            return f"Something is there {where} that these recordings cannot name: {evidence['reason']}."
+            return f"Something is there {where}, and these recordings cannot name it: {evidence['reason']}."
         if not evidence.get("is_finished", True):
             return f"{UNFINISHED}, as the search was not finished. The simulation differs most {where}."
         return f"Something is missing {where}, and no known effect explains it."

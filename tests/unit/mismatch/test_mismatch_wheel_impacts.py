@@ -12,6 +12,7 @@ from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.mismatch.turnout.wheel_impacts import (
     ImpactSignal,
     _known_stretches,
+    _signal,
     impact_levels,
     impact_signals,
     impacts_at_position,
@@ -74,6 +75,24 @@ def test_bins_near_a_known_irregularity_do_not_count_at_any_position():
     assert impact_levels(passages).evidence() > 12.0 and impact_levels(free).evidence() < 0.0
     parts = (Kink(5.5, 0.002, 0.4), Corrugation(2.0, 4.0, 1e-5, 0.1), SimpleNamespace(places=(1.0, 3.0)), np.sin)
     assert list(_known_stretches(parts)) == [(5.5, 5.5), (1.0, 3.0)]
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_impacts_are_located_where_their_wheels_were_a_lag_before(direction):
+    passages = [replace(s, lag=direction * 1.5) for s in visit(1, lambda t, k: (5.3, slice(None)), direction=direction)]
+    assert abs(impact_levels(passages).position() - (5.3 - direction * 1.5)) < 0.5
+
+
+@pytest.mark.parametrize(("direction", "sign"), [("facing", 1.0), ("trailing", -1.0)])
+def test_a_known_irregularity_is_left_out_from_1_m_before_to_2_m_behind_it_as_the_train_runs(direction, sign):
+    case = TrackCase(measured_campaign(small_plan((15.0,), hammer_positions=()), (), 7))
+    aligned = case.fitted_passages()[0]
+    aligned = replace(aligned, passage=replace(aligned.passage, direction=direction))
+    position = float(np.mean([s.place for s in aligned.sensors]))
+    signal = _signal(aligned, IMPACTS.high_frequency, [(position, position)])
+    beyond = sign * (signal.wheels - position)
+    assert np.array_equal(signal.is_free, ~np.any((beyond > -1.0) & (beyond < 2.0), axis=1))
+    assert 0 < signal.is_free.sum() < signal.is_free.size and signal.lag == sign * IMPACTS.lag
 
 
 def with_impacts(aligned, position):
