@@ -8,14 +8,8 @@ from dataclasses import replace
 from os import PathLike
 
 from turnout.errors import ReadError, TurnoutError, installation_error
-from turnout.readers.formats import (
-    FORMATS,
-    Format,
-    detect_format,
-    reject_archive,
-    reject_other_file,
-    reject_spreadsheet,
-)
+from turnout.readers.foreign_formats import reject_foreign_format
+from turnout.readers.formats import FORMATS, Format, detect_format
 from turnout.readers.interpret import convert_records
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source, load
 from turnout.records import LongRecording, RawDescription, ReadResult, Recording
@@ -270,9 +264,7 @@ def _collected_warnings(source: Source) -> Iterator[list[ReadError]]:
 
 
 def _format_of(source: Source, description: RawDescription) -> Format:
-    reject_spreadsheet(source)
-    reject_archive(source)
-    reject_other_file(source)
+    reject_foreign_format(source)
     if description.format == "auto":
         return detect_format(source)
     if description.format not in FORMATS:

@@ -13,6 +13,7 @@ import scipy.io
 from turnout.errors import ReadError
 from turnout.readers import read
 from turnout.readers.entries import entries_of_text
+from turnout.readers.foreign_formats import FOREIGN_FORMATS
 from turnout.records import RawChannel, RawDescription
 
 RATE = 20000.0
@@ -238,6 +239,17 @@ def test_a_file_of_another_kind_is_named_with_what_to_do(head, said, ending, tmp
     with pytest.raises(ReadError) as caught:
         read(f"A7.{ending}", tmp_path, layout())
     assert f"A7.{ending}, byte 0: it is {said}" in str(caught.value)
+
+
+@pytest.mark.parametrize(("entry", "start"), [(entry, start) for entry in FOREIGN_FORMATS for start in entry.starts])
+def test_every_start_of_a_foreign_format_is_recognised_only_where_it_belongs(entry, start, tmp_path):
+    is_foreign = []
+    for front in (b"", b"\xef\xbb\xbf \n"):
+        (tmp_path / "A7.csv").write_bytes(bytes(entry.offset) + front + start + bytes(300))
+        with pytest.raises(ReadError) as caught:
+            read("A7.csv", tmp_path, layout())
+        is_foreign.append(f"it is {entry.label}. {entry.remedy}" in str(caught.value))
+    assert is_foreign == [True, entry.is_text]
 
 
 def test_two_columns_of_one_name_in_parquet_are_named(tmp_path):
