@@ -11,6 +11,7 @@ from turnout_blind.diagnose import diagnosis_folder
 from turnout_blind.seal import BlindError, digest, read_commit, verify
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from typing import Any
 
 
@@ -74,6 +75,34 @@ def read_revealed(
     if not (out / "revealed").exists():
         raise BlindError(out, "revealed", "the truth has not been revealed", "Run turnout blind reveal first")
     return verify(out, out / "revealed"), *read_findings(out, label)
+
+
+def set_labels(outs: Sequence[str | Path]) -> list[str]:
+    """Prefixes of the case ids of sets that are scored together.
+
+    Parameters
+    ----------
+    outs : sequence of str or Path
+        Folders of the sets.
+
+    Returns
+    -------
+    list of str
+        "" of a single set, "NAME/" of several.
+
+    Raises
+    ------
+    BlindError
+        If a case is in two of the sets: it would count twice.
+    """
+    seen: dict[str, str | Path] = {}
+    for out in outs:
+        for case, sealed in read_commit(out)["cases"].items():
+            if sealed["truth_sha256"] in seen:
+                other = seen[sealed["truth_sha256"]]
+                raise BlindError(out, "commit.json", f"case {case} is also in {other}", "Give each set once")
+            seen[sealed["truth_sha256"]] = out
+    return [f"{Path(out).resolve().name}/" if len(outs) > 1 else "" for out in outs]
 
 
 def read_findings(out: str | Path, label: str | None = None) -> tuple[dict[str, list | None], dict[str, Any]]:

@@ -5,11 +5,13 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from scipy.stats import binom
 
 from turnout_blind.score.answers import answers_of
+from turnout_blind.score.calibration import by_answer, reliability, worst_difference
 from turnout_blind.score.intervals import clopper_pearson
 from turnout_blind.score.matching import gain_of, judge
-from turnout_blind.score.metrics import confusion, figures, reliability
+from turnout_blind.score.metrics import confusion, figures
 from turnout_blind.score.names import RIGHT_LOCKS, RIGHT_NAMES, SAME_PARAMETERS, right_names
 from turnout_blind.score.report import failure_table, oracle_text, read_oracle
 from turnout_blind.seal import BlindError
@@ -329,6 +331,35 @@ def test_fifths_hold_equal_numbers_and_ties_stay_together():
     judged = [judge(truth("c", "control"), answers_of([{"verdict": "none", "probability": p}])) for p in stated]
     assert [n for _, _, n in reliability(judged)] == [2, 2, 4, 2]
     assert reliability(judged)[0][0] == pytest.approx(0.15)
+
+
+def test_exact_probabilities_differ_from_the_shares_as_the_binomial_distribution_says():
+    """One group of 25 answers stated with 0.8: 2.5 and 97.5 % points of |k/25 - 0.8|, k binomial."""
+    results = [judge(truth("c", "control"), answers_of([{"verdict": "none", "probability": 0.8}])) for _ in range(25)]
+    k = np.arange(26)
+    differences, order = np.abs(k / 25.0 - 0.8), np.argsort(np.abs(k / 25.0 - 0.8), kind="stable")
+    below = np.cumsum(binom.pmf(k, 25, 0.8)[order])
+    expected = [differences[order][np.searchsorted(below, q)] for q in (0.025, 0.975)]
+    difference, by_chance = worst_difference(results)
+    assert difference == pytest.approx(0.2)  # all 25 are right
+    assert by_chance == pytest.approx(expected, abs=1e-12)
+
+
+def test_certain_answers_leave_nothing_to_chance_and_few_answers_are_not_compared():
+    control = truth("c", "control")
+    sure = [judge(control, answers_of([{"verdict": "none", "probability": 1.0}])) for _ in range(5)]
+    assert worst_difference(sure) == (0.0, (0.0, 0.0))
+    assert worst_difference(sure[:4]) == (None, None)
+
+
+def test_probabilities_are_compared_for_each_kind_of_answer():
+    """Two names of one effect, one of them wrong; two answers of none, one of them beside a clear effect."""
+    clear = truth("s", "single", "void")
+    named = [row(clear["effects"][0], name, probability=0.9) for name in ("hanging_sleeper", "rail_shear")]
+    none = [{"verdict": "none", "probability": p} for p in (0.6, 0.8)]
+    results = [judge(clear, answers_of([r])) for r in (*named, none[0])]
+    results += [judge(truth("c", "control"), answers_of([none[1]]))]
+    assert by_answer(results) == {"none": (pytest.approx(0.7), 1, 2), "one name": (pytest.approx(0.9), 1, 2)}
 
 
 def test_an_oracle_by_another_tool_is_refused(tmp_path):

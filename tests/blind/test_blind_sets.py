@@ -168,12 +168,12 @@ def test_the_tool_sees_neither_truth_nor_generator(copy, tmp_path):
         assert said == "" if held["isolation"] == "unshare" else "opened" not in said
     assert (truth / "set.json").exists()  # outside it is there as before
     assert len(reveal(out, truth)) == 2
-    report = report_text(out)
+    report = report_text([out])
     assert "| controls: false alarms | 0.0 % (0) | 0.0 to 97.5 % | 1 | <= 3.33 % | met |" in report
     spoilt = next((out / "findings").glob("*.json"))
     spoilt.write_text('[{"verdict": "named"}]')
     with pytest.raises(BlindError, match="not the rows that the tool wrote"):
-        report_text(out)
+        report_text([out])
 
 
 @pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
@@ -182,7 +182,7 @@ def test_a_tool_that_fails_is_counted_and_not_hidden(copy):
     held = diagnose_set(out, truth, "{python} -c 'raise SystemExit(3)'", report=lambda line: None)
     assert {run["status"] for run in held["cases"].values()} == {"failed"}
     reveal(out, truth)
-    assert "| cases without an answer | 100.0 % (2)" in report_text(out)
+    assert "| cases without an answer | 100.0 % (2)" in report_text([out])
 
 
 @pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
@@ -234,7 +234,7 @@ def test_a_case_that_exceeds_its_budget_is_silence(copy, code, budget, said):
     held = diagnose_set(out, truth, f"{{python}} -c '{code}'", report=lambda line: None, workers=2, **budget)
     assert {(run["status"], run["said"]) for run in held["cases"].values()} == {("over budget", said)}
     reveal(out, truth)
-    assert "| controls: false alarms | 0.0 % (0)" in report_text(out)
+    assert "| controls: false alarms | 0.0 % (0)" in report_text([out])
 
 
 @pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
@@ -350,6 +350,28 @@ def test_a_page_shows_figures_pictures_stories_failures_and_ablations(scored, tm
     page.write_text("no marks")
     with pytest.raises(BlindError, match="not there once each"):
         write_page(page, scored)
+
+
+@pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
+def test_sets_are_pooled_and_none_counts_twice(scored, tmp_path):
+    """One false alarm of one control in each of two sets: 2 of 2. The second set differs only in its seals."""
+    other = tmp_path / "other"
+    shutil.copytree(scored, other)
+    with pytest.raises(BlindError, match=f"is also in {scored}"):
+        report_text([scored, other])
+    for path in (other / "revealed").glob("T*.json"):
+        text = path.read_text()
+        path.write_text(text + " ")
+        commit = (other / "commit.json").read_text()
+        (other / "commit.json").write_text(commit.replace(digest(text.encode()), digest((text + " ").encode())))
+    for record in other.rglob("diagnosis.json"):
+        held = json.loads(record.read_text()) | {"commit_sha256": digest((other / "commit.json").read_bytes())}
+        record.write_text(json.dumps(held))
+    pooled = report_text([scored, other])
+    assert "| controls: false alarms | 100.0 % (2)" in pooled
+    assert "| controls: false alarms | 2 of 2 | 0 of 2 |" in pooled
+    assert "| one name | 4 | 0.80 |" in pooled
+    assert sorted(set(re.findall(rf"({scored.name}|other)/T", pooled))) == sorted([scored.name, "other"])
 
 
 @pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")

@@ -74,9 +74,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     keep = steps.add_parser("keep", help="store a revealed set without recordings: seals, truths, findings")
     keep.add_argument("--folder", required=True, help="folder to write")
     for sub in (make, diagnose, reveal, score, keep):
+        if sub is score:
+            sub.add_argument("--out", required=True, nargs="+", help="folder of the set; several are pooled")
+            continue
         sub.add_argument("--out", required=True, help="folder of the set")
-        if sub is not score:
-            sub.add_argument("--truth", help="folder of the truth (default: --out followed by -truth)")
+        sub.add_argument("--truth", help="folder of the truth (default: --out followed by -truth)")
 
 
 def run(args: argparse.Namespace) -> None:
@@ -147,7 +149,10 @@ def _score(args: argparse.Namespace) -> None:
     from turnout.files import write_text
     from turnout_blind.score.histories import history_text
     from turnout_blind.score.report import report_text
+    from turnout_blind.seal import BlindError
 
+    if args.page and (args.histories or len(args.out) > 1):
+        raise BlindError(args.page, "--page", "a page shows one set of single visits", "Give one --out, no --histories")
     if args.histories:
         text = history_text(args.out)
         if args.report:
@@ -159,7 +164,7 @@ def _score(args: argparse.Namespace) -> None:
     if args.page:
         from turnout_blind.score.page import write_page
 
-        write_page(args.page, args.out, names, args.effects, args.stories.split(",") if args.stories else None)
+        write_page(args.page, args.out[0], names, args.effects, args.stories.split(",") if args.stories else None)
     if args.report:
         write_text(args.report, text)
     print(text)

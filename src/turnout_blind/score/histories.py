@@ -1,15 +1,15 @@
-"""Score a revealed set of histories: effects named in time, onsets, false alarms, maintenance called a defect."""
+"""Score revealed sets of histories: effects named in time, onsets, false alarms, maintenance called a defect."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from math import log
 from typing import TYPE_CHECKING, Any
 
 from turnout_blind.history import parameters_at
-from turnout_blind.reveal import read_revealed
+from turnout_blind.reveal import read_revealed, set_labels
 from turnout_blind.score.matching import MAX_POSITION_ERROR, MIN_CLEAR_GAIN, gain_of
 from turnout_blind.score.metrics import Rate, Share
 from turnout_blind.score.names import right_names
@@ -226,24 +226,31 @@ def history_figures(results: Sequence[HistoryResult]) -> list[Share | Rate]:
     ]  # fmt: skip
 
 
-def history_text(out: str | Path) -> str:
-    """Report of a set of histories as Markdown: every figure with its interval, and every site.
+def _cost_text(n: int, diagnosis: Mapping[str, Any]) -> str:
+    times = sorted(run["cpu_s"] for run in diagnosis["cases"].values())
+    return (
+        f"{n} sites, tool {diagnosis['tool_sha256'][:12]}, commit.json {diagnosis['commit_sha256'][:12]}, "
+        f"truth hidden by {diagnosis['isolation']}. {times[len(times) // 2]:.0f} CPU s a site in the median."
+    )
+
+
+def history_text(outs: Sequence[str | Path]) -> str:
+    """Report of sets of histories as Markdown: every figure with its interval, and every site. Sets are pooled.
 
     Parameters
     ----------
-    out : str or Path
-        Folder of the set.
+    outs : sequence of str or Path
+        Folders of the sets.
 
     Returns
     -------
     str
         The report.
     """
-    results, diagnosis = score_histories(out)
-    times = sorted(run["cpu_s"] for run in diagnosis["cases"].values())
+    scored = [score_histories(out) for out in outs]
+    results = [replace(r, case=label + r.case) for label, (of_set, _) in zip(set_labels(outs), scored) for r in of_set]
     lines = [
-        f"{len(results)} sites, tool {diagnosis['tool_sha256'][:12]}, commit.json {diagnosis['commit_sha256'][:12]}, "
-        f"truth hidden by {diagnosis['isolation']}. {times[len(times) // 2]:.0f} CPU s a site in the median.",
+        *(_cost_text(len(of_set), diagnosis) for of_set, diagnosis in scored),
         "", "| figure | cases | share | 95 % interval | bar | met |", "|---|---|---|---|---|---|",
     ]  # fmt: skip
     for f in history_figures(results):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from turnout_blind.score.calibration import worst_difference
 from turnout_blind.score.intervals import clopper_pearson, poisson_interval
 from turnout_blind.score.matching import MIN_CLEAR_GAIN
 
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from turnout_blind.score.matching import CaseResult
 
 MAX_FIT_LOSS = 1.0  # loss of held-out fit that counts if the row gives no standard error [points]
-MIN_GROUP_SIZE = 5  # smallest group of stated probabilities that is compared with its bar [cases]
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,10 @@ class Rate:
 
 @dataclass(frozen=True)
 class Value:
-    """A figure other than a share: ``value`` from ``n`` cases, nan if nothing was measured."""
+    """A figure other than a share: ``value`` from ``n`` cases, nan if nothing was measured.
+
+    ``by_chance`` are the 2.5 and 97.5 % points of the value of a tool without an error, None if they are not known.
+    """
 
     name: str
     value: float
@@ -87,6 +90,7 @@ class Value:
     bar: float | None = None
     sense: str = "<="
     unit: str = ""
+    by_chance: tuple[float, float] | None = None
 
     @property
     def is_met(self) -> bool | None:
@@ -243,39 +247,14 @@ def _has_lost_fit(j: CaseResult) -> bool:
 
 
 def _calibration_figure(results: Sequence[CaseResult]) -> Value:
-    differences = [abs(stated - share) for stated, share, n in reliability(results) if n >= MIN_GROUP_SIZE]
-    n = sum(j.probability is not None for j in results)
+    difference, by_chance = worst_difference(results)
+    n = sum(j.probability is not None for j in results) if difference is not None else 0
     name = "probability: worst fifth, stated from seen"
-    return Value(name, max(differences, default=float("nan")), n if differences else 0, 0.1)
+    return Value(name, float("nan") if difference is None else difference, n, 0.1, by_chance=by_chance)
 
 
 def _median(values: Collection[float]) -> float:
     return float(np.median(list(values))) if values else float("nan")
-
-
-def reliability(results: Sequence[CaseResult]) -> list[tuple[float, float, int]]:
-    """Stated and observed probability of five groups of equal size, except that ties stay together.
-
-    Parameters
-    ----------
-    results : sequence of CaseResult
-        Results of the cases.
-
-    Returns
-    -------
-    list of (float, float, int)
-        Mean stated probability, share right and number of cases.
-    """
-    stated = sorted((j.probability, j.is_answer_right) for j in results if j.probability is not None)
-    if not stated:
-        return []
-    p, right = np.array(stated, dtype=float).T
-    edges = np.unique(np.quantile(p, np.arange(1, 5) / 5.0, method="inverted_cdf"))
-    group = np.searchsorted(edges, p)
-    return [
-        (float(p[group == g].mean()), float(right[group == g].mean()), int((group == g).sum()))
-        for g in np.unique(group)
-    ]
 
 
 def confusion(results: Sequence[CaseResult]) -> dict[str, Counter[str]]:

@@ -64,7 +64,7 @@ def write_page(
     stories = case_texts(out, path, cases, extra_names, read_oracle(out), effects)
     measured = "\n\n".join(
         [
-            report_text(out, extra_names).strip(),
+            report_text([out], extra_names).strip(),
             f"![Answers by kind and size of the concealed effect]({severity})", PICTURE_KEY,
             f"![Stated probability and share right]({reliability})", stories,
         ]

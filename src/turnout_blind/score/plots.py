@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from turnout_blind.score.calibration import reliability
 from turnout_blind.score.intervals import clopper_pearson
-from turnout_blind.score.metrics import reliability
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

@@ -1,15 +1,18 @@
-"""Write the report of a revealed set as Markdown."""
+"""Write the report of revealed sets as Markdown. Several sets are pooled: their cases count as those of one."""
 
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from turnout_blind.reveal import read_revealed
+from turnout_blind.reveal import read_revealed, set_labels
 from turnout_blind.score.answers import answers_of
+from turnout_blind.score.calibration import by_answer, reliability
+from turnout_blind.score.intervals import clopper_pearson
 from turnout_blind.score.matching import judge
-from turnout_blind.score.metrics import Share, confusion, figures, is_handled_right, reliability, severity
+from turnout_blind.score.metrics import Share, confusion, figures, is_handled_right, severity
 from turnout_blind.seal import BlindError, read_commit
 
 if TYPE_CHECKING:
@@ -51,6 +54,35 @@ def score_set(
         for case in sorted(truths)
         if case in diagnosis["cases"]
     ], diagnosis
+
+
+def score_sets(
+    outs: Sequence[str | Path], extra_names: Mapping[str, Sequence[str]] | None = None
+) -> list[tuple[list[CaseResult], dict[str, Any]]]:
+    """Score revealed sets that are pooled.
+
+    Parameters
+    ----------
+    outs : sequence of str or Path
+        Folders of the sets.
+    extra_names : mapping or None
+        Right names of added effects by kind.
+
+    Returns
+    -------
+    list of (list of CaseResult, dict)
+        Result of ``score_set`` of each. The ids of the cases of several sets begin with the name of their set.
+
+    Raises
+    ------
+    BlindError
+        If a case is in two of the sets.
+    """
+    scored = []
+    for label, out in zip(set_labels(outs), outs):
+        results, diagnosis = score_set(out, extra_names)
+        scored.append(([replace(j, case=label + j.case) for j in results], diagnosis))
+    return scored
 
 
 def provenance(record: Mapping[str, Any]) -> dict[str, str]:
@@ -140,15 +172,36 @@ def ablation_labels(out: str | Path) -> list[str]:
     return sorted(p.parent.name for p in (Path(out) / "ablations").glob("*/diagnosis.json"))
 
 
-def report_text(out: str | Path, extra_names: Mapping[str, Sequence[str]] | None = None) -> str:
-    """Markdown: figures with their bars, confusion, severity, reliability, failures, ablations, cost.
-
-    Fits with the true effect are read from ``out``/oracle.json.
+def read_oracles(outs: Sequence[str | Path]) -> dict[str, tuple[float, float]]:
+    """Fits with the true effect of several sets (``read_oracle``).
 
     Parameters
     ----------
-    out : str or Path
-        Folder of the set.
+    outs : sequence of str or Path
+        Folders of the sets.
+
+    Returns
+    -------
+    dict of (float, float)
+        Held-out fit without and with the true effect [%], by case as in ``score_sets``.
+
+    Raises
+    ------
+    BlindError
+        If one was computed with another tool or for another set.
+    """
+    return {label + case: fits for label, out in zip(set_labels(outs), outs) for case, fits in read_oracle(out).items()}
+
+
+def report_text(outs: Sequence[str | Path], extra_names: Mapping[str, Sequence[str]] | None = None) -> str:
+    """Markdown: figures with their bars, confusion, severity, reliability, failures, ablations, cost.
+
+    Fits with the true effect are read from oracle.json of each set.
+
+    Parameters
+    ----------
+    outs : sequence of str or Path
+        Folders of the sets.
     extra_names : mapping or None
         Right names of added effects by kind.
 
@@ -157,22 +210,28 @@ def report_text(out: str | Path, extra_names: Mapping[str, Sequence[str]] | None
     str
         Markdown.
     """
-    results, diagnosis = score_set(out, extra_names)
+    scored = score_sets(outs, extra_names)
+    results = [result for of_set, _ in scored for result in of_set]
     sections = [
-        cost_text(results, diagnosis, len(read_commit(out)["cases"])),
-        *oracle_text(out),
-        figure_table(figures(results, read_oracle(out))),
+        *(
+            cost_text(of_set, diagnosis, len(read_commit(out)["cases"]))
+            for out, (of_set, diagnosis) in zip(outs, scored)
+        ),
+        *(text for out in outs for text in oracle_text(out)),
+        figure_table(figures(results, read_oracles(outs))),
         "First answer (columns) by concealed effect (rows):",
         confusion_table(confusion(results)),
         "Answers by size of the effect, the smallest first (visibility in points: answer; * = with the right name):",
         severity_table(severity(results)),
         "Stated probability and share right, in up to five groups of the cases, equal ones together:",
         "\n".join(f"- {p:.2f}: {share:.2f} of {n}" for p, share, n in reliability(results)) or "- none stated",
+        "The same by kind of the first answer:",
+        answer_table(by_answer(results)),
         "False alarms, wrong names, clear effects that were not named or not reported, cases without an answer:",
         failure_table(results),
     ]
-    if ablation_labels(out):
-        sections += ["Ablations, each over its own cases:", ablation_table(out, results, extra_names)]
+    if any(ablation_labels(out) for out in outs):
+        sections += ["Ablations, each over its own cases:", ablation_table(outs, results, extra_names)]
     return "\n\n".join(sections) + "\n"
 
 
@@ -242,14 +301,14 @@ def _is_failure(j: CaseResult) -> bool:
 
 
 def ablation_table(
-    out: str | Path, results: Sequence[CaseResult], extra_names: Mapping[str, Sequence[str]] | None = None
+    outs: Sequence[str | Path], results: Sequence[CaseResult], extra_names: Mapping[str, Sequence[str]] | None = None
 ) -> str:
     """A row per key figure and a column per ablation, each over its own cases.
 
     Parameters
     ----------
-    out : str or Path
-        Folder of the set.
+    outs : sequence of str or Path
+        Folders of the sets.
     results : sequence of CaseResult
         Results of the tool itself.
     extra_names : mapping or None
@@ -260,7 +319,10 @@ def ablation_table(
     str
         Markdown.
     """
-    columns = {"the tool": results} | {label: score_set(out, extra_names, label)[0] for label in ablation_labels(out)}
+    columns = {"the tool": list(results)}
+    for out in outs:
+        for label in ablation_labels(out):
+            columns.setdefault(label, []).extend(score_set(out, extra_names, label)[0])
     by_column = {name: {f.name: f for f in figures(cases) if isinstance(f, Share)} for name, cases in columns.items()}
     lines = ["| figure | " + " | ".join(f"{n} (n = {len(c)})" for n, c in columns.items()) + " |"]
     lines.append("|---" * (len(columns) + 1) + "|")
@@ -295,7 +357,28 @@ def figure_table(values: Iterable[Share | Value]) -> str:
             )
         else:
             text = f"{f.value:.3g} {f.unit}".strip() if f.n else "not measured"
-            lines.append(f"| {f.name} | {text} | | {f.n} | {bar and bar + ' ' + f.unit} | {verdict} |")
+            by_chance = "" if f.by_chance is None else "{:.2f} to {:.2f} by chance".format(*f.by_chance)
+            lines.append(f"| {f.name} | {text} | {by_chance} | {f.n} | {bar and bar + ' ' + f.unit} | {verdict} |")
+    return "\n".join(lines)
+
+
+def answer_table(groups: Mapping[str, tuple[float, int, int]]) -> str:
+    """A row per kind of answer: number of cases, mean stated probability, share right with its 95 % interval.
+
+    Parameters
+    ----------
+    groups : mapping
+        Result of ``by_answer``.
+
+    Returns
+    -------
+    str
+        Markdown.
+    """
+    lines = ["| first answer | cases | stated | right | 95 % |", "|---|---|---|---|---|"]
+    for answer, (stated, k, n) in groups.items():
+        low, high = clopper_pearson(k, n)
+        lines.append(f"| {answer} | {n} | {stated:.2f} | {k / n:.2f} ({k}) | {low:.2f} to {high:.2f} |")
     return "\n".join(lines)
 
 
