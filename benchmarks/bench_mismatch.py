@@ -18,7 +18,8 @@ from benchmarks.bar import Bar, stopwatch
 from turnout import physics
 from turnout.mismatch import diagnose
 from turnout.mismatch.engine.distinguishability import distinguishability
-from turnout.mismatch.engine.reserved_data import fit_percent, predict_reserved
+from turnout.mismatch.engine.fit_quality import fit_percent
+from turnout.mismatch.engine.reserved_data import predict_reserved
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.planned_case import PlannedCase, measured_campaign, small_plan, turnout_plan
 from turnout.stages.mismatch_groups import reserved_names, select_passages

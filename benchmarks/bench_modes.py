@@ -13,7 +13,7 @@ from benchmarks.bar import Bar, stopwatch
 from benchmarks.modes_demonstration import demonstration_coverage
 from turnout.config.settings.identify import IdentifySettings
 from turnout.modal import identify
-from turnout.modal.state_space import continuous_pole
+from turnout.modal.poles import continuous_pole
 from turnout.modal.summary import cramer_rao_bound
 
 SHARE = float(os.environ.get("TURNOUT_BENCH_SHARE", "1"))

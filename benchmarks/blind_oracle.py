@@ -22,9 +22,10 @@ from tqdm import tqdm
 import turnout
 from benchmarks.blind_bridge import campaigns_of
 from turnout.errors import TurnoutError
+from turnout.mismatch.engine.fit_quality import fit_percent
 from turnout.mismatch.engine.joint_problem import cost_at
 from turnout.mismatch.engine.map_fit import fit_jointly
-from turnout.mismatch.engine.reserved_data import fit_percent, predict_reserved
+from turnout.mismatch.engine.reserved_data import predict_reserved
 from turnout.mismatch.turnout.case import TrackCase
 from turnout_blind.score.matching import MAX_POSITION_ERROR, MIN_CLEAR_GAIN, gain_of
 from turnout_blind.score.names import SAME_PARAMETERS, right_names

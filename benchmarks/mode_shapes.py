@@ -20,7 +20,7 @@ from turnout.config.settings.identify import IdentifySettings
 from turnout.modal import identify
 from turnout.modal.block_errors import blocks_with_errors
 from turnout.modal.mode_shape import two_point_shapes
-from turnout.modal.state_space import continuous_pole
+from turnout.modal.poles import continuous_pole
 
 RATE, N, N_IMPACT, N_CAMPAIGN, N_SECTION = 10e3, 1000, 10, 24, 24
 NOISE = 0.02  # of the amplitude of the first mode (34 dB)

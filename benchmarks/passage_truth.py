@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.published import published_model
-from turnout.modal.state_space import continuous_pole
+from turnout.modal.poles import continuous_pole
 from turnout.passage.axle_patterns import read_patterns
 from turnout.passage.result import PassageSensor
 from turnout.records import Channel, ModalModel, Recording

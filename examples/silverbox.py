@@ -12,8 +12,9 @@ from examples.oscillator_case import LAWS, OscillatorCase
 from examples.recorded import DOCS, folder_of, plotting, save, table
 
 from turnout.mismatch import diagnose
+from turnout.mismatch.engine.fit_quality import fit_percent
 from turnout.mismatch.engine.latent_force import latent_law
-from turnout.mismatch.engine.reserved_data import fit_percent, predict_reserved
+from turnout.mismatch.engine.reserved_data import predict_reserved
 
 RATE = 1e7 / 2**14  # [Hz]
 ARROW, START, LENGTH = 40000, 40650, 8692  # samples of the arrow; the first multisine and the length of each

@@ -6,7 +6,7 @@ import numpy as np
 
 from benchmarks.published.misprints import REPAIRED_OUTPUT
 from benchmarks.published.tables import RATE, TABLE_1, TABLE_2
-from turnout.modal.state_space import modal_parameters
+from turnout.modal.poles import modal_parameters
 
 PAIRS = {pair.key: pair for pair in TABLE_1 + TABLE_2}
 BANDS = {"low": "ballast", "high": "railpad"}

@@ -6,7 +6,7 @@ import numpy as np
 
 from benchmarks.published.models import PublishedModel, published_model
 from turnout.modal.frf import haversine_pulse, pulse_response
-from turnout.modal.state_space import continuous_pole
+from turnout.modal.poles import continuous_pole
 
 
 @dataclass(frozen=True)

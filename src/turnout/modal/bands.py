@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.modal.mixed_effects import MIN_DAMPING
+from turnout.modal.poles import continuous_pole
 from turnout.modal.selection import Selection
-from turnout.modal.state_space import continuous_pole
 from turnout.records import FittedReceptance, Rejection
 
 if TYPE_CHECKING:

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.modal.state_space import balanced_pair, discrete_pole
+from turnout.modal.poles import discrete_pole
+from turnout.modal.state_space import balanced_pair
 
 if TYPE_CHECKING:
     from turnout.records import ModalModel

@@ -14,7 +14,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 from scipy.linalg import eigh
 from scipy.sparse.linalg import LinearOperator, eigsh, svds
 
-from turnout.modal.state_space import modal_parameters
+from turnout.modal.poles import modal_parameters
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -9,12 +9,8 @@ import numpy as np
 
 from turnout.modal.least_squares import linearise
 from turnout.modal.mixed_effects import MixedFit, fit_mixed
-from turnout.modal.mode_tests import (
-    fit_and_prune,
-    mode_chi_squared,
-    mode_failures,
-    screen,
-)
+from turnout.modal.mode_candidates import fit_and_prune, screen
+from turnout.modal.mode_tests import mode_chi_squared, mode_failures
 from turnout.modal.noise import (
     Background,
     noise_filter,
@@ -27,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from turnout.config.settings.identify import IdentifySettings
-    from turnout.modal.mode_tests import Candidate
+    from turnout.modal.mode_candidates import Candidate
 
 MAX_NOISE_PASSES = 3  # fits with a new whitening filter
 

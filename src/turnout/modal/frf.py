@@ -15,7 +15,7 @@ from scipy.linalg import eigh
 from scipy.ndimage import uniform_filter1d
 
 from turnout.modal.frf_fit import FrfFit, fit_each
-from turnout.modal.state_space import continuous_pole
+from turnout.modal.poles import continuous_pole
 from turnout.modal.summary import Summary, summarise
 
 if TYPE_CHECKING:

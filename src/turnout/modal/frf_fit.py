@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from turnout.modal.state_space import continuous_pole
+from turnout.modal.poles import continuous_pole
 
 POLYNOMIAL_TERMS = 3  # coefficients of the polynomial in frequency that stands for modes outside the band
 MAX_DAMPING = 0.95  # damping ratio at which a step of the fit ends: at 1 there is no oscillation

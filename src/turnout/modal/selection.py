@@ -23,13 +23,8 @@ from turnout.modal.explanation import (
 )
 from turnout.modal.least_squares import linearise
 from turnout.modal.mixed_effects import MixedFit
-from turnout.modal.mode_tests import (
-    filter_reappearing,
-    fit_and_prune,
-    mode_chi_squared,
-    mode_failures,
-    start_values,
-)
+from turnout.modal.mode_candidates import filter_reappearing, fit_and_prune, start_values
+from turnout.modal.mode_tests import mode_chi_squared, mode_failures
 from turnout.modal.noise import (
     Background,
     hum_frequencies,

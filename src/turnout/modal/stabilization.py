@@ -13,8 +13,9 @@ import numpy as np
 from turnout.modal.era import subspaces
 from turnout.modal.least_squares import linearise
 from turnout.modal.mixed_effects import fit_common
-from turnout.modal.mode_tests import Candidate, mode_chi_squared
-from turnout.modal.state_space import continuous_pole, modal_parameters
+from turnout.modal.mode_candidates import Candidate
+from turnout.modal.mode_tests import mode_chi_squared
+from turnout.modal.poles import continuous_pole, modal_parameters
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -1,10 +1,6 @@
 """Assemble modes, residues and diagnostics into a modal model with a state space.
 
 The state-space pairs have the balanced form in which the paper prints its models.
-
-Convert between the poles of a sampled system and frequencies and damping ratios.
-
-Fit of each held-out impact by the modes of the other impacts, and the fit of random modes to compare with.
 """
 
 from __future__ import annotations
@@ -14,236 +10,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
 
-from turnout.modal.least_squares import drift_columns, linearise, powers
+from turnout.modal.decay_fit import held_out_fit, random_mode_fits
+from turnout.modal.poles import discrete_pole
 from turnout.records import ModalModel, Rejection
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Any
 
-    from numpy.typing import ArrayLike
-
     from turnout.config.settings.identify import IdentifySettings
     from turnout.modal.summary import ImpactEstimates
     from turnout.records import Mode
-
-
-def modal_parameters(pole: ArrayLike, rate: float) -> tuple[np.ndarray, np.ndarray]:
-    r"""Undamped natural frequency and damping ratio of discrete poles.
-
-    .. math:: s = f_s \ln z, \quad f_n = |s| / 2\pi, \quad \zeta = -\mathrm{Re}(s) / |s|
-
-    Parameters
-    ----------
-    pole : array of complex
-        Eigenvalues z of the state matrix, any shape.
-    rate : float
-        Sampling rate. [Hz]
-
-    Returns
-    -------
-    frequency, damping : arrays of float
-        Undamped natural frequency [Hz] and damping ratio, same shape.
-
-    References
-    ----------
-    Barkhordari et al., eq. 16, which calls the frequency in Hz an angular one.
-
-    Examples
-    --------
-    An undamped pole a quarter turn per sample is at a quarter of the sampling rate.
-
-    >>> frequency, damping = modal_parameters(1j, 20e3)
-    >>> print(f"{frequency:.0f} Hz, {abs(damping):.0f}")
-    5000 Hz, 0
-    """
-    s = np.log(np.asarray(pole, dtype=complex)) * rate
-    magnitude = np.abs(s)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        damping = np.where(magnitude > 0.0, -s.real / magnitude, np.nan)
-    return magnitude / (2.0 * np.pi), damping
-
-
-def continuous_pole(frequency: ArrayLike, damping: ArrayLike) -> np.ndarray:
-    r"""Pole in the upper half plane of an underdamped mode.
-
-    .. math:: s = 2\pi f_n (-\zeta + i\sqrt{1-\zeta^2})
-
-    Parameters
-    ----------
-    frequency : float or array
-        Undamped natural frequency. [Hz]
-    damping : float or array
-        Damping ratio, below 1 in magnitude, broadcast against ``frequency``.
-
-    Returns
-    -------
-    (...) array of complex
-        Pole s. [1/s]
-
-    Raises
-    ------
-    ValueError
-        For a damping ratio of 1 or more.
-
-    Examples
-    --------
-    >>> s = continuous_pole(1.0 / (2.0 * np.pi), 0.6)
-    >>> print(f"{s:.1f}")
-    -0.6+0.8j
-    """
-    damping = np.asarray(damping, dtype=float)
-    if np.any(np.abs(damping) >= 1.0):
-        raise ValueError(f"need damping ratios below 1, the highest is {np.max(np.abs(damping)):.3g}")
-    return 2.0 * np.pi * np.asarray(frequency) * (-damping + 1j * np.sqrt(1.0 - damping**2))
-
-
-def discrete_pole(frequency: ArrayLike, damping: ArrayLike, rate: float) -> np.ndarray:
-    r"""Pole of the sampled mode, :math:`z = \exp(s / f_s)`; the inverse of :func:`modal_parameters`.
-
-    Parameters
-    ----------
-    frequency : float or array
-        Undamped natural frequency. [Hz]
-    damping : float or array
-        Damping ratio, below 1 in magnitude.
-    rate : float
-        Sampling rate. [Hz]
-
-    Returns
-    -------
-    (...) array of complex
-        Pole z.
-
-    Raises
-    ------
-    ValueError
-        For a damping ratio of 1 or more.
-
-    Examples
-    --------
-    >>> f, zeta = modal_parameters(discrete_pole(99.45, 0.2912, 20e3), 20e3)
-    >>> print(f"{f:.2f} Hz, {zeta:.4f}")
-    99.45 Hz, 0.2912
-    """
-    return np.exp(continuous_pole(frequency, damping) / rate)
-
-
-def fit_percent(measured: np.ndarray, residual: np.ndarray) -> np.ndarray:
-    r"""Fit of each decay, :math:`100 (1 - \|a - \hat a\| / \|a - \bar a\|)`.
-
-    Parameters
-    ----------
-    measured : (n_decay, n) array of float
-        Measured decays.
-    residual : (n_decay, n) array of float
-        Measured minus modelled decays.
-
-    Returns
-    -------
-    (n_decay,) array of float
-        Fit of each decay, nan for a constant one. [%]
-
-    References
-    ----------
-    Barkhordari et al., eq. 22, with its brackets corrected.
-
-    Examples
-    --------
-    >>> fit_percent(np.array([[1.0, -1.0]]), np.array([[0.5, -0.5]]))
-    array([50.])
-    """
-    centred = np.linalg.norm(measured - measured.mean(axis=-1, keepdims=True), axis=-1)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.where(centred > 0.0, 100.0 * (1.0 - np.linalg.norm(residual, axis=-1) / centred), np.nan)
-
-
-def held_out_fit(theta: np.ndarray, decays: np.ndarray, rate: float) -> np.ndarray:
-    """Fit of each decay with the mean modes of all other decays, amplitudes refitted.
-
-    Parameters
-    ----------
-    theta : (n_decay, n_mode, 2) array of float
-        Ln f [Hz] and zeta of each decay.
-    decays : (n_decay, n) array of float
-        Free decays. [m/s²]
-    rate : float
-        Sampling rate. [Hz]
-
-    Returns
-    -------
-    (n_decay,) array of float
-        Fit, nan for a single decay. [%]
-    """
-    n = len(decays)
-    if n < 2:
-        return np.full(n, np.nan)
-    mean_modes = (theta.sum(axis=0) - theta) / (n - 1)
-    mean_modes[..., 1] = np.clip(mean_modes[..., 1], 1e-5, 0.95)
-    return fit_percent(decays, linearise(mean_modes, decays, rate, drift_columns(decays.shape[1], -1)).residual)
-
-
-def validation_fit(model: ModalModel, decays: Sequence[np.ndarray]) -> np.ndarray:
-    """Fit of decays of another response with the modes of a model, amplitudes refitted.
-
-    Parameters
-    ----------
-    model : ModalModel
-        Model with at least one mode.
-    decays : sequence of (n,) arrays of float
-        Free decays that took no part in the identification, at the model's rate. [m/s²]
-
-    Returns
-    -------
-    (n_decay,) array of float
-        Fit of each decay. [%]
-    """
-    n = min(len(decay) for decay in decays)
-    records = np.array([np.asarray(decay, dtype=float)[:n] for decay in decays])
-    theta = np.array([[np.log(mode.frequency), mode.damping] for mode in model.modes])
-    modes = np.broadcast_to(theta, (len(records), *theta.shape))
-    return fit_percent(records, linearise(modes, records, model.rate, drift_columns(n, -1)).residual)
-
-
-def random_mode_fits(
-    decays: np.ndarray, rate: float, bands: Sequence[tuple[float, float]], draws: int, seed: int = 20171001
-) -> np.ndarray:
-    """Median fit over the decays for random mode sets, one mode in each band.
-
-    Frequencies are uniform in the logarithm within the bands, damping ratios uniform from 0.02 to 0.3. Amplitudes are
-    fitted like those of the real modes: this is the fit that free amplitudes give.
-
-    Parameters
-    ----------
-    decays : (n_decay, n) array of float
-        Free decays. [m/s²]
-    rate : float
-        Sampling rate. [Hz]
-    bands : sequence of (float, float)
-        Lowest and highest frequency of each band. [Hz]
-    draws : int
-        Number of mode sets.
-    seed : int
-        Seed of the draws.
-
-    Returns
-    -------
-    (draws,) array of float
-        Median fit of each draw. [%]
-    """
-    rng = np.random.default_rng(seed)
-    low, high = np.log(np.array(bands, dtype=float)).T
-    log_frequency = rng.uniform(low, high, (draws, len(bands)))
-    theta = np.stack([log_frequency, rng.uniform(0.02, 0.3, log_frequency.shape)], axis=-1)
-    n = decays.shape[1]
-    wave = powers(discrete_pole(np.exp(log_frequency), theta[..., 1], rate), n)
-    basis = np.concatenate([wave.real, wave.imag], axis=1)
-    gram = basis @ basis.transpose(0, 2, 1)
-    centred = np.linalg.norm(decays - decays.mean(axis=1, keepdims=True), axis=1)
-    product = basis @ decays.T
-    explained = np.einsum("dki,dki->di", product, np.linalg.solve(gram, product))
-    residual = np.sqrt(np.maximum(np.sum(decays**2, axis=1) - explained, 0.0))
-    return np.median(100.0 * (1.0 - residual / centred), axis=1)
 
 
 def balanced_pair(pole: complex, residue: complex) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

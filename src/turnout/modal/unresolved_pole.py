@@ -8,7 +8,7 @@ import numpy as np
 
 from turnout.modal.least_squares import powers
 from turnout.modal.mixed_effects import MAX_DAMPING, MIN_DAMPING
-from turnout.modal.state_space import continuous_pole
+from turnout.modal.poles import continuous_pole
 from turnout.modal.systematic_error import noise_near
 
 if TYPE_CHECKING:

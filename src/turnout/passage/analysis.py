@@ -9,15 +9,13 @@ import numpy as np
 
 from turnout.passage.axle_count import best_count, count_without_distance
 from turnout.passage.axles import sensor_times
-from turnout.passage.channel_checks import (
-    channel_states,
-    inconsistent_channels,
-    inconsistent_positions,
-    lost_sensors,
+from turnout.passage.channel_checks import channel_states, lost_sensors
+from turnout.passage.crossing_nose import MIN_MOTION_GAIN, detect_at_nose, fixed_impact_correlation, simultaneity
+from turnout.passage.electrical_pulses import (
     without_pulses,
 )
-from turnout.passage.crossing_nose import MIN_MOTION_GAIN, detect_at_nose, fixed_impact_correlation, simultaneity
 from turnout.passage.kinematics import Motion, pair_correlations, refine_slowness, scan_slowness
+from turnout.passage.position_checks import inconsistent_channels, inconsistent_positions
 from turnout.passage.result import Passage
 from turnout.passage.sensor_stack import align_sensors, second_train
 from turnout.passage.speed import combine_speeds, motion_of, slowness_from_sensors, with_acceleration

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.constants import MAD_TO_SD
-from turnout.passage.channel_checks import half_shifts
 from turnout.passage.kinematics import Motion
+from turnout.passage.position_checks import half_shifts
 from turnout.passage.result import SpeedFinding
 
 if TYPE_CHECKING:

@@ -1,7 +1,4 @@
-"""Metadata of named variables: entries of a group and of its parents, and which variables are samples.
-
-The names that loggers use in European languages are listed here in lower case, without accents, with "_" for blanks.
-"""
+"""Metadata of named variables: entries of a group and of its parents."""
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -10,9 +7,14 @@ from typing import Any
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.entries import MAX_ENTRIES, Entry, UnreadObject, entries_of
+from turnout.readers.entries import Entry, UnreadObject, entries_of
 from turnout.readers.lazy import ARRAYS
-from turnout.readers.rate_words import is_rate_name
+from turnout.readers.metadata_names import (
+    ATTRIBUTES_MARK,
+    CONDITION_NAMES,
+    UNIT_NAMES,
+)
+from turnout.readers.sample_variables import Attributes, holds_samples, is_slow, matrices, size_of_longest, vectors
 from turnout.readers.scale_words import is_scale_name
 from turnout.readers.source import CONDITIONS, Source
 from turnout.readers.stated_scales import entry_statements
@@ -20,32 +22,6 @@ from turnout.readers.stated_scales import entry_statements
 
 class Alphabetical(dict):
     """Variables of a file that sorts them alphabetically: their order carries no information."""
-
-
-START_NAMES = (
-    "started_at", "start_time", "starttime", "wf_start_time", "startzeit", "startzeitpunkt", "messbeginn", "messstart",
-    "beginn_der_messung", "heure_de_debut", "debut_de_mesure", "debut_de_la_mesure", "starttijd", "begintijd",
-    "begin_meting", "zacatek_mereni", "cas_zacatku", "starttid", "starttidspunkt",
-)  # fmt: skip
-# The day of a start whose time of day is in a line of its own.
-START_DATE_NAMES = ("start_date", "startdatum", "date_de_debut", "begindatum", "datum_zacatku", "startdato")
-# Unlike n_samples, which counts per record, these may count the rows of the whole file.
-SAMPLE_COUNT_NAMES = (
-    "number_of_samples", "no_of_samples", "num_samples", "sample_count", "samples", "total_samples", "nsamples",
-    "number_of_points", "number_of_data_points", "no_of_points", "num_points", "data_points", "npts",
-    "anzahl_messwerte", "anzahl_der_messwerte", "anzahl_werte", "anzahl_abtastwerte",
-    "anzahl_samples", "anzahl_datenpunkte", "nombre_d_echantillons", "nombre_de_points", "aantal_samples",
-    "aantal_meetwaarden", "aantal_meetpunten", "pocet_vzorku", "antal_samples", "antal_malepunkter",
-    "antal_datapunkter",
-)  # fmt: skip
-
-
-TIME_NAMES = ("time", "t", "time_s")
-CHANNEL_NAMES = ("channels", "channel_names", "names", "labels")
-UNIT_NAMES = ("units", "unit", "channel_units")
-ATTRIBUTES_MARK = " (attributes)"  # behind the name of a variable: the name of its attributes
-RECORD_COUNT_NAMES = ("n_records", "n_record")
-CONDITION_NAMES = {spelling: name for name in CONDITIONS for spelling in (name, name.replace("_", " "))}
 
 
 class Metadata:
@@ -213,8 +189,8 @@ class Metadata:
         own = {
             name: value
             for name, value in self.variables.items()
-            if not isinstance(value, Mapping) or 2 * _longest(value) < longest or not holds_samples(value)
-            if not isinstance(value, Attributes) or not _is_slow(self.variables.get(value.owner), value.owner, samples)
+            if not isinstance(value, Mapping) or 2 * size_of_longest(value) < longest or not holds_samples(value)
+            if not isinstance(value, Attributes) or not is_slow(self.variables.get(value.owner), value.owner, samples)
         }
         return (*entries_of(own, self.place), *(self.parent.entries if self.parent else ()))
 
@@ -330,114 +306,3 @@ def list_of_texts(value: Any) -> list[str]:
     return [
         v.decode("utf-8", "replace") if isinstance(v, bytes) else str(v).strip() for v in np.ravel(np.asarray(value))
     ]
-
-
-class Attributes(dict):
-    """Attributes of the variable ``owner``: metadata, never a group of samples.
-
-    Parameters
-    ----------
-    owner : str
-        Name of the variable.
-    values : mapping of str to any
-        Name -> value.
-    """
-
-    def __init__(self, owner: str, values: Mapping[str, Any]):
-        super().__init__(values)
-        self.owner = owner
-
-
-def _is_slow(value: Any, name: str, samples: set[str]) -> bool:
-    """Whether a variable is an array beside the samples, for example one that is sampled at a lower rate."""
-    return isinstance(value, ARRAYS) and value.size > 1 and name not in samples and name.lower() not in TIME_NAMES
-
-
-def _longest(value: Mapping) -> int:
-    """Size of the largest array in a group or one of its groups."""
-    sizes = (_longest(v) if isinstance(v, Mapping) else v.size if isinstance(v, ARRAYS) else 0 for v in value.values())
-    return max(sizes, default=0)
-
-
-def holds_samples(value: Mapping) -> bool:
-    """Whether a group or one of its groups holds samples, or a variable that cannot be read.
-
-    Parameters
-    ----------
-    value : mapping
-        Variables of a group.
-
-    Returns
-    -------
-    bool
-        False for a group of short entries.
-    """
-    if isinstance(value, Attributes):
-        return False
-    return bool(vectors(value) or matrices(value)) or any(
-        isinstance(v, ReadError) or (isinstance(v, Mapping) and holds_samples(v)) for v in value.values()
-    )
-
-
-def matrices(variables: Mapping[str, Any]) -> dict[str, Any]:
-    """Arrays that can be samples in two or three dimensions.
-
-    Parameters
-    ----------
-    variables : mapping of str to any
-        Name -> value of any type.
-
-    Returns
-    -------
-    dict of str to any
-        Those that are numeric arrays with at least two numbers along one axis.
-    """
-    arrays = {name: v for name, v in variables.items() if isinstance(v, ARRAYS) and v.dtype.kind in "fiu"}
-    return {name: v for name, v in arrays.items() if v.ndim in (2, 3) and min(v.shape) >= 1 and max(v.shape) > 1}
-
-
-def is_flag_series(array: Any) -> bool:
-    """Whether an array holds true and false, as the mask of invalid samples does; all equal it says nothing.
-
-    Parameters
-    ----------
-    array : array or LazyColumn
-        Numbers of any type.
-
-    Returns
-    -------
-    bool
-        False for any other type.
-    """
-    return bool(array.dtype.kind == "b" and np.any(array[:]) and not np.all(array[:]))
-
-
-def vectors(variables: Mapping[str, Any]) -> dict[str, Any]:
-    """Vectors that can be channels; those much shorter than the longest are metadata, not samples.
-
-    Parameters
-    ----------
-    variables : mapping of str to any
-        Name -> value of any type.
-
-    Returns
-    -------
-    dict of str to any
-        Vectors of numbers or flags that are longer than half of the longest and have no name of metadata.
-    """
-    reserved_names = {
-        *TIME_NAMES,
-        *CHANNEL_NAMES,
-        *UNIT_NAMES,
-        *START_NAMES,
-        *RECORD_COUNT_NAMES,
-        *CONDITIONS,
-    }
-    candidates = {
-        name: v
-        for name, v in variables.items()
-        if isinstance(v, ARRAYS) and v.ndim == 1 and v.size > 1 and (v.dtype.kind in "fiu" or is_flag_series(v))
-        if name.lower() not in reserved_names and not (is_rate_name(name) and v.size <= MAX_ENTRIES)
-    }
-    longest = max((v.size for v in candidates.values()), default=0)
-    return {name: v for name, v in candidates.items() if 2 * v.size > longest}

@@ -7,15 +7,9 @@ from typing import Any
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.array_metadata import (
-    ATTRIBUTES_MARK,
-    TIME_NAMES,
-    Alphabetical,
-    Attributes,
-    holds_samples,
-    matrices,
-    vectors,
-)
+from turnout.readers.array_metadata import Alphabetical
+from turnout.readers.metadata_names import ATTRIBUTES_MARK, TIME_NAMES
+from turnout.readers.sample_variables import Attributes, holds_samples, matrices, vectors
 from turnout.readers.scale_words import is_scale_name
 from turnout.readers.stated_scales import scale_text
 from turnout.readers.stated_units import is_unit_name

@@ -28,13 +28,7 @@ from mmap import mmap
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.array_metadata import (
-    RECORD_COUNT_NAMES,
-    SAMPLE_COUNT_NAMES,
-    START_DATE_NAMES,
-    START_NAMES,
-    Metadata,
-)
+from turnout.readers.array_metadata import Metadata
 from turnout.readers.clock_texts import is_clock_or_date
 from turnout.readers.csv_cells import BLANK, first_cells
 from turnout.readers.csv_columns import seconds_per_number, time_column
@@ -43,6 +37,7 @@ from turnout.readers.csv_rows import columns_in_memory, lazy_columns
 from turnout.readers.entries import Entry
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.lost_entries import control_character_errors
+from turnout.readers.metadata_names import RECORD_COUNT_NAMES, SAMPLE_COUNT_NAMES, START_DATE_NAMES, START_NAMES
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.start_columns import start_in_cells
 from turnout.readers.start_times import start_fields

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 
-from turnout.readers.array_metadata import TIME_NAMES
+from turnout.readers.metadata_names import TIME_NAMES
 from turnout.readers.source import MEANINGLESS_UNITS, Source
 from turnout.units import conversion
 

@@ -6,12 +6,6 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from mmap import mmap
 
-from turnout.readers.array_metadata import (
-    RECORD_COUNT_NAMES,
-    SAMPLE_COUNT_NAMES,
-    START_DATE_NAMES,
-    START_NAMES,
-)
 from turnout.readers.csv_cells import (
     BLANK,
     NO_ROW_REMEDY,
@@ -25,6 +19,7 @@ from turnout.readers.csv_cells import (
 from turnout.readers.csv_columns import NAME_WITH_UNIT, names_and_units
 from turnout.readers.entries import FREE_TEXT, Entry, entries_of_text
 from turnout.readers.lost_entries import CONTROL_CHARACTER
+from turnout.readers.metadata_names import RECORD_COUNT_NAMES, SAMPLE_COUNT_NAMES, START_DATE_NAMES, START_NAMES
 from turnout.readers.other_subjects import STRONG, subject_of
 from turnout.readers.rate_units import rate_unit
 from turnout.readers.rate_words import is_rate_name

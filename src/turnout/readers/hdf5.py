@@ -15,12 +15,14 @@ import h5py
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.array_metadata import ATTRIBUTES_MARK, TIME_NAMES, Alphabetical, Attributes, matrices
+from turnout.readers.array_metadata import Alphabetical
 from turnout.readers.channel_groups import STATED_SCALES
 from turnout.readers.claims import Hdf5Claims, open_hdf5
 from turnout.readers.lazy import is_large, lazy_array
+from turnout.readers.metadata_names import ATTRIBUTES_MARK, TIME_NAMES
 from turnout.readers.named_arrays import raw_file
 from turnout.readers.packing import apply_packing, unstated_fills
+from turnout.readers.sample_variables import Attributes, matrices
 from turnout.readers.scale_words import is_fill_name, is_scale_name
 from turnout.readers.source import COPY_AGAIN, RawFile, Source
 from turnout.readers.stated_scales import scale_text, scales_in_text

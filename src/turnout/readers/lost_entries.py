@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.array_metadata import START_NAMES
+from turnout.readers.metadata_names import START_NAMES
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawRecord, Source
 
 MIN_NAME_SIZE = 5  # characters: shorter names resemble many

@@ -15,7 +15,7 @@ import scipy.io
 from pymatreader.pymatreader import _parse_scipy_mat_dict as parse_loaded_variables
 from scipy.io.matlab import matfile_version
 
-from turnout.readers.array_metadata import TIME_NAMES, Alphabetical
+from turnout.readers.array_metadata import Alphabetical
 from turnout.readers.lazy import LazyColumn, LazyMatrix, is_large, lazy_array
 from turnout.readers.mat_elements import HEADER_SIZE, unpacked_file
 from turnout.readers.matlab_objects import (
@@ -26,6 +26,7 @@ from turnout.readers.matlab_objects import (
     with_marked_objects,
     with_marked_references,
 )
+from turnout.readers.metadata_names import TIME_NAMES
 from turnout.readers.named_arrays import raw_file
 from turnout.readers.source import RawFile, Source
 from turnout.readers.stated_units import is_unit_name

@@ -11,17 +11,17 @@ import h5py
 import numpy as np
 from scipy.io.matlab import MatlabOpaque
 
-from turnout.readers.array_metadata import (
+from turnout.readers.array_metadata import Alphabetical
+from turnout.readers.entries import UnreadObject
+from turnout.readers.metadata_names import (
     CHANNEL_NAMES,
     RECORD_COUNT_NAMES,
     SAMPLE_COUNT_NAMES,
     TIME_NAMES,
     UNIT_NAMES,
-    Alphabetical,
-    holds_samples,
 )
-from turnout.readers.entries import UnreadObject
 from turnout.readers.rate_words import is_rate_name
+from turnout.readers.sample_variables import holds_samples
 from turnout.readers.scale_words import is_scale_name
 from turnout.readers.source import Source
 

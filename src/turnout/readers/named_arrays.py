@@ -24,25 +24,20 @@ from typing import Any
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.array_metadata import (
-    CHANNEL_NAMES,
-    RECORD_COUNT_NAMES,
-    START_NAMES,
-    TIME_NAMES,
-    UNIT_NAMES,
-    Alphabetical,
-    Attributes,
-    Metadata,
-    holds_samples,
-    list_of_texts,
-    matrices,
-    vectors,
-)
+from turnout.readers.array_metadata import Alphabetical, Metadata, list_of_texts
 from turnout.readers.channel_groups import STATED_SCALES, with_channel_groups
 from turnout.readers.channel_maps import kind_of
 from turnout.readers.clock_texts import with_durations
 from turnout.readers.entries import MAX_ENTRIES
 from turnout.readers.lazy import ARRAYS, Array, Column
+from turnout.readers.metadata_names import (
+    CHANNEL_NAMES,
+    RECORD_COUNT_NAMES,
+    START_NAMES,
+    TIME_NAMES,
+    UNIT_NAMES,
+)
+from turnout.readers.sample_variables import Attributes, holds_samples, matrices, vectors
 from turnout.readers.source import RawFile, RawRecord, Source
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import scale_problem, scale_statements, without_drawings

@@ -15,12 +15,14 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from turnout.errors import ReadError
-from turnout.readers.array_metadata import RECORD_COUNT_NAMES, START_NAMES, TIME_NAMES, Metadata, is_flag_series
+from turnout.readers.array_metadata import Metadata
 from turnout.readers.channel_maps import kind_of
 from turnout.readers.claims import check_parquet
 from turnout.readers.clock_texts import with_durations
 from turnout.readers.entries import entries_of
 from turnout.readers.lazy import Column, LazyColumn
+from turnout.readers.metadata_names import RECORD_COUNT_NAMES, START_NAMES, TIME_NAMES
+from turnout.readers.sample_variables import is_flag_series
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import entry_statements, scale_text, without_drawings

@@ -20,7 +20,6 @@ from typing import Any
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.array_metadata import START_NAMES
 from turnout.readers.entries import MAX_ENTRIES, Entry, UnreadObject
 from turnout.readers.entry_candidates import (
     DURATION,
@@ -33,6 +32,7 @@ from turnout.readers.entry_candidates import (
     candidates,
 )
 from turnout.readers.entry_owners import container_of
+from turnout.readers.metadata_names import START_NAMES
 from turnout.readers.overload_flags import overload_entries
 from turnout.readers.precision import EXACT_PRECISION, around
 from turnout.readers.rate_agreement import is_near_rate

@@ -15,7 +15,8 @@ from turnout.mismatch.calibrated.answers_of_change import DAMPER_SHARES
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.model_answer import position_of
 from turnout.mismatch.engine.diagnose import diagnose, fit_base
-from turnout.mismatch.engine.reserved_data import gain_error, reserved_fit
+from turnout.mismatch.engine.fit_quality import gain_error
+from turnout.mismatch.engine.reserved_data import reserved_fit
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.calibration import calibrated_parameters

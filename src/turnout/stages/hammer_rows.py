@@ -7,8 +7,8 @@ import numpy as np
 
 from turnout.hammer_test.dynamic_stiffness import dynamic_stiffness
 from turnout.modal.block_errors import blocks_with_errors
+from turnout.modal.decay_fit import validation_fit
 from turnout.modal.mode_shape import two_point_shapes
-from turnout.modal.state_space import validation_fit
 from turnout.records import Impact, ModalModel, Mode, Receptance
 
 # Hz: rejected poles in this band are reported. Others vary with the noise, far from the track's two resonances.

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from turnout.config.turnout import TurnoutConfig
 from turnout.errors import ReadError
 from turnout.mismatch.turnout import HammerInput, PassageInput
-from turnout.passage.channel_checks import without_pulses
+from turnout.passage.electrical_pulses import without_pulses
 from turnout.readers import read
 from turnout.records import LongRecording, Recording, Unit
 from turnout.stages import common

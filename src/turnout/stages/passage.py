@@ -17,9 +17,9 @@ from turnout.errors import PartlyComputed, ReadError
 from turnout.passage.analysis import analyse
 from turnout.passage.axle_load import LoadCalibration, axle_load
 from turnout.passage.axle_patterns import Pattern
-from turnout.passage.channel_checks import without_pulses
 from turnout.passage.channel_fit import fit_channel
 from turnout.passage.clusters import Clusters
+from turnout.passage.electrical_pulses import without_pulses
 from turnout.passage.result import Passage, PassageSensor
 from turnout.passage.segmentation import cut_passages
 from turnout.passage.timetable import listed_for, listed_trains

@@ -6,15 +6,9 @@ import numpy as np
 import pytest
 
 from turnout.mismatch.turnout.planned_case import small_plan
-from turnout.mismatch.turnout.track_parameters import (
-    CASTING_SDS,
-    RAIL_SDS,
-    casting_elements,
-    rail_sds,
-    track_nuisances,
-    with_rail,
-    zone_of,
-)
+from turnout.mismatch.turnout.rail_parameters import CASTING_SDS, RAIL_SDS, rail_sds, with_rail
+from turnout.mismatch.turnout.track_parameters import track_nuisances
+from turnout.mismatch.turnout.zone import casting_elements, zone_of
 from turnout.simulate.track import RailStretch
 
 PLAN = small_plan((15.0,), hammer_positions=(24.0,))

@@ -21,13 +21,13 @@ from turnout.mismatch.engine.decision_facts import (
     UnprovenEvidence,
 )
 from turnout.mismatch.engine.nuisance import Nuisance
-from turnout.mismatch.engine.reserved_data import Verification
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.search_limit import SearchLimit
 from turnout.mismatch.engine.strained_values import StrainedValue
 from turnout.mismatch.engine.thresholds import THRESHOLDS, threshold_rows
 from turnout.mismatch.engine.two_effects import PairEvidence
 from turnout.mismatch.engine.verdict import ANSWERS, Verdict
+from turnout.mismatch.engine.verification import Verification
 from turnout.physics import Parameter
 
 TABLES = (

@@ -8,8 +8,8 @@ from scipy.stats import binom
 
 from turnout import physics
 from turnout.mismatch.engine.candidate import Candidate
-from turnout.mismatch.engine.reserved_data import Verification
 from turnout.mismatch.engine.residual_attribution import Attribution, attribute
+from turnout.mismatch.engine.verification import Verification
 from turnout.report.finding_text import facts
 from turnout.stages.finding_row import finding_row
 

@@ -13,7 +13,7 @@ from turnout.errors import SimulationError
 from turnout.mismatch import diagnose
 from turnout.mismatch.turnout import CampaignInput, TrackCase, receptance_observation, sensitivity
 from turnout.mismatch.turnout.campaign import HammerInput
-from turnout.mismatch.turnout.observations import observe_tests
+from turnout.mismatch.turnout.observed_tests import observe_tests
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.mismatch.turnout.receptance_model import ReceptanceModel
 from turnout.simulate import uniform_track

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from turnout.mismatch.engine.fit_quality import fit_percent, gain_error
 from turnout.mismatch.engine.observation import Observation
-from turnout.mismatch.engine.reserved_data import fit_percent, gain_error
 
 STRETCH = 40  # samples over which the noise of a draw stays alike
 

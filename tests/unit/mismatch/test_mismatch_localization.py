@@ -9,11 +9,11 @@ from scipy.stats import f
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.decision import calibrate, judge
+from turnout.mismatch.engine.fit_quality import is_significantly_worse
 from turnout.mismatch.engine.localization import Location, _credible_evidence, locate
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
-from turnout.mismatch.engine.reserved_data import is_significantly_worse
 from turnout.mismatch.engine.residual_space import ResidualSpace
 from turnout.mismatch.engine.space_evidence import (
     AMPLITUDES,

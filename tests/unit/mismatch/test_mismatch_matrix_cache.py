@@ -11,7 +11,8 @@ from turnout.mismatch.turnout import matrix_cache
 from turnout.mismatch.turnout.matrix_cache import matrices_of
 from turnout.mismatch.turnout.receptance_model import ReceptanceModel
 from turnout.mismatch.turnout.receptance_sensitivity import ReceptanceSensitivity
-from turnout.mismatch.turnout.track_parameters import COMMON_PARAMETERS, SUPPORT_PARAMETERS, castings_of
+from turnout.mismatch.turnout.track_parameters import COMMON_PARAMETERS, SUPPORT_PARAMETERS
+from turnout.mismatch.turnout.zone import castings_of
 from turnout.simulate import uniform_track
 from turnout.simulate.blade import Blade
 from turnout.simulate.matrices import assemble

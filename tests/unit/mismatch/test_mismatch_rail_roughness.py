@@ -7,7 +7,7 @@ import pytest
 
 from turnout import physics
 from turnout.mismatch.turnout import TrackCase
-from turnout.mismatch.turnout.observations import with_errors
+from turnout.mismatch.turnout.observed_passages import with_errors
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.mismatch.turnout.priors import TRACK
 from turnout.mismatch.turnout.rail_roughness import amplitude_sd, wave_columns

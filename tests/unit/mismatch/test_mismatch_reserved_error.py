@@ -5,10 +5,11 @@ import pytest
 
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case
+from turnout.mismatch.engine.fit_quality import fit_percent, gain_error
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
-from turnout.mismatch.engine.reserved_data import fit_percent, gain_error, predict_reserved
+from turnout.mismatch.engine.reserved_data import predict_reserved
 from turnout.mismatch.engine.reserved_error import error_of_fitted
 from turnout.physics import Parameter
 

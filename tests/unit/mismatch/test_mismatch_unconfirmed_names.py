@@ -10,11 +10,12 @@ from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.decision import confirm
 from turnout.mismatch.engine.diagnose import diagnose
+from turnout.mismatch.engine.fit_quality import lost_evidence
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
-from turnout.mismatch.engine.reserved_data import Verification, lost_evidence, reserved_excess_ratio
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.verdict import Verdict
+from turnout.mismatch.engine.verification import Verification, reserved_excess_ratio
 from turnout.stages.finding_row import sentence
 
 POSTERIOR = {"pad_preload": 0.8, "none": 0.15, "unknown": 0.05}

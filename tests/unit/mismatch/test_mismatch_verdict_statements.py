@@ -12,13 +12,14 @@ from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.evidence import assess, explained_share, score_of, worst_excess
 from turnout.mismatch.engine.findings import Findings
+from turnout.mismatch.engine.fit_quality import fit_percent
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
-from turnout.mismatch.engine.reserved_data import Verification, fit_percent, predict_with_decoy
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.two_effects import settle_pair
+from turnout.mismatch.engine.verification import Verification, predict_with_decoy
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.candidates.catalogue import candidate_of, channel_sites
 from turnout.mismatch.turnout.passage_observation import AlignedPassage, observe_passage

@@ -94,7 +94,7 @@ def test_a_second_name_must_improve_what_held_out_recordings_show_of_it(monkeypa
 
 
 def _fit_of(case, fit):
-    from turnout.mismatch.engine.reserved_data import fit_percent
+    from turnout.mismatch.engine.fit_quality import fit_percent
 
     predictions = case.predict(fit.values, (), case.reserved)
     return predictions, fit_percent(case.reserved, predictions)

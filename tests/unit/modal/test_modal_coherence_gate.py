@@ -9,7 +9,7 @@ from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.hammer_test import find_impacts, receptance_of
 from turnout.modal import identify
 from turnout.modal.bands import fit_receptance, passed_share
-from turnout.modal.state_space import continuous_pole
+from turnout.modal.poles import continuous_pole
 from turnout.records import Channel, Receptance, Recording
 
 SETTINGS = IdentifySettings(null_draws=10)

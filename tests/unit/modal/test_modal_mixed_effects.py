@@ -6,10 +6,10 @@ from benchmarks.published import hammer_test, published_model
 from scipy.stats import norm
 
 from turnout.modal import cramer_rao_bound, discrete_pole, summarise
+from turnout.modal.decay_fit import held_out_fit, random_mode_fits
 from turnout.modal.least_squares import drift_columns, linearise, powers
 from turnout.modal.mixed_effects import between_variance, fit_common, fit_mixed
 from turnout.modal.noise import noise_filter, whiten
-from turnout.modal.state_space import held_out_fit, random_mode_fits
 
 NO_DRIFT = drift_columns(600, -1)
 

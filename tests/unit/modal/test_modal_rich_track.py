@@ -5,7 +5,7 @@ import pytest
 
 from turnout.config.settings.identify import IdentifySettings
 from turnout.modal import identify
-from turnout.modal.state_space import continuous_pole
+from turnout.modal.poles import continuous_pole
 from turnout.modal.summary import cramer_rao_bound
 from turnout.records import Receptance
 

@@ -6,7 +6,7 @@ import pytest
 from turnout.config.settings.identify import IdentifySettings
 from turnout.modal import identify
 from turnout.modal.mode_shape import amplitude_ratio, two_point_shapes
-from turnout.modal.state_space import continuous_pole
+from turnout.modal.poles import continuous_pole
 
 RATE, N, N_IMPACT = 20e3, 600, 10
 FREQUENCY, DAMPING = np.array([99.0, 616.0]), np.array([0.25, 0.06])

@@ -5,7 +5,7 @@ import pytest
 
 from turnout.config.settings.identify import IdentifySettings
 from turnout.modal import cramer_rao_bound, identify
-from turnout.modal.state_space import continuous_pole
+from turnout.modal.poles import continuous_pole
 
 RATE, N, N_IMPACT, NOISE = 20e3, 600, 10, 0.02
 SETTINGS = IdentifySettings(null_draws=10)

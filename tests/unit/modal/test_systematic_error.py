@@ -10,7 +10,7 @@ from turnout.modal.explanation import Explanation, usable_explanations
 from turnout.modal.least_squares import drift_columns
 from turnout.modal.mixed_effects import fit_mixed
 from turnout.modal.noise import Background
-from turnout.modal.state_space import continuous_pole
+from turnout.modal.poles import continuous_pole
 from turnout.modal.systematic_error import OwnEstimates, common_error, common_residual, systematic_error
 
 SETTINGS = IdentifySettings()

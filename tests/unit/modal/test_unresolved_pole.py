@@ -5,7 +5,7 @@ import pytest
 
 from turnout.modal.least_squares import drift_columns
 from turnout.modal.mixed_effects import fit_mixed
-from turnout.modal.state_space import continuous_pole
+from turnout.modal.poles import continuous_pole
 from turnout.modal.unresolved_pole import second_order_term, second_pole_posterior, unresolved_pole_error
 
 RATE, N, N_IMPACT = 20e3, 600, 20

@@ -8,7 +8,7 @@ from benchmarks.passage_truth import PATTERNS, impact_train
 from scipy import signal
 
 from turnout.passage.analysis import analyse
-from turnout.passage.channel_checks import without_pulses
+from turnout.passage.electrical_pulses import without_pulses
 from turnout.passage.result import PassageSensor
 from turnout.records import Channel
 

@@ -31,9 +31,9 @@ from turnout.mismatch.engine.verdict import AMBIGUOUS, Verdict, calibrate, poste
 if TYPE_CHECKING:
     from turnout.config.settings.mismatch import MismatchSettings
     from turnout.mismatch.engine.fit import Fit
-    from turnout.mismatch.engine.reserved_data import Verification
     from turnout.mismatch.engine.score import Score
     from turnout.mismatch.engine.two_effects import PairEvidence, SecondEvidence
+    from turnout.mismatch.engine.verification import Verification
 
 HOW, PAIRS, SURFACES = "mismatch.md", "decisions/two-effects.md", "decisions/running-surface-priors.md"
 COMPONENT_DIFFERS = "component_differs_under_trains"

@@ -17,9 +17,9 @@ from turnout.mismatch.engine.thresholds import THRESHOLDS
 if TYPE_CHECKING:
     from turnout.config.settings.mismatch import MismatchSettings
     from turnout.mismatch.engine.ambiguity import Ambiguity
-    from turnout.mismatch.engine.reserved_data import Verification
     from turnout.mismatch.engine.score import Score
     from turnout.mismatch.engine.verdict import Verdict
+    from turnout.mismatch.engine.verification import Verification
 
 
 def is_contradicted(worst_gain: float, gain: float, settings: MismatchSettings) -> bool:

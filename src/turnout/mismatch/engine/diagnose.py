@@ -25,7 +25,6 @@ from turnout.mismatch.engine.local_changes import local_change_evidence
 from turnout.mismatch.engine.localization import Location, locate, locate_change, location_of_ambiguity
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.refit import score_candidates
-from turnout.mismatch.engine.reserved_data import Verification, verify
 from turnout.mismatch.engine.reserved_error import error_of_fitted
 from turnout.mismatch.engine.residual_attribution import Attribution, attribute, cell_energies
 from turnout.mismatch.engine.search import Search
@@ -36,6 +35,7 @@ from turnout.mismatch.engine.tolerated_effects import name_tolerated
 from turnout.mismatch.engine.two_effects import add_second, settle_pair
 from turnout.mismatch.engine.unproven_cases import withhold_names
 from turnout.mismatch.engine.verdict import AMBIGUOUS, Verdict
+from turnout.mismatch.engine.verification import Verification, verify
 
 if TYPE_CHECKING:
     from turnout.config.settings.mismatch import MismatchSettings

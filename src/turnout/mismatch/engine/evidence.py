@@ -13,9 +13,10 @@ from turnout.mismatch.engine.channel_levels import loud_recording, worst_channel
 from turnout.mismatch.engine.cross_validation import held_out_score, single_type_estimate, weighted_mean_square
 from turnout.mismatch.engine.decision import judge
 from turnout.mismatch.engine.decision_facts import is_contradicted, likeliest
+from turnout.mismatch.engine.fit_quality import is_significantly_worse, lost_evidence
 from turnout.mismatch.engine.latent_force import LatentForce, latent_law
 from turnout.mismatch.engine.local_changes import local_change_evidence
-from turnout.mismatch.engine.reserved_data import is_significantly_worse, lost_evidence, reserved_fit
+from turnout.mismatch.engine.reserved_data import reserved_fit
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.strained_values import strained_value
 from turnout.mismatch.engine.thresholds import THRESHOLDS

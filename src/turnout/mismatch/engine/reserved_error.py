@@ -20,7 +20,8 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.cross_validation import jackknife_errors, jackknife_steps
-from turnout.mismatch.engine.reserved_data import fit_percent, fit_reserved
+from turnout.mismatch.engine.fit_quality import fit_percent
+from turnout.mismatch.engine.reserved_data import fit_reserved
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.case import Case

@@ -26,8 +26,9 @@ from turnout.mismatch.engine.evidence import (
     worst_excess,
 )
 from turnout.mismatch.engine.findings import Findings
+from turnout.mismatch.engine.fit_quality import gain_error
 from turnout.mismatch.engine.localization import locate
-from turnout.mismatch.engine.reserved_data import gain_error, reserved_fit
+from turnout.mismatch.engine.reserved_data import reserved_fit
 from turnout.mismatch.engine.rule import first_applicable
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.thresholds import THRESHOLDS

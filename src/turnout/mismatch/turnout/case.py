@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from copy import copy
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
@@ -20,13 +20,14 @@ from turnout.mismatch.turnout.accepted_effects import NO_EFFECTS, AcceptedEffect
 from turnout.mismatch.turnout.campaign import CampaignInput
 from turnout.mismatch.turnout.candidates.catalogue import distant_starts, is_testable, list_candidates
 from turnout.mismatch.turnout.disturbances import independent_of_trains
-from turnout.mismatch.turnout.hammer_case import HammerCase
-from turnout.mismatch.turnout.observations import CaseData, case_data, with_errors
+from turnout.mismatch.turnout.hammer_case import HammerCase, hammer_case
+from turnout.mismatch.turnout.observations import CaseData, case_data
+from turnout.mismatch.turnout.observed_passages import with_errors
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.passage_observation import AlignedPassage
 from turnout.mismatch.turnout.predicted_case import PredictedCase
-from turnout.mismatch.turnout.prediction import Predictor
-from turnout.mismatch.turnout.predictions import Predictions, Terms, Values
+from turnout.mismatch.turnout.prediction import PredictionCache, Predictor, no_cache
+from turnout.mismatch.turnout.predictions import Terms, Values
 from turnout.mismatch.turnout.priors import CASE, SIMULATION
 from turnout.mismatch.turnout.unmet_requirements import UnmetRequirement, unmet_requirements
 from turnout.mismatch.turnout.unproven_panels import reservation
@@ -34,27 +35,6 @@ from turnout.mismatch.turnout.wheel_impacts import impacts_at_position
 from turnout.mismatch.turnout.wheel_roughness import log_mass_ratios
 from turnout.mismatch.turnout.worn_nose import worn_noses
 from turnout.physics import RailCorrugation
-
-# (predictor, whether a prediction is cheap) -> a cache around the predictor, or the predictor itself
-PredictionCache: TypeAlias = Callable[[Predictor, bool], Predictions]
-
-
-def no_cache(predictor: Predictor, is_cheap: bool) -> Predictions:
-    """The predictor itself.
-
-    Parameters
-    ----------
-    predictor : Predictor
-        Predicts the recordings of the site.
-    is_cheap : bool
-        Whether a prediction is cheap.
-
-    Returns
-    -------
-    Predictions
-        The predictor.
-    """
-    return predictor
 
 
 class TrackCase(PredictedCase):
@@ -378,35 +358,3 @@ class TrackCase(PredictedCase):
             return self.predictor.with_solver(fine_solver).predict_passage(fit.values, self.all_terms(fit), aligned)
         except SimulationError:
             return predicted
-
-
-def hammer_case(
-    data: CaseData,
-    predictor: Predictor,
-    candidates: Sequence[Candidate],
-    accepted: AcceptedEffects,
-    cache: PredictionCache,
-) -> HammerCase:
-    """Case of the fitted hammer tests alone.
-
-    Parameters
-    ----------
-    data : CaseData
-        Observations and site.
-    predictor : Predictor
-        Predicts the recordings of the site.
-    candidates : sequence of Candidate
-        Effects that have columns in hammer tests.
-    accepted : AcceptedEffects
-        Part of every prediction.
-    cache : callable
-        Makes the cache around the predictor.
-
-    Returns
-    -------
-    HammerCase
-        It has the start values of its own fits, the means of its nuisances.
-    """
-    observations = [o for o in data.observations if o.name in data.frf_pairs]
-    nuisances = data.site.shared_nuisances()
-    return HammerCase(predictor, observations, nuisances, candidates, accepted, cache(predictor, True))

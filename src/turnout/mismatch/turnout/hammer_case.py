@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from copy import copy
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +15,12 @@ from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.mismatch.turnout.predicted_case import PredictedCase
 from turnout.mismatch.turnout.priors import RECEPTANCE
+
+if TYPE_CHECKING:
+    from turnout.mismatch.engine.candidate import Candidate
+    from turnout.mismatch.turnout.accepted_effects import AcceptedEffects
+    from turnout.mismatch.turnout.observations import CaseData
+    from turnout.mismatch.turnout.prediction import PredictionCache, Predictor
 
 
 class HammerCase(PredictedCase):
@@ -51,3 +58,35 @@ class HammerCase(PredictedCase):
         for _ in range(RECEPTANCE.n_drawn_starts):
             drawn = [n.mean + n.sd * float(rng.normal()) for n in self.nuisances]
             yield {n.name: float(np.clip(v, *n.bounds)) for n, v in zip(self.nuisances, drawn)}
+
+
+def hammer_case(
+    data: CaseData,
+    predictor: Predictor,
+    candidates: Sequence[Candidate],
+    accepted: AcceptedEffects,
+    cache: PredictionCache,
+) -> HammerCase:
+    """Case of the fitted hammer tests alone.
+
+    Parameters
+    ----------
+    data : CaseData
+        Observations and site.
+    predictor : Predictor
+        Predicts the recordings of the site.
+    candidates : sequence of Candidate
+        Effects that have columns in hammer tests.
+    accepted : AcceptedEffects
+        Part of every prediction.
+    cache : callable
+        Makes the cache around the predictor.
+
+    Returns
+    -------
+    HammerCase
+        It has the start values of its own fits, the means of its nuisances.
+    """
+    observations = [o for o in data.observations if o.name in data.frf_pairs]
+    nuisances = data.site.shared_nuisances()
+    return HammerCase(predictor, observations, nuisances, candidates, accepted, cache(predictor, True))

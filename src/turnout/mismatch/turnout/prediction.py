@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
+from typing import TypeAlias
 
 import numpy as np
 
@@ -130,3 +131,25 @@ class Predictor(ReceptancePredictor, PassagePredictor, Predictions):
     ) -> list[np.ndarray]:
         """Derivatives, see ``sensitivity.nuisance_jacobian``."""
         return sensitivity.nuisance_jacobian(self, nuisances, values, terms, observations, base)
+
+
+# (predictor, whether a prediction is cheap) -> a cache around the predictor, or the predictor itself
+PredictionCache: TypeAlias = Callable[[Predictor, bool], Predictions]
+
+
+def no_cache(predictor: Predictor, is_cheap: bool) -> Predictions:
+    """The predictor itself.
+
+    Parameters
+    ----------
+    predictor : Predictor
+        Predicts the recordings of the site.
+    is_cheap : bool
+        Whether a prediction is cheap.
+
+    Returns
+    -------
+    Predictions
+        The predictor.
+    """
+    return predictor

@@ -13,13 +13,14 @@ from turnout.mismatch.turnout.lifting_chairs import LiftingChairs
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.predictions import Terms, Values
 from turnout.mismatch.turnout.priors import SIMULATION
+from turnout.mismatch.turnout.rail_parameters import rail_on_grid, with_rail
 from turnout.mismatch.turnout.receptance_model import ReceptanceModel
 from turnout.mismatch.turnout.receptance_observation import FrfPair
 from turnout.mismatch.turnout.receptance_samples import PairSamples
 from turnout.mismatch.turnout.receptance_sensitivity import ReceptanceSensitivity
 from turnout.mismatch.turnout.site import Site
 from turnout.mismatch.turnout.site_model import SiteModel, drop_oldest
-from turnout.mismatch.turnout.track_parameters import rail_on_grid, track_value_key, track_with, with_rail
+from turnout.mismatch.turnout.track_parameters import track_value_key, track_with
 from turnout.simulate.track import Track
 
 

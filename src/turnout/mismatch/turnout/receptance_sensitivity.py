@@ -15,7 +15,8 @@ from scipy.sparse import csr_array
 from turnout.kernel_cache import kernel
 from turnout.mismatch.turnout.priors import RECEPTANCE
 from turnout.mismatch.turnout.receptance_observation import LINES, SHIFTED_LINES
-from turnout.mismatch.turnout.track_parameters import COMMON_PARAMETERS, SUPPORT_PARAMETERS, casting_elements
+from turnout.mismatch.turnout.track_parameters import COMMON_PARAMETERS, SUPPORT_PARAMETERS
+from turnout.mismatch.turnout.zone import casting_elements
 from turnout.simulate.rail import element_mass
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
     from turnout.mismatch.turnout.receptance_model import ReceptanceModel
     from turnout.mismatch.turnout.receptance_observation import FrfPair
-    from turnout.mismatch.turnout.track_parameters import Zone
+    from turnout.mismatch.turnout.zone import Zone
     from turnout.simulate.rail import Rail
     from turnout.simulate.track import RailStretch
 

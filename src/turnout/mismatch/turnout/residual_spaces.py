@@ -18,9 +18,10 @@ from turnout.mismatch.engine.residual_space import ResidualSpace
 from turnout.mismatch.turnout import receptance_observation
 from turnout.mismatch.turnout.priors import PASSAGE, RECEPTANCE, TRACK
 from turnout.mismatch.turnout.pseudo_forces import green_functions
+from turnout.mismatch.turnout.rail_parameters import RAIL_SDS
 from turnout.mismatch.turnout.rail_roughness import amplitude_sd
 from turnout.mismatch.turnout.surface_priors import WHEELS
-from turnout.mismatch.turnout.track_parameters import COMMON_PARAMETERS, RAIL_SDS
+from turnout.mismatch.turnout.track_parameters import COMMON_PARAMETERS
 from turnout.mismatch.turnout.wave_response import WaveTransfer, channel_responses
 
 if TYPE_CHECKING:

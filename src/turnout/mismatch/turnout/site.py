@@ -12,7 +12,8 @@ from turnout.mismatch.turnout.passage_observation import passage_nuisances
 from turnout.mismatch.turnout.priors import TRACK
 from turnout.mismatch.turnout.rail_roughness import Waves
 from turnout.mismatch.turnout.running_surface import RunningSurface
-from turnout.mismatch.turnout.track_parameters import Zone, track_nuisances, zone_of
+from turnout.mismatch.turnout.track_parameters import track_nuisances
+from turnout.mismatch.turnout.zone import Zone, zone_of
 from turnout.simulate.sensor import Sensor
 
 

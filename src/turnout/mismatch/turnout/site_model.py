@@ -12,11 +12,11 @@ from turnout.mismatch.turnout import passage_model
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.passage_observation import AlignedPassage
 from turnout.mismatch.turnout.predictions import Terms, Values
+from turnout.mismatch.turnout.rail_parameters import rail_sds, with_rail
 from turnout.mismatch.turnout.rail_roughness import Waves
 from turnout.mismatch.turnout.receptance_observation import FrfPair
 from turnout.mismatch.turnout.running_surface import RunningSurface
 from turnout.mismatch.turnout.site import Site
-from turnout.mismatch.turnout.track_parameters import rail_sds, with_rail
 from turnout.physics.term import PhysicsTerm
 from turnout.simulate.sensor import Sensor
 from turnout.simulate.track import Track

@@ -1,0 +1,131 @@
+"""Hammer tests of a campaign as observations of a case, with the reasons why some are rejected."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from turnout.mismatch.engine.observation import Observation
+from turnout.mismatch.turnout import receptance_observation
+from turnout.mismatch.turnout.campaign import CampaignInput, HammerInput
+from turnout.mismatch.turnout.chair_scatter import chair_errors, with_chair_errors
+from turnout.mismatch.turnout.hammer_case import HammerCase
+from turnout.mismatch.turnout.lifting_chairs import count_alike, lifting_chairs, with_lifting_error
+from turnout.mismatch.turnout.prediction import Predictor
+from turnout.mismatch.turnout.predictions import Values
+from turnout.mismatch.turnout.priors import CASE, RECEPTANCE
+from turnout.mismatch.turnout.rail_parameters import with_rail
+from turnout.mismatch.turnout.receptance_observation import FrfPair
+from turnout.mismatch.turnout.saturation import SaturationLimit
+from turnout.mismatch.turnout.track_parameters import track_with
+from turnout.simulate.sensor import Sensor
+
+
+@dataclass(frozen=True)
+class ObservedTests:
+    """Hammer tests as ``observations`` (name of the test, Observation), with their pairs and notes."""
+
+    frf_pairs: Mapping[str, FrfPair]
+    observations: tuple[tuple[str, Observation], ...]
+    notes: tuple[str, ...]
+
+
+def observe_tests(
+    campaign: CampaignInput, tolerance: float, saturated: Mapping[str, SaturationLimit] | None = None
+) -> ObservedTests:
+    """Observation of every response channel of a hammer test with accepted impacts.
+
+    Parameters
+    ----------
+    campaign : CampaignInput
+    tolerance : float
+        Relative error of a receptance by hammer, calibration and mounting. [-]
+    saturated : mapping or None
+        Sensors that are not used.
+
+    Returns
+    -------
+    ObservedTests
+    """
+    pairs, observations, notes = {}, [], []
+    for test in campaign.hammer:
+        sensors = [
+            s
+            for s in (*campaign.sensors, *_loose_sensors(test, campaign.sensors))
+            if s.name not in (saturated or {}) and abs(s.place - test.place) <= CASE.max_hammer_distance
+        ]
+        pairs_of_test = receptance_observation.pairs_of_test(test, sensors, tolerance)
+        if not pairs_of_test:
+            notes.append(
+                f"hammer test {test.name}: no channel within {CASE.max_hammer_distance:g} m with "
+                f"{RECEPTANCE.min_impacts} accepted impacts"
+            )
+        for pair, observation in pairs_of_test:
+            pairs[pair.name] = pair
+            observations.append((test.name, observation))
+    return ObservedTests(pairs, tuple(observations), tuple(notes))
+
+
+def _loose_sensors(test: HammerInput, sensors: Sequence[Sensor]) -> list[Sensor]:
+    """Accelerometers of a hammer test that are no installed sensors."""
+    installed, accelerometers = {s.name for s in sensors}, {}
+    for recording in test.recordings[:1]:
+        for channel in recording.channels:
+            if channel.quantity == "acceleration" and channel.name not in installed and channel.position is not None:
+                accelerometers[channel.name] = Sensor(channel.name, channel.position, channel.mounting)
+    return list(accelerometers.values())
+
+
+def fit_hammer_start(
+    predictor: Predictor, tests: ObservedTests, reserved: Collection[str]
+) -> tuple[Predictor, ObservedTests, dict[str, float]]:
+    """Fit of track and sensors to the hammer tests alone, the start of all fits.
+
+    Chairs of a blade that open under impacts are simulated on the track of the file, then on that of the fit.
+
+    Parameters
+    ----------
+    predictor : Predictor
+        Predicts the recordings of the site.
+    tests : ObservedTests
+        Hammer tests of the campaign.
+    reserved : collection of str
+        Names of the tests that no fit uses.
+
+    Returns
+    -------
+    predictor : Predictor
+        With the chairs that open.
+    tests : ObservedTests
+        With the errors of these chairs.
+    values : dict
+        Nuisances of track and sensors by name; empty without a test.
+    """
+    nuisances = predictor.site.shared_nuisances()
+    values = {n.name: n.mean for n in nuisances}
+    if all(name in reserved for name, _ in tests.observations):
+        return predictor, tests, {}
+    predictor, with_errors_of_chairs = _with_lifting_chairs(predictor, tests, values, reserved)
+    for last in [False, True] if predictor.lifting else [True]:
+        fitted = [o for name, o in with_errors_of_chairs.observations if name not in reserved]
+        values = HammerCase(predictor, fitted, nuisances).fit_from_priors()
+        if not last:
+            predictor, with_errors_of_chairs = _with_lifting_chairs(predictor, tests, values, reserved)
+    return predictor, with_errors_of_chairs, values
+
+
+def _with_lifting_chairs(
+    predictor: Predictor, tests: ObservedTests, values: Values, reserved: Collection[str]
+) -> tuple[Predictor, ObservedTests]:
+    """Predictor and tests with chairs that open and differ, on the track of ``values``; the same without chairs."""
+    zone, pairs = predictor.site.nominal, list(tests.frf_pairs.values())
+    lifting = lifting_chairs(track_with(with_rail(zone, values).turnout.track_of("main"), zone, values), pairs)
+    if lifting is None:
+        return predictor, tests
+    errors = chair_errors(predictor, values, pairs)
+    observations = []
+    for (name, o), pair in zip(tests.observations, pairs):
+        n = count_alike(pair, pairs, reserved)
+        lifted = with_lifting_error(o, pair, lifting.change(pair, ()), n)
+        observations.append((name, with_chair_errors(lifted, pair, errors[pair.name], n)))
+    return predictor.with_lifting(lifting), replace(tests, observations=tuple(observations))
