@@ -9,7 +9,7 @@ import numpy as np
 
 from turnout.modal.least_squares import linearise
 from turnout.modal.mixed_effects import MixedFit, fit_mixed
-from turnout.modal.mode_candidates import fit_and_prune, screen
+from turnout.modal.mode_candidates import ModeSearch
 from turnout.modal.mode_tests import mode_chi_squared, mode_failures
 from turnout.modal.noise import (
     Background,
@@ -92,10 +92,9 @@ def explain(
     """
     explanation = Explanation(None, [], background)
     columns = background.columns(decays.shape[1], rate)
-    screened = screen(start, decays, rate, columns, settings, explanation.rejected)
-    explanation.fit, explanation.candidates = fit_and_prune(
-        screened, decays, rate, columns, settings, explanation.rejected, max_damping=max_damping
-    )
+    search = ModeSearch(decays, rate, columns, settings, explanation.rejected)
+    screened = search.screen(start)
+    explanation.fit, explanation.candidates = search.fit_and_prune(screened, max_damping=max_damping)
     if explanation.fit is not None and known_fits is not None:
         if any(_is_same_fit(explanation.fit, known_fit) for known_fit in known_fits):
             return Explanation(None, [], background)
@@ -137,16 +136,9 @@ def _refine_noise(
         previous, explanation.whitening = explanation.whitening, noise_filter(residual, settings.noise_order_maximum)
         white = whiten(decays, explanation.whitening)
         white_columns = explanation.background.columns(white.shape[1], rate)
-        explanation.fit, explanation.candidates = fit_and_prune(
-            explanation.candidates,
-            white,
-            rate,
-            white_columns,
-            settings,
-            explanation.rejected,
-            explanation.fit.theta,
-            max_damping,
-            indispensable,
+        search = ModeSearch(white, rate, white_columns, settings, explanation.rejected)
+        explanation.fit, explanation.candidates = search.fit_and_prune(
+            explanation.candidates, explanation.fit.theta, max_damping, indispensable
         )
         if len(explanation.whitening) == 1 or len(explanation.whitening) == len(previous):
             break

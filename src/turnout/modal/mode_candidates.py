@@ -123,144 +123,122 @@ def start_values(candidates: Iterable[Candidate]) -> np.ndarray:
     return np.array([[np.log(c.frequency), c.damping] for c in candidates]).reshape(-1, 2)
 
 
-def screen(
-    candidates: list[Candidate],
-    decays: np.ndarray,
-    rate: float,
-    columns: np.ndarray,
-    settings: IdentifySettings,
-    rejected: list[dict],
-) -> list[Candidate]:
-    """Drop candidates that are not significant at the poles of the realisation: the clear ones first, then singly.
+@dataclass(frozen=True)
+class ModeSearch:
+    """Search for the candidates that are modes of the decays of a test.
 
-    Parameters
-    ----------
-    candidates : list of Candidate
-        Candidate poles.
-    decays : (n_decay, n) array of float
-        Free decays. [m/s²]
-    rate : float
-        Sampling rate. [Hz]
-    columns : (n_column, n) array of float
-        Columns of the background.
-    settings : IdentifySettings
-        Settings of the identification.
-    rejected : list of dict
-        Rows of rejected candidates, to which those dropped here are added.
-
-    Returns
-    -------
-    list of Candidate
-        The candidates that remain.
+    ``decays`` (n_decay, n) [m/s²] at ``rate`` [Hz]; ``columns`` (n_column, n) of the background; ``settings`` of the
+    identification. ``rejected`` are rows of rejected candidates, to which those that are dropped here are added.
     """
-    limit = settings.false_mode_probability
-    while candidates:
-        linearisation = linearise(start_values(candidates)[None], decays, rate, columns)
-        sigma2 = linearisation.rss.sum() / degrees_of_freedom(decays, len(candidates), len(columns))
-        probability = common_probability(mode_chi_squared(linearisation, sigma2))
-        dropped = set(np.flatnonzero(probability > MAX_SCREENING_PROBABILITY).tolist()) or {int(np.argmax(probability))}
-        dropped = {m for m in dropped if probability[m] > limit}
-        if not dropped:
-            break
-        rejected += [rejection(candidates[m], "not significant", probability[m], limit) for m in sorted(dropped)]
-        candidates = [c for m, c in enumerate(candidates) if m not in dropped]
-    return candidates
 
+    decays: np.ndarray
+    rate: float
+    columns: np.ndarray
+    settings: IdentifySettings
+    rejected: list[dict]
 
-def fit_and_prune(
-    candidates: list[Candidate],
-    decays: np.ndarray,
-    rate: float,
-    columns: np.ndarray,
-    settings: IdentifySettings,
-    rejected: list[dict],
-    theta: np.ndarray | None = None,
-    max_damping: float | None = None,
-    indispensable: set | None = None,
-) -> tuple[MixedFit | None, list[Candidate]]:
-    """Maximum likelihood with all modes; drops the worst mode that fails a test until none does.
+    def screen(self, candidates: list[Candidate]) -> list[Candidate]:
+        """Drop candidates that are not significant at the poles of the realisation: clear ones first, then singly.
 
-    The fits have the accuracy of ``SEARCH_OPTIONS``, enough to choose modes.
+        Parameters
+        ----------
+        candidates : list of Candidate
+            Candidate poles.
 
-    Parameters
-    ----------
-    candidates : list of Candidate
-        Candidate poles.
-    decays : (n_decay, n) array of float
-        Free decays. [m/s²]
-    rate : float
-        Sampling rate. [Hz]
-    columns : (n_column, n) array of float
-        Columns of the background.
-    settings : IdentifySettings
-        Settings of the identification.
-    rejected : list of dict
-        Rows of rejected candidates, to which those dropped here are added.
-    theta : (n_decay, n_mode, 2) array of float or None
-        Modes of each decay at which the first fit starts; None: those of the candidates.
-    max_damping : float or None
-        Damping up to which a pole may stay in the fit although it is no mode; None: only modes stay.
-    indispensable : set or None
-        Identities of candidates that are not redundant and not tested again; extended.
+        Returns
+        -------
+        list of Candidate
+            The candidates that remain.
+        """
+        limit = self.settings.false_mode_probability
+        while candidates:
+            linearisation = linearise(start_values(candidates)[None], self.decays, self.rate, self.columns)
+            sigma2 = linearisation.rss.sum() / degrees_of_freedom(self.decays, len(candidates), len(self.columns))
+            probability = common_probability(mode_chi_squared(linearisation, sigma2))
+            is_clear = probability > MAX_SCREENING_PROBABILITY
+            dropped = set(np.flatnonzero(is_clear).tolist()) or {int(np.argmax(probability))}
+            dropped = {m for m in dropped if probability[m] > limit}
+            if not dropped:
+                break
+            for m in sorted(dropped):
+                self.rejected.append(rejection(candidates[m], "not significant", probability[m], limit))
+            candidates = [c for m, c in enumerate(candidates) if m not in dropped]
+        return candidates
 
-    Returns
-    -------
-    (MixedFit or None, list of Candidate)
-        Fit of the modes that pass, None if none does, and their candidates.
-    """
-    if not candidates:
-        return None, candidates
-    indispensable = set() if indispensable is None else indispensable
-    fit = fit_mixed(start_values(candidates), decays, rate, columns, theta=theta, **SEARCH_OPTIONS)
-    while True:
-        failures = mode_failures(fit, settings, max_damping)
-        if failures:
-            worst, (reason, value, limit) = failures[0]
-            smaller = None
-        else:
-            redundant, smaller, probability = _redundant_mode(
-                fit, candidates, decays, rate, columns, settings, indispensable
-            )
-            if redundant is None:
-                return fit, candidates
-            worst = redundant
-            reason, value, limit = "splits a stronger mode", probability, settings.false_mode_probability
-        fitted = replace(candidates[worst], frequency=np.exp(fit.shrunken_mean[worst, 0]), damping=fit.mean[worst, 1])
-        rejected.append(rejection(fitted, reason, value, limit))
-        candidates = candidates[:worst] + candidates[worst + 1 :]
+    def fit_and_prune(
+        self,
+        candidates: list[Candidate],
+        theta: np.ndarray | None = None,
+        max_damping: float | None = None,
+        indispensable: set[int] | None = None,
+    ) -> tuple[MixedFit | None, list[Candidate]]:
+        """Maximum likelihood with all modes; drops the worst mode that fails a test until none does.
+
+        The fits have the accuracy of ``SEARCH_OPTIONS``, enough to choose modes.
+
+        Parameters
+        ----------
+        candidates : list of Candidate
+            Candidate poles.
+        theta : (n_decay, n_mode, 2) array of float or None
+            Modes of each decay at which the first fit starts; None: those of the candidates.
+        max_damping : float or None
+            Damping up to which a pole may stay in the fit although it is no mode; None: only modes stay.
+        indispensable : set or None
+            Identities of candidates that are not redundant and not tested again; extended.
+
+        Returns
+        -------
+        (MixedFit or None, list of Candidate)
+            Fit of the modes that pass, None if none does, and their candidates.
+        """
         if not candidates:
             return None, candidates
-        fit = smaller or fit_mixed(np.delete(fit.shrunken_mean, worst, axis=0), decays, rate, columns, **SEARCH_OPTIONS)
+        indispensable = set() if indispensable is None else indispensable
+        fit = self._fit(start_values(candidates), theta=theta)
+        while True:
+            failures = mode_failures(fit, self.settings, max_damping)
+            if failures:
+                worst, (reason, value, limit) = failures[0]
+                smaller = None
+            else:
+                redundant, smaller, probability = self._redundant_mode(fit, candidates, indispensable)
+                if redundant is None:
+                    return fit, candidates
+                worst = redundant
+                reason, value, limit = "splits a stronger mode", probability, self.settings.false_mode_probability
+            frequency, damping = np.exp(fit.shrunken_mean[worst, 0]), fit.mean[worst, 1]
+            fitted = replace(candidates[worst], frequency=frequency, damping=damping)
+            self.rejected.append(rejection(fitted, reason, value, limit))
+            candidates = candidates[:worst] + candidates[worst + 1 :]
+            if not candidates:
+                return None, candidates
+            fit = smaller or self._fit(np.delete(fit.shrunken_mean, worst, axis=0))
 
+    def _fit(self, start: np.ndarray, **options: Any) -> MixedFit:
+        return fit_mixed(start, self.decays, self.rate, self.columns, **options, **SEARCH_OPTIONS)
 
-def _redundant_mode(
-    fit: MixedFit,
-    candidates: list[Candidate],
-    decays: np.ndarray,
-    rate: float,
-    columns: np.ndarray,
-    settings: IdentifySettings,
-    indispensable: set[int],
-) -> tuple[int | None, MixedFit | None, float]:
-    """A mode that overlaps a stronger one and is not needed for the fit: (index, fit without it, probability).
+    def _redundant_mode(
+        self, fit: MixedFit, candidates: list[Candidate], indispensable: set[int]
+    ) -> tuple[int | None, MixedFit | None, float]:
+        """A mode that overlaps a stronger one and is not needed for the fit: (index, fit without it, probability).
 
-    Poles that differ between impacts look like two poles to a realisation of all impacts, but not to a fit of each.
-    """
-    statistic = mode_chi_squared(fit.linearisation, fit.sigma2).sum(axis=0)
-    target_rss = fit.rss + fit.sigma2 * float(chdtri(4 * len(decays), settings.false_mode_probability))
-    for weak in np.argsort(statistic):
-        if id(candidates[weak]) in indispensable:
-            continue
-        gap = np.abs(fit.mean[:, 0] - fit.mean[weak, 0])
-        overlaps = (gap < fit.mean[:, 1] + fit.mean[weak, 1]) & (statistic > statistic[weak])
-        if not overlaps.any():
-            continue
-        # start from common modes: the remaining mode must be free to move between the two
-        without = fit_mixed(
-            np.delete(fit.shrunken_mean, weak, axis=0), decays, rate, columns, target_rss=target_rss, **SEARCH_OPTIONS
-        )
-        probability = float(chdtrc(4 * len(decays), (without.rss - fit.rss) / fit.sigma2))
-        if probability > settings.false_mode_probability:
-            return int(weak), without, probability
-        indispensable.add(id(candidates[weak]))
-    return None, None, 1.0
+        Poles that differ between impacts look like two poles to a realisation of all impacts, but not to a fit of each.
+        """
+        n_values, limit = 4 * len(self.decays), self.settings.false_mode_probability
+        statistic = mode_chi_squared(fit.linearisation, fit.sigma2).sum(axis=0)
+        target_rss = fit.rss + fit.sigma2 * float(chdtri(n_values, limit))
+        for weak in np.argsort(statistic):
+            if id(candidates[weak]) in indispensable:
+                continue
+            gap = np.abs(fit.mean[:, 0] - fit.mean[weak, 0])
+            overlaps = (gap < fit.mean[:, 1] + fit.mean[weak, 1]) & (statistic > statistic[weak])
+            if not overlaps.any():
+                continue
+            # start from common modes: the remaining mode must be free to move between the two
+            without = self._fit(np.delete(fit.shrunken_mean, weak, axis=0), target_rss=target_rss)
+            probability = float(chdtrc(n_values, (without.rss - fit.rss) / fit.sigma2))
+            if probability > limit:
+                return int(weak), without, probability
+            indispensable.add(id(candidates[weak]))
+        return None, None, 1.0

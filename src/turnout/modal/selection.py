@@ -23,7 +23,7 @@ from turnout.modal.explanation import (
 )
 from turnout.modal.least_squares import linearise
 from turnout.modal.mixed_effects import MixedFit
-from turnout.modal.mode_candidates import filter_reappearing, fit_and_prune, start_values
+from turnout.modal.mode_candidates import ModeSearch, filter_reappearing, start_values
 from turnout.modal.mode_tests import mode_chi_squared, mode_failures
 from turnout.modal.noise import (
     Background,
@@ -193,16 +193,10 @@ def _refit(
     result = replace(explanation, rejected=list(explanation.rejected))
     for _ in range(2):
         white = whiten(decays, result.whitening)
-        result.fit, result.candidates = fit_and_prune(
-            result.candidates,
-            white,
-            rate,
-            explanation.background.columns(white.shape[1], rate),
-            settings,
-            result.rejected,
-            theta,
-            max_damping,
-            {id(candidate) for candidate in explanation.candidates},
+        white_columns = explanation.background.columns(white.shape[1], rate)
+        search = ModeSearch(white, rate, white_columns, settings, result.rejected)
+        result.fit, result.candidates = search.fit_and_prune(
+            result.candidates, theta, max_damping, {id(candidate) for candidate in explanation.candidates}
         )
         if result.fit is None:
             break

@@ -69,16 +69,68 @@ class ChannelFit:
         return (self.scores.forecast - self.null.forecast) / (self.max_fit - self.null.forecast)
 
 
+@dataclass(frozen=True)
+class _Excerpt:
+    """Part of a record with the train in it: ``samples`` and, behind the ``band_filter``, ``data`` [m/s²].
+
+    ``expected`` are the samples at which the axles pass, ``start`` [s] is that of the excerpt in the recording.
+    ``record`` is the whole recording, ``min_noise`` [m/s²] the least noise that its converter leaves.
+    """
+
+    record: np.ndarray
+    samples: np.ndarray
+    data: np.ndarray
+    band_filter: np.ndarray
+    expected: np.ndarray
+    start: float
+    min_noise: float
+
+
+def find_peak(
+    samples: np.ndarray, rate: float, axle_times: np.ndarray, model: ModalModel | None, settings: PassageSettings
+) -> ChannelFit:
+    """Peak of one sensor and times of the wheels, without a fit.
+
+    Parameters
+    ----------
+    samples : (n_sample,) array of float
+        Acceleration of the whole recording. [m/s²]
+    rate : float
+        [Hz]
+    axle_times : (n_wheel,) array of float
+        As for ``fit_channel``. [s]
+    model : ModalModel or None
+        Of the sensor's section: it shows the delay of the impacts. None: all delays are allowed for.
+    settings : PassageSettings
+        Settings of the passage analysis.
+
+    Returns
+    -------
+    ChannelFit
+        "peak_only"; "rejected" without two wheels whose windows lie within the recording.
+    """
+    excerpt = _excerpt_of(samples, rate, axle_times, settings)
+    if isinstance(excerpt, ChannelFit):
+        return excerpt
+    if model is None:
+        earlier = settings.delay_search
+        begins = excerpt.expected - earlier * rate
+        window = _windows(excerpt.data, rate, begins, settings.score_window + 2.0 * earlier)
+        return ChannelFit(PEAK_ONLY, times=excerpt.expected / rate + excerpt.start, peak=float(np.max(np.abs(window))))
+    delay, window = _delay_and_window(excerpt, rate, _filtered_basis(model, rate, settings), settings)
+    times = (excerpt.expected + delay) / rate + excerpt.start
+    return ChannelFit(PEAK_ONLY, times=times, peak=float(np.max(np.abs(window))))
+
+
 def fit_channel(
     samples: np.ndarray,
     rate: float,
     axle_times: np.ndarray,
     speed: float,
-    model: ModalModel | None,
+    model: ModalModel,
     settings: PassageSettings,
     other_models: Mapping[str, ModalModel] | None = None,
     with_null: bool = True,
-    with_scores: bool = True,
 ) -> ChannelFit:
     """Fit ``model`` to one sensor.
 
@@ -92,45 +144,28 @@ def fit_channel(
         When the axles pass this sensor; those without a whole window in the recording are left out. [s]
     speed : float
         Speed of the train. [m/s]
-    model : ModalModel or None
-        Of the sensor's section. None: the section has none, and only the peak is found ("peak_only").
+    model : ModalModel
+        Of the sensor's section.
     settings : PassageSettings
         Settings of the passage analysis.
     other_models : mapping or None
         Name -> ModalModel of other sections, whose forecast skill is given for comparison.
     with_null : bool
         Also score random models. Without them "null_explains" cannot result.
-    with_scores : bool
-        Also fit and score the model. Without it only the peak and the times of the wheels are found ("peak_only").
 
     Returns
     -------
     ChannelFit
         "rejected" without two wheels whose windows lie within the recording.
     """
-    samples = np.asarray(samples, dtype=float)
-    samples = samples - np.median(samples)  # the filters start from zero: an offset would act as an impact
-    excerpt, expected = _cut_excerpt(samples, rate, axle_times, settings)
-    if expected.size < 2:
-        return ChannelFit(REJECTED, "fewer than two wheels with a whole window in the recording")
-    band_filter = band_pass(settings.band_low, settings.band_high, settings.filter_order, rate)
-    data = apply_filter(excerpt, band_filter)
-    min_noise = converter_step(samples) / np.sqrt(12.0)  # a record constant within one step has at least this noise
-    if not min_noise > 0.0:
-        return ChannelFit(REJECTED, "it never changes")
-    start = _excerpt_start(samples, rate, axle_times)
-    if model is None:
-        earlier = settings.delay_search  # the delay of the impacts is unknown: all delays are allowed for
-        window = _windows(data, rate, expected - earlier * rate, settings.score_window + 2.0 * earlier)
-        return ChannelFit(PEAK_ONLY, times=expected / rate + start, peak=float(np.max(np.abs(window))))
+    excerpt = _excerpt_of(samples, rate, axle_times, settings)
+    if isinstance(excerpt, ChannelFit):
+        return excerpt
+    data, expected = excerpt.data, excerpt.expected
     basis = _filtered_basis(model, rate, settings)
-    delay = common_delay(delay_power(data, expected, basis, settings))
-    window = _windows(data, rate, expected + delay, settings.score_window)
-    peak = float(np.max(np.abs(window)))
-    if not with_scores:
-        return ChannelFit(PEAK_ONLY, times=(expected + delay) / rate + start, peak=peak)
-    quiet = _quiet_samples(samples, rate, axle_times, speed)
-    times, test = _impacts_and_test(excerpt, expected + delay, quiet, speed, model, rate, settings, min_noise)
+    delay, window = _delay_and_window(excerpt, rate, basis, settings)
+    quiet = _quiet_samples(excerpt.record, rate, axle_times, speed)
+    times, test = _impacts_and_test(excerpt, expected + delay, quiet, speed, model, rate, settings)
     scores = score(data, expected, basis, settings)
     null = (
         NullBand.of(null_scores(data, expected, _cached_null_bases(model.order, rate, settings), settings))
@@ -143,12 +178,12 @@ def fit_channel(
     }
     joint = joint_fit(data, times.times, basis)
     band_ratio = np.sqrt(2.0 * (min(settings.band_high, rate / 2) - settings.band_low) / rate)  # of white noise
-    noise = _band_noise(quiet, rate, band_filter, min_noise * band_ratio)
+    noise = _band_noise(quiet, rate, excerpt.band_filter, excerpt.min_noise * band_ratio)
     status, detail = _judge(scores, null, test, settings)
     return ChannelFit(
         status,
         detail,
-        times.times / rate + start,
+        times.times / rate + excerpt.start,
         times.standard_errors / rate,
         times.ambiguous,
         joint.amplitudes[:, 0],
@@ -158,12 +193,37 @@ def fit_channel(
         null,
         other_skills,
         100.0 * (1.0 - noise / max(float(np.std(window)), 1e-300)),
-        peak,
+        float(np.max(np.abs(window))),
         scores.n_parameter / (scores.n_value / rate),
         data,
         joint.prediction,
-        start,
+        excerpt.start,
     )
+
+
+def _excerpt_of(
+    samples: np.ndarray, rate: float, axle_times: np.ndarray, settings: PassageSettings
+) -> _Excerpt | ChannelFit:
+    """The part of a record with the train in it, or the rejection of the record."""
+    record = np.asarray(samples, dtype=float)
+    record = record - np.median(record)  # the filters start from zero: an offset would act as an impact
+    excerpt, expected = _cut_excerpt(record, rate, axle_times, settings)
+    if expected.size < 2:
+        return ChannelFit(REJECTED, "fewer than two wheels with a whole window in the recording")
+    band_filter = band_pass(settings.band_low, settings.band_high, settings.filter_order, rate)
+    min_noise = converter_step(record) / np.sqrt(12.0)  # a record constant within one step has at least this noise
+    if not min_noise > 0.0:
+        return ChannelFit(REJECTED, "it never changes")
+    data, start = apply_filter(excerpt, band_filter), _excerpt_start(record, rate, axle_times)
+    return _Excerpt(record, excerpt, data, band_filter, expected, start, min_noise)
+
+
+def _delay_and_window(
+    excerpt: _Excerpt, rate: float, basis: WheelBasis, settings: PassageSettings
+) -> tuple[np.ndarray, np.ndarray]:
+    """Delay of the impacts behind the axle times [samples], and the data of all wheels, one behind the other."""
+    delay = common_delay(delay_power(excerpt.data, excerpt.expected, basis, settings))
+    return delay, _windows(excerpt.data, rate, excerpt.expected + delay, settings.score_window)
 
 
 def _band_noise(quiet: np.ndarray, rate: float, band_filter: np.ndarray, least: float) -> float:
@@ -204,20 +264,19 @@ def _quiet_samples(samples: np.ndarray, rate: float, axle_times: np.ndarray, spe
 
 
 def _impacts_and_test(
-    excerpt: np.ndarray,
+    excerpt: _Excerpt,
     expected: np.ndarray,
     quiet: np.ndarray,
     speed: float,
     model: ModalModel,
     rate: float,
     settings: PassageSettings,
-    min_noise: float,
 ) -> tuple[ImpactTimes, DirectionTest]:
     """Impact times and the test of the jump's direction, both on whitened data."""
-    taps, noise = whitener(quiet[: int(rate)] if quiet.size > 0.1 * rate else np.diff(excerpt[: int(rate)]))
-    noise = max(noise, min_noise)
+    taps, noise = whitener(quiet[: int(rate)] if quiet.size > 0.1 * rate else np.diff(excerpt.samples[: int(rate)]))
+    noise = max(noise, excerpt.min_noise)
     basis = wheel_basis(model, taps, rate)
-    white = apply_filter(excerpt, taps)
+    white = apply_filter(excerpt.samples, taps)
     spread = max(min(settings.place_error / speed, settings.time_search) * rate, 1.0)
     search_range = settings.time_search * rate
     times = impact_times(white, expected, basis, search_range, noise, spread, settings.ambiguity_odds)

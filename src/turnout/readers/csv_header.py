@@ -5,6 +5,7 @@ import unicodedata
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from mmap import mmap
+from typing import NamedTuple
 
 from turnout.readers.csv_cells import (
     BLANK,
@@ -37,8 +38,19 @@ NUMERIC_HEAD_NAMES = TEMPERATURES | {
 }  # a head line only if a number follows, else the name of a column
 GROUPED_NUMBER = re.compile(rf"\d{{1,3}}(?:{THOUSANDS_MARK}\d{{3}})+(?!\d)")
 
-# notes, names and units of the columns, byte of the first number, separator, entries with their lines
-Head = tuple[dict[str, float | str], list[str], list[str], int, str, tuple[Entry, ...]]
+
+class Head(NamedTuple):
+    """Lines above the numbers of a text file: ``notes`` by name, ``names`` and ``units`` of the columns.
+
+    The first number is at byte ``offset``; ``entries`` are all entries of the head with their lines.
+    """
+
+    notes: dict[str, float | str]
+    names: list[str]
+    units: list[str]
+    offset: int
+    separator: str
+    entries: tuple[Entry, ...]
 
 
 def read_head(data: bytes | mmap, source: Source) -> Head:
@@ -53,9 +65,7 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
 
     Returns
     -------
-    tuple
-        Notes of the head by name; names and units of the columns; byte of the first number; separator; and all entries
-        of the head with their lines.
+    Head
 
     Raises
     ------
@@ -76,44 +86,11 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
         if not is_row(cells) and _are_rows_of_words(data, position):
             separator, cells = BLANK, cells_of(line, BLANK)
         if is_row(cells):
-            texts = [cells_of(text, separator) for text in text_lines]
-            if separator == BLANK:
-                texts = [words for words in texts if len(words) == len(cells)]
-            texts += _commented_names(head_lines[-1:], texts, len(cells), separator)
-            _check_row_above(texts, head_lines, cells, separator, source)
-            names, units = names_and_units(texts, cells)
-            notes |= {
-                _plain(a): b
-                for a, b, *rest in (t for t in texts if len(t) > 1)
-                if b and not any(rest) and a not in names and is_scale_name(a)
-            }
-            lines_of_entries = ["" if _names_columns(cells_of(t, separator), names, units) else t for t in head_lines]
-            separator_of_head = "," if separator == BLANK else separator  # a word is no cell of a head
-            entries = tuple(entries_of_lines(lines_of_entries, separator_of_head, names))
-            return notes, names, units, position, separator, entries
-        match = HEAD_LINE.match(line.strip())
-        name = match[1].strip() if match else ""
-        plain_name = _plain(name)
-        value = match[3].strip(separator + " ") if match else ""
-        name_with_unit = f"{name} {match[2]}" if match and match[2] else name
-        is_rate = (
-            bool(match)
-            and is_rate_name(name)
-            and (line.startswith("#") or len(cells) == 2 or _begins_with_number(value))
-        )
-        is_note = (
-            plain_name in HEAD_NAMES
-            or (plain_name in NUMERIC_HEAD_NAMES and is_number(value.split()[0] if value else ""))
-            or _states_scale(name_with_unit, value)
-        )
-        if plain_name in SAMPLE_COUNT_NAMES and (grouped := GROUPED_NUMBER.match(value)):
-            value = re.sub(r"\D", "", grouped[0])
+            return _complete_head(notes, text_lines, head_lines, cells, separator, position, source)
         head_lines.append(line)
-        if match and (line.startswith("#") or is_note or is_rate):
-            if _states_scale(name_with_unit, value):
-                notes[name_with_unit] = value
-            else:
-                notes[plain_name if is_note else name] = _value(f"{value} {match[2]}" if match[2] else value)
+        note = _note_of(line, separator, len(cells))
+        if note is not None:
+            notes[note[0]] = note[1]
         elif line.strip():
             text_lines.append(line)
         position = end + 1
@@ -122,6 +99,58 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
     if len(text_lines) < 2:
         raise source.error("line 1", "no line of numbers follows", COPY_AGAIN, reason="empty")
     raise source.error("the file", *_no_numbers(text_lines[-1]))
+
+
+def _complete_head(
+    notes: dict[str, float | str],
+    text_lines: Sequence[str],
+    head_lines: list[str],
+    cells: list[str],
+    separator: str,
+    offset: int,
+    source: Source,
+) -> Head:
+    """The head above the first row, of which ``cells`` are the cells; ``text_lines`` are those without a note."""
+    texts = [cells_of(text, separator) for text in text_lines]
+    if separator == BLANK:
+        texts = [words for words in texts if len(words) == len(cells)]
+    texts += _commented_names(head_lines[-1:], texts, len(cells), separator)
+    _check_row_above(texts, head_lines, cells, separator, source)
+    names, units = names_and_units(texts, cells)
+    scales = {
+        _plain(a): b
+        for a, b, *rest in (t for t in texts if len(t) > 1)
+        if b and not any(rest) and a not in names and is_scale_name(a)
+    }
+    lines_of_entries = ["" if _names_columns(cells_of(t, separator), names, units) else t for t in head_lines]
+    separator_of_head = "," if separator == BLANK else separator  # a word is no cell of a head
+    entries = tuple(entries_of_lines(lines_of_entries, separator_of_head, names))
+    return Head({**notes, **scales}, names, units, offset, separator, entries)
+
+
+def _note_of(line: str, separator: str, n_cells: int) -> tuple[str, float | str] | None:
+    """Name and value of a line of the head that is a note: a comment, a known name, a rate or a scale."""
+    match = HEAD_LINE.match(line.strip())
+    if not match:
+        return None
+    name = match[1].strip()
+    plain_name = _plain(name)
+    value = match[3].strip(separator + " ")
+    name_with_unit = f"{name} {match[2]}" if match[2] else name
+    is_comment = line.startswith("#")
+    is_rate = is_rate_name(name) and (is_comment or n_cells == 2 or _begins_with_number(value))
+    is_note = (
+        plain_name in HEAD_NAMES
+        or (plain_name in NUMERIC_HEAD_NAMES and is_number(value.split()[0] if value else ""))
+        or _states_scale(name_with_unit, value)
+    )
+    if plain_name in SAMPLE_COUNT_NAMES and (grouped := GROUPED_NUMBER.match(value)):
+        value = re.sub(r"\D", "", grouped[0])
+    if not (is_comment or is_note or is_rate):
+        return None
+    if _states_scale(name_with_unit, value):
+        return name_with_unit, value
+    return plain_name if is_note else name, _value(f"{value} {match[2]}" if match[2] else value)
 
 
 NO_TEXT_REMEDY = (

@@ -4,6 +4,7 @@ It assigns the channels of a file to those of the layout, converts units and che
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from datetime import datetime
 from types import MappingProxyType
 from typing import Any
@@ -91,8 +92,9 @@ def convert_records(
     starts = start_times(stamps, description.time_zone)
     order_errors = check_order(starts, source)
     start_of = dict(starts)
-    assignments = Assignments(description.channels, source)
-    entry_check = EntryCheck(description, source)
+    assignments, entry_check = Assignments(description.channels, source), EntryCheck(description, source)
+    limit = max_duration if source.lazy and description.kind == "passage" else None
+    conversion = _Conversion(len(raw.records), assignments, entry_check, description, source, limit)
     for k, record in enumerate(raw.records):
         try:
             if isinstance(record, ReadError):
@@ -100,12 +102,9 @@ def convert_records(
             if k in order_errors:
                 raise order_errors[k]
             record = entry_check.without_checked(record)
-            limit = max_duration if source.lazy and description.kind == "passage" else None
             start = start_of[k]
             started_at = start if start and is_plausible(start) else None
-            recording, channel_errors = _recording(
-                record, k, len(raw.records), started_at, assignments, entry_check, description, source, limit
-            )
+            recording, channel_errors = conversion.recording(record, k, started_at)
             recordings.append(recording)
             remarked = {
                 e.problem for e in errors if e.reason in ("rate_ambiguous", "entry_unknown")
@@ -196,57 +195,75 @@ def _copy_or_correct(key: str, promised: int | None) -> str:
     return f"{COPY_AGAIN}; if it is whole, correct '{key}: {promised}' in the layout (null: any number)"
 
 
-def _recording(
+@dataclass(frozen=True)
+class _Conversion:
+    """What the ``n_record`` records of a file have in common.
+
+    A record that is longer than ``max_duration`` [s] stays in the file.
+    """
+
+    n_record: int
+    assignments: Assignments
+    entry_check: EntryCheck
+    description: RawDescription
+    source: Source
+    max_duration: float | None
+
+    def recording(
+        self, record: RawRecord, k: int, started_at: datetime | None
+    ) -> tuple[Recording | LongRecording, list[ReadError]]:
+        """(recording, errors of channels left out) of raw record ``k``; ReadError if the record cannot be used."""
+        description, source = self.description, self.source
+        where = f"record {k + 1} of {self.n_record}"
+        n_sample = _sample_count(record, where, description.n_samples, source)
+        sensor_rows = self.assignments.sensor_rows(record, where)
+        statements = all_statements(record, k, self.n_record, sensor_rows, where, source)
+        rate = resolve(statements, description.rate, where, source)
+        channel_maps = self.assignments.mappings(record, where)
+        if not channel_maps:
+            raise source.error(where, "the layout wants none of its channels", "Name channels in the layout")
+        block_reader = BlockReader(record, channel_maps, where, source, source.state())
+        is_long = self.max_duration is not None and n_sample / rate > self.max_duration
+        samples = np.empty((0, 0)) if is_long else block_reader(0, n_sample)
+        from_record, from_samples = ChannelStatistics.from_record, ChannelStatistics.from_samples
+        statistics = from_record(block_reader, n_sample) if is_long else from_samples(samples)
+        faults = _faults(record, channel_maps, statistics, n_sample, where, source)
+        if faults and (description.kind != "passage" or len(faults) == len(channel_maps)):
+            raise next(iter(faults.values()))
+        usable = [i for i in range(len(channel_maps)) if i not in faults]
+        fields: dict[str, Any] = {
+            "rate": rate,
+            "channels": tuple(channel_maps[i].channel for i in usable),
+            "kind": description.kind,
+            "source": source.name,
+            "record": k,
+            "started_at": started_at,
+            "conditions": MappingProxyType({n: v for n, v in record.conditions.items() if is_single(v)}),
+        }
+        of_rate = rate_remark(statements, rate, where, source)
+        is_rate_stated = any(s.certainty == CERTAIN and s.intervals for s in statements)
+        of_entries = self.entry_check.remarks(record, rate, self.n_record, where, is_rate_stated)
+        channel_errors = [*faults.values(), *([of_rate] if of_rate else []), *of_entries]
+        if is_long:
+            return LongRecording(block_reader.subset(usable), n_sample, **fields), channel_errors
+        return Recording(samples=samples if not faults else samples[usable], **fields), channel_errors
+
+
+def _faults(
     record: RawRecord,
-    k: int,
-    n_record: int,
-    started_at: datetime | None,
-    assignments: Assignments,
-    entry_check: EntryCheck,
-    description: RawDescription,
+    channel_maps: Sequence[ChannelMapping],
+    statistics: ChannelStatistics,
+    n_sample: int,
+    where: str,
     source: Source,
-    max_duration: float | None,
-) -> tuple[Recording | LongRecording, list[ReadError]]:
-    """(recording, errors of channels left out) of raw record ``k``; ReadError if the record cannot be used."""
-    where = f"record {k + 1} of {n_record}"
-    n_sample = _sample_count(record, where, description.n_samples, source)
-    sensor_rows = assignments.sensor_rows(record, where)
-    statements = all_statements(record, k, n_record, sensor_rows, where, source)
-    rate = resolve(statements, description.rate, where, source)
-    channel_maps = assignments.mappings(record, where)
-    if not channel_maps:
-        raise source.error(where, "the layout wants none of its channels", "Name channels in the layout")
-    block_reader = BlockReader(record, channel_maps, where, source, source.state())
-    is_long = max_duration is not None and n_sample / rate > max_duration
-    samples = np.empty((0, 0)) if is_long else block_reader(0, n_sample)
-    statistics = (
-        ChannelStatistics.from_record(block_reader, n_sample) if is_long else ChannelStatistics.from_samples(samples)
-    )
-    faults = {
+) -> dict[int, ReadError]:
+    """Error of each channel that cannot be used, by its index: those with missing samples first."""
+    of_statistics = {
         i: e
         for i, channel_statistics in enumerate(statistics.by_channel())
         if (e := channel_error(n_sample, channel_statistics, channel_maps[i].channel, where, source))
     }
-    faults = _missing_sample_errors(record, channel_maps, statistics, where, source) | faults
-    if faults and (description.kind != "passage" or len(faults) == len(channel_maps)):
-        raise next(iter(faults.values()))
-    usable = [i for i in range(len(channel_maps)) if i not in faults]
-    fields: dict[str, Any] = {
-        "rate": rate,
-        "channels": tuple(channel_maps[i].channel for i in usable),
-        "kind": description.kind,
-        "source": source.name,
-        "record": k,
-        "started_at": started_at,
-        "conditions": MappingProxyType({n: v for n, v in record.conditions.items() if is_single(v)}),
-    }
-    of_rate = rate_remark(statements, rate, where, source)
-    is_rate_stated = any(s.certainty == CERTAIN and s.intervals for s in statements)
-    of_entries = entry_check.remarks(record, rate, n_record, where, is_rate_stated)
-    channel_errors = [*faults.values(), *([of_rate] if of_rate else []), *of_entries]
-    if is_long:
-        return LongRecording(block_reader.subset(usable), n_sample, **fields), channel_errors
-    return Recording(samples=samples if not faults else samples[usable], **fields), channel_errors
+    return _missing_sample_errors(record, channel_maps, statistics, where, source) | of_statistics
 
 
 def _sample_count(record: RawRecord, where: str, promised: int | None, source: Source) -> int:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -70,6 +70,7 @@ if TYPE_CHECKING:
     from turnout.config.turnout import TurnoutConfig
     from turnout.records import Unit
     from turnout.stages.mismatch_groups import Group
+    from turnout.stages.stored_visits import StoredVisit
 
 AGREEING = "linearized-again"  # folder of visits that agree with the earlier ones, see ``agreeing_visits``
 MAX_FITS_IN_MEMORY = 12  # of the newest visits; others are fitted again where a visit seems to differ
@@ -219,45 +220,79 @@ def calibrate_turnout(
             f"{turnout_id}: no hammer test and no passage below {raw_root}{renewal_note(turnout)}; "
             "nothing can be calibrated."
         )
-    folder, code = Path(work) / FOLDER, fingerprint("turnout.stages.mismatch")
-    code = "-".join([code, *sorted(without)])
+    code = "-".join([fingerprint("turnout.stages.mismatch"), *sorted(without)])
     units_of_visits = {v: unit_of(turnout_id, v, units, turnout.hashes["mismatch"]) for v, units in by_visit.items()}
     versions = {v: version_of(unit, turnout, raw_root, track, code) for v, unit in units_of_visits.items()}
+    folder = Path(work) / FOLDER
     stored = read_visits(folder, turnout_id, versions)
     diagnosed_alone = {s.visit for s in stored if not s.fitted}
     complete = {s.visit for s in stored} - diagnosed_alone
-    missing, notes = [label for label in by_visit if label not in complete], list(copies)
+    missing = [label for label in by_visit if label not in complete]
     of_diagnosis = {(s.visit, s.sections): s.answer for s in stored if s.visit in diagnosed_alone}
-
-    def fit_visit(label: str) -> list[FittedGroup]:
-        about = {"turnout": turnout, "visit": label, "version": versions[label], "without": without}
-        about["answers"] = {sections: a for (visit, sections), a in of_diagnosis.items() if visit == label}
-        print(f"{turnout_id}: fit of visit {label}", file=sys.stderr, flush=True)
-        fitted, reasons = _fit_visit(folder, by_visit[label], raw_root, work, track, about)
-        notes.extend(reasons)
-        return fitted
-
-    fits = dict[str, list[FittedGroup]]()
-    for label in missing:
-        fits[label] = fit_visit(label)
-        if len(fits) > MAX_FITS_IN_MEMORY:
-            del fits[next(iter(fits))]
+    fits = _VisitFits(turnout, folder, by_visit, versions, of_diagnosis, raw_root, work, track, without, [*copies])
+    fits.fit_all(missing)
     stored = read_visits(folder, turnout_id, versions)
     if not stored:
         raise SimulationError(
-            f"{turnout_id}: no visit can be fitted; {'; '.join(notes) or 'no section has recordings'}"
+            f"{turnout_id}: no visit can be fitted; {'; '.join(fits.notes) or 'no section has recordings'}"
         )
+    return _model_of_visits(stored, fits, missing, each_visit)
+
+
+@dataclass
+class _VisitFits:
+    """Fits of the visits of a turnout, made when they are asked for; the last ``MAX_FITS_IN_MEMORY`` are kept.
+
+    ``units`` are the recordings of each visit, ``versions`` as ``version_of`` gives them, ``answers`` those of a
+    diagnosis by (visit, sections). ``notes`` are reasons why groups of sections could not be fitted.
+    """
+
+    turnout: TurnoutConfig
+    folder: Path
+    units: Mapping[str, Sequence[Unit]]
+    versions: Mapping[str, Mapping[str, Any]]
+    answers: Mapping[tuple[str, str], str]
+    raw_root: str | Path
+    work: str | Path
+    track: str | None
+    without: Collection[str]
+    notes: list[str]
+    _in_memory: dict[str, list[FittedGroup]] = field(default_factory=dict)
+
+    def fit_all(self, labels: Iterable[str]) -> None:
+        """Fit visits and store their information."""
+        for label in labels:
+            self._in_memory[label] = self._fit(label)
+            if len(self._in_memory) > MAX_FITS_IN_MEMORY:
+                del self._in_memory[next(iter(self._in_memory))]
+
+    def of_visit(self, label: str) -> list[FittedGroup]:
+        """Fits of the groups of a visit, from memory or made again."""
+        return self._in_memory.get(label) or self._fit(label)
+
+    def _fit(self, label: str) -> list[FittedGroup]:
+        about = {"turnout": self.turnout, "visit": label, "version": self.versions[label], "without": self.without}
+        about["answers"] = {sections: a for (visit, sections), a in self.answers.items() if visit == label}
+        print(f"{self.turnout.id}: fit of visit {label}", file=sys.stderr, flush=True)
+        fitted, reasons = _fit_visit(self.folder, self.units[label], self.raw_root, self.work, self.track, about)
+        self.notes.extend(reasons)
+        return fitted
+
+
+def _model_of_visits(
+    stored: list[StoredVisit], fits: _VisitFits, computed: Sequence[str], each_visit: bool
+) -> CalibratedModel:
+    """The model from the stored information of all visits, of which ``computed`` were fitted for it."""
+    turnout, without = fits.turnout, fits.without
     parameters = parameters_of(stored)
     directions = dip_directions(parameters)
     informed = visits_of(stored)
-    turnout_track, _ = track_of(turnout, track)
+    turnout_track, _ = track_of(turnout, fits.track)
     accepted = changes_of(turnout_track.terms)
     events = [*events_of(turnout, parameters, accepted, informed), *file_errors(parameters, directions)]
-    again = AgreeingInformation(folder / AGREEING / turnout_id, versions)
+    again = AgreeingInformation(fits.folder / AGREEING / turnout.id, fits.versions)
     settings = turnout.settings["mismatch"]
-    informed = agreeing_visits(
-        parameters, informed, events, lambda v: fits.get(v) or fit_visit(v), again, settings.threshold
-    )
+    informed = agreeing_visits(parameters, informed, events, fits.of_visit, again, settings.threshold)
     stored = with_information(stored, informed)
     history = estimate_history(parameters, visits_of(without_findings(stored)), events)
     changes = estimate_history(parameters, informed, events, repeats_between_visits=False, accepted=None)
@@ -276,13 +311,14 @@ def calibrate_turnout(
         against_file,
         surface_changes(directions),
     )
+    notes_by_visit = {s.visit: s.notes for s in stored}
     return CalibratedModel(
         history,
         tuple(with_evidence_under_load(compare_onsets(changes, local), parameters, informed, events, candidates)),
         tuple(deviations),
         {f"{s.visit} {s.sections}": s.answer for s in stored if s.answer not in USED_ANSWERS},
-        tuple(missing),
-        (*notes, *summary_of_notes(note for of in {s.visit: s.notes for s in stored}.values() for note in of)),
+        tuple(computed),
+        (*fits.notes, *summary_of_notes(note for notes in notes_by_visit.values() for note in notes)),
         tuple(within_library(answer, without) for answer in answers),
         reservation(turnout_track),
     )

@@ -17,7 +17,7 @@ from turnout.errors import PartlyComputed, ReadError
 from turnout.passage.analysis import analyse
 from turnout.passage.axle_load import LoadCalibration, axle_load
 from turnout.passage.axle_patterns import Pattern
-from turnout.passage.channel_fit import fit_channel
+from turnout.passage.channel_fit import find_peak, fit_channel
 from turnout.passage.clusters import Clusters
 from turnout.passage.electrical_pulses import without_pulses
 from turnout.passage.result import Passage, PassageSensor
@@ -297,11 +297,11 @@ def _fit_rows(
         fit = None
         if not is_clipped and len(times) >= 2:
             samples, model = recording.signal(sensor.name), section_model.model if section_model else None
-            other_models = {label: m.model for label, m in latest.items() if m is not None and label != sensor.section}
-            fit = fit_channel(
-                samples, recording.rate, times, passage.train_motion.speed, model,
-                settings, other_models, with_scores=is_scored(identity["passed_at_utc"], settings.scored_share),
-            )  # fmt: skip
+            if model is None or not is_scored(identity["passed_at_utc"], settings.scored_share):
+                fit = find_peak(samples, recording.rate, times, model, settings)
+            else:
+                others = {label: m.model for label, m in latest.items() if m is not None and label != sensor.section}
+                fit = fit_channel(samples, recording.rate, times, passage.train_motion.speed, model, settings, others)
         model_id = section_model.model_id if section_model else NO_MODEL
         rows.append(fit_row(fit, sensor, model_id, turnout, identity))
     return rows

@@ -11,7 +11,7 @@ from benchmarks.passage_truth import paper_model
 
 from turnout.config import load_configuration
 from turnout.config.settings.passage import PassageSettings
-from turnout.passage.channel_fit import fit_channel
+from turnout.passage.channel_fit import find_peak, fit_channel
 from turnout.passage.result import PassageSensor
 from turnout.registry.database import open_registry
 from turnout.stages.passage_rows import fit_row
@@ -40,8 +40,8 @@ RECORD = record()
 @pytest.fixture(scope="module")
 def fits():
     """(scored, not scored) of the same record."""
-    arguments = (*RECORD, 40.0, paper_model("CP A7"), replace(PassageSettings(), null_models=5))
-    return fit_channel(*arguments), fit_channel(*arguments, with_scores=False)
+    model, settings = paper_model("CP A7"), replace(PassageSettings(), null_models=5)
+    return fit_channel(*RECORD, 40.0, model, settings), find_peak(*RECORD, model, settings)
 
 
 def test_the_peak_is_that_of_the_scored_passage(fits):
@@ -54,10 +54,10 @@ def test_the_peak_is_that_of_the_scored_passage(fits):
 
 def test_without_a_model_the_peak_is_sought_where_any_delay_may_put_it(fits):
     """The highest sample of the filtered record; a model finds the same one, since its windows hold all impacts."""
-    without = fit_channel(*RECORD, 40.0, None, PassageSettings())
+    without = find_peak(*RECORD, None, PassageSettings())
     assert without.status == "peak_only" and without.scores is None
     assert without.peak == fits[0].peak and np.allclose(without.times, AXLES, atol=1e-9)
-    early = fit_channel(RECORD[0], RATE, AXLES + 0.008, 40.0, None, PassageSettings())  # all impacts 8 ms early
+    early = find_peak(RECORD[0], RATE, AXLES + 0.008, None, PassageSettings())  # all impacts 8 ms early
     assert early.peak == without.peak
 
 
