@@ -11,7 +11,7 @@ import os
 import secrets
 import stat
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -114,7 +114,8 @@ def _unfinished_file(path: Path, temporary: Path) -> Iterator[Path]:
             error.filename = str(path)  # nobody knows the temporary name
         raise
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):  # on a read-only disk it fails even without such a file
+            temporary.unlink(missing_ok=True)
 
 
 def publish_file(unfinished: Path, final: Path) -> None:

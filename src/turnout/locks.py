@@ -49,7 +49,9 @@ def folder_lock(
             f"Nothing was changed: wait for it to end, then run again."
         ) from None
     except OSError as error:
-        raise error_type(f"{folder}: cannot write there: {error}. Give write permission.") from error
+        raise error_type(
+            f"{folder}: cannot write there: {error.strerror or error}. Allow writing there, or use a copy of it."
+        ) from error
     try:
         yield
     finally:

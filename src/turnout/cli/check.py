@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from turnout.records import Unit
     from turnout.units import Conversion
 
+TABLE_SUFFIXES = (".csv", ".ods", ".tsv", ".txt", ".xls", ".xlsx", ".yaml")
 GROUP = "Set up"
 HELP = "check the configuration and the names of raw files"
 
@@ -76,6 +77,8 @@ def run(args: argparse.Namespace) -> int:
     print(f"{args.configuration}: {counts}, {'with faults' if faults else 'no fault'}.")
     for fault in faults:
         print(f"  {fault}")
+    for path in _unread_files(configuration.folder):
+        print(f"  {path}: no command reads a file of this name. Rename it, or move it out of the configuration")
     for event in _planned_events(configuration.events):
         print(f"  {event}")
     for decision in _open_decisions(configuration, layouts):
@@ -105,6 +108,13 @@ def _faults(configuration: Configuration, formats: Collection[str], to_si: Calla
     yield from faults_of_sections(configuration)
     yield from faults_of_tracks(configuration)
     yield from faults_of_vehicles(configuration)
+
+
+def _unread_files(folder: Path) -> list[Path]:
+    """Tables and settings directly in the configuration that no command reads for their name, such as a copy."""
+    from turnout.config.load import TABLES
+
+    return sorted(p for p in folder.iterdir() if p.suffix in TABLE_SUFFIXES and p.name not in (*TABLES, "config.yaml"))
 
 
 def _open_decisions(configuration: Configuration, layouts: Iterable[str]) -> Iterator[str]:
@@ -144,7 +154,8 @@ def _report_left_out(configuration: Configuration, raw: Path, ids: Sequence[str]
         n_files += sum(len(u.files) for u in scanned.units)
         noted_turnout, note_errors = read_notes(turnout, raw)
         problems += [*scanned.problems, *note_errors, *note_contradictions(noted_turnout, raw, scanned.units)]
-        remarks += _without_temperature(noted_turnout, raw, scanned.units)
+        if not note_errors:
+            remarks += _without_temperature(noted_turnout, scanned.units)
     problem_count = count_of(len(problems), "problem") if problems else "no problem"
     print(f"{raw}: {count_of(n_files, 'file')} in {count_of(n_units, 'unit')}, {problem_count}.")
     for problem in problems:
@@ -156,15 +167,13 @@ def _report_left_out(configuration: Configuration, raw: Path, ids: Sequence[str]
     return len(problems)
 
 
-def _without_temperature(turnout: TurnoutConfig, raw: Path, units: Iterable[Unit]) -> Iterator[str]:
+def _without_temperature(turnout: TurnoutConfig, units: Iterable[Unit]) -> Iterator[str]:
     """A remark on a turnout of whose campaigns none has a noted rail temperature: no file, no column or empty cells."""
     days = {unit.campaign for unit in units if unit.kind == "hammer" and unit.campaign}
     if days and all(turnout.campaigns[day].rail_temperature is None for day in days):
-        path = raw / turnout.raw / "campaigns.csv"
-        lack = "no column rail_temperature_c with values" if path.is_file() else "there is no such file"
         yield (
-            f"{path}: {lack}. Charts do not judge a campaign without a rail temperature. "
-            "Note it there, unless the recordings state it"
+            f"{turnout.raw}/campaigns.csv notes no rail temperature of any campaign with files, and a campaign without "
+            "one is not judged. Write it into the column rail_temperature_c, unless the recordings state it."
         )
 
 

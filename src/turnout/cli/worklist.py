@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_csv, add_registry, add_result
 from turnout.cli.query import open_output
+from turnout.counts import count_of
 from turnout.registry.spreadsheet import without_formula
 
 if TYPE_CHECKING:
@@ -67,20 +68,22 @@ def run(args: argparse.Namespace) -> int:
         cursor = con.execute(question, day)
         names = [d[0] for d in cursor.description]
         rows = cursor.fetchall()
-        counts = counts_of(con, today)
+        ((newest,),) = con.execute("select newest_charted()").fetchall()
+        is_past = bool(day) and newest is not None and day[0] < newest
+        counts = counts_of(con, today if is_past or not day else f"timestamp '{day[0]}'")
     add_result(args, [dict(zip(names, row)) for row in rows])
     if args.csv:
         with open_output(args.csv) as stream:
             _write(stream, names, rows)
     else:
-        print(as_text([dict(zip(names, row)) for row in rows], *(counts[:1] if args.asof else counts)))
+        print(as_text([dict(zip(names, row)) for row in rows], *(counts[:1] if is_past else counts)))
     return 0
 
 
 def as_text(
     rows: Sequence[Mapping[str, Any]],
     n_charts: int = 0,
-    n_silenced: int = 0,
+    n_suppressed: int = 0,
     n_unmeasured: int = 0,
     newest: datetime | None = None,
 ) -> str:
@@ -90,10 +93,10 @@ def as_text(
     ----------
     rows : sequence of mapping
         Rows of the view ``worklist``, in their order.
-    n_charts, n_silenced, n_unmeasured : int
-        Number of charts, of those that somebody silenced, and of those not measured for too long.
+    n_charts, n_suppressed, n_unmeasured : int
+        Number of charts, of those that somebody suppressed, and of those not measured for too long.
     newest : datetime, optional
-        Time of the newest campaign; None for the list of another day.
+        Time of the newest campaign; None for the list of an earlier day.
 
     Returns
     -------
@@ -102,16 +105,19 @@ def as_text(
     """
     text = [_paragraph(row) for row in rows]
     if not rows and n_charts:
-        text = ["Nothing to do: no chart in alarm, none that drifts, none that cannot tell."]
+        n_judged = n_charts - n_suppressed - n_unmeasured
+        text = [
+            f"Nothing to do: of {count_of(n_judged, 'chart')} none is in alarm or drifts."
+            if n_judged
+            else "No answer: no chart has recent measurements by which it can be judged."
+        ]
     if rows and rows[0]["n_in_all"] > len(rows):
         text.append(f"... and {rows[0]['n_in_all'] - len(rows)} more: turnout worklist --all")
     if not n_charts:
-        return "\n".join([*text, "No chart has been computed yet: alarms and plans come with the first trend."])
-    if newest is None:  # a list of another day: silenced and unmeasured charts are counted for today only
+        return "\n".join([*text, "No chart has been computed yet: the registry holds no campaign that can be used."])
+    if newest is None:  # a list of an earlier day: suppressed and unmeasured charts are not counted
         return "\n".join(text)
-    from turnout.registry.as_of import past_day_hint
-
-    exclusions = [(n_silenced, "suppressed by a user"), (n_unmeasured, "not measured for too long")]
+    exclusions = [(n_suppressed, "suppressed by a user"), (n_unmeasured, "not measured for too long")]
     phrases = [f"{n} {word}" for n, word in exclusions if n]
     text.append(
         f"Of {n_charts} charts, newest campaign {newest:%Y-%m-%d}"
@@ -119,6 +125,8 @@ def as_text(
         + "."
     )
     if n_unmeasured:
+        from turnout.registry.as_of import past_day_hint
+
         text.append(past_day_hint(newest, "turnout worklist --asof", "list"))
     return "\n".join(text)
 

@@ -104,9 +104,12 @@ def read_csv(path: Path, name: str, columns: tuple[str, ...], n_required: int, a
     for title in columns[:n_required]:
         if title not in titles:
             problem = f"no column {title!r}; the header has {', '.join(titles) or 'nothing'}"
-            raise TableError(
-                Place(name, first, 1), problem, f"Write the header {','.join(columns)}, with commas between"
-            )
+            remedy = f"Write the header {','.join(columns)}, with commas between"
+            for separator, mark in (("semicolons", ";"), ("tabs", "\t")):
+                if title in map(str.strip, header.split(mark)):
+                    problem = f"{separator} between the columns"
+                    remedy = "Put commas between the columns, and a point before decimals"
+            raise TableError(Place(name, first, 1), problem, remedy)
     faults = [
         TableError(Place(name, first, start), *fault)
         for (k, title), start in zip(enumerate(titles), _cell_columns(header))
@@ -136,7 +139,8 @@ def row_problem(cells: Mapping) -> tuple[str, str, str] | None:
     if BROKEN_LINE in cells:
         return BROKEN_LINE, cells[BROKEN_LINE], "Write each row in one line; double quotes go around a whole cell"
     if EXTRA_CELLS in cells:
-        return EXTRA_CELLS, "more cells than columns", "Put a text with commas in double quotes"
+        remedy = "Put a text with commas in double quotes; a number has a decimal point"
+        return EXTRA_CELLS, "more cells than columns", remedy
     return None
 
 

@@ -37,7 +37,7 @@ def read(
     root : path-like
         The raw root. No file outside it is opened, not even through a symbolic link.
     description : RawDescription
-        Format (or "auto"), channel map with units and sensitivities, rate, counts, time zone.
+        Format (or "auto"), channels with units and sensitivities, rate, counts, time zone.
     max_duration : float or None
         Longer records of a large file stay in the file and become a ``LongRecording``; None: all are read. [s]
     max_whole_file_size : int

@@ -173,5 +173,6 @@ def channel_error(
         return source.error(place, problem, remedy, reason="not_finite")
     if constant and channel.quantity != "temperature":
         problem = f"all {n_sample} samples are {value:.6g}: the channel is dead"
-        return source.error(place, problem, "Check sensor, cable and channel map", reason="dead_channel")
+        remedy = "Check the sensor, its cable and 'source' of this channel in the layout"
+        return source.error(place, problem, remedy, reason="dead_channel")
     return None

@@ -83,7 +83,8 @@ def channel_mappings(
         If file and layout disagree about channels or units.
     """
     channels = [c for c in channels if c.quantity != IGNORED or _has_channel(record, c.source, where, source)]
-    indices = [index_of(record, channel.source, where, source) for channel in channels]
+    sources = [channel.source for channel in channels]
+    indices = [index_of(record, wanted, where, source, sources) for wanted in sources]
     if len(set(indices)) < len(indices):
         twice = next(i for i in indices if indices.count(i) > 1)
         raise source.error(where, f"the layout names the channel {record.names[twice]!r} twice", "Name each once")
@@ -106,6 +107,7 @@ def channel_mappings(
 
 
 MAX_LISTED = 12  # channels that a message names
+CORRECT_SOURCE = "Correct 'source' of this channel in the layout"
 
 
 def _name_list(names: Sequence[str]) -> str:
@@ -114,7 +116,9 @@ def _name_list(names: Sequence[str]) -> str:
     return ", ".join(map(repr, names[:MAX_LISTED])) + more
 
 
-def index_of(record: RawRecord, wanted: str | int, where: str, source: Source) -> int:
+def index_of(
+    record: RawRecord, wanted: str | int, where: str, source: Source, assigned: Sequence[str | int] = ()
+) -> int:
     """Row of the channel that the layout calls ``wanted``: a number, a name, or an alias of the format.
 
     Parameters
@@ -127,6 +131,8 @@ def index_of(record: RawRecord, wanted: str | int, where: str, source: Source) -
         The record, for the message.
     source : Source
         The raw file.
+    assigned : sequence of str or int
+        Channels that the layout names; none of them is suggested in place of ``wanted``.
 
     Returns
     -------
@@ -142,7 +148,7 @@ def index_of(record: RawRecord, wanted: str | int, where: str, source: Source) -
         if 0 <= wanted < len(record.names):
             return wanted
         problem = f"there is no channel {wanted}; the file has {len(record.names)}, counted from 0"
-        raise source.error(where, problem, "Correct the channel map or copy the file again", reason="channel_missing")
+        raise source.error(where, problem, f"{CORRECT_SOURCE}, or copy the file again", reason="channel_missing")
     for names in (record.names, [n.strip().casefold() for n in record.names]):
         key = wanted if names is record.names else wanted.strip().casefold()
         if names.count(key) == 1:
@@ -155,11 +161,11 @@ def index_of(record: RawRecord, wanted: str | int, where: str, source: Source) -
     if len(matches) == 1:
         return matches[0]
     available = _name_list(record.names)
-    similar_names = get_close_matches(wanted, record.names, n=1)
+    similar_names = get_close_matches(wanted, [name for name in record.names if name not in assigned], n=1)
     hint = (
-        f"Did you mean {similar_names[0]!r}? Correct the channel map"
+        f"Did you mean {similar_names[0]!r}? {CORRECT_SOURCE}"
         if similar_names
-        else "Correct the channel map or the wiring"
+        else f"{CORRECT_SOURCE}, or find out why the logger did not record the channel"
     )
     count = record.names.count(wanted) + len(matches)
     problem = (
@@ -198,7 +204,7 @@ def _channel_mapping(index: int, record: RawRecord, raw: RawChannel, where: str,
     try:
         conversion_to_si = to_si(raw.quantity, resolve_unit(file_unit, raw.unit), raw.sensitivity, raw.sensitivity_unit)
     except ValueError as error:
-        remedy = "Correct unit and sensitivity of this channel in the layout"
+        remedy = "Correct 'unit' or 'sensitivity' of this channel in the layout"
         raise source.error(place, str(error), remedy, reason="unit_unknown") from error
     if (statement := record.undecided.get(index)) and not (raw.unit or "").endswith("!"):
         raise source.error(place, statement, scale_remedy(file_unit), reason="scale_unknown")
@@ -243,7 +249,7 @@ def _check_stated_units(record: RawRecord, index: int, raw: RawChannel, place: s
     unit_in_use = record.units[index] if not is_meaningless(record.units[index]) else raw.unit or ""
     if quantity := contradicting_quantity(record, index, raw.quantity, unit_in_use):
         problem = f"the file says that its quantity is {quantity}, the layout {raw.quantity} in {unit_in_use!r}"
-        remedy = f"Correct the channel map; if the layout is right, set 'unit: {unit_in_use}!' for this channel"
+        remedy = f"{CORRECT_SOURCE}; if the layout is right, set 'unit: {unit_in_use}!' for this channel"
         raise source.error(place, problem, remedy, reason="unit_unknown")
     rival = contradicting_unit(record, index, raw.unit, raw.quantity, lambda unit: _is_usable(unit, raw))
     if not rival:
@@ -310,16 +316,18 @@ def resolve_unit(file_unit: str, layout_unit: str | None) -> str:
     try:
         written = conversion(file_unit)
     except ValueError:
-        raise ValueError(_conflict_text(f"{file_unit!r}, which is not known", layout_unit)) from None
+        raise ValueError(
+            f"the file says {file_unit!r}, which is not known, the layout {layout_unit!r} "
+            f"('unit: {layout_unit}!' if the layout is right)"
+        ) from None
     of_a_count = stated.dimension == "voltage" or layout_unit.lstrip(" [+-.")[:1].isdigit()
     same = stated.dimension == written.dimension and abs(stated.scale - written.scale) <= 1e-9 * abs(stated.scale)
     if not same and not (written.dimension == "count" and of_a_count):
-        raise ValueError(_conflict_text(repr(file_unit), layout_unit))
+        raise ValueError(
+            f"the file says {file_unit!r}, the layout {layout_unit!r} "
+            f"('unit: {file_unit}' if the file is right, 'unit: {layout_unit}!' if the layout is)"
+        )
     return layout_unit
-
-
-def _conflict_text(statement: str, layout_unit: str) -> str:
-    return f"the file says {statement}, the layout {layout_unit!r} ({layout_unit + '!'!r} would overrule the file)"
 
 
 class Assignments:

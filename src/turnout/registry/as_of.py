@@ -92,7 +92,7 @@ def counts_of(connection: duckdb.DuckDBPyConnection, day: str) -> tuple[int, int
 
 
 def past_day_hint(newest: datetime, option: str, what: str) -> str:
-    """Sentence for a list of today with charts not measured lately: how to get the list of the last data.
+    """Sentence for a list with charts not measured lately: how to get the list of the last data.
 
     Parameters
     ----------
@@ -109,5 +109,4 @@ def past_day_hint(newest: datetime, option: str, what: str) -> str:
         The sentence.
     """
     then = (newest + timedelta(days=1)).date()  # the day after, because a day begins at midnight
-    today = f"As of {datetime.now(UTC):%Y-%m-%d}; the last data are of {newest:%Y-%m-%d}"
-    return f"{today}: {option} {then} shows the {what} of that day."
+    return f"The last data are of {newest:%Y-%m-%d}: {option} {then} shows the {what} of that day."

@@ -129,11 +129,14 @@ def write_plans(
     Raises
     ------
     ConfigError
-        If so many known files are missing that a disk is probably not mounted.
+        If there is no raw root, or so many known files are missing that a disk is probably not mounted.
     """
     texts, missing = _scan_turnouts(configuration, raw_root, folder, shards, turnouts)
     if not accept_vanished and (error := missing.error(configuration.settings["fleet"], raw_root)):
         raise error
+    if not accept_vanished and configuration.ids and not raw_root.is_dir():
+        remedy = "Mount the disk, or make the folder, with one for each turnout in it"
+        raise ConfigError(str(raw_root), "raw root", "there is no such folder", remedy)
     for path, text in texts.items():
         write_if_changed(path, text)
     names = set(shard_names(shards))

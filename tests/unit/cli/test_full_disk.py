@@ -1,8 +1,10 @@
 """A disk that is full: the command names the file, and leaves no part of it that looks like a whole one."""
 
+import errno
 import os
 import resource
 import signal
+import sys
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -21,9 +23,11 @@ def full_disk():
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (LIMIT, hard))
+    writes_bytecode, sys.dont_write_bytecode = not sys.dont_write_bytecode, True  # it would be cut off at the limit
     try:
         yield
     finally:
+        sys.dont_write_bytecode = not writes_bytecode
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
         signal.signal(signal.SIGXFSZ, handler)
 
@@ -95,3 +99,16 @@ def test_a_fault_of_reading_is_said_with_the_file(capsys):
 def test_every_writer_was_tried():
     tried = {"hdf5", "uff58b", "csv", "npz", "mat", "tdms", "wav", "lvm", "parquet"}
     assert set(WRITERS) - tried == {"uff58", "rcmdx", "mat73"}  # as uff58b and hdf5
+
+
+def test_a_read_only_disk_names_the_file_that_was_asked_for(tmp_path, monkeypatch):
+    """It reports itself at the removal of the temporary file, too, although that was never made."""
+
+    def fail(path, *args, **kwargs):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(path))
+
+    monkeypatch.setattr("builtins.open", fail)
+    monkeypatch.setattr(Path, "unlink", fail)
+    with pytest.raises(OSError, match="Read-only") as caught:
+        write_text(tmp_path / "a.html", "x")
+    assert caught.value.filename == str(tmp_path / "a.html")

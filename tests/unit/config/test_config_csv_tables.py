@@ -91,7 +91,7 @@ def test_a_temperature_under_another_title_is_said_and_the_other_cells_are_used(
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("passed_at_utc;train_type\n2024-05-13T10:00;IC3\n", "line 1, column 1: no column 'passed_at_utc'"),
+        ("passed_at_utc;train_type\n2024-05-13T10:00;IC3\n", "line 1, column 1: semicolons between the columns"),
         ("passed_at_utc,axle_load\n", "unknown column 'axle_load'. Did you mean 'axle_load_t'?"),
         ("passed_at_utc,speed\n", "unknown column 'speed'. Did you mean 'speed_kmh'?"),
         ("passed_at_utc\n2024-05-13 noon\n", "line 2, column 1: passed_at_utc is '2024-05-13 noon'. Write YYYY"),

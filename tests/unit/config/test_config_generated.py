@@ -121,6 +121,15 @@ def test_check_names_files_that_no_pattern_knows(copy, capsys):
     assert "tommerup_s2, folder: no file matches a pattern of the layout" in said
 
 
+def test_check_names_tables_that_no_command_reads(copy, capsys):
+    for name in ("turnouts.csv", "config (1).yaml", "README.md", ".lock"):
+        (copy / "config" / name).write_bytes(b"")
+    main(["check"])
+    said = capsys.readouterr().out
+    assert said.count("no command reads a file of this name") == 2
+    assert "config/turnouts.csv: no command" in said and "config/config (1).yaml: no command" in said
+
+
 def test_check_names_folders_that_no_turnout_reads(copy, capsys):
     for name in ("raw/tommerup_s1", "raw/line_7/v7", "raw/W 12"):
         (copy / name).mkdir(parents=True)

@@ -165,9 +165,13 @@ WRONG = {
     ),
     "event on no day": ({"events": "turnout,section,date,kind\nt1,,1.1.2025,tamping\n"}, "Write YYYY-MM-DD"),
     "event of no kind": ({"events": "turnout,section,date,kind\nt1,,2025-01-01,taming\n"}, "Did you mean 'tamping'?"),
+    "events between semicolons": (
+        {"events": "turnout;section;date;kind\nt1;;2025-01-01;tamping\n"},
+        "line 1, column 1: semicolons between the columns. Put commas between the columns",
+    ),
     "event with a comma": (
         {"events": "turnout,section,date,kind,resets,note\nt1,,2025-01-01,tamping,,by machine, twice\n"},
-        "more cells than columns. Put a text with commas in double quotes",
+        "more cells than columns. Put a text with commas in double quotes; a number has a decimal point",
     ),
     "trend of one turnout": (
         {"override": ("t1.yaml", "settings:\n  trend:\n    target_percent: 0.5\n")},

@@ -110,7 +110,21 @@ def test_a_missing_channel_names_those_there_are(tmp_path, in_si):
     error = only_error(name, tmp_path, in_si, 0)
     assert error.reason == "channel_missing"
     found = "there is no channel 'rail'; there are 'force', 'rial'"
-    assert str(error) == f"a.npz, record 1 of 1: {found}. Did you mean 'rial'? Correct the channel map."
+    assert (
+        str(error)
+        == f"a.npz, record 1 of 1: {found}. Did you mean 'rial'? Correct 'source' of this channel in the layout."
+    )
+
+
+def test_a_channel_that_the_layout_uses_is_not_suggested_for_a_missing_one(tmp_path, in_si):
+    name = archive(tmp_path, fs=51200.0, force=saw(), acc_2=saw(), units=["N", "m/s²"])
+    channels = (
+        RawChannel("force", "force", "force"),
+        RawChannel("acc_1", "acc_1", "acceleration"),
+        RawChannel("acc_2", "acc_2", "acceleration"),
+    )
+    error = only_error(name, tmp_path, replace(in_si, channels=channels), 0)
+    assert "no channel 'acc_1'; there are 'force', 'acc_2'" in str(error) and "Did you mean" not in str(error)
 
 
 def test_a_missing_index(tmp_path, in_si):
@@ -118,7 +132,7 @@ def test_a_missing_index(tmp_path, in_si):
     channels = (RawChannel("force", 0, "force"), RawChannel("rail", 1, "acceleration"))
     error = only_error(name, tmp_path, replace(in_si, channels=channels), 0)
     assert error.reason == "channel_missing"
-    assert "record 1 of 1: there is no channel 1; the file has 1, counted from 0. Correct the channel map" in str(error)
+    assert "record 1 of 1: there is no channel 1; the file has 1, counted from 0. Correct 'source' of" in str(error)
 
 
 def test_an_unknown_channel_must_be_named_even_to_be_ignored(tmp_path, in_si):
@@ -152,7 +166,7 @@ def test_a_unit_that_cannot_be_converted(tmp_path, in_si):
     assert error.reason == "unit_unknown"
     assert str(error) == (
         "a.npz, record 1 of 1, channel 'force': 'V' is no unit of force and no sensitivity is given. "
-        "Correct unit and sensitivity of this channel in the layout."
+        "Correct 'unit' or 'sensitivity' of this channel in the layout."
     )
 
 
@@ -281,8 +295,9 @@ def test_a_dead_channel_costs_a_hammer_record(tmp_path, in_si):
     name = archive(tmp_path, fs=51200.0, force=saw(), rail=np.full(100, 0.25), units=["N", "m/s²"])
     error = only_error(name, tmp_path, in_si, 0)
     assert error.reason == "dead_channel"
-    found = "all 100 samples are 0.25: the channel is dead. Check sensor, cable and channel map."
-    assert str(error) == f"a.npz, record 1 of 1, channel 'rail': {found}"
+    found = "all 100 samples are 0.25: the channel is dead"
+    remedy = "Check the sensor, its cable and 'source' of this channel in the layout."
+    assert str(error) == f"a.npz, record 1 of 1, channel 'rail': {found}. {remedy}"
 
 
 def test_a_dead_channel_costs_a_passage_that_channel_only(tmp_path, in_si):

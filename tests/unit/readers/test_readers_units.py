@@ -103,6 +103,6 @@ def test_file_and_layout_must_agree_where_both_speak():
 def test_a_unit_of_the_file_that_nobody_knows_is_no_licence_for_the_layouts():
     with pytest.raises(ValueError) as caught:
         resolve_unit("tf", "kN")
-    said = "the file says 'tf', which is not known, the layout 'kN' ('kN!' would overrule the file)"
+    said = "the file says 'tf', which is not known, the layout 'kN' ('unit: kN!' if the layout is right)"
     assert str(caught.value) == said
     assert resolve_unit("tf", "kN!") == "kN"

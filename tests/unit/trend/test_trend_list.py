@@ -2,7 +2,7 @@
 
 import shutil
 from dataclasses import replace
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 
 import numpy as np
 import pandas as pd
@@ -11,6 +11,7 @@ from benchmarks.trend_fleet import Fleet, drift, modes, step
 from benchmarks.trend_registry import small_registry
 from tests.oracles.trend_views import connect_views
 
+from turnout.cli.worklist import as_text
 from turnout.registry.database import open_registry
 from turnout.registry.derived_tables import publish
 from turnout.report.panels.history import history_panel
@@ -274,7 +275,7 @@ def test_the_list_in_words_says_what_it_rests_on_and_what_it_leaves_out(tmp_path
     assert "26 not measured for too long." in told  # of 2018: all but the alarm
     assert [(e["state"], bool(e["look_at"])) for e in worklist_entries(tmp_path)] == [("inspect this week", True)]
     then = f"{newest + pd.Timedelta(days=1):%Y-%m-%d}"
-    assert f"As of {datetime.now(UTC):%Y-%m-%d}; the last data are of {newest:%Y-%m-%d}: " in told
+    assert f"The last data are of {newest:%Y-%m-%d}: " in told
     assert told.endswith(f"turnout worklist --asof {then} shows the list of that day.\n")
     assert main(["worklist", "--registry", str(tmp_path), "--asof", then]) == 0
     assert "26 not measured" not in capsys.readouterr().out
@@ -296,6 +297,18 @@ def test_the_list_in_words_says_what_it_rests_on_and_what_it_leaves_out(tmp_path
     assert f"Of 27 charts, newest campaign {newest:%Y-%m-%d}: 9 not measured for too long." in told
     assert main(["worklist", "--registry", str(tmp_path), "--asof", f"{newest:%Y-%m-%d}"]) == 0
     assert "INSPECT THIS WEEK" in (then := capsys.readouterr().out) and "Of 27 charts" not in then
+
+
+@pytest.mark.parametrize(
+    ("n_unmeasured", "first_line"),
+    [
+        (0, "Nothing to do: of 12 charts none is in alarm or drifts."),
+        (11, "Nothing to do: of 1 chart none is in alarm or drifts."),
+        (12, "No answer: no chart has recent measurements by which it can be judged."),
+    ],
+)
+def test_an_empty_list_of_charts_without_recent_measurements_is_no_all_clear(n_unmeasured, first_line):
+    assert as_text([], 12, 0, n_unmeasured, datetime(2026, 5, 13)).splitlines()[0] == first_line
 
 
 def test_without_a_trend_nobody_is_told_that_there_is_nothing_to_do(tmp_path, capsys):

@@ -333,3 +333,11 @@ def test_what_passages_are_judged_with_is_an_input_of_their_jobs_once_it_is_ther
     (fleet / "line7/loads.json").write_text("{}")
     assert launch({}, scan=False).learned == ("config/passages/clusters.json", "line7/loads.json")
     assert "learned=RUN.learned" in (repository / "rules/passage.smk").read_text()
+
+
+def test_a_first_run_without_a_raw_root_is_an_error_and_one_with_an_empty_raw_root_is_none(fleet):
+    (fleet / "raw").rename(fleet / "away")
+    with pytest.raises(ConfigError, match=r"raw, raw root: there is no such folder. Mount the disk"):
+        plans(fleet)
+    (fleet / "raw").mkdir()
+    plans(fleet)
