@@ -18,6 +18,7 @@ from turnout.readers.sample_variables import Attributes, holds_samples, is_slow,
 from turnout.readers.scale_words import is_scale_name
 from turnout.readers.source import CONDITIONS, Source
 from turnout.readers.stated_scales import entry_statements
+from turnout.readers.texts import decode_text
 
 
 class Alphabetical(dict):
@@ -303,6 +304,4 @@ def list_of_texts(value: Any) -> list[str]:
         return []
     if isinstance(value, (str, bytes)):
         value = [value]
-    return [
-        v.decode("utf-8", "replace") if isinstance(v, bytes) else str(v).strip() for v in np.ravel(np.asarray(value))
-    ]
+    return [decode_text(v) if isinstance(v, bytes) else str(v).strip() for v in np.ravel(np.asarray(value))]

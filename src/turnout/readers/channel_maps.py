@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from turnout.errors import ReadError
+from turnout.readers.entries import UnreadObject
 from turnout.readers.lazy import Column
 from turnout.readers.rate_units import rate_unit
 from turnout.readers.rate_words import is_rate_name
@@ -154,25 +155,26 @@ def index_of(
         if names.count(key) == 1:
             return names.index(key)
     if wanted in record.not_numbers:
-        problem = f"the channel {wanted!r} holds {record.not_numbers[wanted]}, no real numbers"
+        content = record.not_numbers[wanted]
+        problem = f"the channel {wanted!r} holds {content}, no real numbers"
         remedy = "Export its samples as whole or floating-point numbers"
+        if isinstance(content, UnreadObject):
+            problem = f"the channel {wanted!r} is {content.with_article}, no array of real numbers"
+            remedy = content.remedy(wanted)
         raise source.error(where, problem, remedy, reason="channel_missing")
     matches = [i for i, aliases in enumerate(record.aliases) if wanted in aliases]
     if len(matches) == 1:
         return matches[0]
-    available = _name_list(record.names)
+    if (count := record.names.count(wanted) + len(matches)) > 1:
+        remedy = "Give each channel of the file a name of its own, or name them by their numbers in the layout, from 0"
+        raise source.error(where, f"{count} channels are called {wanted!r}", remedy, reason="channel_missing")
     similar_names = get_close_matches(wanted, [name for name in record.names if name not in assigned], n=1)
     hint = (
         f"Did you mean {similar_names[0]!r}? {CORRECT_SOURCE}"
         if similar_names
         else f"{CORRECT_SOURCE}, or find out why the logger did not record the channel"
     )
-    count = record.names.count(wanted) + len(matches)
-    problem = (
-        f"{count} channels are called {wanted!r}"
-        if count > 1
-        else f"there is no channel {wanted!r}; there are {available}"
-    )
+    problem = f"there is no channel {wanted!r}; there are {_name_list(record.names)}"
     raise source.error(where, problem, hint, reason="channel_missing")
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from turnout.readers.source import Source
+from turnout.readers.texts import decode_text
 
 DATE = r"\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.](?:\d{4}|\d{2})"
 CLOCK = r"(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d{1,12})?)(?: ?([AaPp])\.?[Mm]\.?)?(?:Z| ?UTC| ?[+-]\d{2}:?\d{2})?"
@@ -121,4 +122,4 @@ def with_durations(column: np.ndarray, where: str, source: Source) -> np.ndarray
 
 
 def _text(value: object) -> str:
-    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+    return decode_text(value) if isinstance(value, bytes) else str(value)

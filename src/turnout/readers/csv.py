@@ -18,7 +18,6 @@ A last line without line break may end in a truncated number: it is left out and
 many decimals as all others.
 """
 
-import codecs
 import re
 from collections.abc import Iterator, Sequence
 from datetime import datetime
@@ -42,6 +41,7 @@ from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, RawFile, RawRecord, S
 from turnout.readers.start_columns import start_in_cells
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import entry_statements, scale_problem, scale_statements, without_drawings
+from turnout.readers.texts import wide_encoding
 
 
 def read_raw(source: Source) -> RawFile:
@@ -131,38 +131,6 @@ def _shape(row: bytes) -> tuple[int, int]:
 
 
 END_OF_FILE = b"\x1a"  # the mark with which programs of DOS end a text
-MIN_UTF16_SIZE = 16  # bytes: fewer do not tell the encoding
-
-
-def wide_encoding(head: bytes) -> str:
-    """Encoding of a text in UTF-16 or UTF-32, by its byte order mark or by the zero bytes of its letters in UTF-16.
-
-    Parameters
-    ----------
-    head : bytes
-        First bytes of the file.
-
-    Returns
-    -------
-    str
-        "" for another text.
-
-    Examples
-    --------
-    >>> wide_encoding("force;rail".encode("utf-16-le")), wide_encoding(b"force;rail [m/s2]")
-    ('utf-16-le', '')
-    """
-    if head[:4] in (codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE):
-        return "utf-32"
-    if head[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
-        return "utf-16"
-    even, odd = head[0::2], head[1::2]
-    if len(head) < MIN_UTF16_SIZE or max(even.count(0), odd.count(0)) < MIN_ZERO_SHARE * len(odd):
-        return ""
-    return "utf-16-le" if not even.count(0) else "utf-16-be" if not odd.count(0) else ""
-
-
-MIN_ZERO_SHARE = 0.9  # of the high bytes of a text of numbers with some other letters
 
 
 def _in_utf8(source: Source, encoding: str) -> bytes:

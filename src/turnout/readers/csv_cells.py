@@ -11,6 +11,7 @@ import pyarrow as pa
 
 from turnout.readers.clock_texts import is_clock_or_date
 from turnout.readers.source import COPY_AGAIN, Source
+from turnout.readers.texts import decode_text
 
 # What loggers and spreadsheets write for a missing value; these become nan.
 MISSING_VALUES = (
@@ -67,10 +68,7 @@ def decode_line(data: bytes) -> str:
     str
         Its text without line break; a byte that neither encoding has becomes a replacement character.
     """
-    try:
-        return data.decode("utf-8-sig").strip("\r\n")
-    except UnicodeDecodeError:
-        return data.decode("cp1252", "replace").strip("\r\n")
+    return decode_text(data).strip("\r\n")
 
 
 BLANK = " "

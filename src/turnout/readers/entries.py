@@ -12,6 +12,7 @@ from turnout.errors import ReadError
 from turnout.readers.precision import NUMBER
 from turnout.readers.rate_units import rate_unit
 from turnout.readers.scale_words import is_of_drawing, scale_meaning, value_of_word
+from turnout.readers.texts import decode_text
 
 MAX_ENTRIES = 64  # numbers of a list: longer ones are samples
 MAX_TEXT = 4000  # characters of a text that are searched
@@ -36,14 +37,20 @@ class Entry:
 class UnreadObject:
     """Stands for a value whose content cannot be read: what ``kind`` of object it is, and the ``advice`` to store it.
 
-    The letter x in the advice stands for the name of the variable.
+    The letter x in the advice stands for the name of the variable. ``is_matlab`` marks an object of MATLAB alone.
     """
 
     kind: str
     advice: str
+    is_matlab: bool = True
 
     def __str__(self) -> str:
         return self.kind
+
+    @property
+    def with_article(self) -> str:
+        """Its kind behind an article."""
+        return f"{'an' if self.kind[:1] in 'aeio' else 'a'} {self.kind}"
 
     def remedy(self, name: str) -> str:
         """What to do, for a message.
@@ -124,7 +131,7 @@ def entries_of(variables: Mapping[Any, Any], place: str) -> Iterator[Entry]:
         if isinstance(value, np.ndarray) and value.ndim == 0:
             value = value[()]
         if isinstance(value, (str, bytes)):
-            text = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
+            text = decode_text(value) if isinstance(value, bytes) else value
             value = _decode_json(text)
         if isinstance(value, Mapping):
             yield from entries_of(value, path)

@@ -26,6 +26,7 @@ from turnout.readers.sample_variables import Attributes, matrices
 from turnout.readers.scale_words import is_fill_name, is_scale_name
 from turnout.readers.source import COPY_AGAIN, RawFile, Source
 from turnout.readers.stated_scales import scale_text, scales_in_text
+from turnout.readers.texts import decode_text
 
 UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units")
 
@@ -192,13 +193,22 @@ def _values(dataset: h5py.Dataset | PackedDataset) -> Any:
         fills = (*dataset.fills, *unstated_fills(packed))
         return apply_packing(packed, dataset.factor, dataset.offset, fills)
     if h5py.check_string_dtype(dataset.dtype) is not None:
-        return dataset.asstr()[()]
+        return _texts(dataset[()])
     return dataset[()]
+
+
+def _texts(value: Any) -> Any:
+    """A text or an array of texts, which h5py returns as bytes."""
+    if isinstance(value, bytes):
+        return decode_text(value)
+    return np.array([_texts(v) for v in value.ravel()], dtype=object).reshape(value.shape)
 
 
 def _attribute(value: Any) -> Any:
     if isinstance(value, bytes):
-        return value.decode("utf-8", "replace").strip()
+        return decode_text(value).strip()
+    if isinstance(value, str):  # h5py keeps bytes that are no UTF-8 as surrogates
+        return decode_text(value.encode("utf-8", "surrogateescape"))
     if isinstance(value, np.ndarray) and value.size == 1:
         return _attribute(value.reshape(-1)[0])
     return value

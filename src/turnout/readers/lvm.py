@@ -20,6 +20,7 @@ from turnout.readers.lost_entries import control_character_errors
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, Source, number_or_text
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import scale_problem, scale_statements, without_drawings
+from turnout.readers.texts import decode_text, wide_encoding
 from turnout.readers.time_texts import parse_time
 from turnout.readers.timing import check_simultaneous, start_offsets
 
@@ -45,7 +46,9 @@ def read_raw(source: Source) -> RawFile:
     ReadError
         If the header has no end, or no segment follows.
     """
-    lines = _decode_header(source.data[: source.data.find(END_OF_HEADER)]).splitlines()
+    if encoding := wide_encoding(source.head):
+        raise source.error("byte 0", f"its text is in {encoding[:6].upper()}", "Save it as UTF-8 with a text editor")
+    lines = decode_text(source.data[: source.data.find(END_OF_HEADER)]).splitlines()
     head = _fields(lines, _separator(lines))
     if END_OF_HEADER not in source.data:
         if not source.head.startswith(FIRST_WORDS) and _is_row(source.head.partition(b"\n")[0]):
@@ -84,14 +87,6 @@ def _is_row(line: bytes) -> bool:
     """Whether a line holds only numbers."""
     cells = [cell.strip().replace(b",", b".") for cell in re.split(rb"[\t;]", line.strip())]
     return any(cells) and all(re.fullmatch(rb"[+-]?[\d.]+(?:[eE][+-]?\d+)?", cell) for cell in cells if cell)
-
-
-def _decode_header(raw: bytes) -> str:
-    """Text of the file's header: UTF-8 if valid, else Windows-1252."""
-    try:
-        return raw.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return raw.decode("cp1252", "replace")
 
 
 def _separator(lines: Sequence[str]) -> str:
@@ -153,7 +148,7 @@ def _records(
     started_text = _date_and_time(
         *(_per_channel(fields, name, 1)[0] or head.get(name, "") for name in ("Date", "Time"))
     )
-    entries = (*_entries(fields, segment.steps[0]), *entries_of(head, "the file's header"))
+    entries = (*_entries(fields), *entries_of(head, "the file's header"))
     has_x = x is not None and len(x) == n_row and bool(np.isfinite(x).all())
     n_sample = n_row // n_write
     undecided = _undecided_scales(fields, head, count)
@@ -179,13 +174,13 @@ def _segment(source: Source, start: int, stop: int, head: Mapping[str, str], sep
     first = source.data.find(b"\n", source.data.find(b"\nX_Value", max(end, start), stop) + 1, stop) + 1
     if end < 0 or first == 0 or b"\nX_Value" not in source.data[end:stop]:
         raise source.error(where, "its header has no end", COPY_AGAIN, reason="truncated")
-    text = source.data[start:end].decode("utf-8", "replace").splitlines()
+    text = decode_text(source.data[start:end]).splitlines()
     n_x_columns = {"No": 0, "One": 1}.get(head.get("X_Columns", "One"), 2)
     fields = {cells[0].strip(): [c.strip() for c in cells[1:]] for cells in (line.split(separator) for line in text)}
     if n_x_columns == 2:
         fields = {name: _cells_of_channels(cells) for name, cells in fields.items()}
     mark = head.get("Decimal_Separator", ".")
-    x_line = source.data[source.data.find(b"\nX_Value", end) + 1 : first].decode("utf-8", "replace")
+    x_line = decode_text(source.data[source.data.find(b"\nX_Value", end) + 1 : first])
     titles = x_line.rstrip("\r\n").split(separator)[1 :: max(n_x_columns, 1)]
     names = [name for name in titles if name and name != "Comment"]
     with source.parsed_by("the header", where):
@@ -260,13 +255,13 @@ def _per_channel(fields: Mapping[str, list[str]], name: str, count: int) -> list
     return [*fields.get(name, []), *[""] * count][:count]
 
 
-def _entries(fields: Mapping[str, list[str]], step: float) -> Iterator[Entry]:
-    """Entries of a segment's header, one per channel where the channels differ; a ``Delta_X`` of 0 states nothing."""
+def _entries(fields: Mapping[str, list[str]]) -> Iterator[Entry]:
+    """Entries of a segment's header, one per channel where the channels differ."""
     for name, values in fields.items():
         for i, value in enumerate(dict.fromkeys(value for value in values if value)):
             if name != "Delta_X":
                 yield Entry(f"header of the segment: {name}", name, value)
-            elif step > 0 and i == 0:
+            elif i == 0:
                 yield step_entry("header of the segment: Delta_X", value)
 
 

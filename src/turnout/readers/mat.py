@@ -12,10 +12,12 @@ import h5py
 import numpy as np
 import pymatreader
 import scipy.io
+import scipy.sparse
 from pymatreader.pymatreader import _parse_scipy_mat_dict as parse_loaded_variables
 from scipy.io.matlab import matfile_version
 
 from turnout.readers.array_metadata import Alphabetical
+from turnout.readers.entries import UnreadObject
 from turnout.readers.lazy import LazyColumn, LazyMatrix, is_large, lazy_array
 from turnout.readers.mat_elements import HEADER_SIZE, unpacked_file
 from turnout.readers.matlab_objects import (
@@ -31,6 +33,9 @@ from turnout.readers.named_arrays import raw_file
 from turnout.readers.source import RawFile, Source
 from turnout.readers.stated_units import is_unit_name
 
+SPARSE_MATRIX = UnreadObject(
+    "sparse matrix", "Store it with all its zeros in MATLAB before saving, x = full(x)", is_matlab=False
+)
 VERSION_5, VERSION_73 = 1, 2  # as scipy numbers them
 
 
@@ -85,6 +90,8 @@ def _lazy_arrays(source: Source) -> dict[str, LazyColumn | LazyMatrix]:
 
 def _plain_variables(value: Any, mapping_type: type[dict]) -> Any:
     """The value with dictionaries of ``mapping_type`` and arrays; a structure array becomes channels or records."""
+    if scipy.sparse.issparse(value):
+        return SPARSE_MATRIX
     if isinstance(value, dict):
         members = _structure_array(value) or value
         members = {name: _plain_variables(v, mapping_type) for name, v in members.items()}

@@ -182,7 +182,8 @@ def check_objects(variables: Mapping[str, Any], source: Source) -> dict[str, Any
     listed = ", ".join(f"{name!r} ({value})" for name, value in list(objects.items())[:MAX_LISTED])
     more = f" and {len(objects) - MAX_LISTED} more" if len(objects) > MAX_LISTED else ""
     name, value = next(iter(objects.items()))
-    problem = f"only MATLAB can read what it holds: {listed}{more}"
+    content = "only MATLAB can read what it holds" if value.is_matlab else "none of its variables is a full array"
+    problem = f"{content}: {listed}{more}"
     raise source.error(f"variable {name!r}", problem, value.remedy(name.replace("/", ".")), reason="unreadable")
 
 
@@ -208,7 +209,8 @@ def _with_errors(variables: Mapping[str, Any], path: str, source: Source) -> dic
             value = Alphabetical(checked_group) if isinstance(value, Alphabetical) else checked_group
         elif (unread := next((mark for _, mark in _objects({name: value})), None)) and _is_needed(str(name)):
             remedy = unread.remedy(inner.replace("/", "."))
-            value = source.error(f"variable {inner!r}", f"it is an {unread}, which only MATLAB can read", remedy)
+            reader = "only MATLAB can read" if unread.is_matlab else "is not read"
+            value = source.error(f"variable {inner!r}", f"it is {unread.with_article}, which {reader}", remedy)
         checked[name] = value
     return checked
 

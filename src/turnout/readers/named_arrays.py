@@ -28,7 +28,7 @@ from turnout.readers.array_metadata import Alphabetical, Metadata, list_of_texts
 from turnout.readers.channel_groups import STATED_SCALES, with_channel_groups
 from turnout.readers.channel_maps import kind_of
 from turnout.readers.clock_texts import with_durations
-from turnout.readers.entries import MAX_ENTRIES
+from turnout.readers.entries import MAX_ENTRIES, UnreadObject
 from turnout.readers.lazy import ARRAYS, Array, Column
 from turnout.readers.metadata_names import (
     CHANNEL_NAMES,
@@ -38,6 +38,7 @@ from turnout.readers.metadata_names import (
     UNIT_NAMES,
 )
 from turnout.readers.sample_variables import Attributes, holds_samples, matrices, vectors
+from turnout.readers.signal_structures import with_signal_structures
 from turnout.readers.source import RawFile, RawRecord, Source
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import scale_problem, scale_statements, without_drawings
@@ -208,7 +209,8 @@ def raw_file(variables: Mapping, source: Source, parent: Metadata | None = None)
     ReadError
         If the variables do not say which arrays are the samples.
     """
-    variables = _with_vectors(_with_durations(with_channel_groups(_with_fields(variables)), source))
+    variables = with_channel_groups(with_signal_structures(_with_fields(variables), source))
+    variables = _with_vectors(_with_durations(variables, source))
     facts = Metadata(variables, source, parent)
     expected = facts.count(RECORD_COUNT_NAMES)
     numbered = numbered_names(variables)
@@ -296,6 +298,7 @@ def _numbered_record(value: Any, k: int, n: int, where: str, facts: Metadata, so
             raise value
         if not isinstance(value, Mapping):
             return _record(value, facts, k, n, where, source)
+        value = with_channel_groups(value)
         if damaged := [v for v in value.values() if isinstance(v, ReadError)]:
             raise damaged[0]
         records = _group_records(value, Metadata(value, source, facts), source, k, n)
@@ -391,10 +394,14 @@ def _raw_record(
         time=time,
         time_label=facts.label_of(TIME_NAMES),
         undecided=_undecided_scales(names, facts),
-        not_numbers={
-            name: kind_of(v.dtype) for name, v in facts.variables.items() if isinstance(v, np.ndarray) and _is_other(v)
-        },
+        not_numbers=_not_numbers(facts.variables),
     )
+
+
+def _not_numbers(variables: Mapping[str, Any]) -> dict[str, str | UnreadObject]:
+    """What the variables hold that could be channels and are no real numbers."""
+    arrays = {n: kind_of(v.dtype) for n, v in variables.items() if isinstance(v, np.ndarray) and _is_other(v)}
+    return arrays | {n: v for n, v in variables.items() if isinstance(v, UnreadObject)}
 
 
 def _is_other(array: np.ndarray) -> bool:

@@ -7,6 +7,7 @@ import numpy as np
 
 from turnout.readers.entries import Entry
 from turnout.readers.scale_words import plain_word
+from turnout.readers.texts import decode_text
 
 OVERLOAD = re.compile(
     r"overload|overflow|overrange|outofrange|clipp|saturat|u(?:e)?bersteuer|uberlauf|surcharge|sovraccaric"
@@ -46,7 +47,7 @@ def overload_entries(entries: Iterable[Entry]) -> Iterator[Entry]:
 def _is_true(value: object) -> bool:
     """Whether a value says yes: a word, a number above 0, or a list with one of them."""
     if isinstance(value, bytes):
-        value = value.decode("utf-8", "replace")
+        value = decode_text(value)
     if isinstance(value, str):
         word = value.strip().casefold()
         return word in TRUE_WORDS or (word.isdecimal() and int(word) > 0)

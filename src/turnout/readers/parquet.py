@@ -26,6 +26,7 @@ from turnout.readers.sample_variables import is_flag_series
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import entry_statements, scale_text, without_drawings
+from turnout.readers.texts import decode_text
 from turnout.readers.time_texts import stated_time
 from turnout.readers.timing import seconds_since_first
 
@@ -194,7 +195,7 @@ class RowGroupReader:
 
 def _notes_of(metadata: dict[bytes, bytes] | None) -> dict[str, Any]:
     """The metadata of the schema or of a field as variables, decoded from JSON where possible."""
-    raw = {k.decode("utf-8", "replace"): v.decode("utf-8", "replace") for k, v in (metadata or {}).items()}
+    raw = {decode_text(k): decode_text(v) for k, v in (metadata or {}).items()}
     notes = {}
     for key, text in raw.items():
         try:
@@ -214,7 +215,7 @@ def _metadata(schema: pa.Schema) -> dict[str, Any]:
 
 
 def _field_notes(field: pa.Field) -> dict[str, str]:
-    return {k.decode("utf-8", "replace"): v.decode("utf-8", "replace") for k, v in (field.metadata or {}).items()}
+    return {decode_text(k): decode_text(v) for k, v in (field.metadata or {}).items()}
 
 
 def _varies(stamps: Column) -> bool:

@@ -35,12 +35,19 @@ def resolve(statements: Sequence[Statement], promised: float | None, where: str,
     ReadError
         If nothing states the rate, a statement is not understood, or two contradict each other beyond rounding.
     """
+    certain = [s for s in statements if s.certainty == CERTAIN]
+    is_stated = any(s.intervals for s in certain)
     for statement in statements:
-        if not statement.intervals:
+        if not statement.intervals and statement.is_defined and not is_stated:
+            problem = f"{statement.text!r} in {statement.place} states no rate, and nothing else does"
+            name = statement.text.partition(": ")[0]
+            remedy = f"{STEP_REMEDY}, 'checked_entries: {name}'"
+            raise source.error(where, problem, remedy, reason="wrong_rate")
+        if not statement.intervals and not statement.is_defined:
             problem = f"{statement.text!r} in {statement.place} may state the sampling rate and is not understood"
             remedy = "Write it as a number with its unit (Hz, kHz, s, ms, µs), or remove it if it means something else"
             raise source.error(where, problem, remedy, reason="wrong_rate")
-    certain = [s for s in statements if s.certainty == CERTAIN]
+    certain = [s for s in certain if s.intervals]
     layout = None if promised is None else around(promised, EXACT_PRECISION)
     holding = _most_precise(certain, layout, where, source)
     if holding is None:
@@ -117,6 +124,9 @@ def rate_remark(statements: Sequence[Statement], rate: float, where: str, source
     )
 
 
+STEP_REMEDY = (
+    "Export the record again with its rate or a column of the time; if the layout's rate is right, name the entry there"
+)
 RATE_REMEDY = "Give the rate in the layout, or as hammer_rate_hz or passage_rate_hz in turnouts.tsv"
 
 

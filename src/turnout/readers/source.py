@@ -24,7 +24,7 @@ from turnout.files import sparse_size, special_kind
 from turnout.records import EMPTY_MAPPING
 
 if TYPE_CHECKING:
-    from turnout.readers.entries import Entry
+    from turnout.readers.entries import Entry, UnreadObject
     from turnout.readers.lazy import LazyColumn
 
 COPY_AGAIN = "Copy the file again from the logger"
@@ -228,7 +228,7 @@ class RawRecord:
     aliases: tuple[tuple[str, ...], ...] = ()
     undecided: Mapping[int, str] = field(default_factory=lambda: EMPTY_MAPPING)
     audio: str = ""
-    not_numbers: Mapping[str, str] = field(default_factory=lambda: EMPTY_MAPPING)
+    not_numbers: Mapping[str, str | UnreadObject] = field(default_factory=lambda: EMPTY_MAPPING)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "units", tuple(self.units) or ("",) * len(self.names))

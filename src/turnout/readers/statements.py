@@ -21,6 +21,7 @@ from turnout.readers.other_subjects import STRONG, subject_of
 from turnout.readers.precision import NUMBER, Interval, around, readings
 from turnout.readers.rate_units import RateUnit, rate_unit
 from turnout.readers.rate_words import CERTAIN, NOT, POSSIBLY, name_meaning, reduction_of_name
+from turnout.readers.texts import decode_text
 
 MAX_CLOCK_DRIFT = 1e-4  # relative: two clocks of one logger with separate crystals may differ by this much
 PLAUSIBLE_RATES = (10.0, 1e8)  # Hz: no vibration is sampled outside; a possible statement outside means something else
@@ -44,7 +45,8 @@ class Statement:
 
     The first of ``intervals`` is the usual meaning; without any it is not understood. ``certainty`` is CERTAIN or
     POSSIBLY. ``is_clock`` marks a time axis, whose clock may drift. ``factor`` above 1 is one by which the file states
-    that samples were left out: its rate may be the one before.
+    that samples were left out: its rate may be the one before. ``is_defined`` marks the step that the format defines:
+    one of 0 says nothing beside another statement.
     """
 
     place: str
@@ -53,6 +55,7 @@ class Statement:
     certainty: int = CERTAIN
     is_clock: bool = False
     factor: int = 1
+    is_defined: bool = False
 
     @property
     def usual(self) -> Interval:
@@ -119,7 +122,7 @@ def statements_of(entries: Iterable[Entry], k: int = 0, n: int = 1) -> list[Stat
     >>> statement.usual.rate
     25600.0
     """
-    found: dict[tuple[str, str], tuple[Statement, str, bool]] = {}
+    found: dict[tuple[str, str], tuple[Statement, Entry, bool]] = {}
     factors: dict[str, int] = {}  # by name: each channel may state the same one
     for entry in entries:
         reduction = reduction_of_name(entry.name)
@@ -131,9 +134,12 @@ def statements_of(entries: Iterable[Entry], k: int = 0, n: int = 1) -> list[Stat
                 factors[entry.name.strip().casefold()] = reduction_factor(value)
             for statement in statements_of_value(entry.name, value, type(value).__name__):
                 is_final = bool(reduction) or entry.is_defined
-                found.setdefault((entry.place, statement.text), (statement, entry.place, is_final))
+                found.setdefault((entry.place, statement.text), (statement, entry, is_final))
     factor = math.prod(factors.values())
-    return [_at_place(statement, place, 1 if is_final else factor) for statement, place, is_final in found.values()]
+    return [
+        replace(_at_place(statement, entry.place, 1 if is_final else factor), is_defined=entry.is_defined)
+        for statement, entry, is_final in found.values()
+    ]
 
 
 PLAIN_TYPES = (str, float, int)
@@ -175,7 +181,7 @@ def _values(value: Any, k: int, n: int) -> list[Any]:
         values = [value[k]] if n > 1 and len(value) == n else list(dict.fromkeys(v for v in value if np.isscalar(v)))
     else:
         values = [value]
-    return [v.decode("utf-8", "replace") if isinstance(v, bytes) else v for v in values]
+    return [decode_text(v) if isinstance(v, bytes) else v for v in values]
 
 
 MAX_FACTOR = 10**5  # samples of the converter for each sample of the file

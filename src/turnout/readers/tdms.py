@@ -232,14 +232,13 @@ def _scale_text(*levels: Mapping[str, Any]) -> str:
 
 
 def _entries(channels: Sequence[nptdms.TdmsChannel], groups: Mapping[str, Mapping[str, Any]]) -> Iterator[Entry]:
-    """Properties of the groups and of the channels; a ``wf_increment`` of 0 states nothing."""
+    """Properties of the groups and of the channels."""
     places: list[tuple[str, Mapping[str, Any]]] = [
         (f"property of the group {name!r}", values) for name, values in groups.items()
     ]
     places += [(f"property of the channel {c.name!r}", c.properties) for c in channels]
     for place, values in places:
-        stated = {name: _in_utc(value) for name, value in values.items() if name != "wf_increment" or value != 0}
-        for entry in entries_of(stated, ""):
+        for entry in entries_of({name: _in_utc(value) for name, value in values.items()}, ""):
             is_step = entry.name == "wf_increment"
             yield Entry(f"{place}: {entry.name}", entry.name, entry.value, is_defined=is_step)
 

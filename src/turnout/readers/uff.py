@@ -292,8 +292,9 @@ FACTOR_PRECISION = 1e-5  # relative: factors of dataset 164 are printed with few
 def _entries(sets: Sequence[UffDataset]) -> Iterator[Entry]:
     """The step of the abscissa of each set, and the texts of its ID lines."""
     for dataset in sets:
-        if dataset.x is None and dataset.step > 0:
-            yield step_entry("abscissa spacing (record 7)", dataset.step_text, dataset.labels[0][2])
+        if dataset.x is None:
+            step = 0.0 if np.isnan(dataset.step) or not dataset.step_text else dataset.step_text
+            yield step_entry("abscissa spacing (record 7)", step, dataset.labels[0][2])
         for i, text in enumerate(dataset.ids, 1):
             if i != 3 and text not in ("", "NONE"):
                 yield from entries_of_text(text, f"ID line {i}")

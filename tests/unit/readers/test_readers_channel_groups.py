@@ -120,7 +120,7 @@ def test_the_unit_of_a_structure_beside_a_vector_contradicts_the_layout(tmp_path
 
 
 def test_groups_without_a_vector_are_named_with_what_they_hold(tmp_path):
-    signal = {"x_values": {"increment": 0.001}, "y_values": {"values": np.arange(400.0)}}
+    signal = {"clock": {"increment": 0.001}, "trace": {"values": np.arange(400.0)}}
     scipy.io.savemat(tmp_path / "a.mat", {"force": signal, "rail": signal})
     error, *_ = read("a.mat", tmp_path, RawDescription((RawChannel("f", "force", "force", "N"),), rate=1000.0)).errors
-    assert "group 'force': it holds no vector of samples; in it are 'x_values', 'y_values'. Save each" in str(error)
+    assert "group 'force': it holds no vector of samples; in it are 'clock', 'trace'. Save each" in str(error)

@@ -1,0 +1,60 @@
+"""Decoding of the texts in raw files, whose encoding no format states reliably."""
+
+import codecs
+
+MIN_UTF16_SIZE = 16  # bytes: fewer do not tell the encoding
+
+
+def decode_text(data: bytes) -> str:
+    """Text of bytes: UTF-8 if they are valid UTF-8, else Windows-1252 of western loggers.
+
+    Parameters
+    ----------
+    data : bytes
+        A line, a name, a unit or another text of a file.
+
+    Returns
+    -------
+    str
+        The text without a byte order mark; a byte that neither encoding has becomes a replacement character.
+
+    Examples
+    --------
+    >>> decode_text("m/s²".encode("utf-8")), decode_text("m/s²".encode("latin-1"))
+    ('m/s²', 'm/s²')
+    """
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", "replace")
+
+
+def wide_encoding(head: bytes) -> str:
+    """Encoding of a text in UTF-16 or UTF-32, by its byte order mark or by the zero bytes of its letters in UTF-16.
+
+    Parameters
+    ----------
+    head : bytes
+        First bytes of the file.
+
+    Returns
+    -------
+    str
+        "" for another text.
+
+    Examples
+    --------
+    >>> wide_encoding("force;rail".encode("utf-16-le")), wide_encoding(b"force;rail [m/s2]")
+    ('utf-16-le', '')
+    """
+    if head[:4] in (codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE):
+        return "utf-32"
+    if head[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
+        return "utf-16"
+    even, odd = head[0::2], head[1::2]
+    if len(head) < MIN_UTF16_SIZE or max(even.count(0), odd.count(0)) < MIN_ZERO_SHARE * len(odd):
+        return ""
+    return "utf-16-le" if not even.count(0) else "utf-16-be" if not odd.count(0) else ""
+
+
+MIN_ZERO_SHARE = 0.9  # of the high bytes of a text of numbers with some other letters
