@@ -4,11 +4,15 @@ import hashlib
 import json
 import multiprocessing
 import os
+import runpy
 import shutil
 import signal
 import subprocess
 import sys
 import time
+import traceback
+from functools import partialmethod
+from multiprocessing.connection import Client, Listener
 from pathlib import Path
 
 import numpy as np
@@ -177,7 +181,8 @@ def command(*options, cores=2, shards=1, chain="toy_fleet:unit", target="work/ve
 def run(folder, *options, check=True, **more):
     """Run the workflow in ``folder``; the completed process with what it said in ``stdout``.
 
-    The process is forked from one that has imported Snakemake, which costs as much as a whole run of a toy fleet.
+    Snakemake and the scripts of its jobs run in forks of processes that have imported what they need, which costs more
+    than a whole run of a toy fleet. The nights in these tests and the tutorial start new interpreters.
     """
     words, output = command(*options, **more), Path(folder) / ".output"
     process = FORKS.Process(target=snakemake, args=(words[3:], str(folder), str(output), environment()))
@@ -191,7 +196,13 @@ def run(folder, *options, check=True, **more):
 
 
 FORKS = multiprocessing.get_context("forkserver")
-FORKS.set_forkserver_preload(["snakemake.cli", "pandas", "turnout.workflow.launch", "turnout.readers.formats"])
+FORKS.set_forkserver_preload(
+    [
+        "snakemake.cli", "pandas", "turnout.workflow.launch", "turnout.readers.formats", "turnout.workflow.jobs",
+        "turnout.registry.job", "turnout.stages.common", "turnout.stages.trend", "turnout.stages.worklist",
+        "turnout.report.job", "turnout.stages.change_units",
+    ]
+)  # fmt: skip
 
 
 def snakemake(words, folder, output, variables):
@@ -203,8 +214,61 @@ def snakemake(words, folder, output, variables):
         os.dup2(file.fileno(), 1)
         os.dup2(file.fileno(), 2)
     from snakemake.cli import main
+    from snakemake.script import PythonScript
 
-    main(words)
+    with Listener(family="AF_UNIX") as listener:
+        # Snakemake has threads, from which no process is forked: this one has none.
+        server = os.fork()
+        if server == 0:
+            serve_scripts(listener)
+        PythonScript.execute_script = partialmethod(execute_script, listener.address)
+        try:
+            main(words)
+        finally:
+            os.kill(server, signal.SIGKILL)
+            os.waitpid(server, 0)
+
+
+def execute_script(job, address, path, edit=False):
+    """Instead of Snakemake's method: the server runs the script, and this raises what a new interpreter would cause."""
+    from snakemake.benchmark import benchmarked
+
+    with Client(address) as connection:
+        connection.send(path)
+        with benchmarked(connection.recv(), job.bench_record):
+            code = connection.recv()
+    if code:
+        raise subprocess.CalledProcessError(code, path)
+
+
+def serve_scripts(listener):
+    """Run each script that a client asks for in a fork; the answers are its process and at its end its exit code."""
+    signal.signal(signal.SIGCHLD, lambda *_: os.waitpid(-1, os.WNOHANG))
+    while True:
+        connection = listener.accept()
+        if os.fork() == 0:
+            signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+            path, process = connection.recv(), os.fork()
+            if process == 0:
+                os._exit(run_script(path))
+            connection.send(process)
+            connection.send(os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]))
+            os._exit(0)
+        connection.close()
+
+
+def run_script(path):
+    """Exit code of the script. A traceback is not kept, since its frames would keep a pool of processes open."""
+    try:
+        runpy.run_path(path, run_name="__main__")
+    except SystemExit as end:
+        return end.code or 0
+    except BaseException:
+        traceback.print_exc()
+        return 1
+    finally:
+        sys.stdout.flush()
+    return 0
 
 
 def kill(process):
