@@ -2,6 +2,8 @@
 
 import ast
 
+from syntax_trees import tree_of
+
 from turnout import constants
 from turnout.units import PARAMETER_UNITS, UNITS
 
@@ -22,7 +24,7 @@ def test_no_module_repeats_a_constant(repository):
         f"{path.relative_to(package)}:{line} {value}: import it from turnout.constants"
         for path in sorted(package.rglob("*.py"))
         if path.name != "constants.py"
-        for line, value in repeated(ast.parse(path.read_text(encoding="utf-8")))
+        for line, value in repeated(tree_of(path))
     ]
     assert not wrong, "\n".join(wrong)
 

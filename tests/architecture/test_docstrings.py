@@ -3,6 +3,8 @@
 import ast
 import re
 
+from syntax_trees import tree_of
+
 MIN_SHARE = 0.95  # of the public functions with parameters
 HEADINGS = ("Parameters\n", "Attributes\n")
 
@@ -11,7 +13,7 @@ def classes(repository):
     """Name -> (names of its bases, its methods) of every class of the two packages; names are unique but for a few."""
     table = {}
     for path in sorted((repository / "src").rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(tree_of(path)):
             if isinstance(node, ast.ClassDef):
                 bases = {ast.unparse(base).split("[")[0].split(".")[-1] for base in node.bases}
                 methods = {item.name: item for item in node.body if isinstance(item, ast.FunctionDef)}
@@ -38,7 +40,7 @@ def inherits_sections(name, class_name, table):
 def public_functions(repository):
     """(place, function, name of its class or "") of every public function and method with parameters."""
     for path in sorted((repository / "src").rglob("*.py")):
-        tree = ast.parse(path.read_text(encoding="utf-8"))
+        tree = tree_of(path)
         for node in tree.body:
             in_class = isinstance(node, ast.ClassDef)
             if node.__class__ not in (ast.ClassDef, ast.FunctionDef) or node.name.startswith("_"):
@@ -69,7 +71,7 @@ def test_what_is_returned_is_not_said_twice(repository):
     """A summary that says what is returned needs no second copy below "Returns"."""
     repeated = []
     for path in sorted((repository / "src").rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(tree_of(path)):
             text = (ast.get_docstring(node) or "") if isinstance(node, ast.FunctionDef) else ""
             if "Returns\n-------\n" not in text:
                 continue

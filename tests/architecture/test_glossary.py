@@ -4,6 +4,7 @@ import ast
 import re
 
 import pytest
+from syntax_trees import tree_of
 
 # Words of the last column of docs/glossary.md with another meaning, in which they may be used.
 OTHER_MEANINGS = {
@@ -34,7 +35,7 @@ def replaced_words(repository):
 
 def messages(path):
     """Text constants of a module with a space in them, docstrings excluded, and the labels of printed lines."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    tree = tree_of(path)
     for node in ast.walk(tree):
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "_line" and node.args:
             yield from (str(x.value) for x in ast.walk(node.args[0]) if isinstance(x, ast.Constant))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
+from syntax_trees import tree_of
 
 LOWEST = {
     "arrow_memory",
@@ -86,7 +87,7 @@ def running_nodes(tree):
 def imports_of(path):
     """Every module imported anywhere in the file, at the top or inside a function."""
     imported = []
-    for node in running_nodes(ast.parse(path.read_text())):
+    for node in running_nodes(tree_of(path)):
         if isinstance(node, ast.Import):
             imported += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.level == 0:
@@ -181,7 +182,7 @@ def test_only_the_named_packages_open_files(repository):
     for package, path in sources(repository):
         if package in OPENS_FILES:
             continue
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in ast.walk(tree_of(path)):
             if isinstance(node, ast.Call):
                 name = getattr(node.func, "id", getattr(node.func, "attr", ""))
                 if name in OPENING_CALLS:

@@ -5,11 +5,12 @@ import subprocess
 import sys
 
 import pytest
+from syntax_trees import tree_of
 
 
 def modules(repository):
     for path in sorted((repository / "src").rglob("*.py")):
-        yield path.relative_to(repository), ast.parse(path.read_text(encoding="utf-8"))
+        yield path.relative_to(repository), tree_of(path)
 
 
 def functions(tree, in_class=False):

@@ -5,6 +5,7 @@ import re
 from functools import cache
 
 import pytest
+from syntax_trees import tree_of
 
 # Words that say nothing of what is in a variable. Stored names (assigned names and parameters) are counted.
 EMPTY = frozenset(
@@ -50,7 +51,7 @@ EXCEPTIONS: dict[str, str] = {
 def modules(repository):
     for package in ("turnout", "turnout_blind"):
         for path in sorted((repository / "src" / package).rglob("*.py")):
-            yield path.relative_to(repository / "src"), ast.parse(path.read_text(encoding="utf-8"))
+            yield path.relative_to(repository / "src"), tree_of(path)
 
 
 def stored_names(tree):

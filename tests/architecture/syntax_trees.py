@@ -1,0 +1,10 @@
+"""Syntax trees of source files. Many tests walk through all of them, so each file is parsed once per process."""
+
+import ast
+from functools import cache
+
+
+@cache
+def tree_of(path):
+    """Syntax tree of a file; no test changes it."""
+    return ast.parse(path.read_text(encoding="utf-8"))
