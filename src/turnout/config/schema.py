@@ -8,6 +8,7 @@ from difflib import get_close_matches
 from typing import Any
 
 from turnout.config.document import Branch, Leaf
+from turnout.config.settings.setting import MAIL_ADDRESSES, MAIL_SENDER, WEB_ADDRESS
 from turnout.errors import ConfigError
 
 ID = r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}"
@@ -17,6 +18,9 @@ PATTERN_TEXTS = {
     ID: "1 to 64 letters, digits, _ and -, the first a letter or digit",
     LABEL: "letters, digits and -, the first a letter",
     NAME: "letters, digits, _ and -, the first a letter",
+    WEB_ADDRESS: "an address that begins with https:// (or http://), or '' for none",
+    MAIL_SENDER: "name@host or Name <name@host>, or '' for the first recipient",
+    MAIL_ADDRESSES: "name@host, several with commas between, or '' for none",
 }
 NO_TURNOUT = "There are no turnouts yet: add one with 'turnout add ID LAYOUT'"
 VALUE_TYPES = {

@@ -110,6 +110,7 @@ def _key(cls: type, field: Field, hint: Any) -> Key | Group:
         minimum=metadata.get("minimum"),
         maximum=metadata.get("maximum"),
         choices=tuple(metadata.get("choices") or ()),
+        pattern=metadata.get("pattern", ""),
         many=many,
         nullable=nullable,
         default=default,

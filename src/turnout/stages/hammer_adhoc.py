@@ -8,8 +8,9 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
+from zoneinfo import ZoneInfo
 
 from turnout.config import TurnoutConfig
 from turnout.config.filename_pattern import compile_pattern
@@ -179,7 +180,7 @@ def files_by_day(
 
 
 def _noted_day(paths: Sequence[Path], description: RawDescription) -> str:
-    """Day of the first time noted in files; ReadError if none of them holds a usable record."""
+    """Day of the first time noted in files, in the zone of the layout; ReadError without a usable record."""
     faults: list[ReadError] = []
     times, n_usable = [], 0
     for path in paths:
@@ -193,10 +194,11 @@ def _noted_day(paths: Sequence[Path], description: RawDescription) -> str:
         times += [recording.started_at for recording in result.recordings if recording.started_at is not None]
         n_usable += len(result.recordings)
     if times:
-        return min(times).date().isoformat()
+        return min(times).replace(tzinfo=UTC).astimezone(ZoneInfo(description.time_zone)).date().isoformat()
     if faults and not n_usable and not any(map(_has_responses, paths)):
         raise faults[0]
     observation = "neither its name nor the file says on which day it was recorded"
+    observation += next((f" ({fault.problem})" for fault in faults if fault.reason == "start_unknown"), "")
     raise ConfigError(paths[0], "--campaign", observation, "Write --campaign YYYY-MM-DD")
 
 

@@ -27,11 +27,11 @@ if TYPE_CHECKING:
     from typing import Any
 
     from turnout.config.settings.alerts import AlertsSettings
+from turnout.config.settings.setting import MAIL_ADDRESS, WEB_ADDRESS
 
 SENT_FILE = Path("work/alerts.json")
 STATES = ("confirm now", "inspect this week", "plan", "cannot tell")  # a chart that learns needs nobody
 MAX_NAMED = 3  # entries named in the subject
-ADDRESS = re.compile(r"[^<>;,]*<[^\s<>;,]+>|[^\s<>;,]+")  # address, or Name <address>; "root" is one of a local server
 PASSWORD, WEBHOOK = "TURNOUT_SMTP_PASSWORD", "TURNOUT_WEBHOOK"  # of the environment
 
 
@@ -200,7 +200,7 @@ def message_text(entries: Sequence[Mapping[str, Any]]) -> str:
 def _send_mail(entries: Sequence[Mapping[str, Any]], settings: AlertsSettings) -> None:
     recipients = [address.strip() for address in settings.recipients.split(",") if address.strip()]
     for address in (*recipients, *filter(None, [settings.sender])):
-        if not ADDRESS.fullmatch(address):
+        if not re.fullmatch(MAIL_ADDRESS, address):
             raise ValueError(f"{address!r} is no mail address. Write name@host, several with commas between")
     message = EmailMessage()
     message["Subject"], message["From"] = subject(entries), settings.sender or recipients[0]
@@ -224,7 +224,7 @@ def _post(entries: Sequence[Mapping[str, Any]], settings: AlertsSettings) -> Non
     """One JSON object: ``text`` for chat programs, ``entries`` for others."""
     content = {"text": f"{subject(entries)}\n\n{message_text(entries)}", "entries": [dict(e) for e in entries]}
     url = _webhook(settings)
-    if not url.startswith(("https://", "http://")):
+    if not re.fullmatch(WEB_ADDRESS, url):
         raise ValueError("the address begins neither with https:// nor with http://")
     body = json.dumps(content, default=str, ensure_ascii=False).encode()
     request = urllib.request.Request(url, body, {"Content-Type": "application/json; charset=utf-8"})

@@ -403,6 +403,37 @@ def test_a_share_in_percent_is_recognised(tmp_path):
         configuration(tmp_path, settings="receptance: {gate_level: 90}")
 
 
+@pytest.mark.parametrize(
+    "key, value, words",
+    [
+        ("webhook", "chat.example.org/hooks/abc", "an address that begins with https:// (or http://)"),
+        ("webhook", "ftp://example.org", "an address that begins with https:// (or http://)"),
+        ("webhook", "https://", "an address that begins with https:// (or http://)"),
+        ("recipients", "a@b.c; d@e.f", "name@host, several with commas between"),
+        ("sender", "a@b.c, d@e.f", "name@host or Name <name@host>"),
+    ],
+)
+def test_an_address_to_which_the_night_cannot_send_is_recognised(key, value, words, tmp_path):
+    with pytest.raises(ConfigErrors) as caught:
+        configuration(tmp_path, settings=f"alerts: {{{key}: '{value}'}}")
+    assert f"{key} is {value!r}. Write {words}" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "key, value",
+    [
+        ("webhook", "https://chat.example.org/hooks/abc?x=1"),
+        ("webhook", "http://127.0.0.1:8080/"),
+        ("webhook", ""),
+        ("recipients", "a@b.c, Track team <d@e.f>"),
+        ("recipients", "root"),
+        ("sender", "Turnout <a@b.c>"),
+    ],
+)
+def test_an_address_that_the_night_can_use_is_accepted(key, value, tmp_path):
+    assert configuration(tmp_path, settings=f"alerts: {{{key}: '{value}'}}").settings["alerts"] is not None
+
+
 @pytest.mark.parametrize("kind", WRONG)
 def test_it_is_said_where_and_what_to_write(tmp_path, kind):
     changes, words = WRONG[kind]

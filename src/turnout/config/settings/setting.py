@@ -3,6 +3,11 @@
 from dataclasses import field
 from typing import Any
 
+WEB_ADDRESS = r"(?:https?://[^\s/]\S*)?"
+MAIL_ADDRESS = r"[^<>;,]*<[^\s<>;,]+>|[^\s<>;,]+"  # address, or Name <address>; "root" is one of a local server
+MAIL_SENDER = rf"\s*(?:{MAIL_ADDRESS})?\s*"
+MAIL_ADDRESSES = rf"{MAIL_SENDER}(?:,{MAIL_SENDER})*"
+
 
 def setting(
     default: Any,
@@ -11,6 +16,7 @@ def setting(
     minimum: float | None = None,
     maximum: float | None = None,
     choices: tuple | None = None,
+    pattern: str = "",
 ) -> Any:
     """Dataclass field with metadata.
 
@@ -30,6 +36,8 @@ def setting(
         Largest value that is allowed; None: no limit.
     choices : tuple or None
         The only values that are allowed; None: any.
+    pattern : str
+        Regular expression of the texts that are allowed, one of this module; "": any.
 
     Returns
     -------
@@ -50,7 +58,14 @@ def setting(
     >>> Gate().level, fields(Gate)[0].metadata["why"]
     (0.8, "the paper's gate")
     """
-    metadata = {"unit": unit, "why": why, "minimum": minimum, "maximum": maximum, "choices": choices}
+    metadata = {
+        "unit": unit,
+        "why": why,
+        "minimum": minimum,
+        "maximum": maximum,
+        "choices": choices,
+        "pattern": pattern,
+    }
     if isinstance(default, (list, dict, set)):
         raise TypeError("use a tuple, settings are immutable")
     return field(default=default, metadata=metadata)
