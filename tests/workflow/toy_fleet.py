@@ -37,7 +37,7 @@ hammer:
 
 def unit(unit, turnout, raw_root, algo=""):
     """Toy chain: read every file, one row for it, one row per record."""
-    from turnout.stages.common import read_or_quarantine, recording_row
+    from turnout.stages.raw_files import read_or_quarantine, recording_row
 
     base = {
         "turnout_id": unit.turnout,

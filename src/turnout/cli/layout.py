@@ -56,9 +56,9 @@ def run(args: argparse.Namespace) -> int:
     from turnout.errors import ConfigError
     from turnout.files import write_atomic
     from turnout.readers.formats import FORMATS
-    from turnout.stages.common import require_file
     from turnout.stages.file_contents import file_contents
     from turnout.stages.layout_draft import decisions, layout_draft
+    from turnout.stages.raw_files import require_file
     from turnout.units import to_si
 
     if not re.fullmatch(ID, args.name):

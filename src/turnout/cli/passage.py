@@ -69,10 +69,10 @@ def run(args: argparse.Namespace) -> int:
     from turnout.config import load_configuration
     from turnout.errors import REMARK_REASONS, ReadError
     from turnout.readers import read
-    from turnout.stages.common import require_file
     from turnout.stages.layout_reading import grouped_errors
     from turnout.stages.passage import trains_in
     from turnout.stages.passage_context import passage_context
+    from turnout.stages.raw_files import require_file
 
     turnout = load_configuration(args.configuration).turnout(args.turnout)
     description = turnout.require_passages().description

@@ -47,12 +47,12 @@ class Metadata:
     @cached_property
     def scale_facts(self) -> dict[str, Any]:
         """Variables of this group and its parent groups whose names speak of a scale; those of the group count."""
-        own = {
+        of_group = {
             name: value
             for name, value in self.lower.items()
             if is_scale_name(name) and not _is_nested_text(value)  # nested
         }
-        return {**(self.parent.scale_facts if self.parent else {}), **own}
+        return {**(self.parent.scale_facts if self.parent else {}), **of_group}
 
     def get(self, names: Sequence[str]) -> Any:
         """The first variable of ``names``, here or in a parent group; ReadError if it is damaged.
@@ -187,13 +187,13 @@ class Metadata:
         """All metadata of the group and of its parents, with their places; records beside this one take no part."""
         samples = {*vectors(self.variables), *matrices(self.variables)}
         longest = max((self.variables[name].size for name in samples), default=0)
-        own = {
+        of_group = {
             name: value
             for name, value in self.variables.items()
             if not isinstance(value, Mapping) or 2 * size_of_longest(value) < longest or not holds_samples(value)
             if not isinstance(value, Attributes) or not is_slow(self.variables.get(value.owner), value.owner, samples)
         }
-        return (*entries_of(own, self.place), *(self.parent.entries if self.parent else ()))
+        return (*entries_of(of_group, self.place), *(self.parent.entries if self.parent else ()))
 
     def nested_scales(self, names: Sequence[str]) -> dict[int, str]:
         """Problems about scales that nested metadata state; attributes of single variables take no part.
@@ -215,8 +215,8 @@ class Metadata:
         while level:
             inner = {entry.place.casefold() for entry in nested}
             n_outer = len(level.parent.entries) if level.parent else 0
-            own = level.entries[: len(level.entries) - n_outer]
-            nested += [e for e in own if ATTRIBUTES_MARK not in e.place and e.place.casefold() not in inner]
+            of_level = level.entries[: len(level.entries) - n_outer]
+            nested += [e for e in of_level if ATTRIBUTES_MARK not in e.place and e.place.casefold() not in inner]
             level = level.parent
         direct = set(self.scale_facts)  # judged by the group itself
         return entry_statements((e for e in nested if e.place.casefold() not in direct), names)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from turnout.counts import first_texts
 from turnout.errors import ReadError
 from turnout.readers.entries import UnreadObject
 from turnout.readers.lazy import Column
@@ -113,8 +114,7 @@ CORRECT_SOURCE = "Correct 'source' of this channel in the layout"
 
 def _name_list(names: Sequence[str]) -> str:
     """Names for a message, the first ones of a long list."""
-    more = f" and {len(names) - MAX_LISTED} more" if len(names) > MAX_LISTED else ""
-    return ", ".join(map(repr, names[:MAX_LISTED])) + more
+    return first_texts([*map(repr, names)], MAX_LISTED)
 
 
 def index_of(

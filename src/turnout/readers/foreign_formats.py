@@ -120,11 +120,11 @@ def reject_foreign_format(source: Source) -> None:
     ReadError
         If it is; the remedy says how to get a file that is read.
     """
-    found = next((entry for entry in FOREIGN_FORMATS if entry.has_content(source.head)), None)
-    if found is None and source.head.startswith(ZIP_START):
-        found = _zip_without_arrays(source)
-    if found is not None:
-        raise source.error("byte 0", f"it is {found.label}", found.remedy)
+    foreign_format = next((entry for entry in FOREIGN_FORMATS if entry.has_content(source.head)), None)
+    if foreign_format is None and source.head.startswith(ZIP_START):
+        foreign_format = _zip_without_arrays(source)
+    if foreign_format is not None:
+        raise source.error("byte 0", f"it is {foreign_format.label}", foreign_format.remedy)
 
 
 def _zip_without_arrays(source: Source) -> ForeignFormat | None:

@@ -250,5 +250,5 @@ def _phase(values: np.ndarray, title: str) -> np.ndarray:
 
 def _unit(title: str) -> str:
     """Unit in brackets in a title, "" without one."""
-    found = re.findall(r"[\[(]([^\])]*/\s*k?N)[\])]", title)
-    return found[0] if found else ""
+    units = re.findall(r"[\[(]([^\])]*/\s*k?N)[\])]", title)
+    return units[0] if units else ""

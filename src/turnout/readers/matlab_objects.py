@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 from scipy.io.matlab import MatlabOpaque
 
+from turnout.counts import first_texts
 from turnout.readers.array_metadata import Alphabetical
 from turnout.readers.entries import UnreadObject
 from turnout.readers.metadata_names import (
@@ -179,11 +180,10 @@ def check_objects(variables: Mapping[str, Any], source: Source) -> dict[str, Any
     objects = dict(_objects(variables))
     if not objects or holds_samples(variables):
         return _with_errors(variables, "", source)
-    listed = ", ".join(f"{name!r} ({value})" for name, value in list(objects.items())[:MAX_LISTED])
-    more = f" and {len(objects) - MAX_LISTED} more" if len(objects) > MAX_LISTED else ""
+    listed = first_texts([f"{name!r} ({value})" for name, value in objects.items()], MAX_LISTED)
     name, value = next(iter(objects.items()))
     content = "only MATLAB can read what it holds" if value.is_matlab else "none of its variables is a full array"
-    problem = f"{content}: {listed}{more}"
+    problem = f"{content}: {listed}"
     raise source.error(f"variable {name!r}", problem, value.remedy(name.replace("/", ".")), reason="unreadable")
 
 

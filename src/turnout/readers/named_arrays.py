@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from turnout.counts import first_texts
 from turnout.errors import ReadError
 from turnout.readers.array_metadata import Alphabetical, Metadata, list_of_texts
 from turnout.readers.channel_groups import STATED_SCALES, with_channel_groups
@@ -247,8 +248,7 @@ def _problem_without_samples(variables: Mapping[str, Any]) -> str:
         for name, value in variables.items()
         if not isinstance(value, Attributes)
     ]
-    more = f" and {len(listed) - MAX_LISTED} more" if len(listed) > MAX_LISTED else ""
-    return f"it holds no record: no variable is an array of samples; there are {', '.join(listed[:MAX_LISTED])}{more}"
+    return f"it holds no record: no variable is an array of samples; there are {first_texts(listed, MAX_LISTED)}"
 
 
 def _with_fields(variables: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -122,7 +122,7 @@ def statements_of(entries: Iterable[Entry], k: int = 0, n: int = 1) -> list[Stat
     >>> statement.usual.rate
     25600.0
     """
-    found: dict[tuple[str, str], tuple[Statement, Entry, bool]] = {}
+    statements: dict[tuple[str, str], tuple[Statement, Entry, bool]] = {}
     factors: dict[str, int] = {}  # by name: each channel may state the same one
     for entry in entries:
         reduction = reduction_of_name(entry.name)
@@ -134,11 +134,11 @@ def statements_of(entries: Iterable[Entry], k: int = 0, n: int = 1) -> list[Stat
                 factors[entry.name.strip().casefold()] = reduction_factor(value)
             for statement in statements_of_value(entry.name, value, type(value).__name__):
                 is_final = bool(reduction) or entry.is_defined
-                found.setdefault((entry.place, statement.text), (statement, entry, is_final))
+                statements.setdefault((entry.place, statement.text), (statement, entry, is_final))
     factor = math.prod(factors.values())
     return [
         replace(_at_place(statement, entry.place, 1 if is_final else factor), is_defined=entry.is_defined)
-        for statement, entry, is_final in found.values()
+        for statement, entry, is_final in statements.values()
     ]
 
 
@@ -216,11 +216,11 @@ def _statements(entry: Entry, value: Any) -> Iterator[Statement]:
     if meaning.certainty != CERTAIN and subject_of(entry.name) == STRONG:
         return
     text = str(value).strip()
-    shown = f"{entry.name}: {text[:40]}"
+    quoted_entry = f"{entry.name}: {text[:40]}"
     number, unit_text = _split(text) if isinstance(value, str) else (value, "")
     if number is None:
         if meaning.certainty == CERTAIN and text.casefold() not in PLACEHOLDERS and not _is_dated(text):
-            yield Statement(entry.place, shown, (), CERTAIN)
+            yield Statement(entry.place, quoted_entry, (), CERTAIN)
         elif meaning.certainty != CERTAIN and isinstance(value, str):
             pieces = [e for e in entries_of_text(text, entry.place) if (e.name, e.value) != (entry.name, text)]
             for piece in pieces:
@@ -229,8 +229,8 @@ def _statements(entry: Entry, value: Any) -> Iterator[Statement]:
     unit = rate_unit(unit_text) if unit_text else meaning.unit
     certainty = meaning.certainty
     if certainty == NOT and unit is not None:
-        other = name_meaning(f"{entry.name} [{unit_text}]") if unit_text else meaning
-        certainty = other.certainty
+        with_unit = name_meaning(f"{entry.name} [{unit_text}]") if unit_text else meaning
+        certainty = with_unit.certainty
     if certainty == NOT:
         return
     if unit is not None and unit.is_sampling and certainty == POSSIBLY:
@@ -240,9 +240,9 @@ def _statements(entry: Entry, value: Any) -> Iterator[Statement]:
     if not intervals and meaning.is_step and any(r.value >= MIN_EPOCH for r in readings(number)):
         return  # "ts: 1715587200" is a time of day
     if certainty == CERTAIN and not isinstance(value, str) and not np.isfinite(value):
-        yield Statement(entry.place, shown, (), CERTAIN)
+        yield Statement(entry.place, quoted_entry, (), CERTAIN)
     elif intervals or certainty == CERTAIN:
-        yield Statement(entry.place, shown, intervals, certainty)
+        yield Statement(entry.place, quoted_entry, intervals, certainty)
 
 
 def _statements_of_piece(piece: Entry) -> Iterator[Statement]:
@@ -259,11 +259,15 @@ def _split(text: str) -> tuple[str | None, str]:
         match = spaced
     if not match:
         return None, ""
-    number, rest = match[0].rstrip(".,' "), text[match.end() :].strip()
-    if rest[:1].isdigit() or (rest[:1] in ("-", ":", "/") and rest[1:2].isdigit()) or len(rest) > 40:
+    number, unit_text = match[0].rstrip(".,' "), text[match.end() :].strip()
+    if (
+        unit_text[:1].isdigit()
+        or (unit_text[:1] in ("-", ":", "/") and unit_text[1:2].isdigit())
+        or len(unit_text) > 40
+    ):
         return None, ""
-    rest = re.split(r"[;,(]", rest)[0].strip() if rate_unit(rest) is None else rest
-    return number, rest
+    unit_text = re.split(r"[;,(]", unit_text)[0].strip() if rate_unit(unit_text) is None else unit_text
+    return number, unit_text
 
 
 def _is_dated(text: str) -> bool:

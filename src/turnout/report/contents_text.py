@@ -189,8 +189,8 @@ def _channel_texts(channels: Sequence[ChannelContents]) -> list[str]:
 
 
 def _candidates(contents: FileContents, role: str) -> str:
-    found = contents.with_role(role)
-    return "; ".join(f"{c.name!r} ({c.role.why})" for c in found) or "no candidate"
+    channels = contents.with_role(role)
+    return "; ".join(f"{c.name!r} ({c.role.why})" for c in channels) or "no candidate"
 
 
 def _event_words(contents: FileContents) -> str:
@@ -211,14 +211,14 @@ def _event_lines(contents: FileContents) -> list[str]:
         span = f"peaks {sizes[0]:.4g} to {sizes[-1]:.4g} {unit or '(no unit)'} in {contents.event_channel!r}"
         return [_line("impacts", f"{len(sizes)}, {span}"), _line("", _event_times(contents, "s"))]
     if contents.kind == "trains":
-        shown = f"{len(contents.events)}, stretches that are loud for longer than the rest"
-        return [_line("trains", shown), _line("", _event_times(contents, "s"))]
+        stretches = f"{len(contents.events)}, stretches that are loud for longer than the rest"
+        return [_line("trains", stretches), _line("", _event_times(contents, "s"))]
     return [_line("impacts", "none found; no train found either")]
 
 
 def _event_times(contents: FileContents, unit: str) -> str:
-    shown = [f"record {e.record} at {e.time:.4g} {unit}" for e in contents.events[:MAX_EVENTS]]
-    return ", ".join(shown) + (" ..." if len(contents.events) > MAX_EVENTS else "")
+    times = [f"record {e.record} at {e.time:.4g} {unit}" for e in contents.events[:MAX_EVENTS]]
+    return ", ".join(times) + (" ..." if len(contents.events) > MAX_EVENTS else "")
 
 
 def _response_words(contents: FileContents) -> str:
@@ -232,12 +232,12 @@ def _response_words(contents: FileContents) -> str:
 
 def _response_lines(contents: FileContents) -> list[str]:
     names = contents.responses.names if contents.responses is not None else ()
-    shown = "; ".join(names[:MAX_EVENTS]) + (" ..." if len(names) > MAX_EVENTS else "")
+    listed_names = "; ".join(names[:MAX_EVENTS]) + (" ..." if len(names) > MAX_EVENTS else "")
     return [
         _line("contents", _response_words(contents)),
         _line("step", f"{contents.responses.frequency[1] - contents.responses.frequency[0]:.6g} Hz")
         if contents.responses is not None
         else "",
-        _line("responses", shown),
+        _line("responses", listed_names),
         _line("impacts", "none: the responses are averaged, so no impact can be judged"),
     ]

@@ -22,9 +22,9 @@ from turnout.simulate.parameters import load_track, load_vehicle
 from turnout.simulate.passage import simulate_passage
 from turnout.simulate.sensor import Sensor
 from turnout.stages.calibrate import calibrate_to_files, resolve_track
-from turnout.stages.common import require_file
 from turnout.stages.passage import sensors_of
 from turnout.stages.passage_context import known_patterns
+from turnout.stages.raw_files import require_file
 from turnout.workflow.scan import scan
 
 if TYPE_CHECKING:

@@ -98,8 +98,8 @@ class FileContents:
         tuple of ChannelContents
             In the order of the file; those with the better evidence first.
         """
-        found = [channel for channel in self.channels if channel.role.name == role]
-        return tuple(sorted(found, key=lambda channel: channel.role.rank))
+        channels = [channel for channel in self.channels if channel.role.name == role]
+        return tuple(sorted(channels, key=lambda channel: channel.role.rank))
 
 
 def file_contents(path: Path | str) -> FileContents:
@@ -142,20 +142,20 @@ def _response_contents(path: Path, real_path: Path, responses: FrequencyResponse
 
 
 def _contents(path: Path, source: Source, format_name: str, raw: RawFile) -> FileContents:
-    found, expected = raw.records, raw.expected
-    errors = [*(e for e in found if isinstance(e, ReadError)), *errors_without_layout(raw, source)]
+    raw_records, expected = raw.records, raw.expected
+    errors = [*(e for e in raw_records if isinstance(e, ReadError)), *errors_without_layout(raw, source)]
     problems = [f"{e.where}: {e.problem}. {e.remedy}." for e in errors]
-    numbered = [(k, record) for k, record in enumerate(found) if isinstance(record, RawRecord)]
+    numbered = [(k, record) for k, record in enumerate(raw_records) if isinstance(record, RawRecord)]
     records = tuple(record for _, record in numbered)
-    if expected is not None and len(found) < expected:
-        problems.append(f"it holds {len(found)} of the {expected} records that its own header promises")
+    if expected is not None and len(raw_records) < expected:
+        problems.append(f"it holds {len(raw_records)} of the {expected} records that its own header promises")
     base = FileContents(
-        str(path), format_name, FORMATS[format_name].meaning, source.size, len(found),
+        str(path), format_name, FORMATS[format_name].meaning, source.size, len(raw_records),
         records=records, problems=tuple(problems),
     )  # fmt: skip
     if not records:
         return base
-    rates = [stated_rate(record, k, len(found), source) for k, record in numbered]
+    rates = [stated_rate(record, k, len(raw_records), source) for k, record in numbered]
     rate = next((r for r in rates if r.value is not None), rates[0])
     problems += [f"record {k + 1}: {r.problem}" for (k, _), r in zip(numbered, rates) if r.problem]
     differing = sorted({r.value for r in rates if r.value is not None})
@@ -179,7 +179,7 @@ def _contents(path: Path, source: Source, format_name: str, raw: RawFile) -> Fil
         has_zone=bool(starts) and starts[0].tzinfo is not None,
         channels=channels,
         problems=tuple(dict.fromkeys(problems)),
-        unexplained=tuple(_unexplained_names(first, rate.value, len(found))) if rate.value else (),
+        unexplained=tuple(_unexplained_names(first, rate.value, len(raw_records))) if rate.value else (),
     )
     return _with_events(contents) if rate.value else contents
 

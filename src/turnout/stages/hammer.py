@@ -23,15 +23,7 @@ from turnout.hammer_test.response_quality import find_track_impacts
 from turnout.modal import identify
 from turnout.records import Impact, ModalModel, RawDescription, Receptance, Recording, Rejection, Unit
 from turnout.registry.ids import content_id
-from turnout.stages.common import (
-    MAX_CAMPAIGN_OFFSET,
-    MISFILED_REMEDY,
-    quarantine_row,
-    rail_temperature,
-    read_or_quarantine,
-    recording_row,
-    time_contradiction,
-)
+from turnout.stages.filed_times import MAX_CAMPAIGN_OFFSET, MISFILED_REMEDY, time_contradiction
 from turnout.stages.hammer_curve_rows import density_columns, receptance_row
 from turnout.stages.hammer_responses import response_model, responses_of
 from turnout.stages.hammer_rows import (
@@ -42,6 +34,10 @@ from turnout.stages.hammer_rows import (
     model_row,
     shape_columns,
     validation_columns,
+)
+from turnout.stages.raw_files import quarantine_row, read_or_quarantine, recording_row
+from turnout.stages.recording_notes import (
+    rail_temperature,
 )
 
 # Largest value of the registry's column `test`.

@@ -20,8 +20,8 @@ from turnout.errors import ConfigError, ReadError
 from turnout.readers import read
 from turnout.readers.frequency_responses import find_responses
 from turnout.records import EMPTY_MAPPING, RawDescription, Unit
-from turnout.stages.common import require_file
 from turnout.stages.hammer import hammer_config, hammer_unit
+from turnout.stages.raw_files import require_file
 from turnout.workflow.guard import compute_guarded
 from turnout.workflow.scan import scan
 

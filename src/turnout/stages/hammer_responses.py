@@ -21,7 +21,7 @@ from turnout.modal.frf import FrfMode, FrfModes, modes_of_frf
 from turnout.readers.frequency_responses import FrequencyResponses, check_evaluable, find_responses
 from turnout.records import ModalModel, Mode, Rejection
 from turnout.records.modal import value_with_error
-from turnout.stages.common import quarantine_row
+from turnout.stages.raw_files import quarantine_row
 
 METHOD = "frf"
 NO_IMPACTS = "from averaged frequency responses: no impact could be judged"

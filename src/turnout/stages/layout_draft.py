@@ -92,8 +92,8 @@ def _check_same_channels(group: Sequence[FileContents]) -> None:
 
 def _labels(hammer: Sequence[FileContents]) -> list[str]:
     """Labels of sections that the file names begin with."""
-    found = [match[1] for c in hammer if (match := TEST_NAME.fullmatch(Path(c.path).stem))]
-    return list(dict.fromkeys(found))
+    labels = [match[1] for c in hammer if (match := TEST_NAME.fullmatch(Path(c.path).stem))]
+    return list(dict.fromkeys(labels))
 
 
 def _section_lines(labels: Sequence[str]) -> Iterator[str]:

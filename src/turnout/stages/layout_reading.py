@@ -15,15 +15,15 @@ from turnout.hammer_test import receptance_of
 from turnout.hammer_test.response_quality import find_track_impacts
 from turnout.readers import read
 from turnout.records import Impact, LongRecording, RawDescription, ReadResult, Recording, Rejection, Unit
-from turnout.stages.common import (
+from turnout.stages.filed_times import (
     MAX_CAMPAIGN_OFFSET,
     MAX_NAME_OFFSET,
     MISFILED_REMEDY,
     TIME_REMEDY,
-    rail_temperature,
     time_contradiction,
     time_of_label,
 )
+from turnout.stages.recording_notes import rail_temperature
 from turnout.units import SI
 
 STIFFNESS_BAND = (80.0, 300.0)  # Hz, of the printed dynamic stiffness
@@ -117,10 +117,10 @@ def _read(
         faults.append(f"{path}, the file: same bytes as {same}. Put the file of each section in its place.")
     text = _contents_text(result)
     if description.kind == "hammer":
-        more, found = _hammer_faults(turnout, section, path, result.recordings)
+        more, found_events = _hammer_faults(turnout, section, path, result.recordings)
     else:
-        more, found = _passage_faults(path, [*result.recordings, *result.long_recordings])
-    return FileReading(turnout.id, section, path, f"{text}{found}", (*faults, *more))
+        more, found_events = _passage_faults(path, [*result.recordings, *result.long_recordings])
+    return FileReading(turnout.id, section, path, f"{text}{found_events}", (*faults, *more))
 
 
 def _filing_errors(turnout: TurnoutConfig, unit: Unit, path: str, result: ReadResult) -> Iterator[ReadError]:

@@ -21,10 +21,10 @@ from turnout.stages.accepted_changes import changes_of
 from turnout.stages.budget import Budget, BudgetSpentError, Watch
 from turnout.stages.changed_effects import changed_effects
 from turnout.stages.checkpoint import Checkpoint, Replay
-from turnout.stages.common import quarantine_row
 from turnout.stages.mismatch_groups import Group, groups, members_of
 from turnout.stages.mismatch_inputs import gather_inputs
 from turnout.stages.mismatch_rows import finding_tables
+from turnout.stages.raw_files import quarantine_row
 from turnout.stages.track_files import digest_of_model, track_of
 from turnout.stages.visit_notes import notes_in_words
 from turnout.stages.visit_time import years_of

@@ -18,13 +18,12 @@ from turnout.mismatch.turnout import HammerInput, PassageInput
 from turnout.passage.electrical_pulses import without_pulses
 from turnout.readers import read
 from turnout.records import LongRecording, Recording, Unit
-from turnout.stages import common
-from turnout.stages.common import rail_temperature
 from turnout.stages.copied_files import without_copies
 from turnout.stages.layout_checks import position_fault
 from turnout.stages.mismatch_trains import TrainUnknownError, train_of
 from turnout.stages.passage import PassageContext, passage_unit, sensors_of, trains_in
 from turnout.stages.passage_context import known_patterns
+from turnout.stages.recording_notes import noted_rail_temperature, rail_temperature
 from turnout.workflow.current_results import current_results
 from turnout.workflow.scan import unit_id
 
@@ -300,7 +299,7 @@ def _reasons_text(quarantine: Sequence[Mapping[str, Any]]) -> str:
 
 def _passage_conditions(row: Mapping[str, Any], recording: Recording) -> dict[str, float]:
     temperature = row.get("rail_temperature_c")
-    temperature = common.temperature(recording.conditions) if temperature is None else temperature
+    temperature = noted_rail_temperature(recording.conditions) if temperature is None else temperature
     return {} if temperature is None else {"rail_temperature": float(temperature)}
 
 

@@ -14,7 +14,7 @@ from turnout.errors import ConfigError, SimulationError
 from turnout.mismatch.turnout.priors import TRACK
 from turnout.simulate import load_vehicle
 from turnout.simulate.vehicle import Vehicle
-from turnout.stages.common import number
+from turnout.stages.recording_notes import noted_number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -67,7 +67,7 @@ def train_of(row: Mapping, notes: Mapping, folder: Path) -> IdentifiedTrain:
     -------
     IdentifiedTrain
     """
-    noted_speed = KMH * (number(notes, "speed") or 0.0) or row.get("speed_listed_kmh")
+    noted_speed = KMH * (noted_number(notes, "speed") or 0.0) or row.get("speed_listed_kmh")
     speed = row.get("speed_kmh") or noted_speed
     type_names = _type_names(row, notes)
     type_name = _with_a_file(type_names, folder)
@@ -147,7 +147,8 @@ def _loaded_vehicle(
         single_unit = load_vehicle(name, 0.0, folder)
     except (SimulationError, ConfigError) as error:
         raise TrainUnknownError(f"type {name}: {error}") from None
-    n, units = len(single_unit.wheels), max(1, round(number(notes, "n_units") or number(notes, "units") or 1.0))
+    noted_units = noted_number(notes, "n_units") or noted_number(notes, "units") or 1.0
+    n, units = len(single_unit.wheels), max(1, round(noted_units))
     axle_doubts: tuple[str, ...] = ()
     if n_axles_heard and n_axles_heard % n:
         axle_doubts = (
@@ -184,7 +185,7 @@ def _load_share(
     if full <= empty:
         return 0.0, TRACK.load_sd, ()
     if row.get("axle_load_t") is None:
-        noted_share = number(notes, "load_share")
+        noted_share = noted_number(notes, "load_share")
         if noted_share is not None:
             return noted_share, TRACK.load_sd, ()
         light, heavy = (_sprung_mass(v) for v in vehicles)

@@ -25,16 +25,9 @@ from turnout.passage.segmentation import cut_passages
 from turnout.passage.timetable import listed_for, listed_trains
 from turnout.records import LongRecording, ModalModel, Recording, Unit
 from turnout.registry.ids import content_id
-from turnout.stages.common import (
-    MAX_NAME_OFFSET,
-    TIME_REMEDY,
-    quarantine_row,
-    read_or_quarantine,
-    recording_row,
-    time_contradiction,
-    time_of_label,
-)
+from turnout.stages.filed_times import MAX_NAME_OFFSET, TIME_REMEDY, time_contradiction, time_of_label
 from turnout.stages.passage_rows import finding_rows, fit_row, passage_row
+from turnout.stages.raw_files import quarantine_row, read_or_quarantine, recording_row
 from turnout.units import IGNORED
 
 NO_MODEL = "none"  # in the place of a model's id: the section has no model

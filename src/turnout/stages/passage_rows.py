@@ -16,7 +16,8 @@ from turnout.passage.result import Passage, PassageSensor
 from turnout.passage.timetable import ListedTrain
 from turnout.passage.train_type import UNKNOWN
 from turnout.records import Rejection
-from turnout.stages.common import number, quarantine_row, temperature
+from turnout.stages.raw_files import quarantine_row
+from turnout.stages.recording_notes import noted_number, noted_rail_temperature
 
 TIME_DIGITS = 5  # of a wheel's time in seconds: a fifth of a sample at 20 kHz
 
@@ -115,13 +116,13 @@ def passage_row(
         "n_axles": passage.n_axle,
         "direction": passage.direction,
         "track": passage.track,
-        "rail_temperature_c": temperature(conditions),
+        "rail_temperature_c": noted_rail_temperature(conditions),
         "axle_load_source": "unavailable",
     }
     remarks = [f.detail or f.reason for f in passage.findings]
-    noted_temperature = number(conditions, "rail_temperature")
-    if noted_temperature is not None and temperature(conditions) is None:
-        remarks.append(f"rail temperature {noted_temperature:g} °C noted, not used")
+    rail_temperature = noted_number(conditions, "rail_temperature")
+    if rail_temperature is not None and noted_rail_temperature(conditions) is None:
+        remarks.append(f"rail temperature {rail_temperature:g} °C noted, not used")
     if speed is not None and type_ is not None:
         row |= {
             "speed_kmh": KMH * float(speed.speed),

@@ -21,7 +21,7 @@ from turnout.passage.result import Passage, PassageSensor
 from turnout.passage.timetable import ListedTrain, listed_for, listed_trains
 from turnout.readers import read
 from turnout.records import LongRecording, Recording, Unit
-from turnout.stages.common import time_of_label
+from turnout.stages.filed_times import time_of_label
 from turnout.stages.passage import sensors_of, trains_in
 from turnout.stages.passage_context import read_clusters, read_loads
 from turnout.workflow.scan import scan

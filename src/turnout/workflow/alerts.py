@@ -17,6 +17,7 @@ from email.message import EmailMessage
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from turnout.counts import first_texts
 from turnout.errors import TurnoutError
 from turnout.files import read_json, write_text
 from turnout.registry.as_of import chart_in_words, list_day
@@ -168,9 +169,8 @@ def subject(entries: Sequence[Mapping[str, Any]]) -> str:
     str
         One line.
     """
-    named = ", ".join(f"{entry['turnout_id']} {entry['sections']}" for entry in entries[:MAX_NAMED])
-    more = f" and {len(entries) - MAX_NAMED} more" if len(entries) > MAX_NAMED else ""
-    return f"Turnout: {len(entries)} new {'entry' if len(entries) == 1 else 'entries'}: {named}{more}"
+    named = first_texts([f"{entry['turnout_id']} {entry['sections']}" for entry in entries], MAX_NAMED)
+    return f"Turnout: {len(entries)} new {'entry' if len(entries) == 1 else 'entries'}: {named}"
 
 
 def message_text(entries: Sequence[Mapping[str, Any]]) -> str:

@@ -15,6 +15,7 @@ from types import FrameType
 
 from filelock import FileLock, Timeout
 
+from turnout.counts import first_texts
 from turnout.errors import TurnoutError
 from turnout.files import changed_at
 from turnout.installation import shipped_path
@@ -65,16 +66,12 @@ class NightReport:
             f"{self.quarantined} of these with rows in quarantine, "
             + (f"{self.rejected} hammer test{'s' * (self.rejected > 1)} rejected, " if self.rejected else "")
             + f"{self.vanished} vanished"
-            + (f"; nothing could be used yet of {self._unused_text()}" if self.unused else "")
+            + (f"; nothing could be used yet of {first_texts(self.unused, MAX_TURNOUTS_SHOWN)}" if self.unused else "")
             + (f"; worst: {', '.join(f'{t} ({n})' for t, n in self.worst)}" if self.worst else "")
             + (f", see {QUERY_HINT}" if self.worst or self.unused else "")
             + ("" if self.published else "; the registry was not published")
             + (f"; why: {self.reason}" if self.reason else "")
         )
-
-    def _unused_text(self) -> str:
-        more = len(self.unused) - MAX_TURNOUTS_SHOWN
-        return ", ".join(self.unused[:MAX_TURNOUTS_SHOWN]) + (f" and {more} more" if more > 0 else "")
 
 
 def nightly(

@@ -32,11 +32,11 @@ from turnout.stages import mismatch, mismatch_groups, mismatch_inputs
 from turnout.stages.accept_finding import with_entry
 from turnout.stages.accepted_effects import AcceptedEffect
 from turnout.stages.calibrate import calibrate_to_files
-from turnout.stages.common import number, rail_temperature
 from turnout.stages.mismatch_groups import groups, neighbours_of, select_passages, unit_of
 from turnout.stages.mismatch_inputs import MAX_SIMILAR_PASSAGES, Note, VisitInputs, _thin_out, gather_inputs
 from turnout.stages.mismatch_results import Results, diagnose_turnout
 from turnout.stages.mismatch_trains import train_of
+from turnout.stages.recording_notes import noted_number, rail_temperature
 from turnout.stages.track_files import digest_of_model, track_of
 from turnout.workflow.scan import scan, unit_id
 
@@ -64,7 +64,7 @@ def train(row, noted, repository):
     ("said", "means"), [("27.8", 27.8), ("27,8", 27.8), (12, 12.0), ("120 km/h", None), (None, None), ("nan", None)]
 )
 def test_a_number_in_the_notes_is_read_or_is_none(said, means):
-    assert number({"speed": said}, "speed") == means
+    assert noted_number({"speed": said}, "speed") == means
 
 
 def test_a_direction_in_other_letters_is_that_direction_and_one_unheard_is_said(repository):

@@ -41,16 +41,10 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class SecondEvidence:
-    """What decides whether a second effect stands beside the first (``decision.SECOND_RULES``).
-
-    ``findings`` of the first effect, with the scores of the second. ``second`` is the verdict on these, and
-    ``score`` the one that it names, or None.
-    """
+class _EvidenceBesideFirst:
+    """What decides about effects beside the first of ``findings``."""
 
     findings: Findings
-    second: Verdict
-    score: Score | None
 
     @property
     def search(self) -> Search:
@@ -61,6 +55,18 @@ class SecondEvidence:
     def first(self) -> Verdict:
         """Verdict on the first effect."""
         return self.findings.verdicts[0]
+
+
+@dataclass(frozen=True)
+class SecondEvidence(_EvidenceBesideFirst):
+    """What decides whether a second effect stands beside the first (``decision.SECOND_RULES``).
+
+    ``findings`` of the first effect, with the scores of the second. ``second`` is the verdict on these, and
+    ``score`` the one that it names, or None.
+    """
+
+    second: Verdict
+    score: Score | None
 
     @property
     def named(self) -> Score:
@@ -160,20 +166,8 @@ def add_second(findings: Findings, second: Verdict, score: Score | None) -> tupl
 
 
 @dataclass(frozen=True)
-class PairEvidence:
+class PairEvidence(_EvidenceBesideFirst):
     """What decides which of two effects remain (``decision.PAIR_RULES``), computed when a rule asks for it."""
-
-    findings: Findings
-
-    @property
-    def search(self) -> Search:
-        """The search that found the pair."""
-        return self.findings.search
-
-    @property
-    def first(self) -> Verdict:
-        """Verdict on the first effect."""
-        return self.findings.verdicts[0]
 
     @property
     def second(self) -> Verdict:

@@ -19,9 +19,9 @@ from turnout.mismatch.turnout import sensitivity
 from turnout.mismatch.turnout.accepted_effects import NO_EFFECTS, AcceptedEffect, AcceptedEffects, effects_on
 from turnout.mismatch.turnout.campaign import CampaignInput
 from turnout.mismatch.turnout.candidates.catalogue import distant_starts, is_testable, list_candidates
+from turnout.mismatch.turnout.case_data import CaseData, case_data
 from turnout.mismatch.turnout.disturbances import independent_of_trains
 from turnout.mismatch.turnout.hammer_case import HammerCase, hammer_case
-from turnout.mismatch.turnout.observations import CaseData, case_data
 from turnout.mismatch.turnout.observed_passages import with_errors
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.passage_observation import AlignedPassage

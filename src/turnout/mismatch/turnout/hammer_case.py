@@ -19,7 +19,7 @@ from turnout.mismatch.turnout.priors import RECEPTANCE
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
     from turnout.mismatch.turnout.accepted_effects import AcceptedEffects
-    from turnout.mismatch.turnout.observations import CaseData
+    from turnout.mismatch.turnout.case_data import CaseData
     from turnout.mismatch.turnout.prediction import PredictionCache, Predictor
 
 

@@ -16,8 +16,8 @@ from turnout.mismatch.turnout import passage_band, passage_observation, receptan
 from turnout.mismatch.turnout.campaign import CampaignInput, HammerInput, PassageInput
 from turnout.mismatch.turnout.candidates.catalogue import list_candidates
 from turnout.mismatch.turnout.case import TrackCase
+from turnout.mismatch.turnout.case_data import CaseData
 from turnout.mismatch.turnout.chair_scatter import chair_errors, with_chair_errors
-from turnout.mismatch.turnout.observations import CaseData
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.passage_observation import AlignedPassage
 from turnout.mismatch.turnout.prediction import Predictor

@@ -11,7 +11,7 @@ from turnout.mismatch.turnout.candidates.catalogue import recorded_quantities, s
 from turnout.physics.hypothesis import ContactSite, TrainSite
 
 if TYPE_CHECKING:
-    from turnout.mismatch.turnout.observations import CaseData
+    from turnout.mismatch.turnout.case_data import CaseData
     from turnout.physics.requirement import Requirement
 
 

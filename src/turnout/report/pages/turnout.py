@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING
 
-from turnout.counts import count_of
+from turnout.counts import count_of, first_texts
 from turnout.records.modal import value_with_error
 from turnout.report import panels
 from turnout.report.formatting import badge, day, diagnoses_once, number_ranges, with_half_width
@@ -248,23 +248,21 @@ def _hidden_counts(quarantine: Sequence[Mapping[str, Any]]) -> list[tuple[str, i
 
 def _unused_tests(tests: Sequence[Mapping[str, Any]]) -> str:
     """Earlier tests of a section that gave no model, the newest first; they are not in its history."""
-    entries = [f"{day(t['measured_at_utc'])} ({_reason(t)})" for t in tests[:MAX_UNUSED_SHOWN]]
-    more = len(tests) - MAX_UNUSED_SHOWN
-    return ", ".join(entries) + (f" and {more} before" if more > 0 else "")
+    entries = [f"{day(t['measured_at_utc'])} ({_reason(t)})" for t in tests]
+    return first_texts(entries, MAX_UNUSED_SHOWN, others="before")
 
 
 def _off_track(modes: Sequence[Mapping[str, Any]], verdict: str) -> str:
     """Modes with a ``verdict`` of ``modes_off_track``, the newest first, with standard errors where they are known."""
-    chosen = [m for m in modes if m["verdict"] == verdict]
     entries = [
         f"{day(m['measured_at_utc'])} {m['band']} {_with_error(m['frequency_hz'], m['frequency_se_hz'], 1, ' Hz')}, "
         f"damping {_with_error(m['damping_ratio'], m['damping_se'], 4)} "
         f"(median of {count_of(m['n_history'], 'campaign')} before: {m['frequency_track_hz']:.1f} Hz, "
         f"{m['damping_track']:.4f}{_residue_words(m['residue_ratio'])}{_shape_words(m['shape_mac'])})"
-        for m in chosen[:MAX_UNUSED_SHOWN]
+        for m in modes
+        if m["verdict"] == verdict
     ]
-    more = len(chosen) - MAX_UNUSED_SHOWN
-    return "; ".join(entries) + (f" and {more} before" if more > 0 else "")
+    return first_texts(entries, MAX_UNUSED_SHOWN, "; ", "before")
 
 
 def _with_error(value: float, error: float | None, decimals: int, unit: str = "") -> str:

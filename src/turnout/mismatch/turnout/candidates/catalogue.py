@@ -32,7 +32,7 @@ from turnout.simulate.blade import transfer_position
 if TYPE_CHECKING:
     from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.turnout.case import TrackCase
-    from turnout.mismatch.turnout.observations import CaseData
+    from turnout.mismatch.turnout.case_data import CaseData
 
 
 def list_candidates(data: CaseData, families: Collection[str] | None = None) -> tuple[Candidate, ...]:

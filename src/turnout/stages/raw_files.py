@@ -1,30 +1,15 @@
-"""Read a raw file into its registry row, or into quarantine rows with the reasons why it is not used.
-
-Also reads the numbers that people note in recordings.
-"""
+"""Read a raw file into its registry row, or into quarantine rows with the reasons why it is not used."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from datetime import datetime, timedelta
-from math import isfinite
+from collections.abc import Mapping
 from pathlib import Path
-from statistics import median
 from typing import Any, cast
 
 from turnout.errors import ReadError
 from turnout.readers import read
 from turnout.records import LongRecording, RawDescription, ReadResult, Recording
 from turnout.registry.ids import content_id
-
-# Largest time between a recording and its campaign: it may last into the night, and a clock may show local time.
-MAX_CAMPAIGN_OFFSET = timedelta(days=2)
-MISFILED_REMEDY = (
-    "It is used. Move it to its day's campaign if it is another's; a logger's clock that was wrong does no harm"
-)
-# Largest time between the file's name and its content; names in local time differ by less.
-MAX_NAME_OFFSET = timedelta(days=1)
-TIME_REMEDY = "Which is right is not known. Rename it, or export it again with the right time"
 
 
 def require_file(path: str | Path) -> Path:
@@ -112,63 +97,6 @@ def read_or_quarantine(
             quarantine.append(quarantine_row(duplicate, base, unit_kind, "read", None, recording_id))
             return None
     return result if result.recordings or result.long_recordings else None
-
-
-def time_of_label(label: str) -> datetime | None:
-    """Time of a unit from its file name, YYYYMMDDTHHMMSSZ.
-
-    Parameters
-    ----------
-    label : str
-        Label of the unit.
-
-    Returns
-    -------
-    datetime or None
-        Naive UTC; None without a valid time.
-    """
-    stem = label.rsplit("/", 1)[-1].split(".")[0]
-    try:
-        return datetime.strptime(stem, "%Y%m%dT%H%M%SZ")
-    except ValueError:
-        return None
-
-
-def time_contradiction(
-    path: str,
-    recordings: Iterable[Recording | LongRecording],
-    filed_at: datetime | None,
-    tolerance: timedelta,
-    remedy: str,
-    reason: str = "wrong_time",
-) -> ReadError | None:
-    """Error if the first time noted in a file differs from the time that it is filed under.
-
-    Parameters
-    ----------
-    path : str
-        Path of the file.
-    recordings : iterable of Recording or LongRecording
-        Records of the file.
-    filed_at : datetime or None
-        Time that the file is filed under, naive UTC.
-    tolerance : timedelta
-        Largest accepted difference.
-    remedy : str
-        What to do, a sentence without its full stop.
-    reason : str
-        Code of the error; that of a remark where the file is used.
-
-    Returns
-    -------
-    ReadError or None
-        None if both times agree or one is not known; it is returned, not raised.
-    """
-    recorded_at = min((r.started_at for r in recordings if r.started_at is not None), default=None)
-    if filed_at is None or recorded_at is None or abs(recorded_at - filed_at) <= tolerance:
-        return None
-    observation = f"says it was recorded on {recorded_at:%Y-%m-%d %H:%M}, and is filed under {filed_at:%Y-%m-%d %H:%M}"
-    return ReadError(path, "the file", observation, remedy, reason)
 
 
 def quarantine_row(
@@ -268,74 +196,3 @@ def recording_row(
         "expected_n_samples": description.n_samples,
         **more,
     }
-
-
-MIN_RAIL_TEMPERATURE, MAX_RAIL_TEMPERATURE = -50.0, 80.0  # °C: a noted rail temperature outside is a broken thermometer
-
-
-def number(notes: Mapping[str, Any], name: str) -> float | None:
-    """The value that a file notes under a name, as a number.
-
-    Parameters
-    ----------
-    notes : mapping of str to any
-        Notes of a record by name.
-    name : str
-        Name of the note.
-
-    Returns
-    -------
-    float or None
-        None if it is missing, no number or not finite.
-
-    Examples
-    --------
-    >>> number({"speed": "27,8"}, "speed"), number({"speed": "fast"}, "speed")
-    (27.8, None)
-    """
-    try:
-        value = float(str(notes[name]).strip().replace(",", "."))
-    except (KeyError, ValueError):
-        return None
-    return value if isfinite(value) else None
-
-
-def temperature(notes: Mapping[str, Any]) -> float | None:
-    """The rail temperature that a file notes. [°C]
-
-    A broken thermometer notes 85 or 999.
-
-    Parameters
-    ----------
-    notes : mapping of str to any
-        Notes of a record by name.
-
-    Returns
-    -------
-    float or None
-        None without one, or outside the plausible range.
-
-    Examples
-    --------
-    >>> temperature({"rail_temperature": "21,5"}), temperature({"rail_temperature": 999.0})
-    (21.5, None)
-    """
-    value = number(notes, "rail_temperature")
-    return value if value is not None and MIN_RAIL_TEMPERATURE <= value <= MAX_RAIL_TEMPERATURE else None
-
-
-def rail_temperature(recordings: Iterable[Recording]) -> float | None:
-    """Median of the rail temperatures noted in recordings. [°C]
-
-    Parameters
-    ----------
-    recordings : iterable of Recording
-        Recordings of one section and campaign.
-
-    Returns
-    -------
-    float or None
-        None if no recording notes one.
-    """
-    temperatures = [t for r in recordings if (t := temperature(r.conditions)) is not None]
-    return median(temperatures) if temperatures else None

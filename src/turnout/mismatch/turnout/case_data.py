@@ -1,4 +1,4 @@
-"""Recordings of a campaign as observations of a case, with the reasons why some are rejected."""
+"""What a case of a turnout is made of: the observations of a campaign, its site, and what is not used."""
 
 from __future__ import annotations
 
